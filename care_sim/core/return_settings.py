@@ -6,7 +6,7 @@ formulas lie in `care_sim.sensors`, each with its source; `docs/returns.md` show
 
 from dataclasses import dataclass, fields
 
-from care_sim.base.bounds import bounded
+from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.checks import check_known
 from care_sim.base.errors import InvalidInput
 
@@ -25,7 +25,9 @@ _NEEDS = {
 
 @dataclass(frozen=True, kw_only=True)
 class ReturnSettings:
-    """Which pulses come back, and what they tell."""
+    """Which pulses come back, and what they tell. Raises InvalidInput for a value out of its bounds
+    and for a setting that has no meaning without another one.
+    """
 
     lidar_stated_range_m: float = bounded(0.0, 0, 10_000)
     """From here a target of `lidar_stated_reflectance` that faces the LiDAR returns just enough, in
@@ -59,6 +61,10 @@ class ReturnSettings:
     (`care_sim.sensors.crosstalk`).
     """
 
+    def __post_init__(self) -> None:
+        check_fields(self)
+        self.check_returns()
+
     @property
     def shapes_beams(self) -> bool:
         """Whether a ray alone does not tell what a cell returns."""
@@ -77,7 +83,7 @@ class ReturnSettings:
         that there are not.
         """
         check_known("lidar_returns", self.lidar_returns, RETURNS_KEPT)
-        changed = changed_settings(self, RAYS)
+        changed = [n for n, usual in RETURN_SETTINGS.items() if getattr(self, n) != usual]
         for name in changed:
             if (needed := _NEEDS.get(name, name)) not in changed:
                 raise InvalidInput(f"{name} has no meaning without {needed}")

@@ -152,8 +152,8 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     | `lidar_divergence_mrad` | returns | angle between opposite edges of a beam, mrad |
     | `lidar_returns` | returns | which echo of a beam, "strongest", "last" or "both" |
     | `lidar_sweep_s` | returns | how long a sweep takes, whose columns fire one by one, s |
-    | `lidar_crosstalk` | returns | share of the cells with the pulse of another LiDAR |
     | `lidar_compensated` | returns | whether its points are freed of the ego's motion |
+    | `lidar_crosstalk` | returns | share of the cells with the pulse of another LiDAR |
     | `ego_speed_sigma` | odometry | noise on the car's own speed, m/s |
     | `driver` | driver | who brakes, "fixed" or "careful-human" (4) |
     | `brake_mps2` | fixed driver | its deceleration, m/s^2 |

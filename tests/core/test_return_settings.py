@@ -18,12 +18,16 @@ def test_the_switches_are_conditions_of_both_loops_and_off():
         ({"visibility_m": 50.0}, "visibility_m has no meaning without lidar_stated_range_m"),
         ({"rain_mm_h": 5.0}, "rain_mm_h has no meaning without lidar_stated_range_m"),
         ({"lidar_stated_reflectance": 0.8}, "lidar_stated_reflectance has no meaning without"),
+        ({"lidar_returns": "last"}, "lidar_returns has no meaning without lidar_divergence_mrad"),
+        ({"lidar_returns": "first"}, "unknown lidar_returns 'first'; known: both, last, strongest"),
+        ({"lidar_compensated": True}, "lidar_compensated has no meaning without lidar_sweep_s"),
         ({"lidar_stated_range_m": -1.0}, "lidar_stated_range_m must lie in"),
     ],
 )
 def test_a_setting_that_says_nothing_is_refused(given, needed):
-    with pytest.raises(InvalidInput, match=needed):
-        Conditions(**given)
+    for kind in (Conditions, ReturnSettings):
+        with pytest.raises(InvalidInput, match=needed):
+            kind(**given)
 
 
 def test_a_film_takes_these_settings_alone():

@@ -177,3 +177,9 @@ def test_recordings_refuse_what_they_do_not_hold(drive, switch):
     told = f"{name} cannot be changed of the film .*, which was made with {RETURN_SETTINGS[name]}"
     with pytest.raises(InvalidInput, match=told):
         gymnasium.make("CARE-Replay-v0", source=f"argoverse2:{drive.parent}", **SWITCHES[switch])
+
+
+def test_a_sweep_that_outlasts_a_keyframe_is_refused():
+    with pytest.raises(InvalidInput, match=r"lidar_sweep_s must be at most the 0\.1 s between"):
+        gymnasium.make("CARE-Dense-v0", lidar_sweep_s=0.2)
+    gymnasium.make("CARE-Street-v0", lidar_sweep_s=0.2).close()
