@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from care_sim.core.grid import AngularGrid
 
@@ -26,14 +27,17 @@ def bundle(grid: AngularGrid, divergence_mrad: float) -> list[AngularGrid]:
 
 
 def _shifted(grid: AngularGrid, across: float, up: float) -> AngularGrid:
-    """The grid turned to the left by `across`, its rows raised by `up`, radians."""
+    """The grid turned to the left by `across` about its own axes, its rows raised by `up`,
+    radians.
+    """
     # Held within the grid's own bounds: straight up is as far up as a row goes.
     rows = np.clip(grid.elevations + up, -np.pi / 2, np.pi / 2).tolist()
-    heading = float(np.remainder(grid.heading + across + np.pi, 2 * np.pi) - np.pi)
-    return replace(
-        grid,
-        top=rows[0],
-        bottom=rows[-1],
-        heading=heading,
-        listed=tuple(rows) if grid.listed else (),
-    )
+    listed = tuple(rows) if grid.listed else ()
+    raised = replace(grid, top=rows[0], bottom=rows[-1], listed=listed)
+    turned = grid.heading + across
+    if not grid.is_tilted:
+        return replace(raised, heading=float(np.remainder(turned + np.pi, 2 * np.pi) - np.pi))
+    # A tilt is told about the heading: the same tilt is another one about another heading.
+    mount = grid.tilt * Rotation.from_euler("Z", turned)
+    heading, lowered, roll = mount.as_euler("ZYX").tolist()
+    return replace(raised, heading=heading, pitch=-lowered, roll=roll)

@@ -109,6 +109,17 @@ def test_all_together_play_in_every_scenario(name):
         assert len(info["fired"]) == env.unwrapped.rig.budget
 
 
+@pytest.mark.parametrize("sensor", ["os1-64", "m1-forward"])
+def test_all_together_play_with_other_sensors(sensor):
+    with gymnasium.make("CARE-Dense-v0", budget=0.03, sensor=sensor, **ALL) as env:
+        env.reset(seed=0)
+        observation, *_, info = env.step(env.action_space.sample())
+        grid = env.unwrapped.rig.grid
+        told = observation["ranges"].ravel()[info["fired"]] < np.float32(grid.range_m)
+        assert 0 < told.sum() < len(told)
+        assert np.array_equal(info["times_s"] < 0, told)
+
+
 @every_switch
 def test_moving_what_nobody_looks_at_changes_nothing(switch):
     forward = np.zeros((32, 512), bool)

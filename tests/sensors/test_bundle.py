@@ -8,6 +8,7 @@ GRIDS = [
     AngularGrid(),
     AngularGrid(columns=120, field_of_view=2 * np.pi / 3, heading=0.5),
     AngularGrid.of_elevations([0.2, 0.05, -0.1, -0.3], columns=90),
+    AngularGrid(heading=1.0, pitch=-0.3, roll=0.2),
 ]
 
 
