@@ -83,7 +83,7 @@ class Export(PlayOptions):
 
 def _scene_results(config: PlayConfig) -> dict[str, list[JsonRow]]:
     """Play a nuScenes scene: the boxes of every sample, by its token, in the official form."""
-    film = config.source.film(config.scene)
+    film = config.film()
     shots = zip(film.shots, play_through_film(config, film).keyframes, strict=True)
     return {
         shot.token: result_boxes(shot, record.detections, record.velocities)

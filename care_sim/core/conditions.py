@@ -21,6 +21,7 @@ from care_sim.core.driver_settings import DRIVER_SETTINGS, DriverSettings
 from care_sim.core.firing.listing import CELLS, settled
 from care_sim.core.grid import AZIMUTH_MARGIN, ELEVATION_MARGIN
 from care_sim.core.grid_rays import MOST_COLUMNS, MOST_ROWS
+from care_sim.core.return_settings import RETURN_SETTINGS, ReturnSettings
 
 MIN_RETURNS = 3
 """Fired rays that must hit an object. The fewest that span a surface."""
@@ -118,9 +119,9 @@ class LidarFaults:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sensing(CameraFaults, LidarFaults):
-    """How well the car senses: engine, thresholds, and everything that degrades camera, LiDAR and
-    odometry.
+class Sensing(CameraFaults, LidarFaults, ReturnSettings):
+    """How well the car senses: engine, thresholds, which pulses return, and everything that
+    degrades camera, LiDAR and odometry.
     """
 
     ego_speed_sigma: float = bounded(0.0, 0, 10)
@@ -142,6 +143,7 @@ class Sensing(CameraFaults, LidarFaults):
         check_fields(self)
         self._check_latency()
         self._check_rows()
+        self.check_returns()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -185,7 +187,13 @@ class ClosedLoopConditions(DriverSettings, Conditions):
 
 DEFAULTS = {field.name: field.default for field in fields(ClosedLoopConditions)}
 OF_BOTH_LOOPS = tuple(field.name for field in fields(Conditions))
-COLUMNS_WHERE_CHANGED = (*DRIVER_SETTINGS, "firing", "camera_profile", "camera_latency_s")
+COLUMNS_WHERE_CHANGED = (
+    *DRIVER_SETTINGS,
+    *RETURN_SETTINGS,
+    "firing",
+    "camera_profile",
+    "camera_latency_s",
+)
 """Conditions that are a column of results only where they are not the default: so rows, and the
 digests made of them, stay as they were before there was a choice."""
 CAMERA_FAULTS = tuple(field.name for field in fields(CameraFaults))

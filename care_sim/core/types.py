@@ -252,9 +252,30 @@ class Scan:
     """What came back from the fired cells."""
 
     cells: Cells
-    """(n,) the fired ones, ascending."""
+    """(n,) the fired ones, ascending; one that has two returns comes twice, the nearer first."""
     ranges: Floats
     """(n,) in metres, inf without a return."""
+    intensities: Floats | None = None
+    """(n,) calibrated, 0 to 1 and 0 without a return (`care_sim.sensors.signal`); None of a LiDAR
+    whose pulses have no strength.
+    """
+    times: Floats | None = None
+    """(n,) seconds from the keyframe, below 0, and 0 without a return (`care_sim.sensors.sweep`);
+    None where all cells fire at once.
+    """
+    points: Floats | None = None
+    """(n, 3) where the returns lie, the motion of the ego compensated; None where they lie along
+    the directions of their cells.
+    """
+
+    def take(self, kept: Mask) -> "Scan":
+        """Some of the rows, by mask (n,)."""
+        optional = (self.intensities, self.times, self.points)
+        return Scan(
+            self.cells[kept],
+            self.ranges[kept],
+            *(None if column is None else column[kept] for column in optional),
+        )
 
 
 @dataclass(frozen=True)

@@ -75,6 +75,8 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     | key | content | whose |
     |---|---|---|
     | `fired` | the cells of this keyframe (1) | the car's own |
+    | `intensities` | of each, where pulses have strength, 0 without a return (1) | the car's own |
+    | `times_s` | of each, where columns fire one by one, s from the keyframe (1) | the car's own |
     | `braking` | whether the brake is on | the car's own |
     | `time_s` | time of the keyframe, seconds from the start | the car's own |
     | `detected` | whether this keyframe detected the first-sighting actor (2) | scoring alone |
@@ -143,6 +145,15 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     | `lidar_range_sigma` | LiDAR | noise on every range, m |
     | `lidar_dropout` | LiDAR | share of the returns that are lost |
     | `lidar_dead_rows` | LiDAR | elevation rows that return nothing; row 0 is the highest |
+    | `lidar_stated_range_m` | returns | range that its data sheet states, m (5) |
+    | `lidar_stated_reflectance` | returns | reflectance at which it is stated |
+    | `visibility_m` | returns | meteorological visibility in fog, m |
+    | `rain_mm_h` | returns | rain, mm/h |
+    | `lidar_divergence_mrad` | returns | angle between opposite edges of a beam, mrad |
+    | `lidar_returns` | returns | which echo of a beam, "strongest", "last" or "both" |
+    | `lidar_sweep_s` | returns | how long a sweep takes, whose columns fire one by one, s |
+    | `lidar_compensated` | returns | whether its points are freed of the ego's motion |
+    | `lidar_crosstalk` | returns | share of the cells with the pulse of another LiDAR |
     | `ego_speed_sigma` | odometry | noise on the car's own speed, m/s |
     | `driver` | driver | who brakes, "fixed" or "careful-human" (4) |
     | `brake_mps2` | fixed driver | its deceleration, m/s^2 |
@@ -156,7 +167,8 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
 
     (3) `care_sim.core.firing`; B is then the cells of the units that the budget buys. (4)
     `care_sim.driving.braking` and `care_sim.driving.careful_human`. Only `fixed` has the settings
-    that begin with `brake_`.
+    that begin with `brake_`. (5) `care_sim.core.return_settings`; at 0 all that is in reach
+    returns.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012 (Gymnasium's)
@@ -287,7 +299,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
 
     def _info(self, record: Keyframe, terms: dict[str, float]) -> dict[str, Any]:
         own = {
-            "fired": self._fired_as_info(record.fired),
+            **self._scan_info(record.fired),
             "braking": record.braking,
             "time_s": record.time_s,
         }

@@ -15,6 +15,7 @@ from care_sim.core.arrays import Mask
 from care_sim.core.conditions import IDEAL_CAMERA
 from care_sim.core.grid import AngularGrid
 from care_sim.core.pinhole import PinholeCamera
+from care_sim.core.return_settings import changed_settings
 from care_sim.core.sensor_setup import Position
 from care_sim.core.types import Action
 from care_sim.envs.detection import detector_of
@@ -59,6 +60,8 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
     | key | content | whose |
     |---|---|---|
     | `fired` | the cells of this keyframe | the car's own |
+    | `intensities` | of each, where pulses have strength, 0 without a return | the car's own |
+    | `times_s` | of each, where columns fire one by one, s from the keyframe | the car's own |
     | `time_s` | time of the keyframe, seconds from the start | the car's own |
     | `objects` | how many annotated objects are within 50 m | scoring alone |
     | `found` | how many of them were found at this keyframe | scoring alone |
@@ -156,7 +159,7 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         self._masks.append(found)
         scored = found[self._sightings.scored(record.index)]
         self._over = loop.over
-        own = {"fired": self._fired_as_info(fired), "time_s": shot.time_s}
+        own = {**self._scan_info(fired), "time_s": shot.time_s}
         info = self._info_of(own, {"objects": len(scored), "found": int(scored.sum())})
         if self._over:
             info["outcome"] = asdict(self.score.tally())
@@ -189,6 +192,11 @@ class FilmEnv(OpenLoopEnv):
             raise InvalidInput(f"film must be a care_sim.loops.film.Film, got {shown(film)}")
         self.film = film
         super().__init__(film.grid, film.cameras, film.position, film.keyframe_s, **parameters)
+        for name in changed_settings(self.conditions.filmed, film.returns):
+            raise InvalidInput(
+                f"{name} cannot be changed of the film {film.name}, which was made with "
+                f"{getattr(film.returns, name)}"
+            )
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

@@ -39,7 +39,8 @@ class StreetEnv(OpenLoopEnv):
         """
         self._reseed(seed, options)
         entropy = self._draw_entropy(seed)
-        return self._start(street_film(entropy, self._secret, self._setup), entropy)
+        film = street_film(entropy, self._secret, self._setup, self.conditions.filmed)
+        return self._start(film, entropy)
 
 
 class ReplayEnv(FilmEnv):

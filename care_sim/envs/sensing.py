@@ -67,6 +67,11 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
             )
         check_dead_rows(grid, conditions.lidar_dead_rows)
         check_camera_profile(conditions.camera_profile)
+        if conditions.lidar_sweep_s > keyframe_s:
+            raise InvalidInput(
+                f"lidar_sweep_s must be at most the {keyframe_s:g} s between keyframes, got "
+                f"{conditions.lidar_sweep_s:g}"
+            )
         self.conditions = conditions
         self.scoring_info = scoring_info
         self._secret = secret if isinstance(secret, str) else ""
@@ -183,13 +188,16 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         floor = partial(self._floors.at, self._keyframe) if self.conditions.floor else None
         return self.rig.hardware.fire(scores, self.rig.budget, floor, self._last_fired)
 
-    def _fired_as_info(self, fired: Cells) -> Cells | list[int]:
-        """The fired cells as `info` holds them, a copy.
+    def _scan_info(self, fired: Cells) -> dict[str, Any]:
+        """The fired cells and what their returns told, as `info` holds them, in copies.
 
-        Without the floor it is a list, since Gymnasium's vector environments stack arrays of one
+        Without the floor they are lists, since Gymnasium's vector environments stack arrays of one
         length.
         """
-        return fired.copy() if self.conditions.floor else fired.tolist()
+        scan = {"fired": fired, **self.loop.told}
+        if self.conditions.floor:
+            return {name: values.copy() for name, values in scan.items()}
+        return {name: values.tolist() for name, values in scan.items()}
 
 
 def split_conditions(

@@ -23,10 +23,12 @@ from care_sim.loops.needless import NeedlessBraking
 from care_sim.loops.records import Keyframe, Sight
 from care_sim.loops.scan_detection import ScanDetection
 from care_sim.loops.seeds import SensorSeeds
+from care_sim.loops.told import Told, told_by
 from care_sim.loops.truth import TrackObjects
 from care_sim.perception.base import Detector
 from care_sim.perception.tracker import TrackMemory
 from care_sim.sensors.annotated import IdentifiedDetections
+from care_sim.sensors.beams import Beams
 from care_sim.sensors.box_pool import EMPTY_POOL, BoxPool
 from care_sim.sensors.camera import CameraDetector, Picture, faultless_detections, window_on
 from care_sim.sensors.engines import ENGINES
@@ -60,6 +62,8 @@ class ClosedLoop:
     """
     guarded_m: float
     """Width of the strip ahead that the driver guards, metres."""
+    told: Told
+    """What the returns of the last keyframe told besides their ranges."""
 
     def __init__(
         self,
@@ -75,7 +79,12 @@ class ClosedLoop:
         self._labels = labels = world.labels()
         self._reported = np.array(list(labels), np.int64)
         self._engine = ENGINES[conditions.engine](world.bullet, rig.grid)
-        self._lidar = Lidar(rig.grid, self._engine, conditions, seeds.lidar)
+        beams = (
+            Beams(world.bullet, rig.grid, conditions, conditions.engine, world.linear_motion)
+            if conditions.shapes_beams
+            else None
+        )
+        self._lidar = Lidar(rig.grid, self._engine, conditions, seeds.lidar, beams)
         self._camera = CameraDetector(
             list(labels),
             conditions,
@@ -110,6 +119,7 @@ class ClosedLoop:
         # The outcome of a drive alone tells of it, and it asks the truth about every body.
         self._needless = NeedlessBraking(front_m, self.guarded_m / 2, conditions) if plan else None
         self.index = 0
+        self.told = {}
         self._look(np.zeros(rig.grid.shape, np.float32))
 
     def keyframe(self, fired: Cells) -> Keyframe:
@@ -125,6 +135,7 @@ class ClosedLoop:
 
         # The scan, the detector and the tracker see the world as it was when the cells were chosen.
         scan, bodies = self._lidar.fire(fired, sensor)
+        self.told = told_by(fired, scan.cells, intensities=scan.intensities, times_s=scan.times)
         detections, behind, found = self._detection.detect(scan, bodies, self._local_boxes)
         tracks = self._memory.update(detections, sensor)
         self._track_objects.note(tracks, behind)
@@ -267,7 +278,8 @@ class ClosedLoop:
     def _range_image(self, scan: Scan) -> NDArray[np.float32]:
         # 0 means not fired, the reach no return: a scan says inf, which no observation holds.
         ranges = np.zeros(self.rig.grid.size, np.float32)
-        ranges[scan.cells] = np.minimum(scan.ranges, self.rig.grid.range_m)
+        # From behind, so that of two returns of a cell the nearer one is written last.
+        ranges[scan.cells[::-1]] = np.minimum(scan.ranges[::-1], self.rig.grid.range_m)
         return ranges.reshape(self.rig.grid.shape)
 
     def _local_boxes(self, bodies: Integers) -> Floats:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.core.pinhole import PinholeCamera
+from care_sim.core.return_settings import RAYS, ReturnSettings
 from care_sim.core.sensor_setup import LIDAR_POSITION, Position
 from care_sim.core.types import Ego
 from care_sim.sensors.annotated import NO_ANNOTATIONS, Annotations, Cloud, IdentifiedDetections
@@ -47,8 +48,9 @@ class Shot:
 @dataclass(frozen=True, eq=False)
 class Film:
     """A scene: its name, the cameras of its car, the LiDAR's height above the road, seconds between
-    keyframes, the grid whose cells its clouds hold, and the LiDAR's `place` (x, y) on the car, the
-    default one where a recording does not tell it.
+    keyframes, the grid whose cells its clouds hold, the LiDAR's `place` (x, y) on the car, the
+    default one where a recording does not tell it, and the settings of the `returns` that its
+    clouds hold.
 
     `hidden` are the objects that its source annotates at the first keyframe though no sensor tells
     of them there: neither a return nor a pixel. No shot annotates them, so nobody has to find them;
@@ -65,6 +67,7 @@ class Film:
     grid: AngularGrid = field(default_factory=AngularGrid)
     place: tuple[float, float] = LIDAR_POSITION[:2]
     detected: bool = False
+    returns: ReturnSettings = RAYS
 
     @property
     def position(self) -> Position:

@@ -8,7 +8,7 @@ import numpy as np
 
 from care_sim.core.grid import Cells
 from care_sim.loops.film import Shot
-from care_sim.sensors.annotated import Cloud
+from care_sim.sensors.annotated import Cloud, joined
 from care_sim.sensors.recorded_lidar import RecordedLidar
 
 
@@ -29,16 +29,4 @@ def with_sweeps(returned: Cloud, lidar: RecordedLidar, held: Cells, shot: Shot) 
         points = shot.sensor.points_of(sweep.sensor, own.points)
         times = np.full(len(own), sweep.time_s - shot.time_s)
         clouds.append(replace(own, points=points, times=times))
-    return _joined(clouds)
-
-
-def _joined(clouds: list[Cloud]) -> Cloud:
-    cells = np.concatenate([cloud.cells for cloud in clouds])
-    # A cloud comes in the order of its cells.
-    order = np.argsort(cells, kind="stable")
-    return Cloud(
-        cells[order],
-        np.concatenate([cloud.points for cloud in clouds])[order],
-        np.concatenate([cloud.objects for cloud in clouds])[order],
-        np.concatenate([cloud.times for cloud in clouds if cloud.times is not None])[order],
-    )
+    return joined(clouds)

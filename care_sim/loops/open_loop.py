@@ -19,6 +19,7 @@ from care_sim.loops.false_box_pools import pool_of_film
 from care_sim.loops.film import Film, Shot
 from care_sim.loops.held_mask import with_sweeps
 from care_sim.loops.seeds import SensorSeeds
+from care_sim.loops.told import Told, told_by
 from care_sim.loops.truth import TrackObjects
 from care_sim.perception.base import Detector
 from care_sim.perception.tracker import TrackMemory
@@ -54,6 +55,8 @@ class OpenLoop:
     """The number of the coming keyframe, from 0."""
     belief: Belief
     """All that a policy may know when it chooses the cells."""
+    told: Told
+    """What the returns of the last keyframe told besides their ranges."""
 
     def __init__(
         self,
@@ -82,6 +85,7 @@ class OpenLoop:
         self._track_objects = TrackObjects()
         self._held: Cells = np.empty(0, np.int64)
         self.index = 0
+        self.told = {}
         self._look(np.zeros(rig.grid.shape, np.float32))
 
     @property
@@ -101,6 +105,7 @@ class OpenLoop:
 
         # In the order of the closed loop, but for the car: a film moves on by itself.
         cloud = self._lidar.fire(fired, shot.cloud)
+        self.told = told_by(fired, cloud.cells, intensities=cloud.intensities, times_s=cloud.times)
         gathered = with_sweeps(cloud, self._lidar, self._held, shot)
         self._held = fired
         detections, objects = self._detector.detect(gathered, shot.annotations)

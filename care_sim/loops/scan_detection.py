@@ -10,7 +10,7 @@ from care_sim.core.types import Detections, Scan
 from care_sim.perception.base import Detector
 from care_sim.perception.matching import found_objects
 from care_sim.perception.proxy import ReturnsRule
-from care_sim.sensors.annotated import NO_OBJECT, Annotations, Cloud
+from care_sim.sensors.annotated import NO_OBJECT, Annotations, cloud_of
 
 
 class ScanDetection:
@@ -45,11 +45,8 @@ class ScanDetection:
         if self._detector is None:
             detections, detected = self._returns_rule.detections(bodies, boxes_of)
             return detections, detected, detected
-        (returned,) = np.nonzero(np.isfinite(scan.ranges))
-        cells = scan.cells[returned]
-        points = self._grid.directions[cells] * scan.ranges[returned, None]
-        reported = np.isin(bodies[returned], self._reported)
-        cloud = Cloud(cells, points, np.where(reported, bodies[returned], NO_OBJECT))
+        objects = np.where(np.isin(bodies, self._reported), bodies, NO_OBJECT)
+        cloud = cloud_of(scan, objects, self._grid)
         present = Annotations(self._reported, self._classes, boxes_of(self._reported))
         detections, behind = self._detector.detect(cloud, present)
         hit = np.isin(present.objects, behind)

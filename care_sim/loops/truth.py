@@ -11,6 +11,7 @@ import numpy as np
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.belief import Belief
 from care_sim.core.types import Scan, Tracks
+from care_sim.loops.told import Told
 from care_sim.sensors.annotated import NO_OBJECT
 
 
@@ -39,6 +40,7 @@ class Loop(Protocol):
     """What the environments ask of a loop, besides its keyframes."""
 
     belief: Belief
+    told: Told
 
     def true_boxes(self, tracks: Tracks) -> Floats:
         """(n, 7) true boxes, in the sensor frame, of the objects behind forecasts."""

@@ -4,13 +4,14 @@ each box.
 The objects are truth: for the scoring and privileged policies.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from care_sim.core.arrays import Floats, Integers, Mask
-from care_sim.core.grid import Cells
-from care_sim.core.types import ImageDetections
+from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.types import ImageDetections, Scan
 
 NO_OBJECT = -1
 """The object behind a return or a camera box that lies on no annotated object."""
@@ -38,12 +39,14 @@ NO_ANNOTATIONS = Annotations(np.empty(0, np.int64), np.empty(0, np.int64), np.em
 class Cloud:
     """Returns: `cells` (P,) ascending (several returns of a recorded sweep may share one), `points`
     (P, 3) in the sensor frame, `objects` (P,) the annotated object that each lies on or NO_OBJECT,
-    `times` (P,), seconds from the keyframe, where they have their own.
+    `intensities` (P,), 0 to 1, where pulses have strength (`care_sim.sensors.signal`), and `times`
+    (P,), seconds from the keyframe, where they have their own (`care_sim.sensors.sweep`).
     """
 
     cells: Cells
     points: Floats
     objects: Integers
+    intensities: Floats | None = None
     times: Floats | None = None
 
     def __len__(self) -> int:
@@ -51,13 +54,44 @@ class Cloud:
 
     def take(self, kept: Mask) -> "Cloud":
         """Some of the returns, by mask (P,)."""
-        rows = np.flatnonzero(kept)
+        return self.ordered(np.flatnonzero(kept))
+
+    def ordered(self, rows: Integers) -> "Cloud":
+        """The returns in these rows, in this order."""
         return Cloud(
             self.cells[rows],
             self.points.take(rows, axis=0),
             self.objects[rows],
+            None if self.intensities is None else self.intensities[rows],
             None if self.times is None else self.times[rows],
         )
+
+
+def joined(clouds: Sequence[Cloud]) -> Cloud:
+    """The returns of clouds with the same columns, in the order of their cells."""
+    cells = np.concatenate([cloud.cells for cloud in clouds])
+    order = np.argsort(cells, kind="stable")
+    return Cloud(
+        cells[order],
+        np.concatenate([cloud.points for cloud in clouds])[order],
+        np.concatenate([cloud.objects for cloud in clouds])[order],
+        _column([cloud.intensities for cloud in clouds], order),
+        _column([cloud.times for cloud in clouds], order),
+    )
+
+
+def _column(columns: Sequence[Floats | None], order: Integers) -> Floats | None:
+    known = [column for column in columns if column is not None]
+    return np.concatenate(known)[order] if len(known) == len(columns) else None
+
+
+def cloud_of(scan: Scan, objects: Integers, grid: AngularGrid) -> Cloud:
+    """The returns of a scan of a grid; `objects` (n,) are those behind its rows."""
+    returned = np.isfinite(scan.ranges)
+    points = scan.points
+    if points is None:
+        points = grid.directions[scan.cells] * np.where(returned, scan.ranges, 0.0)[:, None]
+    return Cloud(scan.cells, points, objects, scan.intensities, scan.times).take(returned)
 
 
 @dataclass(frozen=True)

@@ -1,49 +1,87 @@
 """A LiDAR that fires chosen cells, and nothing else."""
 
+from dataclasses import replace
+
 import numpy as np
 
-from care_sim.core.arrays import Integers
-from care_sim.core.conditions import LidarFaults
+from care_sim.core.arrays import Integers, Mask
+from care_sim.core.conditions import Sensing
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.types import Scan
+from care_sim.sensors.beams import Beams
+from care_sim.sensors.crosstalk import crosstalk_of
 from care_sim.sensors.engines import RayEngine
 from care_sim.sensors.lidar_faults import CellFaults
 from care_sim.world.bullet import NO_BODY
 
 
 class Lidar:
-    """Casts the fired cells through an engine; `CellFaults` are applied to what comes back."""
+    """Casts the fired cells through an engine, or as `beams` where pulses have more to them than a
+    ray; `CellFaults` and `Crosstalk` are applied to what comes back.
+    """
 
     def __init__(
         self,
         grid: AngularGrid,
         engine: RayEngine,
-        faults: LidarFaults,
+        sensing: Sensing,
         seed: np.random.SeedSequence,
+        beams: Beams | None = None,
     ):
         self.grid = grid
         self._engine = engine
-        self._faults = CellFaults(grid, faults, seed)
+        self._beams = beams
+        self._faults = CellFaults(grid, sensing, seed)
+        self._crosstalk = crosstalk_of(grid, sensing, seed)
 
     def peek(self, sensor: Frame) -> Scan:
-        """What a scan of every cell would return, before noise and dropout, which stay undrawn."""
-        cells = np.arange(self.grid.size)
-        ranges, _ = self._engine.cast(sensor, cells)
-        return Scan(cells, np.where(self._faults.dead, np.inf, ranges))
+        """What a scan of every cell would return, before noise, crosstalk and dropout, which stay
+        undrawn.
+        """
+        scan, _ = self._cast(np.arange(self.grid.size), sensor)
+        if len(scan.cells) > self.grid.size:
+            # Of a cell with two returns the nearer one, which comes first.
+            scan = scan.take(np.diff(scan.cells, prepend=-1) > 0)
+        return _without(scan, self._faults.dead)
 
     def hits(self, body: int, cells: Cells, sensor: Frame) -> int:
-        """How many of `cells` would hit a body, before noise and dropout, which stay undrawn."""
-        _, bodies = self._engine.cast(sensor, cells)
-        return int(np.count_nonzero((bodies == body) & ~self._faults.dead[cells]))
+        """How many of `cells` would hit a body, before noise, crosstalk and dropout, which stay
+        undrawn.
+        """
+        scan, bodies = self._cast(cells, sensor)
+        return int(np.count_nonzero((bodies == body) & ~self._faults.dead[scan.cells]))
 
     def fire(self, cells: Cells, sensor: Frame) -> tuple[Scan, Integers]:
         """Fire `cells` from the frame `sensor`.
 
         Returns the scan, and the body id behind every return for the proxy detector alone.
         """
-        ranges, ids = self._engine.cast(sensor, cells)
+        scan, ids = self._cast(cells, sensor)
         if self._faults.is_noisy:
-            ranges = self._faults.draw_noisy(ranges, cells)
-        lost = self._faults.draw_lost(cells)
-        return Scan(cells, np.where(lost, np.inf, ranges)), np.where(lost, NO_BODY, ids)
+            scan = replace(scan, ranges=self._faults.draw_noisy(scan.ranges, scan.cells))
+        if self._crosstalk is not None:
+            scan, ids = self._crosstalk.over_scan(scan, ids)
+        lost = self._faults.draw_lost(scan.cells)
+        scan = _without(scan, lost)
+        if self._beams is not None:
+            scan = self._beams.compensated(scan, sensor)
+        return scan, np.where(lost, NO_BODY, ids)
+
+    def _cast(self, cells: Cells, sensor: Frame) -> tuple[Scan, Integers]:
+        """What the cells meet, and the bodies behind it."""
+        if self._beams is not None:
+            return self._beams.cast(sensor, cells)
+        ranges, ids = self._engine.cast(sensor, cells)
+        return Scan(cells, ranges), ids
+
+
+def _without(scan: Scan, lost: Mask) -> Scan:
+    """The scan whose `lost` (n,) cells return nothing."""
+    ranges = np.where(lost, np.inf, scan.ranges)
+    strengths, times = scan.intensities, scan.times
+    if strengths is not None:
+        strengths = np.where(lost, 0.0, strengths)
+    if times is not None:
+        times = np.where(np.isfinite(ranges), times, 0.0)
+    return Scan(scan.cells, ranges, strengths, times)

@@ -1,20 +1,24 @@
 """A LiDAR whose full scan was recorded: fired cells return their part of it, after the faults."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from care_sim.core.arrays import Floats
-from care_sim.core.conditions import LidarFaults
+from care_sim.core.conditions import Sensing
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.sensors.annotated import Cloud
+from care_sim.sensors.crosstalk import crosstalk_of
 from care_sim.sensors.lidar_faults import CellFaults
 
 
 class RecordedLidar:
-    """Hands out the returns of fired cells; `CellFaults` are applied to them."""
+    """Hands out the returns of fired cells; `CellFaults` and `Crosstalk` are applied to them."""
 
-    def __init__(self, grid: AngularGrid, faults: LidarFaults, seed: np.random.SeedSequence):
+    def __init__(self, grid: AngularGrid, sensing: Sensing, seed: np.random.SeedSequence):
         self.grid = grid
-        self._faults = CellFaults(grid, faults, seed)
+        self._faults = CellFaults(grid, sensing, seed)
+        self._crosstalk = crosstalk_of(grid, sensing, seed)
 
     def fire(self, cells: Cells, cloud: Cloud) -> Cloud:
         """The returns of `cells` (k,) in the recorded `cloud`, after the faults."""
@@ -22,7 +26,9 @@ class RecordedLidar:
         answering = np.zeros(self.grid.size, dtype=bool)
         answering[cells] = ~self._faults.draw_lost(cells)
         returned = cloud.take(answering[cloud.cells])
-        return self._noisy(returned) if self._faults.is_noisy else returned
+        if self._faults.is_noisy:
+            returned = self._noisy(returned)
+        return self._crosstalk.over_cloud(returned, answering) if self._crosstalk else returned
 
     def peek(self, cloud: Cloud) -> Cloud:
         """What every cell would return, before noise and dropout, which stay undrawn."""
@@ -40,4 +46,4 @@ class RecordedLidar:
         # Noise is along the ray: a point moves with its range, and stays in its cell.
         ranges = np.linalg.norm(cloud.points, axis=1)
         moved = self._faults.draw_noisy(ranges, cloud.cells) / ranges
-        return Cloud(cloud.cells, cloud.points * moved[:, None], cloud.objects)
+        return replace(cloud, points=cloud.points * moved[:, None])

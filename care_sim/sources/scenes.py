@@ -6,6 +6,7 @@ from typing import Any, NamedTuple, Protocol
 from care_sim.base.checks import check_known
 from care_sim.base.digests import data_digest, file_digest
 from care_sim.base.errors import InvalidInput, shortened
+from care_sim.core.return_settings import RAYS, ReturnSettings, changed_settings
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.loops.film import Film
 from care_sim.sensors.setups import DEFAULT_SETUP, sensor_columns, sensor_setup
@@ -43,8 +44,14 @@ class Source(Protocol):
         """The set-up, its name or its file, whose grid its films hold."""
         ...
 
-    def film(self, scene: Scene) -> Film:
-        """The film of a scene. Raises InvalidInput where it cannot be made."""
+    def film(self, scene: Scene, returns: ReturnSettings = RAYS) -> Film:
+        """The film of a scene whose pulses return by `returns`. Raises InvalidInput where it cannot
+        be made.
+        """
+        ...
+
+    def check_returns(self, returns: ReturnSettings) -> None:
+        """Raise InvalidInput where no film can be made with `returns`."""
         ...
 
     def row(self, scene: Scene) -> dict[str, Any]:
@@ -71,9 +78,12 @@ class Streets:
         """One per seed."""
         return [Scene(street_name(seed), seed) for seed in SPLITS[self.split]]
 
-    def film(self, scene: Scene) -> Film:
+    def film(self, scene: Scene, returns: ReturnSettings = RAYS) -> Film:
         """The street of the seed."""
-        return record(make_street(scene.seed), sensor_setup(self.sensor))
+        return record(make_street(scene.seed), sensor_setup(self.sensor), returns)
+
+    def check_returns(self, returns: ReturnSettings) -> None:
+        """A street is filmed with any."""
 
     def row(self, scene: Scene) -> dict[str, Any]:
         """The name of a street says all but the sensor."""
@@ -98,9 +108,18 @@ class Recorded:
         """
         return [Scene(name, 0) for name in self.recordings.scenes()]
 
-    def film(self, scene: Scene) -> Film:
+    def film(self, scene: Scene, returns: ReturnSettings = RAYS) -> Film:
         """The recorded scene of the name."""
+        self.check_returns(returns)
         return self.recordings.film(scene.name)
+
+    def check_returns(self, returns: ReturnSettings) -> None:
+        """The switches of returns need the surfaces that pulses meet, which nobody recorded."""
+        for name in changed_settings(returns, RAYS):
+            raise InvalidInput(
+                f"{name} cannot be changed on recordings: they hold points, and not what returned "
+                "them"
+            )
 
     def row(self, scene: Scene) -> dict[str, Any]:
         """The kind, the hash of the scene's files, that of the camera detections where there are

@@ -2,9 +2,10 @@
 rendered.
 """
 
+from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -12,16 +13,19 @@ from care_sim.base.random_streams import secret_entropy
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.frames import Frame
 from care_sim.core.pinhole import PinholeCamera
+from care_sim.core.return_settings import RAYS, ReturnSettings
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.core.types import CLASSES
 from care_sim.loops.film import Film, Shot
-from care_sim.sensors.annotated import Annotations, Cloud, IdentifiedDetections
+from care_sim.sensors.annotated import Annotations, Cloud, IdentifiedDetections, cloud_of
+from care_sim.sensors.beams import Beams
 from care_sim.sensors.setups import DEFAULT_SETUP, sensor_setup
 from care_sim.sensors.surround import SURROUND_CAMERAS, full_sweep, numbers_of, surround_detections
 from care_sim.streets.draft import STREET_KEYFRAME_S
 from care_sim.streets.street import Street, make_street
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.bullet import BulletWorld
+from care_sim.world.linear_motion import LinearMotion, rates_between
 
 SIGHT_M = 60.0
 """Bodies whose hull is further than this from the sensor are left out, unless its LiDAR reaches
@@ -29,42 +33,47 @@ further: the default one reaches 50 m, and an adult shows its camera the least n
 about 50 m."""
 
 _DEFAULT = sensor_setup(DEFAULT_SETUP)
+_ENGINE = "bullet"
+"""What casts the rays of every film, so that films of all settings differ by these alone."""
 _NO_CLASS = -1
 """The class of a body that the five classes do not hold."""
 
 
-def record(street: Street, setup: SensorSetup = _DEFAULT) -> Film:
-    """The film of a street, taken by a sensor set-up. `Cloud.objects` and `Annotations.objects` are
-    the columns of `street.poses`.
+def record(street: Street, setup: SensorSetup = _DEFAULT, returns: ReturnSettings = RAYS) -> Film:
+    """The film of a street, taken by a sensor set-up whose pulses return by `returns`.
+    `Cloud.objects` and `Annotations.objects` are the columns of `street.poses`.
 
     An object is annotated at a keyframe if a return of the full sweep lies on it or a camera shows
     it. nuScenes is alike: it scores what has at least one LiDAR or radar point. Nobody could have
     seen what is wholly hidden. The street knows those too: who is wholly hidden at its first
-    keyframe is in `Film.hidden`.
+    keyframe is in `Film.hidden`. Whatever returns, the same are annotated: those whom plain rays or
+    a camera meet.
     """
     cameras = setup.equipped(SURROUND_CAMERAS)
     with closing(BulletWorld()) as world:
-        bodies = _StreetBodies(street, world, setup)
+        bodies = _StreetBodies(street, world, setup, returns)
         shots, hidden = zip(*(bodies.shot(k, cameras) for k in range(len(street.ego))), strict=True)
     x, y, z = setup.position
     told = street.name, cameras, z, STREET_KEYFRAME_S
-    return Film(*told, shots, hidden[0], setup.grid, (x, y))
+    return Film(*told, shots, hidden[0], setup.grid, (x, y), returns=returns)
 
 
-def street_film(seed: int, secret: str = "", setup: SensorSetup = _DEFAULT) -> Film:
+def street_film(
+    seed: int, secret: str = "", setup: SensorSetup = _DEFAULT, returns: ReturnSettings = RAYS
+) -> Film:
     """The film of the street of a seed. The last one is kept, for policies that meet the same
     street in turn. With a secret it is another street, whose seed cannot be guessed. Its name
     tells the given seed, and not the layout.
     """
-    return _street_film(seed, secret, setup)
+    return _street_film(seed, secret, setup, returns)
 
 
 @lru_cache(maxsize=1)
-def _street_film(seed: int, secret: str, setup: SensorSetup) -> Film:
+def _street_film(seed: int, secret: str, setup: SensorSetup, returns: ReturnSettings) -> Film:
     if not secret:
-        return record(make_street(seed), setup)
+        return record(make_street(seed), setup, returns)
     street = make_street(secret_entropy("street", (seed,), secret))
-    return record(replace(street, name=f"street-{seed:04d}-secret"), setup)
+    return record(replace(street, name=f"street-{seed:04d}-secret"), setup, returns)
 
 
 class _StreetBodies:
@@ -72,7 +81,10 @@ class _StreetBodies:
     way.
     """
 
-    def __init__(self, street: Street, world: BulletWorld, setup: SensorSetup):
+    def __init__(
+        self, street: Street, world: BulletWorld, setup: SensorSetup, returns: ReturnSettings
+    ):
+        self._returns = returns
         self._street = street
         self._world = world
         self._setup = setup
@@ -104,6 +116,8 @@ class _StreetBodies:
         cloud = Cloud(swept.cells, swept.points, numbers_of(swept.objects, numbers))
         # Seen by the full sweep or by a camera, whatever a policy will fire later.
         shown = np.isin(labelled, np.concatenate([cloud.objects, identified.objects]))
+        if self._returns.shapes_beams:
+            cloud = self._returned(keyframe, sensor, numbers)
         annotations, hidden = (
             Annotations(labelled[kept], self._classes[labelled[kept]], boxes[kept])
             for kept in (shown, ~shown)
@@ -113,6 +127,24 @@ class _StreetBodies:
         return Shot(
             keyframe * STREET_KEYFRAME_S, token, sensor, motion, annotations, identified, cloud
         ), hidden
+
+    def _returned(self, keyframe: int, sensor: Frame, numbers: Mapping[int, int]) -> Cloud:
+        """The returns of every cell; `numbers` are those of the bodies that are reported."""
+        grid = self._setup.grid
+        beams = Beams(self._world, grid, self._returns, _ENGINE, partial(self._motion, keyframe))
+        scan, bodies = beams.cast(sensor, np.arange(grid.size))
+        return cloud_of(beams.compensated(scan, sensor), numbers_of(bodies, numbers), grid)
+
+    def _motion(self, keyframe: int) -> LinearMotion:
+        """How everything moved since the keyframe before; at the first, until the next."""
+        street = self._street
+        last, coming = max(keyframe, 1) - 1, max(keyframe, 1)
+        ways = rates_between(street.poses[last], street.poses[coming], STREET_KEYFRAME_S)
+        own = rates_between(street.ego[[last]], street.ego[[coming]], STREET_KEYFRAME_S)
+        rates = np.zeros((len(self._world.primitives.poses), 3))
+        rates[[*self._bodies.values()]] = ways[[*self._bodies]]
+        x, y, yaw = street.ego[keyframe].tolist()
+        return LinearMotion((x, y, yaw), own[0], rates)
 
     def _set_up(self, keyframe: int, sensor: Frame) -> Integers:
         """Put every body that is near where it is now. Returns their numbers, ascending."""

@@ -45,7 +45,7 @@ class MechanismScene:
     def __init__(self, batch: Sequence[MechanismConfig]):
         started = time.perf_counter()
         config = batch[0]
-        self._film = config.source.film(config.scene)
+        self._film = config.film()
         self._film_hash = film_hash(self._film)
         shown = [shot.annotations for shot in self._film.shots]
         self._sightings = Sightings.of(

@@ -59,6 +59,7 @@ class PlayConfig(Conditions, RunConfig):
                 raise InvalidInput(
                     f"{name} cannot be changed in the open loop: its films are made without it"
                 )
+        self.source.check_returns(self.filmed)
         with gymnasium.make(
             # Any film will do for this check, and a generated street needs no data.
             "care_sim:CARE-Street-v0",
@@ -72,6 +73,10 @@ class PlayConfig(Conditions, RunConfig):
     def of_scene(self, scene: Scene, floor_seed: int) -> Self:
         """The same in another scene with another floor, which need no check."""
         return self.changed(scene=scene, floor_seed=floor_seed)
+
+    def film(self) -> Film:
+        """The film of the scene. Raises InvalidInput where it cannot be made."""
+        return self.source.film(self.scene, self.filmed)
 
     def make_env(self, film: Film) -> FilmEnv:
         """The environment of this play, not yet reset, over the film of its scene."""
@@ -120,8 +125,8 @@ class PlayConfig(Conditions, RunConfig):
 
     @property
     def batch(self) -> Hashable:
-        """All plays of a scene share its film."""
-        return self.source, self.scene
+        """All plays of a scene share its film, unless other pulses return in it."""
+        return self.source, self.scene, self.filmed
 
     @property
     def similarity_keys(self) -> tuple[SimilarityKey, ...]:

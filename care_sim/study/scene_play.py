@@ -68,7 +68,7 @@ class ScenePlayer:
 
     def __init__(self, config: PlayConfig):
         started = time.perf_counter()
-        self._film = config.source.film(config.scene)
+        self._film = config.film()
         self._film_s = time.perf_counter() - started
         self._film_hash = film_hash(self._film)
         self._references: dict[PlayConfig, PlayRecord] = {}

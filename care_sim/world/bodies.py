@@ -8,6 +8,18 @@ the anchors of MMDetection3D's configurations for it.
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from care_sim.world.materials import (
+    CLOTHING,
+    CONCRETE,
+    DARK_PAINT,
+    GLASS,
+    LEAVES,
+    LIGHT_PAINT,
+    RUBBER,
+    SKIN,
+    TIMBER,
+)
+
 Triple = tuple[float, float, float]
 Shape = Literal["box", "cylinder", "sphere"]
 
@@ -16,13 +28,15 @@ Shape = Literal["box", "cylinder", "sphere"]
 class Part:
     """One primitive of a body: full extents `size`, those of the bounding box where it is round.
 
-    `centre` is in the body frame, metres; `colour` is red, green and blue from 0 to 1.
+    `centre` is in the body frame, metres; `colour` is red, green and blue from 0 to 1; `material`
+    is one of `care_sim.world.materials.REFLECTANCES`.
     """
 
     shape: Shape
     size: Triple
     centre: Triple
     colour: Triple
+    material: str = DARK_PAINT
 
 
 @dataclass(frozen=True)
@@ -35,30 +49,41 @@ class BodyKind:
     parts: tuple[Part, ...]
 
 
-TYRE = (0.08, 0.08, 0.09)
-GLASS = (0.25, 0.32, 0.38)
+BLACK = (0.08, 0.08, 0.09)
+TINTED = (0.25, 0.32, 0.38)
+LIGHT_GREY = (0.82, 0.82, 0.8)
 
 
 def _box(
-    x: tuple[float, float], y: tuple[float, float], z: tuple[float, float], colour: Triple
+    x: tuple[float, float],
+    y: tuple[float, float],
+    z: tuple[float, float],
+    colour: Triple,
+    material: str = DARK_PAINT,
 ) -> Part:
     """A box from where to where it reaches along each axis of the body."""
     size = (x[1] - x[0], y[1] - y[0], z[1] - z[0])
     centre = ((x[1] + x[0]) / 2, (y[1] + y[0]) / 2, (z[1] + z[0]) / 2)
-    return Part("box", size, centre, colour)
+    return Part("box", size, centre, colour, material)
 
 
 def _two_box(
-    name: str, label: str, size: Triple, waist: float, cabin: tuple[float, float], colour: Triple
+    name: str,
+    label: str,
+    size: Triple,
+    waist: float,
+    cabin: tuple[float, float],
+    colour: Triple,
+    paint: str = DARK_PAINT,
 ) -> BodyKind:
-    """A passenger vehicle: full-length body up to `waist`, and a cabin above it. `cabin` says from
-    where to where it reaches, as shares of the length from the rear.
+    """A passenger vehicle: full-length body up to `waist`, and a cabin of glass above it. `cabin`
+    says from where to where it reaches, as shares of the length from the rear.
     """
     length, width, height = size
     half, side = length / 2, width / 2
-    body = _box((-half, half), (-side, side), (0.0, waist), colour)
+    body = _box((-half, half), (-side, side), (0.0, waist), colour, paint)
     ends = (-half + cabin[0] * length, -half + cabin[1] * length)
-    glass = _box(ends, (0.1 - side, side - 0.1), (waist, height), GLASS)
+    glass = _box(ends, (0.1 - side, side - 0.1), (waist, height), TINTED, GLASS)
     return BodyKind(name, label, size, (body, glass))
 
 
@@ -68,15 +93,19 @@ def _lorry(
     """Cab in front (length `cab`) and a box behind it, both down to the ground (side skirts)."""
     length, width, height = size
     half, side = length / 2, width / 2
-    box = _box((-half, half - cab - 0.1), (-side, side), (0.0, height), (0.82, 0.82, 0.8))
+    walls = (-half, half - cab - 0.1), (-side, side), (0.0, height)
+    box = _box(*walls, LIGHT_GREY, LIGHT_PAINT)
     front = _box((half - cab, half), (0.1 - side, side - 0.1), (0.0, cab_height), colour)
     return BodyKind(name, label, size, (box, front))
 
 
-def _block(name: str, label: str | None, size: Triple, colour: Triple) -> BodyKind:
+def _block(
+    name: str, label: str | None, size: Triple, colour: Triple, material: str = DARK_PAINT
+) -> BodyKind:
     length, width, height = size
     half, side = length / 2, width / 2
-    return BodyKind(name, label, size, (_box((-half, half), (-side, side), (0.0, height), colour),))
+    whole = _box((-half, half), (-side, side), (0.0, height), colour, material)
+    return BodyKind(name, label, size, (whole,))
 
 
 def _person(name: str, size: Triple, colour: Triple) -> BodyKind:
@@ -93,11 +122,14 @@ def _person(name: str, size: Triple, colour: Triple) -> BodyKind:
             (leg, leg, hip),
             (sign * (length - leg) / 2, -sign * width / 5, hip / 2),
             (0.15, 0.17, 0.3),
+            CLOTHING,
         )
         for sign in (1, -1)
     ]
-    torso = Part("box", (0.6 * length, width, chin - hip), (0.0, 0.0, (hip + chin) / 2), colour)
-    head = Part("sphere", (height - chin,) * 3, (0.0, 0.0, (chin + height) / 2), (0.9, 0.72, 0.6))
+    trunk = (0.6 * length, width, chin - hip)
+    torso = Part("box", trunk, (0.0, 0.0, (hip + chin) / 2), colour, CLOTHING)
+    middle = (0.0, 0.0, (chin + height) / 2)
+    head = Part("sphere", (height - chin,) * 3, middle, (0.9, 0.72, 0.6), SKIN)
     return BodyKind(name, "pedestrian", size, (*legs, torso, head))
 
 
@@ -105,10 +137,11 @@ def _cyclist(name: str, size: Triple) -> BodyKind:
     length, width, height = size
     radius = 0.34
     wheels = [
-        _box((x - radius, x + radius), (-0.03, 0.03), (0.0, 2 * radius), TYRE)
+        _box((x - radius, x + radius), (-0.03, 0.03), (0.0, 2 * radius), BLACK, RUBBER)
         for x in (length / 2 - radius, radius - length / 2)
     ]
-    rider = _box((-0.25, 0.2), (-width / 2, width / 2), (2 * radius, height), (0.1, 0.5, 0.3))
+    place = (-0.25, 0.2), (-width / 2, width / 2), (2 * radius, height)
+    rider = _box(*place, (0.1, 0.5, 0.3), CLOTHING)
     return BodyKind(name, "bicycle", size, (*wheels, rider))
 
 
@@ -117,11 +150,12 @@ def _motorcycle(name: str, size: Triple) -> BodyKind:
     length, width, height = size
     radius = 0.31
     wheels = [
-        _box((x - radius, x + radius), (-0.07, 0.07), (0.0, 2 * radius), TYRE)
+        _box((x - radius, x + radius), (-0.07, 0.07), (0.0, 2 * radius), BLACK, RUBBER)
         for x in (length / 2 - radius, radius - length / 2)
     ]
     engine = _box((-0.75, 0.6), (-0.2, 0.2), (0.3, 0.85), (0.6, 0.1, 0.1))
-    rider = _box((-0.45, 0.15), (-width / 2, width / 2), (0.75, height), (0.15, 0.15, 0.18))
+    place = (-0.45, 0.15), (-width / 2, width / 2), (0.75, height)
+    rider = _box(*place, (0.15, 0.15, 0.18), CLOTHING)
     return BodyKind(name, "bicycle", size, (*wheels, engine, rider))
 
 
@@ -131,9 +165,11 @@ CATALOGUE = {
         _two_box("car", "car", (4.61, 1.95, 1.72), 0.95, (0.18, 0.72), (0.15, 0.3, 0.65)),
         # A panel van, reported as a truck: length and width of a Volkswagen Transporter with long
         # wheelbase, and a raised roof.
-        _two_box("van", "truck", (5.30, 1.90, 2.40), 2.00, (0.0, 0.85), (0.85, 0.85, 0.88)),
+        _two_box(
+            "van", "truck", (5.30, 1.90, 2.40), 2.00, (0.0, 0.85), (0.85, 0.85, 0.88), LIGHT_PAINT
+        ),
         _lorry("truck", "truck", (6.74, 2.46, 2.73), 1.7, 2.3, (0.75, 0.2, 0.15)),
-        _block("bus", "bus", (11.19, 2.94, 3.47), (0.9, 0.75, 0.1)),
+        _block("bus", "bus", (11.19, 2.94, 3.47), (0.9, 0.75, 0.1), LIGHT_PAINT),
         _cyclist("bicycle", (1.68, 0.60, 1.27)),
         # Its mean size in nuScenes as in the anchors of CBGS (Zhu et al. 2019, Det3D). Reported as
         # a bicycle, the one class of two-wheelers; the recordings leave motorcycles out.
@@ -149,22 +185,22 @@ CATALOGUE = {
         # Bodies that the five reported classes do not hold. A box trailer on its legs, side skirts
         # down: length and height of nuScenes, the width that European roads allow (Directive
         # 96/53/EC: 2.55 m).
-        _block("trailer", None, (12.01, 2.55, 3.82), (0.55, 0.57, 0.6)),
+        _block("trailer", None, (12.01, 2.55, 3.82), (0.55, 0.57, 0.6), LIGHT_PAINT),
         # Site hoarding of 2.4 m panels.
-        _block("hoarding", None, (12.0, 0.10, 2.40), (0.2, 0.4, 0.3)),
+        _block("hoarding", None, (12.0, 0.10, 2.40), (0.2, 0.4, 0.3), TIMBER),
         # A piece of garden hedge as high as a person: below the 2 m that German neighbour law
         # allows near a boundary.
-        _block("hedge", None, (6.0, 0.8, 1.8), (0.2, 0.42, 0.2)),
+        _block("hedge", None, (6.0, 0.8, 1.8), (0.2, 0.42, 0.2), LEAVES),
         # A garden wall of two metres, the highest beside a pavement that most German building codes
         # allow without a permit.
-        _block("wall", None, (6.0, 0.24, 2.0), (0.6, 0.5, 0.42)),
+        _block("wall", None, (6.0, 0.24, 2.0), (0.6, 0.5, 0.42), CONCRETE),
         # A skip for rubble, 7 cubic metres (DIN 30720).
         _block("skip", None, (3.6, 1.75, 1.5), (0.8, 0.5, 0.1)),
         # A detached house of two storeys.
-        _block("house", None, (11.0, 9.0, 6.5), (0.72, 0.6, 0.5)),
-        _block("building", None, (18.0, 8.0, 9.0), (0.66, 0.6, 0.54)),
+        _block("house", None, (11.0, 9.0, 6.5), (0.72, 0.6, 0.5), CONCRETE),
+        _block("building", None, (18.0, 8.0, 9.0), (0.66, 0.6, 0.54), CONCRETE),
         # A closed row of eight such buildings.
-        _block("terrace", None, (144.0, 8.0, 9.0), (0.66, 0.6, 0.54)),
+        _block("terrace", None, (144.0, 8.0, 9.0), (0.66, 0.6, 0.54), CONCRETE),
         # The recording car of nuScenes, a Renault Zoe: 4.08 x 1.73 x 1.56 (manufacturer's data
         # sheet).
         BodyKind(
@@ -173,7 +209,7 @@ CATALOGUE = {
             (4.08, 1.73, 1.56),
             (
                 _box((-2.04, 2.04), (-0.865, 0.865), (0.0, 0.85), (0.9, 0.9, 0.92)),
-                _box((-1.7, 0.25), (-0.765, 0.765), (0.85, 1.56), GLASS),
+                _box((-1.7, 0.25), (-0.765, 0.765), (0.85, 1.56), TINTED, GLASS),
             ),
         ),
     )

@@ -80,7 +80,8 @@ class Primitives:
     """Every part of the opaque bodies of one world, and where the bodies are.
 
     `shapes` (k,) places in SHAPES, `halves` (k, 3) half extents and `offsets` (k, 3) centres of the
-    parts in the body frame, metres; `owners` (k,) body ids. `poses` (m, 7), one row per body id: x,
+    parts in the body frame, metres; `owners` (k,) body ids, the parts of a body side by side;
+    `materials` k names. `poses` (m, 7), one row per body id: x,
     y, z in metres and the quaternion x, y, z, w, world frame.
     """
 
@@ -89,11 +90,13 @@ class Primitives:
         self.owners = np.empty(0, np.int64)
         self.halves = np.empty((0, 3))
         self.offsets = np.empty((0, 3))
+        self.materials: list[str] = []
         self.poses = np.empty((0, 7))
 
     def add(self, body: int, parts: Sequence[Part]) -> None:
         """Take in a body, its parts in its own frame; a body that nothing can hit has none."""
         self.poses = np.vstack([self.poses, np.zeros((body + 1 - len(self.poses), 7))])
+        self.materials += [part.material for part in parts]
         if parts:
             self.shapes = np.append(self.shapes, [SHAPES.index(part.shape) for part in parts])
             self.owners = np.append(self.owners, [body] * len(parts))

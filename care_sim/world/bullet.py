@@ -3,7 +3,8 @@
 World frame: x along the road, y left, z up; metres and radians.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 from weakref import finalize
 
@@ -94,6 +95,19 @@ class BulletWorld:
         rows[:, 5], rows[:, 6] = np.sin(half), np.cos(half)
         self.primitives.poses[bodies] = rows
         self._bodies.moved(bodies.tolist())
+
+    @contextmanager
+    def placed(self, poses: Floats) -> Iterator[None]:
+        """While it lasts, the bodies at `poses` (m, 7) in the place of `primitives.poses`."""
+        own = self.primitives.poses
+        changed = np.flatnonzero((poses != own).any(axis=1)).tolist()
+        self.primitives.poses = poses
+        self._bodies.moved(changed)
+        try:
+            yield
+        finally:
+            self.primitives.poses = own
+            self._bodies.moved(changed)
 
     def cast(self, origin: Floats, directions: Floats, reach: float) -> tuple[Floats, Integers]:
         """Cast rays (n, 3 unit vectors, world frame) from `origin`.

@@ -16,6 +16,7 @@ from care_sim.world.bodies import CATALOGUE, BodyKind
 from care_sim.world.body_tables import Footprints
 from care_sim.world.bullet import BulletWorld
 from care_sim.world.crosser import Meeting
+from care_sim.world.linear_motion import LinearMotion, rates_between
 from care_sim.world.route import Route
 from care_sim.world.route_car import RouteCar
 from care_sim.world.speed_plan import SpeedPlan
@@ -98,7 +99,7 @@ class World:
         self.ego_body = self.bullet.add(self.ego_kind, self.ego.pose, transparent=True)
         self._footprints = Footprints()
         self._footprints.add(self.ego_body, self.ego_kind.size, self.ego.pose)
-        self._before = self._footprints.boxes[:, :2].copy()
+        self._before = self._footprints.boxes.copy()
         self.first_sighting = None
         self.speed_plan = None
         self.goal_m = np.inf
@@ -136,7 +137,7 @@ class World:
             kind = CATALOGUE[kind]
         body = self.bullet.add(kind, place, backdrop=backdrop)
         self._footprints.add(body, kind.size, place)
-        self._before = self._footprints.boxes[:, :2].copy()
+        self._before = self._footprints.boxes.copy()
         actor = Actor(name, kind, body, pose_at, reported)
         self.actors.append(actor)
         if not isinstance(pose, tuple):
@@ -180,8 +181,18 @@ class World:
 
     def velocities_of(self, bodies: Integers) -> Floats:
         """(n, 2) velocities of bodies (n,) in the world frame, m/s, over the last world step."""
-        moved = self._footprints.boxes[bodies, :2] - self._before[bodies]
+        moved = self._footprints.boxes[bodies, :2] - self._before[bodies, :2]
         return np.asarray(moved / WORLD_STEP_S)
+
+    def linear_motion(self) -> LinearMotion:
+        """How everything moved over the last world step; before the first, all stands."""
+        places = [0, 1, 6]
+        # Where there is no body is no place, and nothing that moves.
+        rates = rates_between(
+            self._before[:, places], self._footprints.boxes[:, places], WORLD_STEP_S
+        )
+        rates = np.nan_to_num(rates)
+        return LinearMotion(self.ego.pose, rates[self.ego_body], rates)
 
     def advance(self, acceleration: float, duration: float) -> ClosestApproach:
         """Move everything by `duration` seconds, a whole number of world steps. The ego holds
@@ -221,7 +232,7 @@ class World:
         # Poses are read after events, which may change who moves.
         bodies = np.array(self._moving_bodies)
         poses = np.array([self.ego.pose, *(actor.pose_at(self.time) for actor in self._moving)])
-        self._before = self._footprints.boxes[:, :2].copy()
+        self._before = self._footprints.boxes.copy()
         self.bullet.move_all(bodies, poses)
         self._footprints.move_all(bodies, poses)
         return self._approach()

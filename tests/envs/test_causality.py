@@ -11,9 +11,9 @@ from care_sim.sensors.engines.fast import Fast
 BEHIND = (-15.0, 1.0, 0.0)
 
 
-def observe(name, pose, mask):
+def observe(name, pose, mask, **conditions):
     """Observations over four keyframes with a car put at `pose`, out of view."""
-    env = gymnasium.make(name, disable_env_checker=True, floor=False).unwrapped
+    env = gymnasium.make(name, disable_env_checker=True, floor=False, **conditions).unwrapped
     env.reset(seed=0)
     world = env.loop.world
     # Behind the ego stands a hoarding across the road: a drive has cameras all round.

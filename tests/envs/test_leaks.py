@@ -34,8 +34,8 @@ class Broken(Dartout):
         raise RuntimeError("no furniture")
 
 
-def made(name="CARE-Dartout-v0"):
-    return gymnasium.make(name, disable_env_checker=True, budget=0.01)
+def made(name="CARE-Dartout-v0", **conditions):
+    return gymnasium.make(name, disable_env_checker=True, budget=0.01, **conditions)
 
 
 def closed(seed):
@@ -45,8 +45,8 @@ def closed(seed):
     env.close()
 
 
-def dropped(seed, name="CARE-Dartout-v0"):
-    env = made(name)
+def dropped(seed, name="CARE-Dartout-v0", **conditions):
+    env = made(name, **conditions)
     env.reset(seed=seed)
     env.step(np.zeros((32, 512), np.float32))
 
@@ -111,14 +111,22 @@ def test_they_stay_flat_over_a_thousand():
     is_flat(closed_or_dropped, max(CYCLES, 1000), MIXED_GROWTH_MB)
 
 
-@pytest.mark.parametrize("name", CLOSED_LOOP)
-def test_a_dropped_environment_leaves_its_client_at_once_without_the_garbage_collector(name):
+@pytest.mark.parametrize(
+    ("name", "conditions"),
+    [
+        *((name, {}) for name in CLOSED_LOOP),
+        ("CARE-Dartout-v0", {"lidar_sweep_s": 0.1, "lidar_divergence_mrad": 3.0}),
+    ],
+)
+def test_a_dropped_environment_leaves_its_client_at_once_without_the_garbage_collector(
+    name, conditions
+):
     gc.collect()
     before = clients()
     gc.disable()
     try:
         for seed in range(MOST_FREE + 2):
-            dropped(seed, name)
+            dropped(seed, name, **conditions)
         assert clients() <= before + 1
     finally:
         gc.enable()

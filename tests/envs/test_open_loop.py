@@ -225,7 +225,7 @@ def test_a_street_is_drawn_by_the_seed_and_filmed_once(monkeypatch, short_street
     monkeypatch.setattr(
         street_films,
         "record",
-        lambda street, setup: filmed.append(street.name) or record(street, setup),
+        lambda street, *taken: filmed.append(street.name) or record(street, *taken),
     )
     street_films._street_film.cache_clear()
     for budget in (0.1, 0.2):

@@ -4,7 +4,7 @@ length.
 
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from unittest import mock
 
 from care_sim.sources import street_films
@@ -27,25 +27,27 @@ def part_of(street, keyframes):
 
 
 @contextmanager
-def few_and_short():
+def few_and_short(keyframes=KEYFRAMES):
     """While it lasts, a seed gives an environment one of four streets, one of each layout, which
-    ends after 10 keyframes in the place of 40. A whole film takes three seconds, and the checkers
-    of Gymnasium and Stable-Baselines3 ask for ten to thirty of them.
+    ends after 10 keyframes, or as many as are asked for, in the place of 40. A whole film takes
+    three seconds, and the checkers of Gymnasium and Stable-Baselines3 ask for ten to thirty of
+    them.
     """
-    with mock.patch.multiple(street_films, make_street=_short_street, record=_filmed):
+    make_street = partial(_short_street, keyframes=keyframes)
+    with mock.patch.multiple(street_films, make_street=make_street, record=_filmed):
         street_films._street_film.cache_clear()
         yield
     street_films._street_film.cache_clear()
 
 
 @cache
-def _short_street(seed):
+def _short_street(seed, keyframes):
     # Layouts take turns by seed, so this one has the layout of the street that it stands for.
-    return part_of(make_street(seed % len(LAYOUTS)), slice(KEYFRAMES))
+    return part_of(make_street(seed % len(LAYOUTS)), slice(keyframes))
 
 
-def _filmed(street, setup):
-    key = street.name, setup
+def _filmed(street, *taken):
+    key = street.name, len(street.ego), *taken
     if key not in _films:
-        _films[key] = record(street, setup)
+        _films[key] = record(street, *taken)
     return _films[key]

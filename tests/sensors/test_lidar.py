@@ -101,7 +101,13 @@ def test_the_scan_turns_with_the_sensor(grid, street, lidar):
 
 
 def test_a_scan_carries_no_body_ids():
-    assert [field.name for field in fields(Scan)] == ["cells", "ranges"]
+    assert [field.name for field in fields(Scan)] == [
+        "cells",
+        "ranges",
+        "intensities",
+        "times",
+        "points",
+    ]
 
 
 def test_without_noise_the_generator_does_not_matter(grid, street, lidar):

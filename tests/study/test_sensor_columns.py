@@ -121,7 +121,7 @@ def test_an_episode_of_a_page_is_not_played_again_with_another_set_up(file):
 def test_a_film_is_taken_with_the_sensor_of_its_source(file, monkeypatch):
     filmed = []
     monkeypatch.setattr(
-        "care_sim.sources.scenes.record", lambda street, setup: filmed.append(setup)
+        "care_sim.sources.scenes.record", lambda street, setup, returns: filmed.append(setup)
     )
     source_of("streets", sensor=str(file)).film(SCENE)
     assert filmed == [sensor_setup(file)]

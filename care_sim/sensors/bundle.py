@@ -1,0 +1,43 @@
+"""A beam that spreads, as a bundle of rays: one in the middle and six round it."""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from care_sim.core.grid import AngularGrid
+
+_RING = np.sqrt(7 / 12)
+"""How far from the middle the six lie, in half beams. So the seven rays, of equal weight, have the
+variance of a disc that is lit evenly: 1/4 of the half beam squared along each axis."""
+
+
+def bundle(grid: AngularGrid, divergence_mrad: float) -> list[AngularGrid]:
+    """Grids whose cells hold one ray of each cell's beam; the grid itself, then those of the ring.
+
+    `divergence_mrad` is the angle between opposite edges of the beam in milliradians. At rows that
+    look up or down by e, beams are narrower across by cos(e).
+    """
+    radius = _RING * divergence_mrad / 2000
+    angles = np.arange(6) * np.pi / 3
+    around = zip(
+        (radius * np.cos(angles)).tolist(), (radius * np.sin(angles)).tolist(), strict=True
+    )
+    return [grid, *(_shifted(grid, across, up) for across, up in around)]
+
+
+def _shifted(grid: AngularGrid, across: float, up: float) -> AngularGrid:
+    """The grid turned to the left by `across` about its own axes, its rows raised by `up`,
+    radians.
+    """
+    # Held within the grid's own bounds: straight up is as far up as a row goes.
+    rows = np.clip(grid.elevations + up, -np.pi / 2, np.pi / 2).tolist()
+    listed = tuple(rows) if grid.listed else ()
+    raised = replace(grid, top=rows[0], bottom=rows[-1], listed=listed)
+    turned = grid.heading + across
+    if not grid.is_tilted:
+        return replace(raised, heading=float(np.remainder(turned + np.pi, 2 * np.pi) - np.pi))
+    # A tilt is told about the heading: the same tilt is another one about another heading.
+    mount = grid.tilt * Rotation.from_euler("Z", turned)
+    heading, lowered, roll = mount.as_euler("ZYX").tolist()
+    return replace(raised, heading=heading, pitch=-lowered, roll=roll)

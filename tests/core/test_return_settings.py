@@ -1,0 +1,37 @@
+import pytest
+
+from care_sim.base.errors import InvalidInput
+from care_sim.core.conditions import COLUMNS_WHERE_CHANGED, DEFAULTS, Conditions
+from care_sim.core.return_settings import RAYS, RETURN_SETTINGS, ReturnSettings, changed_settings
+
+
+def test_the_switches_are_conditions_of_both_loops_and_off():
+    usual = Conditions()
+    assert usual.filmed == RAYS
+    assert not usual.shapes_beams
+    assert {*RETURN_SETTINGS} <= {*DEFAULTS} & {*COLUMNS_WHERE_CHANGED}
+
+
+@pytest.mark.parametrize(
+    ("given", "needed"),
+    [
+        ({"visibility_m": 50.0}, "visibility_m has no meaning without lidar_stated_range_m"),
+        ({"rain_mm_h": 5.0}, "rain_mm_h has no meaning without lidar_stated_range_m"),
+        ({"lidar_stated_reflectance": 0.8}, "lidar_stated_reflectance has no meaning without"),
+        ({"lidar_returns": "last"}, "lidar_returns has no meaning without lidar_divergence_mrad"),
+        ({"lidar_returns": "first"}, "unknown lidar_returns 'first'; known: both, last, strongest"),
+        ({"lidar_compensated": True}, "lidar_compensated has no meaning without lidar_sweep_s"),
+        ({"lidar_stated_range_m": -1.0}, "lidar_stated_range_m must lie in"),
+    ],
+)
+def test_a_setting_that_says_nothing_is_refused(given, needed):
+    for kind in (Conditions, ReturnSettings):
+        with pytest.raises(InvalidInput, match=needed):
+            kind(**given)
+
+
+def test_a_film_takes_these_settings_alone():
+    given = {"lidar_stated_range_m": 40.0, "visibility_m": 100.0}
+    filmed = Conditions(**given, lidar_dropout=0.2).filmed
+    assert filmed == ReturnSettings(**given)
+    assert changed_settings(filmed, RAYS) == ["lidar_stated_range_m", "visibility_m"]
