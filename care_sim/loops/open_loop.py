@@ -14,6 +14,7 @@ from care_sim.core.grid import Cells
 from care_sim.core.observation_limits import Limits
 from care_sim.core.rig import Rig
 from care_sim.core.types import Detections, Scan, Tracks
+from care_sim.driving.localisation import Localisation
 from care_sim.driving.odometry import Odometry
 from care_sim.loops.false_box_pools import pool_of_film
 from care_sim.loops.film import Film, Shot
@@ -75,6 +76,7 @@ class OpenLoop:
             objects, sensing, film.keyframe_s, seeds.camera, film.cameras, pool
         )
         self._odometry = Odometry(sensing.ego_speed_sigma, seeds.odometry)
+        self._localisation = Localisation(sensing, film.keyframe_s, seeds.odometry)
         self._detector = detector
         self._limits = Limits(rig)
         self._memory = TrackMemory(film.keyframe_s)
@@ -100,9 +102,10 @@ class OpenLoop:
         # In the order of the closed loop, but for the car: a film moves on by itself.
         cloud = self._lidar.fire(fired, shot.cloud)
         detections, objects = self._detector.detect(cloud, shot.annotations)
-        tracks = self._memory.update(detections, shot.sensor)
+        taken_for = self._localisation.taken_for(shot.sensor)
+        tracks = self._memory.update(detections, taken_for)
         self._track_objects.note(tracks, objects)
-        velocities = self._memory.velocities(tracks, shot.sensor)
+        velocities = self._memory.velocities(tracks, taken_for)
 
         # After the last keyframe there is nothing to look at, and no cells are to be chosen.
         self.index += 1
@@ -147,11 +150,13 @@ class OpenLoop:
 
     def _look(self, ranges: NDArray[np.float32]) -> None:
         shot = self.shot
+        self._localisation.advance()
+        taken_for = self._localisation.taken_for(shot.sensor)
         self._arrived = self._camera.detect(
-            shot.seen, shot.sensor.yaw, self._boxes(shot), shot.time_s
+            shot.seen, taken_for.yaw, self._boxes(shot), shot.time_s
         )
         ego = self._odometry.reading(shot.ego)
-        tracks = self._memory.tracks(shot.sensor)
+        tracks = self._memory.tracks(taken_for)
         self.belief = self._limits.belief(ego, self._arrived.detections, tracks, ranges)
 
     def _boxes(self, shot: Shot) -> Floats:

@@ -5,7 +5,7 @@ left out for a reason.
 from dataclasses import fields
 from itertools import combinations, product
 
-from care_sim.core.conditions import DEFAULTS, CameraFaults, LidarFaults
+from care_sim.core.conditions import DEFAULTS, LOCALISATION, CameraFaults, LidarFaults
 from care_sim.envs import IDS
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.envs.scenes import ReplayEnv, StreetEnv
@@ -51,6 +51,7 @@ LEFT_OUT = {
     "camera_detections": "a file of the user's",
     "camera_latency_s": "begins with the next list: one more choice changes every episode of this",
     "camera_profile": "begins with the next list, too",
+    **dict.fromkeys(LOCALISATION, "begin with the next list, too"),
 }
 """Arguments that the list does not hold, and why."""
 
