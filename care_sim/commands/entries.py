@@ -76,7 +76,7 @@ COMMANDS = {
         "vehicle",
         "Vehicle",
         "Play the paper's vehicle study: late evidence in turns, a camera that fails in mid-drive, "
-        "and a pose that is not exact.",
+        "a pose that is not exact; then time the car's software stage by stage.",
     ),
     "faults": CommandEntry(
         "faults",

@@ -29,6 +29,11 @@ _MARGINS = (
     "keyframe that CARE+SBF would give up on the same tracks, by its sigma_pos."
 )
 
+_DRIVEN = (
+    "Of drives: share of the way that was driven, and of the keyframes those with the brake on and "
+    "nothing to brake for, means."
+)
+
 
 def forecast_table(study: VehicleRows) -> Table:
     """Errors of forecasts, what the margins hold of them, and what forgetting releases."""
@@ -48,29 +53,47 @@ def forecast_table(study: VehicleRows) -> Table:
             "held by Eq. 4",
             "held by a full hull",
             *(f"released, {rules.label}" for rules in FORGETTING),
+            "way driven",
+            "braked for nothing",
         ),
         tuple(lines),
-        (_MARGINS,),
+        (_MARGINS, _DRIVEN),
         papers((paper.GUARD,)),
     )
 
 
 def _forecasts(rows: Sequence[Row]) -> TableRow:
-    counts = [row["forecasts"] for row in rows if row["forecasts"]]
-    means, tails = (
-        np.average([row[name] for row in rows if row["forecasts"]], weights=counts)
-        for name in ("forecast_error_m", "forecast_error_p95_m")
-    )
+    forecasts = total(rows, "forecasts")
     keyframes = total(rows, "keyframes")
     return (
-        f"{means:.2f}",
-        f"{tails:.2f}",
-        *(share(total(rows, f"forecasts_in_{name}"), sum(counts)) for name in ("eq4", "margin")),
+        _mean_error(rows, "forecast_error_m"),
+        _mean_error(rows, "forecast_error_p95_m"),
+        *(share(total(rows, f"forecasts_in_{name}"), forecasts) for name in ("eq4", "margin")),
         *(
             f"{total(rows, name) / keyframes:.1f}"
             for name in ("released_cells", "released_cells_vehicle")
         ),
+        *_driven(rows),
     )
+
+
+def _mean_error(rows: Sequence[Row], column: str) -> str:
+    """The mean over episodes, each weighed by its forecasts; empty without any."""
+    seen = [row for row in rows if row["forecasts"]]
+    if not seen:
+        return ""
+    weights = [row["forecasts"] for row in seen]
+    return f"{np.average([row[column] for row in seen], weights=weights):.2f}"
+
+
+def _driven(rows: Sequence[Row]) -> TableRow:
+    """Of drives alone: only they have a way."""
+    drives = [row for row in rows if row.get("progress") is not None]
+    if not drives:
+        return "", ""
+    needless = total(drives, "needless_braking")
+    driven = float(np.mean([row["progress"] for row in drives]))
+    return f"{100 * driven:.0f}%", share(needless, total(drives, "keyframes"))
 
 
 def pose_tables(study: VehicleRows) -> list[Table]:
