@@ -151,7 +151,11 @@ _VEHICLE = Schema(
     | dict.fromkeys(VEHICLE_LISTS, _COUNTS)
     | dict.fromkeys(VEHICLE_COUNTS, COUNT)
     | dict.fromkeys(VEHICLE_MEASURES, as_optional(SUM)),
-    _EPISODES.further | {"progress": as_optional(SUM), "needless_braking": as_optional(COUNT)},
+    {
+        **_EPISODES.further,
+        "progress": as_optional(SUM),
+        "needless_braking": as_optional(COUNT),
+    },
 )
 EPISODES = ResultsFormat(
     unit="episodes",

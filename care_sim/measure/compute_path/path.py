@@ -113,8 +113,8 @@ class _Path:
             number * self._rig.keyframe_s,
         )
         tracks = watch(TRACKER, self._memory.tracks, SENSOR)
-        ranges = self._ranges.reshape(self._rig.grid.shape)
-        belief = watch(BELIEF, self._limits.belief, _EGO, arrived.detections, tracks, ranges)
+        image = self._ranges.reshape(self._rig.grid.shape)
+        belief = watch(BELIEF, self._limits.belief, _EGO, arrived.detections, tracks, image)
         observation = watch(BELIEF, belief.to_observation)
 
         # The choice, as `care_sim.policies.base.Policy` and the environments make it.

@@ -71,7 +71,7 @@ def _figures(spent: Mapping[str, Floats]) -> dict[str, list[float]]:
     }
     return {
         name: np.percentile(ms[np.isfinite(ms)], (50, 99, 100)).tolist()
-        for name, ms in (spent | sums).items()
+        for name, ms in {**spent, **sums}.items()
         if np.isfinite(ms).any()
     }
 
