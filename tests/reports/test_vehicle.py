@@ -25,11 +25,12 @@ SEEDS = range(5)
 
 
 def noted(config):
-    """A made-up law: compensation saves every late turn; the camera's absence costs 4 m; an error
-    of the position makes forecasts 1 m wrong.
+    """A made-up law: compensation saves every late turn of 3 cases in 11; the camera's absence
+    costs 4 m; an error of the position makes forecasts 1 m wrong.
     """
     kept = dict(config.policy_parameters).get("yaw_compensation", True)
-    late_turn = bool(config.camera_latency) and config.scenario == "ncap"
+    test = dict(config.scenario_parameters).get("test")
+    late_turn = bool(config.camera_latency) and test == "CPTAfs-50"
     return {
         "collision": late_turn and not kept,
         "evidence_ages_ms": (100 * config.camera_latency,) * 19 + (1000,),
@@ -96,9 +97,10 @@ def test_compensation_is_paired_by_case_and_seed(study):
     lines = block(compensation_table(study), TURNS.name)
     worlds = len(TURNS.places) * len(SEEDS)
     care, without, *others, metres, points = lines["0.4 s late"]
-    assert (care, without) == (f"16.0, 0/{worlds}", f"16.0, {worlds}/{worlds}")
+    assert (care, without) == (f"16.0, 0/{worlds}", f"16.0, {3 * len(SEEDS)}/{worlds}")
     assert others == [f"16.0, 0/{worlds}"] * 2
-    assert (metres, points) == ("+0.0 [0.0,0.0]", "+100* [100,100]")
+    assert metres == "+0.0 [0.0,0.0]"
+    assert points.startswith("+27* [")
     assert lines["newest picture"][1] == "", "without lag nothing is played twice"
 
 
