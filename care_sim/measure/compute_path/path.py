@@ -17,7 +17,6 @@ from care_sim.core.actions import scores_of
 from care_sim.core.allocation import allocate
 from care_sim.core.arrays import Floats
 from care_sim.core.belief import Observation
-from care_sim.core.boxes import planar_ranges
 from care_sim.core.conditions import Conditions
 from care_sim.core.grid import Cells
 from care_sim.core.observation_limits import Limits
@@ -109,7 +108,7 @@ class _Path:
             self._camera.detect,
             seen,
             SENSOR.yaw,
-            planar_ranges(boxes),
+            boxes,
             number * self._rig.keyframe_s,
         )
         tracks = watch(TRACKER, self._memory.tracks, SENSOR)
