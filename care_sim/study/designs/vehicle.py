@@ -42,7 +42,8 @@ DENSE = Group("dense, 3%", (Place("dense", 0.03),))
 DARTOUT = Group("dartout, 10%", (Place("dartout", 0.10),))
 
 # The ages of the camera's evidence are those of the paper: 0.11 to 0.14 s on average, 0.42 s at the
-# 95th percentile. In whole keyframes they are 0.1 and 0.4 s; `camera_latency_s` could tell finer ones.
+# 95th percentile. In whole keyframes they are 0.1 and 0.4 s; `camera_latency_s` would take them in
+# seconds.
 EVIDENCE_LEVELS = (
     Variant("newest picture"),
     Variant("0.1 s late", {"camera_latency": 1}),
