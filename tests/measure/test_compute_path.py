@@ -28,7 +28,8 @@ def test_every_stage_of_every_keyframe_is_timed_and_the_detector_at_some():
     spent = compute_path(DEFAULT_SETUP, "care", 0.1, frames=5, seed=0, detect_every=5)
     assert set(spent) == {*STAGES, SCAN}
     assert all(len(ms) == 5 for ms in spent.values())
-    # The first keyframe that counts is the fifth: warm-up comes before it.
+    # The first keyframe that counts has it, however many come.
+    assert np.isfinite(compute_path(DEFAULT_SETUP, "care", 0.1, 1, 0, 10)[DETECTOR]).all()
     assert np.isfinite(spent[DETECTOR]).tolist() == [True, False, False, False, False]
     assert all((spent[stage] > 0).all() for stage in (*STAGES, SCAN) if stage != DETECTOR)
     assert not np.isfinite(compute_path(DEFAULT_SETUP, "care", 0.1, 1, 0)[DETECTOR]).any()

@@ -73,10 +73,15 @@ def compute_path(
         path = _Path(sensing(env).rig, make_policy(policy, env), seed)
         with closing(path.caster.world):
             spent = [
-                path.keyframe(number, bool(detect_every) and number % detect_every == 0)
+                path.keyframe(number, bool(detect_every) and _is_due(number, detect_every))
                 for number in range(_WARM_UP + frames)
             ][_WARM_UP:]
     return {stage: 1e3 * np.array([each[stage] for each in spent]) for stage in spent[0]}
+
+
+def _is_due(number: int, detect_every: int) -> bool:
+    """Whether the detector runs: all through the warm-up, then from the first that counts on."""
+    return number < _WARM_UP or (number - _WARM_UP) % detect_every == 0
 
 
 class _Path:
