@@ -35,6 +35,7 @@ _STUDIES = (
     "order",
     "firing",
     "faults",
+    "vehicle",
     "crowding",
     "ncap",
     "r157",

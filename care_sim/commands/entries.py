@@ -72,6 +72,12 @@ COMMANDS = {
         "Play the dense street under every hardware, or with --source the first-sighting protocol, "
         "and tell what a policy that knows its hardware has over one whose demand is projected.",
     ),
+    "vehicle": CommandEntry(
+        "vehicle",
+        "Vehicle",
+        "Play the paper's vehicle study: late evidence in turns, a camera that fails in mid-drive, "
+        "a pose that is not exact; then time the car's software stage by stage.",
+    ),
     "faults": CommandEntry(
         "faults",
         "Faults",

@@ -38,6 +38,9 @@ LONGEST_LATENCY_S = 60.0
 LONGEST_BLACKOUT_S = 3600.0
 """Latest begin and longest time of a blackout: far beyond the end of any episode or scene."""
 
+LONGEST_CORRELATION_S = 1e6
+"""Longer than any drive: over a minute such an error walks by 1% of its spread."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class CameraFaults:
@@ -128,6 +131,14 @@ class Sensing(CameraFaults, LidarFaults, ReturnSettings):
     """Gaussian noise on the car's own speed as policy and controller read it, m/s; it never changes
     the sign. The acceleration beside it is exact.
     """
+    ego_position_sigma_m: float = bounded(0.0, 0, 50)
+    """Spread of the error in x and in y of where the car takes itself to be, metres. Tracks are
+    kept in that frame, and so is the way that the car is to go."""
+    ego_yaw_sigma_deg: float = bounded(0.0, 0, 180)
+    """Spread of the error in the heading of that pose, degrees."""
+    ego_pose_correlation_s: float = bounded(0.0, 0, LONGEST_CORRELATION_S)
+    """How long these errors last, seconds (`care_sim.driving.localisation`): 0 draws them anew at
+    every keyframe, a time far beyond the episode lets them walk at random."""
     engine: str = "fast"
     """What casts the rays and draws the pictures of the closed loop: `fast`, which is compiled, or
     `bullet`, PyBullet's own and the reference.
@@ -187,9 +198,11 @@ class ClosedLoopConditions(DriverSettings, Conditions):
 
 DEFAULTS = {field.name: field.default for field in fields(ClosedLoopConditions)}
 OF_BOTH_LOOPS = tuple(field.name for field in fields(Conditions))
+LOCALISATION = ("ego_position_sigma_m", "ego_yaw_sigma_deg", "ego_pose_correlation_s")
 COLUMNS_WHERE_CHANGED = (
     *DRIVER_SETTINGS,
     *RETURN_SETTINGS,
+    *LOCALISATION,
     "firing",
     "camera_profile",
     "camera_latency_s",

@@ -15,6 +15,9 @@ from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
 from care_sim.core.types import Ego, Tracks
 
+VEHICLE_SIGMA_M = 0.4
+"""sigma_pos on the paper's vehicle (Remark 3)."""
+
 
 @dataclass(frozen=True)
 class ForgettingRules:
@@ -86,7 +89,9 @@ class Forgetting:
         # needs (Eq. 4), and never beyond that of a full hull.
         margin = self._rig.azimuth_margin
         decayed = np.ceil(margin - self.rules.decay_per_keyframe * streaks)
-        shrunk = np.clip(np.maximum(decayed, self._uncertainty(tracks.ranges)), 0, margin)
+        width = self._rig.grid.column_width
+        needed = uncertainty_columns(self.rules.position_sigma_m, tracks.ranges, width)
+        shrunk = np.clip(np.maximum(decayed, needed), 0, margin)
         return np.where(low, shrunk, margin).astype(np.int64), low
 
     def _low_criticality(self, tracks: Tracks, ego: Ego) -> Mask:
@@ -101,11 +106,15 @@ class Forgetting:
         harmless: Mask = (receding | static) & (tracks.hits > 1)
         return harmless & (ranges > self.rules.guard_distance(ego.speed))
 
-    def _uncertainty(self, ranges: Floats) -> Floats:
-        """m_unc of Eq. 4, in columns."""
-        # The angle of a short arc is its length over its range, which must not be 0.
-        angle = self.rules.position_sigma_m / np.maximum(ranges, 1e-9)
-        return np.ceil(angle / self._rig.grid.column_width)
+
+def uncertainty_columns(position_sigma_m: float, ranges: Floats, column_width: float) -> Floats:
+    """m_unc of Eq. 4: (n,) whole columns of `column_width` radians for tracks at `ranges` (n,)
+    metres whose positions are uncertain by `position_sigma_m`.
+    """
+    # The angle of a short arc is its length over its range, which must not be 0.
+    angle = position_sigma_m / np.maximum(ranges, 1e-9)
+    columns: Floats = np.ceil(angle / column_width)
+    return columns
 
 
 def released_cells(hulls: Sequence[Cells], exploitation: Sequence[Cells], size: int) -> int:

@@ -6,7 +6,7 @@ body id of the simulator: truth stays in the world and in the scoring.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -114,6 +114,10 @@ class ImageDetections:
         return ImageDetections(
             self.classes, self.confidences, self.boxes, self.cameras, ages, yaw_changes
         )
+
+    def unturned(self) -> "ImageDetections":
+        """The same detections as if the car had not turned since their pictures."""
+        return replace(self, yaw_changes=np.zeros(len(self)))
 
     def rows(self) -> Floats:
         """(n, 9) table in the order of `COLUMNS`, read-only."""

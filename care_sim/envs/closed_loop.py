@@ -29,6 +29,8 @@ from care_sim.sensors.setups import DEFAULT_SETUP, Sensor, sensor_setup
 from care_sim.viewer.pictures.keyframe import draw_keyframe
 from care_sim.world.world import WORLD_STEP_S, whole_steps
 
+KEYFRAME_S = 0.1
+"""Between two decisions, unless another time is given: a turn of a spinning LiDAR."""
 LONGEST_KEYFRAME_S = 1.0
 """In a longer keyframe a car at 30 km/h drives more than 8 m, past what it brakes for."""
 
@@ -155,6 +157,8 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     | `lidar_compensated` | returns | whether its points are freed of the ego's motion |
     | `lidar_crosstalk` | returns | share of the cells with the pulse of another LiDAR |
     | `ego_speed_sigma` | odometry | noise on the car's own speed, m/s |
+    | `ego_position_sigma_m`, `ego_yaw_sigma_deg` | localisation | errors of its pose, m, degrees |
+    | `ego_pose_correlation_s` | localisation | how long these errors last, s |
     | `driver` | driver | who brakes, "fixed" or "careful-human" (4) |
     | `brake_mps2` | fixed driver | its deceleration, m/s^2 |
     | `brake_reaction_s` | fixed driver | from decision to full braking, s |
@@ -183,7 +187,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         sensor: Sensor = DEFAULT_SETUP,
         detector: str = PROXY,
         detector_parameters: Mapping[str, object] | None = None,
-        keyframe_s: float = 0.1,
+        keyframe_s: float = KEYFRAME_S,
         reward_weights: Mapping[str, float] | None = None,
         render_mode: str | None = None,
         secret: str | bool = False,

@@ -18,6 +18,7 @@ from care_sim.core.types import Command, Scan, Tracks
 from care_sim.driving.corridor import along_route
 from care_sim.driving.cruising import Cruising, CruisingRules
 from care_sim.driving.drivers import make_driver
+from care_sim.driving.localisation import Localisation
 from care_sim.driving.odometry import Odometry
 from care_sim.loops.needless import NeedlessBraking
 from care_sim.loops.records import Keyframe, Sight
@@ -95,6 +96,7 @@ class ClosedLoop:
             step_s=WORLD_STEP_S,
         )
         self._odometry = Odometry(conditions.ego_speed_sigma, seeds.odometry)
+        self._localisation = Localisation(conditions, rig.keyframe_s, seeds.odometry)
         self._detection = ScanDetection(rig.grid, labels, conditions.min_returns, detector)
         self._min_returns = conditions.min_returns
         self._limits = Limits(rig)
@@ -137,10 +139,10 @@ class ClosedLoop:
         scan, bodies = self._lidar.fire(fired, sensor)
         self.told = told_by(fired, scan.cells, intensities=scan.intensities, times_s=scan.times)
         detections, behind, found = self._detection.detect(scan, bodies, self._local_boxes)
-        tracks = self._memory.update(detections, sensor)
+        tracks = self._memory.update(detections, self._localisation.taken_for(sensor))
         self._track_objects.note(tracks, behind)
         middle = self._middle()
-        command = self._command(middle)
+        command = self._command(self._localisation.taken_for(middle))
         needless = self._needless is not None and self._needless.judge(
             world, middle, command.braking
         )
@@ -239,12 +241,14 @@ class ClosedLoop:
         boxes = sensor.boxes_to_local(self.world.boxes_of(self._reported))
         taken = [self._photograph(camera, sensor, boxes) for camera in self._camera.mounted]
         seen = faultless_detections(taken, self._labels)
-        self._camera.take(seen, sensor.yaw, boxes, self.world.time)
+        yaw = self._localisation.taken_for(sensor).yaw
+        self._camera.take(seen, yaw, boxes, self.world.time)
         rest = self.world.advance(acceleration, self.rig.keyframe_s - after_s)
         return ClosestApproach.over([before, rest])
 
     def _look(self, ranges: NDArray[np.float32]) -> None:
         """Take the cameras' pictures and form the belief on which the next cells are chosen."""
+        self._localisation.advance()
         self.sensor = sensor = Frame.mounted(self.world.ego.pose, self.rig.sensor_position)
         boxes = self._local_boxes(self._reported)
         self.pictures = tuple(
@@ -262,11 +266,12 @@ class ClosedLoop:
 
         # The boxes that arrive, late and with errors, and the forecasts: all that is known when the
         # next cells are chosen.
+        taken_for = self._localisation.taken_for(sensor)
         if not self._camera.timing.after_s:
-            self._camera.take(self.seen, sensor.yaw, boxes, self.world.time)
-        arrived = self._camera.newest(sensor.yaw)
+            self._camera.take(self.seen, taken_for.yaw, boxes, self.world.time)
+        arrived = self._camera.newest(taken_for.yaw)
         ego = self._odometry.reading(self.world.ego_motion)
-        tracks = self._memory.tracks(sensor)
+        tracks = self._memory.tracks(taken_for)
         self.belief = self._limits.belief(ego, arrived.detections, tracks, ranges)
         # A rendered box lies in the picture, so the limits leave out none but the last, too many.
         self.detected_bodies = arrived.objects[: len(self.belief.detections)]

@@ -14,6 +14,7 @@ from care_sim.core.grid import Cells
 from care_sim.core.observation_limits import Limits
 from care_sim.core.rig import Rig
 from care_sim.core.types import Detections, Scan, Tracks
+from care_sim.driving.localisation import Localisation
 from care_sim.driving.odometry import Odometry
 from care_sim.loops.false_box_pools import pool_of_film
 from care_sim.loops.film import Film, Shot
@@ -79,6 +80,7 @@ class OpenLoop:
             objects, sensing, film.keyframe_s, seeds.camera, film.cameras, pool
         )
         self._odometry = Odometry(sensing.ego_speed_sigma, seeds.odometry)
+        self._localisation = Localisation(sensing, film.keyframe_s, seeds.odometry)
         self._detector = detector
         self._limits = Limits(rig)
         self._memory = TrackMemory(film.keyframe_s)
@@ -109,9 +111,10 @@ class OpenLoop:
         gathered = with_sweeps(cloud, self._lidar, self._held, shot)
         self._held = fired
         detections, objects = self._detector.detect(gathered, shot.annotations)
-        tracks = self._memory.update(detections, shot.sensor)
+        taken_for = self._localisation.taken_for(shot.sensor)
+        tracks = self._memory.update(detections, taken_for)
         self._track_objects.note(tracks, objects)
-        velocities = self._memory.velocities(tracks, shot.sensor)
+        velocities = self._memory.velocities(tracks, taken_for)
 
         # After the last keyframe there is nothing to look at, and no cells are to be chosen.
         self.index += 1
@@ -156,11 +159,13 @@ class OpenLoop:
 
     def _look(self, ranges: NDArray[np.float32]) -> None:
         shot = self.shot
+        self._localisation.advance()
+        taken_for = self._localisation.taken_for(shot.sensor)
         self._arrived = self._camera.detect(
-            shot.seen, shot.sensor.yaw, self._boxes(shot), shot.time_s
+            shot.seen, taken_for.yaw, self._boxes(shot), shot.time_s
         )
         ego = self._odometry.reading(shot.ego)
-        tracks = self._memory.tracks(shot.sensor)
+        tracks = self._memory.tracks(taken_for)
         self.belief = self._limits.belief(ego, self._arrived.detections, tracks, ranges)
 
     def _boxes(self, shot: Shot) -> Floats:

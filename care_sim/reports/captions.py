@@ -110,6 +110,16 @@ _EPISODES_COVERAGE = (
 )
 EPISODES_CAPTION = (*_EPISODES_READING, *_OF_RATES, *_EPISODES_COVERAGE)
 VALIDATION_CAPTION = (*_EPISODES_READING, *_OF_COLLISIONS, *_EPISODES_COVERAGE)
+VEHICLE_CAPTION = (
+    Remark(
+        "A cell of policies: median first detection in metres, and how many of the episodes ended "
+        "with a collision. Worlds, that is cases with their seeds, are what differences are paired "
+        "by here."
+    ),
+    *_EPISODES_READING,
+    *_statistics(f"{GATE_COLLISION_POINTS:.0f} points of collisions avoided"),
+    *_EPISODES_COVERAGE,
+)
 # The classes are in care_sim.evaluation.collision_outcomes, the mark in care_sim.scenarios.r157.
 R157_CAPTION = (
     Remark(

@@ -3,6 +3,9 @@
 from collections.abc import Iterable
 from typing import Protocol
 
+import numpy as np
+
+from care_sim.core.arrays import Integers
 from care_sim.evaluation.bootstrap import Interval
 from care_sim.evaluation.censoring import Quartiles
 from care_sim.reports.contrasts import Contrast
@@ -89,6 +92,14 @@ def quarters(values: Quartiles) -> str:
 def spread(values: Quartiles) -> str:
     """A median detection distance with its quartiles."""
     return f"{median(values)} {quarters(values)}".rstrip()
+
+
+def spread_of_counts(counts: Integers) -> str:
+    """Median, quartiles and number of counts; empty without any."""
+    if not len(counts):
+        return ""
+    low, middle, high = np.quantile(counts, (0.25, 0.5, 0.75))
+    return f"{middle:.0f} [{low:.0f}, {high:.0f}] ({len(counts)})"
 
 
 def mean(difference: ShownDifference | None) -> str:

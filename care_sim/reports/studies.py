@@ -14,6 +14,7 @@ from care_sim.reports.captions import (
     PROTOCOL_CAPTION,
     R157_CAPTION,
     VALIDATION_CAPTION,
+    VEHICLE_CAPTION,
     Remark,
 )
 from care_sim.reports.figures.budget import BUDGET_FIGURES, sweep_figures
@@ -30,6 +31,7 @@ from care_sim.reports.figures.order import (
 from care_sim.reports.figures.protocol import PROTOCOL_FIGURES, protocol_figures
 from care_sim.reports.figures.r157 import R157_FIGURE, r157_figures
 from care_sim.reports.figures.validate import VALIDATION_FIGURE, validation_figures
+from care_sim.reports.figures.vehicle import VEHICLE_FIGURE, vehicle_figures
 from care_sim.reports.mechanism.tables import mechanism_closing, mechanism_tables
 from care_sim.reports.protocol import ablations as open_ablations
 from care_sim.reports.protocol import firing as open_firing
@@ -47,6 +49,7 @@ from care_sim.reports.tables.paper_statements import statements
 from care_sim.reports.tables.r157 import r157_tables
 from care_sim.reports.tables.sweep import sweep_tables
 from care_sim.reports.tables.validate import validation_closing, validation_tables
+from care_sim.reports.vehicle.tables import vehicle_tables
 from care_sim.study.designs.crowding import VEHICLES_COLUMN
 from care_sim.study.designs.ncap import (
     REPORTED_COLUMN,
@@ -56,7 +59,7 @@ from care_sim.study.designs.ncap import (
 )
 from care_sim.study.designs.paper import NO_COLLISION
 from care_sim.study.designs.r157 import CASE_COLUMNS
-from care_sim.study.results_formats import EPISODES, MECHANISM, PLAYS, ResultsFormat
+from care_sim.study.results_formats import EPISODES, MECHANISM, PLAYS, VEHICLE, ResultsFormat
 from care_sim.study.rows.parquet import read_notes
 from care_sim.study.rows.schema import COUNT, FLAG, SUM, TEXT, Column, Schema, as_optional
 from care_sim.study.run_config import Row
@@ -179,6 +182,16 @@ _ALL = (
         fault_figures,
         _sweep_closing,
         FAULT_FIGURES,
+    ),
+    Study(
+        "vehicle",
+        "The vehicle study",
+        vehicle_tables,
+        vehicle_figures,
+        _sweep_closing,
+        (VEHICLE_FIGURE,),
+        VEHICLE_CAPTION,
+        VEHICLE,
     ),
     Study(
         "ncap",

@@ -14,6 +14,7 @@ from care_sim.base.checks import check_known, check_seed
 from care_sim.core.conditions import COLUMNS_WHERE_CHANGED, DEFAULTS, ClosedLoopConditions
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.envs import CLOSED_LOOP
+from care_sim.envs.closed_loop import KEYFRAME_S
 from care_sim.perception.detectors import PROXY
 from care_sim.scenarios import make_scenario
 from care_sim.sensors.setups import DEFAULT_SETUP, sensor_columns
@@ -51,6 +52,7 @@ class EpisodeConfig(ClosedLoopConditions, RunConfig):
     policy: str
     budget: float = 0.1
     seed: int = 0
+    keyframe_s: float = KEYFRAME_S
     # Made, since a field with a name for its default takes nothing but names.
     sensor: str | SensorSetup = field(default_factory=lambda: DEFAULT_SETUP)
     detector: str = PROXY
@@ -82,6 +84,7 @@ class EpisodeConfig(ClosedLoopConditions, RunConfig):
             f"care_sim:{ENVIRONMENT_IDS[self.scenario]}",
             disable_env_checker=True,
             budget=self.budget,
+            keyframe_s=self.keyframe_s,
             sensor=self.sensor,
             detector=self.detector,
             detector_parameters=dict(self.detector_parameters),
@@ -91,13 +94,14 @@ class EpisodeConfig(ClosedLoopConditions, RunConfig):
 
     def row(self) -> Row:
         """All parameters, flat; those of detector, scenario and policy as `detector.NAME`,
-        `scenario.NAME`, `policy.NAME`. `sensor`, `detector` and `COLUMNS_WHERE_CHANGED` are columns
-        only where they are not the default.
+        `scenario.NAME`, `policy.NAME`. `sensor`, `detector`, `keyframe_s` and
+        `COLUMNS_WHERE_CHANGED` are columns only where they are not the default.
         """
         plain = {n: getattr(self, n) for n in PLAIN_FIELDS if n not in COLUMNS_WHERE_CHANGED}
         # Without the columns the rows, and the digests made of them, stay as they were before there
         # was a choice.
-        chosen = {"detector": PROXY} | {name: DEFAULTS[name] for name in COLUMNS_WHERE_CHANGED}
+        own = {"detector": PROXY, "keyframe_s": KEYFRAME_S}
+        chosen = own | {name: DEFAULTS[name] for name in COLUMNS_WHERE_CHANGED}
         other = {n: getattr(self, n) for n, usual in chosen.items() if getattr(self, n) != usual}
         return (
             plain

@@ -1,5 +1,5 @@
-"""The kinds of results: episodes of the closed loop, plays of the open loop, and plays of it whose
-rays are accounted for; how each is played and how it is kept.
+"""The kinds of results: episodes of the closed loop, those of the vehicle study, plays of the open
+loop, and plays of it whose rays are accounted for; how each is played and how it is kept.
 """
 
 from collections.abc import Callable, Sequence
@@ -39,6 +39,12 @@ from care_sim.study.rows.schema import (
 from care_sim.study.run_config import Row
 from care_sim.study.runner import PlayBatch
 from care_sim.study.scene_play import SUMS, play_scene
+from care_sim.study.vehicle.play import (
+    VEHICLE_COUNTS,
+    VEHICLE_LISTS,
+    VEHICLE_MEASURES,
+    play_vehicle,
+)
 
 
 @dataclass(frozen=True)
@@ -79,7 +85,7 @@ they do not know was at its default.
 """
 _OF_EPISODES = (
     _BY_WRITER
-    | {"detector": as_optional(TEXT)}
+    | {"detector": as_optional(TEXT), "keyframe_s": as_optional(SUM)}
     | {name: CONDITION_COLUMNS[name] for name in COLUMNS_WHERE_CHANGED}
 )
 """Those of every study of the closed loop."""
@@ -141,12 +147,31 @@ _MECHANISM = Schema(
     | dict.fromkeys((RECEIVED, *BELIEF_MARKS), as_optional(_COUNTS)),
     _BY_WRITER | _OF_SOME_PLAYS,
 )
+_VEHICLE = Schema(
+    {**_EPISODES.needed, "keyframes": COUNT}
+    | dict.fromkeys(VEHICLE_LISTS, _COUNTS)
+    | dict.fromkeys(VEHICLE_COUNTS, COUNT)
+    | dict.fromkeys(VEHICLE_MEASURES, as_optional(SUM)),
+    {
+        **_EPISODES.further,
+        "progress": as_optional(SUM),
+        "needless_braking": as_optional(COUNT),
+    },
+)
 EPISODES = ResultsFormat(
     unit="episodes",
     play_batch=play_episodes,
     kept_rows=with_added_columns,
     file="episodes.parquet",
     schema=_EPISODES,
+    listed=listed_episodes,
+)
+VEHICLE = ResultsFormat(
+    unit="watched episodes",
+    play_batch=play_vehicle,
+    kept_rows=with_added_columns,
+    file="vehicle.parquet",
+    schema=_VEHICLE,
     listed=listed_episodes,
 )
 PLAYS = ResultsFormat(
@@ -167,7 +192,7 @@ MECHANISM = ResultsFormat(
     schema=_MECHANISM,
     listed=listed_plays,
 )
-RESULTS_FORMATS = (EPISODES, PLAYS, MECHANISM)
+RESULTS_FORMATS = (EPISODES, VEHICLE, PLAYS, MECHANISM)
 _PARAMETERS = frozenset(
     {
         *PLAIN_FIELDS,
@@ -177,6 +202,7 @@ _PARAMETERS = frozenset(
         "sensor_hash",
         "sensor_setup",
         "detector",
+        "keyframe_s",
         "camera_detections",
         "sweeps",
         "presence",

@@ -16,7 +16,14 @@ from care_sim.sources.scenes import source_of
 from care_sim.study.episode_config import PLAIN_FIELDS, grid
 from care_sim.study.journal import JOURNAL, Journal
 from care_sim.study.play_config import PLAY_FIELDS, play_grid
-from care_sim.study.results_formats import _PARAMETERS, EPISODES, MECHANISM, PLAYS, RESULTS_FORMATS
+from care_sim.study.results_formats import (
+    _PARAMETERS,
+    EPISODES,
+    MECHANISM,
+    PLAYS,
+    RESULTS_FORMATS,
+    VEHICLE,
+)
 from care_sim.study.rows.parquet import read_notes, read_rows, write_rows
 from tests.helpers.made_rows import STUDY, rows
 
@@ -295,6 +302,8 @@ def test_every_parameter_is_a_column_that_is_read():
     """What a reader drops is no part of what a row was asked with."""
     known = {kind.file: {*kind.schema.needed, *kind.schema.further} for kind in RESULTS_FORMATS}
     assert {*PLAIN_FIELDS} <= known[EPISODES.file]
-    of_plays = {*PLAY_FIELDS} | (_PARAMETERS - {*PLAIN_FIELDS})
+    # A film has its own times: the period of a keyframe is one of the closed loop.
+    assert "keyframe_s" in known[EPISODES.file] & known[VEHICLE.file]
+    of_plays = {*PLAY_FIELDS} | (_PARAMETERS - {*PLAIN_FIELDS, "keyframe_s"})
     assert of_plays - {"driver"} <= known[PLAYS.file]
     assert of_plays <= known[MECHANISM.file]

@@ -1,6 +1,7 @@
 """Rows made by hand."""
 
 from care_sim.study.episode_config import grid
+from care_sim.study.vehicle.play import VEHICLE_COUNTS, VEHICLE_LISTS, VEHICLE_MEASURES
 
 NEAREST_M = 3.0
 """How near an actor came that was never detected."""
@@ -19,6 +20,13 @@ def row(config, distance, **changes):
         "rays_fired": 1000,
     }
     return config.row() | outcome | changes
+
+
+def vehicle_row(config, distance, **changes):
+    """The row of an episode of the vehicle study, in which little was to be noted."""
+    noted = dict.fromkeys(VEHICLE_COUNTS, 0) | dict.fromkeys(VEHICLE_LISTS, ())
+    none = dict.fromkeys(VEHICLE_MEASURES)
+    return row(config, distance) | {"keyframes": 10} | noted | none | changes
 
 
 def rows(policy, distances, scenario="dense", budget=0.03, changes=None, **conditions):

@@ -9,6 +9,7 @@ from care_sim.core.conditions import Sensing
 from care_sim.core.frames import Frame
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES, Detections, Ego, ImageDetections
+from care_sim.driving.localisation import Localisation
 from care_sim.loops.film import Film, Shot
 from care_sim.loops.open_loop import OpenLoop
 from care_sim.loops.seeds import SensorSeeds
@@ -173,6 +174,36 @@ def test_truth_moves_a_forecast_to_its_object_while_that_is_annotated():
     loop.keyframe(NOWHERE)
     loop.keyframe(NOWHERE)
     assert np.array_equal(loop.true_boxes(tracks), tracks.boxes)
+
+
+def errors_of(keyframes, **spreads):
+    """(keyframes, 3) errors of the pose in x, y and yaw that loops of the usual seeds meet."""
+    localisation = Localisation(Sensing(**spreads), 0.5, np.random.SeedSequence(2))
+    origin, found = Frame(0.0, 0.0, 0.0, 0.0), []
+    for _ in range(keyframes):
+        taken = localisation.taken_for(origin)
+        found.append((taken.x, taken.y, taken.yaw))
+        localisation.advance()
+    return np.array(found)
+
+
+def test_a_wrong_pose_moves_the_forecast_of_what_stands():
+    """Seen with the errors e0 and e1, and forecast with e2: off by 2 e1 - e0 - e2."""
+    spread = {"ego_position_sigma_m": 0.2}
+    loop = loop_of(film(), **spread)
+    for _ in range(2):
+        loop.keyframe(on_the_car(loop))
+    e0, e1, e2 = errors_of(4, **spread)[1:, :2]
+    off = loop.belief.tracks.boxes[0, :2] - loop.shot.annotations.boxes[0, :2]
+    assert off == pytest.approx(2 * e1 - e0 - e2)
+
+
+def test_a_wrong_heading_enters_the_change_of_yaw_since_a_picture():
+    spread = {"ego_yaw_sigma_deg": 2.0}
+    loop = loop_of(film(bend=0.1), camera_latency=1, **spread)
+    loop.keyframe(NOWHERE)
+    before, now = errors_of(3, **spread)[1:, 2]
+    assert loop.belief.detections.yaw_changes == pytest.approx([0.1 + now - before])
 
 
 def test_a_full_scan_is_read_without_a_draw():

@@ -35,7 +35,8 @@ def test_every_built_in_policy_has_tags_a_source_and_a_summary_that_fit_80_colum
 
 
 def test_parameters_come_with_their_defaults():
-    assert parameter_texts(BUILT_IN["care"]) == []
+    assert parameter_texts(BUILT_IN["history"]) == []
+    assert parameter_texts(BUILT_IN["care"]) == ["yaw_compensation=True"]
     assert parameter_texts(BUILT_IN["random-points"]) == ["seed=0"]
     assert {"k_safe=2.0", "standstill_m=2.0"} <= set(parameter_texts(BUILT_IN["care-sbf"]))
 

@@ -19,12 +19,13 @@ from care_sim.study.designs import (
     order,
     paper,
     validate,
+    vehicle,
 )
 from care_sim.study.episode_config import grid
 from care_sim.study.rows.parquet import read_rows, write_rows
 from care_sim.study.rows.reading import with_added_columns
 from tests.helpers import made_worlds
-from tests.helpers.made_rows import CROWD, CUT_INS, STUDY, row
+from tests.helpers.made_rows import CROWD, CUT_INS, STUDY, row, vehicle_row
 
 
 @pytest.mark.parametrize("name", STUDIES)
@@ -46,7 +47,7 @@ def test_an_unknown_study_is_one_clear_line(tmp_path):
         InvalidInput,
         match=r"unknown study in .* 'gardening'; "
         "known: ablate, ablate-open-loop, crowding, faults, firing, firing-open-loop, mechanism, "
-        "ncap, order, order-open-loop, paper, protocol, r157, sweep, validate",
+        "ncap, order, order-open-loop, paper, protocol, r157, sweep, validate, vehicle",
     ):
         study_of(tmp_path / "episodes.parquet")
 
@@ -64,6 +65,7 @@ EPISODES = {
     ],
     "order": [row(config, 9.0) for config in order.order_study([0]) if config.scenario == "dense"],
     "firing": [row(config, 9.0) for config in firing.firing_study([0])],
+    "vehicle": [vehicle_row(config, 9.0) for config in vehicle.vehicle_study([0])],
 }
 
 

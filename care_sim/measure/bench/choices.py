@@ -67,12 +67,12 @@ def observation(rig: Rig, seed: int) -> Observation:
         misses=np.zeros(TRACKS, np.int64),
         hits=np.full(TRACKS, 5),
     )
-    detections = _seen(rig.cameras[0], boxes, classes)
+    detections = seen_by(rig.cameras[0], boxes, classes)
     empty = np.zeros(rig.grid.shape, np.float32)
     return Belief(Ego(8.0), rig.budget, detections, tracks, empty).to_observation()
 
 
-def _seen(camera: PinholeCamera, boxes: Floats, classes: np.ndarray) -> ImageDetections:
+def seen_by(camera: PinholeCamera, boxes: Floats, classes: np.ndarray) -> ImageDetections:
     """Every box that reaches into the picture, cut at its edge; nothing hides anything."""
     edges = (camera.width, camera.height) * 2
     pictured = np.clip(camera.project_boxes(boxes), 0, edges)

@@ -1,8 +1,6 @@
 """Tables of what happens on the shared belief, beside the paper's figures."""
 
-import numpy as np
-
-from care_sim.core.arrays import Integers
+from care_sim.reports.formatting import spread_of_counts
 from care_sim.reports.mechanism import paper
 from care_sim.reports.mechanism.formatting import (
     figure_of_paper,
@@ -86,7 +84,7 @@ def allocation_table(study: MechanismRows) -> Table:
 
 def _allocation_line(study: MechanismRows, policy: str) -> TableRow:
     cells, covered = study.received(policy)
-    own = [_spread(cells[~covered]), _spread(cells[covered])]
+    own = [spread_of_counts(cells[~covered]), spread_of_counts(cells[covered])]
     if policy == study.driver:
         return (name_of(study, policy), "", "", "", *own)
     moved = study.difference(policy)
@@ -106,11 +104,3 @@ def _share(part: int, whole: int) -> str:
 
 def _mean(total: int, count: int) -> str:
     return f"{total / count:,.0f}" if count else "none"
-
-
-def _spread(cells: Integers) -> str:
-    """Median, quartiles and number of counts; empty without any."""
-    if not len(cells):
-        return ""
-    low, middle, high = np.quantile(cells, (0.25, 0.5, 0.75))
-    return f"{middle:.0f} [{low:.0f}, {high:.0f}] ({len(cells)})"

@@ -91,8 +91,9 @@ def config_of(row: Row) -> EpisodeConfig:
     """
     # A condition that the file's version did not know, or the row does not tell, is the default.
     plain = {name: row[name] for name in PLAIN_FIELDS if row.get(name) is not None}
-    if row.get("detector") is not None:
-        plain["detector"] = row["detector"]
+    for name in ("detector", "keyframe_s"):
+        if row.get(name) is not None:
+            plain[name] = row[name]
     plain["sensor"] = setup_of_columns(row)
     for kind in ("detector", "scenario", "policy"):
         plain[f"{kind}_parameters"] = _parameters(row, kind)

@@ -8,20 +8,23 @@ from care_sim.base.errors import percent
 from care_sim.perception.detectors import PROXY
 from care_sim.sources.scenes import Scene, Source
 from care_sim.study.episode_config import EpisodeConfig, grid
+from care_sim.study.parameters import Parameters
 from care_sim.study.play_config import PlayConfig, play_grid
 from care_sim.study.rows.reading import Key, key_of
-from care_sim.study.run_config import Row
+from care_sim.study.run_config import Row, flat
 
 
 class Place(NamedTuple):
-    """A scenario and a budget, where every level is played."""
+    """A scenario, if need be with parameters, and a budget: where every level is played."""
 
     scenario: str
     budget: float
+    parameters: Parameters = ()
 
     def row(self) -> Row:
         """As columns of an episode."""
-        return {"scenario": self.scenario, "budget": self.budget}
+        given = flat("scenario", self.parameters)
+        return {"scenario": self.scenario, "budget": self.budget} | given
 
     def __str__(self) -> str:
         return f"{self.scenario}, {percent(self.budget)}"
@@ -56,7 +59,14 @@ class Variant:
     ) -> list[EpisodeConfig]:
         """The episodes of this level; `full` runs once for all that it does not feel."""
         played = [self.policy or policy for policy in policies]
-        return grid([place.scenario], played, [place.budget], seeds, **self._given())
+        return grid(
+            [place.scenario],
+            played,
+            [place.budget],
+            seeds,
+            scenario_parameters=place.parameters,
+            **self._given(),
+        )
 
     def plays(
         self,

@@ -49,6 +49,8 @@ def _setting_of_episode(row: Row) -> Setting:
     # Sorted, so that the order of columns in a file does not make another setting.
     conditions = sorted((n.removeprefix("scenario."), v) for n, v in changed)
     conditions += _sensor(row)
+    if row.get("keyframe_s") is not None:
+        conditions.append(("keyframe_s", row["keyframe_s"]))
     if row.get("detector") is not None:
         conditions.append(("detector", with_parameters(row, "detector")))
     return Setting(row["scenario"], tuple(conditions))

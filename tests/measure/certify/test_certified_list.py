@@ -5,7 +5,7 @@ left out for a reason.
 from dataclasses import fields
 from itertools import combinations, product
 
-from care_sim.core.conditions import DEFAULTS, CameraFaults, LidarFaults
+from care_sim.core.conditions import DEFAULTS, LOCALISATION, CameraFaults, LidarFaults
 from care_sim.core.return_settings import RETURN_SETTINGS
 from care_sim.envs import IDS
 from care_sim.envs.closed_loop import ClosedLoopEnv
@@ -53,7 +53,9 @@ LEFT_OUT = {
     "camera_latency_s": "begins with the next list: one more choice changes every episode of this",
     "camera_profile": "begins with the next list, too",
     "sweeps": "of nuScenes",
-} | dict.fromkeys(RETURN_SETTINGS, "recordings refuse them, but for crosstalk")
+    **dict.fromkeys(LOCALISATION, "begin with the next list, too"),
+    **dict.fromkeys(RETURN_SETTINGS, "recordings refuse them, but for crosstalk"),
+}
 """Arguments that the list does not hold, and why."""
 
 

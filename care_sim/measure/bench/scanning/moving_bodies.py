@@ -29,7 +29,7 @@ class MovingBodies:
     kinds: tuple[BodyKind, ...]
     poses: Floats
 
-    def at(self, number: int) -> Floats:
+    def at(self, number: float) -> Floats:
         """(n, 3) poses at a scan: every body sways along its heading."""
         shift = SWAY_M * np.sin(number + 1)
         heading = self.poses[:, 2]

@@ -1,0 +1,42 @@
+"""`care-sim vehicle`: the paper's vehicle study on simulated drives, and the time that the car's
+software takes.
+"""
+
+import json
+import sys
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from care_sim.base.bounds import bounded
+from care_sim.base.files import write_text
+from care_sim.commands.shared.episode_studies import FixedStudy
+from care_sim.commands.shared.study_command import console
+from care_sim.measure.compute_path.report import compute_report, compute_tables
+from care_sim.study.designs.vehicle import vehicle_study
+
+_FILE = "compute-path.json"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Vehicle(FixedStudy):
+    """Play the paper's vehicle study: late evidence in turns, a camera that fails in mid-drive, a
+    pose that is not exact; then time the car's software stage by stage.
+    """
+
+    also: tuple[str, ...] | None = ()
+    """Further policies, installed ones too, that are played beside those of the study."""
+    frames: int = bounded(1000, 0, 100_000)
+    """Keyframes over which the software is timed, on one core; 0 leaves it out."""
+    out: Path = Path("runs/vehicle")
+    """Folder of the results; an interrupted study goes on there."""
+
+    def __call__(self) -> int:
+        """Run it."""
+        code = self.play("vehicle", vehicle_study, self.out)
+        if self.frames:
+            report = compute_report(self.frames, partial(print, "measuring", file=sys.stderr))
+            for table in compute_tables(report):
+                console().print(table.rich())
+            write_text(self.out / _FILE, json.dumps(report, indent=1) + "\n")
+        return code

@@ -1,0 +1,64 @@
+"""The rows of the vehicle study by group of places, level and policy."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from care_sim.core.arrays import Integers
+from care_sim.evaluation.censoring import quartiles
+from care_sim.reports.formatting import marked, median
+from care_sim.study.designs.variants import Variant
+from care_sim.study.designs.vehicle import Group
+from care_sim.study.rows.reading import detections, grouped, tags_of_row
+from care_sim.study.run_config import Row
+
+
+class VehicleRows:
+    """The rows of a study; what was not played is an empty list."""
+
+    def __init__(self, rows: Sequence[Row]):
+        self.rows = rows
+        self.tags = {row["policy"]: tags_of_row(row) for row in rows}
+        self._cells = grouped(rows)
+
+    def of(self, group: Group, level: Variant, policy: str) -> list[Row]:
+        """The rows of all places of a group. Their `seed` names place and seed: it is by worlds
+        that policies are paired.
+        """
+        return [
+            row | {"seed": (number, row["seed"])}
+            for number, place in enumerate(group.places)
+            for row in self._cells.get(level.key(place, policy), ())
+        ]
+
+    def further(self, policies: Sequence[str]) -> list[str]:
+        """The policies, then those that joined in."""
+        known = {*policies, "care-sbf", "full", "all-camera"}
+        return [*policies, *(policy for policy in self.tags if policy not in known)]
+
+    def marked(self, policy: str) -> str:
+        """A policy's name, with a mark when no car can have it."""
+        return marked(policy, self.tags.get(policy, ()))
+
+
+def total(rows: Sequence[Row], column: str) -> int:
+    """The sum of a column."""
+    return int(sum(row[column] for row in rows))
+
+
+def joined(rows: Sequence[Row], column: str) -> Integers:
+    """The lists of a column, one after the other."""
+    return np.array([value for row in rows for value in row[column]], np.int64)
+
+
+def share(part: int, whole: int) -> str:
+    """A part in per cent; empty of nothing."""
+    return f"{100 * part / whole:.1f}%" if whole else ""
+
+
+def outcome(rows: Sequence[Row]) -> str:
+    """Median first detection in metres, and how many episodes ended with a collision."""
+    if not rows:
+        return ""
+    hits = sum(row["collision"] for row in rows)
+    return f"{median(quartiles(detections(rows)))}, {hits}/{len(rows)}"

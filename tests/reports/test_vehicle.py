@@ -1,0 +1,177 @@
+"""The tables of the vehicle study, of rows whose answers are known."""
+
+import pytest
+
+from care_sim.reports.figures.vehicle import VEHICLE_FIGURE, vehicle_figures
+from care_sim.reports.studies import STUDIES
+from care_sim.reports.vehicle.evidence_tables import compensation_table, evidence_table
+from care_sim.reports.vehicle.fallback_tables import cost_tables, fallback_table
+from care_sim.reports.vehicle.pose_tables import forecast_table, guard_table, pose_tables
+from care_sim.reports.vehicle.rows import VehicleRows
+from care_sim.study.designs.vehicle import (
+    BLACKOUTS,
+    DENSE,
+    DRIVES,
+    EVIDENCE_LEVELS,
+    POSE_LEVELS,
+    TURNS,
+    vehicle_study,
+)
+from care_sim.study.results_formats import VEHICLE
+from care_sim.study.rows.parquet import read_rows, write_rows
+from tests.helpers.made_rows import vehicle_row
+
+SEEDS = range(5)
+
+
+def noted(config):
+    """A made-up law: compensation saves every late turn of 3 cases in 11; the camera's absence
+    costs 4 m; an error of the position makes forecasts 1 m wrong.
+    """
+    kept = dict(config.policy_parameters).get("yaw_compensation", True)
+    test = dict(config.scenario_parameters).get("test")
+    late_turn = bool(config.camera_latency) and test == "CPTAfs-50"
+    return {
+        "collision": late_turn and not kept,
+        "evidence_ages_ms": (100 * config.camera_latency,) * 19 + (1000,),
+        "boxes": 40,
+        "turned_boxes": 10 if config.camera_latency else 0,
+        "turned_held": 9 if config.camera_latency else 0,
+        "unturned_held": 5 if config.camera_latency else 0,
+        "dark_keyframes": 10 if config.blackout_s else 0,
+        "dark_alike": 10 if config.blackout_s else 0,
+        "dark_entries_alike": (1, 1) if config.blackout_s else (),
+        "dark_entry_cells": (2, 30) if config.blackout_s else (),
+        "dark_entry_covered": (0, 1) if config.blackout_s else (),
+        "apart_after_s": 0.2 if config.blackout_s == 1.0 else None,
+        "forecasts": 20,
+        "forecast_error_m": 1.0 if config.ego_position_sigma_m else 0.0,
+        "forecast_error_p95_m": 2.0 if config.ego_position_sigma_m else 0.0,
+        "forecasts_in_eq4": 10,
+        "forecasts_in_margin": 15,
+        "standing_keyframes": 3,
+        "standing_guard_least_m": 4.0,
+        "standing_guard_most_m": 4.0,
+        "released_cells": 100,
+        "released_cells_vehicle": 10,
+        **({"progress": 0.5, "needless_braking": 2} if config.scenario == "drive" else {}),
+    }
+
+
+def distance(config):
+    return 12.0 if config.blackout_s else 16.0
+
+
+@pytest.fixture(scope="module")
+def rows():
+    return [
+        vehicle_row(config, distance(config), tags="causal", **noted(config))
+        for config in vehicle_study(SEEDS)
+    ]
+
+
+@pytest.fixture(scope="module")
+def study(rows):
+    return VehicleRows(rows)
+
+
+def block(table, group):
+    """The lines under a group's heading, by their first entry."""
+    start = table.rows.index((group,)) + 1
+    lines = {}
+    for line in table.rows[start:]:
+        if len(line) == 1:
+            break
+        lines[line[0]] = line[1:]
+    return lines
+
+
+def test_ages_are_those_of_all_keyframes_and_shares_those_of_all_boxes(study):
+    lines = block(evidence_table(study), TURNS.name)
+    # 19 of 20 pictures are 0.4 s old, one is 1 s old.
+    assert lines["0.4 s late"] == ("0.43", "0.43", "25.0%", "90.0%", "50.0%")
+    assert lines["newest picture"] == ("0.05", "0.05", "0.0%", "", "")
+
+
+def test_compensation_is_paired_by_case_and_seed(study):
+    lines = block(compensation_table(study), TURNS.name)
+    worlds = len(TURNS.places) * len(SEEDS)
+    care, without, *others, metres, points = lines["0.4 s late"]
+    assert (care, without) == (f"16.0, 0/{worlds}", f"16.0, {3 * len(SEEDS)}/{worlds}")
+    assert others == [f"16.0, 0/{worlds}"] * 2
+    assert metres == "+0.0 [0.0,0.0]"
+    assert points.startswith("+27* [")
+    assert lines["newest picture"][1] == "", "without lag nothing is played twice"
+
+
+def test_a_camera_that_is_away_leaves_one_policy(study):
+    table = fallback_table(study)
+    lines = {line[0]: line[1:] for line in table.rows}
+    times = BLACKOUTS[DENSE][1].label
+    alike = ("50 of 50", "10 of 10", "2 [2, 2] (5)", "30 [30, 30] (5)")
+    assert lines[f"{DENSE.name}: {times}"] == (*alike, "0.2 (5 of 5)")
+    assert lines[f"{DENSE.name}: away throughout"] == (*alike, "")
+    assert f"{DENSE.name}: camera on" not in lines
+    assert lines["(paper)"] == ("", "37 of 37", "1 to 5", "117 to 123", "")
+
+
+def test_the_cost_is_the_camera_on_less_the_camera_away(study):
+    table = cost_tables(study)[0]
+    assert table.title.startswith(DENSE.name)
+    (care, *_) = table.rows
+    assert care == ("care", "16.0, 0/5", "12.0, 0/5", "12.0, 0/5", "+4.0* [4.0,4.0]", "+0 [0,0]")
+
+
+def test_forecasts_and_what_is_released_are_means(study):
+    lines = block(forecast_table(study), DRIVES.name)
+    told = ("50.0%", "75.0%", "10.0", "1.0", "50%", "20.0%")
+    assert lines["exact pose"] == ("0.00", "0.00", *told)
+    assert lines["0.4 m, anew"] == ("1.00", "2.00", *told)
+    assert block(forecast_table(study), DENSE.name)["exact pose"][-2:] == ("", "")
+
+
+def test_every_policy_and_rule_has_a_line_under_an_error_of_the_pose(study):
+    table = pose_tables(study)[1]
+    names = [line[0] for line in table.rows]
+    assert names == ["care", "history", "care-sbf, sigma_pos 0", "care-sbf, sigma_pos 0.4 m"]
+    assert all(len(line) == 1 + len(POSE_LEVELS) and all(line) for line in table.rows)
+
+
+def test_the_guard_is_told_beside_the_papers(study, rows):
+    (here, paper) = guard_table(study).rows
+    assert here == ("here", f"{3 * len(rows):,}", "4.00 to 4.00")
+    assert paper == ("(paper)", "570", "4.00")
+    off = [*rows, rows[0] | {"standing_guard_most_m": 4.2}]
+    assert guard_table(VehicleRows(off)).rows[0][2] == "4.00 to 4.20"
+
+
+def test_a_file_changes_nothing_in_the_tables(rows, tmp_path):
+    write_rows(rows, tmp_path / VEHICLE.file, "vehicle", schema=VEHICLE.schema)
+    read = read_rows(tmp_path / VEHICLE.file, STUDIES["vehicle"].schema)
+    assert STUDIES["vehicle"].tables(read) == STUDIES["vehicle"].tables(rows)
+
+
+def test_without_a_forecast_or_a_picture_there_is_no_number():
+    bare = VehicleRows([vehicle_row(config, 9.0) for config in vehicle_study([0])])
+    assert block(evidence_table(bare), TURNS.name)["0.4 s late"] == ("", "", "", "", "")
+    lines = block(forecast_table(bare), DENSE.name)
+    assert lines["exact pose"] == ("", "", "", "", "0.0", "0.0", "", "")
+    assert len(fallback_table(bare).rows) == 1
+    assert guard_table(bare).rows[0] == ("here", "0", "")
+
+
+def test_a_part_of_the_study_has_its_tables_and_its_figure(rows):
+    few = [row for row in rows if row["scenario"] == "dense" and row["policy"] == "history"]
+    assert all(table.title for table in STUDIES["vehicle"].tables(few))
+    (figure,) = vehicle_figures(few).values()
+    assert figure.axes
+
+
+def test_the_figure_shows_every_late_level(rows):
+    held, errors = vehicle_figures(rows)[VEHICLE_FIGURE].axes
+    late = [level.label for level in EVIDENCE_LEVELS if "camera_latency" in level.changes]
+    assert [text.get_text() for text in held.get_yticklabels()] == late
+    compensated, without, *_ = held.get_lines()
+    assert set(compensated.get_xdata()) == {90.0}
+    assert set(without.get_xdata()) == {50.0}
+    assert errors.get_lines()[0].get_xdata().max() == 1.0
