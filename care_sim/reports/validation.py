@@ -10,7 +10,7 @@ import numpy as np
 
 from care_sim.base.errors import counted, percent
 from care_sim.evaluation.censoring import FEWEST_PAIRS
-from care_sim.reports.contrasts import AVOIDED, DETECTION, Contrast, contrast
+from care_sim.reports.contrasts import AVOIDED, DETECTION, Contrast, contrast, preventable
 from care_sim.reports.controls import is_control
 from care_sim.study.designs.validate import CAMERA_POLICIES, is_training
 from care_sim.study.rows.reading import detections, setting_of, tags_of_row
@@ -84,9 +84,9 @@ class WorldPlays:
     def lead(self, ours: str | None, theirs: str | None, budget: float) -> Lead:
         """What one policy has over another at a budget; nothing where one of them is None."""
         a, b = (self.played(policy, budget) if policy else [] for policy in (ours, theirs))
-        spared = {row["seed"] for row in self.played(FULL, budget) if not row["collision"]}
-        preventable = ([row for row in rows if row["seed"] in spared] for rows in (a, b))
-        return Lead(contrast(DETECTION, a, b), contrast(AVOIDED, *preventable))
+        full = self.played(FULL, budget)
+        avoided = contrast(AVOIDED, preventable(full, a), preventable(full, b))
+        return Lead(contrast(DETECTION, a, b), avoided)
 
     def camera_lead(self, budget: float) -> Lead:
         """What the best policy with a camera has over the best control."""
