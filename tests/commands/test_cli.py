@@ -322,6 +322,9 @@ def test_the_lists(capsys):
     assert "dartout" in out
     assert "vehicles=7" in out
     assert "ego_speed_mps=8.03,8.63 (0.5 to 60)" in out
+    assert "CCCscp-near, drawn)" in out
+    assert "speed_kph=40.0 (0 to 140; 0 is drawn)" in out
+    assert "who=None (of pedestrian, child, bicycle, car; None is drawn)" in out
     assert parameters(["ego_speed_mps=8.03,8.63"]) == (("ego_speed_mps", (8.03, 8.63)),)
 
 
