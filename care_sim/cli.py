@@ -3,6 +3,7 @@
 import contextlib
 import io
 import os
+import re
 import shutil
 import sys
 from collections.abc import Callable, Sequence
@@ -11,7 +12,7 @@ from typing import Any, NoReturn
 from care_sim.base import interrupts
 from care_sim.base.errors import InvalidInput, MissingExtra, one_line, shortened, shown
 from care_sim.commands.entries import COMMANDS
-from care_sim.commands.shared.parsing import chosen_command
+from care_sim.commands.shared.parsing import chosen_command, option_names
 
 _BAD_INPUT = 2
 _UNEXPECTED = 70
@@ -23,6 +24,8 @@ _DEBUG = "--debug"
 _ABOUT = (
     "Benchmark for adaptive LiDAR sensing: the closed loop, and first sightings in the open loop."
 )
+_MOST_OPTIONS = ("sweep", "protocol")
+"""Of the closed and of the open loop, the commands that take every condition."""
 _LONGEST = 2000
 """Characters of a complaint, at the most."""
 _NARROWEST = 20
@@ -175,7 +178,24 @@ def parsed_command(arguments: Sequence[str]) -> Callable[[], int]:
     commands = {name: _described(command.about) for name, command in COMMANDS.items()}
     if named in COMMANDS:
         commands[named] = COMMANDS[named].loaded()
-    return chosen_command(commands, "care-sim", _ABOUT, arguments)
+    try:
+        return chosen_command(commands, "care-sim", _ABOUT, arguments)
+    except InvalidInput as error:
+        raise InvalidInput(f"{error}{_who_has_them(str(error))}") from None
+
+
+def _who_has_them(complaint: str) -> str:
+    """For a complaint of options that a command lacks, which other ones have them; else empty."""
+    if not complaint.startswith("Unrecognized options"):
+        return ""
+    lacking = re.findall(r"--[\w-]+", complaint.partition(";")[0])
+    held = {name: option_names(COMMANDS[name].loaded()) for name in _MOST_OPTIONS}
+    told = []
+    for option in dict.fromkeys(lacking):
+        owners = [f"care-sim {name}" for name in held if option.replace("_", "-") in held[name]]
+        if owners:
+            told.append(f"; {option} is an option of {' and '.join(owners)}")
+    return "".join(told)
 
 
 def _described(about: str) -> Callable[..., Any]:

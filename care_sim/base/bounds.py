@@ -1,15 +1,15 @@
 """What a field of a dataclass may be: stated beside its default, checked when the dataclass is
 made, and told by lists.
 
-The kind follows from the default: a flag, text, a whole number, a number, or a range of numbers
-(low, high). Numbers of any type become Python's own, so that equal configurations are written
-alike.
+The kind follows from the default: a flag, text, a whole number, a number, or, where it is bounded,
+a range of numbers (low, high). Numbers of any type become Python's own, so that equal
+configurations are written alike.
 """
 
 from dataclasses import Field, field, fields
 from typing import Any
 
-from care_sim.base.checks import check_flag, check_number, check_range, check_whole, is_number
+from care_sim.base.checks import check_flag, check_number, check_range, check_whole
 from care_sim.base.errors import InvalidInput, shown
 
 _BOUNDS = "bounds"
@@ -52,7 +52,8 @@ def _settled(name: str, value: Any, default: Any, bounds: tuple[float, float]) -
     elif isinstance(default, float):
         check_number(name, value, *bounds)
         return float(value)
-    elif isinstance(default, tuple) and len(default) == 2 and all(map(is_number, default)):
+    # Two numbers without bounds are a list that happens to hold two.
+    elif bounds != _ANY and isinstance(default, tuple) and len(default) == 2:
         check_range(name, value, *bounds)
         return float(value[0]), float(value[1])
     return value

@@ -5,6 +5,7 @@ or another callable that makes the thing. Of two entries with one name the first
 as for modules. A built-in name cannot be taken.
 """
 
+import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
@@ -80,12 +81,22 @@ class Plugins(Generic[Made]):
             made = entry.load()
         # Foreign code may fail in any way; some leaves by `sys.exit`.
         except (Exception, SystemExit) as error:
-            raise InvalidInput(error_line(error)) from error
+            raise InvalidInput(f"{error_line(error)}{_found_in(entry, error)}") from error
         # The first fault is told; the others may follow from it.
         for fault in self.faults(made):
             raise InvalidInput(f"{entry.value} {fault}")
         maker: Callable[..., Made] = made
         return maker
+
+
+def _found_in(entry: EntryPoint, error: BaseException) -> str:
+    """Where a module is that lacks the name of an entry; empty for another error."""
+    # Another file or folder of the same name may hide the module that is meant.
+    module = sys.modules.get(entry.module)
+    if module is None or not isinstance(error, AttributeError):
+        return ""
+    place = getattr(module, "__file__", None) or ", ".join(getattr(module, "__path__", ()))
+    return f" (found in {place})" if place else ""
 
 
 def package_of(entry: EntryPoint) -> str:

@@ -10,9 +10,11 @@ from care_sim.policies.listing import policy_paragraphs
 from care_sim.scenarios import SCENARIOS
 from care_sim.scenarios.crossing import OCCLUDERS
 from care_sim.scenarios.mirroring import MIRRORED
+from care_sim.scenarios.ncap.scenario import DRAWN
 from care_sim.scenarios.ncap.table import TESTS
 from care_sim.scenarios.r157.grid import KINDS, SIDES
 from care_sim.sensors.setups import setup_lines
+from care_sim.streets.encounters import COMERS
 
 
 @dataclass(frozen=True)
@@ -45,8 +47,17 @@ class Sensors:
         return 0
 
 
-_NAMED = {"occluder": OCCLUDERS, "mirrored": MIRRORED, "kind": KINDS, "side": SIDES, "test": TESTS}
+_NAMED = {
+    "occluder": OCCLUDERS,
+    "mirrored": MIRRORED,
+    "kind": KINDS,
+    "side": SIDES,
+    "test": (*TESTS, DRAWN),
+    "who": COMERS,
+}
 """The choices of the parameters of scenarios that are names."""
+_ZERO = {"speed_kph": "0 is drawn", "target_kph": "0 is the protocol's"}
+"""What 0 stands for, of parameters in which it is no number."""
 
 
 @dataclass(frozen=True)
@@ -64,10 +75,17 @@ class Scenarios:
 
 
 def _choices(field: Field[Any]) -> str:
-    """The values that a parameter may have, in brackets; empty where nothing bounds them."""
-    if field.name in _NAMED:
-        return f" (of {', '.join(_NAMED[field.name])})"
-    return f" ({allowed(field)})" if allowed(field) else ""
+    """The values that a parameter may have, and which the seed draws, in brackets; empty where
+    there is nothing to tell.
+    """
+    named = f"of {', '.join(_NAMED[field.name])}" if field.name in _NAMED else ""
+    told = (
+        named or allowed(field),
+        _ZERO.get(field.name, ""),
+        "None is drawn" if field.default is None else "",
+    )
+    text = "; ".join(filter(None, told))
+    return f" ({text})" if text else ""
 
 
 def _summary(thing: object) -> str:

@@ -45,7 +45,7 @@ DETECTION = Measure("First detection", "m", 1, GATE_M, detection)
 BRAKED = Measure("Braked", "points", 0, GATE_POINTS, lambda row: Reading(100.0 * row["braked"]))
 DETECTED = Measure("Detected", "points", 0, GATE_POINTS, _detected)
 AVOIDED = Measure(
-    "Collision avoided",
+    "Collisions avoided",
     "points",
     0,
     GATE_COLLISION_POINTS,
@@ -118,6 +118,12 @@ def contrast(
         if seeds
         else None
     )
+
+
+def preventable(full: Sequence[Row], rows: Sequence[Row]) -> list[Row]:
+    """The rows of the seeds on which the full scan collides with nobody."""
+    spared = {row["seed"] for row in full if not row["collision"]}
+    return [row for row in rows if row["seed"] in spared]
 
 
 def _read(measure: Measure, rows: Sequence[Row]) -> dict[int, Reading]:

@@ -8,8 +8,9 @@ from itertools import combinations
 
 import numpy as np
 
-from care_sim.base.errors import percent
-from care_sim.reports.contrasts import AVOIDED, DETECTION, Contrast, contrast
+from care_sim.base.errors import counted, percent
+from care_sim.evaluation.censoring import FEWEST_PAIRS
+from care_sim.reports.contrasts import AVOIDED, DETECTION, Contrast, contrast, preventable
 from care_sim.reports.controls import is_control
 from care_sim.study.designs.validate import CAMERA_POLICIES, is_training
 from care_sim.study.rows.reading import detections, setting_of, tags_of_row
@@ -83,9 +84,9 @@ class WorldPlays:
     def lead(self, ours: str | None, theirs: str | None, budget: float) -> Lead:
         """What one policy has over another at a budget; nothing where one of them is None."""
         a, b = (self.played(policy, budget) if policy else [] for policy in (ours, theirs))
-        spared = {row["seed"] for row in self.played(FULL, budget) if not row["collision"]}
-        preventable = ([row for row in rows if row["seed"] in spared] for rows in (a, b))
-        return Lead(contrast(DETECTION, a, b), contrast(AVOIDED, *preventable))
+        full = self.played(FULL, budget)
+        avoided = contrast(AVOIDED, preventable(full, a), preventable(full, b))
+        return Lead(contrast(DETECTION, a, b), avoided)
 
     def camera_lead(self, budget: float) -> Lead:
         """What the best policy with a camera has over the best control."""
@@ -123,8 +124,18 @@ class WorldPlays:
         return found
 
     @property
+    def has_too_few(self) -> bool:
+        """Whether there are too few test seeds for any difference to count."""
+        return self._test_seeds < FEWEST_PAIRS
+
+    @property
     def verdict(self) -> str:
-        """Whether the world discriminates, in one sentence."""
+        """Whether the world discriminates, in one sentence; nothing is said on too few seeds."""
+        if self.has_too_few:
+            return (
+                f"{self.setting.label}: no verdict on {counted(self._test_seeds, 'test seed')}, it "
+                f"takes {FEWEST_PAIRS}."
+            )
         failings = {budget: self.failings(budget) for budget in self.budgets}
         passed = [percent(budget) for budget, found in failings.items() if not found]
         if passed:
@@ -133,6 +144,10 @@ class WorldPlays:
             f"at {percent(budget)} {', '.join(found)}" for budget, found in failings.items()
         )
         return f"{self.setting.label}: does not discriminate, because {because}."
+
+    @property
+    def _test_seeds(self) -> int:
+        return len({row["seed"] for row in self.test_rows})
 
     @property
     def _controls(self) -> list[str]:

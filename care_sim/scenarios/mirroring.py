@@ -31,7 +31,11 @@ class MirrorableScenario(Scenario):
 
     def empty_world(self, traffic: Traffic, ego_speed: float, rng: np.random.Generator) -> World:
         """The world to be filled, at time zero; `ego_speed` in m/s."""
-        return (MirroredWorld if self._reflects(rng) else World)(traffic, ego_speed)
+        reflects = self._reflects(rng)
+        world = (MirroredWorld if reflects else World)(traffic, ego_speed)
+        if self.mirrored == "drawn":
+            world.drawn = {"mirrored": "always" if reflects else "never"}
+        return world
 
     def _reflects(self, rng: np.random.Generator) -> bool:
         # A stream of its own: the draws that follow are those of the world that is not reflected.

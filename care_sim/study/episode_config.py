@@ -196,6 +196,14 @@ def of_seeds(configs: Sequence[EpisodeConfig], seeds: Sequence[int]) -> list[Epi
     return [config.with_seed(seed) for config in configs for seed in dict.fromkeys(seeds)]
 
 
+def of_cases(configs: Sequence[EpisodeConfig], cases: Sequence[Parameters]) -> list[EpisodeConfig]:
+    """The configurations in each of the cases: parameters of the scenario, of which the caller
+    knows that they are sound. Raises InvalidInput for too many, before they are made.
+    """
+    check_size(len(configs) * len(cases))
+    return [config.changed(scenario_parameters=case) for case in cases for config in configs]
+
+
 def _config(scenario: str, policy: str, budget: float, given: dict[str, Any]) -> EpisodeConfig:
     return EpisodeConfig(scenario, policy, **effective_conditions(policy, budget, given))
 

@@ -4,7 +4,7 @@ import math
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from datetime import timedelta
 
 from rich.console import Console
@@ -40,16 +40,19 @@ def run_with_progress(
     found = [(config, journal[config.key]["wall_s"]) for config in configs if config.key in journal]
     remaining = RemainingTime((config for config in configs if config.key not in journal), found)
     unit = kind.unit
-    with (
-        progress_bar(len(configs), unit)
-        if sys.stderr.isatty()
-        else nullcontext(ProgressLines(len(configs), unit)) as show
-    ):
+    with shown_progress(len(configs), unit) as show:
         reporter = ProgressReporter(remaining, show, len(configs))
         failures = run_all(configs, journal, workers, make_executor, reporter, kind.play_batch)
     if len(found) < len(configs):
         print(reporter.summary(unit), file=sys.stderr)
     return failures
+
+
+def shown_progress(total: int, unit: str) -> AbstractContextManager[Show]:
+    """A bar where stderr is a terminal, lines elsewhere."""
+    if sys.stderr.isatty():
+        return progress_bar(total, unit)
+    return nullcontext(ProgressLines(total, unit))
 
 
 class ProgressReporter(RunListener):

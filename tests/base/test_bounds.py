@@ -184,11 +184,13 @@ def test_a_dataclass_is_settled_by_kind():
         count: int = bounded(1, 0, 5)
         share: float = 0.5
         span: tuple[float, float] = bounded((1.0, 2.0), 0, 3)
+        several: tuple[float, ...] = (0.3, 0.1)
 
         def __post_init__(self):
             check_fields(self, " of it")
 
     assert Thing(span=[1, 2], share=1) == Thing(span=(1.0, 2.0), share=1.0)
+    assert Thing(several=(0.1,)).several == (0.1,)
     for name, value in (
         ("flag", 1),
         ("name", 2),

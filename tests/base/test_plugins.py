@@ -76,3 +76,24 @@ def test_only_names_are_known(installed, name):
     THINGS.check("twin")
     with pytest.raises(InvalidInput, match="unknown thing"):
         THINGS.check(name)
+
+
+def test_a_module_without_the_name_tells_where_it_was_found(install, tmp_path):
+    install("plain", "reach = 3", THINGS.group, lost="Missing")
+    with pytest.raises(InvalidInput) as caught:
+        THINGS.maker("lost")
+    place = tmp_path / "plain" / "plain.py"
+    assert str(caught.value) == (
+        f"AttributeError: module 'plain' has no attribute 'Missing' (found in {place})"
+    )
+
+
+def test_a_folder_that_hides_the_module_is_named(install, tmp_path, monkeypatch):
+    """As a folder of data beside the script does, whose name is the package's."""
+    install("shadowed", MODULE, THINGS.group, hidden="ours")
+    (tmp_path / "shadowed" / "shadowed.py").unlink()
+    folder = tmp_path / "work" / "shadowed"
+    folder.mkdir(parents=True)
+    monkeypatch.syspath_prepend(str(folder.parent))
+    with pytest.raises(InvalidInput, match=rf"no attribute 'ours' \(found in {folder}\)"):
+        THINGS.maker("hidden")

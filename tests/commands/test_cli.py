@@ -54,6 +54,13 @@ def test_a_host_that_calls_a_command_keeps_its_handlers_and_may_do_so_in_a_threa
         (["run", "dense", "--policy", "best"], ["'best'", "care"]),
         (["run", "dense", "--bugdet", "1"], ["--bugdet", "--budget"]),
         (["run", "dense", "--budget", "x"], ["--budget", "'x'"]),
+        (["ncap", "--driver", "careful-human"], ["--driver is an option of care-sim sweep\n"]),
+        (["validate", "ncap", "--no_floor"], ["--no_floor is an option of care-sim sweep and"]),
+        (
+            ["mechanism", "--floor-seeds", "2"],
+            ["--floor-seeds is an option of care-sim protocol\n"],
+        ),
+        (["ncap", "--wheels", "3"], ["Unrecognized options: --wheels, 3\n"]),
         (["run", "dense", "--budget", "0"], ["budget", "(0, 1]"]),
         (["run", "dense", "--budget", "1.5"], ["budget", "(0, 1]"]),
         (["run", "dense", "--camera-latency", "-1"], ["camera_latency", ">= 0"]),
@@ -315,6 +322,9 @@ def test_the_lists(capsys):
     assert "dartout" in out
     assert "vehicles=7" in out
     assert "ego_speed_mps=8.03,8.63 (0.5 to 60)" in out
+    assert "CCCscp-near, drawn)" in out
+    assert "speed_kph=40.0 (0 to 140; 0 is drawn)" in out
+    assert "who=None (of pedestrian, child, bicycle, car; None is drawn)" in out
     assert parameters(["ego_speed_mps=8.03,8.63"]) == (("ego_speed_mps", (8.03, 8.63)),)
 
 

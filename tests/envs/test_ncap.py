@@ -62,7 +62,7 @@ def test_a_drawn_test_is_told_to_the_scoring_and_its_world_is_that_test():
     with make(budget=0.03, test="drawn", speed_kph=0) as env:
         begun, info = env.reset(seed=4)
         poses = [actor.pose_at(1.0) for actor in env.unwrapped.loop.world.actors]
-    assert set(info["drawn"]) == {"test", "speed_kph", "target_kph"}
+    assert set(info["drawn"]) == {"test", "speed_kph", "target_kph", "mirrored"}
     with make(budget=0.03, **info["drawn"]) as env:
         same, told = env.reset(seed=4)
         assert poses == [actor.pose_at(1.0) for actor in env.unwrapped.loop.world.actors]
@@ -76,7 +76,7 @@ def test_a_drawn_test_is_told_to_the_scoring_and_its_world_is_that_test():
 def test_speeds_alone_are_told_where_the_test_is_given():
     with make(budget=0.03, test="CCFtap", speed_kph=0) as env:
         _, info = env.reset(seed=1)
-    assert set(info["drawn"]) == {"speed_kph", "target_kph"}
+    assert set(info["drawn"]) == {"speed_kph", "target_kph", "mirrored"}
 
 
 def test_vectors_tell_what_every_world_drew():

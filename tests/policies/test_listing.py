@@ -31,6 +31,8 @@ def test_every_built_in_policy_has_tags_a_source_and_a_summary_that_fit_80_colum
         assert title == f"{make.name} ({', '.join(make.tags)})"
         assert make.source in " ".join(line.strip() for line in lines)
         assert 2 <= len(lines) <= 6
+        # Told to its end.
+        assert any(line.endswith(".") for line in lines)
         assert max(map(len, lines)) <= 80
 
 

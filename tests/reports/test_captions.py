@@ -24,6 +24,8 @@ def table_of(entry):
         ("not detected", EPISODES_CAPTION, "reads 'not detected'"),
         ("≥-8.0", EPISODES_CAPTION, "≥: at least"),
         ("+3.0*", EPISODES_CAPTION, "Asterisk"),
+        ("Preventable collisions avoided", EPISODES_CAPTION, "full scan collides with nobody"),
+        ("Collisions avoided", EPISODES_CAPTION, "gate of collisions is 10 points"),
         (Bold("+3.0"), EPISODES_CAPTION, "Bold"),
         (Bold("+3.0"), PROTOCOL_CAPTION, "Bold"),
         ("+3.0 °", PROTOCOL_CAPTION, "Marked °"),

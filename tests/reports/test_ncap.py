@@ -139,6 +139,7 @@ def test_the_figure_has_a_panel_for_every_policy_and_budget():
     panels = [axes for axes in figure.axes if axes.images and axes.get_title(loc="left")]
     titles = [axes.get_title(loc="left") for axes in panels]
     assert titles == ["full, 100%", "care, 3%", "fan, 3%", "full, 100%", "care, 10%", "fan, 10%"]
+    assert [label.get_text() for label in panels[-1].get_xticklabels()] == ["20", "40"]
     care = panels[1].images[0].get_array()
     # Lines downwards, speeds to the right: 20 and 40 km/h.
     assert np.ma.filled(care, np.nan)[:, 0] == pytest.approx([5.0, 2.0, 5.0])

@@ -133,6 +133,12 @@ def test_each_question_can_fail_alone(changed, reason):
     assert only(world(TELLING | changed, TRAINING)).failings(0.03) == [reason]
 
 
+@pytest.mark.parametrize(("seeds", "verdict"), [(4, "no verdict"), (5, "discriminates at 3%")])
+def test_there_is_no_verdict_below_five_test_seeds(seeds, verdict):
+    rows = [each for each in world(TELLING, TRAINING) if not seeds <= each["seed"] < SEEDS]
+    assert only(rows).verdict.startswith(f"dartout: {verdict}")
+
+
 def test_two_are_apart_whichever_of_them_is_ahead():
     test = TELLING | {"full": (19.0, 1), "history": (18.5, 1)}
     assert only(world(test, TRAINING)).failings(0.03) == []

@@ -7,7 +7,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.rig import Rig
 from care_sim.policies.controls.rehearsal import rehearsal
 from care_sim.scenarios import SCENARIOS, make_scenario
-from care_sim.scenarios.mirroring import MirrorableScenario
+from care_sim.scenarios.mirroring import MirrorableScenario, MirroredWorld
 
 every_scenario = pytest.mark.parametrize(
     "name", [name for name, kind in SCENARIOS.items() if issubclass(kind, MirrorableScenario)]
@@ -53,6 +53,18 @@ def test_a_drawn_side_is_one_of_both_and_each_comes(name):
         assert np.array_equal(drawn, here) != np.array_equal(drawn, there)
         sides.append(np.array_equal(drawn, there))
     assert {*sides} == {True, False}
+
+
+@every_scenario
+def test_the_side_that_was_drawn_is_told(name):
+    for seed in range(6):
+        world = make_scenario(name, mirrored="drawn").build(np.random.default_rng(seed))
+        told = {"mirrored": "always" if isinstance(world, MirroredWorld) else "never"}
+        assert world.drawn == told
+        world.close()
+    world = make_scenario(name, mirrored="always").build(np.random.default_rng(0))
+    assert world.drawn == {}
+    world.close()
 
 
 @every_scenario

@@ -149,6 +149,24 @@ def test_half_of_the_seeds_are_mirrored_and_nothing_else_is(name):
     assert np.angle(np.exp(1j * (other[:, 2] + one[:, 2]))) == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("seed", "side"), [(RIGHT_HAND, "never"), (LEFT_HAND, "always")], ids=["right", "left"]
+)
+def test_the_side_can_be_asked_for_and_a_drawn_one_is_told(seed, side):
+    """A world of the side that a seed draws is the world of that seed, its cars included."""
+    drawn, given, other = (
+        make_scenario("ncap", mirrored=mirrored).build(np.random.default_rng(seed))
+        for mirrored in ("drawn", side, {"never": "always", "always": "never"}[side])
+    )
+    seen = [world.boxes(world.actors) for world in (drawn, given, other)]
+    assert drawn.drawn == {"mirrored": side}
+    assert given.drawn == {}
+    for world in (drawn, given, other):
+        world.close()
+    np.testing.assert_array_equal(seen[0], seen[1])
+    np.testing.assert_allclose(seen[2][:, 1], -seen[0][:, 1], atol=1e-9)
+
+
 @every_test
 def test_a_test_is_over_when_the_ego_has_braked_in_time(name):
     for speeds in ends_of(name):
@@ -191,6 +209,7 @@ def test_a_bend_turns_by_what_it_says(radius, clothoid, right):
         ({"test": "CPTAfs-50"}, "speed_kph of CPTAfs-50 must be one of 10, 15, 20"),
         ({"test": "CCFtap", "speed_kph": 30.0}, "speed_kph of CCFtap must be one of 10, 15, 20"),
         ({"speed_kph": 150.0}, r"speed_kph of ncap must lie in \[0, 140\]"),
+        ({"mirrored": "half"}, "unknown mirrored 'half'; known: always, drawn, never"),
         ({"test": "drawn"}, "speed_kph of ncap must be 0 where the test is drawn"),
         ({"speed_kph": 0, "target_kph": 20}, "target_kph of ncap must be 0 where speed_kph is"),
         ({"speed_kph": 0.5}, "speed_kph of ncap must be 0 or at least 1, got 0.5"),

@@ -6,13 +6,13 @@ from care_sim.scenarios import make_scenario
 from care_sim.scenarios.r157.grid import kinds_in_turn
 from care_sim.scenarios.r157.preventable import preventable
 from care_sim.study.designs import r157
-from care_sim.study.episode_config import grid
+from care_sim.study.episode_config import EpisodeConfig, grid
 
 
 def test_the_study_plays_every_preventable_case_and_no_other(monkeypatch):
     few = preventable(kinds_in_turn())[::100]
     monkeypatch.setattr(r157, "kinds_in_turn", lambda: [*few, *kinds_in_turn()[:3]])
-    configs = r157.r157_study([0, 1], ["fan"])
+    configs = r157.r157_study([0, 1])
     assert {r157.case_of(config.row()) for config in configs} == {*few}
     played = Counter((config.policy, config.budget) for config in configs)
     policies = ("history", "all-camera", "care", "fan")
@@ -22,6 +22,25 @@ def test_the_study_plays_every_preventable_case_and_no_other(monkeypatch):
     assert {config.driver for config in r157.r157_study([0], driver="careful-human")} == {
         "careful-human"
     }
+
+
+def test_every_third_case_is_a_third_of_the_same():
+    whole = r157.r157_study([0], ["care", "fan"], [0.02])
+    few = r157.r157_study([0], ["care", "fan"], [0.02], every=3)
+    assert (len(whole), len(few)) == (2 * 379, 2 * 127)
+    assert few[::2] == whole[::2][::3]
+
+
+def test_configurations_are_as_if_each_had_been_checked():
+    for config in r157.r157_study([3], ["care", "full"], [0.01])[::401]:
+        again = EpisodeConfig(
+            "r157",
+            config.policy,
+            config.budget,
+            3,
+            scenario_parameters=tuple(vars(r157.case_of(config.row())).items()),
+        )
+        assert (config, config.row()) == (again, again.row())
 
 
 def test_a_case_as_parameters_is_the_case_that_is_drawn():

@@ -170,6 +170,20 @@ def chosen_command(
     raise InvalidInput(_one_line(complaint.getvalue()))
 
 
+def option_names(command: type) -> set[str]:
+    """The options of a command as they are written, those that several commands share included."""
+    names = set()
+    for field in fields(command):
+        written = field.name.replace("_", "-")
+        if is_dataclass(field.default):
+            names |= option_names(type(field.default))
+        elif isinstance(field.default, bool):
+            names |= {f"--{written}", f"--no-{written}"}
+        else:
+            names.add(f"--{written}")
+    return names
+
+
 def _refusal(end: BaseException | None) -> InvalidInput | None:
     """The InvalidInput of an options' class, which tyro takes for a mistake of its own kind."""
     while end is not None and not isinstance(end, InvalidInput):

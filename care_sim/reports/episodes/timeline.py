@@ -8,7 +8,7 @@ from rich.text import Text
 
 from care_sim.base.errors import printable
 from care_sim.driving.drivers import brake_delay_s
-from care_sim.loops.records import Keyframe, Outcome
+from care_sim.loops.records import DriveOutcome, Keyframe
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.run_config import Row
 
@@ -50,10 +50,45 @@ def print_timeline(
         table.add_row(*(_cells(frame) if frame else ["..."]))
     console.print(table)
     console.print(_LEGEND.format(delay=brake_delay_s(config)), markup=False)
-    for name in Outcome.__dataclass_fields__:
+    for name in _told(row):
         console.print(f"{_LABELS.get(name, name):44} {text(row[name])}")
+    for number, encounter in enumerate(row.get("encounters", ()), 1):
+        line = f"encounter {number}: {encounter_text(encounter, keyframes)}"
+        console.print(line, markup=False)
     console.print(f"{'episode_hash':44} {row['episode_hash']}")
     console.print(f"{'wall_s':44} {row['wall_s']:.1f}")
+
+
+def _told(row: Row) -> list[str]:
+    """The columns that are shown: what the seed drew, and the outcome, of a drive the whole one
+    but for its encounters.
+    """
+    drawn = [name for name in row if name.startswith("drawn.")]
+    outcome = [name for name in DriveOutcome.__dataclass_fields__ if name != "encounters"]
+    return [*drawn, *(name for name in outcome if name in row)]
+
+
+def encounter_text(encounter: Row, keyframes: Sequence[Keyframe]) -> str:
+    """Who came, from where, and what came of it. `encounter` holds the fields of
+    `care_sim.loops.records.EncounterOutcome`, times are those of the `keyframes`.
+    """
+    known = "reported" if encounter["occluder_reported"] else "unreported"
+    who = (
+        f"{encounter['who']} from the {encounter['side']} ({encounter['course']}, "
+        f"{encounter['way']}), behind {encounter['occluder']} ({known})"
+    )
+    if not encounter["set_off"]:
+        return f"{who}: never set off"
+    seen, found = encounter["view_keyframe"], encounter["detection_keyframe"]
+    told = [
+        "never in view" if seen is None else f"in view at {keyframes[seen].time_s:.1f} s",
+        "not detected"
+        if found is None
+        else f"detected at {keyframes[found].time_s:.1f} s, "
+        f"{encounter['detection_distance_m']:.1f} m",
+        *(["hit"] if encounter["hit"] else []),
+    ]
+    return f"{who}: {'; '.join(told)}"
 
 
 def eventful(keyframes: Sequence[Keyframe]) -> list[Keyframe | None]:

@@ -43,6 +43,7 @@ def ncap_figure(rows: Sequence[Row]) -> Figure:
             )
     _name_axes([*panels[:, 0]], results, speeds)
     for axes in panels[-1]:
+        axes.tick_params(axis="x", labelrotation=90)
         axes.set_xlabel("test speed (km/h)", fontsize=7)
     seeds = len({row["seed"] for row in rows})
     title = f"mean score of {seeds} seeds; pale: no test at this speed"
@@ -74,8 +75,7 @@ def _draw(
 
 
 def _name_axes(first: Sequence[Axes], results: NcapRows, speeds: Sequence[float]) -> None:
-    """Names of tests beside the first panels; every other speed below, since they are narrow."""
+    """Names of tests beside the first panels; every speed below, upright since they are narrow."""
     for axes in first:
         axes.set_yticks(range(len(results.lines)), [line.label for line in results.lines])
-    shown = range(0, len(speeds), 2)
-    first[0].set_xticks(shown, [f"{speeds[place]:g}" for place in shown])
+    first[0].set_xticks(range(len(speeds)), [f"{speed:g}" for speed in speeds])

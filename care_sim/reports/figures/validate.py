@@ -74,8 +74,10 @@ def validation_figures(rows: Sequence[Row]) -> dict[str, Figure]:
         line[0].set_ylim(-_BELOW * highest, highest)
     for axes, budget in zip(panels[0], budgets, strict=True):
         axes.set_title(f"budget {percent(budget)}", loc="left", fontsize=10)
+    # The title names a world that stands alone.
+    names = _names(worlds) if len(worlds) > 1 else []
     for axes in panels[-1]:
-        axes.set_xticks(range(len(worlds)), _names(worlds), rotation=30, ha="right", fontsize=8)
+        axes.set_xticks(range(len(names)), names, rotation=30, ha="right", fontsize=8)
     marks = tag_notes(tags[policy] for policy in _SHOWN if policy in tags)
     seeds = len({row["seed"] for world in worlds for row in world.test_rows})
     changed = ", then with one factor changed" if len(worlds) > 1 else ""

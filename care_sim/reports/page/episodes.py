@@ -3,8 +3,9 @@ were made.
 """
 
 import math
-from collections.abc import Sequence
-from concurrent.futures import BrokenExecutor, Future
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import BrokenExecutor, Future, as_completed
 from dataclasses import dataclass
 
 from care_sim.loops.records import Outcome
@@ -14,6 +15,7 @@ from care_sim.study.episode_config import PLAIN_FIELDS, EpisodeConfig
 from care_sim.study.episode_play import result_or_reason
 from care_sim.study.executors import ExecutorFactory, processes
 from care_sim.study.parameters import Parameters
+from care_sim.study.progress import Show, rounded_duration, shown_progress
 from care_sim.study.run_config import Row
 from care_sim.study.runner import DIED
 
@@ -69,8 +71,8 @@ def episodes_to_watch(rows: Sequence[Row], most: int) -> list[Row]:
 def played_again(
     rows: Sequence[Row], workers: int, make_executor: ExecutorFactory = processes
 ) -> list[Episode]:
-    """Play the episodes of rows again, in processes. An interrupt does not wait for episodes that
-    have not begun.
+    """Play the episodes of rows again, in processes, and show on stderr how far they are. An
+    interrupt does not wait for episodes that have not begun.
     """
     if not rows:
         return []
@@ -78,11 +80,25 @@ def played_again(
     try:
         # Each by itself: what was played before the death of a worker stays.
         futures = [executor.submit(result_or_reason, _replay_of, row) for row in rows]
+        with shown_progress(len(rows), "episodes") as show:
+            follow(futures, show)
         return [Episode(row, _ending(future)) for row, future in zip(rows, futures, strict=True)]
     finally:
         # After an interrupt the episodes that wait are not begun. Those that are being played end
         # first.
         executor.shutdown(cancel_futures=True)
+
+
+def follow(
+    futures: Sequence[Future[Replay | str]],
+    show: Show,
+    clock: Callable[[], float] = time.monotonic,
+) -> None:
+    """Wait for all, and show how many have ended and how long the others should take."""
+    started = clock()
+    for done, _ in enumerate(as_completed(futures), 1):
+        left_s = (clock() - started) / done * (len(futures) - done)
+        show(done, f"{rounded_duration(left_s)} left")
 
 
 def config_of(row: Row) -> EpisodeConfig:

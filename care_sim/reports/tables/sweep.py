@@ -7,7 +7,16 @@ from collections.abc import Sequence
 from care_sim.base.errors import percent
 from care_sim.evaluation.censoring import Quartiles
 from care_sim.reports.cells import Cell, summarise
-from care_sim.reports.contrasts import BRAKED, DETECTED, DETECTION, Contrast, Measure, contrast
+from care_sim.reports.contrasts import (
+    AVOIDED,
+    BRAKED,
+    DETECTED,
+    DETECTION,
+    Contrast,
+    Measure,
+    contrast,
+    preventable,
+)
 from care_sim.reports.formatting import ends, interval, marked, spread, tag_notes, unsigned
 from care_sim.reports.table import Table
 from care_sim.reports.tables.controls import control_tables
@@ -35,7 +44,7 @@ SWEEP_COLUMNS = (
     "as full",
     "paper",
 )
-_FILES_ONLY = ("pass m", "clearance m", "collisions", "interval", "as full")
+_FILES_ONLY = ("pass m", "clearance m", "interval", "as full")
 """Columns that 80 characters of a terminal leave no room for."""
 _WHOLE = tuple(column for column in SWEEP_COLUMNS if column not in ("policy", "paper"))
 
@@ -64,8 +73,9 @@ def levels_table(title: str, cells: Sequence[Cell]) -> Table:
     regretted = any(cell.regret for cell in cells) or all(cell.policy == FULL for cell in cells)
     missing = [] if regretted else ["Regret: full not run."]
     notes = [*tag_notes(cell.tags for cell in cells), *missing, *_nobody_notes(cells)]
-    # Without censored episodes the column holds zeros, and a terminal has no room for them.
-    hidden = _FILES_ONLY if any(cell.never for cell in cells) else (*_FILES_ONLY, "never")
+    # A terminal has no room for columns of zeros.
+    counted = {"never": [cell.never for cell in cells], "collisions": [c.collisions for c in cells]}
+    hidden = (*_FILES_ONLY, *(column for column, counts in counted.items() if not any(counts)))
     return Table(title, SWEEP_COLUMNS, tuple(lines), tuple(notes), tuple(sentences), hidden, _WHOLE)
 
 
@@ -94,8 +104,8 @@ def _contrast_table(
     # The budgets of the reference: at others there is nothing to compare with.
     budgets = sorted({cell.budget for cell in cells if cell.policy == reference})
     lines: list[tuple[str, ...]] = []
-    for measure in (DETECTION, BRAKED, *([DETECTED] if any(cell.never for cell in cells) else [])):
-        lines.append((f"{measure.name}, {measure.unit}",))
+    for measure in _measures(cells):
+        lines.append((f"{_name(measure, setting, groups)}, {measure.unit}",))
         for policy in (policy for policy in tags if policy != reference):
             pairs = [
                 ((setting, reference, budget), (setting, policy, budget)) for budget in budgets
@@ -113,15 +123,33 @@ def _contrast_table(
     )
 
 
-def _ahead(measure: Measure, ours: Key, theirs: Key, groups: Groups) -> Contrast | None:
-    """What a policy has over another at the same budget, or over the full scan."""
-    setting, policy, _ = theirs
-    return contrast(
-        measure,
-        groups.get(ours),
-        # The full scan has one budget, and is held against every budget of the others.
-        full_of(groups, setting) if policy == FULL else groups.get(theirs),
+def _measures(cells: Sequence[Cell]) -> list[Measure]:
+    """What is compared: detections and collisions where not all policies have all or none."""
+    further = (
+        (DETECTED, any(cell.never for cell in cells)),
+        (AVOIDED, any(cell.collisions for cell in cells)),
     )
+    return [DETECTION, BRAKED, *(measure for measure, differs in further if differs)]
+
+
+def _name(measure: Measure, setting: Setting, groups: Groups) -> str:
+    """The name of a measure; that of collisions tells whether it counts the preventable alone."""
+    if measure is AVOIDED and full_of(groups, setting):
+        return f"Preventable {measure.name.lower()}"
+    return measure.name
+
+
+def _ahead(measure: Measure, ours: Key, theirs: Key, groups: Groups) -> Contrast | None:
+    """What a policy has over another at the same budget, or over the full scan; of collisions, on
+    the seeds on which the full scan has none, if it was played.
+    """
+    setting, policy, _ = theirs
+    full = full_of(groups, setting)
+    # The full scan has one budget, and is held against every budget of the others.
+    rows = groups.get(ours, ()), full or () if policy == FULL else groups.get(theirs, ())
+    if measure is AVOIDED and full:
+        rows = preventable(full, rows[0]), preventable(full, rows[1])
+    return contrast(measure, *rows)
 
 
 def _published(cell: Cell) -> PublishedResult | None:

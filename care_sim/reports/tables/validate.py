@@ -5,7 +5,7 @@ from functools import partial
 from itertools import combinations
 
 from care_sim.base.errors import counted, percent
-from care_sim.evaluation.censoring import quartiles
+from care_sim.evaluation.censoring import FEWEST_PAIRS, quartiles
 from care_sim.reports.contrasts import GATE_COLLISION_POINTS, GATE_M
 from care_sim.reports.controls import BEST_CONTROL
 from care_sim.reports.formatting import interval, marked, mean, median, tag_notes
@@ -31,7 +31,8 @@ _QUESTIONS = (
     "same seed, the interval excludes zero, and nothing that counts as much speaks against it. "
     f"1: the {_BEST_CAMERA} leads the {BEST_CONTROL}, by this much. 2: the full scan leads the "
     f"{BEST_CONTROL}, so that there is something to win. 3: each two of {', '.join(SEPARATED)} are "
-    "told apart by the same gates. A world discriminates at a budget where all three are so."
+    "told apart by the same gates. A world discriminates at a budget where all three are so. Too "
+    f"few: no difference counts on fewer than {FEWEST_PAIRS} test seeds."
 )
 _HIT = (
     "Hit: episodes with a collision. Lost: episodes in which the full scan itself hits, or never "
@@ -121,16 +122,18 @@ def _verdict(world: WorldPlays, budget: float) -> _Line:
         world.best_camera(budget) or "",
         world.best_control(budget) or "",
         world.hindsight_control(budget) or "",
-        _word(lead.leads),
+        _answer(world, lead.leads),
         mean(lead.detection),
         mean(lead.avoided),
-        _word(world.full_lead(budget).leads),
-        _word(all(pair.is_told for pair in world.separations(budget).values())),
-        _word(not world.failings(budget)),
+        _answer(world, world.full_lead(budget).leads),
+        _answer(world, all(pair.is_told for pair in world.separations(budget).values())),
+        _answer(world, not world.failings(budget)),
     )
 
 
-def _word(so: bool) -> str:
+def _answer(world: WorldPlays, so: bool) -> str:
+    if world.has_too_few:
+        return "too few"
     return Bold("yes") if so else "no"
 
 

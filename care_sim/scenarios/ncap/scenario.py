@@ -10,6 +10,7 @@ from care_sim.base.checks import check_known
 from care_sim.base.errors import InvalidInput
 from care_sim.core.frames import Pose
 from care_sim.scenarios.base import LONGEST_EPISODE_S, NO_LIMIT_MPS, Scenario
+from care_sim.scenarios.mirroring import MIRRORED
 from care_sim.scenarios.ncap.approach import across, ahead, braking_ahead
 from care_sim.scenarios.ncap.forms import (
     Across,
@@ -49,8 +50,7 @@ class Ncap(Scenario):
 
     An ego that does not brake hits the target as the protocol wants it. The seed draws only what
     the protocol leaves open: within its tolerance the ego's speed, when the sensor begins, the
-    sizes of the cars that stand there, and the side: half of the episodes are mirrored, as in
-    left-hand traffic.
+    sizes of the cars that stand there, and, unless `mirrored` says, the side.
 
     With `test="drawn", speed_kph=0` the seed draws a test too, each as often as the others, and one
     of its pairs of speeds, so that a map of a single test does not fit.
@@ -68,6 +68,8 @@ class Ncap(Scenario):
     target_kph: float = bounded(0.0, 0, 140)
     """The target's, km/h. 0 stands for the protocol's at the ego's speed: the first where it has
     several, unless the pair is drawn."""
+    mirrored: str = "drawn"
+    """never, always, or half of the seeds: reflected at the ego's way, as in left-hand traffic."""
     occluder_reported: bool = True
     excess_kph: Range = bounded((0.0, 1.0), 0, 4)
     """By how much the ego is faster than the test's speed: the protocol's tolerance."""
@@ -82,6 +84,7 @@ class Ncap(Scenario):
     def __post_init__(self) -> None:
         super().__post_init__()
         check_known("test of ncap", self.test, (*TESTS, DRAWN))
+        check_known("mirrored", self.mirrored, MIRRORED)
         for name in ("speed_kph", "target_kph"):
             if 0 < getattr(self, name) < 1:
                 raise InvalidInput(
@@ -127,7 +130,8 @@ class Ncap(Scenario):
         own = self.drawn(rng)
         world = own._build(rng)
         if not self.speed_kph:
-            world.drawn = {"speed_kph": own.speed_kph, "target_kph": own.target_kph}
+            speeds = {"speed_kph": own.speed_kph, "target_kph": own.target_kph}
+            world.drawn = {**speeds, **world.drawn}
         if self.test == DRAWN:
             world.drawn = {"test": own.test, **world.drawn}
         return world
@@ -138,6 +142,8 @@ class Ncap(Scenario):
         speed = (self.speed_kph + draw(rng, self.excess_kph)) / 3.6
         start_s = test.start_s + draw(rng, self.phase_s)
         side = 1.0 if rng.random() < 0.5 else -1.0
+        if self.mirrored != DRAWN:
+            side = -1.0 if self.mirrored == "always" else 1.0
         sizes = Sizes(
             (draw(rng, self.small_length_m), draw(rng, self.small_width_m), SMALL_HEIGHT_M),
             (draw(rng, self.large_length_m), draw(rng, self.large_width_m), LARGE_HEIGHT_M),
@@ -148,6 +154,8 @@ class Ncap(Scenario):
         traffic = Traffic((1,), ego_lane=0, lane_width=LANE_WIDTH_M, speed_limit=NO_LIMIT_MPS)
         world = World(traffic, speed, _mirrored_route(meeting.route, side))
         world.has_oncoming = True
+        if self.mirrored == DRAWN:
+            world.drawn = {"mirrored": "always" if side < 0 else "never"}
         self._add_cars(world, meeting, sizes, side)
         world.first_sighting = world.add(
             test.target.body, test.target.body, lambda time: _mirrored(meeting.motion(time), side)

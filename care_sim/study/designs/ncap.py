@@ -6,7 +6,7 @@ from typing import Any
 
 from care_sim.scenarios.ncap.forms import Across, NcapTest
 from care_sim.scenarios.ncap.table import TESTS
-from care_sim.study.episode_config import EpisodeConfig, grid
+from care_sim.study.episode_config import EpisodeConfig, grid, of_cases
 from care_sim.study.parameters import Parameters
 
 NCAP_POLICIES = ("history", "all-camera", "care", "care-sightlines", "fan", "full")
@@ -69,8 +69,6 @@ def ncap_study(
     step_kph: float = NCAP_STEP_KPH,
 ) -> list[EpisodeConfig]:
     """Every case, policy and budget: 140 cases, 2,240 configurations a seed by default."""
-    return [
-        config
-        for case in ncap_cases(tests, step_kph)
-        for config in grid(["ncap"], policies, budgets, seeds, scenario_parameters=case.parameters)
-    ]
+    # The cases are the protocols' own, which need no check: policies and budgets are checked once.
+    cases = [case.parameters for case in ncap_cases(tests, step_kph)]
+    return of_cases(grid(["ncap"], policies, budgets, seeds), cases)

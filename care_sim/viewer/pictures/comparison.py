@@ -48,7 +48,7 @@ def draw_panel(name: str, loop: ClosedLoop, frames: Sequence[Keyframe]) -> Image
     canvas.paste(_cells_ahead(loop), (0, _GRID_TOP))
     contact = contact_text(loop, frames[-1])
     text, colour = (contact, HIT.colour) if contact else verdict_text(frames, loop.rig.keyframe_s)
-    draw.text((8, _COMPARISON_HEIGHT - 26), text, colour, drawing.font(18))
+    draw.text((8, _COMPARISON_HEIGHT - 26), text, colour, drawing.font(16))
     return canvas
 
 
@@ -94,8 +94,10 @@ def verdict_text(frames: Sequence[Keyframe], keyframe_s: float) -> tuple[str, dr
             IN_VIEW.colour,
         )
     so_far = outcome(frames)
-    late = f", {found - seen:.1f} s late" if seen is not None and found > seen else ""
-    clearance = (
-        "" if so_far.clearance_m is None else f"; least clearance {so_far.clearance_m:.1f} m"
+    after = (
+        f", {found - seen:.1f} s after coming into view"
+        if seen is not None and found > seen
+        else ""
     )
-    return f"detected at {so_far.detection_distance_m:.1f} m{late}{clearance}", DETECTED.colour
+    clearance = "" if so_far.clearance_m is None else f"; clearance {so_far.clearance_m:.1f} m"
+    return f"detected at {so_far.detection_distance_m:.1f} m{after}{clearance}", DETECTED.colour

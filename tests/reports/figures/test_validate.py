@@ -28,6 +28,7 @@ def test_alone_a_world_has_no_factor_and_what_stands_at_zero_is_in_sight():
     assert figure.get_suptitle() == "dartout: 6 test seeds"
     assert "best control of dartout: " in figure.get_supxlabel()
     assert all(axes.get_ylim()[0] < 0 for axes in figure.axes)
+    assert [axes.get_xticklabels() for axes in figure.axes] == [[], []]
 
 
 def test_the_best_control_is_that_of_each_world():

@@ -118,6 +118,33 @@ def test_detection_rates_are_compared_only_where_somebody_missed():
     assert ("Detected, points", "all-camera") not in blocks(everybody)
 
 
+def collided(policy, seeds):
+    """Five episodes, of which those of `seeds` end in a collision."""
+    return [each | {"collision": each["seed"] in seeds} for each in rows(policy, [15.0] * 5)]
+
+
+COLLISIONS = [*collided("care", {4}), *collided("history", {1, 2, 4})]
+
+
+def test_collisions_are_compared_where_somebody_was_hit():
+    assert not any("ollision" in block for block, _ in blocks())
+    assert blocks(COLLISIONS)["Collisions avoided, points", "history"][0].startswith("+40 [0,80]")
+
+
+def test_preventable_are_the_collisions_that_the_full_scan_avoids_on_the_same_seed():
+    """It collides on seeds 3 and 4: of the other three, history collides on two."""
+    found = blocks([*COLLISIONS, *collided("full", {3, 4})])
+    assert found["Preventable collisions avoided, points", "history"][0].startswith("+67 [")
+    assert found["Preventable collisions avoided, points", "full"] == ("+0 [0,0]",)
+
+
+@pytest.mark.parametrize(("study", "shown"), [(COLLISIONS, True), (STUDY, False)])
+def test_the_terminal_shows_collisions_where_there_are_any(study, shown):
+    terminal = io.StringIO()
+    Console(width=80, file=terminal).print(sweep_tables(study)[0].rich())
+    assert ("collisions" in terminal.getvalue()) is shown
+
+
 def test_without_care_or_another_policy_there_is_no_contrast():
     assert len(sweep_tables([row for row in STUDY if row["policy"] != "care"])) == 1
     assert len(sweep_tables(rows("care", [15.0]))) == 1

@@ -4,7 +4,7 @@ import pytest
 
 from care_sim.reports.table import Bold
 from care_sim.reports.tables.validate import validation_closing, validation_tables
-from tests.helpers.made_worlds import SATURATED, STUDY, TRAINING, cell, world
+from tests.helpers.made_worlds import SATURATED, SEEDS, STUDY, TELLING, TRAINING, cell, world
 
 TITLES = (
     "Does the world discriminate?",
@@ -32,6 +32,15 @@ def test_a_line_a_budget_says_who_was_chosen_and_answers_the_questions(tables):
         ("3%", "care", "rows", "fan", "yes", "+5.0*", "+60*", "yes", "yes", "yes"),
     )
     assert isinstance(verdicts.rows[3][-1], Bold)
+
+
+def test_answers_on_too_few_seeds_are_neither_yes_nor_no():
+    """On four seeds CARE leads and the full scan leaves much to win, but no difference counts."""
+    rows = [each for each in world(TELLING, TRAINING) if not 4 <= each["seed"] < SEEDS]
+    verdict = validation_tables(rows)[0].rows[1]
+    assert verdict[4:7] == ("too few", "+5.0", "+50")
+    assert verdict[7:] == ("too few",) * 3
+    assert validation_closing(rows)[1] == "dartout: no verdict on 4 test seeds, it takes 5."
 
 
 def test_collisions_stand_side_by_side_with_those_of_the_full_scan(tables):
