@@ -53,7 +53,9 @@ def listed_values(path: Path, most: int = MOST_BYTES) -> Iterator[Any]:
             raise ValueError("it holds no list")
         place = opened.end()
         is_open = opened[1] is None
+        number = 0
         while is_open:
+            number += 1
             # From here on the text holds the next value as a whole, or all that is left.
             if len(text) - place < MOST_CHARACTERS:
                 text, place = text[place:] + file.read(_CHUNK), 0
@@ -61,6 +63,10 @@ def listed_values(path: Path, most: int = MOST_BYTES) -> Iterator[Any]:
                 value, place = decode(text, place)
             except RecursionError as error:
                 raise ValueError("it is nested too deep") from error
+            # The place that the error tells is one of the text in memory, not of the file.
+            except json.JSONDecodeError as error:
+                most = f"at most {MOST_CHARACTERS} characters"
+                raise ValueError(f"value {number} is no JSON of {most}: {error.msg}") from error
             yield value
             ended = _VALUE_ENDED.match(text, place)
             if ended is None:

@@ -29,7 +29,7 @@ class R157(EpisodeStudy):
     budgets: tuple[float, ...] = R157_BUDGETS
     """Shares of the cells that may fire at a keyframe, above 0 and at most 1."""
     every: int = bounded(1, 1, 100)
-    """Plays every N-th preventable case of the grid: 3 plays 127 of the 379."""
+    """Plays one of N preventable cases of the grid, by a fixed lot: 3 plays 127 of the 379."""
     driver: str = FIXED
     """fixed, or careful-human: the regulation's driver at the wheel."""
     out: Path = Path("runs/r157")

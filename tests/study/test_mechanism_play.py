@@ -155,7 +155,7 @@ def test_a_policy_that_states_no_demand_is_told_in_one_line(monkeypatch):
 
 
 def test_a_scene_gives_a_row_for_the_driver_the_policies_and_the_full_scan(monkeypatch):
-    monkeypatch.setattr(type(STREETS), "film", lambda source, scene: FILM)
+    monkeypatch.setattr(type(STREETS), "film", lambda source, scene, returns: FILM)
     configs = mechanism_plays(
         STREETS, [Scene("handmade", 0)], ["history"], budget=0.1, driver="care", floor=False
     )

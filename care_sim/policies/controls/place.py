@@ -10,7 +10,7 @@ from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
-from care_sim.policies.controls.rows import nearest_rows
+from care_sim.policies.controls.rows import cells_by_row
 from care_sim.policies.learned.weights import load_weights, shipped_weights
 
 
@@ -48,5 +48,5 @@ def likeliest_first(rig: Rig, sightings: NDArray[np.floating]) -> Cells:
     them.
     """
     # Most cells of a map have none: without the rows, larger budgets would go to the sky.
-    rows = nearest_rows(rig)
+    rows = cells_by_row(rig)
     return rows[np.argsort(-sightings[rows], kind="stable")]

@@ -33,7 +33,7 @@ class Rows(Policy):
         super().__init__(rig)
         if elevation_deg is not None:
             check_number("elevation_deg", elevation_deg, -90, 90)
-        self._pattern = nearest_rows(rig, elevation_deg)
+        self._pattern = cells_by_row(rig, elevation_deg)
 
     def demand(self, belief: Belief) -> Demand:
         """The same cells at every keyframe."""
@@ -49,7 +49,7 @@ def entry_elevation_deg(rig: Rig) -> float:
     return round(math.degrees(math.atan(rise)), 2)
 
 
-def nearest_rows(rig: Rig, elevation_deg: float | None = None) -> Cells:
+def cells_by_row(rig: Rig, elevation_deg: float | None = None) -> Cells:
     """(N,) all cells, row after row, the row nearest to an elevation first: the given one, else
     `entry_elevation_deg`. Every first few cells of a row lie evenly over it. On a tilted grid every
     column gives its own nearest cell to the first such row, and so on.
@@ -66,6 +66,6 @@ def nearest_rows(rig: Rig, elevation_deg: float | None = None) -> Cells:
 def entry_cells(rig: Rig) -> Cells:
     """(columns,) the cell of every column at which things enter the range of scoring."""
     columns = rig.grid.columns
-    nearest = nearest_rows(rig)[:columns]
+    nearest = cells_by_row(rig)[:columns]
     cells: Cells = nearest[np.argsort(nearest % columns)]
     return cells

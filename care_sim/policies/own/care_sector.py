@@ -10,7 +10,7 @@ from care_sim.core.residual import camera_layers
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
-from care_sim.policies.controls.rows import entry_cells, nearest_rows
+from care_sim.policies.controls.rows import cells_by_row, entry_cells
 from care_sim.policies.own.care_sightlines import WEDGE_ROUNDS
 from care_sim.policies.own.care_spread import (
     CORE_FIRST,
@@ -40,7 +40,7 @@ class CareSector(Policy):
         check_whole("min_returns", min_returns, 1)
         self._hull_round = HULL_CELLS_PER_RETURN * min_returns
         self._wedge_round = WEDGE_CELLS_PER_RETURN * min_returns
-        self._rows = nearest_rows(rig)
+        self._rows = cells_by_row(rig)
         self._sector = entry_cells(rig)[columns_ahead(rig.grid)]
 
     def demand(self, belief: Belief) -> Demand:

@@ -11,7 +11,7 @@ from care_sim.core.residual import camera_layers
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
-from care_sim.policies.controls.rows import entry_cells, nearest_rows
+from care_sim.policies.controls.rows import cells_by_row, entry_cells
 from care_sim.policies.own.care_spread import (
     CORE_FIRST,
     HULL_CELLS_PER_RETURN,
@@ -74,7 +74,7 @@ class CareSightlines(Policy):
         self._rechecks = explained
         self._watches = sight_lines
         self._entries = entry_cells(rig)
-        self._rows = CellSets.of([nearest_rows(rig)] if rows else [])
+        self._rows = CellSets.of([cells_by_row(rig)] if rows else [])
         self.reset()
 
     def reset(self) -> None:

@@ -124,7 +124,7 @@ def _contrast_table(
 
 
 def _measures(cells: Sequence[Cell]) -> list[Measure]:
-    """What is compared: detections and collisions where not all policies have all or none."""
+    """What is compared: detections and collisions where any policy has some."""
     further = (
         (DETECTED, any(cell.never for cell in cells)),
         (AVOIDED, any(cell.collisions for cell in cells)),

@@ -62,9 +62,10 @@ def _kept(place: Path, stamp: str, make: Callable[[], pa.Table]) -> pa.Table | N
         # Another process may have made it while this one waited.
         table = _mapped(place, stamp)
         if table is None and _can_be_written(place):
-            with suppress(OSError):  # the disk is full
-                _write(place, make().replace_schema_metadata({_STAMP: stamp}))
-            table = _mapped(place, stamp)
+            table = make().replace_schema_metadata({_STAMP: stamp})
+            with suppress(OSError):  # the disk is full: it stays in memory alone
+                _write(place, table)
+                table = _mapped(place, stamp) or table
     return table
 
 

@@ -31,9 +31,9 @@ class Fitting(NamedTuple):
     left_out: list[str]
 
 
-def fitting(sensor: str | SensorSetup) -> Fitting:
+def fitting(sensor: str | SensorSetup, policies: Sequence[str] = FIRING_POLICIES) -> Fitting:
     """What of the study fits a set-up: units that divide its grid and of which the least budget
-    buys one, and policies without weights of another grid.
+    buys one, and those of the `policies` that have no weights of another grid.
     """
     setup = sensor_setup(sensor)
     found = Fitting([], [], [])
@@ -43,7 +43,7 @@ def fitting(sensor: str | SensorSetup) -> Fitting:
             found.firings.append(firing)
         except InvalidInput as error:
             found.left_out.append(f"left out with {setup.name}: {firing} ({error})")
-    for policy in FIRING_POLICIES:
+    for policy in policies:
         try:
             grid(["dense"], [policy], FIRING_BUDGETS[-1:], [0], sensor=sensor)
             found.policies.append(policy)

@@ -9,7 +9,7 @@ from care_sim.policies.controls.history_learned_place import HistoryLearnedPlace
 from care_sim.policies.controls.history_place import HistoryPlace
 from care_sim.policies.controls.history_rows import HistoryRows
 from care_sim.policies.controls.learned_place import learned_cells
-from care_sim.policies.controls.rows import nearest_rows
+from care_sim.policies.controls.rows import cells_by_row
 from care_sim.policies.learned.weights import Card, save_weights
 
 GRID = AngularGrid()
@@ -24,7 +24,7 @@ def test_the_hull_of_the_track_comes_first_and_then_the_rows(belief_of, car):
     demand = HistoryRows(Rig()).demand(belief_of([car(1, 20)]))
     assert [cells.tolist() for cells in demand.exploitation] == [HULL]
     ((pattern,),) = demand.layers
-    assert np.array_equal(pattern, nearest_rows(Rig())[:819])
+    assert np.array_equal(pattern, cells_by_row(Rig())[:819])
 
 
 def test_the_hull_of_the_track_comes_first_and_then_the_map(belief_of, car, tmp_path):

@@ -13,7 +13,7 @@ from care_sim.core.rig import Rig
 from care_sim.policies import controls, make_policy, tags_of
 from care_sim.policies.controls.fan import Fan
 from care_sim.policies.controls.place import Place
-from care_sim.policies.controls.rows import Rows, entry_elevation_deg, nearest_rows
+from care_sim.policies.controls.rows import Rows, cells_by_row, entry_elevation_deg
 from care_sim.policies.controls.stride import Stride
 from care_sim.policies.controls.sweep import Sweep
 from care_sim.policies.learned.weights import Card, save_weights
@@ -87,7 +87,7 @@ def test_a_pattern_fires_the_same_whatever_it_is_shown(name):
 
 def test_rows_begin_where_a_car_enters_the_range():
     """-1.25 degrees lies nearest to row 9 at -1.33, then row 8 at 0.0 and row 10 at -2.67."""
-    rows = nearest_rows(Rig())[:: GRID.columns] // GRID.columns
+    rows = cells_by_row(Rig())[:: GRID.columns] // GRID.columns
     assert rows[:3].tolist() == [9, 8, 10]
     assert sorted(rows) == [*range(GRID.rows)]
 
@@ -102,7 +102,7 @@ def test_rows_begin_there_wherever_the_lidar_stands(height, elevation, first):
     """
     rig = Rig(sensor_height_m=height)
     assert entry_elevation_deg(rig) == elevation
-    rows = nearest_rows(rig)[:: GRID.columns] // GRID.columns
+    rows = cells_by_row(rig)[:: GRID.columns] // GRID.columns
     assert rows[:3].tolist() == first
     assert chosen(Rows(rig))[0] // GRID.columns == first[0]
 
@@ -158,7 +158,7 @@ def test_place_takes_the_highest_of_its_map(tmp_path):
     save_weights(tmp_path / "map.npz", {"sightings": sightings}, Card("place", GRID))
     cells = chosen(Place(Rig(budget=GRID.size), tmp_path / "map.npz"))
     assert cells[:2].tolist() == [4 * 512 + 7, 9 * 512 + 300]
-    rows = nearest_rows(Rig())
+    rows = cells_by_row(Rig())
     assert np.array_equal(cells[2:], rows[~np.isin(rows, cells[:2])])
 
 

@@ -7,7 +7,7 @@ import care_sim
 from care_sim.core.grid import AngularGrid
 from care_sim.core.residual import camera_layers
 from care_sim.core.rig import Rig
-from care_sim.policies.controls.rows import nearest_rows
+from care_sim.policies.controls.rows import cells_by_row
 from care_sim.policies.own.care_sector import CareSector
 from care_sim.policies.own.care_spread import CORE_FIRST
 from care_sim.policies.own.sector import columns_ahead
@@ -35,7 +35,7 @@ def test_without_camera_and_tracks_it_is_the_sector_then_rows(belief_of):
     layers = CareSector(Rig()).demand(belief_of()).layers
     asked = [[cells.tolist() for cells in layer] for layer in layers]
     sector = (9 * 512 + columns_ahead(AngularGrid())).tolist()
-    rows = nearest_rows(Rig()).tolist()
+    rows = cells_by_row(Rig()).tolist()
     assert asked == [[], [sector], [], [], [], [rows[:512]], [], [rows[:819]]]
 
 

@@ -9,7 +9,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.belief import MAX_DETECTIONS
 from care_sim.core.residual import camera_layers
 from care_sim.core.types import ImageDetections
-from care_sim.policies.controls.rows import nearest_rows
+from care_sim.policies.controls.rows import cells_by_row
 from care_sim.policies.own.care_spread import CORE_FIRST
 
 
@@ -62,7 +62,7 @@ def test_every_layer_gives_its_part_of_a_set(environment, encounter):
     """Three returns make a detection: 6 cells of a hull and 9 of a wedge are a round."""
     policy = care_sim.make_policy("care-sightlines", environment)
     rig = policy.rig
-    pattern = nearest_rows(rig)
+    pattern = cells_by_row(rig)
     longest = np.zeros(3, int)
     for observation in encounter:
         belief = rig.read(observation)
@@ -141,7 +141,7 @@ def test_the_last_layer_is_as_much_of_the_pattern_rows_as_may_fire(environment, 
     policy = care_sim.make_policy("care-sightlines", environment)
     policy(encounter[0])
     ((cells,),) = policy.demanded.layers[-1:]
-    assert np.array_equal(cells, nearest_rows(policy.rig)[: policy.rig.budget])
+    assert np.array_equal(cells, cells_by_row(policy.rig)[: policy.rig.budget])
 
 
 @pytest.mark.parametrize("idea", ["camera", "ahead", "explained", "sight_lines", "rows"])

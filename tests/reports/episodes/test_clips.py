@@ -202,12 +202,12 @@ def test_the_verdict_of_a_panel():
     )
     late = panel.verdict_text(keyframes(hidden, seen, seen, found, found), 0.1)
     assert late == (
-        "detected at 17.0 m, 0.2 s late; least clearance 14.0 m",
+        "detected at 17.0 m, 0.2 s after coming into view; clearance 14.0 m",
         DETECTED.colour,
     )
     assert (
         panel.verdict_text(keyframes(hidden, found), 0.1)[0]
-        == "detected at 19.0 m; least clearance 17.0 m"
+        == "detected at 19.0 m; clearance 17.0 m"
     )
 
 

@@ -1,6 +1,7 @@
 import pytest
 
 from care_sim.core.conditions import LOCALISATION, Sensing
+from care_sim.core.return_settings import RETURN_SETTINGS
 from care_sim.reports.figures.faults import FAULT_FIGURES, fault_figures
 from care_sim.reports.table import Bold
 from care_sim.reports.tables.faults import StudyCells, fault_tables, order
@@ -88,8 +89,8 @@ def test_strengths_that_were_not_played_are_passed_over(rows):
 def test_every_fault_of_the_sensing_grows_from_none_in_some_panel():
     varied = {name for fault in FAULTS for level in fault.levels for name in level.changes}
     faults = set(Sensing.__dataclass_fields__) - {"engine", "min_returns", "camera_confidence"}
-    # The vehicle study varies the pose; the camera's profile and seconds have a page of their own.
-    elsewhere = {*LOCALISATION, "camera_profile", "camera_latency_s"}
+    # The vehicle study varies the pose; returns, the camera's profile and seconds have pages.
+    elsewhere = {*LOCALISATION, *RETURN_SETTINGS, "camera_profile", "camera_latency_s"}
     assert varied == faults - elsewhere
     for fault in FAULTS:
         values = [float(level.label) for level in fault.levels]

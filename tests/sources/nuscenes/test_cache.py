@@ -1,5 +1,6 @@
 """Tables that are kept in files: made once, made anew when they must be."""
 
+import errno
 import os
 from concurrent.futures import ThreadPoolExecutor
 from time import sleep
@@ -8,6 +9,7 @@ import pyarrow as pa
 import pytest
 
 from care_sim.base.errors import InvalidInput
+from care_sim.sources.nuscenes import cache
 from care_sim.sources.nuscenes.cache import cached_table
 
 PLACE = "kept.arrow"
@@ -91,6 +93,15 @@ def test_where_nothing_can_be_written_every_process_makes_its_own(maker, tmp_pat
     (tmp_path / "caches").write_text("a file")
     assert [maker.cached() for _ in range(2)] == [kept("one")] * 2
     assert maker.made == 2
+
+
+def test_on_a_full_disk_a_table_is_made_once_and_stays_in_memory(maker, monkeypatch):
+    def full(place, table):
+        raise OSError(errno.ENOSPC, "no space left on device")
+
+    monkeypatch.setattr(cache, "_write", full)
+    assert maker.cached() == kept("one")
+    assert maker.made == 1
 
 
 def test_who_wants_it_meanwhile_waits(maker):
