@@ -65,8 +65,8 @@ def listed_values(path: Path, most: int = MOST_BYTES) -> Iterator[Any]:
                 raise ValueError("it is nested too deep") from error
             # The place that the error tells is one of the text in memory, not of the file.
             except json.JSONDecodeError as error:
-                most = f"at most {MOST_CHARACTERS} characters"
-                raise ValueError(f"value {number} is no JSON of {most}: {error.msg}") from error
+                limit = f"at most {MOST_CHARACTERS} characters"
+                raise ValueError(f"value {number} is no JSON of {limit}: {error.msg}") from error
             yield value
             ended = _VALUE_ENDED.match(text, place)
             if ended is None:
