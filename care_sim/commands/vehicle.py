@@ -27,7 +27,8 @@ class Vehicle(FixedStudy):
     """
 
     also: tuple[str, ...] | None = ()
-    """Further policies, installed ones too, that are played beside those of the study."""
+    """Further policies, installed ones too, that are played beside those of the study; not
+    care-sbf, full or all-camera, of which it asks some questions itself."""
     frames: int = bounded(1000, 0, 100_000)
     """Keyframes over which the software is timed, on one core; 0 leaves it out."""
     out: Path = Path("runs/vehicle")
