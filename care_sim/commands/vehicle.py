@@ -4,16 +4,18 @@ software takes.
 
 import json
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 from care_sim.base.bounds import bounded
-from care_sim.base.files import write_text
+from care_sim.base.files import JSON, check_output, write_text
 from care_sim.commands.shared.episode_studies import FixedStudy
-from care_sim.commands.shared.study_command import console
+from care_sim.commands.shared.study_command import DONE, console
 from care_sim.measure.compute_path.report import compute_report, compute_tables
 from care_sim.study.designs.vehicle import vehicle_study
+from care_sim.study.episode_config import EpisodeConfig
 
 _FILE = "compute-path.json"
 
@@ -25,7 +27,8 @@ class Vehicle(FixedStudy):
     """
 
     also: tuple[str, ...] | None = ()
-    """Further policies, installed ones too, that are played beside those of the study."""
+    """Further policies, installed ones too, that are played beside those of the study; not
+    care-sbf, full or all-camera, of which it asks some questions itself."""
     frames: int = bounded(1000, 0, 100_000)
     """Keyframes over which the software is timed, on one core; 0 leaves it out."""
     out: Path = Path("runs/vehicle")
@@ -33,10 +36,17 @@ class Vehicle(FixedStudy):
 
     def __call__(self) -> int:
         """Run it."""
-        code = self.play("vehicle", vehicle_study, self.out)
-        if self.frames:
+        code = self.play("vehicle", self._configurations, self.out)
+        if self.frames and code == DONE:
             report = compute_report(self.frames, partial(print, "measuring", file=sys.stderr))
             for table in compute_tables(report):
                 console().print(table.rich())
             write_text(self.out / _FILE, json.dumps(report, indent=1) + "\n")
         return code
+
+    def _configurations(self, seeds: Sequence[int], also: Sequence[str]) -> list[EpisodeConfig]:
+        """The episodes of the study, once it is sure that the timings after it can be written."""
+        configs = vehicle_study(seeds, also)
+        if self.frames:
+            check_output(self.out / _FILE, JSON)
+        return configs

@@ -122,8 +122,9 @@ VALIDATION_CAPTION = (*_EPISODES_READING, *_OF_COLLISIONS, *_EPISODES_COVERAGE)
 VEHICLE_CAPTION = (
     Remark(
         "A cell of policies: median first detection in metres, and how many of the episodes ended "
-        "with a collision. Worlds, that is cases with their seeds, are what differences are paired "
-        "by here."
+        "with a collision. Where some episodes met nobody, the number after the median is that of "
+        "the others. NCAP turns are paired by case and seed, and resampled by case, each with its "
+        "mean over the seeds."
     ),
     *_EPISODES_READING,
     *_statistics(f"{GATE_COLLISION_POINTS:.0f} points of collisions avoided"),

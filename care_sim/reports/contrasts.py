@@ -6,6 +6,11 @@ numbers).
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import groupby
+from operator import itemgetter
+from typing import Any
+
+import numpy as np
 
 from care_sim.evaluation.bootstrap import Interval
 from care_sim.evaluation.censoring import Difference, Reading, difference
@@ -109,15 +114,28 @@ def contrast(
     measure: Measure, ours: Sequence[Row] | None, theirs: Sequence[Row] | None
 ) -> Contrast | None:
     """`ours` minus `theirs`, paired by seed; None without shared seeds that have the measure."""
-    a, b = (_read(measure, rows or ()) for rows in (ours, theirs))
-    # Only seeds that both have played are pairs. Sorted, they give the same resamples whatever the
-    # order of the rows.
-    seeds = sorted(set(a) & set(b))
-    return (
-        Contrast(measure, difference([a[s] for s in seeds], [b[s] for s in seeds]))
-        if seeds
-        else None
-    )
+    pairs = _pairs(measure, ours, theirs)
+    if not pairs:
+        return None
+    a, b = zip(*pairs.values(), strict=True)
+    return Contrast(measure, difference(a, b))
+
+
+def contrast_of_cases(
+    measure: Measure, ours: Sequence[Row] | None, theirs: Sequence[Row] | None
+) -> Contrast | None:
+    """The same of rows whose `seed` is a pair of case and seed, where cases are what is drawn: each
+    counts with its means over the seeds. One case on many seeds is so one world, and no proof.
+    """
+    pairs = _pairs(measure, ours, theirs)
+    if not pairs:
+        return None
+    means = []
+    for _, worlds in groupby(pairs, key=itemgetter(0)):
+        a, b = zip(*(pairs[world] for world in worlds), strict=True)
+        means.append((_mean(a), _mean(b)))
+    a, b = zip(*means, strict=True)
+    return Contrast(measure, difference(a, b))
 
 
 def preventable(full: Sequence[Row], rows: Sequence[Row]) -> list[Row]:
@@ -126,7 +144,23 @@ def preventable(full: Sequence[Row], rows: Sequence[Row]) -> list[Row]:
     return [row for row in rows if row["seed"] in spared]
 
 
-def _read(measure: Measure, rows: Sequence[Row]) -> dict[int, Reading]:
+def _pairs(
+    measure: Measure, ours: Sequence[Row] | None, theirs: Sequence[Row] | None
+) -> dict[Any, tuple[Reading, Reading]]:
+    """What both have measured, by seed."""
+    a, b = (_read(measure, rows or ()) for rows in (ours, theirs))
+    # Only seeds that both have played are pairs. Sorted, they give the same resamples whatever the
+    # order of the rows.
+    return {seed: (a[seed], b[seed]) for seed in sorted(set(a) & set(b))}
+
+
+def _mean(readings: Sequence[Reading]) -> Reading:
+    """Of a mean with a censored value is known that the truth lies between 0 and this."""
+    value = float(np.mean([reading.value for reading in readings]))
+    return Reading(value, any(reading.censored for reading in readings))
+
+
+def _read(measure: Measure, rows: Sequence[Row]) -> dict[Any, Reading]:
     """What was measured, by seed."""
     found = ((row["seed"], measure.read(row)) for row in rows)
     return {seed: reading for seed, reading in found if reading is not None}

@@ -57,6 +57,12 @@ def new_objects(loop: OpenLoop, belief: Belief, sightings: Sightings) -> list[Ne
             explained=by_memory[boxes],
             tracked=number in tracked,
         )
-        covered = bool(np.isin(hull, known).sum() >= _COVERAGE * len(hull))
-        made.append(NewObject(appearance, hull, covered))
+        made.append(NewObject(appearance, hull, is_covered(hull, known)))
     return made
+
+
+def is_covered(hull: Cells, known: Cells) -> bool:
+    """Whether an object with this `hull` (n,) appears inside established coverage: hulls of tracks,
+    whose cells are `known` (m,), hold half of it or more.
+    """
+    return bool(np.isin(hull, known).sum() >= _COVERAGE * len(hull))

@@ -1,13 +1,17 @@
 """The tables of the vehicle study, of rows whose answers are known."""
 
+from itertools import product
+
 import pytest
 
+from care_sim.evaluation.censoring import Bound
+from care_sim.reports.contrasts import AVOIDED, DETECTION, contrast, contrast_of_cases
 from care_sim.reports.figures.vehicle import VEHICLE_FIGURE, vehicle_figures
 from care_sim.reports.studies import STUDIES
 from care_sim.reports.vehicle.evidence_tables import compensation_table, evidence_table
 from care_sim.reports.vehicle.fallback_tables import cost_tables, fallback_table
 from care_sim.reports.vehicle.pose_tables import forecast_table, guard_table, pose_tables
-from care_sim.reports.vehicle.rows import VehicleRows
+from care_sim.reports.vehicle.rows import VehicleRows, outcome
 from care_sim.study.designs.vehicle import (
     BLACKOUTS,
     DENSE,
@@ -28,16 +32,16 @@ def noted(config):
     """A made-up law: compensation saves every late turn of 3 cases in 11; the camera's absence
     costs 4 m; an error of the position makes forecasts 1 m wrong.
     """
+    late = bool(config.camera_latency or config.camera_latency_s)
     kept = dict(config.policy_parameters).get("yaw_compensation", True)
     test = dict(config.scenario_parameters).get("test")
-    late_turn = bool(config.camera_latency) and test == "CPTAfs-50"
     return {
-        "collision": late_turn and not kept,
-        "evidence_ages_ms": (100 * config.camera_latency,) * 19 + (1000,),
+        "collision": late and test == "CPTAfs-50" and not kept,
+        "evidence_ages_ms": (round(1e3 * config.camera_latency_s),) * 19 + (1000,),
         "boxes": 40,
-        "turned_boxes": 10 if config.camera_latency else 0,
-        "turned_held": 9 if config.camera_latency else 0,
-        "unturned_held": 5 if config.camera_latency else 0,
+        "turned_boxes": 10 if late else 0,
+        "turned_held": 9 if late else 0,
+        "unturned_held": 5 if late else 0,
         "dark_keyframes": 10 if config.blackout_s else 0,
         "dark_alike": 10 if config.blackout_s else 0,
         "dark_entries_alike": (1, 1) if config.blackout_s else (),
@@ -54,8 +58,12 @@ def noted(config):
         "standing_guard_most_m": 4.0,
         "released_cells": 100,
         "released_cells_vehicle": 10,
-        **({"progress": 0.5, "needless_braking": 2} if config.scenario == "drive" else {}),
+        **({"progress": 0.5} if config.scenario == "drive" else {}),
     }
+
+
+def row(seed, distance, most=None):
+    return {"seed": seed, "detection_distance_m": distance, "undetected_to_m": most}
 
 
 def distance(config):
@@ -88,20 +96,50 @@ def block(table, group):
 
 def test_ages_are_those_of_all_keyframes_and_shares_those_of_all_boxes(study):
     lines = block(evidence_table(study), TURNS.name)
-    # 19 of 20 pictures are 0.4 s old, one is 1 s old.
-    assert lines["0.4 s late"] == ("0.43", "0.43", "25.0%", "90.0%", "50.0%")
+    # 19 of 20 pictures are 0.42 s old, one is 1 s old.
+    assert lines["0.42 s late"] == ("0.45", "0.45", "25.0%", "90.0%", "50.0%")
     assert lines["newest picture"] == ("0.05", "0.05", "0.0%", "", "")
 
 
-def test_compensation_is_paired_by_case_and_seed(study):
+def test_compensation_is_paired_by_case_and_seed_and_resampled_by_case(study):
     lines = block(compensation_table(study), TURNS.name)
     worlds = len(TURNS.places) * len(SEEDS)
-    care, without, *others, metres, points = lines["0.4 s late"]
+    care, without, *others, metres, points = lines["0.42 s late"]
     assert (care, without) == (f"16.0, 0/{worlds}", f"16.0, {3 * len(SEEDS)}/{worlds}")
     assert others == [f"16.0, 0/{worlds}"] * 2
     assert metres == "+0.0 [0.0,0.0]"
-    assert points.startswith("+27* [")
+    # 3 cases of 11: of the resamples 3% have none of them, (8/11)^11, and 1% more than 6.
+    assert points == "+27 [0,55]"
     assert lines["newest picture"][1] == "", "without lag nothing is played twice"
+
+
+def test_one_case_on_many_seeds_proves_no_more_than_on_one():
+    copies = [{"seed": world, "collision": False} for world in product(range(11), SEEDS)]
+    hit = [each | {"collision": each["seed"][0] == 4} for each in copies]
+    once = [[each for each in side if each["seed"][1] == 0] for side in (copies, hit)]
+    found = contrast_of_cases(AVOIDED, copies, hit)
+    assert found == contrast_of_cases(AVOIDED, *once) == contrast(AVOIDED, *once)
+    assert found.mean == pytest.approx(100 / 11)
+    assert not found.excludes_zero
+    assert contrast(AVOIDED, copies, hit).excludes_zero
+    assert contrast_of_cases(AVOIDED, copies, []) is None
+
+
+def test_a_case_with_a_censored_distance_is_censored():
+    ours = [row((case, seed), 10.0) for case in range(5) for seed in (0, 1)]
+    theirs = [row((case, 0), None, 4.0) for case in range(5)]
+    theirs += [row((case, 1), 8.0) for case in range(5)]
+    # The seed 2 of a case that only one side has is no pair.
+    found = contrast_of_cases(DETECTION, [*ours, row((0, 2), 99.0)], theirs)
+    assert (found.mean, found.bound, found.difference.pairs) == (4.0, Bound.AT_LEAST, 5)
+
+
+def test_a_median_of_some_episodes_tells_of_how_many():
+    met = row(0, 12.0) | {"collision": False}
+    assert outcome([met, met]) == "12.0, 0/2"
+    nobody = met | {"detection_distance_m": None, "undetected_to_m": None}
+    assert outcome([met, nobody]) == "12.0 (1), 0/2"
+    assert outcome([nobody]) == "- (0), 0/1"
 
 
 def test_a_camera_that_is_away_leaves_one_policy(study):
@@ -124,7 +162,7 @@ def test_the_cost_is_the_camera_on_less_the_camera_away(study):
 
 def test_forecasts_and_what_is_released_are_means(study):
     lines = block(forecast_table(study), DRIVES.name)
-    told = ("50.0%", "75.0%", "10.0", "1.0", "50%", "20.0%")
+    told = ("50.0%", "75.0%", "10.0", "1.0", "50%", "30.0%")
     assert lines["exact pose"] == ("0.00", "0.00", *told)
     assert lines["0.4 m, anew"] == ("1.00", "2.00", *told)
     assert block(forecast_table(study), DENSE.name)["exact pose"][-2:] == ("", "")
@@ -153,7 +191,7 @@ def test_a_file_changes_nothing_in_the_tables(rows, tmp_path):
 
 def test_without_a_forecast_or_a_picture_there_is_no_number():
     bare = VehicleRows([vehicle_row(config, 9.0) for config in vehicle_study([0])])
-    assert block(evidence_table(bare), TURNS.name)["0.4 s late"] == ("", "", "", "", "")
+    assert block(evidence_table(bare), TURNS.name)["0.42 s late"] == ("", "", "", "", "")
     lines = block(forecast_table(bare), DENSE.name)
     assert lines["exact pose"] == ("", "", "", "", "0.0", "0.0", "", "")
     assert len(fallback_table(bare).rows) == 1
@@ -169,7 +207,7 @@ def test_a_part_of_the_study_has_its_tables_and_its_figure(rows):
 
 def test_the_figure_shows_every_late_level(rows):
     held, errors = vehicle_figures(rows)[VEHICLE_FIGURE].axes
-    late = [level.label for level in EVIDENCE_LEVELS if "camera_latency" in level.changes]
+    late = [level.label for level in EVIDENCE_LEVELS if "late" in level.label]
     assert [text.get_text() for text in held.get_yticklabels()] == late
     compensated, without, *_ = held.get_lines()
     assert set(compensated.get_xdata()) == {90.0}

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from care_sim.base.errors import InvalidInput
 from care_sim.study.designs.vehicle import (
     BLACKOUTS,
     DENSE,
@@ -57,6 +58,31 @@ def test_every_level_of_every_question_is_played_once():
         "history",
         "fan",
     }
+
+
+@pytest.mark.parametrize("policy", ["care-sbf", "full", "all-camera"])
+def test_a_policy_of_some_questions_cannot_join_in(policy):
+    """Its rows of the other questions would stand in no table."""
+    with pytest.raises(InvalidInput, match=f"plays {policy} itself .* any policy but care-sbf"):
+        vehicle_study([0], ["fan", policy])
+
+
+def test_late_levels_have_the_ages_of_the_paper():
+    late = [level for level in EVIDENCE_LEVELS if is_late(level)]
+    assert [level.label for level in EVIDENCE_LEVELS if "late" in level.label] == [
+        level.label for level in late
+    ]
+    assert [level.changes.get("camera_latency_s") for level in late] == [0.12, 0.42, None]
+    place = TURNS.places[0]
+    for level in late:
+        for one in (level, uncompensated(level)):
+            (config,) = one.configurations(place, ["care"], [0])
+            assert key_of(config.row() | {"tags": "causal"}) == one.key(place, "care")
+
+
+def test_ages_in_seconds_are_rounded_up_to_steps_of_the_world():
+    late = vehicle_row(replace(DENSE_CARE, camera_latency_s=0.12))
+    assert set(late["evidence_ages_ms"]) == {150}
 
 
 def test_the_turning_tests_are_those_in_which_the_ego_turns():

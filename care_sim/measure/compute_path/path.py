@@ -53,7 +53,7 @@ _WARM_UP = 5
 """Keyframes that do not count: the first compiles, and tracks have a velocity from the second."""
 _SLOWER = 10
 """Bodies sway this much slower than in the measure of scans: at most 0.08 m a keyframe."""
-_EGO = Ego(8.0)
+_EGO = Ego(0.0)
 
 _Answer = TypeVar("_Answer")
 

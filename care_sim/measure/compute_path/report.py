@@ -31,7 +31,8 @@ _OURS = (
     "Ours holds: the hand-over of finished camera boxes, clustering of the returns of the cells "
     "that fired, tracking, the observation, the policy, Algorithm 1 with its floor. It does not "
     "hold what finds boxes in images (YOLOX in the paper), nor a learned 3D detector. CPU time of "
-    "one core, so that what else the machine runs does not count."
+    "one core, so that what else the machine runs does not count; the paper's budget is of the "
+    "wall clock."
 )
 
 Figures = dict[str, Any]

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from care_sim.reports.figures.styles import bare_axes
-from care_sim.reports.vehicle.rows import VehicleRows, total
+from care_sim.reports.vehicle.rows import VehicleRows, mean_over_forecasts, total
 from care_sim.study.designs.vehicle import (
     EVIDENCE_GROUPS,
     EVIDENCE_LEVELS,
@@ -60,13 +60,10 @@ def _draw_held(axes: Axes, study: VehicleRows) -> None:
 
 def _draw_errors(axes: Axes, study: VehicleRows) -> None:
     for group, colour in zip(POSE_GROUPS, _COLOURS, strict=True):
-        means = []
-        for level in POSE_LEVELS:
-            rows = [row for row in study.of(group, level, REFERENCE) if row["forecasts"]]
-            errors = [row["forecast_error_m"] for row in rows]
-            means.append(
-                np.average(errors, weights=[row["forecasts"] for row in rows]) if rows else np.nan
-            )
+        means = [
+            mean_over_forecasts(study.of(group, level, REFERENCE), "forecast_error_m")
+            for level in POSE_LEVELS
+        ]
         axes.plot(means, range(len(means)), _WITH, color=colour, label=group.name)
     axes.set_yticks(range(len(POSE_LEVELS)), [level.label for level in POSE_LEVELS])
     axes.set_xlabel("mean error of the forecasts (m)", fontsize=8)

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from care_sim.reports.contrasts import AVOIDED, DETECTION, contrast
+from care_sim.reports.contrasts import AVOIDED, DETECTION, contrast, contrast_of_cases
 from care_sim.reports.formatting import interval
 from care_sim.reports.protocol.formatting import PAPER
 from care_sim.reports.protocol.notes import papers
@@ -84,6 +84,8 @@ def compensation_table(study: VehicleRows) -> Table:
 
 def _compensation_lines(study: VehicleRows, others: Sequence[str]) -> Iterator[TableRow]:
     for group in EVIDENCE_GROUPS:
+        # The seeds of a case are nearly copies of it, those of a drive are drives of their own.
+        differ = contrast_of_cases if len(group.places) > 1 else contrast
         yield (group.name,)
         for level in EVIDENCE_LEVELS:
             rows = study.of(group, level, REFERENCE)
@@ -96,6 +98,6 @@ def _compensation_lines(study: VehicleRows, others: Sequence[str]) -> Iterator[T
                 outcome(rows),
                 outcome(without),
                 *(outcome(study.of(group, level, policy)) for policy in others),
-                interval(contrast(DETECTION, rows, without)),
-                interval(contrast(AVOIDED, rows, without)),
+                interval(differ(DETECTION, rows, without)),
+                interval(differ(AVOIDED, rows, without)),
             )

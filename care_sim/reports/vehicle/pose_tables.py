@@ -11,7 +11,7 @@ from care_sim.reports.protocol.formatting import PAPER
 from care_sim.reports.protocol.notes import papers
 from care_sim.reports.table import Table, TableRow
 from care_sim.reports.vehicle import paper
-from care_sim.reports.vehicle.rows import VehicleRows, outcome, share, total
+from care_sim.reports.vehicle.rows import VehicleRows, mean_over_forecasts, outcome, share, total
 from care_sim.study.designs.variants import Variant
 from care_sim.study.designs.vehicle import (
     FORGETTING,
@@ -30,8 +30,8 @@ _MARGINS = (
 )
 
 _DRIVEN = (
-    "Of drives: share of the way that was driven, and of the keyframes those with the brake on and "
-    "nothing to brake for, means."
+    "Of drives: share of the way that was driven, mean, and of all keyframes those at which the "
+    "car stands, for whatever reason."
 )
 
 
@@ -49,12 +49,12 @@ def forecast_table(study: VehicleRows) -> Table:
         (
             "pose",
             "mean error, m",
-            "95th percentile, m",
+            "mean of the episodes' 95th percentiles, m",
             "held by Eq. 4",
             "held by a full hull",
             *(f"released, {rules.label}" for rules in FORGETTING),
             "way driven",
-            "braked for nothing",
+            "car stands",
         ),
         tuple(lines),
         (_MARGINS, _DRIVEN),
@@ -66,8 +66,10 @@ def _forecasts(rows: Sequence[Row]) -> TableRow:
     forecasts = total(rows, "forecasts")
     keyframes = total(rows, "keyframes")
     return (
-        _mean_error(rows, "forecast_error_m"),
-        _mean_error(rows, "forecast_error_p95_m"),
+        *(
+            f"{mean_over_forecasts(rows, name):.2f}" if forecasts else ""
+            for name in ("forecast_error_m", "forecast_error_p95_m")
+        ),
         *(share(total(rows, f"forecasts_in_{name}"), forecasts) for name in ("eq4", "margin")),
         *(
             f"{total(rows, name) / keyframes:.1f}"
@@ -77,23 +79,14 @@ def _forecasts(rows: Sequence[Row]) -> TableRow:
     )
 
 
-def _mean_error(rows: Sequence[Row], column: str) -> str:
-    """The mean over episodes, each weighed by its forecasts; empty without any."""
-    seen = [row for row in rows if row["forecasts"]]
-    if not seen:
-        return ""
-    weights = [row["forecasts"] for row in seen]
-    return f"{np.average([row[column] for row in seen], weights=weights):.2f}"
-
-
 def _driven(rows: Sequence[Row]) -> TableRow:
     """Of drives alone: only they have a way."""
     drives = [row for row in rows if row.get("progress") is not None]
     if not drives:
         return "", ""
-    needless = total(drives, "needless_braking")
+    standing = total(drives, "standing_keyframes")
     driven = float(np.mean([row["progress"] for row in drives]))
-    return f"{100 * driven:.0f}%", share(needless, total(drives, "keyframes"))
+    return f"{100 * driven:.0f}%", share(standing, total(drives, "keyframes"))
 
 
 def pose_tables(study: VehicleRows) -> list[Table]:

@@ -8,7 +8,7 @@ from care_sim.core.arrays import Integers
 from care_sim.evaluation.censoring import quartiles
 from care_sim.reports.formatting import marked, median
 from care_sim.study.designs.variants import Variant
-from care_sim.study.designs.vehicle import Group
+from care_sim.study.designs.vehicle import PLAYED_IN_PART, Group
 from care_sim.study.rows.reading import detections, grouped, tags_of_row
 from care_sim.study.run_config import Row
 
@@ -33,7 +33,7 @@ class VehicleRows:
 
     def further(self, policies: Sequence[str]) -> list[str]:
         """The policies, then those that joined in."""
-        known = {*policies, "care-sbf", "full", "all-camera"}
+        known = {*policies, *PLAYED_IN_PART}
         return [*policies, *(policy for policy in self.tags if policy not in known)]
 
     def marked(self, policy: str) -> str:
@@ -56,9 +56,22 @@ def share(part: int, whole: int) -> str:
     return f"{100 * part / whole:.1f}%" if whole else ""
 
 
+def mean_over_forecasts(rows: Sequence[Row], column: str) -> float:
+    """The mean of a column over episodes, each weighed by its forecasts; NaN without any."""
+    seen = [row for row in rows if row["forecasts"]]
+    if not seen:
+        return np.nan
+    weights = [row["forecasts"] for row in seen]
+    return float(np.average([row[column] for row in seen], weights=weights))
+
+
 def outcome(rows: Sequence[Row]) -> str:
-    """Median first detection in metres, and how many episodes ended with a collision."""
+    """Median first detection in metres, of how many episodes where some met nobody, and how many
+    episodes ended with a collision.
+    """
     if not rows:
         return ""
+    found = detections(rows)
+    met = f" ({len(found)})" if len(found) < len(rows) else ""
     hits = sum(row["collision"] for row in rows)
-    return f"{median(quartiles(detections(rows)))}, {hits}/{len(rows)}"
+    return f"{median(quartiles(found))}{met}, {hits}/{len(rows)}"

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 
+from care_sim.base.errors import InvalidInput
 from care_sim.core.forgetting import VEHICLE_SIGMA_M
 from care_sim.scenarios.ncap.forms import AcrossExit
 from care_sim.scenarios.ncap.table import TESTS
@@ -42,12 +43,11 @@ DENSE = Group("dense, 3%", (Place("dense", 0.03),))
 DARTOUT = Group("dartout, 10%", (Place("dartout", 0.10),))
 
 # The ages of the camera's evidence are those of the paper: 0.11 to 0.14 s on average, 0.42 s at the
-# 95th percentile. In whole keyframes they are 0.1 and 0.4 s; `camera_latency_s` would take them in
-# seconds.
+# 95th percentile. The world's steps of 0.05 s make them 0.15 and 0.45 s.
 EVIDENCE_LEVELS = (
     Variant("newest picture"),
-    Variant("0.1 s late", {"camera_latency": 1}),
-    Variant("0.4 s late", {"camera_latency": 4}),
+    Variant("0.12 s late", {"camera_latency_s": 0.12}),
+    Variant("0.42 s late", {"camera_latency_s": 0.42}),
     Variant("planned every 0.3 s", {"keyframe_s": 0.3}),
     Variant("planned every 0.3 s, 0.3 s late", {"keyframe_s": 0.3, "camera_latency": 1}),
 )
@@ -95,6 +95,10 @@ FORGETTING = (
 """CARE+SBF without and with the margin of the paper's vehicle."""
 
 
+PLAYED_IN_PART = ("care-sbf", "full", "all-camera")
+"""Policies that only some of the questions are asked of."""
+
+
 def uncompensated(level: Variant) -> Variant:
     """The level for CARE without compensation of the car's turn."""
     return Variant(level.label, level.changes, UNCOMPENSATED, "care")
@@ -107,11 +111,20 @@ def forgetting(level: Variant, rules: Variant) -> Variant:
 
 def is_late(level: Variant) -> bool:
     """Whether the camera's evidence is old, without which there is nothing to compensate."""
-    return "camera_latency" in level.changes
+    return not level.changes.keys().isdisjoint(("camera_latency", "camera_latency_s"))
 
 
 def vehicle_study(seeds: Sequence[int], also: Sequence[str] = ()) -> list[EpisodeConfig]:
-    """Every level of every question; `also` are further policies of all."""
+    """Every level of every question; `also` are further policies of all. Raises InvalidInput for
+    one of `PLAYED_IN_PART`.
+    """
+    for policy in also:
+        if policy in PLAYED_IN_PART:
+            # Its rows would stand among those that the study plays of it, and in no table.
+            raise InvalidInput(
+                f"the vehicle study plays {policy} itself where its tables show it; --also takes "
+                f"any policy but {', '.join(PLAYED_IN_PART)}"
+            )
     asked: list[tuple[Group, Variant, tuple[str, ...]]] = []
     for group, level in product(EVIDENCE_GROUPS, EVIDENCE_LEVELS):
         asked.append((group, level, (*EVIDENCE_POLICIES, *also)))

@@ -13,12 +13,8 @@ from care_sim.core.grid import Cells
 from care_sim.envs.sensing import SensingEnv
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.policies.base import Policy
+from care_sim.study.appearances import is_covered
 from care_sim.study.run_config import Row
-
-_COVERAGE = 0.5
-"""Share of the cells of an object's hull that hulls of tracks hold where it appears inside
-established coverage.
-"""
 
 
 class Fallback:
@@ -78,8 +74,7 @@ class Fallback:
         for hull in loop.rig.hulls(boxes):
             self._entries_alike.append(int(alike))
             self._entry_cells.append(int(np.isin(hull, fired).sum()))
-            held = int(np.isin(hull, tracked).sum())
-            self._entry_covered.append(int(held >= _COVERAGE * len(hull)))
+            self._entry_covered.append(int(is_covered(hull, tracked)))
 
     def columns(self) -> Row:
         """As columns of a row."""

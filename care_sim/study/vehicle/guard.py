@@ -27,7 +27,6 @@ class Guard:
         self._forgetting = [Forgetting(rules, loop.rig) for rules in (self._rules, vehicle)]
         self._standing_guards_m: list[float] = []
         self._released = np.zeros(2, np.int64)
-        self._keyframes = 0
 
     def look(self, loop: ClosedLoop) -> None:
         """Note the coming keyframe."""
