@@ -5,6 +5,7 @@ formulas lie in `care_sim.sensors`, each with its source; `docs/returns.md` show
 """
 
 from dataclasses import dataclass, fields
+from typing import Any
 
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.checks import check_known
@@ -97,7 +98,7 @@ class ReturnSettings:
                 raise InvalidInput(f"{name} has no meaning without {needed}")
 
 
-RETURN_SETTINGS = {field.name: field.default for field in fields(ReturnSettings)}
+RETURN_SETTINGS: dict[str, Any] = {field.name: field.default for field in fields(ReturnSettings)}
 """Their names and defaults."""
 RAYS = ReturnSettings()
 """All switches off."""
