@@ -5,6 +5,7 @@ formulas lie in `care_sim.sensors`, each with its source; `docs/returns.md` show
 """
 
 from dataclasses import dataclass, fields
+from typing import Any
 
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.checks import check_known
@@ -21,6 +22,8 @@ _NEEDS = {
     "lidar_compensated": "lidar_sweep_s",
 }
 """Settings that say nothing unless another one is switched on."""
+_LEAST_M = 0.01
+"""Metres. The formulas divide by a range and by a visibility: nearer to 0 they would overflow."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,14 +34,15 @@ class ReturnSettings:
 
     lidar_stated_range_m: float = bounded(0.0, 0, 10_000)
     """From here a target of `lidar_stated_reflectance` that faces the LiDAR returns just enough, in
-    clear air, metres: a line of every data sheet. A return is then as strong as its surface and
-    its distance make it (`care_sim.sensors.signal`), and weaker ones are lost. At 0 none is.
+    clear air, metres, 0.01 at least: a line of every data sheet. A return is then as strong as its
+    surface and its distance make it (`care_sim.sensors.signal`), and weaker ones are lost. At 0
+    none is.
     """
     lidar_stated_reflectance: float = bounded(0.1, 0.001, 1)
     """Reflectance of the target at `lidar_stated_range_m`, 0 to 1; most data sheets take 0.1."""
     visibility_m: float = bounded(0.0, 0, 1_000_000)
-    """Meteorological visibility in fog, metres (`care_sim.sensors.weather`); 0 is clear air. The
-    cameras see on as before.
+    """Meteorological visibility in fog, metres, 0.01 at least (`care_sim.sensors.weather`); 0 is
+    clear air. The cameras see on as before.
     """
     rain_mm_h: float = bounded(0.0, 0, 1000)
     """Rain, millimetres per hour (`care_sim.sensors.weather`). The cameras see on as before."""
@@ -79,17 +83,22 @@ class ReturnSettings:
         return ReturnSettings(**(told | {"lidar_crosstalk": RETURN_SETTINGS["lidar_crosstalk"]}))
 
     def check_returns(self) -> None:
-        """Raise InvalidInput for a setting that has no meaning without another one, and for returns
-        that there are not.
+        """Raise InvalidInput for a setting that has no meaning without another one, for a distance
+        too near to 0, and for returns that there are not.
         """
         check_known("lidar_returns", self.lidar_returns, RETURNS_KEPT)
         changed = [n for n, usual in RETURN_SETTINGS.items() if getattr(self, n) != usual]
+        for name in ("lidar_stated_range_m", "visibility_m"):
+            if 0 < getattr(self, name) < _LEAST_M:
+                raise InvalidInput(
+                    f"{name} must be 0 or at least {_LEAST_M:g}, got {getattr(self, name):g}"
+                )
         for name in changed:
             if (needed := _NEEDS.get(name, name)) not in changed:
                 raise InvalidInput(f"{name} has no meaning without {needed}")
 
 
-RETURN_SETTINGS = {field.name: field.default for field in fields(ReturnSettings)}
+RETURN_SETTINGS: dict[str, Any] = {field.name: field.default for field in fields(ReturnSettings)}
 """Their names and defaults."""
 RAYS = ReturnSettings()
 """All switches off."""

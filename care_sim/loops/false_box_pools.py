@@ -8,6 +8,7 @@ import numpy as np
 
 from care_sim.base.times import LAST_BITS_S
 from care_sim.core.conditions import IDEAL_CAMERA, ClosedLoopConditions
+from care_sim.core.return_settings import RETURN_SETTINGS
 from care_sim.core.rig import Rig
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.film import Film
@@ -39,14 +40,20 @@ def pool_of_another_drive(
     """Drive through `world`, every cell fired, and close it: what the camera shows before misses
     and delay.
 
-    The car brakes as a full scan makes it brake, whatever the policy, so that all policies meet the
-    same false boxes. The true boxes of a car that hardly brakes differ a little from them.
+    The car brakes as a full scan in clear air makes it brake, every pulse a plain ray, whatever the
+    policy and the returns of the episode: all of them meet the same false boxes. The true boxes of
+    a car that hardly brakes differ a little from them.
 
     With the `seeds` of an episode its mount errs as the episode's does: false boxes of a straight
     camera would be known among those of a crooked one.
     """
     with closing(world):
-        ideal = replace(conditions, false_positive_rate=0.0, camera_profile=IDEAL_CAMERA)
+        ideal = replace(
+            conditions,
+            false_positive_rate=0.0,
+            camera_profile=IDEAL_CAMERA,
+            **RETURN_SETTINGS,
+        )
         loop = ClosedLoop(world, rig, ideal, seeds, detector=detector)
         cells = np.arange(rig.grid.size)
         seen = []

@@ -10,6 +10,8 @@ from care_sim.core.grid import AngularGrid
 _RING = np.sqrt(7 / 12)
 """How far from the middle the six lie, in half beams. So the seven rays, of equal weight, have the
 variance of a disc that is lit evenly: 1/4 of the half beam squared along each axis."""
+_CUT_APART = 1e-9
+"""Radians between rows that are cut: rows of a grid descend."""
 
 
 def bundle(grid: AngularGrid, divergence_mrad: float) -> list[AngularGrid]:
@@ -30,10 +32,7 @@ def _shifted(grid: AngularGrid, across: float, up: float) -> AngularGrid:
     """The grid turned to the left by `across` about its own axes, its rows raised by `up`,
     radians.
     """
-    # Held within the grid's own bounds: straight up is as far up as a row goes.
-    rows = np.clip(grid.elevations + up, -np.pi / 2, np.pi / 2).tolist()
-    listed = tuple(rows) if grid.listed else ()
-    raised = replace(grid, top=rows[0], bottom=rows[-1], listed=listed)
+    raised = _raised(grid, up)
     turned = grid.heading + across
     if not grid.is_tilted:
         return replace(raised, heading=float(np.remainder(turned + np.pi, 2 * np.pi) - np.pi))
@@ -41,3 +40,15 @@ def _shifted(grid: AngularGrid, across: float, up: float) -> AngularGrid:
     mount = grid.tilt * Rotation.from_euler("Z", turned)
     heading, lowered, roll = mount.as_euler("ZYX").tolist()
     return replace(raised, heading=heading, pitch=-lowered, roll=roll)
+
+
+def _raised(grid: AngularGrid, up: float) -> AngularGrid:
+    """The grid with its rows raised by `up` radians; straight up is as far up as a row goes, and
+    straight down as far down.
+    """
+    rows = grid.elevations + up
+    apart = _CUT_APART * np.arange(grid.rows)
+    held = np.clip(rows, apart[::-1] - np.pi / 2, np.pi / 2 - apart)
+    # Where rows are cut the others keep their places, so that not all are evenly spaced.
+    listed = tuple(held.tolist()) if grid.listed or (held != rows).any() else ()
+    return replace(grid, top=float(held[0]), bottom=float(held[-1]), listed=listed)

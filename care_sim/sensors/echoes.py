@@ -14,8 +14,7 @@ from care_sim.core.arrays import Floats, Integers
 from care_sim.core.return_settings import BOTH, LAST, STRONGEST
 
 SEPARATION_M = 1.0
-"""Surfaces are told apart from this distance on (Velodyne, VLP-16 manual, dual returns). It is what
-a pulse of 7 ns needs: half its length."""
+"""Surfaces are told apart from this distance on (Velodyne, VLP-16 manual, dual returns)."""
 _EDGE_ON = 1e-12
 """The intensity of a surface that is met edge-on, so that its place still counts."""
 

@@ -22,6 +22,11 @@ def test_the_switches_are_conditions_of_both_loops_and_off():
         ({"lidar_returns": "first"}, "unknown lidar_returns 'first'; known: both, last, strongest"),
         ({"lidar_compensated": True}, "lidar_compensated has no meaning without lidar_sweep_s"),
         ({"lidar_stated_range_m": -1.0}, "lidar_stated_range_m must lie in"),
+        ({"lidar_stated_range_m": 1e-200}, "lidar_stated_range_m must be 0 or at least 0.01, got"),
+        (
+            {"lidar_stated_range_m": 40.0, "visibility_m": 1e-310},
+            "visibility_m must be 0 or at least 0.01, got",
+        ),
     ],
 )
 def test_a_setting_that_says_nothing_is_refused(given, needed):

@@ -30,6 +30,23 @@ def test_seven_rays_lie_round_the_direction_of_their_cell(grid, divergence):
     assert apart.mean(axis=0) == pytest.approx(np.zeros_like(middle), abs=1e-3 * divergence)
 
 
-def test_a_row_that_looks_straight_down_stays_on_the_sphere():
-    grid = AngularGrid(rows=4, top=0.0, bottom=-np.pi / 2)
-    assert all(one.bottom >= -np.pi / 2 for one in bundle(grid, 20.0))
+@pytest.mark.parametrize(
+    "grid",
+    [
+        AngularGrid(rows=4, top=0.0, bottom=-np.pi / 2),
+        # Several rows lie within a beam of straight up and of straight down.
+        AngularGrid(rows=512, columns=64, top=np.pi / 2, bottom=-np.pi / 2),
+        AngularGrid.of_elevations([np.pi / 2, 1.56, 0.3, -np.pi / 2]),
+    ],
+    ids=["down", "dense", "listed"],
+)
+def test_every_row_moves_by_the_same_angle_but_those_that_would_pass_straight_up_or_down(grid):
+    grids = bundle(grid, 100.0)
+    raised = [one.elevations - grid.elevations for one in grids]
+    inner = np.abs(grid.elevations) < np.pi / 2 - 0.05
+    for one, moved in zip(grids, raised, strict=True):
+        assert moved[inner] == pytest.approx(np.median(moved[inner]), abs=1e-9)
+        ends = np.clip(grid.elevations + moved[inner][0], -np.pi / 2, np.pi / 2)
+        assert one.elevations == pytest.approx(ends, abs=1e-6)
+    highest = max(moved[inner][0] for moved in raised)
+    assert highest == pytest.approx(0.05 * np.sqrt(7 / 12) * np.sin(np.pi / 3))

@@ -89,7 +89,7 @@ def test_ghosts_come_as_often_as_stated_and_never_where_an_object_is(aside, expe
     times_s = 0.1 * np.arange(400)
 
     def seen(shift):
-        row = [CAR, 0.9, *(edges + np.array([shift, 0.0, shift, 0.0])), 0, 0.0, 0.0]
+        row = [CAR, 0.9, *np.add(edges, [shift, 0.0, shift, 0.0]), 0, 0.0, 0.0]
         rows = np.array([row], float)
         return IdentifiedDetections(ImageDetections.from_rows(rows), np.array([0]))
 

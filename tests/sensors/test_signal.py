@@ -47,6 +47,15 @@ def test_without_a_stated_range_everything_in_reach_is_noticed_and_nothing_else(
     ]
 
 
+@pytest.mark.filterwarnings("error")
+def test_the_least_range_in_the_thickest_fog_is_a_number():
+    signal = Signal(ReturnSettings(lidar_stated_range_m=0.01, visibility_m=0.01, rain_mm_h=1000.0))
+    ranges = np.array([1e-6, 1.0, 1e6, np.inf])
+    intensities = signal.intensities(np.ones(4), ranges)
+    assert np.isfinite(intensities).all()
+    assert signal.suffices(intensities, ranges).tolist() == [True, False, False, False]
+
+
 def test_intensities_are_those_of_the_surface_in_clear_air_and_nothing_without_one():
     signal = Signal(ReturnSettings(lidar_stated_range_m=40.0))
     assert signal.intensities(np.array([0.3, 0.3]), np.array([5.0, np.inf])).tolist() == [0.3, 0.0]
