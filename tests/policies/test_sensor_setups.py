@@ -11,6 +11,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.grid import AngularGrid
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.policies import BUILT_IN
+from tests.helpers.played_keyframes import played
 
 SMALL = SensorSetup(
     "small",
@@ -60,15 +61,6 @@ def environments(short_streets):
         env.close()
 
 
-def played(env, policy):
-    observation, _ = env.reset(seed=0)
-    policy.reset()
-    for _ in range(KEYFRAMES):
-        action = policy(observation)
-        observation, _, _, _, info = env.step(action)
-        yield observation, action, info["fired"]
-
-
 @pytest.mark.parametrize(("environment", "setup", "name"), CASES)
 def test_within_the_budget_and_the_same_after_reset(
     environments, request, environment, setup, name
@@ -77,7 +69,7 @@ def test_within_the_budget_and_the_same_after_reset(
         request.getfixturevalue("open3d")
     env = environments(environment, setup, 1.0 if name == "full" else 0.05)
     policy = care_sim.make_policy(name, env)
-    first, again = (list(played(env, policy)) for _ in range(2))
+    first, again = (list(played(env, policy, KEYFRAMES)) for _ in range(2))
     budget = env.unwrapped.rig.budget
     for (observation, action, fired), (_, same, _) in zip(first, again, strict=True):
         assert env.observation_space.contains(observation)

@@ -12,6 +12,7 @@ from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.measure.certify.design import AS_LISTED
 from care_sim.policies import BUILT_IN
+from tests.helpers.played_keyframes import played
 from tests.policies.test_sensor_setups import OF_A_GRID
 
 DEGREE = np.pi / 180
@@ -60,15 +61,6 @@ def policies(setup, firing):
     return [name for name in BUILT_IN if name not in left_out]
 
 
-def played(env, policy):
-    observation, _ = env.reset(seed=0)
-    policy.reset()
-    for _ in range(KEYFRAMES):
-        action = policy(observation)
-        observation, _, _, _, info = env.step(action)
-        yield observation, action, info["fired"]
-
-
 @pytest.mark.parametrize("firing", FIRINGS)
 @pytest.mark.parametrize("setup", SETUPS)
 def test_whole_units_of_the_budget_and_the_same_after_reset(setup, firing):
@@ -81,7 +73,7 @@ def test_whole_units_of_the_budget_and_the_same_after_reset(setup, firing):
         rig = env.unwrapped.rig
         for name in policies(setup, firing):
             policy = care_sim.make_policy(name, env, **AS_LISTED.get(name, {}))
-            first, again = (list(played(env, policy)) for _ in range(2))
+            first, again = (list(played(env, policy, KEYFRAMES)) for _ in range(2))
             for (observation, action, fired), (_, same, _) in zip(first, again, strict=True):
                 assert env.observation_space.contains(observation), name
                 assert env.action_space.contains(action), name
@@ -94,7 +86,7 @@ def test_whole_units_of_the_budget_and_the_same_after_reset(setup, firing):
 @pytest.mark.parametrize("firing", HARDWARE)
 def test_the_full_scan_fires_everything_with_any_hardware(firing):
     with gymnasium.make("CARE-Dense-v0", sensor=TILTED, budget=1.0, firing=firing) as env:
-        for *_, fired in played(env, care_sim.make_policy("full", env)):
+        for *_, fired in played(env, care_sim.make_policy("full", env), KEYFRAMES):
             assert len(fired) == TILTED.grid.size
 
 
