@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from care_sim.core.arrays import Floats, Integers
-from care_sim.core.return_settings import BOTH, LAST, STRONGEST
+from care_sim.core.return_settings import LAST, STRONGEST
 
 SEPARATION_M = 1.0
 """Surfaces are told apart from this distance on (Velodyne, VLP-16 manual, dual returns)."""
@@ -78,12 +78,21 @@ def echoes_of(ranges: Floats, intensities: Floats, bodies: Integers) -> Echoes:
 
 
 def reported(echoes: Echoes, kept: str) -> Echoes:
-    """What a sensor reports of the echoes that keeps `strongest`, `last` or `both`."""
+    """What a sensor reports of the echoes that keeps `strongest`, `last` or `both`.
+
+    Where the strongest is also the last, `both` has the second strongest beside it (Velodyne,
+    VLP-16 manual, page 57).
+    """
     power = echoes.intensities / echoes.ranges**2
-    strongest = _last_rows(echoes.beams, power)
+    if kept == STRONGEST:
+        return echoes.take(_last_rows(echoes.beams, power))
     last = _last_rows(echoes.beams, echoes.ranges)
-    rows = {STRONGEST: strongest, LAST: last, BOTH: np.union1d(strongest, last)}[kept]
-    return echoes.take(rows)
+    if kept == LAST:
+        return echoes.take(last)
+    # The strongest but for the last one: the strongest of all, unless that is the last.
+    others = np.setdiff1d(np.arange(len(power)), last)
+    strongest = others[_last_rows(echoes.beams[others], power[others])]
+    return echoes.take(np.union1d(strongest, last))
 
 
 def _last_rows(groups: Integers, values: Floats) -> Integers:

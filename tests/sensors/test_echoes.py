@@ -50,6 +50,16 @@ def test_a_bright_surface_behind_may_be_the_strongest():
     assert reported(echoes, "strongest").bodies.tolist() == [5]
 
 
+def test_beside_a_strongest_that_is_the_last_both_has_the_second_strongest():
+    echoes = beam((10.0, 0.05, 4), (20.0, 0.4, 5), (30.0, 0.8, 6), (GONE, 0.0, -1))
+    assert reported(echoes, "strongest").bodies.tolist() == [5]
+    assert reported(echoes, "both").bodies.tolist() == [5, 6]
+    brighter = beam((10.0, 0.05, 4), (20.0, 0.4, 5), (30.0, 1.0, 6), (30.0, 1.0, 6))
+    assert reported(brighter, "strongest").bodies.tolist() == [6]
+    assert reported(brighter, "both").bodies.tolist() == [5, 6]
+    assert len(reported(beam((10.0, 0.4, 4)), "both").beams) == 1
+
+
 def test_what_is_nearer_melts_into_one_echo_between():
     """At the edge of a body 0.6 m before a wall, of the same brightness."""
     echoes = beam((10.0, 0.4, 4), (10.6, 0.4, 5))
