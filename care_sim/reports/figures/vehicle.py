@@ -20,8 +20,11 @@ from care_sim.study.designs.vehicle import (
 from care_sim.study.run_config import REFERENCE, Row
 
 VEHICLE_FIGURE = "vehicle"
-_COLOURS = ("#0072B2", "#D55E00")
+_PALETTE = ("#0072B2", "#D55E00", "#009E73")
 """From the palette of Okabe and Ito (2008), safe for the colour-blind."""
+_NAMES = dict.fromkeys(group.name for group in (*EVIDENCE_GROUPS, *POSE_GROUPS))
+_COLOURS = dict(zip(_NAMES, _PALETTE, strict=True))
+"""Of the places, the same in both panels."""
 _WITH, _WITHOUT = "o", "x"
 
 
@@ -42,7 +45,7 @@ def vehicle_figures(rows: Sequence[Row]) -> dict[str, Figure]:
 
 def _draw_held(axes: Axes, study: VehicleRows) -> None:
     late = [level for level in EVIDENCE_LEVELS if is_late(level)]
-    for group, colour in zip(EVIDENCE_GROUPS, _COLOURS, strict=True):
+    for group in EVIDENCE_GROUPS:
         cells = [study.of(group, level, REFERENCE) for level in late]
         turned = np.array([total(rows, "turned_boxes") for rows in cells], float)
         turned[turned == 0] = np.nan
@@ -52,18 +55,18 @@ def _draw_held(axes: Axes, study: VehicleRows) -> None:
         ):
             shares = 100 * np.array([total(rows, column) for rows in cells]) / turned
             label = f"{group.name}: {how}"
-            axes.plot(shares, range(len(late)), marker, color=colour, label=label)
+            axes.plot(shares, range(len(late)), marker, color=_COLOURS[group.name], label=label)
     axes.set_yticks(range(len(late)), [level.label for level in late])
     axes.set_xlim(0, 105)
     axes.set_xlabel("late boxes in turns whose wedge holds their object (%)", fontsize=8)
 
 
 def _draw_errors(axes: Axes, study: VehicleRows) -> None:
-    for group, colour in zip(POSE_GROUPS, _COLOURS, strict=True):
+    for group in POSE_GROUPS:
         means = [
             mean_over_forecasts(study.of(group, level, REFERENCE), "forecast_error_m")
             for level in POSE_LEVELS
         ]
-        axes.plot(means, range(len(means)), _WITH, color=colour, label=group.name)
+        axes.plot(means, range(len(means)), _WITH, color=_COLOURS[group.name], label=group.name)
     axes.set_yticks(range(len(POSE_LEVELS)), [level.label for level in POSE_LEVELS])
     axes.set_xlabel("mean error of the forecasts (m)", fontsize=8)
