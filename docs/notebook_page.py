@@ -1,0 +1,38 @@
+"""An mkdocs hook: the notebook is run while the site is built, and is a page of it with what came
+out.
+"""
+
+from base64 import b64decode
+from pathlib import Path
+
+import nbformat
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.structure.files import File, Files
+from nbclient import NotebookClient
+
+NOTEBOOK = "quickstart"
+_TIMEOUT_S = 600
+"""For a cell; the first one compiles on a machine that has not done so yet."""
+
+
+def on_files(files: Files, *, config: MkDocsConfig) -> Files:
+    """The files of the site, with the notebook's page and pictures."""
+    book = nbformat.read(Path(config.docs_dir) / f"{NOTEBOOK}.ipynb", as_version=4)
+    NotebookClient(book, timeout=_TIMEOUT_S, kernel_name="python3").execute()
+    parts: list[str] = []
+    for cell in book.cells:
+        parts.append(cell.source if cell.cell_type == "markdown" else _fenced("python", cell.source))
+        for output in cell.get("outputs", []):
+            picture = output.get("data", {}).get("image/png")
+            if picture:
+                name = f"{NOTEBOOK}-{len(parts)}.png"
+                files.append(File.generated(config, name, content=b64decode(picture)))
+                parts.append(f"![What the code above draws]({name})")
+            else:
+                parts.append(_fenced("text", output.get("text") or output["data"]["text/plain"]))
+    files.append(File.generated(config, f"{NOTEBOOK}.md", content="\n\n".join(parts)))
+    return files
+
+
+def _fenced(language: str, text: str) -> str:
+    return f"```{language}\n{text.rstrip()}\n```"
