@@ -6,6 +6,7 @@ from base64 import b64decode
 from pathlib import Path
 
 import nbformat
+from jupyter_client.manager import AsyncKernelManager
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from nbclient import NotebookClient
@@ -18,10 +19,14 @@ _TIMEOUT_S = 600
 def on_files(files: Files, *, config: MkDocsConfig) -> Files:
     """The files of the site, with the notebook's page and pictures."""
     book = nbformat.read(Path(config.docs_dir) / f"{NOTEBOOK}.ipynb", as_version=4)
-    NotebookClient(book, timeout=_TIMEOUT_S, kernel_name="python3").execute()
+    # Between processes of one machine; through TCP the kernel would warn that everybody may listen.
+    kernel = AsyncKernelManager(kernel_name="python3", transport="ipc")
+    NotebookClient(book, km=kernel, timeout=_TIMEOUT_S).execute()
     parts: list[str] = []
     for cell in book.cells:
-        parts.append(cell.source if cell.cell_type == "markdown" else _fenced("python", cell.source))
+        parts.append(
+            cell.source if cell.cell_type == "markdown" else _fenced("python", cell.source)
+        )
         for output in cell.get("outputs", []):
             picture = output.get("data", {}).get("image/png")
             if picture:

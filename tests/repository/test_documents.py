@@ -2,13 +2,16 @@
 somewhere.
 """
 
+import json
 import os
 import re
 import shlex
 import subprocess
 import sys
 import tomllib
+from html.parser import HTMLParser
 from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
 
 import pytest
 from pyarrow.parquet import read_schema
@@ -16,28 +19,20 @@ from pyarrow.parquet import read_schema
 import care_sim.wrappers
 from care_sim import cli
 from care_sim.base.errors import InvalidInput
+from care_sim.commands.entries import COMMANDS
 from care_sim.core.conditions import DEFAULTS
 from care_sim.envs import IDS
 from care_sim.study.results_formats import RESULTS_FORMATS
 from care_sim.viewer.recording.entities import ENTITIES
 from tests.helpers.forked import LEARNING, LIBRARIES, Forked
+from tests.helpers.pages import PAGES, README, SITE, fenced, links, name_of
 from tests.helpers.places import ROOT
 
-SITE = sorted(page for page in (ROOT / "docs").rglob("*.md") if not page.is_symlink())
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "results" / "README.md", *SITE]
 NOTEBOOK = ROOT / "docs" / "quickstart.ipynb"
+FURTHER = {"RecordVideo": "moviepy", "RecordRerun": "rerun", "import polars": "polars"}
+"""What a block names, and the library that it then needs beside the installation."""
 STRATUM_SUM = re.compile(r"[^/]+/[^/]+/(delay|events|found|frames|sighted)")
 """KIND/STRATUM/NAME, which a page explains in one line for all strata."""
-
-
-def fenced(page, language):
-    """The blocks of a page that are marked with a language, or with none."""
-    blocks = re.findall(r"^```(\w*)\n(.*?)^```$", page.read_text(), re.S | re.M)
-    return [text for marked, text in blocks if marked == language]
-
-
-def name_of(page):
-    return str(page.relative_to(ROOT))
 
 
 BLOCKS = [
@@ -62,11 +57,12 @@ def forked():
 
 @pytest.mark.parametrize("block", BLOCKS)
 def test_a_block_runs_on_its_own(block, tmp_path, drive, forked):
-    """In an empty folder, with an Argoverse 2 log in `logs`."""
-    for wrapper, library in (("RecordVideo", "moviepy"), ("RecordRerun", "rerun")):
-        if wrapper in block:
+    """In an empty folder, with an Argoverse 2 log in `logs` and what was published in `results`."""
+    for named, library in FURTHER.items():
+        if named in block:
             pytest.importorskip(library)
     (tmp_path / "logs").symlink_to(drive.parent)
+    (tmp_path / "results").symlink_to(ROOT / "results")
     done = forked.run(block, tmp_path)
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip()
@@ -116,17 +112,51 @@ def test_the_learner_in_one_file_learns(monkeypatch, capsys):
 
 
 def test_the_policy_has_twenty_lines_at_most():
-    (policy,) = (
-        block for block in fenced(ROOT / "README.md", "python") if "class Corridor" in block
-    )
+    page = ROOT / "docs" / "write" / "policy.md"
+    (policy,) = (block for block in fenced(page, "python") if "class Corridor" in block)
     body = policy[policy.index("class Corridor") : policy.index("env = ")]
     assert len([line for line in body.splitlines() if line.strip()]) <= 20
 
 
+class Words(HTMLParser):
+    """The words that a page shows, those of code and tables among them."""
+
+    def __init__(self, html):
+        super().__init__()
+        self.words = []
+        self.feed(html)
+
+    def handle_data(self, data):
+        self.words += data.split()
+
+
+def test_the_readme_is_read_in_three_minutes():
+    markdown = pytest.importorskip("markdown")
+    html = markdown.markdown(README.read_text(), extensions=["tables", "fenced_code"])
+    assert "<table>" in html
+    assert "<code" in html
+    assert 300 < len(Words(html).words) < 700
+
+
+def test_the_readme_plays_an_episode_in_ten_lines():
+    (block,) = fenced(README, "python")
+    assert len([line for line in block.splitlines() if line.strip()]) <= 10
+
+
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_links_lead_somewhere(page):
-    for target in re.findall(r"\]\((?!http|#)([^)#]+)", page.read_text()):
-        assert (page.parent / target).exists(), target
+    """In a file view too, which does not follow a link to a folder: `docs/results` is one."""
+    for target in links(page):
+        place = Path(os.path.normpath(page.parent / target))
+        assert place.exists(), target
+        folders = [folder for folder in place.parents if folder.is_relative_to(ROOT)]
+        assert not any(folder.is_symlink() for folder in folders), f"{target} is behind a link"
+
+
+def test_every_command_has_its_line():
+    page = ROOT / "docs" / "commands.md"
+    told = {line.split()[1] for block in fenced(page, "") for line in block.splitlines()}
+    assert set(COMMANDS) - told == set()
 
 
 def test_every_environment_has_a_page():
@@ -136,7 +166,8 @@ def test_every_environment_has_a_page():
 
 
 def test_the_site_is_built_without_a_warning(tmp_path):
-    pytest.importorskip("material")
+    for library in ("material", "nbclient", "ipykernel"):
+        pytest.importorskip(library)
     command = [
         sys.executable,
         "-m",
@@ -170,25 +201,26 @@ def test_the_site_is_built_without_a_warning(tmp_path):
             r"<(?:script|link|img)[^>]*(?:src|href)=\"?(https?:[^\s\">]+)", page.read_text()
         )
         assert loaded == [], f"{page.name} asks the network"
+    notebook_shows_what_came_out(tmp_path / "site")
 
 
-def test_the_notebook_runs_from_top_to_bottom_and_is_kept_without_outputs():
-    client, nbformat = pytest.importorskip("nbclient"), pytest.importorskip("nbformat")
-    pytest.importorskip("ipykernel")
-    book = nbformat.read(NOTEBOOK, as_version=4)
-    code = [cell for cell in book.cells if cell.cell_type == "code"]
-    assert all(cell.outputs == [] and cell.execution_count is None for cell in code)
-    client.NotebookClient(book, timeout=300, kernel_name="python3").execute()
-    texts = "".join(
-        output.text for cell in code for output in cell.outputs if output.output_type == "stream"
-    )
-    found = [float(number) for number in re.findall(r"detects the person at ([\d.]+) m", texts)]
+def notebook_shows_what_came_out(site):
+    text = (site / "quickstart.html").read_text()
+    found = [float(number) for number in re.findall(r"detects the person at ([\d.]+) m", text)]
     assert len(found) == 3
     assert found[1] > found[0], "CARE sees the person before history does"
-    pictures = [
-        output for cell in code for output in cell.outputs if "image/png" in output.get("data", {})
-    ]
+    pictures = re.findall(r'<img[^>]* src="(quickstart-\d+\.png)"', text)
     assert len(pictures) == 2
+    assert all((site / picture).stat().st_size > 5000 for picture in pictures)
+    index = (site / "index.html").read_text()
+    assert 'href="quickstart.html"' in index
+
+
+def test_the_notebook_is_kept_without_outputs():
+    cells = json.loads(NOTEBOOK.read_text())["cells"]
+    code = [cell for cell in cells if cell["cell_type"] == "code"]
+    assert len(code) > 3
+    assert all(cell["outputs"] == [] and cell["execution_count"] is None for cell in code)
 
 
 def test_the_citation_names_this_version():
@@ -206,13 +238,13 @@ def test_every_column_that_is_read_is_explained(kind):
     assert not unexplained({*kind.schema.needed, *kind.schema.further})
 
 
+def test_every_condition_is_explained_as_a_column():
+    assert not unexplained(DEFAULTS)
+
+
 def unexplained(names):
-    """Those that the page does not name, but for the conditions, which have a page of their own."""
+    """Those that the page does not name."""
     rows = re.findall(r"^\| (.*?) \|", (ROOT / "docs" / "columns.md").read_text(), re.M)
     told = set(re.findall(r"`([\w/ .-]+)`", " ".join(rows)))
-    unknown = {
-        name
-        for name in names
-        if not {name, re.sub(r"\..*", ".NAME", name)} & told and name not in DEFAULTS
-    }
+    unknown = {name for name in names if not {name, re.sub(r"\..*", ".NAME", name)} & told}
     return {name for name in unknown if not STRATUM_SUM.fullmatch(name)}

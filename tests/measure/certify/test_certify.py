@@ -378,7 +378,7 @@ def test_an_episode_of_a_street_goes_as_published():
     assert verdict.as_published, "\n".join(verdict.lines())
 
 
-def test_the_readme_tells_the_hash_of_the_list():
-    readme = (ROOT / "README.md").read_text()
+def test_the_concepts_tell_the_hash_of_the_list():
+    concepts = (ROOT / "docs" / "concepts.md").read_text()
     told = published.combined(published.read()[:CERTIFIED_EPISODES])
-    assert f"{CERTIFIED_EPISODES:,} episodes: {told}" in readme
+    assert f"{CERTIFIED_EPISODES:,} episodes: {told}" in concepts
