@@ -6,12 +6,14 @@ from base64 import b64decode
 from pathlib import Path
 
 import nbformat
-from jupyter_client.manager import AsyncKernelManager
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from nbclient import NotebookClient
+from traitlets.config import Config
 
 NOTEBOOK = "quickstart"
+_PRIVATE = Config({"KernelManager": {"transport": "ipc"}})
+"""Over TCP the kernel warns that everybody on the machine may listen."""
 _TIMEOUT_S = 600
 """For a cell; the first one compiles on a machine that has not done so yet."""
 
@@ -19,9 +21,7 @@ _TIMEOUT_S = 600
 def on_files(files: Files, *, config: MkDocsConfig) -> Files:
     """The files of the site, with the notebook's page and pictures."""
     book = nbformat.read(Path(config.docs_dir) / f"{NOTEBOOK}.ipynb", as_version=4)
-    # Between processes of one machine; through TCP the kernel would warn that everybody may listen.
-    kernel = AsyncKernelManager(kernel_name="python3", transport="ipc")
-    NotebookClient(book, km=kernel, timeout=_TIMEOUT_S).execute()
+    NotebookClient(book, timeout=_TIMEOUT_S, kernel_name="python3", config=_PRIVATE).execute()
     parts: list[str] = []
     for cell in book.cells:
         parts.append(
