@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.core.allocation import allocate
+from care_sim.core.arrays import Integers
 from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
 from care_sim.core.types import Action, Demand
@@ -19,11 +20,17 @@ NOT_FIRED, EXPLOITATION, RESERVE, FLOOR, CHOSEN, ALONG = range(len(SHARES))
 """Places in SHARES."""
 
 
-def scores_of(cells: Cells, shape: tuple[int, int]) -> Action:
-    """The action (E, A) that demands `cells` (n,); the earlier, the higher."""
+def scores_of(cells: Cells, shape: tuple[int, int], shots: Integers | int = 1) -> Action:
+    """The action (E, A) that demands `cells` (n,); the earlier, the higher. Hardware that may fire
+    cells more than once (`care_sim.core.firing.energy`) fires each `shots` (n,) times, as far as
+    their sum does not exceed the budget.
+    """
     scores = np.zeros(shape[0] * shape[1], np.float32)
-    # From 1 down in equal steps, all above 0: the cells are fired in this order, and no others.
-    scores[cells] = np.arange(len(cells), 0, -1, dtype=np.float32) / max(len(cells), 1)
+    most = np.max(shots, initial=1)
+    # In equal steps down from `shots`, over less than 1 / (most + 1) in all: per shot, the last
+    # cell has still more than the first would have if it were fired once more than it should be.
+    steps = np.arange(len(cells)) / max(len(cells), 1) / (most + 1)
+    scores[cells] = (shots - steps) / most
     return scores.reshape(shape)
 
 

@@ -182,7 +182,8 @@ class Conditions(Sensing):
     """
     firing: str = CELLS
     """What the LiDAR can fire (`care_sim.core.firing`): `cells`, `tiles:ROWSxCOLUMNS`,
-    `segments:COLUMNS`, `rows`, `columns`, `vertical-window` or `azimuth-window:DEGREES`.
+    `segments:COLUMNS`, `rows`, `columns`, `vertical-window`, `azimuth-window:DEGREES` or
+    `energy:SHOTS`.
     """
 
     def __post_init__(self) -> None:

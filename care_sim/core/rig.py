@@ -120,7 +120,7 @@ class Rig:
         if self.cell_order == AS_DEMANDED:
             return demand
         exploitation, *layers = map(self.listed, stages_of(demand))
-        return Demand(exploitation, layers)
+        return Demand(exploitation, layers, demand.shots)
 
     def listed(
         self, sets: Sequence[Cells], usual: str = AS_DEMANDED, most: int | None = None

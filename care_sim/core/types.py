@@ -249,6 +249,11 @@ class Demand:
     """Sets of cells, that of the nearest object first."""
     layers: Sequence[Sequence[Cells]] = ()
     """The reserve layers in order of priority, each a sequence of sets of cells."""
+    shots: Integers | None = None
+    """(N,) how often every cell of the grid is to be fired if it is taken, of hardware that may
+    fire one more than once (`care_sim.core.firing.energy`); None for once each. The allocator
+    counts cells: more shots than the budget holds are cut where the hardware deals them.
+    """
 
 
 @dataclass(frozen=True)

@@ -42,7 +42,8 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     `Box(0, 1, (E, A), float32)`: a score for every cell of the angular grid. The `B` highest
     strictly positive scores fire, ties by ascending cell index. If there are fewer, the random
     floor that all policies share fills up (`floor=False` leaves the rest unspent). No action can
-    overspend. Other hardware than free cells (`firing`) fires whole units for them, in that order.
+    overspend. Other hardware than free cells (`firing`) fires whole units for them, in that order,
+    or cells several times.
 
     ### Observation
     A `Dict` of float32 arrays, padded to fixed shapes, that `care_sim.Belief.from_observation`
@@ -76,7 +77,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
 
     | key | content | whose |
     |---|---|---|
-    | `fired` | the cells of this keyframe (1) | the car's own |
+    | `fired` | the cells of this keyframe, each as often as it was fired (1) | the car's own |
     | `intensities` | of each, where pulses have strength, 0 without a return (1) | the car's own |
     | `times_s` | of each, where columns fire one by one, s from the keyframe (1) | the car's own |
     | `braking` | whether the brake is on | the car's own |

@@ -59,7 +59,7 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
 
     | key | content | whose |
     |---|---|---|
-    | `fired` | the cells of this keyframe | the car's own |
+    | `fired` | the cells of this keyframe, each as often as it was fired | the car's own |
     | `intensities` | of each, where pulses have strength, 0 without a return | the car's own |
     | `times_s` | of each, where columns fire one by one, s from the keyframe | the car's own |
     | `time_s` | time of the keyframe, seconds from the start | the car's own |

@@ -37,7 +37,8 @@ class AllocationDifference:
 
 
 def allocation_difference(ours: Sequence[Cells], theirs: Sequence[Cells]) -> AllocationDifference:
-    """Compare the cells fired at every keyframe, each once: the order of selection does not count.
+    """Compare the cells fired at every keyframe: the order of selection does not count, and a cell
+    that is fired n times counts n times.
 
     Allocations differ by the cells that one fires and the other does not, the larger side where the
     sizes differ: of two that spend the same budget, the cells that were fired elsewhere. Raises
@@ -55,4 +56,6 @@ def allocation_difference(ours: Sequence[Cells], theirs: Sequence[Cells]) -> All
 def _moved(ours: Cells, theirs: Cells) -> int:
     # Of equal sizes both sides have as many cells of their own. Of unequal ones the larger side has
     # more: what it fired beyond the other counts, too.
-    return max(len(ours), len(theirs)) - int(np.isin(ours, theirs).sum())
+    size = max(ours.max(initial=0), theirs.max(initial=0)) + 1
+    shared = np.minimum(np.bincount(ours, minlength=size), np.bincount(theirs, minlength=size))
+    return max(len(ours), len(theirs)) - int(shared.sum())

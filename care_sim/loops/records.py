@@ -31,7 +31,8 @@ class Keyframe:
     time_s: float
     """Of the scan, seconds from the start."""
     fired: Cells
-    """(n,) the cells that were fired, ascending."""
+    """(n,) the cells that were fired, ascending; one that was fired several times stands there as
+    often."""
     in_view: bool
     """Whether the unimpaired camera shows the first-sighting actor at the scan."""
     detected: bool
@@ -88,7 +89,7 @@ class Outcome:
     impact_speed_mps: float | None
     """The car's speed at its first contact with any body, None without a collision."""
     rays_fired: int
-    """Cells fired in all."""
+    """Shots fired in all; of all hardware but `energy` these are cells."""
 
 
 @dataclass(frozen=True)

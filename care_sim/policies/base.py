@@ -6,9 +6,13 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import ClassVar
 
+import numpy as np
+
+from care_sim.base.checks import as_array
 from care_sim.base.errors import InvalidInput
 from care_sim.core.actions import scores_of
 from care_sim.core.allocation import allocate
+from care_sim.core.arrays import Integers
 from care_sim.core.belief import Belief, Observation
 from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
@@ -69,7 +73,8 @@ class Policy(ABC):
         """
         belief = self.rig.read(observation)
         try:
-            return scores_of(self._cells(belief), self.rig.grid.shape)
+            cells = self._cells(belief)
+            return scores_of(cells, self.rig.grid.shape, self._shots(cells))
         except InvalidInput as error:
             raise InvalidInput(f"policy {self.name or type(self).__name__}: {error}") from error
 
@@ -85,6 +90,20 @@ class Policy(ABC):
         if cells.min(initial=0) < 0 or cells.max(initial=0) >= self.rig.grid.size:
             raise InvalidInput(f"cells must lie in 0..{self.rig.grid.size - 1}")
         return cells
+
+    def _shots(self, cells: Cells) -> Integers | int:
+        """(n,) how often each of the demanded `cells` is to be fired, as the hardware can do it."""
+        most = self.rig.hardware.most_shots
+        asked = self.demanded.shots if self.demanded is not None else None
+        # Where no cell is fired twice the demand is an order, and nothing else.
+        if asked is None or most == 1:
+            return 1
+        shots = as_array("shots of a demand", asked)
+        if shots.shape != (self.rig.grid.size,) or shots.dtype.kind not in "iu" or shots.min() < 1:
+            raise InvalidInput(
+                f"shots of a demand must be {self.rig.grid.size} whole numbers of 1 or more"
+            )
+        return np.minimum(shots[cells], most)
 
 
 class PrivilegedPolicy(Policy):

@@ -48,18 +48,21 @@ class Beams:
         self._compensates = settings.lidar_compensated
         self._motion = motion
 
-    def cast(self, sensor: Frame, cells: Cells) -> tuple[Scan, Integers]:
+    def cast(
+        self, sensor: Frame, cells: Cells, shots: Integers | None = None
+    ) -> tuple[Scan, Integers]:
         """The returns of `cells` (n,), ascending, from the frame `sensor` of the keyframe, and the
-        body behind each, NO_BODY where nothing returned.
+        body behind each, NO_BODY where nothing returned. `shots` (N,) says of all cells of the grid
+        how often they fire; each of `cells` once, unless given.
         """
         if self._sweep is None:
-            return self._scan(cells, self._cast_at_once(sensor, cells))
+            return self._scan(cells, self._cast_at_once(sensor, cells, shots))
         motion = self._motion()
         now = self._world.primitives.poses
         parts = [Echoes.none()]
         for seconds, places in self._sweep.instants(cells):
             with self._world.placed(motion.poses(now, seconds)):
-                echoes = self._cast_at_once(motion.sensor(sensor, seconds), cells[places])
+                echoes = self._cast_at_once(motion.sensor(sensor, seconds), cells[places], shots)
             parts.append(echoes._replace(beams=places[echoes.beams]))
         return self._scan(cells, Echoes.joined(parts))
 
@@ -73,7 +76,7 @@ class Beams:
         points = self._grid.directions[scan.cells] * ranges[:, None]
         return replace(scan, points=self._motion().compensated(points, sensor, scan.times))
 
-    def _cast_at_once(self, sensor: Frame, cells: Cells) -> Echoes:
+    def _cast_at_once(self, sensor: Frame, cells: Cells, shots: Integers | None) -> Echoes:
         """What is noticed of cells that fire at one instant, at which the sensor is in this frame;
         `Echoes.beams` are places in `cells`.
         """
@@ -83,7 +86,8 @@ class Beams:
             echoes = echoes_of(ranges, intensities, bodies)
         else:
             echoes = Echoes(np.arange(len(cells)), *met[0])
-        noticed = self._signal.suffices(echoes.intensities, echoes.ranges)
+        fired = 1 if shots is None else shots[cells[echoes.beams]]
+        noticed = self._signal.suffices(echoes.intensities, echoes.ranges, fired)
         echoes = echoes.take(np.flatnonzero(noticed))
         return reported(echoes, self._kept) if len(met) > 1 else echoes
 

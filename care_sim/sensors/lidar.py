@@ -6,6 +6,7 @@ import numpy as np
 
 from care_sim.core.arrays import Integers, Mask
 from care_sim.core.conditions import Sensing
+from care_sim.core.firing.shots import shots_by_cell
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.types import Scan
@@ -36,8 +37,8 @@ class Lidar:
         self._crosstalk = crosstalk_of(grid, sensing, seed)
 
     def peek(self, sensor: Frame) -> Scan:
-        """What a scan of every cell would return, before noise, crosstalk and dropout, which stay
-        undrawn.
+        """What a scan of every cell would return, each fired once, before noise, crosstalk and
+        dropout, which stay undrawn.
         """
         scan, _ = self._cast(np.arange(self.grid.size), sensor)
         if len(scan.cells) > self.grid.size:
@@ -46,20 +47,23 @@ class Lidar:
         return _without(scan, self._faults.dead)
 
     def hits(self, body: int, cells: Cells, sensor: Frame) -> int:
-        """How many of `cells` would hit a body, before noise, crosstalk and dropout, which stay
-        undrawn.
+        """How many of `cells`, each fired once, would hit a body, before noise, crosstalk and
+        dropout, which stay undrawn.
         """
         scan, bodies = self._cast(cells, sensor)
         return int(np.count_nonzero((bodies == body) & ~self._faults.dead[scan.cells]))
 
-    def fire(self, cells: Cells, sensor: Frame) -> tuple[Scan, Integers]:
-        """Fire `cells` from the frame `sensor`.
+    def fire(self, fired: Cells, sensor: Frame) -> tuple[Scan, Integers]:
+        """Fire the ascending cells `fired` from the frame `sensor`. One that stands there several
+        times is fired as often, and answers once: what its receiver counts adds up.
 
         Returns the scan, and the body id behind every return for the proxy detector alone.
         """
-        scan, ids = self._cast(cells, sensor)
+        cells, shots = shots_by_cell(fired, self.grid.size)
+        scan, ids = self._cast(cells, sensor, shots)
         if self._faults.is_noisy:
-            scan = replace(scan, ranges=self._faults.draw_noisy(scan.ranges, scan.cells))
+            measured = self._faults.draw_noisy(scan.ranges, scan.cells, shots)
+            scan = replace(scan, ranges=measured)
         if self._crosstalk is not None:
             scan, ids = self._crosstalk.over_scan(scan, ids)
         lost = self._faults.draw_lost(scan.cells)
@@ -68,10 +72,12 @@ class Lidar:
             scan = self._beams.compensated(scan, sensor)
         return scan, np.where(lost, NO_BODY, ids)
 
-    def _cast(self, cells: Cells, sensor: Frame) -> tuple[Scan, Integers]:
-        """What the cells meet, and the bodies behind it."""
+    def _cast(
+        self, cells: Cells, sensor: Frame, shots: Integers | None = None
+    ) -> tuple[Scan, Integers]:
+        """What the cells meet, and the bodies behind it; `shots` as in `Beams.cast`."""
         if self._beams is not None:
-            return self._beams.cast(sensor, cells)
+            return self._beams.cast(sensor, cells, shots)
         ranges, ids = self._engine.cast(sensor, cells)
         return Scan(cells, ranges), ids
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.arrays import Floats, Mask
+from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.conditions import LidarFaults
 from care_sim.core.grid import AngularGrid, Cells
 
@@ -29,10 +29,16 @@ class CellFaults:
         self._noise = np.random.default_rng(seed)
         self._dropout = np.random.default_rng(seed.spawn(1)[0])
 
-    def draw_noisy(self, ranges: Floats, cells: Cells) -> Floats:
-        """(n,) the `ranges` (n,) of `cells` (n,) as they are measured at this keyframe, metres."""
+    def draw_noisy(self, ranges: Floats, cells: Cells, shots: Integers | None = None) -> Floats:
+        """(n,) the `ranges` (n,) of `cells` (n,) as they are measured at this keyframe, metres.
+
+        `shots` (N,) says how often every cell fires, once unless given: the mean over n shots errs
+        by the root of n less.
+        """
         sigma = self._faults.lidar_range_sigma
         errors = sigma * self._noise.standard_normal(self._grid.size)[cells]
+        if shots is not None:
+            errors /= np.sqrt(shots[cells])
         # No return stays no return: noise is that of a measured range.
         (hit,) = np.isfinite(ranges).nonzero()
         measured = ranges.copy()

@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from care_sim.core.arrays import Floats
+from care_sim.core.arrays import Floats, Integers
 from care_sim.core.conditions import Sensing
+from care_sim.core.firing.shots import shots_by_cell
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.sensors.annotated import Cloud
 from care_sim.sensors.crosstalk import crosstalk_of
@@ -20,14 +21,17 @@ class RecordedLidar:
         self._faults = CellFaults(grid, sensing, seed)
         self._crosstalk = crosstalk_of(grid, sensing, seed)
 
-    def fire(self, cells: Cells, cloud: Cloud) -> Cloud:
-        """The returns of `cells` (k,) in the recorded `cloud`, after the faults."""
+    def fire(self, fired: Cells, cloud: Cloud) -> Cloud:
+        """The returns of the ascending cells `fired` (k,) in the recorded `cloud`, after the
+        faults; a cell that stands there several times was fired as often.
+        """
+        cells, shots = shots_by_cell(fired, self.grid.size)
         # A cell is dropped with all its returns, of which a recorded sweep may have several.
         answering = np.zeros(self.grid.size, dtype=bool)
         answering[cells] = ~self._faults.draw_lost(cells)
         returned = cloud.take(answering[cloud.cells])
         if self._faults.is_noisy:
-            returned = self._noisy(returned)
+            returned = self._noisy(returned, shots)
         return self._crosstalk.over_cloud(returned, answering) if self._crosstalk else returned
 
     def peek(self, cloud: Cloud) -> Cloud:
@@ -42,8 +46,8 @@ class RecordedLidar:
         nearest[cells] = np.minimum.reduceat(np.linalg.norm(cloud.points, axis=1), starts)
         return nearest
 
-    def _noisy(self, cloud: Cloud) -> Cloud:
+    def _noisy(self, cloud: Cloud, shots: Integers | None) -> Cloud:
         # Noise is along the ray: a point moves with its range, and stays in its cell.
         ranges = np.linalg.norm(cloud.points, axis=1)
-        moved = self._faults.draw_noisy(ranges, cloud.cells) / ranges
+        moved = self._faults.draw_noisy(ranges, cloud.cells, shots) / ranges
         return replace(cloud, points=cloud.points * moved[:, None])

@@ -8,11 +8,15 @@ the sensor's secret. Its data sheet tells the same in other words: the range R a
 reflectance rho_0 that faces it is still seen. Therefore a return exists where
 
     rho cos(theta) exp(-2 alpha r) / r^2 >= rho_0 / R^2.
+
+Of a cell that is fired n times the receiver adds up what it counts. Limited by its own photons, of
+which it must count so many, it needs an nth of the power: the left side counts n times, and in
+clear air the reach grows with the square root of n. `docs/firing.md` has the sources.
 """
 
 import numpy as np
 
-from care_sim.core.arrays import Floats, Mask
+from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.return_settings import ReturnSettings
 from care_sim.sensors.weather import fog_extinction, rain_extinction
 
@@ -38,7 +42,18 @@ class Signal:
         air = np.exp(-2 * self._extinction * np.where(met, ranges, 0.0))
         return np.where(met, brightness * air, 0.0)
 
-    def suffices(self, intensities: Floats, ranges: Floats) -> Mask:
-        """(n,) whether returns of `intensities` (n,) from `ranges` (n,) are noticed."""
+    def suffices(self, intensities: Floats, ranges: Floats, shots: Integers | int = 1) -> Mask:
+        """(n,) whether returns of `intensities` (n,) from `ranges` (n,) are noticed, of cells that
+        are fired `shots` (n,) times.
+        """
         met = np.isfinite(ranges)
-        return met & (intensities >= self._least * np.where(met, ranges, 0.0) ** 2)
+        return met & (shots * intensities >= self._least * np.where(met, ranges, 0.0) ** 2)
+
+    def shots_needed(self, intensities: Floats, ranges: Floats) -> Floats:
+        """(n,) the fewest shots with which returns of `intensities` (n,) from `ranges` (n,) are
+        noticed, whole numbers from 1; inf where none suffice.
+        """
+        needed = np.full(len(ranges), np.inf)
+        met = np.isfinite(ranges) & (intensities > 0)
+        np.divide(self._least * ranges**2, intensities, out=needed, where=met)
+        return np.maximum(np.ceil(needed), 1.0)

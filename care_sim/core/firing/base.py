@@ -23,7 +23,8 @@ class Hardware(ABC):
     The budget is paid in units. Subclasses name what they stand for: `name` as `firing` has it, the
     `numbers` behind the colon of it, if any, with their `usual` values, the `unit` in one word, the
     `product`, and its public `source`. `spends_floor` says whether the random floor gets what is
-    left of the budget.
+    left of the budget. `most_shots` is how often a cell may be fired at a keyframe, and
+    `counted`, in one word, what the budget B is a number of.
     """
 
     name: ClassVar[str]
@@ -33,6 +34,8 @@ class Hardware(ABC):
     product: ClassVar[str]
     source: ClassVar[str]
     spends_floor: ClassVar[bool] = True
+    counted: ClassVar[str] = "cell"
+    most_shots: int = 1
 
     def __init__(self, grid: AngularGrid, unit_cells: int):
         self.grid = grid
@@ -57,7 +60,8 @@ class Hardware(ABC):
 
     @abstractmethod
     def fire(self, scores: NDArray[Any], budget: int, floor: Floor, last: Cells) -> Cells:
-        """The cells that fire, ascending, never more than `budget`.
+        """The cells that fire, ascending, never more than `budget`; where one may be fired more
+        than once, it stands there once for every shot.
 
         Cells with strictly positive `scores` (E, A) are demanded, the highest score first, ties by
         ascending index. Then the `floor` spends what is left. `last` are the cells that fired at

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.firing.azimuth_window import AzimuthWindow
 from care_sim.core.firing.base import Hardware
+from care_sim.core.firing.energy import Energy
 from care_sim.core.firing.free_cells import FreeCells
 from care_sim.core.firing.ring_segments import RingSegments
 from care_sim.core.firing.tiles import Tiles
@@ -25,6 +26,7 @@ HARDWARE: dict[str, type[Hardware]] = {
         WholeColumns,
         VerticalWindow,
         AzimuthWindow,
+        Energy,
     )
 }
 _NUMBER = re.compile(r"[0-9]{1,6}(\.[0-9]{1,6})?")

@@ -53,7 +53,8 @@ class ExportScans(Watching):
       `bodies` (`name`, `class` or null, `box`), all in the world frame (x along the road, y left,
       z up) and truth;
       `tracks` (`id`, `class`, `box` of the forecast, `velocity` over ground) in the sensor frame;
-      `fired` cells; `detected` (the first-sighting actor), `braking`, `speed_mps`.
+      `fired` cells, each as often as it was; `detected` (the first-sighting actor), `braking`,
+      `speed_mps`.
     - `episode.json`: `units`, `grid`, `classes`, `shares`, and `outcome`, null until the end.
 
     ### Arguments

@@ -17,7 +17,7 @@ _COLUMNS = (
     "speed\nm/s",
     "sensor to\nactor m",
     "hull to\nhull m",
-    "cells\nfired",
+    "rays\nfired",
     "seen",
     "found",
     "brake",

@@ -207,7 +207,8 @@ def fullness(fired: Cells, grid: AngularGrid) -> str:
     """How much of every sector fires, one digit per sector."""
     sectors = np.floor((grid.azimuths + np.pi) / (2 * np.pi) * SECTORS).astype(np.int64)
     # Cells are numbered row by row, so that the remainder is the column.
-    counts = np.bincount(sectors[np.asarray(fired) % grid.columns], minlength=SECTORS)
+    # A cell that was fired several times is as full as one that was fired once.
+    counts = np.bincount(sectors[np.unique(fired) % grid.columns], minlength=SECTORS)
     cells = np.maximum(np.bincount(sectors, minlength=SECTORS), 1) * grid.rows
     return "".join(
         _DIGITS[round(digit)] for digit in (counts / cells * (len(_DIGITS) - 1)).tolist()

@@ -41,7 +41,7 @@ def draw_panel(name: str, loop: ClosedLoop, frames: Sequence[Keyframe]) -> Image
     canvas.paste(_chase_view(loop, frames[-1]), (0, _TOP))
     draw.text(
         (8, _GRID_TOP - 20),
-        f"{len(frames[-1].fired)} LiDAR cells fired, those ahead:",
+        f"{len(frames[-1].fired)} LiDAR {loop.rig.hardware.counted}s fired, those ahead:",
         FAINT_INK,
         drawing.font(14),
     )

@@ -91,14 +91,18 @@ def draw_keyframe(loop: ClosedLoop, frame: Keyframe | None) -> NDArray[np.uint8]
 
 def _write_header(draw: ImageDraw.ImageDraw, loop: ClosedLoop, frame: Keyframe | None) -> None:
     motion = loop.world.ego_motion
-    budget = loop.rig.budget
+    budget, counted = loop.rig.budget, loop.rig.hardware.counted
     words = [(12, f"{loop.world.time:.1f} s", INK), (90, f"{motion.speed:.1f} m/s", INK)]
     if frame is None:
         words.append(
-            (330, f"nothing fired yet, budget {budget} of {loop.rig.grid.size} cells", FAINT_INK)
+            (
+                330,
+                f"nothing fired yet, budget {budget} of {loop.rig.grid.size} {counted}s",
+                FAINT_INK,
+            )
         )
     else:
-        words.append((330, f"{len(frame.fired)} of {budget} cells fired", INK))
+        words.append((330, f"{len(frame.fired)} of {budget} {counted}s fired", INK))
         if contact := contact_text(loop, frame):
             draw.rounded_rectangle((630, 6, 952, 34), 6, HIT.colour)
             words.append((640, contact, BACKGROUND))

@@ -110,11 +110,11 @@ def _write_words(
     found: int,
     objects: int,
 ) -> None:
-    budget = loop.rig.budget
+    budget, counted = loop.rig.budget, loop.rig.hardware.counted
     fired = (
-        f"nothing fired yet, budget {budget} cells"
+        f"nothing fired yet, budget {budget} {counted}s"
         if record is None
-        else f"{len(record.fired)} of {budget} cells fired"
+        else f"{len(record.fired)} of {budget} {counted}s fired"
     )
     for x, text in (
         (12, f"{time_s:.1f} s"),

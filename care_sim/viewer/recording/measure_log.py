@@ -59,7 +59,9 @@ class MeasureLog:
         """A keyframe, with the state of the first-sighting actor."""
         frame = watched.record
         self._frames.append(frame)
-        self._counts.append(np.bincount(watched.shares.ravel(), minlength=len(SHARES)))
+        # A cell that was fired several times was paid for as often.
+        paid = watched.shares.ravel()[frame.fired]
+        self._counts.append(np.bincount(paid, minlength=len(SHARES)))
         brake = "on" if frame.braking else "off"
         self._change(
             "states/actor", state, f"actor {state}, {frame.distance_m:.1f} m from the sensor"
