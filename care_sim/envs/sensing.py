@@ -89,6 +89,7 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
             firing=conditions.firing,
             sensor_x_m=x,
             sensor_y_m=y,
+            returns=conditions.filmed,
             setup=setup,
         )
         self.action_space = spaces.Box(0.0, 1.0, grid.shape, np.float32)

@@ -8,6 +8,7 @@ from care_sim.core.belief import Belief
 from care_sim.core.grid import Cells
 from care_sim.core.types import Demand
 from care_sim.policies.own.care_sightlines import CareSightlines
+from care_sim.policies.own.target_shots import TargetShots
 
 
 class CareUnits(CareSightlines):
@@ -18,6 +19,9 @@ class CareUnits(CareSightlines):
     B cells counts B, the next B - 1, down to the last, which counts 1. Of the units that can fire
     together those are demanded that are worth the most. All hold as many cells, so that they are
     worth the most per cell paid, too. With free cells that is `care-sightlines`, cell for cell.
+
+    Where cells may be fired several times, each has the shots that what is known to stand there
+    takes to return (`care_sim.policies.own.target_shots`), as far as the budget goes.
     """
 
     name = "care-units"
@@ -32,8 +36,13 @@ class CareUnits(CareSightlines):
 
         # Of a cell that was not fired an observation says 0.
         last = np.flatnonzero(belief.ranges.ravel() > 0)
-        best = hardware.best(worth, belief.budget, last)
-        return Demand(layers=[[self._cells_of(best)]])
+        best = self._cells_of(hardware.best(worth, belief.budget, last))
+        if hardware.most_shots == 1:
+            return Demand(layers=[[best]])
+        # The allocator counts cells. Shots are what is paid, so they are counted here.
+        shots = TargetShots(self.rig).of(belief)
+        paid = np.cumsum(shots[best]) <= belief.budget
+        return Demand(layers=[[best[paid]]], shots=shots)
 
     def _cells_of(self, units: Integers) -> Cells:
         """All cells of some units (k,), unit after unit, each ascending."""

@@ -1,0 +1,62 @@
+"""How many shots a cell takes to return what is known to stand there: far, dark or in fog."""
+
+import numpy as np
+
+from care_sim.core.arrays import Floats, Integers
+from care_sim.core.belief import Belief
+from care_sim.core.residual import wedge_rays, wedges
+from care_sim.core.rig import Rig
+from care_sim.core.types import CLASSES, ImageDetections
+from care_sim.sensors.signal import Signal
+from care_sim.world.bodies import CATALOGUE
+
+_HEIGHTS_M = np.array([CATALOGUE[name].size[2] for name in CLASSES])
+"""The typical body of every class; `CATALOGUE` has their sources."""
+PERSON_REFLECTANCE = 0.4
+"""The least that targets of pedestrians have at 850 to 910 nm (ISO 19206-2: 40 to 60%)."""
+_SHOWS_PERSON = np.isin(CLASSES, ("pedestrian", "bicycle"))
+
+
+class TargetShots:
+    """The shots of a rig, which tells how its pulses return.
+
+    A target is taken to face the LiDAR. A person is as dark as one may be. Paint can be anything,
+    so that a vehicle is taken for the target at which the data sheet states its range. A forecast
+    is as far as its centre, an image box as far as the typical height of its class makes it.
+    """
+
+    def __init__(self, rig: Rig):
+        self._rig = rig
+        self._most = rig.hardware.most_shots
+        self._signal = Signal(rig.returns)
+        vehicle = rig.returns.lidar_stated_reflectance
+        self._brightness = np.where(_SHOWS_PERSON, PERSON_REFLECTANCE, vehicle)
+
+    def of(self, belief: Belief) -> Integers:
+        """(N,) the shots of every cell: of those hulls and wedges that hold it, as many as the one
+        needs that needs most. What even the most shots would not show has one, for it may be
+        brighter or nearer; so has a cell of which nothing is known.
+        """
+        shots = np.ones(self._rig.grid.size, np.int64)
+        detections, tracks = belief.detections, belief.tracks
+        for sets, classes, ranges in (
+            (self._rig.hulls(tracks.boxes), tracks.classes, tracks.ranges),
+            (wedges(detections, self._rig), detections.classes, self._ranges(detections)),
+        ):
+            intensities = self._signal.intensities(self._brightness[classes], ranges)
+            needed = self._signal.shots_needed(intensities, ranges)
+            useful = np.where(needed <= self._most, needed, 1).astype(np.int64)
+            np.maximum.at(shots, sets.cells, np.repeat(useful, sets.sizes))
+        return shots
+
+    def _ranges(self, detections: ImageDetections) -> Floats:
+        """(n,) metres to what image boxes show, by their heights."""
+        if not len(detections):
+            return np.empty(0)
+        cameras = self._rig.camera_models
+        pixels = detections.boxes[:, 3] - detections.boxes[:, 1]
+        focal = cameras.focals[detections.cameras]
+        depths = focal * _HEIGHTS_M[detections.classes] / np.maximum(pixels, 1.0)
+        # A depth is along the optical axis; the ray through the middle of the box is longer.
+        middles = wedge_rays(detections, self._rig)[:, 0]
+        return depths * np.linalg.norm(middles, axis=1)
