@@ -18,10 +18,10 @@ from care_sim.base.times import LAST_BITS_S
 from care_sim.core.allocation import RESERVE_FRACTION
 from care_sim.core.cell_order import AS_DEMANDED
 from care_sim.core.driver_settings import DRIVER_SETTINGS, DriverSettings
-from care_sim.core.firing.listing import CELLS, settled
+from care_sim.core.firing.listing import CELLS, most_shots, settled
 from care_sim.core.grid import AZIMUTH_MARGIN, ELEVATION_MARGIN
 from care_sim.core.grid_rays import MOST_COLUMNS, MOST_ROWS
-from care_sim.core.return_settings import RETURN_SETTINGS, ReturnSettings
+from care_sim.core.return_settings import RETURN_SETTINGS, FilmedReturns, ReturnSettings
 
 MIN_RETURNS = 3
 """Fired rays that must hit an object. The fewest that span a surface."""
@@ -190,6 +190,15 @@ class Conditions(Sensing):
         super().__post_init__()
         # Conditions that mean the same must be equal: they are part of what identifies an episode.
         object.__setattr__(self, "firing", settled(self.firing))
+
+    @property
+    def filmed(self) -> FilmedReturns:
+        """How pulses return, as a film is made with it."""
+        told = {name: getattr(self, name) for name in RETURN_SETTINGS}
+        told["lidar_crosstalk"] = RETURN_SETTINGS["lidar_crosstalk"]
+        # Without strength, more shots return nothing else.
+        shots = most_shots(self.firing) if self.lidar_stated_range_m else 1
+        return FilmedReturns(**told, most_shots=shots)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -74,14 +74,6 @@ class ReturnSettings:
         """Whether a ray alone does not tell what a cell returns."""
         return bool(self.lidar_stated_range_m or self.lidar_divergence_mrad or self.lidar_sweep_s)
 
-    @property
-    def filmed(self) -> "ReturnSettings":
-        """These settings alone, as a film is made with them; crosstalk is drawn when it is
-        played.
-        """
-        told = {name: getattr(self, name) for name in RETURN_SETTINGS}
-        return ReturnSettings(**(told | {"lidar_crosstalk": RETURN_SETTINGS["lidar_crosstalk"]}))
-
     def check_returns(self) -> None:
         """Raise InvalidInput for a setting that has no meaning without another one, for a distance
         too near to 0, and for returns that there are not.
@@ -100,7 +92,18 @@ class ReturnSettings:
 
 RETURN_SETTINGS: dict[str, Any] = {field.name: field.default for field in fields(ReturnSettings)}
 """Their names and defaults."""
-RAYS = ReturnSettings()
+
+
+@dataclass(frozen=True, kw_only=True)
+class FilmedReturns(ReturnSettings):
+    """How pulses return in a film, without crosstalk, which is drawn when it is played. It holds
+    what returns to a cell that is fired up to `most_shots` times.
+    """
+
+    most_shots: int = 1
+
+
+RAYS = FilmedReturns()
 """All switches off."""
 
 

@@ -19,7 +19,7 @@ from care_sim.core.grid import AZIMUTH_MARGIN, ELEVATION_MARGIN, AngularGrid, Ce
 from care_sim.core.grid_rays import MOST_COLUMNS, MOST_ROWS
 from care_sim.core.pinhole import PinholeCamera, camera_models
 from care_sim.core.pinhole_kernels import CameraModels
-from care_sim.core.return_settings import RAYS, ReturnSettings
+from care_sim.core.return_settings import RAYS, FilmedReturns
 from care_sim.core.types import Demand
 
 LIDAR_X_M = -0.445
@@ -40,8 +40,8 @@ class Rig:
     `elevation_margin` rows. The LiDAR stands `sensor_height_m` above the road, `sensor_x_m` before
     and `sensor_y_m` left of the car's middle. The sets that a policy demands are listed in a
     `cell_order` (`care_sim.core.cell_order.CELL_ORDERS`) before cells are chosen. `firing` names
-    the hardware that fires them (`care_sim.core.firing`), and `returns` how their pulses return;
-    crosstalk, which is drawn, is left out of it. `setup` tells the set-up by name and hash
+    the hardware that fires them (`care_sim.core.firing`), and `returns` how their pulses return,
+    without crosstalk. `setup` tells the set-up by name and hash
     (`care_sim.core.sensor_setup`); nothing of recordings, and of rigs that were made without one.
     Raises InvalidInput for a value out of its bounds.
     """
@@ -58,7 +58,7 @@ class Rig:
     firing: str = CELLS
     sensor_x_m: float = bounded(LIDAR_X_M, -MOST_SHIFT_M, MOST_SHIFT_M)
     sensor_y_m: float = bounded(0.0, -MOST_SHIFT_M, MOST_SHIFT_M)
-    returns: ReturnSettings = RAYS
+    returns: FilmedReturns = RAYS
     setup: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
@@ -67,8 +67,8 @@ class Rig:
             raise InvalidInput(f"grid must be an AngularGrid, got {shown(self.grid)}")
         check_known("cell_order", self.cell_order, CELL_ORDERS)
         object.__setattr__(self, "firing", settled(self.firing))
-        if not isinstance(self.returns, ReturnSettings):
-            raise InvalidInput(f"returns must be ReturnSettings, got {shown(self.returns)}")
+        if not isinstance(self.returns, FilmedReturns):
+            raise InvalidInput(f"returns must be FilmedReturns, got {shown(self.returns)}")
         cameras = self.cameras
         if not (
             isinstance(cameras, tuple | list)

@@ -197,6 +197,11 @@ class FilmEnv(OpenLoopEnv):
                 f"{name} cannot be changed of the film {film.name}, which was made with "
                 f"{getattr(film.returns, name)}"
             )
+        if self.conditions.filmed.most_shots > film.returns.most_shots:
+            raise InvalidInput(
+                f"firing {self.conditions.firing} cannot be played on the film {film.name}: it "
+                f"holds what returns to {film.returns.most_shots} shots of a cell at most"
+            )
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

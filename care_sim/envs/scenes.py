@@ -9,7 +9,7 @@ from care_sim.envs.sensing import Observed
 from care_sim.sensors.setups import DEFAULT_SETUP, Sensor, sensor_setup
 from care_sim.sensors.surround import SURROUND_CAMERAS
 from care_sim.sources.recordings import film_of, recordings
-from care_sim.sources.street_films import street_film
+from care_sim.sources.street_films import check_filmed, street_film
 from care_sim.streets.draft import STREET_KEYFRAME_S
 
 
@@ -29,6 +29,7 @@ class StreetEnv(OpenLoopEnv):
         cameras = setup.equipped(SURROUND_CAMERAS)
         mounted = setup.grid, cameras, setup.position
         super().__init__(*mounted, STREET_KEYFRAME_S, setup.label, **parameters)
+        check_filmed(self.conditions.filmed)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.core.pinhole import PinholeCamera
-from care_sim.core.return_settings import RAYS, ReturnSettings
+from care_sim.core.return_settings import RAYS, FilmedReturns
 from care_sim.core.sensor_setup import LIDAR_POSITION, Position
 from care_sim.core.types import Ego
 from care_sim.sensors.annotated import NO_ANNOTATIONS, Annotations, Cloud, IdentifiedDetections
@@ -67,7 +67,7 @@ class Film:
     grid: AngularGrid = field(default_factory=AngularGrid)
     place: tuple[float, float] = LIDAR_POSITION[:2]
     detected: bool = False
-    returns: ReturnSettings = RAYS
+    returns: FilmedReturns = RAYS
 
     @property
     def position(self) -> Position:

@@ -103,7 +103,8 @@ class Policy(ABC):
             raise InvalidInput(
                 f"shots of a demand must be {self.rig.grid.size} whole numbers of 1 or more"
             )
-        return np.minimum(shots[cells], most)
+        held: Integers = np.minimum(shots[cells], most)
+        return held
 
 
 class PrivilegedPolicy(Policy):

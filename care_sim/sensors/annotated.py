@@ -40,7 +40,8 @@ class Cloud:
     """Returns: `cells` (P,) ascending (several returns of a recorded sweep may share one), `points`
     (P, 3) in the sensor frame, `objects` (P,) the annotated object that each lies on or NO_OBJECT,
     `intensities` (P,), 0 to 1, where pulses have strength (`care_sim.sensors.signal`), and `times`
-    (P,), seconds from the keyframe, where they have their own (`care_sim.sensors.sweep`).
+    (P,), seconds from the keyframe, where they have their own (`care_sim.sensors.sweep`). `shots`
+    (P,) is how often a cell must be fired for each to return; None where once is enough for all.
     """
 
     cells: Cells
@@ -48,9 +49,16 @@ class Cloud:
     objects: Integers
     intensities: Floats | None = None
     times: Floats | None = None
+    shots: Floats | None = None
 
     def __len__(self) -> int:
         return len(self.cells)
+
+    def to_shots(self, fired: Integers | None = None) -> "Cloud":
+        """The returns of cells that are `fired` (N,) times; once each, unless it is given."""
+        if self.shots is None:
+            return self
+        return self.take(self.shots <= (1 if fired is None else fired[self.cells]))
 
     def take(self, kept: Mask) -> "Cloud":
         """Some of the returns, by mask (P,)."""
@@ -64,6 +72,7 @@ class Cloud:
             self.objects[rows],
             None if self.intensities is None else self.intensities[rows],
             None if self.times is None else self.times[rows],
+            None if self.shots is None else self.shots[rows],
         )
 
 
@@ -77,6 +86,7 @@ def joined(clouds: Sequence[Cloud]) -> Cloud:
         np.concatenate([cloud.objects for cloud in clouds])[order],
         _column([cloud.intensities for cloud in clouds], order),
         _column([cloud.times for cloud in clouds], order),
+        _column([cloud.shots for cloud in clouds], order),
     )
 
 

@@ -29,14 +29,16 @@ class RecordedLidar:
         # A cell is dropped with all its returns, of which a recorded sweep may have several.
         answering = np.zeros(self.grid.size, dtype=bool)
         answering[cells] = ~self._faults.draw_lost(cells)
-        returned = cloud.take(answering[cloud.cells])
+        returned = cloud.take(answering[cloud.cells]).to_shots(shots)
         if self._faults.is_noisy:
             returned = self._noisy(returned, shots)
         return self._crosstalk.over_cloud(returned, answering) if self._crosstalk else returned
 
     def peek(self, cloud: Cloud) -> Cloud:
-        """What every cell would return, before noise and dropout, which stay undrawn."""
-        return cloud.take(~self._faults.dead[cloud.cells])
+        """What every cell would return, each fired once, before noise and dropout, which stay
+        undrawn.
+        """
+        return cloud.take(~self._faults.dead[cloud.cells]).to_shots()
 
     def ranges(self, cloud: Cloud) -> Floats:
         """(N,) the nearest return of every cell in metres, inf without one."""

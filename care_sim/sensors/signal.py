@@ -47,7 +47,8 @@ class Signal:
         are fired `shots` (n,) times.
         """
         met = np.isfinite(ranges)
-        return met & (shots * intensities >= self._least * np.where(met, ranges, 0.0) ** 2)
+        enough: Mask = shots * intensities >= self._least * np.where(met, ranges, 0.0) ** 2
+        return met & enough
 
     def shots_needed(self, intensities: Floats, ranges: Floats) -> Floats:
         """(n,) the fewest shots with which returns of `intensities` (n,) from `ranges` (n,) are
@@ -56,4 +57,5 @@ class Signal:
         needed = np.full(len(ranges), np.inf)
         met = np.isfinite(ranges) & (intensities > 0)
         np.divide(self._least * ranges**2, intensities, out=needed, where=met)
-        return np.maximum(np.ceil(needed), 1.0)
+        fewest: Floats = np.maximum(np.ceil(needed), 1.0)
+        return fewest

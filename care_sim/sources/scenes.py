@@ -6,12 +6,12 @@ from typing import Any, NamedTuple, Protocol
 from care_sim.base.checks import check_known
 from care_sim.base.digests import data_digest, file_digest
 from care_sim.base.errors import InvalidInput, shortened
-from care_sim.core.return_settings import RAYS, ReturnSettings, changed_settings
+from care_sim.core.return_settings import RAYS, FilmedReturns, changed_settings
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.loops.film import Film
 from care_sim.sensors.setups import DEFAULT_SETUP, sensor_columns, sensor_setup
 from care_sim.sources.recordings import RECORDING_KINDS, NuScenes, Recordings, recordings
-from care_sim.sources.street_films import record
+from care_sim.sources.street_films import check_filmed, record
 from care_sim.streets.street import (
     CALIBRATION_SEEDS,
     EVALUATION_SEEDS,
@@ -44,13 +44,13 @@ class Source(Protocol):
         """The set-up, its name or its file, whose grid its films hold."""
         ...
 
-    def film(self, scene: Scene, returns: ReturnSettings = RAYS) -> Film:
+    def film(self, scene: Scene, returns: FilmedReturns = RAYS) -> Film:
         """The film of a scene whose pulses return by `returns`. Raises InvalidInput where it cannot
         be made.
         """
         ...
 
-    def check_returns(self, returns: ReturnSettings) -> None:
+    def check_returns(self, returns: FilmedReturns) -> None:
         """Raise InvalidInput where no film can be made with `returns`."""
         ...
 
@@ -78,12 +78,13 @@ class Streets:
         """One per seed."""
         return [Scene(street_name(seed), seed) for seed in SPLITS[self.split]]
 
-    def film(self, scene: Scene, returns: ReturnSettings = RAYS) -> Film:
+    def film(self, scene: Scene, returns: FilmedReturns = RAYS) -> Film:
         """The street of the seed."""
         return record(make_street(scene.seed), sensor_setup(self.sensor), returns)
 
-    def check_returns(self, returns: ReturnSettings) -> None:
-        """A street is filmed with any."""
+    def check_returns(self, returns: FilmedReturns) -> None:
+        """A street is filmed with all but one; see `care_sim.sources.street_films`."""
+        check_filmed(returns)
 
     def row(self, scene: Scene) -> dict[str, Any]:
         """The name of a street says all but the sensor."""
@@ -108,12 +109,12 @@ class Recorded:
         """
         return [Scene(name, 0) for name in self.recordings.scenes()]
 
-    def film(self, scene: Scene, returns: ReturnSettings = RAYS) -> Film:
+    def film(self, scene: Scene, returns: FilmedReturns = RAYS) -> Film:
         """The recorded scene of the name."""
         self.check_returns(returns)
         return self.recordings.film(scene.name)
 
-    def check_returns(self, returns: ReturnSettings) -> None:
+    def check_returns(self, returns: FilmedReturns) -> None:
         """The switches of returns need the surfaces that pulses meet, which nobody recorded."""
         for name in changed_settings(returns, RAYS):
             raise InvalidInput(

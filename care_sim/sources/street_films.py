@@ -9,17 +9,19 @@ from functools import lru_cache, partial
 
 import numpy as np
 
+from care_sim.base.errors import InvalidInput
 from care_sim.base.random_streams import secret_entropy
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.frames import Frame
 from care_sim.core.pinhole import PinholeCamera
-from care_sim.core.return_settings import RAYS, ReturnSettings
+from care_sim.core.return_settings import RAYS, STRONGEST, FilmedReturns
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.core.types import CLASSES
 from care_sim.loops.film import Film, Shot
 from care_sim.sensors.annotated import Annotations, Cloud, IdentifiedDetections, cloud_of
 from care_sim.sensors.beams import Beams
 from care_sim.sensors.setups import DEFAULT_SETUP, sensor_setup
+from care_sim.sensors.signal import Signal
 from care_sim.sensors.surround import SURROUND_CAMERAS, full_sweep, numbers_of, surround_detections
 from care_sim.streets.draft import STREET_KEYFRAME_S
 from care_sim.streets.street import Street, make_street
@@ -39,7 +41,7 @@ _NO_CLASS = -1
 """The class of a body that the five classes do not hold."""
 
 
-def record(street: Street, setup: SensorSetup = _DEFAULT, returns: ReturnSettings = RAYS) -> Film:
+def record(street: Street, setup: SensorSetup = _DEFAULT, returns: FilmedReturns = RAYS) -> Film:
     """The film of a street, taken by a sensor set-up whose pulses return by `returns`.
     `Cloud.objects` and `Annotations.objects` are the columns of `street.poses`.
 
@@ -49,6 +51,7 @@ def record(street: Street, setup: SensorSetup = _DEFAULT, returns: ReturnSetting
     keyframe is in `Film.hidden`. Whatever returns, the same are annotated: those whom plain rays or
     a camera meet.
     """
+    check_filmed(returns)
     cameras = setup.equipped(SURROUND_CAMERAS)
     with closing(BulletWorld()) as world:
         bodies = _StreetBodies(street, world, setup, returns)
@@ -58,8 +61,19 @@ def record(street: Street, setup: SensorSetup = _DEFAULT, returns: ReturnSetting
     return Film(*told, shots, hidden[0], setup.grid, (x, y), returns=returns)
 
 
+def check_filmed(returns: FilmedReturns) -> None:
+    """Raise InvalidInput where one film does not tell what every number of shots returns: which
+    echo is the last depends on how many are noticed, and which is the strongest does not.
+    """
+    if returns.most_shots > 1 and returns.lidar_returns != STRONGEST:
+        raise InvalidInput(
+            f"lidar_returns must be {STRONGEST} on a street whose cells may be fired several "
+            f"times (firing energy with lidar_stated_range_m), got {returns.lidar_returns}"
+        )
+
+
 def street_film(
-    seed: int, secret: str = "", setup: SensorSetup = _DEFAULT, returns: ReturnSettings = RAYS
+    seed: int, secret: str = "", setup: SensorSetup = _DEFAULT, returns: FilmedReturns = RAYS
 ) -> Film:
     """The film of the street of a seed. The last one is kept, for policies that meet the same
     street in turn. With a secret it is another street, whose seed cannot be guessed. Its name
@@ -69,7 +83,7 @@ def street_film(
 
 
 @lru_cache(maxsize=1)
-def _street_film(seed: int, secret: str, setup: SensorSetup, returns: ReturnSettings) -> Film:
+def _street_film(seed: int, secret: str, setup: SensorSetup, returns: FilmedReturns) -> Film:
     if not secret:
         return record(make_street(seed), setup, returns)
     street = make_street(secret_entropy("street", (seed,), secret))
@@ -82,7 +96,7 @@ class _StreetBodies:
     """
 
     def __init__(
-        self, street: Street, world: BulletWorld, setup: SensorSetup, returns: ReturnSettings
+        self, street: Street, world: BulletWorld, setup: SensorSetup, returns: FilmedReturns
     ):
         self._returns = returns
         self._street = street
@@ -132,8 +146,14 @@ class _StreetBodies:
         """The returns of every cell; `numbers` are those of the bodies that are reported."""
         grid = self._setup.grid
         beams = Beams(self._world, grid, self._returns, _ENGINE, partial(self._motion, keyframe))
-        scan, bodies = beams.cast(sensor, np.arange(grid.size))
-        return cloud_of(beams.compensated(scan, sensor), numbers_of(bodies, numbers), grid)
+        most = self._returns.most_shots
+        scan, bodies = beams.cast(sensor, np.arange(grid.size), np.full(grid.size, most))
+        told = beams.compensated(scan, sensor)
+        cloud = cloud_of(told, numbers_of(bodies, numbers), grid)
+        if most == 1 or scan.intensities is None:
+            return cloud
+        needed = Signal(self._returns).shots_needed(scan.intensities, scan.ranges)
+        return replace(cloud, shots=needed[np.isfinite(scan.ranges)])
 
     def _motion(self, keyframe: int) -> LinearMotion:
         """How everything moved since the keyframe before; at the first, until the next."""

@@ -50,7 +50,7 @@ def new_objects(loop: OpenLoop, belief: Belief, sightings: Sightings) -> list[Ne
     made = []
     for number, hull in zip(annotations.objects[rows].tolist(), hulls, strict=True):
         boxes = np.flatnonzero(pictured == number)
-        cloud = loop.shot.cloud
+        cloud = loop.shot.cloud.to_shots()
         appearance = Appearance(
             returns=cloud.cells[cloud.objects == number],
             wedges=tuple(own_wedges[box] for box in boxes.tolist()),

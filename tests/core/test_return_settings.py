@@ -2,7 +2,13 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import COLUMNS_WHERE_CHANGED, DEFAULTS, Conditions
-from care_sim.core.return_settings import RAYS, RETURN_SETTINGS, ReturnSettings, changed_settings
+from care_sim.core.return_settings import (
+    RAYS,
+    RETURN_SETTINGS,
+    FilmedReturns,
+    ReturnSettings,
+    changed_settings,
+)
 
 
 def test_the_switches_are_conditions_of_both_loops_and_off():
@@ -38,5 +44,11 @@ def test_a_setting_that_says_nothing_is_refused(given, needed):
 def test_a_film_takes_these_settings_alone():
     given = {"lidar_stated_range_m": 40.0, "visibility_m": 100.0}
     filmed = Conditions(**given, lidar_dropout=0.2).filmed
-    assert filmed == ReturnSettings(**given)
+    assert filmed == FilmedReturns(**given)
     assert changed_settings(filmed, RAYS) == ["lidar_stated_range_m", "visibility_m"]
+
+
+def test_a_film_holds_what_more_shots_return_where_pulses_have_strength():
+    assert Conditions(firing="energy:6", lidar_stated_range_m=40.0).filmed.most_shots == 6
+    assert Conditions(firing="energy:6", lidar_dropout=0.2).filmed == RAYS
+    assert Conditions(firing="tiles", lidar_stated_range_m=40.0).filmed.most_shots == 1

@@ -21,6 +21,12 @@ def test_three_keyframes_by_hand():
     assert difference.cells_where_differing == 1.5
 
 
+def test_a_cell_that_is_fired_more_often_differs_by_its_shots():
+    """Both fire 1, one of them three times: two of its shots went elsewhere."""
+    difference = allocation_difference([cells(1, 1, 1, 2)], [cells(1, 2, 3, 4)])
+    assert difference == AllocationDifference(1, 1, 2)
+
+
 def test_equal_allocations_and_none():
     assert allocation_difference([cells(1)], [cells(1)]).cells_where_differing == 0
     assert math.isnan(allocation_difference([], []).share)

@@ -42,7 +42,7 @@ def test_the_full_scan_alone_stands_under_free_cells():
 
 def test_what_does_not_fit_a_set_up_is_left_out_with_a_line():
     fits = fitting("m1-forward")
-    assert fits.firings == ["cells", "rows", "columns", "vertical-window"]
+    assert fits.firings == ["cells", "rows", "columns", "vertical-window", "energy:4"]
     assert set(FIRING_POLICIES) - {*fits.policies} == {"place"}
     said = " ".join(fits.left_out)
     assert "left out with m1-forward: tiles:4x8 (rows of firing tiles must divide the 126" in said
@@ -64,7 +64,7 @@ def test_every_set_up_is_played_under_what_fits_it():
     configs = firing_study([0], ["fan"], ["hdl-32e", "m1-forward"])
     other = [config for config in configs if config.sensor == "m1-forward"]
     assert len(configs) - len(other) == len(firing_study([0], ["fan"]))
-    assert len(other) == 4 * len(FIRING_POLICIES[1:]) * len(FIRING_BUDGETS) + 1
+    assert len(other) == 5 * len(FIRING_POLICIES[1:]) * len(FIRING_BUDGETS) + 1
     assert "fan" in {config.policy for config in other}
 
 

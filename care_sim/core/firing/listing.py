@@ -46,6 +46,14 @@ def settled(firing: str) -> str:
     return ":".join([kind.name, *(["x".join(map(_text, numbers))] if numbers else [])])
 
 
+def most_shots(firing: str) -> int:
+    """How often the hardware of a text may fire a cell at a keyframe. Raises InvalidInput for what
+    names no hardware.
+    """
+    kind, numbers = _parsed(firing)
+    return int(numbers[0]) if kind is Energy else kind.most_shots
+
+
 def hardware_of(firing: str, grid: AngularGrid) -> Hardware:
     """The hardware that a text names, over a grid. Raises InvalidInput for what names none, and
     for units that do not divide the grid.

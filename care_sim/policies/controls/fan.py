@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from care_sim.base.checks import check_whole
 from care_sim.core.belief import Belief
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
@@ -17,6 +18,9 @@ class Fan(Policy):
     """Fires what lies ahead, between the horizon and `LOWEST_DEG`, the columns nearest to straight
     ahead first: at 3% of the paper's grid 20 degrees to either side. When the fan has gone all
     round, the other rows follow in the same way.
+
+    With `shots` it asks for as many times fewer cells, each of which hardware that fires cells
+    several times then fires as often. Raises InvalidInput for less than one.
     """
 
     name = "fan"
@@ -24,8 +28,10 @@ class Fan(Policy):
     source = "own: a pattern that never changes"
     is_pattern = True
 
-    def __init__(self, rig: Rig):
+    def __init__(self, rig: Rig, shots: int = 1):
         super().__init__(rig)
+        check_whole("shots", shots, 1)
+        self._shots = shots
         grid = rig.grid
         elevations = grid.elevations_ahead
         is_low = (elevations < grid.row_height / 2) & (elevations > np.deg2rad(LOWEST_DEG))
@@ -35,4 +41,4 @@ class Fan(Policy):
 
     def demand(self, belief: Belief) -> Demand:
         """The same cells at every keyframe."""
-        return Demand(layers=[[self._pattern[: belief.budget]]])
+        return Demand(layers=[[self._pattern[: belief.budget // self._shots]]])

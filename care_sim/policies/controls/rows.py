@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from care_sim.base.checks import check_number
+from care_sim.base.checks import check_number, check_whole
 from care_sim.core.belief import Belief
 from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
@@ -21,7 +21,8 @@ ENTRY_DISTANCE_M = 50.0
 class Rows(Policy):
     """Fires the rows nearest to the elevation at which things enter the range, nearest first; the
     last row is thinned evenly. That elevation follows from the rig (`entry_elevation_deg`), unless
-    one is given. Raises InvalidInput for one that is none.
+    one is given. `shots` are as of `care_sim.policies.controls.fan`. Raises InvalidInput for an
+    elevation that is none, and for less than one shot.
     """
 
     name = "rows"
@@ -29,15 +30,17 @@ class Rows(Policy):
     source = "own: a pattern that never changes"
     is_pattern = True
 
-    def __init__(self, rig: Rig, elevation_deg: float | None = None):
+    def __init__(self, rig: Rig, elevation_deg: float | None = None, shots: int = 1):
         super().__init__(rig)
+        check_whole("shots", shots, 1)
+        self._shots = shots
         if elevation_deg is not None:
             check_number("elevation_deg", elevation_deg, -90, 90)
         self._pattern = cells_by_row(rig, elevation_deg)
 
     def demand(self, belief: Belief) -> Demand:
         """The same cells at every keyframe."""
-        return Demand(layers=[[self._pattern[: belief.budget]]])
+        return Demand(layers=[[self._pattern[: belief.budget // self._shots]]])
 
 
 def entry_elevation_deg(rig: Rig) -> float:

@@ -59,4 +59,5 @@ class TargetShots:
         depths = focal * _HEIGHTS_M[detections.classes] / np.maximum(pixels, 1.0)
         # A depth is along the optical axis; the ray through the middle of the box is longer.
         middles = wedge_rays(detections, self._rig)[:, 0]
-        return depths * np.linalg.norm(middles, axis=1)
+        ranges: Floats = depths * np.linalg.norm(middles, axis=1)
+        return ranges

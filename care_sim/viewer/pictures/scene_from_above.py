@@ -8,6 +8,7 @@ from PIL import Image, ImageDraw
 
 from care_sim.core.arrays import Floats, Mask
 from care_sim.core.boxes import box_corners
+from care_sim.core.firing.shots import shots_by_cell
 from care_sim.evaluation.sightings import RANGE_M
 from care_sim.loops.open_loop import OpenLoop, OpenLoopKeyframe
 from care_sim.sensors.annotated import Cloud
@@ -62,7 +63,7 @@ def draw_plan(
     is left as it was.
     """
     shot = loop.film.shots[index]
-    returned = _returned(shot.cloud, record)
+    returned = _returned(shot.cloud, record, loop.rig.grid.size)
     canvas = Image.new("RGB", (PICTURE_WIDTH, PICTURE_HEIGHT), BACKGROUND)
     draw = ImageDraw.Draw(canvas)
     colours = [
@@ -147,10 +148,12 @@ def _pixels(places: Floats) -> Floats:
     return pixels
 
 
-def _returned(cloud: Cloud, record: OpenLoopKeyframe | None) -> Cloud:
-    """The returns of the cells that fired."""
-    fired = np.empty(0, np.int64) if record is None else record.fired
-    return cloud.take(np.isin(cloud.cells, fired))
+def _returned(cloud: Cloud, record: OpenLoopKeyframe | None, size: int) -> Cloud:
+    """The returns of the cells that fired, of a grid of that size."""
+    if record is None:
+        return cloud.take(np.zeros(len(cloud), bool))
+    fired, shots = shots_by_cell(record.fired, size)
+    return cloud.take(np.isin(cloud.cells, fired)).to_shots(shots)
 
 
 def _ranges(
