@@ -74,7 +74,7 @@ class Policy(ABC):
         belief = self.rig.read(observation)
         try:
             cells = self._cells(belief)
-            return scores_of(cells, self.rig.grid.shape, self._shots(cells))
+            return scores_of(cells, self.rig.grid.shape, self._asked_shots(cells))
         except InvalidInput as error:
             raise InvalidInput(f"policy {self.name or type(self).__name__}: {error}") from error
 
@@ -91,7 +91,7 @@ class Policy(ABC):
             raise InvalidInput(f"cells must lie in 0..{self.rig.grid.size - 1}")
         return cells
 
-    def _shots(self, cells: Cells) -> Integers | int:
+    def _asked_shots(self, cells: Cells) -> Integers | int:
         """(n,) how often each of the demanded `cells` is to be fired, as the hardware can do it."""
         most = self.rig.hardware.most_shots
         asked = self.demanded.shots if self.demanded is not None else None

@@ -24,9 +24,10 @@ from care_sim.study.rows.settings import Setting
 from care_sim.study.run_config import FULL, Row
 
 FIRING_FIGURE = "firing"
-_COLOURS = ("#000000", "#0072B2", "#56B4E9", "#D55E00", "#009E73", "#E69F00", "#CC79A7")
-"""From the palette of Okabe and Ito (2008), safe for the colour-blind."""
-_MARKERS = ("o", "s", "D", "^", "v", ">", "<")
+_COLOURS = ("#000000", "#0072B2", "#56B4E9", "#D55E00", "#009E73", "#E69F00", "#CC79A7", "#777777")
+"""From the palette of Okabe and Ito (2008), safe for the colour-blind, and a grey for its yellow,
+which is faint on white."""
+_MARKERS = ("o", "s", "D", "^", "v", ">", "<", "P")
 _STYLES = {
     kind: Style(colour, marker)
     for kind, colour, marker in zip(HARDWARE, _COLOURS, _MARKERS, strict=True)

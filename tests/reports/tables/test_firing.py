@@ -17,8 +17,8 @@ def test_a_policy_stands_once_a_budget_with_a_column_a_hardware():
     levels, _ = firing_tables(ROWS)
     assert levels.title == "dense: first detection by hardware, median, m"
     assert levels.columns == ("policy", "budget", *FIRINGS)
-    assert levels.rows[0] == ("care", "3%", "15.0", "14.0", *["15.0"] * 5)
-    assert levels.rows[-1] == ("full", "100%", *["15.0"] * 7)
+    assert levels.rows[0] == ("care", "3%", "15.0", "14.0", *["15.0"] * 6)
+    assert levels.rows[-1] == ("full", "100%", *["15.0"] * 8)
 
 
 def test_the_lead_is_that_of_the_policy_that_knows_its_hardware():
