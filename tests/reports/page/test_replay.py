@@ -156,6 +156,7 @@ def test_fullness_counts_the_cells_of_a_sector_in_all_rows():
     ]
     assert fullness(np.array(third), grid) == "00z" + "0" * (SECTORS - 3)
     assert fullness(np.arange(grid.size), grid) == "z" * SECTORS
+    assert fullness(np.repeat(np.arange(grid.size), 4), grid) == "z" * SECTORS
     assert fullness(np.array(third[: len(third) // 7]), grid)[2] == "5"
 
 
