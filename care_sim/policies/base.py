@@ -93,18 +93,16 @@ class Policy(ABC):
 
     def _asked_shots(self, cells: Cells) -> Integers | int:
         """(n,) how often each of the demanded `cells` is to be fired, as the hardware can do it."""
-        most = self.rig.hardware.most_shots
         asked = self.demanded.shots if self.demanded is not None else None
-        # Where no cell is fired twice the demand is an order, and nothing else.
-        if asked is None or most == 1:
+        if asked is None:
             return 1
         shots = as_array("shots of a demand", asked)
         if shots.shape != (self.rig.grid.size,) or shots.dtype.kind not in "iu" or shots.min() < 1:
             raise InvalidInput(
                 f"shots of a demand must be {self.rig.grid.size} whole numbers of 1 or more"
             )
-        held: Integers = np.minimum(shots[cells], most)
-        return held
+        possible: Integers = np.minimum(shots[cells], self.rig.hardware.most_shots)
+        return possible
 
 
 class PrivilegedPolicy(Policy):

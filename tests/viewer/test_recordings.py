@@ -292,3 +292,16 @@ def test_raw_actions_are_chosen_or_floor(tmp_path, read):
     )
     assert set(cells[10 * entities.ROW_PIXELS, 512 - 100 :]) == {CHOSEN}
     assert found.fixed["agent/outcome"]["TextDocument:text"] == ["The episode was not finished."]
+
+
+def test_a_share_of_the_budget_is_counted_in_shots(tmp_path, read):
+    """A hundred cells have four shots each; the floor spends the rest."""
+    path = tmp_path / "shots.rrd"
+    with RecordRerun(gymnasium.make("CARE-Dartout-v0", firing="energy"), path) as env:
+        env.reset(seed=0)
+        scores = np.zeros(env.action_space.shape, np.float32)
+        scores[10, :100] = 1.0
+        env.step(scores)
+    found = read(path)
+    assert found.numbers("agent/budget/chosen") == pytest.approx([100 * 400 / 1638])
+    assert found.numbers("agent/budget/floor") == pytest.approx([100 * 1238 / 1638])
