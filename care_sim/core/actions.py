@@ -26,11 +26,12 @@ def scores_of(cells: Cells, shape: tuple[int, int], shots: Integers | int = 1) -
     their sum does not exceed the budget.
     """
     scores = np.zeros(shape[0] * shape[1], np.float32)
-    most = np.max(shots, initial=1)
+    most = shots if isinstance(shots, int) else int(shots.max(initial=1))
     # In equal steps down from `shots`, over less than 1 / (most + 1) in all: per shot, the last
     # cell has still more than the first would have if it were fired once more than it should be.
-    steps = np.arange(len(cells)) / max(len(cells), 1) / (most + 1)
-    scores[cells] = (shots - steps) / most
+    whole = max(len(cells), 1) * (most + 1)
+    steps = np.arange(len(cells), dtype=np.float32)
+    scores[cells] = (shots * whole - steps) / np.float32(whole * most)
     return scores.reshape(shape)
 
 
