@@ -44,7 +44,7 @@ LINES = [
     (name_of(page), line.partition("#")[0].strip())
     for page in PAGES
     for block in fenced(page, "")
-    for line in block.splitlines()
+    for line in block.replace("\\\n", " ").splitlines()
     if re.match(r"care-sim [a-z]", line)
 ]
 
