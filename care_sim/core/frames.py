@@ -100,6 +100,12 @@ class Frame:
         return np.array([self.x, self.y, self.z])
 
     @cached_property
+    def turn_back(self) -> tuple[float, float]:
+        """Cosine and sine of -yaw, which turns vectors on the ground into the frame's axes."""
+        # NumPy's, as in `turned`.
+        return float(np.cos(-self.yaw)), float(np.sin(-self.yaw))
+
+    @cached_property
     def rotation(self) -> Rotation:
         """From the axes of this frame to those of the world."""
         return Rotation.from_euler("ZYX", [self.yaw, self.pitch, self.roll])
@@ -121,8 +127,8 @@ class Frame:
         plane.
         """
         if self._upright:
-            back = np.cos(-self.yaw), np.sin(-self.yaw)
-            return _seen_from(np.ascontiguousarray(boxes, dtype=float), back, self._place)
+            table = np.ascontiguousarray(boxes, dtype=float)
+            return _seen_from(table, self.turn_back, self._place)
         centres = self.vectors_to_local(boxes[:, :3] - self.origin)
         return _boxes_turned(boxes, centres, self.vectors_to_local)
 
@@ -131,7 +137,7 @@ class Frame:
         ground.
         """
         if self._upright:
-            turn = np.cos(self.yaw), np.sin(self.yaw)
+            turn = float(np.cos(self.yaw)), float(np.sin(self.yaw))
             return _placed_at(np.ascontiguousarray(boxes, dtype=float), turn, self._place)
         centres = self.origin + self.vectors_to_world(boxes[:, :3])
         return _boxes_turned(boxes, centres, self.vectors_to_world)
