@@ -113,11 +113,10 @@ class ImageDetections:
         """The same detections of a picture that was taken `age_s` seconds ago, since when the car
         has turned by `yaw_change` radians.
         """
-        ages = np.full(len(self), age_s)
-        yaw_changes = np.full(len(self), yaw_change)
-        return ImageDetections(
-            self.classes, self.confidences, self.boxes, self.cameras, ages, yaw_changes
-        )
+        rows = self.rows().copy()
+        rows[:, self.AGE] = age_s
+        rows[:, self.YAW_CHANGE] = yaw_change
+        return ImageDetections.from_checked_rows(rows)
 
     def unturned(self) -> "ImageDetections":
         """The same detections as if the car had not turned since their pictures."""

@@ -31,7 +31,13 @@ from care_sim.perception.tracker import TrackMemory
 from care_sim.sensors.annotated import IdentifiedDetections
 from care_sim.sensors.beams import Beams
 from care_sim.sensors.box_pool import EMPTY_POOL, BoxPool
-from care_sim.sensors.camera import CameraDetector, Picture, faultless_detections, window_on
+from care_sim.sensors.camera import (
+    CameraDetector,
+    Picture,
+    class_table,
+    seen_of_classes,
+    window_on,
+)
 from care_sim.sensors.engines import ENGINES
 from care_sim.sensors.lidar import Lidar
 from care_sim.world.approach import ClosestApproach
@@ -77,7 +83,8 @@ class ClosedLoop:
     ):
         self.world = world
         self.rig = rig
-        self._labels = labels = world.labels()
+        labels = world.labels()
+        self._classes = class_table(labels)
         self._reported = np.array(list(labels), np.int64)
         self._engine = ENGINES[conditions.engine](world.bullet, rig.grid)
         beams = (
@@ -240,7 +247,7 @@ class ClosedLoop:
         sensor = Frame.mounted(self.world.ego.pose, self.rig.sensor_position)
         boxes = sensor.boxes_to_local(self.world.boxes_of(self._reported))
         taken = [self._photograph(camera, sensor, boxes) for camera in self._camera.mounted]
-        seen = faultless_detections(taken, self._labels)
+        seen = seen_of_classes(taken, self._classes)
         yaw = self._localisation.taken_for(sensor).yaw
         self._camera.take(seen, yaw, boxes, self.world.time)
         rest = self.world.advance(acceleration, self.rig.keyframe_s - after_s)
@@ -262,7 +269,7 @@ class ClosedLoop:
                 self.pictures, self.rig.cameras, self._camera.mounted, strict=True
             )
         ]
-        self.seen = faultless_detections(taken, self._labels)
+        self.seen = seen_of_classes(taken, self._classes)
 
         # The boxes that arrive, late and with errors, and the forecasts: all that is known when the
         # next cells are chosen.
