@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.compiled import compiled
-from care_sim.core.arrays import Floats
+from care_sim.core.arrays import Floats, Integers
 
 SOUND, BEYOND, NO_ROW = range(3)
 """What the rows of a table can be: in order; with a number beyond the bound, or NaN; neither
@@ -48,3 +48,27 @@ def lie_between(numbers: NDArray[np.floating], least: float, most: float) -> boo
         for k in range(numbers.shape[1]):
             outside += not least <= numbers[m, k] <= most
     return outside == 0
+
+
+@compiled()
+def rows_within(rows: Floats, least: Floats, most: Floats) -> bool:
+    """Whether all rows (n, k) lie between `least` (k,) and `most`, one row for all (1, k) or one
+    each (n, k). NaN never does.
+    """
+    for n in range(len(rows)):
+        upper = most[min(n, len(most) - 1)]
+        for k in range(rows.shape[1]):
+            if not least[k] <= rows[n, k] <= upper[k]:
+                return False
+    return True
+
+
+@compiled()
+def range_image(size: int, cells: Integers, ranges: Floats, reach: float) -> NDArray[np.float32]:
+    """(N,) metres of the fired `cells` (n,), `reach` where nothing returned, 0 of cells that were
+    not fired. Of a cell with several returns the first counts.
+    """
+    image = np.zeros(size, np.float32)
+    for n in range(len(cells) - 1, -1, -1):
+        image[cells[n]] = min(ranges[n], reach)
+    return image

@@ -69,8 +69,10 @@ class Frame:
     @classmethod
     def mounted(cls, pose: Pose, at: tuple[float, float, float]) -> "Frame":
         """The frame of a sensor mounted `at` (x, y, z) in the frame of a body at `pose`."""
-        x, y = turned(np.array(at[:2]), pose[2])
-        return cls(pose[0] + float(x), pose[1] + float(y), at[2], pose[2])
+        ahead, left, up = at
+        x, y, yaw = pose
+        cos, sin = float(np.cos(yaw)), float(np.sin(yaw))
+        return cls(x + (cos * ahead - sin * left), y + (sin * ahead + cos * left), up, yaw)
 
     @classmethod
     def turned_by(cls, rotation: Rotation, origin: Floats) -> "Frame":

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.belief import Belief
+from care_sim.core.belief_kernels import range_image
 from care_sim.core.boxes import planar_ranges
 from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.frames import Frame
@@ -288,11 +289,10 @@ class ClosedLoop:
         return Picture.of(self._engine.body_ids(camera, sensor, window), window)
 
     def _range_image(self, scan: Scan) -> NDArray[np.float32]:
-        # 0 means not fired, the reach no return: a scan says inf, which no observation holds.
-        ranges = np.zeros(self.rig.grid.size, np.float32)
-        # From behind, so that of two returns of a cell the nearer one is written last.
-        ranges[scan.cells[::-1]] = np.minimum(scan.ranges[::-1], self.rig.grid.range_m)
-        return ranges.reshape(self.rig.grid.shape)
+        grid = self.rig.grid
+        return range_image(grid.size, scan.cells, scan.ranges, float(grid.range_m)).reshape(
+            grid.shape
+        )
 
     def _local_boxes(self, bodies: Integers) -> Floats:
         return self.sensor.boxes_to_local(self.world.boxes_of(bodies))
@@ -316,5 +316,5 @@ class ClosedLoop:
         target = self.world.first_sighting
         if target is None:
             return float("inf")
-        ((x, y),) = self.world.boxes([target])[:, :2].tolist()
+        x, y = self.world.centre_of(target.body)
         return float(np.hypot(x - sensor.x, y - sensor.y))

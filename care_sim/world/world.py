@@ -108,7 +108,7 @@ class World:
         self.meetings = []
         self.drawn = {}
         self._moving: list[Actor] = []
-        self._moving_bodies = [self.ego_body]
+        self._moving_bodies = np.array([self.ego_body])
         self._events: list[tuple[float, Callable[[], None]]] = []
         self._every_step: list[Callable[[World], None]] = []
         self._ego_motion = Ego(ego_speed)
@@ -142,7 +142,7 @@ class World:
         self.actors.append(actor)
         if not isinstance(pose, tuple):
             self._moving.append(actor)
-            self._moving_bodies.append(body)
+            self._moving_bodies = np.append(self._moving_bodies, body)
         return actor
 
     def at(self, time: float, event: Callable[[], None]) -> None:
@@ -178,6 +178,11 @@ class World:
     def boxes_of(self, bodies: Integers) -> Floats:
         """(n, 7) boxes of bodies (n,) in the world frame."""
         return self._footprints.boxes[bodies]
+
+    def centre_of(self, body: int) -> tuple[float, float]:
+        """x, y of the centre of a body in the world frame."""
+        x, y = self._footprints.boxes[body, :2].tolist()
+        return x, y
 
     def velocities_of(self, bodies: Integers) -> Floats:
         """(n, 2) velocities of bodies (n,) in the world frame, m/s, over the last world step."""
@@ -219,10 +224,11 @@ class World:
 
         # Events that are due are taken off the list before any is called: one may start another,
         # which has its turn at the next step if it is due already.
-        due = [event for start, event in self._events if start <= self.time]
-        self._events = [(start, event) for start, event in self._events if start > self.time]
-        for event in due:
-            event()
+        if self._events:
+            due = [event for start, event in self._events if start <= self.time]
+            self._events = [(start, event) for start, event in self._events if start > self.time]
+            for event in due:
+                event()
         for look in self._every_step:
             look(self)
         self._ego_motion = Ego(
@@ -230,11 +236,12 @@ class World:
         )
 
         # Poses are read after events, which may change who moves.
-        bodies = np.array(self._moving_bodies)
-        poses = np.array([self.ego.pose, *(actor.pose_at(self.time) for actor in self._moving)])
+        bodies = self._moving_bodies
+        poses = [self.ego.pose, *(actor.pose_at(self.time) for actor in self._moving)]
+        table = np.array(poses, float)
         self._before = self._footprints.boxes.copy()
-        self.bullet.move_all(bodies, poses)
-        self._footprints.move_all(bodies, poses)
+        self.bullet.move_all(bodies, table)
+        self._footprints.move_all(bodies, table)
         return self._approach()
 
     def _approach(self) -> ClosestApproach:
@@ -248,7 +255,7 @@ class World:
         nearest = clearance = np.inf
         if self.first_sighting is not None:
             target = self.first_sighting.body
-            own, other = self.boxes_of(np.array([self.ego_body, target])).tolist()
+            own, other = self.centre_of(self.ego_body), self.centre_of(target)
             nearest = float(np.hypot(other[0] - own[0], other[1] - own[1]))
             clearance = self.bullet.clearance(self.ego_body, target)
         impact = None
