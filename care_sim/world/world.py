@@ -16,6 +16,7 @@ from care_sim.world.bodies import CATALOGUE, BodyKind
 from care_sim.world.body_tables import Footprints
 from care_sim.world.bullet import BulletWorld
 from care_sim.world.crosser import Meeting
+from care_sim.world.least_clearance import LeastClearance
 from care_sim.world.linear_motion import LinearMotion, rates_between
 from care_sim.world.route import Route
 from care_sim.world.route_car import RouteCar
@@ -205,15 +206,29 @@ class World:
         """
         # Looked at after every step: between two keyframes the car may hit something and be past
         # it, or come closest to it.
-        return ClosestApproach.over(
-            [self._step(acceleration) for _ in range(whole_steps(duration))]
-        )
+        impacts = []
+        nearest = clearance = np.inf
+        target = self.first_sighting
+        least = LeastClearance(self.bullet, self.ego_body, target.body) if target else None
+        for _ in range(whole_steps(duration)):
+            self._step(acceleration)
+            impacts.append(self._impact())
+            if target is not None and least is not None:
+                own, other = self.boxes_of(np.array([self.ego_body, target.body]))
+                away = np.hypot(other[0] - own[0], other[1] - own[1])
+                nearest = min(nearest, float(away))
+                least.note(own, other)
+        if least is not None:
+            clearance = least.metres()
+        first = next((impact for impact in impacts if impact is not None), None)
+        return ClosestApproach(nearest, clearance, first)
 
     def close(self) -> None:
         """Free the simulator."""
         self.bullet.close()
 
-    def _step(self, acceleration: float) -> ClosestApproach:
+    def _step(self, acceleration: float) -> None:
+        """Move everything by a world step."""
         # The traffic moves first, the ego in it, then the clock; events are of the new time.
         before = self.ego.speed
         self.ego.accelerate(acceleration, WORLD_STEP_S)
@@ -242,28 +257,16 @@ class World:
         self._before = self._footprints.boxes.copy()
         self.bullet.move_all(bodies, table)
         self._footprints.move_all(bodies, table)
-        return self._approach()
 
-    def _approach(self) -> ClosestApproach:
+    def _impact(self) -> Impact | None:
+        """The ego's contact with a body now."""
         # The exact distance is PyBullet's; asking it about every body would take most of a step.
-        near = self._footprints.near(self.ego_body, CONTACT_REACH_M).tolist()
-        touched = [
-            body
-            for body in near
-            if self.bullet.clearance(self.ego_body, body, CONTACT_REACH_M) <= 0.0
-        ]
-        nearest = clearance = np.inf
-        if self.first_sighting is not None:
-            target = self.first_sighting.body
-            own, other = self.centre_of(self.ego_body), self.centre_of(target)
-            nearest = float(np.hypot(other[0] - own[0], other[1] - own[1]))
-            clearance = self.bullet.clearance(self.ego_body, target)
-        impact = None
-        if touched:
-            (box,) = self.boxes_of(np.array(touched[:1]))
-            ahead = lies_ahead(box, self.ego.pose, self.ego_kind.size[0])
-            impact = Impact(touched[0], self.ego.speed, ahead)
-        return ClosestApproach(nearest, clearance, impact)
+        for body in self._footprints.near(self.ego_body, CONTACT_REACH_M).tolist():
+            if self.bullet.clearance(self.ego_body, body, CONTACT_REACH_M) <= 0.0:
+                (box,) = self.boxes_of(np.array([body]))
+                ahead = lies_ahead(box, self.ego.pose, self.ego_kind.size[0])
+                return Impact(body, self.ego.speed, ahead)
+        return None
 
 
 def _motion(pose: Pose | Motion | RoadVehicle) -> Motion:
