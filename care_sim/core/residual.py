@@ -16,11 +16,17 @@ from care_sim.core.types import ImageDetections, Tracks
 def camera_layers(belief: Belief, rig: Rig) -> tuple[CellSets, CellSets]:
     """(U, M) of Algorithm 2: the wedges of unexplained and of explained detections.
 
-    U is the reserve layer of CARE. Both are in the order of the detections.
+    Both are in the order of the detections.
     """
     every = wedges(belief.detections, rig)
     known = explained(belief.detections, belief.tracks, rig)
     return every.take(~known), every.take(known)
+
+
+def unexplained_layer(belief: Belief, rig: Rig) -> CellSets:
+    """U of Algorithm 2 alone, the reserve layer of CARE; nothing is laid for what is explained."""
+    known = explained(belief.detections, belief.tracks, rig)
+    return wedges(belief.detections.take(~known), rig)
 
 
 def explained(detections: ImageDetections, tracks: Tracks, rig: Rig) -> Mask:

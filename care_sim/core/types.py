@@ -109,6 +109,10 @@ class ImageDetections:
         vars(made)["_rows"] = _shared(table)
         return made
 
+    def take(self, rows: NDArray[np.int64] | Mask) -> "ImageDetections":
+        """Some of the detections, by index or mask."""
+        return ImageDetections.from_checked_rows(self.rows()[rows])
+
     def aged(self, age_s: float, yaw_change: float) -> "ImageDetections":
         """The same detections of a picture that was taken `age_s` seconds ago, since when the car
         has turned by `yaw_change` radians.
