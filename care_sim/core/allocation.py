@@ -111,8 +111,7 @@ def _filled(stages: Sequence[Sequence[Cells]], limits: Sequence[int]) -> Cells:
     stage_ends = np.array([*accumulate(map(len, stages))], np.int64)
 
     # A table of flags runs from the lowest to the highest cell, so its size must be bounded.
-    lowest = int(sets.cells.min(initial=0))
-    highest = int(sets.cells.max(initial=0))
+    lowest, highest = _bounds(sets.cells)
     if highest - lowest > HIGHEST_CELL:
         wrong = lowest if lowest < 0 else highest
         raise InvalidInput(f"cells must lie in 0..{HIGHEST_CELL}, got {wrong}")
@@ -150,6 +149,15 @@ class _Selection(NamedTuple):
     chosen: Cells
     taken: Mask
     lowest: int
+
+
+@compiled()
+def _bounds(cells: Cells) -> tuple[int, int]:
+    """The lowest of the cells, at most 0, and the highest, at least 0."""
+    lowest = highest = 0
+    for cell in cells:
+        lowest, highest = min(lowest, cell), max(highest, cell)
+    return lowest, highest
 
 
 @compiled()

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from care_sim.base.checks import as_array
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats
+from care_sim.core.belief_kernels import BEYOND, NO_ROW, lie_between, read_rows
 from care_sim.core.types import CLASSES, Ego, ImageDetections, Tracks
 
 MAX_DETECTIONS = 128
@@ -23,8 +24,6 @@ HIGHEST = 2.0**24
 smaller ones."""
 
 Observation = Mapping[str, NDArray[np.float32]]
-
-_LABELS = frozenset(range(len(CLASSES)))
 
 
 @dataclass(frozen=True)
@@ -60,8 +59,7 @@ class Belief:
         ranges = _array(observation, "ranges", 2, None).astype(np.float32, copy=False)
         if not ranges.size:
             raise InvalidInput("ranges of an observation must hold a cell at least")
-        # NaN fails both comparisons, so that finite numbers need no check of their own.
-        fits = ranges.min(initial=0) >= 0 and ranges.max(initial=0) <= HIGHEST
+        fits = lie_between(np.ascontiguousarray(ranges), 0.0, HIGHEST)
         if not (0 <= budget <= 1 and fits):
             raise InvalidInput(
                 "an observation's budget must lie in [0, 1], its ranges be numbers of 0 or more"
@@ -119,19 +117,21 @@ def _rows(observation: Observation, key: str, columns: Sequence[str]) -> Floats:
     for rows that are neither padding nor of a known class, and for what no sensor says.
     """
     table = _array(observation, key, 2, len(columns))
-    rows: Floats = table[table[:, 0] != -1].astype(np.float64)
-    if not len(rows):
-        return rows
-    if not (rows.min() >= -HIGHEST and rows.max() <= HIGHEST):
+    # What an environment shows is compiled for; anything else is made the same first.
+    if table.dtype != np.float32:
+        table = table.astype(np.float64)
+    rows, verdict = read_rows(
+        np.ascontiguousarray(table), columns.index("class"), len(CLASSES), HIGHEST
+    )
+    if verdict == BEYOND:
         raise _beyond(key)
-    leads = rows[:, 0].tolist()
-    labels = rows[:, columns.index("class")].tolist()
-    if not (_LABELS.issuperset(labels) and all(one >= 0 and one.is_integer() for one in leads)):
+    if verdict == NO_ROW:
         raise InvalidInput(
             f"{key} of an observation: a row must begin with a whole number, -1 where it is"
             f" padding, and be of a class 0 to {len(CLASSES) - 1}"
         )
-    return rows
+    read: Floats = rows
+    return read
 
 
 def _beyond(key: str) -> InvalidInput:

@@ -69,8 +69,10 @@ class Frame:
     @classmethod
     def mounted(cls, pose: Pose, at: tuple[float, float, float]) -> "Frame":
         """The frame of a sensor mounted `at` (x, y, z) in the frame of a body at `pose`."""
-        x, y = turned(np.array(at[:2]), pose[2])
-        return cls(pose[0] + float(x), pose[1] + float(y), at[2], pose[2])
+        ahead, left, up = at
+        x, y, yaw = pose
+        cos, sin = float(np.cos(yaw)), float(np.sin(yaw))
+        return cls(x + (cos * ahead - sin * left), y + (sin * ahead + cos * left), up, yaw)
 
     @classmethod
     def turned_by(cls, rotation: Rotation, origin: Floats) -> "Frame":
@@ -100,6 +102,12 @@ class Frame:
         return np.array([self.x, self.y, self.z])
 
     @cached_property
+    def turn_back(self) -> tuple[float, float]:
+        """Cosine and sine of -yaw, which turns vectors on the ground into the frame's axes."""
+        # NumPy's, as in `turned`.
+        return float(np.cos(-self.yaw)), float(np.sin(-self.yaw))
+
+    @cached_property
     def rotation(self) -> Rotation:
         """From the axes of this frame to those of the world."""
         return Rotation.from_euler("ZYX", [self.yaw, self.pitch, self.roll])
@@ -121,8 +129,8 @@ class Frame:
         plane.
         """
         if self._upright:
-            back = np.cos(-self.yaw), np.sin(-self.yaw)
-            return _seen_from(np.ascontiguousarray(boxes, dtype=float), back, self._place)
+            table = np.ascontiguousarray(boxes, dtype=float)
+            return _seen_from(table, self.turn_back, self._place)
         centres = self.vectors_to_local(boxes[:, :3] - self.origin)
         return _boxes_turned(boxes, centres, self.vectors_to_local)
 
@@ -131,7 +139,7 @@ class Frame:
         ground.
         """
         if self._upright:
-            turn = np.cos(self.yaw), np.sin(self.yaw)
+            turn = float(np.cos(self.yaw)), float(np.sin(self.yaw))
             return _placed_at(np.ascontiguousarray(boxes, dtype=float), turn, self._place)
         centres = self.origin + self.vectors_to_world(boxes[:, :3])
         return _boxes_turned(boxes, centres, self.vectors_to_world)

@@ -28,6 +28,7 @@ import numpy as np
 
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.belief import HIGHEST, MAX_DETECTIONS, MAX_TRACKS, Belief
+from care_sim.core.belief_kernels import rows_within
 from care_sim.core.residual import explaining_tracks
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES, Ego, ImageDetections, Tracks
@@ -91,7 +92,7 @@ class Limits:
         """Whether nothing of the detections lies beyond the limits, so that all are shown."""
         least, most = self._pictured
         rows = detections.rows()
-        return len(rows) <= MAX_DETECTIONS and _within(rows, least, most[detections.cameras])
+        return len(rows) <= MAX_DETECTIONS and rows_within(rows, least, most[detections.cameras])
 
     def _shown(self, detections: ImageDetections) -> Integers:
         """The rows of those that lie in the picture, and no more than the table holds."""
@@ -130,7 +131,7 @@ class Limits:
     def _limited_tracks(self, tracks: Tracks) -> Tracks:
         rows = tracks.rows()
         least, most = self.tracks
-        if _within(rows, least, most):
+        if rows_within(rows, least, most[None]):
             return tracks
 
         # Directions are kept first. Clipping alone would turn a bearing, a velocity and a heading.
@@ -153,11 +154,6 @@ class Limits:
         order = np.ones(len(tracks), np.int64)
         order[first[first >= 0]] = 0
         return tracks.take(np.sort(np.argsort(order, kind="stable")[:MAX_TRACKS]))
-
-
-def _within(rows: Floats, least: Floats, most: Floats) -> bool:
-    """Whether every number lies within its bounds, which NaN never does."""
-    return bool((rows >= least).all() and (rows <= most).all())
 
 
 def _without_turns(angles: Floats) -> Floats:

@@ -78,8 +78,8 @@ class PinholeCamera:
         """World position (3,) of the camera on a sensor at the frame `sensor`, and (3, 3) its axes
         in the world: rows are forward, left and up.
         """
-        position, *axes = sensor.vectors_to_world(self._mounting)
-        return sensor.origin + position, np.array(axes)
+        mounting = sensor.vectors_to_world(self._mounting)
+        return sensor.origin + mounting[0], mounting[1:]
 
     @cached_property
     def _mounting(self) -> Floats:

@@ -27,7 +27,7 @@ class RandomFloor:
         own = np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, *children))
         self._bits = np.random.PCG64(own)
         self._words = np.empty(0, np.uint32)
-        self._cells = cells
+        self._ordered = np.arange(cells)
         self._floor = np.empty(0, np.int64)
         self._keyframe = -1
 
@@ -40,13 +40,13 @@ class RandomFloor:
         return self._floor
 
     def _permutation(self) -> Cells:
-        cells = np.arange(self._cells)
-        last = self._cells - 1
+        cells = self._ordered.copy()
+        last = len(cells) - 1
         while last > 0:
             # NumPy takes the lower half of a number first, then the upper one. What is left over
             # begins the next floor.
             if not len(self._words):
-                self._words = self._bits.random_raw(_DRAWN).astype("<u8").view("<u4")
+                self._words = self._bits.random_raw(_DRAWN).astype("<u8", copy=False).view("<u4")
             last, used = _shuffle(cells, last, self._words)
             self._words = self._words[used:]
         return cells

@@ -8,7 +8,6 @@ from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.belief import Belief
 from care_sim.core.cell_sets import CellSets
-from care_sim.core.frames import turned
 from care_sim.core.pinhole_kernels import CameraModels, box_rays, model_of, pixel
 from care_sim.core.rig import Rig
 from care_sim.core.types import ImageDetections, Tracks
@@ -17,11 +16,17 @@ from care_sim.core.types import ImageDetections, Tracks
 def camera_layers(belief: Belief, rig: Rig) -> tuple[CellSets, CellSets]:
     """(U, M) of Algorithm 2: the wedges of unexplained and of explained detections.
 
-    U is the reserve layer of CARE. Both are in the order of the detections.
+    Both are in the order of the detections.
     """
     every = wedges(belief.detections, rig)
     known = explained(belief.detections, belief.tracks, rig)
     return every.take(~known), every.take(known)
+
+
+def unexplained_layer(belief: Belief, rig: Rig) -> CellSets:
+    """U of Algorithm 2 alone, the reserve layer of CARE; nothing is laid for what is explained."""
+    known = explained(belief.detections, belief.tracks, rig)
+    return wedges(belief.detections.take(~known), rig)
 
 
 def explained(detections: ImageDetections, tracks: Tracks, rig: Rig) -> Mask:
@@ -67,7 +72,21 @@ def wedge_rays(detections: ImageDetections, rig: Rig) -> Floats:
     boxes = np.ascontiguousarray(detections.boxes)
     rays = box_rays(boxes, np.ascontiguousarray(detections.cameras), rig.camera_models)
     # Since the picture was taken the car has turned, so its directions have turned the other way.
-    return turned(rays, -detections.yaw_changes[:, None])
+    angles = -detections.yaw_changes
+    turned: Floats = _turned_bundles(rays, np.cos(angles), np.sin(angles))
+    return turned
+
+
+@compiled()
+def _turned_bundles(rays: Floats, cosines: Floats, sines: Floats) -> Floats:
+    """Bundles of rays (n, k, 3), each turned about z by the angle with this cosine and sine."""
+    turned = rays.copy()
+    for n in range(len(rays)):
+        cos, sin = cosines[n], sines[n]
+        for ray in turned[n]:
+            x, y = ray[0], ray[1]
+            ray[0], ray[1] = cos * x - sin * y, sin * x + cos * y
+    return turned
 
 
 @compiled()

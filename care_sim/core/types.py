@@ -95,8 +95,10 @@ class ImageDetections:
 
     @classmethod
     def from_checked_rows(cls, table: Floats) -> "ImageDetections":
-        """The columns of rows (n, 9) without padding, whose numbers are known to be in order."""
-        return cls(
+        """The columns of rows (n, 9) without padding, whose numbers are known to be in order. The
+        table is theirs from now on.
+        """
+        made = cls(
             classes=table[:, cls.CLASS].astype(np.int64),
             confidences=table[:, cls.CONFIDENCE],
             boxes=table[:, cls.BOX],
@@ -104,16 +106,21 @@ class ImageDetections:
             ages=table[:, cls.AGE],
             yaw_changes=table[:, cls.YAW_CHANGE],
         )
+        vars(made)["_rows"] = _shared(table)
+        return made
+
+    def take(self, rows: NDArray[np.int64] | Mask) -> "ImageDetections":
+        """Some of the detections, by index or mask."""
+        return ImageDetections.from_checked_rows(self.rows()[rows])
 
     def aged(self, age_s: float, yaw_change: float) -> "ImageDetections":
         """The same detections of a picture that was taken `age_s` seconds ago, since when the car
         has turned by `yaw_change` radians.
         """
-        ages = np.full(len(self), age_s)
-        yaw_changes = np.full(len(self), yaw_change)
-        return ImageDetections(
-            self.classes, self.confidences, self.boxes, self.cameras, ages, yaw_changes
-        )
+        rows = self.rows().copy()
+        rows[:, self.AGE] = age_s
+        rows[:, self.YAW_CHANGE] = yaw_change
+        return ImageDetections.from_checked_rows(rows)
 
     def unturned(self) -> "ImageDetections":
         """The same detections as if the car had not turned since their pictures."""
@@ -182,8 +189,10 @@ class Tracks:
 
     @classmethod
     def from_checked_rows(cls, table: Floats) -> "Tracks":
-        """The columns of rows (n, 13) without padding, whose numbers are known to be in order."""
-        return cls(
+        """The columns of rows (n, 13) without padding, whose numbers are known to be in order. The
+        table is theirs from now on.
+        """
+        made = cls(
             ids=table[:, cls.ID].astype(np.int64),
             classes=table[:, cls.CLASS].astype(np.int64),
             boxes=table[:, cls.BOX],
@@ -191,6 +200,8 @@ class Tracks:
             misses=table[:, cls.MISSES].astype(np.int64),
             hits=table[:, cls.HITS].astype(np.int64),
         )
+        vars(made)["_rows"] = _shared(table)
+        return made
 
     def take(self, rows: NDArray[np.int64] | Mask) -> "Tracks":
         """Some of the tracks, by index or mask."""

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Mask
 from care_sim.core.boxes import half_extents
 from care_sim.core.frames import Frame, turned
@@ -47,17 +48,40 @@ def enters_strip(ahead: Tracks, front_m: float, reach_m: float, horizon_s: float
     """(n,) which tracks lie ahead of `front_m` within `reach_m` to either side of the way, or will
     within `horizon_s` if they keep their velocities. Tracks as `along_route` gives them.
     """
-    half_x, half_y = half_extents(ahead.boxes)
-    reach = reach_m + half_y
-    # Sideways motion is even, so that a track is in the strip at some time of the horizon exactly
-    # if the stretch between where it is now and where it is then meets the strip.
-    now = ahead.boxes[:, 1]
-    then = now + ahead.velocities[:, 1] * horizon_s
-    return (
-        (ahead.boxes[:, 0] + half_x > front_m)
-        & (np.minimum(now, then) <= reach)
-        & (np.maximum(now, then) >= -reach)
-    )
+    boxes = np.ascontiguousarray(ahead.boxes)
+    # The sines and cosines are NumPy's, on every machine.
+    turns = np.cos(boxes[:, 6]), np.sin(boxes[:, 6])
+    velocities = np.ascontiguousarray(ahead.velocities)
+    strip = float(front_m), float(reach_m), float(horizon_s)
+    found: Mask = _enters(boxes, turns, velocities, strip)
+    return found
+
+
+@compiled()
+def _enters(
+    boxes: Floats,
+    turns: tuple[Floats, Floats],
+    velocities: Floats,
+    strip: tuple[float, float, float],
+) -> Mask:
+    """See `enters_strip`. `turns` are cosines and sines (n,) of the headings; `strip` is where it
+    begins, its reach to either side, and the horizon.
+    """
+    front_m, reach_m, horizon_s = strip
+    found = np.empty(len(boxes), np.bool_)
+    for n in range(len(boxes)):
+        length, width = boxes[n, 3], boxes[n, 4]
+        cos, sin = abs(turns[0][n]), abs(turns[1][n])
+        half_x, half_y = (length * cos + width * sin) / 2, (length * sin + width * cos) / 2
+        reach = reach_m + half_y
+        # Sideways motion is even, so that a track is in the strip at some time of the horizon
+        # exactly if the stretch between where it is now and where it is then meets the strip.
+        now = boxes[n, 1]
+        then = now + velocities[n, 1] * horizon_s
+        found[n] = (
+            boxes[n, 0] + half_x > front_m and min(now, then) <= reach and max(now, then) >= -reach
+        )
+    return found
 
 
 def leaves_strip_s(ahead: Tracks, reach_m: float, horizon_s: float) -> Floats:

@@ -40,9 +40,10 @@ def checked_scores(action: NDArray[np.floating], shape: tuple[int, int]) -> NDAr
         raise InvalidInput(f"action must have shape {shape} (rows, columns), got {scores.shape}")
     if scores.dtype.kind not in "biuf":
         raise InvalidInput(f"action must hold numbers, got {scores.dtype}")
-    # What overflows float32 becomes infinite, and is refused below.
-    with np.errstate(over="ignore"):
-        scores = scores.astype(np.float32, copy=False)
+    if scores.dtype != np.float32:
+        # What overflows float32 becomes infinite, and is refused below.
+        with np.errstate(over="ignore"):
+            scores = scores.astype(np.float32)
     if not np.isfinite(scores).all():
         raise InvalidInput(
             "action must not hold NaN or infinity (of float32); score a cell 0 to leave it out"

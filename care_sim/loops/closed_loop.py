@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.belief import Belief
+from care_sim.core.belief_kernels import range_image
 from care_sim.core.boxes import planar_ranges
 from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.frames import Frame
@@ -31,7 +32,13 @@ from care_sim.perception.tracker import TrackMemory
 from care_sim.sensors.annotated import IdentifiedDetections
 from care_sim.sensors.beams import Beams
 from care_sim.sensors.box_pool import EMPTY_POOL, BoxPool
-from care_sim.sensors.camera import CameraDetector, Picture, faultless_detections, window_on
+from care_sim.sensors.camera import (
+    CameraDetector,
+    Picture,
+    class_table,
+    seen_of_classes,
+    window_on,
+)
 from care_sim.sensors.engines import ENGINES
 from care_sim.sensors.lidar import Lidar
 from care_sim.world.approach import ClosestApproach
@@ -77,7 +84,8 @@ class ClosedLoop:
     ):
         self.world = world
         self.rig = rig
-        self._labels = labels = world.labels()
+        labels = world.labels()
+        self._classes = class_table(labels)
         self._reported = np.array(list(labels), np.int64)
         self._engine = ENGINES[conditions.engine](world.bullet, rig.grid)
         beams = (
@@ -240,7 +248,7 @@ class ClosedLoop:
         sensor = Frame.mounted(self.world.ego.pose, self.rig.sensor_position)
         boxes = sensor.boxes_to_local(self.world.boxes_of(self._reported))
         taken = [self._photograph(camera, sensor, boxes) for camera in self._camera.mounted]
-        seen = faultless_detections(taken, self._labels)
+        seen = seen_of_classes(taken, self._classes)
         yaw = self._localisation.taken_for(sensor).yaw
         self._camera.take(seen, yaw, boxes, self.world.time)
         rest = self.world.advance(acceleration, self.rig.keyframe_s - after_s)
@@ -262,7 +270,7 @@ class ClosedLoop:
                 self.pictures, self.rig.cameras, self._camera.mounted, strict=True
             )
         ]
-        self.seen = faultless_detections(taken, self._labels)
+        self.seen = seen_of_classes(taken, self._classes)
 
         # The boxes that arrive, late and with errors, and the forecasts: all that is known when the
         # next cells are chosen.
@@ -281,11 +289,10 @@ class ClosedLoop:
         return Picture.of(self._engine.body_ids(camera, sensor, window), window)
 
     def _range_image(self, scan: Scan) -> NDArray[np.float32]:
-        # 0 means not fired, the reach no return: a scan says inf, which no observation holds.
-        ranges = np.zeros(self.rig.grid.size, np.float32)
-        # From behind, so that of two returns of a cell the nearer one is written last.
-        ranges[scan.cells[::-1]] = np.minimum(scan.ranges[::-1], self.rig.grid.range_m)
-        return ranges.reshape(self.rig.grid.shape)
+        grid = self.rig.grid
+        return range_image(grid.size, scan.cells, scan.ranges, float(grid.range_m)).reshape(
+            grid.shape
+        )
 
     def _local_boxes(self, bodies: Integers) -> Floats:
         return self.sensor.boxes_to_local(self.world.boxes_of(bodies))
@@ -309,5 +316,5 @@ class ClosedLoop:
         target = self.world.first_sighting
         if target is None:
             return float("inf")
-        ((x, y),) = self.world.boxes([target])[:, :2].tolist()
+        x, y = self.world.centre_of(target.body)
         return float(np.hypot(x - sensor.x, y - sensor.y))

@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from care_sim.base.checks import check_whole
+from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.conditions import MIN_RETURNS
 from care_sim.core.types import Detections
@@ -24,8 +25,7 @@ class ReturnsRule:
     """
 
     def __init__(self, labels: Mapping[int, int], min_returns: int = MIN_RETURNS):
-        # Ascending, for bisection. A last entry that no body has catches whatever is beyond them.
-        self._bodies = np.array([*sorted(labels), np.iinfo(np.int64).max])
+        self._bodies = np.array(sorted(labels), np.int64)
         self._labels = np.array([labels[body] for body in sorted(labels)], np.int64)
         self._min_returns = min_returns
 
@@ -36,12 +36,37 @@ class ReturnsRule:
 
         `boxes_of` gives the (n, 7) sensor-frame boxes of bodies (n,).
         """
-        # Returns of bodies that are not reported, and of none, fall on a row of another number.
-        rows = np.searchsorted(self._bodies, hits)
-        counts = np.bincount(rows[self._bodies[rows] == hits], minlength=len(self._bodies))
-        kept = np.flatnonzero(counts[:-1] >= self._min_returns)
+        kept, returns = _hit_often(self._bodies, hits, self._min_returns)
         bodies = self._bodies[kept]
-        return Detections(self._labels[kept], boxes_of(bodies), counts[kept]), bodies
+        return Detections(self._labels[kept], boxes_of(bodies), returns), bodies
+
+
+@compiled()
+def _hit_often(bodies: Integers, hits: Integers, least: int) -> tuple[Integers, Integers]:
+    """The rows (k,) of those of `bodies` (n,), ascending ids, that are at least so often among the
+    `hits`, and how often they are.
+    """
+    counts = np.zeros(len(bodies), np.int64)
+    row = 0
+    for hit in hits:
+        # Neighbouring rays mostly hit the same body. Else it is found by bisection.
+        if row == len(bodies) or bodies[row] != hit:
+            row, end = 0, len(bodies)
+            while row < end:
+                middle = (row + end) // 2
+                if bodies[middle] < hit:
+                    row = middle + 1
+                else:
+                    end = middle
+        if row < len(bodies) and bodies[row] == hit:
+            counts[row] += 1
+    kept = np.empty(len(bodies), np.int64)
+    count = 0
+    for body in range(len(bodies)):
+        if counts[body] >= least:
+            kept[count], counts[count] = body, counts[body]
+            count += 1
+    return kept[:count], counts[:count]
 
 
 class ReturnsProxy:

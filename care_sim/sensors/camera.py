@@ -14,8 +14,9 @@ from care_sim.core.types import ImageDetections
 from care_sim.sensors.annotated import NO_OBJECT, IdentifiedDetections
 from care_sim.sensors.box_pool import EMPTY_POOL, BoxPool
 from care_sim.sensors.camera_faults import Delay, Misses, mounted
+from care_sim.sensors.camera_kernels import reported_boxes, surest_first
 from care_sim.sensors.camera_profiles import PROFILES
-from care_sim.sensors.confidence import MIN_PIXELS, confidence_of
+from care_sim.sensors.confidence import MIN_PIXELS
 from care_sim.sensors.engines.box_kernels import visible_boxes
 from care_sim.sensors.false_boxes import FalseBoxes
 from care_sim.sensors.picture_timing import picture_timing
@@ -28,6 +29,9 @@ CAMERA_HEIGHT = 180
 CAMERA_WIDTH = 320
 FRONT_CAMERA = PinholeCamera(CAMERA_WIDTH, CAMERA_HEIGHT, np.deg2rad(90.0), CAMERA_FROM_LIDAR)
 """90 degrees wide, the default of CARLA's RGB camera, in which the paper ran."""
+
+_NO_ROWS = np.empty((0, len(ImageDetections.COLUMNS)))
+_NO_BODIES = np.empty(0, np.int64)
 
 
 def window_on(camera: PinholeCamera, boxes: Floats) -> PixelWindow:
@@ -76,18 +80,25 @@ def faultless_detections(
 
     `pictures` are one per camera of the rig, in its order.
     """
-    rows = []
-    bodies = []
-    for camera, picture in enumerate(pictures):
-        columns = picture.bodies.tolist(), picture.boxes.tolist(), picture.pixels.tolist()
-        for body, box, pixels in zip(*columns, strict=True):
-            if body in labels and pixels >= MIN_PIXELS:
-                rows.append((labels[body], confidence_of(pixels), *box, camera, 0.0, 0.0))
-                bodies.append(body)
-    table = np.array(rows, float).reshape(-1, len(ImageDetections.COLUMNS))
-    return IdentifiedDetections(
-        ImageDetections.from_checked_rows(table), np.array(bodies, np.int64)
-    )
+    return seen_of_classes(pictures, class_table(labels))
+
+
+def class_table(labels: Mapping[int, int]) -> Integers:
+    """The class of every body by its id, -1 of those that `labels` does not map to one."""
+    table = np.full(max(labels, default=-1) + 1, -1)
+    table[list(labels)] = list(labels.values())
+    return table
+
+
+def seen_of_classes(pictures: Sequence[Picture], classes: Integers) -> IdentifiedDetections:
+    """`faultless_detections`, with the labels as a `class_table`."""
+    parts = [
+        reported_boxes(picture.bodies, picture.boxes, picture.pixels, classes, camera)
+        for camera, picture in enumerate(pictures)
+    ]
+    rows = np.concatenate([_NO_ROWS, *(rows for rows, _ in parts)])
+    bodies = np.concatenate([_NO_BODIES, *(bodies for _, bodies in parts)])
+    return IdentifiedDetections(ImageDetections.from_checked_rows(rows), bodies)
 
 
 class CameraDetector:
@@ -113,6 +124,7 @@ class CameraDetector:
         false_boxes, delay, mount = (np.random.default_rng(child) for child in own)
         self._objects = np.asarray(objects, np.int64)
         self._sensing = sensing
+        self._least_confidence = float(sensing.camera_confidence)
         self._misses = Misses(len(objects), sensing, np.random.default_rng(seed))
         self._false_boxes = FalseBoxes(pool, sensing.false_positive_rate, len(cameras), false_boxes)
         self.timing = picture_timing(sensing, keyframe_s, step_s or keyframe_s)
@@ -159,13 +171,12 @@ class CameraDetector:
             rows, objects = _with_false_boxes(rows, objects, false)
 
         # In the dark nothing is reported, false boxes included; delays go on.
-        confidences = rows[:, ImageDetections.CONFIDENCE]
-        sure = confidences >= self._sensing.camera_confidence
-        reported = np.flatnonzero(sure & (not self._sensing.black_at(time_s)))
+        if self._sensing.black_at(time_s):
+            rows, objects = rows[:0], objects[:0]
         # Of equally sure boxes the leftmost comes first: nothing depends on the order of bodies.
-        order = reported[np.lexsort((rows[reported, ImageDetections.LEFT], -confidences[reported]))]
-        detections = ImageDetections.from_checked_rows(rows[order])
-        self._delay.take(IdentifiedDetections(detections, objects[order]), heading)
+        rows, objects = surest_first(rows, objects, self._least_confidence)
+        detections = ImageDetections.from_checked_rows(rows)
+        self._delay.take(IdentifiedDetections(detections, objects), heading)
 
     def newest(self, heading: float) -> IdentifiedDetections:
         """Begin a keyframe with the car's `heading`: the newest detections that are due, the surest

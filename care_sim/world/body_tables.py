@@ -31,18 +31,38 @@ class Footprints:
         missing = body + 1 - len(self.boxes)
         self.boxes = np.vstack([self.boxes, np.full((missing, 7), np.nan)])
         self.boxes[body, 2:6] = size[2] / 2, *size
-        self.move_all(np.array([body]), np.array([pose]))
+        self.move_all(np.array([body]), np.array([pose], float))
 
     def move_all(self, bodies: Integers, poses: Floats) -> None:
         """Put bodies (n,) at poses (n, 3): x, y, heading."""
-        self.boxes[bodies, :2] = poses[:, :2]
-        self.boxes[bodies, 6] = poses[:, 2]
+        _move(self.boxes, bodies, poses)
 
     def near(self, body: int, within: float) -> Integers:
         """Ids of the other bodies that may be within `within` metres of one. None of those is
         missing; some may be further away, since rectangles along x and y stand for the footprints.
         """
         return _near(self.boxes, body, within)
+
+
+@compiled()
+def _move(boxes: Floats, bodies: Integers, poses: Floats) -> None:
+    """See `Footprints.move_all`."""
+    for n in range(len(bodies)):
+        box = boxes[bodies[n]]
+        box[0], box[1], box[6] = poses[n, 0], poses[n, 1], poses[n, 2]
+
+
+@compiled()
+def stand_at(
+    table: Floats, bodies: Integers, poses: Floats, sines: Floats, cosines: Floats
+) -> None:
+    """Put bodies (n,) into the `table` (m, 7) of `Primitives.poses` at `poses` (n, 3), x, y,
+    heading, on the ground. Sines and cosines (n,) are those of half the headings.
+    """
+    for n in range(len(bodies)):
+        row = table[bodies[n]]
+        row[0], row[1], row[2] = poses[n, 0], poses[n, 1], 0.0
+        row[3], row[4], row[5], row[6] = 0.0, 0.0, sines[n], cosines[n]
 
 
 @compiled()

@@ -15,7 +15,7 @@ from care_sim.core.arrays import Floats, Integers
 from care_sim.core.frames import Frame, Pose
 from care_sim.core.pinhole import NEAR_M, PinholeCamera
 from care_sim.world.bodies import BodyKind
-from care_sim.world.body_tables import Primitives
+from care_sim.world.body_tables import Primitives, stand_at
 from care_sim.world.bullet_bodies import NO_BODY, OPAQUE, TRANSPARENT, BulletBodies
 from care_sim.world.bullet_clients import borrow, give_back, leave, pybullet
 from care_sim.world.polyhedra import Polyhedra
@@ -90,10 +90,7 @@ class BulletWorld:
         """Put bodies (n,) at poses (n, 3) on the ground plane: x, y, heading."""
         # A turn by the angle yaw about z is the quaternion (0, 0, sin(yaw / 2), cos(yaw / 2)).
         half = poses[:, 2] / 2
-        rows = np.zeros((len(poses), 7))
-        rows[:, :2] = poses[:, :2]
-        rows[:, 5], rows[:, 6] = np.sin(half), np.cos(half)
-        self.primitives.poses[bodies] = rows
+        stand_at(self.primitives.poses, bodies, poses, np.sin(half), np.cos(half))
         self._bodies.moved(bodies.tolist())
 
     @contextmanager
@@ -108,6 +105,18 @@ class BulletWorld:
         finally:
             self.primitives.poses = own
             self._bodies.moved(changed)
+
+    @contextmanager
+    def put_back(self, bodies: Sequence[int], poses: Floats) -> Iterator[None]:
+        """While it lasts, some bodies (n,) at `poses` (n, 7), where they were before."""
+        rows = [*bodies]
+        if (self.primitives.poses[rows] == poses).all():
+            yield
+            return
+        table = self.primitives.poses.copy()
+        table[rows] = poses
+        with self.placed(table):
+            yield
 
     def cast(self, origin: Floats, directions: Floats, reach: float) -> tuple[Floats, Integers]:
         """Cast rays (n, 3 unit vectors, world frame) from `origin`.

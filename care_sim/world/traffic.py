@@ -11,10 +11,12 @@ from functools import cached_property
 import numpy as np
 from highway_env.road.lane import StraightLane
 from highway_env.road.road import Road, RoadNetwork
+from highway_env.utils import not_zero
 from highway_env.vehicle.behavior import IDMVehicle
 from highway_env.vehicle.kinematics import Vehicle
 from highway_env.vehicle.objects import Obstacle
 
+from care_sim.core.arrays import Floats
 from care_sim.core.frames import Pose
 from care_sim.world.bodies import BodyKind
 
@@ -44,10 +46,71 @@ class LaneAlongX(StraightLane):  # type: ignore[misc]
         return float(self.start[0]), float(self.start[1]), float(self.direction[0])
 
 
-class LaneDriver(IDMVehicle):  # type: ignore[misc]
-    """An IDM driver, to the last bit, who neither steers nor looks for the nearest lane in the
-    middle of one.
+class StraightVehicle(Vehicle):  # type: ignore[misc]
+    """A vehicle of highway-env, to the last bit, that asks for no sine and no cosine while it goes
+    straight ahead.
     """
+
+    _headed: tuple[float, Floats] | None = None
+
+    @property
+    def direction(self) -> Floats:
+        """(2,) unit vector along the heading."""
+        if self._headed is None or self._headed[0] != self.heading:
+            self._headed = self.heading, super().direction
+        return self._headed[1]
+
+    def step(self, dt: float) -> None:
+        """Move by `dt` seconds."""
+        if self.action["steering"] != 0.0 or self.impact is not None:
+            super().step(dt)
+            return
+        # With its wheels straight a vehicle does not slip sideways, and its heading stays.
+        self.clip_actions()
+        self.position += self.speed * self.direction * dt
+        self.speed += self.action["acceleration"] * dt
+        self.on_state_update()
+
+
+class LaneDriver(StraightVehicle, IDMVehicle):  # type: ignore[misc]
+    """An IDM driver, to the last bit, who neither steers nor looks for the nearest lane in the
+    middle of one. Its numbers are plain floats, which NumPy would clip one by one.
+    """
+
+    def act(self, action: dict[str, float] | str | None = None) -> None:
+        """Decide on the next step."""
+        # Who changes lanes, or has come to the end of one, decides as highway-env does.
+        lane = self.lane
+        along = lane.local_coordinates(self.position)[0]
+        if (
+            self.lane_index != self.target_lane_index
+            or lane.after_end(self.position, along)
+            or not self._follows(lane)
+        ):
+            super().act(action)
+            return
+        ahead, _ = self.road.neighbour_vehicles(self, self.lane_index)
+        wanted = self.acceleration(self, ahead)
+        held = min(max(wanted, -self.ACC_MAX), self.ACC_MAX)
+        self.action = {"steering": 0.0, "acceleration": held}
+
+    def acceleration(
+        self,
+        ego_vehicle: Vehicle,
+        front_vehicle: Vehicle | None = None,
+        rear_vehicle: Vehicle | None = None,
+    ) -> float:
+        """m/s^2 that `ego_vehicle` wishes for behind `front_vehicle`, if any."""
+        # The powers are NumPy's: Python's round otherwise.
+        limit = ego_vehicle.lane.speed_limit
+        wanted_mps = min(max(ego_vehicle.target_speed, 0), limit)
+        share = max(ego_vehicle.speed, 0) / abs(not_zero(wanted_mps))
+        wish = self.COMFORT_ACC_MAX * (1 - np.power(share, self.DELTA))
+        if front_vehicle:
+            gap = self.desired_gap(ego_vehicle, front_vehicle)
+            apart = not_zero(ego_vehicle.lane_distance_to(front_vehicle))
+            wish -= self.COMFORT_ACC_MAX * np.power(gap / apart, 2)
+        return float(wish)
 
     def steering_control(self, target_lane_index: tuple[str, str, int]) -> float:
         """Angle of the front wheels, radians."""
@@ -97,7 +160,7 @@ class Traffic:
 
     def add_ego(self, x: float, speed: float, kind: BodyKind) -> "RoadVehicle":
         """The car with the sensors, in lane 0 at `x`; `RoadVehicle.accelerate` drives it."""
-        ego = self._make(Vehicle, x, 0, speed, kind)
+        ego = self._make(StraightVehicle, x, 0, speed, kind)
         ego.enter()
         ego.forget_lane()
         return ego

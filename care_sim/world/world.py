@@ -16,6 +16,7 @@ from care_sim.world.bodies import CATALOGUE, BodyKind
 from care_sim.world.body_tables import Footprints
 from care_sim.world.bullet import BulletWorld
 from care_sim.world.crosser import Meeting
+from care_sim.world.least_clearance import LeastClearance
 from care_sim.world.linear_motion import LinearMotion, rates_between
 from care_sim.world.route import Route
 from care_sim.world.route_car import RouteCar
@@ -108,7 +109,7 @@ class World:
         self.meetings = []
         self.drawn = {}
         self._moving: list[Actor] = []
-        self._moving_bodies = [self.ego_body]
+        self._moving_bodies = np.array([self.ego_body])
         self._events: list[tuple[float, Callable[[], None]]] = []
         self._every_step: list[Callable[[World], None]] = []
         self._ego_motion = Ego(ego_speed)
@@ -142,7 +143,7 @@ class World:
         self.actors.append(actor)
         if not isinstance(pose, tuple):
             self._moving.append(actor)
-            self._moving_bodies.append(body)
+            self._moving_bodies = np.append(self._moving_bodies, body)
         return actor
 
     def at(self, time: float, event: Callable[[], None]) -> None:
@@ -179,6 +180,11 @@ class World:
         """(n, 7) boxes of bodies (n,) in the world frame."""
         return self._footprints.boxes[bodies]
 
+    def centre_of(self, body: int) -> tuple[float, float]:
+        """x, y of the centre of a body in the world frame."""
+        x, y = self._footprints.boxes[body, :2].tolist()
+        return x, y
+
     def velocities_of(self, bodies: Integers) -> Floats:
         """(n, 2) velocities of bodies (n,) in the world frame, m/s, over the last world step."""
         moved = self._footprints.boxes[bodies, :2] - self._before[bodies, :2]
@@ -200,15 +206,29 @@ class World:
         """
         # Looked at after every step: between two keyframes the car may hit something and be past
         # it, or come closest to it.
-        return ClosestApproach.over(
-            [self._step(acceleration) for _ in range(whole_steps(duration))]
-        )
+        impacts = []
+        nearest = clearance = np.inf
+        target = self.first_sighting
+        least = LeastClearance(self.bullet, self.ego_body, target.body) if target else None
+        for _ in range(whole_steps(duration)):
+            self._step(acceleration)
+            impacts.append(self._impact())
+            if target is not None and least is not None:
+                own, other = self.boxes_of(np.array([self.ego_body, target.body]))
+                away = np.hypot(other[0] - own[0], other[1] - own[1])
+                nearest = min(nearest, float(away))
+                least.note(own, other)
+        if least is not None:
+            clearance = least.metres()
+        first = next((impact for impact in impacts if impact is not None), None)
+        return ClosestApproach(nearest, clearance, first)
 
     def close(self) -> None:
         """Free the simulator."""
         self.bullet.close()
 
-    def _step(self, acceleration: float) -> ClosestApproach:
+    def _step(self, acceleration: float) -> None:
+        """Move everything by a world step."""
         # The traffic moves first, the ego in it, then the clock; events are of the new time.
         before = self.ego.speed
         self.ego.accelerate(acceleration, WORLD_STEP_S)
@@ -219,10 +239,11 @@ class World:
 
         # Events that are due are taken off the list before any is called: one may start another,
         # which has its turn at the next step if it is due already.
-        due = [event for start, event in self._events if start <= self.time]
-        self._events = [(start, event) for start, event in self._events if start > self.time]
-        for event in due:
-            event()
+        if self._events:
+            due = [event for start, event in self._events if start <= self.time]
+            self._events = [(start, event) for start, event in self._events if start > self.time]
+            for event in due:
+                event()
         for look in self._every_step:
             look(self)
         self._ego_motion = Ego(
@@ -230,33 +251,22 @@ class World:
         )
 
         # Poses are read after events, which may change who moves.
-        bodies = np.array(self._moving_bodies)
-        poses = np.array([self.ego.pose, *(actor.pose_at(self.time) for actor in self._moving)])
+        bodies = self._moving_bodies
+        poses = [self.ego.pose, *(actor.pose_at(self.time) for actor in self._moving)]
+        table = np.array(poses, float)
         self._before = self._footprints.boxes.copy()
-        self.bullet.move_all(bodies, poses)
-        self._footprints.move_all(bodies, poses)
-        return self._approach()
+        self.bullet.move_all(bodies, table)
+        self._footprints.move_all(bodies, table)
 
-    def _approach(self) -> ClosestApproach:
+    def _impact(self) -> Impact | None:
+        """The ego's contact with a body now."""
         # The exact distance is PyBullet's; asking it about every body would take most of a step.
-        near = self._footprints.near(self.ego_body, CONTACT_REACH_M).tolist()
-        touched = [
-            body
-            for body in near
-            if self.bullet.clearance(self.ego_body, body, CONTACT_REACH_M) <= 0.0
-        ]
-        nearest = clearance = np.inf
-        if self.first_sighting is not None:
-            target = self.first_sighting.body
-            own, other = self.boxes_of(np.array([self.ego_body, target])).tolist()
-            nearest = float(np.hypot(other[0] - own[0], other[1] - own[1]))
-            clearance = self.bullet.clearance(self.ego_body, target)
-        impact = None
-        if touched:
-            (box,) = self.boxes_of(np.array(touched[:1]))
-            ahead = lies_ahead(box, self.ego.pose, self.ego_kind.size[0])
-            impact = Impact(touched[0], self.ego.speed, ahead)
-        return ClosestApproach(nearest, clearance, impact)
+        for body in self._footprints.near(self.ego_body, CONTACT_REACH_M).tolist():
+            if self.bullet.clearance(self.ego_body, body, CONTACT_REACH_M) <= 0.0:
+                (box,) = self.boxes_of(np.array([body]))
+                ahead = lies_ahead(box, self.ego.pose, self.ego_kind.size[0])
+                return Impact(body, self.ego.speed, ahead)
+        return None
 
 
 def _motion(pose: Pose | Motion | RoadVehicle) -> Motion:

@@ -1,8 +1,11 @@
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from care_sim.core.frames import Frame
 from care_sim.core.types import CLASSES, Detections
+from care_sim.perception import track_kernels as kernels
 from care_sim.perception.tracker import MemoryRules, TrackMemory
 
 STILL = Frame(0.0, 0.0, 1.84, 0.0)
@@ -37,6 +40,11 @@ def test_the_first_sight_has_a_box_and_no_velocity():
     assert tracks.boxes[0] == pytest.approx([10, 2, 0.9 - 1.84, 2, 1, 1.8, 0.3])
     assert tracks.velocities.tolist() == [[0, 0]]
     assert (tracks.ids.tolist(), tracks.misses.tolist()) == ([0], [0])
+
+
+def test_of_equally_near_tracks_the_older_comes_first():
+    (tracks,) = follow(TrackMemory(DT), [[("car", 10, 2), ("car", 10, -2), ("car", 9, 0)]])
+    assert tracks.ids.tolist() == [2, 0, 1]
 
 
 def test_velocity_from_two_frames_and_a_forecast_one_keyframe_ahead():
@@ -221,3 +229,25 @@ def test_an_empty_memory_is_empty():
     memory.predict()
     memory.update(detections(), STILL)
     assert len(memory.tracks(STILL)) == 0
+
+
+NEAR = st.floats(-4.0, 4.0)
+SEEN = st.lists(st.tuples(st.sampled_from(["car", "pedestrian"]), NEAR, NEAR), max_size=6)
+
+
+@settings(deadline=None)
+@given(st.lists(SEEN, min_size=2, max_size=4))
+def test_whoever_can_be_only_one_is_matched_as_the_assignment_matches(frames):
+    """So the shortcut around the assignment changes nothing, crowded or not."""
+
+    def told():
+        return [
+            (tracks.rows().tolist())
+            for tracks in follow(TrackMemory(DT), frames, Frame(1.0, -2.0, 1.84, 0.3))
+        ]
+
+    plain = told()
+    pairs = kernels.possible_pairs
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(kernels, "possible_pairs", lambda *given: (*pairs(*given)[:3], False))
+        assert told() == plain

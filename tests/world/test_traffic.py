@@ -1,5 +1,7 @@
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from care_sim.world import traffic
 from care_sim.world.bodies import CATALOGUE
@@ -134,10 +136,64 @@ def mixed():
     )
 
 
+def as_highway_env_drives(monkeypatch, run):
+    """What `run` gives on the vehicles and lanes of highway-env itself."""
+    with monkeypatch.context() as patch:
+        patch.setattr(traffic, "LaneDriver", traffic.IDMVehicle)
+        patch.setattr(traffic, "StraightVehicle", traffic.Vehicle)
+        patch.setattr(traffic, "LaneAlongX", traffic.StraightLane)
+        patch.setattr(traffic.RoadVehicle, "forget_lane", lambda vehicle: None)
+        return run()
+
+
 def test_all_vehicles_go_as_those_of_highway_env_to_the_last_bit(monkeypatch):
     poses = mixed()
-    monkeypatch.setattr(traffic, "LaneDriver", traffic.IDMVehicle)
-    monkeypatch.setattr(traffic, "LaneAlongX", traffic.StraightLane)
-    monkeypatch.setattr(traffic.RoadVehicle, "forget_lane", lambda vehicle: None)
-    assert poses.tobytes() == mixed().tobytes()
+    assert poses.tobytes() == as_highway_env_drives(monkeypatch, mixed).tobytes()
     assert np.ptp(poses[:, 3:, 1], axis=0) == pytest.approx(3.5, abs=0.1)
+
+
+DIRECTIONS = (1, 1, -1, -1)
+PLACES = st.floats(-60.0, 60.0)
+LANES_THERE = st.integers(0, len(DIRECTIONS) - 1)
+SPEEDS = st.floats(0.0, 16.0)
+AT_THE_ENDS = st.sampled_from([994.0, -994.0, 999.0])
+DRIVERS = st.tuples(
+    PLACES | AT_THE_ENDS, LANES_THERE, SPEEDS, st.sampled_from([0.0, 0.0, 0.0, 0.02, -1e-9])
+)
+PULLING_OUT = st.tuples(PLACES, st.sampled_from([(0, 1), (1, 0), (2, 3), (3, 2)]), SPEEDS)
+
+
+@settings(
+    deadline=None, max_examples=12, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(
+    st.lists(DRIVERS, max_size=4),
+    st.lists(PULLING_OUT, max_size=2),
+    st.lists(st.tuples(PLACES, LANES_THERE), max_size=2),
+    SPEEDS,
+    st.lists(st.floats(-9.0, 3.0), min_size=1, max_size=6),
+)
+def test_random_traffic_goes_as_in_highway_env_to_the_last_bit(
+    monkeypatch, drivers, pulling_out, stop_lines, speed, accelerations
+):
+    """Some overlap at the start, some are not along their lane, some are at rest or too fast."""
+
+    def run():
+        road = Traffic(DIRECTIONS, 0, 3.5, 14.0)
+        ego = road.add_ego(0.0, speed, EGO)
+        for x, lane in stop_lines:
+            road.add_stop_line(x, lane)
+        made = [road.add_driver(x, lane, mps, CAR) for x, lane, mps, _ in drivers]
+        for driver, (*_, askew) in zip(made, drivers, strict=True):
+            driver._vehicle.heading += askew
+        for x, (start, target), mps in pulling_out:
+            made.append(road.add_parked_driver(x, start, CAR, mps))
+            made[-1].pull_out(target)
+        motions = []
+        for step in range(30):
+            ego.accelerate(accelerations[step % len(accelerations)], DT)
+            road.step(DT)
+            motions += [[*one.pose, one.speed, one._vehicle.action["acceleration"]] for one in made]
+        return np.array(motions)
+
+    assert run().tobytes() == as_highway_env_drives(monkeypatch, run).tobytes()

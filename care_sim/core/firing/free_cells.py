@@ -6,9 +6,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.firing.base import Floor, Hardware, demanded, ranked
 from care_sim.core.grid import AngularGrid, Cells
+
+_NO_FLOOR = np.empty(0, np.int64)
 
 
 class FreeCells(Hardware):
@@ -48,12 +51,27 @@ def fired_cells(scores: NDArray[np.floating] | Mask, budget: int, floor: Cells |
     They are the `budget` highest strictly positive `scores` (E, A), ties by ascending index. Where
     there are fewer, `floor` tops them up; None leaves the rest unspent.
     """
-    flat = scores.ravel().astype(np.float32, copy=False)
-    (chosen,) = (flat > 0).nonzero()
-    if len(chosen) > budget:
-        chosen = demanded(scores)[:budget]
-    elif floor is not None and len(chosen) < budget:
-        # So much of the floor is enough: at most len(chosen) of these cells are taken.
-        free = floor[:budget]
-        chosen = np.concatenate([chosen, free[flat[free] <= 0][: budget - len(chosen)]])
-    return np.sort(chosen)
+    wanted = scores.ravel().astype(np.float32, copy=False) > 0
+    count = int(np.count_nonzero(wanted))
+    if count > budget:
+        return np.sort(demanded(scores)[:budget])
+    return _topped_up(wanted, count, _NO_FLOOR if floor is None else floor, budget)
+
+
+@compiled()
+def _topped_up(wanted: Mask, count: int, floor: Cells, budget: int) -> Cells:
+    """The `count` cells that are `wanted` (N,) and the first of the `floor` besides, up to the
+    budget, ascending. `wanted` is overwritten.
+    """
+    for cell in floor:
+        if count >= budget:
+            break
+        count += not wanted[cell]
+        wanted[cell] = True
+    fired = np.empty(count, np.int64)
+    place = 0
+    for cell in range(len(wanted)):
+        if wanted[cell]:
+            fired[place] = cell
+            place += 1
+    return fired

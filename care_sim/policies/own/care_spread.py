@@ -6,7 +6,7 @@ from typing import ClassVar
 from care_sim.base.checks import check_whole
 from care_sim.core.belief import Belief
 from care_sim.core.conditions import MIN_RETURNS
-from care_sim.core.residual import camera_layers
+from care_sim.core.residual import unexplained_layer
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
@@ -46,7 +46,7 @@ class CareSpread(Policy):
 
     def demand(self, belief: Belief) -> Demand:
         """Layers: a round of wedges, a round of hulls, and both again."""
-        unexplained, _ = camera_layers(belief, self.rig)
+        unexplained = unexplained_layer(belief, self.rig)
         hulls = self.rig.hulls(belief.tracks.boxes)
         wedges = self.rig.listed(unexplained, CORE_FIRST, 2 * self._wedge_round)
         hulls = self.rig.listed(hulls, CORE_FIRST, 2 * self._hull_round)

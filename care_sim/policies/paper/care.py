@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from care_sim.base.checks import check_flag
 from care_sim.core.belief import Belief
-from care_sim.core.residual import camera_layers
+from care_sim.core.residual import unexplained_layer
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
@@ -32,5 +32,5 @@ class Care(Policy):
         """Hulls, then the wedges of the residual."""
         if not self._yaw_compensation:
             belief = replace(belief, detections=belief.detections.unturned())
-        unexplained, _ = camera_layers(belief, self.rig)
+        unexplained = unexplained_layer(belief, self.rig)
         return Demand(self.rig.hulls(belief.tracks.boxes), [unexplained])

@@ -1,0 +1,74 @@
+"""The tables of an observation, compiled: reading them back, and what may stand in them."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_sim.base.compiled import compiled
+from care_sim.core.arrays import Floats, Integers
+
+SOUND, BEYOND, NO_ROW = range(3)
+"""What the rows of a table can be: in order; with a number beyond the bound, or NaN; neither
+padding nor of a known class."""
+
+
+@compiled()
+def read_rows(
+    table: NDArray[np.floating], label: int, labels: int, highest: float
+) -> tuple[Floats, int]:
+    """The rows (n, k) of a table (m, k) that do not begin with -1, which is padding, and whether
+    they are `SOUND`.
+
+    Numbers go up to `highest`. Rows begin with a whole number of 0 or more, and have a class below
+    `labels` in the column `label`.
+    """
+    rows = np.empty(table.shape)
+    verdict = SOUND
+    count = 0
+    for m in range(len(table)):
+        if table[m, 0] == -1:
+            continue
+        for k in range(table.shape[1]):
+            number = np.float64(table[m, k])
+            rows[count, k] = number
+            if not -highest <= number <= highest:
+                verdict = BEYOND
+        lead, own = rows[count, 0], rows[count, label]
+        known = lead >= 0 and lead == np.floor(lead) and 0 <= own < labels and own == np.floor(own)
+        if not known and verdict == SOUND:
+            verdict = NO_ROW
+        count += 1
+    return rows[:count].copy(), verdict
+
+
+@compiled()
+def lie_between(numbers: NDArray[np.floating], least: float, most: float) -> bool:
+    """Whether all numbers (m, k) lie within these bounds, which NaN never does."""
+    outside = 0
+    for m in range(len(numbers)):
+        for k in range(numbers.shape[1]):
+            outside += not least <= numbers[m, k] <= most
+    return outside == 0
+
+
+@compiled()
+def rows_within(rows: Floats, least: Floats, most: Floats) -> bool:
+    """Whether all rows (n, k) lie between `least` (k,) and `most`, one row for all (1, k) or one
+    each (n, k). NaN never does.
+    """
+    for n in range(len(rows)):
+        upper = most[min(n, len(most) - 1)]
+        for k in range(rows.shape[1]):
+            if not least[k] <= rows[n, k] <= upper[k]:
+                return False
+    return True
+
+
+@compiled()
+def range_image(size: int, cells: Integers, ranges: Floats, reach: float) -> NDArray[np.float32]:
+    """(N,) metres of the fired `cells` (n,), `reach` where nothing returned, 0 of cells that were
+    not fired. Of a cell with several returns the first counts.
+    """
+    image = np.zeros(size, np.float32)
+    for n in range(len(cells) - 1, -1, -1):
+        image[cells[n]] = min(ranges[n], reach)
+    return image

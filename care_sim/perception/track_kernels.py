@@ -1,0 +1,177 @@
+"""The tracks of one world, compiled: which detections belong to which, and how they live on.
+
+Tracks are a table (m, 13) in the order of `Tracks.COLUMNS`, by ascending id, in the world frame.
+Detections are their `classes` (n,) and their boxes `seen` (n, 7), in the world frame, too.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from care_sim.base.compiled import compiled
+from care_sim.base.times import LAST_BITS_S
+from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.types import Tracks
+
+# Numbers of a module are what compiled code can hold.
+_ID, _CLASS, _X, _Y = Tracks.ID, Tracks.CLASS, Tracks.CENTRE.start, Tracks.CENTRE.start + 1
+_VX, _VY = Tracks.VELOCITY.start, Tracks.VELOCITY.start + 1
+_BOX, _BOX_WIDTH = Tracks.BOX.start, Tracks.BOX.stop - Tracks.BOX.start
+_MISSES, _HITS = Tracks.MISSES, Tracks.HITS
+
+
+Rules = tuple[float, float, float, float]
+"""The fields of `Life`."""
+Pairs = tuple[Integers, Integers]
+"""The rows (k,) of tracks, and of the detections that belong to them."""
+
+
+class Life(NamedTuple):
+    """What association and life of a track follow (`care_sim.perception.tracker.MemoryRules`)."""
+
+    keyframe_s: float
+    gate_m: float
+    first_speed_mps: float
+    coast_s: float
+
+
+@compiled()
+def forecast(tracks: Floats, seconds: float) -> Floats:
+    """The tracks `seconds` later, at constant velocity."""
+    moved = tracks.copy()
+    for m in range(len(moved)):
+        moved[m, _X] += moved[m, _VX] * seconds
+        moved[m, _Y] += moved[m, _VY] * seconds
+    return moved
+
+
+@compiled()
+def seen_nearest_first(tracks: Floats, boxes: Floats, turn: tuple[float, float]) -> Floats:
+    """The tracks at other `boxes` (m, 7), those of a sensor's frame, the nearest first. `turn` is
+    the cosine and the sine of the angle by which velocities turn into its axes.
+    """
+    cos, sin = turn
+    ranges = np.empty(len(tracks))
+    seen = np.empty(tracks.shape)
+    for m in range(len(tracks)):
+        # Each is put behind all that are not farther: tracks of one distance stay in the order in
+        # which they were begun.
+        away = math.hypot(boxes[m, 0], boxes[m, 1])
+        place = m
+        while place > 0 and ranges[place - 1] > away:
+            ranges[place] = ranges[place - 1]
+            _copy_row(seen, place - 1, seen, place)
+            place -= 1
+        ranges[place] = away
+        _copy_row(tracks, m, seen, place)
+        _put_box(seen[place], boxes[m])
+        seen[place, _VX] = cos * tracks[m, _VX] - sin * tracks[m, _VY]
+        seen[place, _VY] = sin * tracks[m, _VX] + cos * tracks[m, _VY]
+    return seen
+
+
+@compiled()
+def possible_pairs(
+    tracks: Floats, classes: Integers, seen: Floats, rules: Rules
+) -> tuple[Floats, Mask, Pairs, bool]:
+    """(m, n) metres between forecasts and detections, (m, n) which of them can be one object; the
+    rows of both in such pairs where none is in two, and whether that is so.
+    """
+    life = Life(*rules)
+    distances = np.empty((len(tracks), len(seen)))
+    possible = np.zeros(distances.shape, np.bool_)
+    rows = np.empty(len(seen), np.int64)
+    columns = np.empty(len(seen), np.int64)
+    is_taken = np.zeros(len(seen), np.bool_)
+    count = 0
+    alone = True
+    for m in range(len(tracks)):
+        # A track with a velocity is forecast where it should be, and its gate is that of the match.
+        # One seen once is forecast where it was, and may have gone any way since.
+        gate = life.gate_m
+        if tracks[m, _HITS] <= 1:
+            gate += life.first_speed_mps * ((tracks[m, _MISSES] + 1) * life.keyframe_s)
+        before = count
+        for n in range(len(seen)):
+            distances[m, n] = math.hypot(tracks[m, _X] - seen[n, 0], tracks[m, _Y] - seen[n, 1])
+            if distances[m, n] <= gate and tracks[m, _CLASS] == classes[n]:
+                possible[m, n] = True
+                alone = alone and count == before and not is_taken[n]
+                if alone:
+                    is_taken[n] = True
+                    rows[count], columns[count] = m, n
+                    count += 1
+    return distances, possible, (rows[:count], columns[:count]), alone
+
+
+@compiled()
+def lived_on(
+    tracks: Floats, classes: Integers, seen: Floats, pairs: Pairs, rules: Rules, next_id: int
+) -> tuple[Floats, Integers]:
+    """The tracks a keyframe later, and (n,) the id of the track of every detection.
+
+    `pairs` belong together. A detection without a track begins one, from `next_id` on.
+    """
+    life = Life(*rules)
+    rows, columns = pairs
+    detected = np.full(len(tracks), -1)
+    for k in range(len(rows)):
+        detected[rows[k]] = columns[k]
+
+    # Who has not been detected for too long is dropped, new ones come last. Ids count up and are
+    # never given again, so each means one object.
+    result = np.empty((len(tracks) + len(seen), tracks.shape[1]))
+    ids = np.full(len(seen), -1)
+    count = 0
+    for m in range(len(tracks)):
+        n = detected[m]
+        elapsed = (tracks[m, _MISSES] + 1) * life.keyframe_s
+        if n < 0 and elapsed > life.coast_s + LAST_BITS_S:
+            continue
+        _copy_row(tracks, m, result, count)
+        result[count, _MISSES] += 1
+        if n >= 0:
+            _follow(result[count], seen[n], elapsed)
+            ids[n] = int(tracks[m, _ID])
+        count += 1
+    for n in range(len(seen)):
+        if ids[n] < 0:
+            ids[n] = next_id
+            _begin(result[count], next_id, classes[n], seen[n])
+            next_id += 1
+            count += 1
+    return result[:count], ids
+
+
+@compiled()
+def _follow(track: Floats, box: Floats, elapsed: float) -> None:
+    """Set a track to the `box` (7,) on which it is detected, `elapsed` seconds after the last."""
+    # A forecast moved at constant velocity; moved back, it is where the object was last seen. The
+    # velocity is the way from there over the time since, however many keyframes that is.
+    track[_VX] = (box[0] - (track[_X] - track[_VX] * elapsed)) / elapsed
+    track[_VY] = (box[1] - (track[_Y] - track[_VY] * elapsed)) / elapsed
+    track[_MISSES] = 0.0
+    track[_HITS] += 1
+    _put_box(track, box)
+
+
+@compiled()
+def _begin(track: Floats, number: int, label: int, box: Floats) -> None:
+    """Make a row the track of what is seen for the first time."""
+    for k in range(len(track)):
+        track[k] = 0.0
+    track[_ID], track[_CLASS], track[_HITS] = number, label, 1.0
+    _put_box(track, box)
+
+
+@compiled()
+def _put_box(track: Floats, box: Floats) -> None:
+    for k in range(_BOX_WIDTH):
+        track[_BOX + k] = box[k]
+
+
+@compiled()
+def _copy_row(source: Floats, row: int, target: Floats, place: int) -> None:
+    for k in range(source.shape[1]):
+        target[place, k] = source[row, k]

@@ -1,0 +1,77 @@
+"""PyBullet is asked about few moments, and the least clearance of all stays what it is."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from care_sim.world.bodies import CATALOGUE
+from care_sim.world.body_tables import Footprints
+from care_sim.world.bullet import BulletWorld
+from care_sim.world.least_clearance import PADDING_M, LeastClearance, least_gap
+
+KINDS = ("adult", "bicycle", "car", "motorcycle", "pedestrian", "trailer", "truck", "van", "hedge")
+POSES = st.tuples(st.floats(-9.0, 9.0), st.floats(-9.0, 9.0), st.floats(-7.0, 7.0))
+
+
+class Pair:
+    """The ego and another body, and how often PyBullet was asked about them."""
+
+    def __init__(self, kind):
+        self.world = BulletWorld()
+        self.footprints = Footprints()
+        self.asked = 0
+        start = (0.0, 0.0, 0.0)
+        self.bodies = []
+        for each in (CATALOGUE["ego"], CATALOGUE[kind]):
+            self.bodies.append(self.world.add(each, start))
+            self.footprints.add(self.bodies[-1], each.size, start)
+        exact = self.world.clearance
+
+        def clearance(*bodies):
+            self.asked += 1
+            return exact(*bodies)
+
+        self.world.clearance = clearance
+
+    def put(self, *poses):
+        table = np.array(poses)
+        self.world.move_all(np.array(self.bodies), table)
+        self.footprints.move_all(np.array(self.bodies), table)
+
+    @property
+    def boxes(self):
+        return self.footprints.boxes[self.bodies]
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.sampled_from(KINDS), st.lists(st.tuples(POSES, POSES), min_size=1, max_size=4))
+def test_the_least_of_all_moments_is_that_of_asking_at_each(kind, moments):
+    pair = Pair(kind)
+    least = LeastClearance(pair.world, *pair.bodies)
+    each = []
+    for poses in moments:
+        pair.put(*poses)
+        least.note(*pair.boxes)
+        each.append(pair.world.clearance(*pair.bodies))
+        assert least_gap(*pair.boxes) - PADDING_M <= each[-1]
+    now = pair.world.primitives.poses.copy()
+    assert least.metres() == min(each)
+    assert (pair.world.primitives.poses == now).all()
+    assert pair.world.clearance(*pair.bodies) == each[-1]
+    pair.world.close()
+
+
+def test_of_two_that_come_nearer_only_the_last_moment_is_asked_about():
+    pair = Pair("pedestrian")
+    least = LeastClearance(pair.world, *pair.bodies)
+    for x in (9.0, 8.6, 8.2):
+        pair.put((0.0, 0.0, 0.0), (x, 1.0, np.pi / 2))
+        least.note(*pair.boxes)
+    assert least.metres() == pytest.approx(8.2 - 2.04 - 0.33, abs=0.01)
+    assert pair.asked == 1
+    pair.world.close()
+
+
+def test_without_a_moment_nothing_is_near():
+    assert LeastClearance(Pair("car").world, 1, 2).metres() == np.inf
