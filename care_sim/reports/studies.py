@@ -11,8 +11,10 @@ from care_sim.reports.captions import (
     EPISODES_CAPTION,
     MECHANISM_CAPTION,
     NCAP_CAPTION,
+    OPEN_REALISM_CAPTION,
     PROTOCOL_CAPTION,
     R157_CAPTION,
+    REALISM_CAPTION,
     VALIDATION_CAPTION,
     VEHICLE_CAPTION,
     Remark,
@@ -30,6 +32,12 @@ from care_sim.reports.figures.order import (
 )
 from care_sim.reports.figures.protocol import PROTOCOL_FIGURES, protocol_figures
 from care_sim.reports.figures.r157 import R157_FIGURE, r157_figures
+from care_sim.reports.figures.realism import (
+    OPEN_REALISM_FIGURE,
+    REALISM_FIGURE,
+    open_realism_figures,
+    realism_figures,
+)
 from care_sim.reports.figures.validate import VALIDATION_FIGURE, validation_figures
 from care_sim.reports.figures.vehicle import VEHICLE_FIGURE, vehicle_figures
 from care_sim.reports.mechanism.tables import mechanism_closing, mechanism_tables
@@ -38,6 +46,8 @@ from care_sim.reports.protocol import firing as open_firing
 from care_sim.reports.protocol import order as open_order
 from care_sim.reports.protocol.closing import protocol_closing
 from care_sim.reports.protocol.tables import protocol_tables
+from care_sim.reports.realism import episodes as realism
+from care_sim.reports.realism import plays as open_realism
 from care_sim.reports.table import Table
 from care_sim.reports.tables.ablations import ablation_tables
 from care_sim.reports.tables.crowding import crowding_tables
@@ -221,6 +231,15 @@ _ALL = (
         (FIRING_FIGURE,),
     ),
     Study(
+        "realism",
+        "Headline orders under realistic conditions, closed loop",
+        realism.realism_tables,
+        realism_figures,
+        realism.realism_closing,
+        (REALISM_FIGURE,),
+        REALISM_CAPTION,
+    ),
+    Study(
         "validate",
         "Validation of a world",
         validation_tables,
@@ -248,6 +267,16 @@ _ALL = (
         protocol_closing,
         (),
         PROTOCOL_CAPTION,
+        PLAYS,
+    ),
+    Study(
+        "realism-open-loop",
+        "Headline orders under realistic conditions, open loop",
+        open_realism.realism_tables,
+        open_realism_figures,
+        open_realism.realism_closing,
+        (OPEN_REALISM_FIGURE,),
+        OPEN_REALISM_CAPTION,
         PLAYS,
     ),
     Study(
