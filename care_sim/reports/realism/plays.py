@@ -106,8 +106,8 @@ class RealismPlays:
     ) -> dict[str, Standing]:
         found = {}
         for level in self.conditions:
-            keys = (self._key(level, budget, policy) for policy in (ours, theirs))
-            if standing := of_plays(self._cells.difference(ratio, *keys)):
+            first, second = (self._key(level, budget, policy) for policy in (ours, theirs))
+            if standing := of_plays(self._cells.difference(ratio, first, second)):
                 found[level.label] = standing
         return found
 

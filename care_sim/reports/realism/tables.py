@@ -18,14 +18,30 @@ _NAMES = ("policy",)
 class RealismStudy(Protocol):
     """What was played of the study in one of the loops."""
 
-    title: str
-    unit: str
-    levels_told: str
-    """What a level of a policy is."""
-    conditions: Sequence[Variant]
-    """Those that were played."""
-    cameras: Sequence[Variant]
-    """Of those, the ones that change the camera alone."""
+    @property
+    def title(self) -> str:
+        """Which loop."""
+        ...
+
+    @property
+    def unit(self) -> str:
+        """That of differences."""
+        ...
+
+    @property
+    def levels_told(self) -> str:
+        """What the figure of a policy is."""
+        ...
+
+    @property
+    def conditions(self) -> Sequence[Variant]:
+        """Those that were played."""
+        ...
+
+    @property
+    def cameras(self) -> Sequence[Variant]:
+        """Of those, the ones that change the camera alone."""
+        ...
 
     def orders(self) -> Mapping[str, Sequence[Order]]:
         """The orders by measure; the measure is empty where each headline table has its own."""
@@ -54,7 +70,8 @@ class RealismStudy(Protocol):
 
 def tables_of(study: RealismStudy) -> list[Table]:
     """The orders, those that change, the second column, and the figures under every condition."""
-    return [_orders(study), _changes(study), _second_column(study), _levels(study)]
+    tables = [_orders(study), _changes(study), _second_column(study), _levels(study)]
+    return [table for table in tables if table.rows]
 
 
 def verdict_sentences(study: RealismStudy) -> list[str]:
