@@ -113,6 +113,7 @@ def test_bad_input_is_one_line_and_exit_code_2(arguments, names, capsys, tmp_pat
         ["crowding"],
         ["order"],
         ["firing"],
+        ["realism"],
         ["vehicle"],
     ],
     ids=lambda command: command[0],

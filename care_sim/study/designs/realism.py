@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from care_sim.base.errors import InvalidInput
+from care_sim.base.seed_ranges import split_of
 from care_sim.core.firing.listing import CELLS, HARDWARE, settled
 from care_sim.scenarios.ncap.table import TESTS
 from care_sim.sources.scenes import Scene, Source
@@ -95,8 +96,10 @@ class Headline(Group):
     most_seeds: int | None = None
 
     def seeds(self, asked: Sequence[int]) -> list[int]:
-        """Those that it plays."""
-        return [seed + self.first_seed for seed in asked[: self.most_seeds]]
+        """Those that it plays. Raises InvalidInput where they are of another split."""
+        played = [seed + self.first_seed for seed in asked[: self.most_seeds]]
+        split_of([*asked, *played])
+        return played
 
 
 def _street(scenario: str, budget: float, *pairs: Pair) -> Headline:
