@@ -7,11 +7,9 @@ from care_sim.reports.realism import episodes, plays
 from care_sim.reports.realism.orders import Order, Standing, Verdict, changes, of_plays
 from care_sim.reports.studies import STUDIES
 from care_sim.reports.table import Bold
-from care_sim.sources.scenes import Scene, Streets
 from care_sim.study.designs.realism import (
     CONDITIONS,
     FILM_CONDITIONS,
-    FILM_PAIRS,
     IDEAL,
     LATE_CAMERA,
     realism_study,
