@@ -7,18 +7,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from care_sim.base.errors import unknown
-from care_sim.reports.captions import (
-    EPISODES_CAPTION,
-    MECHANISM_CAPTION,
-    NCAP_CAPTION,
-    OPEN_REALISM_CAPTION,
-    PROTOCOL_CAPTION,
-    R157_CAPTION,
-    REALISM_CAPTION,
-    VALIDATION_CAPTION,
-    VEHICLE_CAPTION,
-    Remark,
-)
+from care_sim.reports import captions, closings
 from care_sim.reports.figures.budget import BUDGET_FIGURES, sweep_figures
 from care_sim.reports.figures.crowding import CROWDING_FIGURE, crowding_figures
 from care_sim.reports.figures.faults import FAULT_FIGURES, fault_figures
@@ -54,11 +43,10 @@ from care_sim.reports.tables.crowding import crowding_tables
 from care_sim.reports.tables.faults import fault_tables
 from care_sim.reports.tables.firing import firing_tables
 from care_sim.reports.tables.ncap import ncap_tables
-from care_sim.reports.tables.order import order_closing, order_tables
-from care_sim.reports.tables.paper_statements import statements
+from care_sim.reports.tables.order import order_tables
 from care_sim.reports.tables.r157 import r157_tables
 from care_sim.reports.tables.sweep import sweep_tables
-from care_sim.reports.tables.validate import validation_closing, validation_tables
+from care_sim.reports.tables.validate import validation_tables
 from care_sim.reports.vehicle.tables import vehicle_tables
 from care_sim.study.designs.crowding import VEHICLES_COLUMN
 from care_sim.study.designs.ncap import (
@@ -67,7 +55,6 @@ from care_sim.study.designs.ncap import (
     TARGET_COLUMN,
     TEST_COLUMN,
 )
-from care_sim.study.designs.paper import NO_COLLISION
 from care_sim.study.designs.r157 import CASE_COLUMNS
 from care_sim.study.results_formats import EPISODES, MECHANISM, PLAYS, VEHICLE, ResultsFormat
 from care_sim.study.rows.parquet import read_notes
@@ -91,7 +78,7 @@ class Study:
     figures: Callable[[Sequence[Row]], dict[str, Figure]]
     closing: Callable[[Sequence[Row]], list[str]]
     figure_names: tuple[str, ...]
-    caption: tuple[Remark, ...] = EPISODES_CAPTION
+    caption: tuple[captions.Remark, ...] = captions.EPISODES_CAPTION
     results: ResultsFormat = EPISODES
     columns: Mapping[str, Column] = field(default_factory=dict)
 
@@ -106,29 +93,8 @@ class Study:
         )
 
 
-def collisions(rows: Sequence[Row]) -> str:
-    """Collisions over all rows."""
-    return f"Collisions: {sum(row['collision'] for row in rows)} in {len(rows)} episodes."
-
-
-def _sweep_closing(rows: Sequence[Row]) -> list[str]:
-    return [collisions(rows)]
-
-
 def _no_figures(_rows: Sequence[Row]) -> dict[str, Figure]:
     return {}
-
-
-def _paper_closing(rows: Sequence[Row]) -> list[str]:
-    return [f'{collisions(rows)} Paper: "{NO_COLLISION}"', *map(str, statements(rows))]
-
-
-def _validation_closing(rows: Sequence[Row]) -> list[str]:
-    return [collisions(rows), *validation_closing(rows)]
-
-
-def _order_closing(rows: Sequence[Row]) -> list[str]:
-    return [collisions(rows), *order_closing(rows)]
 
 
 _ORDER_COLUMNS = {"cell_order": TEXT}
@@ -147,7 +113,7 @@ _ALL = (
         "Sweep of the closed loop",
         sweep_tables,
         sweep_figures,
-        _sweep_closing,
+        closings.sweep_closing,
         BUDGET_FIGURES,
     ),
     Study(
@@ -155,7 +121,7 @@ _ALL = (
         "The paper's closed-loop study",
         sweep_tables,
         sweep_figures,
-        _paper_closing,
+        closings.paper_closing,
         BUDGET_FIGURES,
     ),
     Study(
@@ -163,7 +129,7 @@ _ALL = (
         "Crowding in the closed loop",
         crowding_tables,
         crowding_figures,
-        _sweep_closing,
+        closings.sweep_closing,
         (CROWDING_FIGURE,),
         columns={VEHICLES_COLUMN: COUNT},
     ),
@@ -172,9 +138,9 @@ _ALL = (
         "Cut-ins of UN Regulation 157",
         r157_tables,
         r157_figures,
-        _sweep_closing,
+        closings.sweep_closing,
         (R157_FIGURE,),
-        R157_CAPTION,
+        captions.R157_CAPTION,
         columns=_CASE_COLUMNS,
     ),
     Study(
@@ -182,7 +148,7 @@ _ALL = (
         "Ablations of the closed loop",
         ablation_tables,
         _no_figures,
-        _sweep_closing,
+        closings.sweep_closing,
         (),
     ),
     Study(
@@ -190,7 +156,7 @@ _ALL = (
         "Faults in the closed loop",
         fault_tables,
         fault_figures,
-        _sweep_closing,
+        closings.fault_closing,
         FAULT_FIGURES,
     ),
     Study(
@@ -198,9 +164,9 @@ _ALL = (
         "The vehicle study",
         vehicle_tables,
         vehicle_figures,
-        _sweep_closing,
+        closings.sweep_closing,
         (VEHICLE_FIGURE,),
-        VEHICLE_CAPTION,
+        captions.VEHICLE_CAPTION,
         VEHICLE,
     ),
     Study(
@@ -208,9 +174,9 @@ _ALL = (
         "Euro NCAP tests",
         ncap_tables,
         ncap_figures,
-        _sweep_closing,
+        closings.ncap_closing,
         (NCAP_FIGURE,),
-        NCAP_CAPTION,
+        captions.NCAP_CAPTION,
         columns=_NCAP_COLUMNS,
     ),
     Study(
@@ -218,7 +184,7 @@ _ALL = (
         "Order of cells in the closed loop",
         order_tables,
         order_figures,
-        _order_closing,
+        closings.order_closing,
         (ORDER_FIGURE,),
         columns=_ORDER_COLUMNS,
     ),
@@ -227,7 +193,7 @@ _ALL = (
         "Hardware in the closed loop",
         firing_tables,
         firing_figures,
-        _sweep_closing,
+        closings.sweep_closing,
         (FIRING_FIGURE,),
     ),
     Study(
@@ -237,16 +203,16 @@ _ALL = (
         realism_figures,
         realism.realism_closing,
         (REALISM_FIGURE,),
-        REALISM_CAPTION,
+        captions.REALISM_CAPTION,
     ),
     Study(
         "validate",
         "Validation of a world",
         validation_tables,
         validation_figures,
-        _validation_closing,
+        closings.validation_closing,
         (VALIDATION_FIGURE,),
-        VALIDATION_CAPTION,
+        captions.VALIDATION_CAPTION,
     ),
     Study(
         "order-open-loop",
@@ -255,7 +221,7 @@ _ALL = (
         open_order_figures,
         open_order.order_closing,
         (OPEN_ORDER_FIGURE,),
-        PROTOCOL_CAPTION,
+        captions.PROTOCOL_CAPTION,
         PLAYS,
         _ORDER_COLUMNS,
     ),
@@ -266,7 +232,7 @@ _ALL = (
         _no_figures,
         protocol_closing,
         (),
-        PROTOCOL_CAPTION,
+        captions.PROTOCOL_CAPTION,
         PLAYS,
     ),
     Study(
@@ -276,7 +242,7 @@ _ALL = (
         open_realism_figures,
         open_realism.realism_closing,
         (OPEN_REALISM_FIGURE,),
-        OPEN_REALISM_CAPTION,
+        captions.OPEN_REALISM_CAPTION,
         PLAYS,
     ),
     Study(
@@ -286,7 +252,7 @@ _ALL = (
         _no_figures,
         open_ablations.ablation_closing,
         (),
-        PROTOCOL_CAPTION,
+        captions.PROTOCOL_CAPTION,
         PLAYS,
     ),
     Study(
@@ -296,7 +262,7 @@ _ALL = (
         protocol_figures,
         protocol_closing,
         PROTOCOL_FIGURES,
-        PROTOCOL_CAPTION,
+        captions.PROTOCOL_CAPTION,
         PLAYS,
     ),
     Study(
@@ -306,7 +272,7 @@ _ALL = (
         _no_figures,
         mechanism_closing,
         (),
-        MECHANISM_CAPTION,
+        captions.MECHANISM_CAPTION,
         MECHANISM,
     ),
 )

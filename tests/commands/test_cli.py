@@ -54,8 +54,9 @@ def test_a_host_that_calls_a_command_keeps_its_handlers_and_may_do_so_in_a_threa
         (["run", "dense", "--policy", "best"], ["'best'", "care"]),
         (["run", "dense", "--bugdet", "1"], ["--bugdet", "--budget"]),
         (["run", "dense", "--budget", "x"], ["--budget", "'x'"]),
-        (["ncap", "--driver", "careful-human"], ["--driver is an option of care-sim sweep\n"]),
-        (["validate", "ncap", "--no_floor"], ["--no_floor is an option of care-sim sweep and"]),
+        (["crowding", "--driver", "careful-human"], ["--driver is an option of care-sim sweep\n"]),
+        (["reproduce", "--no_floor"], ["--no_floor is an option of care-sim sweep and"]),
+        (["faults", "--camera-latency", "1"], ["camera_latency is a fault that grows"]),
         (
             ["mechanism", "--floor-seeds", "2"],
             ["--floor-seeds is an option of care-sim protocol\n"],

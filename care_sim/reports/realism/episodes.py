@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from care_sim.evaluation.censoring import quartiles
+from care_sim.reports.closings import collisions
 from care_sim.reports.contrasts import (
     AVOIDED,
     DETECTION,
@@ -28,11 +29,7 @@ def realism_tables(rows: Sequence[Row]) -> list[Table]:
 
 def realism_closing(rows: Sequence[Row]) -> list[str]:
     """Size of the study, and how many orders hold."""
-    hits = sum(row["collision"] for row in rows)
-    return [
-        f"Collisions: {hits} in {len(rows)} episodes.",
-        *verdict_sentences(RealismEpisodes(rows)),
-    ]
+    return [collisions(rows), *verdict_sentences(RealismEpisodes(rows))]
 
 
 class RealismEpisodes(GroupRows):
