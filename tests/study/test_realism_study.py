@@ -25,6 +25,11 @@ STREETS = Streets("evaluation")
 SCENES = [Scene("street-0000", 0), Scene("street-0001", 1)]
 
 
+@pytest.fixture(scope="module")
+def configs():
+    return realism_study([3, 4], ["rows"])
+
+
 def labels(levels):
     return [level.label for level in levels]
 
@@ -53,9 +58,8 @@ def test_every_pair_is_of_policies_that_its_headline_plays():
         }
 
 
-def test_every_configuration_stands_in_a_cell_of_the_tables():
+def test_every_configuration_stands_in_a_cell_of_the_tables(configs):
     """The keys by which tables look rows up are those that the rows of the study have."""
-    configs = realism_study([0, 1], ["rows"])
     assert len(configs) == len(set(configs))
     asked = {
         level.key(place, policy)
@@ -67,9 +71,9 @@ def test_every_configuration_stands_in_a_cell_of_the_tables():
     assert {key_of(config.row()) for config in configs} == asked
 
 
-def test_drives_have_the_published_seeds_and_tests_of_euro_ncap_one():
+def test_drives_have_the_published_seeds_and_tests_of_euro_ncap_one(configs):
     seeds = {name: set() for name in ("drive", "ncap", "dense")}
-    for config in realism_study([3, 4]):
+    for config in configs:
         if config.scenario in seeds:
             seeds[config.scenario].add(config.seed)
     assert seeds == {"drive": {103, 104}, "ncap": {3}, "dense": {3, 4}}
@@ -77,7 +81,7 @@ def test_drives_have_the_published_seeds_and_tests_of_euro_ncap_one():
 
 def test_drives_of_another_split_are_refused():
     with pytest.raises(InvalidInput, match="999 of test and 1099 of calibration"):
-        realism_study([999])
+        BY_NAME["drive, 1%"].seeds([999])
 
 
 def test_the_tests_of_euro_ncap_are_each_at_its_highest_speed_up_to_40_kph():
