@@ -44,11 +44,12 @@ class Realism(ProtocolVariants):
         self.check_options()
         if self.source is not None:
             return self._play_source(self.source)
+        seeds = seeds_of(self.seeds)
+        also, left_out = self.further_policies()
+        configs = realism_study(seeds, also)
         report_problems(
             [line for headline in HEADLINES for line in headline_conditions(headline).left_out]
         )
-        also, left_out = self.further_policies()
-        configs = realism_study(seeds_of(self.seeds), also)
         return self.play_study("realism", configs, self.folder("realism"), left_out)
 
     def _play_source(self, named: str) -> int:
