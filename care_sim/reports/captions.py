@@ -136,9 +136,9 @@ _VERDICTS = (
         "Orders: the first policy minus the second; positive where the first detects earlier, "
         "avoids or finds more. Beside the difference stands what becomes of the order under ideal "
         "conditions: it holds (both intervals lie on one side of zero), is lost (the interval "
-        "holds zero) or flips (it lies on the other side). Of two that are not told apart under "
-        "ideal conditions: tied (here neither), or a lead arises. No verdict of fewer than five "
-        "pairs."
+        "holds zero, or may where actors were missed) or flips (it lies on the other side). Of two "
+        "that are not told apart under ideal conditions: tied (here neither), or a lead arises. No "
+        "verdict of fewer than five pairs."
     ),
 )
 REALISM_CAPTION = (

@@ -26,8 +26,8 @@ LATE_CAMERA = Variant("yolox camera, 0.12 s late", _YOLOX | {"camera_latency_s":
 FILM_CAMERA = Variant("yolox camera", _YOLOX)
 LATE_FILM_CAMERA = Variant("yolox camera, 0.5 s late", _YOLOX | {"camera_latency": 1})
 
-# A data sheet of a spinning sensor of 10 Hz, the early one of Ouster's OS1 (docs/returns.md): a
-# target of 10% returns up to 40 m.
+# A spinning sensor that turns once a keyframe, with the range of the early data sheet of Ouster's
+# OS1: a target of 10% returns up to 40 m (docs/returns.md).
 _TURN = {"lidar_sweep_s": 0.1}
 _RANGE = {"lidar_stated_range_m": 40.0}
 _FIRINGS = tuple(
