@@ -37,6 +37,7 @@ _STUDIES = (
     "ablate",
     "order",
     "firing",
+    "realism",
     "faults",
     "vehicle",
     "crowding",

@@ -72,6 +72,12 @@ COMMANDS = {
         "Play the dense street under every hardware, or with --source the first-sighting protocol, "
         "and tell what a policy that knows its hardware has over one whose demand is projected.",
     ),
+    "realism": CommandEntry(
+        "realism",
+        "Realism",
+        "Play the headline tables under the conditions of a real car, with --source that of first "
+        "sightings, and tell which orders of policies hold, are lost or flip.",
+    ),
     "vehicle": CommandEntry(
         "vehicle",
         "Vehicle",

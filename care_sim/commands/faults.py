@@ -1,9 +1,14 @@
 """`care-sim faults`: every fault grows, and the order of the policies changes."""
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import Annotated
+
+import tyro
 
 from care_sim.commands.shared.episode_studies import FixedStudy
+from care_sim.commands.shared.options import DEFAULT_SENSING, SensingOptions
 from care_sim.study.designs.faults import fault_study
 
 
@@ -13,7 +18,10 @@ class Faults(FixedStudy):
 
     out: Path = Path("runs/faults")
     """Folder of the results; an interrupted study goes on there."""
+    conditions: Annotated[SensingOptions, tyro.conf.arg(name="")] = DEFAULT_SENSING
+    """Conditions that all episodes share, other than those that grow."""
 
     def __call__(self) -> int:
         """Run it."""
-        return self.play("faults", fault_study, self.out)
+        study = partial(fault_study, **self.conditions.sensing())
+        return self.play("faults", study, self.out)

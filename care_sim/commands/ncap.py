@@ -2,12 +2,15 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
+
+import tyro
 
 from care_sim.base.bounds import bounded
 from care_sim.base.checks import check_known
 from care_sim.base.errors import InvalidInput
 from care_sim.commands.shared.episode_studies import EpisodeStudy
-from care_sim.commands.shared.options import seeds_of
+from care_sim.commands.shared.options import DEFAULT_SENSING, SensingOptions, seeds_of
 from care_sim.commands.shared.selection import check_values, expanded, playable
 from care_sim.scenarios.ncap.table import TESTS
 from care_sim.study.designs.ncap import (
@@ -39,6 +42,8 @@ class Ncap(EpisodeStudy):
     """Plays the protocols' speeds that are multiples of this; 5 plays them all."""
     out: Path = Path("runs/ncap")
     """Folder of the results; an interrupted study goes on there."""
+    conditions: Annotated[SensingOptions, tyro.conf.arg(name="")] = DEFAULT_SENSING
+    """Conditions that all episodes share."""
 
     def __call__(self) -> int:
         """Run it."""
@@ -48,10 +53,12 @@ class Ncap(EpisodeStudy):
             check_known("test", name, TESTS)
         if not ncap_cases(tests, self.step_kph):
             raise InvalidInput(f"no speed of these tests is a multiple of {self.step_kph:g} km/h")
+        common = self.conditions.sensing()
         policies, left_out = playable(
-            self.policies, lambda name: grid(["ncap"], [name], self.budgets[:1], [0])
+            self.policies, lambda name: grid(["ncap"], [name], self.budgets[:1], [0], **common)
         )
         if not policies:
             raise InvalidInput("none of the policies can be played")
-        configs = ncap_study(seeds_of(self.seeds), policies, tests, self.budgets, self.step_kph)
+        seeds = seeds_of(self.seeds)
+        configs = ncap_study(seeds, policies, tests, self.budgets, self.step_kph, **common)
         return self.play_study("ncap", configs, self.out, left_out)

@@ -9,7 +9,7 @@ import tyro
 from care_sim.base.bounds import bounded
 from care_sim.base.checks import check_known
 from care_sim.commands.shared.episode_studies import EpisodeStudy
-from care_sim.commands.shared.options import seeds_of
+from care_sim.commands.shared.options import DEFAULT_SENSING, SensingOptions, seeds_of
 from care_sim.commands.shared.selection import check_values
 from care_sim.scenarios import SCENARIOS
 from care_sim.study.designs.validate import levels_of, validation_study
@@ -39,6 +39,8 @@ class Validate(EpisodeStudy):
     ego_speed_mps=12.2,12.8."""
     out: Path = Path("runs/validate")
     """Folder of the results; an interrupted validation goes on there."""
+    conditions: Annotated[SensingOptions, tyro.conf.arg(name="")] = DEFAULT_SENSING
+    """Conditions that all episodes share."""
 
     def __call__(self) -> int:
         """Run it."""
@@ -48,6 +50,11 @@ class Validate(EpisodeStudy):
             parameters(self.scenario_parameters), [parameters([text]) for text in self.factors]
         )
         configs = validation_study(
-            self.world, levels, self.budgets, seeds_of(self.seeds), self.training_seeds
+            self.world,
+            levels,
+            self.budgets,
+            seeds_of(self.seeds),
+            self.training_seeds,
+            **self.conditions.sensing(),
         )
         return self.play_study("validate", configs, self.out)

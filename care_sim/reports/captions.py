@@ -130,6 +130,27 @@ VEHICLE_CAPTION = (
     *_statistics(f"{GATE_COLLISION_POINTS:.0f} points of collisions avoided"),
     *_EPISODES_COVERAGE,
 )
+# The verdicts are in care_sim.reports.realism.orders.
+_VERDICTS = (
+    Remark(
+        "Orders: the first policy minus the second; positive where the first detects earlier, "
+        "avoids or finds more. Beside the difference stands what becomes of the order under ideal "
+        "conditions: it holds (both intervals lie on one side of zero), is lost (the interval "
+        "holds zero, or may where actors were missed) or flips (it lies on the other side). Of two "
+        "that are not told apart under ideal conditions: tied (here neither), or a lead arises. No "
+        "verdict of fewer than five pairs."
+    ),
+)
+REALISM_CAPTION = (
+    *_VERDICTS,
+    Remark(
+        "Euro NCAP tests and drives: points and counts of collisions avoided. Of the former the "
+        "tests are what is paired, each with its mean over the seeds."
+    ),
+    *_EPISODES_READING,
+    *_statistics(f"{GATE_COLLISION_POINTS:.0f} points of collisions avoided"),
+    *_EPISODES_COVERAGE,
+)
 # The classes are in care_sim.evaluation.collision_outcomes, the mark in care_sim.scenarios.r157.
 R157_CAPTION = (
     Remark(
@@ -185,6 +206,7 @@ PROTOCOL_CAPTION = (
         "about 80 times with 5: of fewer than about 20 scenes they are too narrow."
     ),
 )
+OPEN_REALISM_CAPTION = (*_VERDICTS, *PROTOCOL_CAPTION)
 MECHANISM_CAPTION = (
     Remark(
         "On the shared belief one policy drives, and every other is asked at each keyframe what it "

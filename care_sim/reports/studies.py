@@ -7,16 +7,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from care_sim.base.errors import unknown
-from care_sim.reports.captions import (
-    EPISODES_CAPTION,
-    MECHANISM_CAPTION,
-    NCAP_CAPTION,
-    PROTOCOL_CAPTION,
-    R157_CAPTION,
-    VALIDATION_CAPTION,
-    VEHICLE_CAPTION,
-    Remark,
-)
+from care_sim.reports import captions, closings
 from care_sim.reports.figures.budget import BUDGET_FIGURES, sweep_figures
 from care_sim.reports.figures.crowding import CROWDING_FIGURE, crowding_figures
 from care_sim.reports.figures.faults import FAULT_FIGURES, fault_figures
@@ -30,6 +21,12 @@ from care_sim.reports.figures.order import (
 )
 from care_sim.reports.figures.protocol import PROTOCOL_FIGURES, protocol_figures
 from care_sim.reports.figures.r157 import R157_FIGURE, r157_figures
+from care_sim.reports.figures.realism import (
+    OPEN_REALISM_FIGURE,
+    REALISM_FIGURE,
+    open_realism_figures,
+    realism_figures,
+)
 from care_sim.reports.figures.validate import VALIDATION_FIGURE, validation_figures
 from care_sim.reports.figures.vehicle import VEHICLE_FIGURE, vehicle_figures
 from care_sim.reports.mechanism.tables import mechanism_closing, mechanism_tables
@@ -38,17 +35,18 @@ from care_sim.reports.protocol import firing as open_firing
 from care_sim.reports.protocol import order as open_order
 from care_sim.reports.protocol.closing import protocol_closing
 from care_sim.reports.protocol.tables import protocol_tables
+from care_sim.reports.realism import episodes as realism
+from care_sim.reports.realism import plays as open_realism
 from care_sim.reports.table import Table
 from care_sim.reports.tables.ablations import ablation_tables
 from care_sim.reports.tables.crowding import crowding_tables
 from care_sim.reports.tables.faults import fault_tables
 from care_sim.reports.tables.firing import firing_tables
 from care_sim.reports.tables.ncap import ncap_tables
-from care_sim.reports.tables.order import order_closing, order_tables
-from care_sim.reports.tables.paper_statements import statements
+from care_sim.reports.tables.order import order_tables
 from care_sim.reports.tables.r157 import r157_tables
 from care_sim.reports.tables.sweep import sweep_tables
-from care_sim.reports.tables.validate import validation_closing, validation_tables
+from care_sim.reports.tables.validate import validation_tables
 from care_sim.reports.vehicle.tables import vehicle_tables
 from care_sim.study.designs.crowding import VEHICLES_COLUMN
 from care_sim.study.designs.ncap import (
@@ -57,7 +55,6 @@ from care_sim.study.designs.ncap import (
     TARGET_COLUMN,
     TEST_COLUMN,
 )
-from care_sim.study.designs.paper import NO_COLLISION
 from care_sim.study.designs.r157 import CASE_COLUMNS
 from care_sim.study.results_formats import EPISODES, MECHANISM, PLAYS, VEHICLE, ResultsFormat
 from care_sim.study.rows.parquet import read_notes
@@ -81,7 +78,7 @@ class Study:
     figures: Callable[[Sequence[Row]], dict[str, Figure]]
     closing: Callable[[Sequence[Row]], list[str]]
     figure_names: tuple[str, ...]
-    caption: tuple[Remark, ...] = EPISODES_CAPTION
+    caption: tuple[captions.Remark, ...] = captions.EPISODES_CAPTION
     results: ResultsFormat = EPISODES
     columns: Mapping[str, Column] = field(default_factory=dict)
 
@@ -96,29 +93,8 @@ class Study:
         )
 
 
-def collisions(rows: Sequence[Row]) -> str:
-    """Collisions over all rows."""
-    return f"Collisions: {sum(row['collision'] for row in rows)} in {len(rows)} episodes."
-
-
-def _sweep_closing(rows: Sequence[Row]) -> list[str]:
-    return [collisions(rows)]
-
-
 def _no_figures(_rows: Sequence[Row]) -> dict[str, Figure]:
     return {}
-
-
-def _paper_closing(rows: Sequence[Row]) -> list[str]:
-    return [f'{collisions(rows)} Paper: "{NO_COLLISION}"', *map(str, statements(rows))]
-
-
-def _validation_closing(rows: Sequence[Row]) -> list[str]:
-    return [collisions(rows), *validation_closing(rows)]
-
-
-def _order_closing(rows: Sequence[Row]) -> list[str]:
-    return [collisions(rows), *order_closing(rows)]
 
 
 _ORDER_COLUMNS = {"cell_order": TEXT}
@@ -137,7 +113,7 @@ _ALL = (
         "Sweep of the closed loop",
         sweep_tables,
         sweep_figures,
-        _sweep_closing,
+        closings.sweep_closing,
         BUDGET_FIGURES,
     ),
     Study(
@@ -145,7 +121,7 @@ _ALL = (
         "The paper's closed-loop study",
         sweep_tables,
         sweep_figures,
-        _paper_closing,
+        closings.paper_closing,
         BUDGET_FIGURES,
     ),
     Study(
@@ -153,7 +129,7 @@ _ALL = (
         "Crowding in the closed loop",
         crowding_tables,
         crowding_figures,
-        _sweep_closing,
+        closings.sweep_closing,
         (CROWDING_FIGURE,),
         columns={VEHICLES_COLUMN: COUNT},
     ),
@@ -162,9 +138,9 @@ _ALL = (
         "Cut-ins of UN Regulation 157",
         r157_tables,
         r157_figures,
-        _sweep_closing,
+        closings.sweep_closing,
         (R157_FIGURE,),
-        R157_CAPTION,
+        captions.R157_CAPTION,
         columns=_CASE_COLUMNS,
     ),
     Study(
@@ -172,7 +148,7 @@ _ALL = (
         "Ablations of the closed loop",
         ablation_tables,
         _no_figures,
-        _sweep_closing,
+        closings.sweep_closing,
         (),
     ),
     Study(
@@ -180,7 +156,7 @@ _ALL = (
         "Faults in the closed loop",
         fault_tables,
         fault_figures,
-        _sweep_closing,
+        closings.fault_closing,
         FAULT_FIGURES,
     ),
     Study(
@@ -188,9 +164,9 @@ _ALL = (
         "The vehicle study",
         vehicle_tables,
         vehicle_figures,
-        _sweep_closing,
+        closings.sweep_closing,
         (VEHICLE_FIGURE,),
-        VEHICLE_CAPTION,
+        captions.VEHICLE_CAPTION,
         VEHICLE,
     ),
     Study(
@@ -198,9 +174,9 @@ _ALL = (
         "Euro NCAP tests",
         ncap_tables,
         ncap_figures,
-        _sweep_closing,
+        closings.ncap_closing,
         (NCAP_FIGURE,),
-        NCAP_CAPTION,
+        captions.NCAP_CAPTION,
         columns=_NCAP_COLUMNS,
     ),
     Study(
@@ -208,7 +184,7 @@ _ALL = (
         "Order of cells in the closed loop",
         order_tables,
         order_figures,
-        _order_closing,
+        closings.order_closing,
         (ORDER_FIGURE,),
         columns=_ORDER_COLUMNS,
     ),
@@ -217,17 +193,26 @@ _ALL = (
         "Hardware in the closed loop",
         firing_tables,
         firing_figures,
-        _sweep_closing,
+        closings.sweep_closing,
         (FIRING_FIGURE,),
+    ),
+    Study(
+        "realism",
+        "Headline orders under realistic conditions, closed loop",
+        realism.realism_tables,
+        realism_figures,
+        realism.realism_closing,
+        (REALISM_FIGURE,),
+        captions.REALISM_CAPTION,
     ),
     Study(
         "validate",
         "Validation of a world",
         validation_tables,
         validation_figures,
-        _validation_closing,
+        closings.validation_closing,
         (VALIDATION_FIGURE,),
-        VALIDATION_CAPTION,
+        captions.VALIDATION_CAPTION,
     ),
     Study(
         "order-open-loop",
@@ -236,7 +221,7 @@ _ALL = (
         open_order_figures,
         open_order.order_closing,
         (OPEN_ORDER_FIGURE,),
-        PROTOCOL_CAPTION,
+        captions.PROTOCOL_CAPTION,
         PLAYS,
         _ORDER_COLUMNS,
     ),
@@ -247,7 +232,17 @@ _ALL = (
         _no_figures,
         protocol_closing,
         (),
-        PROTOCOL_CAPTION,
+        captions.PROTOCOL_CAPTION,
+        PLAYS,
+    ),
+    Study(
+        "realism-open-loop",
+        "Headline orders under realistic conditions, open loop",
+        open_realism.realism_tables,
+        open_realism_figures,
+        open_realism.realism_closing,
+        (OPEN_REALISM_FIGURE,),
+        captions.OPEN_REALISM_CAPTION,
         PLAYS,
     ),
     Study(
@@ -257,7 +252,7 @@ _ALL = (
         _no_figures,
         open_ablations.ablation_closing,
         (),
-        PROTOCOL_CAPTION,
+        captions.PROTOCOL_CAPTION,
         PLAYS,
     ),
     Study(
@@ -267,7 +262,7 @@ _ALL = (
         protocol_figures,
         protocol_closing,
         PROTOCOL_FIGURES,
-        PROTOCOL_CAPTION,
+        captions.PROTOCOL_CAPTION,
         PLAYS,
     ),
     Study(
@@ -277,7 +272,7 @@ _ALL = (
         _no_figures,
         mechanism_closing,
         (),
-        MECHANISM_CAPTION,
+        captions.MECHANISM_CAPTION,
         MECHANISM,
     ),
 )

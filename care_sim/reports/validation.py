@@ -158,9 +158,18 @@ def played_worlds(rows: Sequence[Row]) -> list[WorldPlays]:
     """The worlds of a validation, the first of them as it is and the others with a factor
     changed.
     """
-    worlds: dict[Setting, list[Row]] = {}
-    for row in rows:
-        worlds.setdefault(setting_of(row), []).append(row)
+    placed = [(setting_of(row), row) for row in rows]
+    # The full scan does not feel every condition: its rows may stand in a plainer setting, and
+    # belong to each that differs from it in those alone.
+    settings = dict.fromkeys(setting for setting, row in placed if row["policy"] != FULL)
+    worlds = {
+        setting: [
+            row
+            for own, row in placed
+            if own == (setting.for_full() if row["policy"] == FULL else setting)
+        ]
+        for setting in settings or dict.fromkeys(setting for setting, _ in placed)
+    }
     return [WorldPlays(setting, own) for setting, own in worlds.items()]
 
 

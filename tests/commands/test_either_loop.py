@@ -8,10 +8,12 @@ from care_sim.base.errors import InvalidInput
 from care_sim.cli import main
 from care_sim.commands.ablate import Ablate
 from care_sim.commands.order import Order
+from care_sim.core.return_settings import RETURN_SETTINGS
 from care_sim.reports.report import read_results
 from care_sim.study.designs.ablations import OPEN_ABLATIONS
 from care_sim.study.designs.firing import FIRINGS
 from care_sim.study.designs.order import ORDERS
+from care_sim.study.designs.realism import FILM_CONDITIONS
 
 
 @pytest.fixture
@@ -46,6 +48,9 @@ def written(folder):
         ("firing --source streets --sensors os1-64", "--sensors has no meaning with --source"),
         ("firing --sensors", "--sensors needs at least one value"),
         ("firing --sensors os2", "unknown sensor 'os2'"),
+        ("realism --budgets 0.1", "--budgets has no meaning without --source"),
+        ("realism --source streets --seeds 3", "--seeds has no meaning with --source"),
+        ("realism --seeds 990 991", "got 990 of test and 1090 of calibration"),
         ("ablate --split val", "--split has no meaning without --source"),
         ("ablate --source streets --seeds 3", "--seeds has no meaning with --source"),
         ("ablate --source streets --budgets", "--budgets needs at least one value"),
@@ -97,6 +102,22 @@ def test_the_hardware_of_a_log_is_played_and_reported_again(logs, tmp_path, caps
     assert len(rows) == len(FIRINGS) * 2 + 1
     # Free cells are the default, and the default has nothing in the column.
     assert {row["firing"] for row in rows if row["policy"] == "care"} == {None, *FIRINGS[1:]}
+    before = written(out)
+    (out / "tables.md").unlink()
+    assert run("report", out) == 0
+    assert written(out) == before
+
+
+def test_the_realism_of_a_log_is_played_and_reported_again(logs, tmp_path, capsys):
+    out = tmp_path / "out"
+    asked = ("realism", "--source", logs, "--policies", "care", "history", "full")
+    asked = (*asked, "--budgets", 0.1, "--workers", 1, "--out", out)
+    assert run(*asked) == 0
+    assert "left out in argoverse2, 10%: sweep of 0.1 s (lidar_sweep_s" in capsys.readouterr().err
+    rows, study, _ = read_results(out)
+    assert study.name == "realism-open-loop"
+    played = [level for level in FILM_CONDITIONS if not {*level.changes} & {*RETURN_SETTINGS}]
+    assert len(rows) == len(played) * 2 + 1
     before = written(out)
     (out / "tables.md").unlink()
     assert run("report", out) == 0

@@ -3,6 +3,7 @@
 import pytest
 
 from care_sim.cli import main
+from care_sim.reports.validation import played_worlds
 from care_sim.study.rows.parquet import read_rows
 
 SHORT = (
@@ -29,6 +30,17 @@ def test_it_plays_every_world_and_its_report_is_made_again_of_the_rows(capsys, t
     assert f"{world}: no verdict on 1 test seed, it takes 5" in out
     assert (tmp_path / "validation.png").is_file()
     assert run(capsys, "report", [tmp_path])[1] == out.replace(f"Results are in {tmp_path}\n", "")
+
+
+def test_a_world_with_another_camera_is_one_world_with_its_full_scan(capsys, tmp_path):
+    """The full scan asks no camera, and its rows have none in their setting."""
+    played = [*SHORT.split("--factors")[0].split(), "--camera-profile", "yolox"]
+    code, out = run(capsys, " ".join(played), ["--out", tmp_path])
+    assert code == 0
+    worlds = played_worlds(read_rows(tmp_path / "episodes.parquet"))
+    assert [dict(world.setting.conditions)["camera_profile"] for world in worlds] == ["yolox"]
+    assert len(worlds[0].played("full", 0.1)) == 1
+    assert "camera profile yolox" in out
 
 
 def test_a_folder_that_another_study_holds_is_refused(capsys, tmp_path):

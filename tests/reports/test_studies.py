@@ -18,6 +18,7 @@ from care_sim.study.designs import (
     ncap,
     order,
     paper,
+    realism,
     validate,
     vehicle,
 )
@@ -47,7 +48,8 @@ def test_an_unknown_study_is_one_clear_line(tmp_path):
         InvalidInput,
         match=r"unknown study in .* 'gardening'; "
         "known: ablate, ablate-open-loop, crowding, faults, firing, firing-open-loop, mechanism, "
-        "ncap, order, order-open-loop, paper, protocol, r157, sweep, validate, vehicle",
+        "ncap, order, order-open-loop, paper, protocol, r157, realism, realism-open-loop, sweep, "
+        "validate, vehicle",
     ):
         study_of(tmp_path / "episodes.parquet")
 
@@ -65,6 +67,7 @@ EPISODES = {
     ],
     "order": [row(config, 9.0) for config in order.order_study([0]) if config.scenario == "dense"],
     "firing": [row(config, 9.0) for config in firing.firing_study([0])],
+    "realism": [row(config, 9.0) for config in realism.realism_study([0])],
     "vehicle": [vehicle_row(config, 9.0) for config in vehicle.vehicle_study([0])],
 }
 
@@ -143,6 +146,7 @@ def test_no_study_is_left_out_above():
         "order-open-loop",
         "ablate-open-loop",
         "firing-open-loop",
+        "realism-open-loop",
     }
     assert {*EPISODES, *plays} == set(STUDIES)
 

@@ -151,6 +151,7 @@ LONG = (
     "ablate",
     "order",
     "firing",
+    "realism",
     "faults",
     "crowding",
     "r157",

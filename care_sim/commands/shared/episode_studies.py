@@ -36,9 +36,13 @@ class FixedStudy(EpisodeStudy):
 
     def play(self, study: str, configurations: _Configurations, out: Path) -> int:
         """Play the configurations of the seeds, with the further policies."""
-        # Which of them can be played is tried on one task in every scenario.
         seeds = seeds_of(self.seeds)
-        named = CONTROLS if self.also is None else self.also
-        also, left_out = playable(named, lambda name: grid(SCENARIOS, [name], [0.1], [0]))
+        also, left_out = self.further_policies()
         configs = of_seeds(configurations(seeds[:1], also), seeds)
         return self.play_study(study, configs, out, left_out)
+
+    def further_policies(self) -> tuple[list[str], list[str]]:
+        """Those that can be played, and a line for each that cannot."""
+        # It is tried on one task in every scenario.
+        named = CONTROLS if self.also is None else self.also
+        return playable(named, lambda name: grid(SCENARIOS, [name], [0.1], [0]))

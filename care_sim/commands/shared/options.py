@@ -14,8 +14,8 @@ from care_sim.study.parameters import parameters
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(ClosedLoopConditions):
-    """Conditions that all episodes share."""
+class SensingOptions(ClosedLoopConditions):
+    """Conditions, sensors and detector that all episodes share, of studies that fix the rest."""
 
     sensor: str = DEFAULT_SETUP
     """LiDAR and cameras: a name of `care-sim sensors`, or a .toml file of a set-up."""
@@ -25,6 +25,17 @@ class Options(ClosedLoopConditions):
     """
     detector_parameters: tuple[str, ...] = ()
     """Parameters of the detector as NAME=VALUE, for example file=model.pt for torchscript."""
+
+    def sensing(self) -> dict[str, Any]:
+        """As arguments of `EpisodeConfig`. Raises InvalidInput for parameters that are none."""
+        given = {field.name: getattr(self, field.name) for field in fields(SensingOptions)}
+        return given | {"detector_parameters": parameters(self.detector_parameters)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options(SensingOptions):
+    """Everything that all episodes share."""
+
     scenario_parameters: tuple[str, ...] = ()
     """Physics of the scenario as NAME=VALUE, a range as NAME=LOW,HIGH, for example vehicles=7
     gap_m=0.8,1.2; see `care-sim scenarios`."""
@@ -36,15 +47,14 @@ class Options(ClosedLoopConditions):
         """As arguments of `EpisodeConfig`, of studies that play these policies. Raises InvalidInput
         for parameters of another one.
         """
-        pairs = {
-            "detector_parameters": parameters(self.detector_parameters),
+        return self.sensing() | {
             "scenario_parameters": parameters(self.scenario_parameters),
             "policy_parameters": policy_parameters(self.policy_parameters, policies),
         }
-        return {field.name: getattr(self, field.name) for field in fields(self)} | pairs
 
 
 DEFAULT_OPTIONS = Options()
+DEFAULT_SENSING = SensingOptions()
 """The defaults."""
 
 

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from care_sim.reports.cells import Cell, StudyCells
 from care_sim.reports.figures.styles import FULL_STYLE, Style, bare_axes, styles
 from care_sim.reports.tables.faults import policies_of
-from care_sim.study.designs.faults import FAULT_PLACES, FAULTS, Fault
+from care_sim.study.designs.faults import FAULT_PLACES, FAULTS, Fault, faults_alone
 from care_sim.study.designs.variants import Place
 from care_sim.study.run_config import Row
 
@@ -55,7 +55,7 @@ FAULT_FIGURES = tuple(
 
 def fault_figures(rows: Sequence[Row]) -> dict[str, Figure]:
     """A figure for every place and measure, by name."""
-    study = StudyCells(rows)
+    study = StudyCells(faults_alone(rows))
     drawn = styles(
         (policy, study.tags.get(policy, ())) for policy in policies_of(study) if policy != "full"
     )

@@ -13,7 +13,7 @@ from care_sim.reports.figures.faults import MEASURES, CurveMeasure
 from care_sim.reports.figures.styles import FULL_STYLE, styles
 from care_sim.reports.page.chart import PANEL_WIDTH, Chart, Encoding, inline, specification
 from care_sim.reports.tables.faults import policies_of
-from care_sim.study.designs.faults import FAULT_PLACES, FAULTS
+from care_sim.study.designs.faults import FAULT_PLACES, FAULTS, faults_alone
 from care_sim.study.designs.variants import Place
 from care_sim.study.run_config import Row
 
@@ -25,7 +25,7 @@ _LEAST = 15.0
 
 def fault_charts(rows: Sequence[Row]) -> list[Chart]:
     """A chart for every place and measure."""
-    study = StudyCells(rows)
+    study = StudyCells(faults_alone(rows))
     return [_chart(study, place, measure) for place, measure in product(FAULT_PLACES, MEASURES)]
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from care_sim.base.errors import InvalidInput, counted
 from care_sim.core.arrays import Floats
+from care_sim.core.return_settings import RETURN_SETTINGS
 from care_sim.evaluation.allocation_differences import AllocationDifference
 from care_sim.evaluation.recall import Tally
 from care_sim.evaluation.scene_contrasts import (
@@ -175,8 +176,10 @@ def _check_films(rows: Sequence[Row]) -> None:
     """The data of a source may have changed between two runs into one folder."""
     films: dict[tuple[object, ...], str] = {}
     for row in rows:
-        # Camera detections from a file and sweeps between keyframes make another film of the scene.
-        made_with = (row.get("camera_detections"), row.get("sweeps"))
+        # Camera detections from a file, sweeps between keyframes and what becomes of pulses make
+        # another film of the scene.
+        names = ("camera_detections", "sweeps", *RETURN_SETTINGS)
+        made_with = [row.get(name) for name in names]
         scene = (row["source"], row["scene"], *made_with)
         if len(row["ttfds"]) != row["events"]:
             raise InvalidInput(

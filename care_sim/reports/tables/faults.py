@@ -9,7 +9,13 @@ from care_sim.reports.cells import Cell, StudyCells
 from care_sim.reports.contrasts import Contrast
 from care_sim.reports.formatting import interval, median
 from care_sim.reports.table import Bold, Table
-from care_sim.study.designs.faults import FAULT_PLACES, FAULT_POLICIES, FAULTS, Fault
+from care_sim.study.designs.faults import (
+    FAULT_PLACES,
+    FAULT_POLICIES,
+    FAULTS,
+    Fault,
+    faults_alone,
+)
 from care_sim.study.designs.variants import Place, Variant
 from care_sim.study.run_config import Row
 
@@ -36,7 +42,7 @@ def policies_of(study: StudyCells) -> list[str]:
 
 def fault_tables(rows: Sequence[Row]) -> list[Table]:
     """Where the order changes, then one table per fault with levels and paired differences."""
-    study = StudyCells(rows)
+    study = StudyCells(faults_alone(rows))
     return [_order_table(study), *(_fault_table(fault, study) for fault in FAULTS)]
 
 

@@ -12,8 +12,8 @@ from care_sim.reports.protocol.notes import papers
 from care_sim.reports.table import Table, TableRow
 from care_sim.reports.vehicle import paper
 from care_sim.reports.vehicle.rows import VehicleRows, joined, outcome, total
-from care_sim.study.designs.variants import Variant
-from care_sim.study.designs.vehicle import BLACKOUTS, FALLBACK_POLICIES, Group
+from care_sim.study.designs.variants import Group, Variant
+from care_sim.study.designs.vehicle import BLACKOUTS, FALLBACK_POLICIES
 from care_sim.study.run_config import REFERENCE, Row
 from care_sim.study.vehicle.play import ASKED
 

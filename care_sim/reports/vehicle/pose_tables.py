@@ -12,13 +12,12 @@ from care_sim.reports.protocol.notes import papers
 from care_sim.reports.table import Table, TableRow
 from care_sim.reports.vehicle import paper
 from care_sim.reports.vehicle.rows import VehicleRows, mean_over_forecasts, outcome, share, total
-from care_sim.study.designs.variants import Variant
+from care_sim.study.designs.variants import Group, Variant
 from care_sim.study.designs.vehicle import (
     FORGETTING,
     POSE_GROUPS,
     POSE_LEVELS,
     POSE_POLICIES,
-    Group,
     forgetting,
 )
 from care_sim.study.run_config import REFERENCE, Row

@@ -1,4 +1,4 @@
-"""The rows of the vehicle study by group of places, level and policy."""
+"""The rows of the vehicle study, and what its tables make of their columns."""
 
 from collections.abc import Sequence
 
@@ -6,39 +6,20 @@ import numpy as np
 
 from care_sim.core.arrays import Integers
 from care_sim.evaluation.censoring import quartiles
-from care_sim.reports.formatting import marked, median
-from care_sim.study.designs.variants import Variant
-from care_sim.study.designs.vehicle import PLAYED_IN_PART, Group
-from care_sim.study.rows.reading import detections, grouped, tags_of_row
+from care_sim.reports.formatting import median
+from care_sim.reports.group_rows import GroupRows
+from care_sim.study.designs.vehicle import PLAYED_IN_PART
+from care_sim.study.rows.reading import detections
 from care_sim.study.run_config import Row
 
 
-class VehicleRows:
-    """The rows of a study; what was not played is an empty list."""
-
-    def __init__(self, rows: Sequence[Row]):
-        self.rows = rows
-        self.tags = {row["policy"]: tags_of_row(row) for row in rows}
-        self._cells = grouped(rows)
-
-    def of(self, group: Group, level: Variant, policy: str) -> list[Row]:
-        """The rows of all places of a group. Their `seed` names place and seed: it is by worlds
-        that policies are paired.
-        """
-        return [
-            row | {"seed": (number, row["seed"])}
-            for number, place in enumerate(group.places)
-            for row in self._cells.get(level.key(place, policy), ())
-        ]
+class VehicleRows(GroupRows):
+    """The rows of the vehicle study."""
 
     def further(self, policies: Sequence[str]) -> list[str]:
         """The policies, then those that joined in."""
         known = {*policies, *PLAYED_IN_PART}
         return [*policies, *(policy for policy in self.tags if policy not in known)]
-
-    def marked(self, policy: str) -> str:
-        """A policy's name, with a mark when no car can have it."""
-        return marked(policy, self.tags.get(policy, ()))
 
 
 def total(rows: Sequence[Row], column: str) -> int:

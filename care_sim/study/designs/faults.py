@@ -5,8 +5,13 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
+from care_sim.base.errors import InvalidInput
+from care_sim.core.conditions import DEFAULTS
 from care_sim.study.designs.variants import Place, Variant
 from care_sim.study.episode_config import EpisodeConfig
+from care_sim.study.rows.reading import setting_of
+from care_sim.study.rows.settings import Setting
+from care_sim.study.run_config import FULL, Row
 
 FAULT_PLACES = (Place("dartout", 0.10), Place("dense", 0.03))
 """The paper's own: the budget at which it injects faults, and the one at which it tells the
@@ -99,12 +104,40 @@ FAULTS = (
 )
 
 
-def fault_study(seeds: Sequence[int], also: Sequence[str] = ()) -> list[EpisodeConfig]:
-    """Every policy at every strength of every fault in both places; `also` are further policies."""
+_VARIED = frozenset(name for fault in FAULTS for level in fault.levels for name in level.changes)
+_SHARED = {*DEFAULTS, "sensor", "sensor_hash", "detector"} - _VARIED
+"""Columns that no fault changes."""
+
+
+def fault_study(
+    seeds: Sequence[int], also: Sequence[str] = (), **common: Any
+) -> list[EpisodeConfig]:
+    """Every policy at every strength of every fault in both places; `also` are further policies,
+    `common` further fields of `EpisodeConfig`. Raises InvalidInput for one that is a fault.
+    """
+    for name in sorted(_VARIED):
+        if common.get(name, DEFAULTS[name]) != DEFAULTS[name]:
+            raise InvalidInput(
+                f"{name} is a fault that grows: the study takes no other start of it"
+            )
+    shared = {name: value for name, value in common.items() if name not in _VARIED}
     made = [
         config
         for place, fault in product(FAULT_PLACES, FAULTS)
         for level in fault.levels
-        for config in level.configurations(place, [*FAULT_POLICIES, *also], seeds)
+        for config in Variant(level.label, {**shared, **level.changes}).configurations(
+            place, [*FAULT_POLICIES, *also], seeds
+        )
     ]
     return list(dict.fromkeys(made))
+
+
+def faults_alone(rows: Sequence[Row]) -> list[Row]:
+    """The rows as if nothing but the faults had been asked for: what all share is left out."""
+    return [{name: value for name, value in row.items() if name not in _SHARED} for row in rows]
+
+
+def common_conditions(rows: Sequence[Row]) -> Setting:
+    """What all rows share but the faults."""
+    row = next((each for each in rows if each["policy"] != FULL), rows[0])
+    return setting_of({name: value for name, value in row.items() if name not in _VARIED})

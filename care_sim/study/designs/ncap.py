@@ -67,8 +67,11 @@ def ncap_study(
     tests: Sequence[str] = tuple(TESTS),
     budgets: Sequence[float] = NCAP_BUDGETS,
     step_kph: float = NCAP_STEP_KPH,
+    **common: Any,
 ) -> list[EpisodeConfig]:
-    """Every case, policy and budget: 140 cases, 2,240 configurations a seed by default."""
+    """Every case, policy and budget: 140 cases, 2,240 configurations a seed by default. `common`
+    are further fields of `EpisodeConfig`.
+    """
     # The cases are the protocols' own, which need no check: policies and budgets are checked once.
     cases = [case.parameters for case in ncap_cases(tests, step_kph)]
-    return of_cases(grid(["ncap"], policies, budgets, seeds), cases)
+    return of_cases(grid(["ncap"], policies, budgets, seeds, **common), cases)

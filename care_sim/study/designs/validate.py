@@ -5,6 +5,7 @@ What is chosen is chosen on training seeds, and what is said is said of test see
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 from care_sim.base.seed_ranges import (
     TRAINING,
@@ -32,9 +33,11 @@ def validation_study(
     budgets: Sequence[float],
     test: Sequence[int],
     trained: int,
+    **common: Any,
 ) -> list[EpisodeConfig]:
     """Every level of a world: camera policies and controls on the first `trained` training seeds,
-    and all policies on the `test` seeds. The learned maps are of the same training seeds.
+    and all policies on the `test` seeds. The learned maps are of the same training seeds, without
+    the conditions. `common` are further fields of `EpisodeConfig`.
 
     Raises InvalidInput for a test seed that is no seed of the benchmark.
     """
@@ -61,6 +64,7 @@ def validation_study(
             seeds,
             scenario_parameters=level,
             policy_parameters=known,
+            **common,
         )
     ]
 

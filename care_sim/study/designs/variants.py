@@ -30,15 +30,33 @@ class Place(NamedTuple):
         return f"{self.scenario}, {percent(self.budget)}"
 
 
+@dataclass(frozen=True)
+class Group:
+    """Places whose episodes are told together."""
+
+    name: str
+    places: tuple[Place, ...]
+
+
 class FilmPlace(NamedTuple):
-    """A kind of source and a budget: where every level is played in the open loop."""
+    """A kind of source and a budget: where every level is played in the open loop. `shared` are
+    further columns of all its plays, as those of a sensor set-up.
+    """
 
     source: str
     budget: float
+    shared: tuple[tuple[str, Any], ...] = ()
 
     def row(self) -> Row:
         """As columns of a play."""
-        return {"source": self.source, "detector": PROXY, "budget": self.budget}
+        return dict(self.shared) | {
+            "source": self.source,
+            "detector": PROXY,
+            "budget": self.budget,
+        }
+
+    def __str__(self) -> str:
+        return f"{self.source}, {percent(self.budget)}"
 
 
 @dataclass(frozen=True)
@@ -74,10 +92,11 @@ class Variant:
         scenes: Sequence[Scene],
         budgets: Sequence[float],
         policies: Iterable[str],
+        floor_seeds: Sequence[int] = (0,),
     ) -> list[PlayConfig]:
-        """The plays of this level in the open loop, with the first floor; `full` once likewise."""
+        """The plays of this level in the open loop; `full` once likewise."""
         played = [self.policy or policy for policy in policies]
-        return play_grid(source, scenes, played, budgets, **self._given())
+        return play_grid(source, scenes, played, budgets, floor_seeds, **self._given())
 
     def for_others(self) -> "Variant":
         """The same conditions for policies that lack the parameters."""

@@ -3,24 +3,15 @@ and a pose that is not exact.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import product
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.forgetting import VEHICLE_SIGMA_M
 from care_sim.scenarios.ncap.forms import AcrossExit
 from care_sim.scenarios.ncap.table import TESTS
-from care_sim.study.designs.variants import Place, Variant
+from care_sim.study.designs.variants import Group, Place, Variant
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.parameters import Parameters
-
-
-@dataclass(frozen=True)
-class Group:
-    """Places whose episodes are told together."""
-
-    name: str
-    places: tuple[Place, ...]
 
 
 def _turning_tests() -> Iterator[Parameters]:

@@ -1,0 +1,54 @@
+"""The sentences after the tables of the studies of the closed loop."""
+
+from collections.abc import Sequence
+
+from care_sim.reports.tables import order, validate
+from care_sim.reports.tables.paper_statements import statements
+from care_sim.study.designs.faults import common_conditions
+from care_sim.study.designs.paper import NO_COLLISION
+from care_sim.study.rows.reading import setting_of
+from care_sim.study.rows.settings import Setting
+from care_sim.study.run_config import FULL, Row
+
+
+def collisions(rows: Sequence[Row]) -> str:
+    """Collisions over all rows."""
+    return f"Collisions: {sum(row['collision'] for row in rows)} in {len(rows)} episodes."
+
+
+def sweep_closing(rows: Sequence[Row]) -> list[str]:
+    """Collisions alone."""
+    return [collisions(rows)]
+
+
+def paper_closing(rows: Sequence[Row]) -> list[str]:
+    """What the paper says, beside what was measured."""
+    return [f'{collisions(rows)} Paper: "{NO_COLLISION}"', *map(str, statements(rows))]
+
+
+def validation_closing(rows: Sequence[Row]) -> list[str]:
+    """The verdicts on the worlds."""
+    return [collisions(rows), *validate.validation_closing(rows)]
+
+
+def order_closing(rows: Sequence[Row]) -> list[str]:
+    """What hangs on the order of cells."""
+    return [collisions(rows), *order.order_closing(rows)]
+
+
+def fault_closing(rows: Sequence[Row]) -> list[str]:
+    """What all episodes share beside the faults."""
+    return [collisions(rows), *_told(common_conditions(rows))]
+
+
+def ncap_closing(rows: Sequence[Row]) -> list[str]:
+    """What all episodes share beside the tests."""
+    row = next((each for each in rows if each["policy"] != FULL), rows[0])
+    plain = {name: value for name, value in row.items() if not name.startswith("scenario.")}
+    return [collisions(rows), *_told(setting_of(plain))]
+
+
+def _told(setting: Setting) -> list[str]:
+    """A sentence where conditions are not the default."""
+    changed = setting.label.removeprefix(f"{setting.world}, ")
+    return [f"Conditions of all episodes: {changed}."] if setting.conditions else []

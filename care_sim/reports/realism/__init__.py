@@ -1,0 +1,1 @@
+"""What realistic conditions do to the orders of the headline tables."""
