@@ -9,7 +9,7 @@ import pytest
 
 from care_sim.base.errors import InvalidInput, MissingExtra
 from care_sim.core.firing import free_cells
-from care_sim.core.types import Scan
+from care_sim.core.types import Scan, Tracks
 from care_sim.driving.braking import BrakingController
 from care_sim.loops.needless import NeedlessBraking
 from care_sim.measure.certify import design, playing, published, run
@@ -199,7 +199,7 @@ def a_track_that_has_moved(monkeypatch):
     def moved(self):
         predict(self)
         calls.append(0)
-        self._tracks.boxes[:1, 0] += 0.001 * (len(calls) == 2)
+        self._table[:1, Tracks.CENTRE.start] += 0.001 * (len(calls) == 2)
 
     monkeypatch.setattr(TrackMemory, "predict", moved)
 
