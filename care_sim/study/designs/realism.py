@@ -211,8 +211,8 @@ def realism_study(seeds: Sequence[int], also: Sequence[str] = ()) -> list[Episod
     of all.
     """
     made: list[EpisodeConfig] = []
-    for headline in HEADLINES:
-        worlds = headline.seeds(seeds)
+    # All seeds are looked at before the first configuration is made.
+    for headline, worlds in [(each, each.seeds(seeds)) for each in HEADLINES]:
         policies = dict.fromkeys([*headline.policies, *also])
         place = headline.places[0]._replace(parameters=())
         for level in headline_conditions(headline).levels:
