@@ -48,7 +48,10 @@ def shipped_files(entry: EntryPoint) -> dict[str, Path] | None:
         if top == first and not roots:
             return None
         for root in roots:
-            new = _files_at(root, beside=top == first and root.name not in files)
+            # A module that is asked for by its place lies among files of any kind, which may change
+            # while it plays: its results, or the log that the shell writes.
+            beside = entry.dist is not None and top == first and root.name not in files
+            new = _files_at(root, beside)
             files |= new
             if project:
                 further = _further_tops(new.values(), project, known)
@@ -122,9 +125,14 @@ def _roots(top: str) -> list[Path]:
 
 
 def _project(entry: EntryPoint) -> Path | None:
-    """The folder that a distribution is installed from for editing (PEP 610)."""
+    """The folder that a distribution is installed from for editing (PEP 610); of a module that
+    belongs to none, its own folder.
+    """
+    if entry.dist is None:
+        places = _roots(entry.module.partition(".")[0])
+        return real_path(places[0].parent) if places else None
     try:
-        told = json.loads((entry.dist and entry.dist.read_text("direct_url.json")) or "")
+        told = json.loads(entry.dist.read_text("direct_url.json") or "")
         return (
             real_path(Path(url2pathname(urlsplit(told["url"]).path)))
             if told["dir_info"]["editable"]

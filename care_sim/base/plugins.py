@@ -3,8 +3,13 @@
 A package adds one through an entry point: its name is what the user writes, its object is a class
 or another callable that makes the thing. Of two entries with one name the first on the path counts,
 as for modules. A built-in name cannot be taken.
+
+What no package adds is asked for by its place, as MODULE:OBJECT, where the module is found as
+Python finds it, or in the folder in which the program was started.
 """
 
+import os
+import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -15,6 +20,7 @@ from care_sim.base.checks import check_known
 from care_sim.base.errors import InvalidInput, error_line
 
 Made = TypeVar("Made")
+_PLACE = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*(\.[^\W\d]\w*)*")
 
 
 @dataclass(frozen=True)
@@ -40,7 +46,7 @@ class Plugins(Generic[Made]):
     def check(self, name: object) -> None:
         """Raise InvalidInput for what is no name of this kind."""
         # Installed packages are searched only for a name that is not built in.
-        if not (isinstance(name, str) and name in self.built_in):
+        if not (isinstance(name, str) and (name in self.built_in or is_place(name))):
             check_known(self.kind, name, self.names())
 
     def maker(self, name: str) -> Callable[..., Made]:
@@ -52,7 +58,11 @@ class Plugins(Generic[Made]):
             built_in = self.built_in[name]
             return self.load(built_in) if isinstance(built_in, EntryPoint) else built_in
         self.check(name)
-        return self.load(self.entries()[name])
+        return self.load(self.entry(name))
+
+    def entry(self, name: str) -> EntryPoint:
+        """The entry of a name that is not built in, or one for a place."""
+        return EntryPoint(name, name, self.group) if is_place(name) else self.entries()[name]
 
     def all_entries(self) -> list[EntryPoint]:
         """Every entry of installed packages in order of name; of one name in order of the path."""
@@ -77,6 +87,8 @@ class Plugins(Generic[Made]):
         """What an entry names. Raises InvalidInput with the reason, in one line, when it is of no
         use.
         """
+        if is_place(entry.name):
+            _look_here()
         try:
             made = entry.load()
         # Foreign code may fail in any way; some leaves by `sys.exit`.
@@ -87,6 +99,18 @@ class Plugins(Generic[Made]):
             raise InvalidInput(f"{entry.value} {fault}")
         maker: Callable[..., Made] = made
         return maker
+
+
+def is_place(name: str) -> bool:
+    """Whether a name is a place, MODULE:OBJECT."""
+    return _PLACE.fullmatch(name) is not None
+
+
+def _look_here() -> None:
+    """Let modules be found in the current folder, after all other places: it hides none of them."""
+    here = os.getcwd()
+    if not {"", here} & {*sys.path}:
+        sys.path.append(here)
 
 
 def _found_in(entry: EntryPoint, error: BaseException) -> str:

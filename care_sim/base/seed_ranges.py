@@ -2,7 +2,7 @@
 
 | seeds | for |
 |---|---|
-| 0 to 999 | test: the benchmark; of streets 0 to 149 are for evaluation |
+| 0 to 999 | test: of streets 0 to 149 are for evaluation; from 200 on `care-sim benchmark` |
 | 1,000 to 1,999 | calibration: what is set before the evaluation; of streets 1,000 to 1,019 |
 | 2,000 to 9,999 | validation: the learning curve, and which weights are kept |
 | 10,000 and up | training |

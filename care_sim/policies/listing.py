@@ -37,7 +37,7 @@ def _paragraph(name: str) -> str:
     try:
         make = maker(name)
     except InvalidInput as error:
-        return _lines(f"{name} (broken)", f"{error} [{package_of(POLICIES.entries()[name])}]")
+        return _lines(f"{name} (broken)", f"{error} [{package_of(POLICIES.entry(name))}]")
     return _lines(
         f"{name} ({', '.join(tags_of(name))})",
         _summary(name, make),
@@ -53,7 +53,7 @@ def _summary(name: str, make: PolicyMaker) -> str:
     if name in BUILT_IN:
         return (inspect.getdoc(inspect.getmodule(make)) or "").partition("\n\n")[0]
     said = (make.__doc__ or "").strip().partition("\n")[0]
-    return f"{said} [{package_of(POLICIES.entries()[name])}]".strip()
+    return f"{said} [{package_of(POLICIES.entry(name))}]".strip()
 
 
 def _hidden(entry: EntryPoint, winner: str) -> str:

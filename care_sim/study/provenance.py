@@ -51,12 +51,12 @@ def policy_digest(policy: str) -> str | None:
     package, and those that its defaults, constants and code name (`care_sim.base.named_files`).
     Empty for a built-in policy, None where there are no files to read.
     """
-    return "" if policy in POLICIES.built_in else _entry_digest(POLICIES.entries()[policy])
+    return "" if policy in POLICIES.built_in else _entry_digest(POLICIES.entry(policy))
 
 
 def detector_digest(detector: str) -> str | None:
     """The same as `policy_digest`, of a detector."""
-    return "" if detector in DETECTORS.built_in else _entry_digest(DETECTORS.entries()[detector])
+    return "" if detector in DETECTORS.built_in else _entry_digest(DETECTORS.entry(detector))
 
 
 def _entry_digest(entry: EntryPoint) -> str | None:

@@ -1,11 +1,13 @@
 """A policy from outside: twenty lines, found by its entry point, through the same door as ours."""
 
+import sys
+
 import gymnasium
 import numpy as np
 import pytest
 
 import care_sim
-from care_sim.base.errors import InvalidInput
+from care_sim.base.errors import BrokenPolicy, InvalidInput
 from care_sim.cli import main
 from care_sim.commands.shared.selection import makeable
 from care_sim.policies import BUILT_IN, policy_names, tags_of
@@ -285,3 +287,30 @@ def test_nothing_of_a_policy_or_detector_reaches_the_terminal_but_text(install, 
     with pytest.raises(SystemExit):
         main(["run", "dartout", "--policy", "nobody\x1b[31m"])
     assert capsys.readouterr().err.rstrip("\n").isprintable()
+
+
+def test_a_policy_is_found_by_its_place_in_the_current_folder(tmp_path, monkeypatch, env):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    (tmp_path / "placed_policy.py").write_text(MODULE + "\n\nfewer = lambda rig: Horizon(rig, 1)\n")
+    policy = care_sim.make_policy("placed_policy:Horizon", env, rows=3)
+    assert policy.rows == 3
+    assert care_sim.make_policy("placed_policy:fewer", env).rows == 1
+    assert tags_of("placed_policy:Horizon") == ("causal",)
+    assert "placed_policy:Horizon" not in policy_names()
+    # What hides there none of Python's own or of what is installed.
+    (tmp_path / "colorsys.py").write_text("raise SystemExit")
+    with pytest.raises(BrokenPolicy, match="rgb_to_hls"):
+        care_sim.make_policy("colorsys:rgb_to_hls", env)
+
+
+@pytest.mark.parametrize("place", ["absent_module:X", "math:absent", "math:pi"])
+def test_a_place_that_holds_no_policy_is_named(place, env):
+    with pytest.raises(BrokenPolicy, match=f"policy {place} cannot be loaded"):
+        care_sim.make_policy(place, env)
+
+
+@pytest.mark.parametrize("text", [":", "math:", ":pi", "a b:c", "math:1", "1a:b", "a.:b", "a:b:c"])
+def test_what_is_no_place_is_an_unknown_name(text, env):
+    with pytest.raises(InvalidInput, match="unknown policy"):
+        care_sim.make_policy(text, env)

@@ -259,3 +259,21 @@ def test_the_shipped_weights_are_looked_at_again(monkeypatch, tmp_path):
     before = code_digest()
     (tmp_path / "a.npz").write_text("2")
     assert code_digest() != before
+
+
+def test_of_a_policy_by_its_place_code_counts_and_what_lies_beside_it_does_not(
+    tmp_path, monkeypatch
+):
+    """A log that the shell writes there must not end the study that it tells of."""
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr("sys.dont_write_bytecode", True)
+    source = "import placed_help\nfrom care_sim.policies.paper.history import History as Mine\n"
+    (tmp_path / "placed.py").write_text(source)
+    (tmp_path / "placed_help.py").write_text("margin = 1")
+    (tmp_path / "log.txt").write_text("one line")
+    (tmp_path / "other.py").write_text("nobody imports this")
+    files = shipped_files(POLICIES.entry("placed:Mine"))
+    assert {*files} == {"placed.py", "placed_help.py"}
+    before = policy_digest("placed:Mine")
+    (tmp_path / "log.txt").write_text("two lines")
+    assert policy_digest("placed:Mine") == before
