@@ -95,6 +95,37 @@ def ratio_of_sums(
     )
 
 
+def mean_of_ratios(
+    groups: Sequence[Sums],
+    *,
+    confidence: float = INTERVAL_CONFIDENCE,
+    resamples: int = RESAMPLES,
+    seed: int = 0,
+) -> Interval:
+    """Mean of the ratios of sums of several groups of scenes, all of one weight, with a percentile
+    bootstrap interval; scenes are drawn with replacement within each group.
+
+    With differences as numerators it is the mean difference of two policies, paired by scene.
+    Raises InvalidInput for no group, and as `ratio_of_sums` does.
+    """
+    if not groups:
+        raise InvalidInput("a mean of ratios must be of at least one group")
+    sums = [_sums(*group) for group in groups]
+    value = float(np.mean([_ratio(a.sum(), b.sum()) for a, b in sums]))
+    if all(_have_one_ratio(*group) for group in sums):
+        return Interval(value, value, value)
+    rng = np.random.default_rng(seed)
+    drawn = [rng.integers(0, len(each), (resamples, len(each))) for each, _ in sums]
+    ratios = [
+        _ratio(a[rows].sum(axis=-1), b[rows].sum(axis=-1))
+        for (a, b), rows in zip(sums, drawn, strict=True)
+    ]
+    # A resample in which a group has a denominator of 0 has no mean, and is ignored.
+    outside = (1 - confidence) / 2
+    low, high = np.nanquantile(np.mean(ratios, axis=0), [outside, 1 - outside])
+    return Interval(value, float(low), float(high))
+
+
 @lru_cache(maxsize=10_000)
 def _resampled_ratio(
     columns: tuple[tuple[tuple[float, ...], tuple[float, ...]], ...],

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.evaluation.bootstrap import paired_difference, ratio_of_sums
+from care_sim.evaluation.bootstrap import mean_of_ratios, paired_difference, ratio_of_sums
 
 
 def test_two_differences_have_a_distribution_known_by_hand():
@@ -202,3 +202,25 @@ def test_how_often_the_interval_of_a_ratio_holds_the_truth(n, least, most):
         _, low, high = ratio_of_sums((gains[drawn], events[drawn]), resamples=1000, seed=trial)
         held += low <= truth <= high
     assert least <= held / 400 <= most
+
+
+def test_a_mean_of_one_ratio_is_that_ratio():
+    group = ([3.0, 0.0, 2.0, 5.0], [4.0, 1.0, 2.0, 9.0])
+    assert mean_of_ratios([group]) == ratio_of_sums(group)
+
+
+def test_groups_weigh_alike_however_large_they_are():
+    small, large = ([1.0], [2.0]), ([0.0] * 50, [10.0] * 50)
+    assert mean_of_ratios([small, large]) == (0.25, 0.25, 0.25)
+
+
+def test_groups_are_drawn_apart():
+    """Each of two groups is 0, 1/2 or 1 with 1/4, 1/2, 1/4: both are 0 in one of 16 draws."""
+    group = ([1.0, 0.0], [1.0, 1.0])
+    assert mean_of_ratios([group, group], confidence=1 - 2 / 16 - 0.02) == (0.5, 0.25, 0.75)
+    assert mean_of_ratios([group, group], confidence=1 - 2 / 16 + 0.02) == (0.5, 0.0, 1.0)
+
+
+def test_a_mean_of_no_ratio_is_refused():
+    with pytest.raises(InvalidInput, match="at least one group"):
+        mean_of_ratios([])
