@@ -32,6 +32,7 @@ _NARROWEST = 20
 """Columns of a terminal for which help is laid out, at the least."""
 
 _STUDIES = (
+    "benchmark",
     "reproduce",
     "sweep",
     "ablate",

@@ -43,6 +43,16 @@ COMMANDS = {
         "Open a recording of `run --record` or `compare --record` in the Rerun viewer (extra "
         "'viewer').",
     ),
+    "benchmark": CommandEntry(
+        "benchmark",
+        "Benchmark",
+        "Play the official suite and write a result file for every policy: one score, its parts.",
+    ),
+    "leaderboard": CommandEntry(
+        "leaderboard",
+        "Leaderboard",
+        "Make one table of results of `benchmark`, or verify them: a random tenth played again.",
+    ),
     "sweep": CommandEntry(
         "sweep",
         "Sweep",

@@ -162,6 +162,8 @@ LONG = (
     "bench",
     "parity",
     "certify",
+    "benchmark",
+    "leaderboard",
     "train",
     "sweep",
     "ncap",

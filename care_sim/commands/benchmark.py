@@ -1,0 +1,101 @@
+"""`care-sim benchmark`: the official suite, one result file for every policy."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from care_sim.base.bounds import bounded, check_fields
+from care_sim.base.errors import InvalidInput, report_problems
+from care_sim.base.files import JSON, check_output
+from care_sim.commands.shared.run_study import summary
+from care_sim.commands.shared.selection import check_values, playable, policy_parameters
+from care_sim.commands.shared.study_command import DONE, FAILED, console
+from care_sim.core.cell_order import AS_DEMANDED
+from care_sim.reports.leaderboard import leaderboard_table
+from care_sim.study.benchmark.play import played
+from care_sim.study.benchmark.player import player_in
+from care_sim.study.benchmark.screening import screened_worlds
+from care_sim.study.benchmark.tasks import Entry, tasks_of
+from care_sim.study.benchmark.worlds import (
+    Salt,
+    World,
+    published_worlds,
+    quick_tenth,
+)
+from care_sim.study.executors import CORES, MOST_WORKERS, processes
+from care_sim.study.run_config import parameters_for
+
+
+@dataclass(frozen=True, kw_only=True)
+class Benchmark:
+    """Play the official suite: drives, Euro NCAP tests and streets at 1% of the cells. Writes a
+    result file for every policy, from which `care-sim leaderboard` makes the table.
+    """
+
+    policy: tuple[str, ...] = ()
+    """Names of `care-sim policies`, or MODULE:OBJECT for one of a file here, such as mine:Mine of
+    mine.py; `all` stands for all but the controls."""
+    policy_parameters: tuple[str, ...] = ()
+    """Parameters of the policies as NAME=VALUE; of one among several as POLICY.NAME=VALUE."""
+    cell_order: str = AS_DEMANDED
+    """In which order the cells of a set are taken, a part of the entry: the policy's own, or one of
+    rows-down, rows-up, columns, random, spread, core-spread."""
+    quick: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """The first tenth of the worlds alone: a trial, and no line of the leaderboard."""
+    sealed: Path | None = None
+    """For whoever runs a competition: a file with a secret salt, which draws other worlds. The
+    journal in the folder holds their seeds; the result files do not."""
+    out: Path = Path("runs/benchmark")
+    """Folder of the result files; what is finished stays there, and the same command goes on."""
+    workers: int = bounded(CORES, 1, MOST_WORKERS)
+    """Processes that play at the same time."""
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    def __call__(self) -> int:
+        """Run it."""
+        check_values(self, "policy")
+        if self.quick and self.sealed:
+            raise InvalidInput("a sealed set is played whole: give either quick or sealed")
+        salt = Salt.read(self.sealed) if self.sealed else None
+        entries, left_out = self._entries()
+        for entry in entries:
+            check_output(self._file(entry), JSON)
+        with player_in(self.out, self.workers, processes) as player:
+            worlds = screened_worlds(player, salt) if salt else self._published()
+            results = played(entries, worlds, player, self.quick, salt.digest if salt else None)
+        for result in results:
+            result.write(self._file(result.entry))
+        if results:
+            console().print(leaderboard_table(results).rich())
+            print(*(f"Result: {self._file(result.entry)}" for result in results), sep="\n")
+        failed = [f"failed: {line}" for line in summary(player.failures, "plays")]
+        report_problems([*failed, *left_out])
+        return FAILED if failed or left_out else DONE
+
+    def _published(self) -> Sequence[World]:
+        return quick_tenth(published_worlds()) if self.quick else published_worlds()
+
+    def _entries(self) -> tuple[list[Entry], list[str]]:
+        """What takes part, and a line for each policy that cannot be made."""
+        given = policy_parameters(self.policy_parameters, self.policy)
+
+        def entry(name: str) -> Entry:
+            return Entry(name, parameters_for(name, given), self.cell_order)
+
+        policies, left_out = playable(
+            self.policy, lambda name: tasks_of(entry(name), quick_tenth(published_worlds()))
+        )
+        if not policies:
+            raise InvalidInput("none of the policies can be played")
+        return [entry(name) for name in policies], left_out
+
+    def _file(self, entry: Entry) -> Path:
+        kind = ".quick" if self.quick else ".sealed" if self.sealed else ""
+        name = re.sub(r"[^\w.=-]+", "-", entry.name)
+        return self.out / f"{name}{kind}.json"

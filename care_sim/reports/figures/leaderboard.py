@@ -1,0 +1,42 @@
+"""The figure of the leaderboard: every score with its interval, and the parts that make it."""
+
+from collections.abc import Sequence
+
+from matplotlib.figure import Figure
+
+from care_sim.reports.figures.styles import bare_axes
+from care_sim.reports.formatting import marked
+from care_sim.study.benchmark.result import BenchmarkResult
+from care_sim.study.benchmark.worlds import PARTS
+
+LEADERBOARD_FIGURE = "leaderboard"
+_PARTS = {"drives": ("#D55E00", "v"), "tests": ("#E69F00", "s"), "streets": ("#0072B2", "^")}
+"""From the palette of Okabe and Ito (2008), safe for the colour-blind."""
+_LINE_INCHES = 0.28
+
+
+def leaderboard_figure(results: Sequence[BenchmarkResult]) -> Figure:
+    """A line for every result, the highest score on top."""
+    ranked = sorted(results, key=lambda result: result.score().mean)
+    figure = Figure(figsize=(8.0, 1.4 + _LINE_INCHES * len(ranked)), layout="constrained")
+    axes = figure.subplots()
+    lines = range(len(ranked))
+    for part in PARTS:
+        colour, marker = _PARTS[part]
+        shares = [result.part_score(part) for result in ranked]
+        axes.scatter(shares, lines, s=22, color=colour, marker=marker, label=part, zorder=3)
+    scores = [result.score() for result in ranked]
+    means = [score.mean for score in scores]
+    ends = [
+        [max(score.mean - score.low, 0.0) for score in scores],
+        [max(score.high - score.mean, 0.0) for score in scores],
+    ]
+    axes.errorbar(
+        means, lines, xerr=ends, fmt="o", color="black", capsize=3, label="score, 95% interval"
+    )
+    axes.set_yticks(lines, [marked(result.entry.name, result.tags) for result in ranked])
+    axes.set_xlim(-2, 102)
+    axes.set_xlabel("% of what a full scan reaches")
+    bare_axes(axes, "0.93", "both")
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside upper left", ncols=4)
+    return figure

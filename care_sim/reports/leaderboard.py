@@ -1,0 +1,84 @@
+"""The leaderboard: results of the benchmark in a table, and the page that explains it."""
+
+from collections.abc import Sequence
+
+from care_sim.base.errors import counted
+from care_sim.evaluation.bootstrap import Interval
+from care_sim.reports.formatting import MARKS, bounds, marked, tag_notes
+from care_sim.reports.table import Bold, Table, TableRow
+from care_sim.study.benchmark.result import BenchmarkResult
+from care_sim.study.benchmark.tasks import CAMERAS, IDEAL, Entry
+from care_sim.study.benchmark.worlds import BENCHMARK_VERSION, PARTS
+
+CONTROL = Entry("place")
+"""A map of the places where things first appeared on 20 other streets; it has no camera and no
+tracks. Of the controls it was the best on the training seeds of the drives and on the published
+streets, before there was a benchmark."""
+_COLUMNS = ("", "policy", "score", f"minus {CONTROL.name}", *PARTS, "ideal camera")
+_SCORE = (
+    "Score: of what a full scan reaches in the same worlds, the share that the policy reaches with "
+    "1% of the cells, in percent: the mean of collisions avoided in drives, collisions avoided in "
+    "Euro NCAP tests, and first sightings found at once on streets, with a camera that errs as "
+    "YOLOX was measured to. In brackets the 95% interval over worlds."
+)
+_MINUS = (
+    f"Minus {CONTROL.name}: points over the control {CONTROL.name}, a fixed map without a camera, "
+    "paired by world; bold where the interval excludes zero."
+)
+_IDEAL = "Ideal camera: the score with a camera that reports whatever shows enough pixels."
+_UNRANKED = "No number: no policy that a car can have."
+_TRIAL = "Only the tenth of the worlds that --quick plays: a trial, and no leaderboard."
+
+
+def leaderboard_table(results: Sequence[BenchmarkResult]) -> Table:
+    """A line for every result, the highest score first. All must be of the same worlds."""
+    ranked = sorted(results, key=lambda result: -result.score().mean)
+    control = next((each for each in results if each.entry == CONTROL), None)
+    # What no car can have stands where its score puts it, and takes no place.
+    contenders = [each for each in ranked if not is_beyond(each)]
+    numbers = {id(each): f"{number}" for number, each in enumerate(contenders, 1)}
+    rows = tuple(_line(each, numbers.get(id(each), ""), control) for each in ranked)
+    return Table(title(results), _COLUMNS, rows, notes_on(results), whole=("", "score"))
+
+
+def title(results: Sequence[BenchmarkResult]) -> str:
+    """Version, and which worlds."""
+    sealed = results[0].sealed
+    worlds = len(results[0].rows) // len(CAMERAS)
+    of = f"sealed by {sealed[:12]}" if sealed else "published"
+    return f"CARE-Sim benchmark {BENCHMARK_VERSION}: {counted(worlds, 'world')}, {of}"
+
+
+def notes_on(results: Sequence[BenchmarkResult]) -> tuple[str, ...]:
+    """What the columns and marks mean."""
+    beyond = (_UNRANKED,) if any(map(is_beyond, results)) else ()
+    trial = (_TRIAL,) if results[0].quick else ()
+    return (*trial, _SCORE, _MINUS, _IDEAL, *beyond, *tag_notes(each.tags for each in results))
+
+
+def is_beyond(result: BenchmarkResult) -> bool:
+    """Whether no car can have the policy."""
+    return bool({*result.tags} & {*MARKS}) or result.entry.policy == "full"
+
+
+def _line(result: BenchmarkResult, number: str, control: BenchmarkResult | None) -> TableRow:
+    return (
+        number,
+        marked(result.entry.name, result.tags),
+        _with_ends(result.score()),
+        _lead(result, control),
+        *(f"{result.part_score(part):.1f}" for part in PARTS),
+        f"{result.score(IDEAL).mean:.1f}",
+    )
+
+
+def _lead(result: BenchmarkResult, control: BenchmarkResult | None) -> str:
+    if control is None or result.entry == CONTROL:
+        return ""
+    lead = result.lead(control)
+    text = f"{lead.mean:+z.1f} {bounds(lead, 1)}"
+    return Bold(text) if lead.low > 0 or lead.high < 0 else text
+
+
+def _with_ends(interval: Interval) -> str:
+    return f"{interval.mean:.1f} {bounds(interval, 1)}"

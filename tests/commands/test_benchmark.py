@@ -1,0 +1,193 @@
+"""`care-sim benchmark` and `care-sim leaderboard`: from a policy of one's own to a line."""
+
+import json
+import re
+import shlex
+from dataclasses import replace
+
+import pytest
+
+from care_sim.cli import main
+from care_sim.study.benchmark import worlds
+from care_sim.study.benchmark.result import read_result
+from care_sim.study.benchmark.worlds import PARTS, published_worlds
+from tests.helpers.made_results import made_result
+from tests.helpers.places import ROOT
+
+PAGE = (ROOT / "docs" / "benchmark.md").read_text()
+(POLICY,) = re.findall(r"^```python\n(.*?)^```$", PAGE, re.S | re.M)
+TRANSCRIPT = [
+    line
+    for block in re.findall(r"^```\n(.*?)^```$", PAGE, re.S | re.M)
+    if "python corridor.py" in block
+    for line in block.splitlines()
+    if "--quick" in line
+]
+THROWING = """
+import care_sim
+
+class Throwing(care_sim.Policy):
+    def demand(self, belief):
+        raise RuntimeError("no idea")
+"""
+
+
+def run(capsys, *words):
+    with pytest.raises(SystemExit) as end:
+        main([*map(str, words)])
+    return end.value.code, *capsys.readouterr()
+
+
+@pytest.fixture
+def one_of_each(monkeypatch):
+    """A tenth as small as it can be: one drive, one test, one street."""
+    monkeypatch.setattr(worlds, "QUICK_SHARE", 120)
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def library(here):
+    """What the repository's own policies reached."""
+    folder = here / "results" / "leaderboard"
+    for policy, share in (("place", 0.5), ("care", 0.7)):
+        made_result(policy, share).write(folder / f"{policy}.json")
+    return folder
+
+
+def test_a_newcomer_gets_a_line(capsys, here, library, one_of_each):
+    """The page's own policy and commands; its trial is cut to one world a part."""
+    (here / "corridor.py").write_text(POLICY)
+    benchmark, leaderboard = TRANSCRIPT
+    code, out, _ = run(capsys, *shlex.split(benchmark)[1:])
+    assert code == 0
+    assert re.search(r"^1 +corridor:Corridor +\d", out, re.M)
+    assert "Result: runs/benchmark/corridor-Corridor.quick.json" in out
+    code, out, _ = run(capsys, *shlex.split(leaderboard)[1:])
+    assert code == 0
+    assert {*re.findall(r"^\d +(\S+)", out, re.M)} == {"corridor:Corridor", "care", "place"}
+    assert "Only the tenth of the worlds" in out
+    page = (here / "runs" / "leaderboard" / "leaderboard.md").read_text()
+    assert "corridor:Corridor" in page
+    assert (here / "runs" / "leaderboard" / "leaderboard.png").is_file()
+
+    # The same command finds all of it, and the file is the same.
+    file = here / "runs" / "benchmark" / "corridor-Corridor.quick.json"
+    before = file.read_text()
+    code, _, err = run(capsys, *shlex.split(benchmark)[1:])
+    assert (code, file.read_text()) == (0, before)
+    assert "took" not in err
+
+    # A trial is no line of the leaderboard.
+    code, out, err = run(capsys, "leaderboard", library, "runs/benchmark")
+    assert code == 1
+    assert "Corridor" not in out
+    assert "corridor-Corridor.quick.json is of --quick" in err
+
+    # Verified it holds; with every row made up it does not.
+    code, out, _ = run(capsys, "leaderboard", "--verify", file)
+    assert (code, "1 episode of 6, drawn by lot, went again as it says" in out) == (0, True)
+    result = read_result(file)
+    replace(result, rows=tuple(row._replace(hash="0" * 16) for row in result.rows)).write(file)
+    code, _, err = run(capsys, "leaderboard", "--verify", file)
+    assert (code, "1 did not go as it says, the first world" in err) == (1, True)
+
+
+def test_one_that_throws_is_named_and_the_other_has_its_file(capsys, here, monkeypatch):
+    test = next(world for world in published_worlds() if world.part == "tests")
+    monkeypatch.setattr("care_sim.commands.benchmark.quick_tenth", lambda _worlds: [test])
+    monkeypatch.setattr("care_sim.study.benchmark.result.PARTS", ("tests",))
+    monkeypatch.setattr("care_sim.reports.leaderboard.PARTS", ("tests",))
+    (here / "thrower.py").write_text(THROWING)
+    code, out, err = run(
+        capsys, "benchmark", "--policy", "thrower:Throwing", "history", "--quick", "--workers", 1
+    )
+    assert code == 1
+    assert [path.name for path in (here / "runs" / "benchmark").glob("*.json")] == [
+        "history.quick.json"
+    ]
+    (line,) = [line for line in err.splitlines() if "failed" in line]
+    assert "thrower:Throwing" in line
+    assert "RuntimeError: no idea (thrower.py, line 6)" in line
+    assert "Throwing" not in out
+
+
+def test_a_sealed_set_is_played_and_verified_by_its_salt_alone(capsys, here, monkeypatch):
+    monkeypatch.setattr(
+        "care_sim.commands.benchmark.screened_worlds",
+        lambda _player, salt: [
+            worlds.World(part, 0, salt.seed(part, 0), 1) for part in PARTS if part == "tests"
+        ],
+    )
+    for place in (
+        "care_sim.study.benchmark.result.PARTS",
+        "care_sim.reports.leaderboard.PARTS",
+        "care_sim.reports.figures.leaderboard.PARTS",
+    ):
+        monkeypatch.setattr(place, ("tests",))
+    monkeypatch.setattr("care_sim.study.benchmark.result.SIZES", {"tests": 1})
+    (here / "salt.txt").write_text("0123456789abcdef" * 4)
+    (here / "other.txt").write_text("fedcba9876543210" * 4)
+    played = run(
+        capsys, "benchmark", "--policy", "history", "--sealed", "salt.txt", "--out", "sealed"
+    )
+    assert played[0] == 0
+    text = (here / "sealed" / "history.sealed.json").read_text()
+    seed = worlds.Salt.read(here / "salt.txt").seed("tests", 0)
+    assert str(seed) not in text
+    assert json.loads(text)["sealed"] in played[1] or json.loads(text)["sealed"][:12] in played[1]
+    assert run(capsys, "leaderboard", "sealed")[0] == 0
+    assert run(capsys, "leaderboard", "--verify", "sealed", "--sealed", "salt.txt")[0] == 0
+    for words in ([], ["--sealed", "other.txt"]):
+        code, _, err = run(capsys, "leaderboard", "--verify", "sealed", *words)
+        assert (code, "sealed by the salt" in err) == (2, True)
+
+
+def test_a_file_of_another_version_is_left_out_and_the_others_are_shown(capsys, library):
+    text = (library / "care.json").read_text()
+    (library / "care.json").write_text(
+        text.replace('"care_sim_benchmark": 1', '"care_sim_benchmark": 0')
+    )
+    code, out, err = run(capsys, "leaderboard", library)
+    assert code == 1
+    assert re.search(r"^1 +place", out, re.M)
+    assert "is of version 0 of the benchmark" in err
+    assert "care-sim benchmark --policy care" in err
+
+
+def test_of_two_results_of_one_name_the_first_counts(capsys, library, here):
+    made_result("care", 0.1).write(here / "mine.json")
+    code, out, err = run(capsys, "leaderboard", library, "mine.json")
+    assert code == 1
+    assert f"left out: mine.json, since {library / 'care.json'} has its name" in err
+    assert out.count("care ") == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["benchmark"], "--policy needs at least one value"),
+        (["benchmark", "--policy", "nobody"], "unknown policy 'nobody'"),
+        (["benchmark", "--policy", "absent:Mine"], "No module named 'absent'"),
+        (["benchmark", "--policy", "math:pi"], "is no Policy"),
+        (["benchmark", "--policy", "learned-place"], "scenario"),
+        (["benchmark", "--policy", "care", "--cell-order", "best"], "cell_order"),
+        (["benchmark", "--policy", "care", "--sealed", "none.txt"], "none.txt holds no salt"),
+        (["benchmark", "--policy", "care", "--quick", "--sealed", "x"], "either quick or sealed"),
+        (["benchmark", "--policy", "care", "--policy-parameters", "k=1"], "k"),
+        (["leaderboard"], "name a folder"),
+        (["leaderboard", "."], "no result of care-sim benchmark in ."),
+        (["leaderboard", "none"], "none cannot be read"),
+        (["leaderboard", ".", "--sealed", "x"], "give verify too"),
+    ],
+)
+def test_what_cannot_be_done_is_told_in_one_line(capsys, here, words, told):
+    code, out, err = run(capsys, *words)
+    assert code == 2
+    assert told in err
+    assert len([line for line in err.splitlines() if line.startswith("care-sim: ")]) <= 2
+    assert out == ""

@@ -1,0 +1,67 @@
+"""The leaderboard: its order, who takes no place, what is compared."""
+
+import pytest
+
+from care_sim.reports.figures.leaderboard import leaderboard_figure
+from care_sim.reports.leaderboard import leaderboard_table
+from care_sim.reports.table import Bold
+from tests.helpers.made_results import made_result
+
+FULL = made_result("full", share=1)
+GOOD = made_result("good", share=0.8)
+PLACE = made_result("place", share=0.4, tags=("causal", "learned", "control"))
+ORACLE = made_result("oracle", share=0.9, tags=("privileged",))
+LOW = made_result("low", share=0.1)
+
+
+def line_of(table, policy):
+    (line,) = (row for row in table.rows if row[1].split()[0] == policy)
+    return line
+
+
+def test_the_highest_score_comes_first_and_what_no_car_can_have_takes_no_place():
+    table = leaderboard_table([LOW, PLACE, ORACLE, GOOD, FULL])
+    assert [row[:2] for row in table.rows] == [
+        ("", "full"),
+        ("", "oracle †"),
+        ("1", "good"),
+        ("2", "place"),
+        ("3", "low"),
+    ]
+    assert any(note.startswith("†") for note in table.notes)
+    assert any(note.startswith("No number") for note in table.notes)
+
+
+def test_each_is_held_against_the_control_where_that_was_played():
+    table = leaderboard_table([GOOD, PLACE, LOW])
+    assert line_of(table, "good")[3].startswith("+4")
+    assert isinstance(line_of(table, "good")[3], Bold)
+    assert line_of(table, "low")[3].startswith("-3")
+    assert line_of(table, "place")[3] == ""
+    assert line_of(leaderboard_table([GOOD]), "good")[3] == ""
+
+
+def test_equal_ones_are_told_apart_by_nothing():
+    same = made_result("same", share=0.4)
+    lead = line_of(leaderboard_table([PLACE, same]), "same")[3]
+    assert lead == "+0.0 [0.0,0.0]"
+    assert not isinstance(lead, Bold)
+
+
+def test_the_parts_stand_beside_the_score():
+    line = line_of(leaderboard_table([GOOD]), "good")
+    assert line[4:6] == ("80.0", "80.0")
+    assert line[2].startswith(line[7])
+
+
+def test_a_trial_says_that_it_is_one():
+    (first, *_) = leaderboard_table([GOOD.cut_to_tenth()]).notes
+    assert first.startswith("Only the tenth of the worlds that --quick plays")
+
+
+def test_the_figure_shows_every_result_the_best_on_top():
+    figure = leaderboard_figure([GOOD, FULL, LOW])
+    (axes,) = figure.axes
+    assert [text.get_text() for text in axes.get_yticklabels()] == ["low", "good", "full"]
+    bars = axes.containers[0].lines[0]
+    assert bars.get_xdata() == pytest.approx([each.score().mean for each in (LOW, GOOD, FULL)])

@@ -1,0 +1,161 @@
+"""The result file of the benchmark: what its score is, and what is refused."""
+
+import json
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from care_sim.base.errors import InvalidInput
+from care_sim.study.benchmark.result import read_result
+from care_sim.study.benchmark.tasks import Entry
+from care_sim.study.benchmark.worlds import BENCHMARK_VERSION, PARTS, STREETS, published_worlds
+from tests.helpers.made_results import made_result
+
+SEAL = "5" * 64
+
+
+def changed(path, **values):
+    """The file with other values."""
+    content = json.loads(path.read_text())
+    path.write_text(json.dumps(content | values))
+    return path
+
+
+def refusal(path):
+    with pytest.raises(InvalidInput) as refused:
+        read_result(path)
+    assert "\n" not in str(refused.value)
+    return str(refused.value)
+
+
+@pytest.fixture
+def file(tmp_path):
+    path = tmp_path / "mine.json"
+    made_result().write(path)
+    return path
+
+
+def test_all_of_the_reachable_is_one_hundred_and_nothing_is_nothing():
+    assert made_result(share=1).score() == (100, 100, 100)
+    assert made_result(share=0).score() == (0, 0, 0)
+
+
+def test_the_score_is_the_mean_of_three_shares():
+    """Half of the drives, half of the tests, and on streets what the first half of them holds."""
+    result = made_result(share=0.5)
+    streets = [row.reachable for row in result.of_part(STREETS, "measured")]
+    expected = 100 * sum(streets[: len(streets) // 2]) / sum(streets)
+    assert [result.part_score(part) for part in PARTS] == [50, 50, expected]
+    mean, low, high = result.score()
+    assert mean == pytest.approx((100 + expected) / 3)
+    assert 35 < low < mean < high < 65
+
+
+def test_a_street_weighs_by_what_a_full_scan_finds_in_it():
+    result = made_result(share=0)
+    rich = max(result.of_part(STREETS, "measured"), key=lambda row: row.reachable)
+    found = tuple(
+        row._replace(reached=row.reachable) if row is rich else row for row in result.rows
+    )
+    of_all = sum(row.reachable for row in result.of_part(STREETS, "measured"))
+    score = replace(result, rows=found).part_score(STREETS)
+    assert score == pytest.approx(100 * rich.reachable / of_all)
+
+
+def test_a_lead_is_paired_by_world():
+    """One world of every part apart, whatever the others hold: nearly certain."""
+    ours, theirs = made_result(share=0.5), made_result(share=0.49)
+    mean, low, high = ours.lead(theirs)
+    assert 0 <= low < mean < high < 4
+    assert ours.score().high - ours.score().low > 2 * (high - low)
+    assert ours.lead(ours) == (0, 0, 0)
+
+
+@given(share=st.floats(0, 1), parameter=st.one_of(st.integers(-9, 9), st.text("ab", max_size=3)))
+def test_a_file_gives_back_what_was_written(tmp_path_factory, share, parameter):
+    path = tmp_path_factory.mktemp("results") / "mine.json"
+    result = made_result(share=share, tags=("causal", "learned"), made_by={"machine": "here"})
+    result = replace(result, entry=Entry("mine", (("k", parameter),), "core-spread"))
+    result.write(path)
+    assert read_result(path) == result
+
+
+def test_a_row_is_a_line(file):
+    lines = file.read_text().splitlines()
+    assert sum(line.startswith('  ["') for line in lines) == len(made_result().rows)
+
+
+@pytest.mark.parametrize("version", [0, BENCHMARK_VERSION + 1, "one"])
+def test_another_version_is_refused_with_the_command_that_plays_it_again(file, version):
+    told = refusal(changed(file, care_sim_benchmark=version))
+    assert f"version {version!r} of the benchmark, this care-sim scores version 1" in told
+    assert "care-sim benchmark --policy mine" in told
+
+
+def test_a_score_that_was_written_in_changes_nothing(file):
+    changed(file, score={"measured": {"score": 99.9}})
+    assert read_result(file).score() == made_result().score()
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda rows: rows[1:],
+        lambda rows: rows[::-1],
+        lambda rows: [*rows, rows[0]],
+        lambda rows: [[*rows[0][:2], 3, *rows[0][3:]], *rows[1:]],
+        lambda rows: [[*rows[0][:4], 2, rows[0][5]], *rows[1:]],
+        lambda rows: [row for row in rows if row[1] == "measured"],
+    ],
+)
+def test_other_worlds_are_refused(file, spoil):
+    rows = json.loads(file.read_text())["rows"]
+    assert "holds other worlds than version 1" in refusal(changed(file, rows=spoil(rows)))
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"rows": [[1]]},
+        {"rows": 3},
+        {"columns": []},
+        {"policy": 7},
+        {"parameters": [["a"]]},
+        {"rows": [["drives", "measured", -1, 0, 1, "h"]]},
+        {"rows": [["drives", "measured", 201, 0.5, 1, "h"]]},
+        {"rows": [["drives", "measured", 201, 0, 0, "h"]]},
+        {"made_by": None},
+    ],
+)
+def test_a_damaged_file_is_named(file, values):
+    told = refusal(changed(file, **values))
+    assert told.startswith(f"{file} is damaged: ")
+
+
+def test_what_is_no_result_is_named(tmp_path):
+    path = tmp_path / "mine.json"
+    assert "cannot be read" in refusal(path)
+    path.write_text("{")
+    assert "cannot be read" in refusal(path)
+    path.write_text("[1]")
+    assert "holds no result of care-sim benchmark" in refusal(path)
+
+
+def test_a_trial_is_read_as_one_and_a_whole_is_cut_to_it(tmp_path):
+    whole = made_result(share=0.04)
+    trial = whole.cut_to_tenth()
+    assert [trial.part_score(part) for part in PARTS[:2]] == [50, pytest.approx(500 / 12)]
+    trial.write(tmp_path / "mine.json")
+    assert read_result(tmp_path / "mine.json") == trial
+    assert trial.cut_to_tenth() is trial
+
+
+def test_a_sealed_result_holds_no_seed_and_must_be_whole(tmp_path):
+    worlds = [world._replace(number=n) for n, world in enumerate(published_worlds())]
+    sealed = made_result(sealed=SEAL, worlds=worlds)
+    sealed.write(tmp_path / "mine.json")
+    assert read_result(tmp_path / "mine.json").sealed == SEAL
+    made_result(sealed=SEAL, worlds=worlds[1:]).write(tmp_path / "less.json")
+    assert "lacks sealed worlds" in refusal(tmp_path / "less.json")
