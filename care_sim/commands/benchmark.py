@@ -88,9 +88,10 @@ class Benchmark:
         def entry(name: str) -> Entry:
             return Entry(name, parameters_for(name, given), self.cell_order)
 
-        policies, left_out = playable(
-            self.policy, lambda name: tasks_of(entry(name), quick_tenth(published_worlds()))
-        )
+        # One world of every part, the streets first: a control that knows one scenario is refused
+        # there, and in a drive would learn it before.
+        tried = [*{world.part: world for world in published_worlds()}.values()][::-1]
+        policies, left_out = playable(self.policy, lambda name: tasks_of(entry(name), tried))
         if not policies:
             raise InvalidInput("none of the policies can be played")
         return [entry(name) for name in policies], left_out

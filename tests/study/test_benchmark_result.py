@@ -4,7 +4,7 @@ import json
 from dataclasses import replace
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
@@ -73,6 +73,7 @@ def test_a_lead_is_paired_by_world():
     assert ours.lead(ours) == (0, 0, 0)
 
 
+@settings(max_examples=15)
 @given(share=st.floats(0, 1), parameter=st.one_of(st.integers(-9, 9), st.text("ab", max_size=3)))
 def test_a_file_gives_back_what_was_written(tmp_path_factory, share, parameter):
     path = tmp_path_factory.mktemp("results") / "mine.json"

@@ -32,7 +32,7 @@ from care_sim.study.benchmark.worlds import (
     quick_tenth,
 )
 
-DIGESTS = {1: "DIGEST"}
+DIGESTS = {1: "feb863cc393f139e"}
 """What a version of the benchmark stands for. Another digest is another version."""
 
 
@@ -62,13 +62,13 @@ def test_all_published_worlds_are_test_seeds_that_nobody_had_looked_at():
 
 def test_a_trial_plays_a_tenth_of_every_part():
     tenth = quick_tenth(published_worlds())
-    assert [sum(world.part == part for world in tenth) for part in PARTS] == [8, 12, 8]
+    assert [sum(world.part == part for world in tenth) for part in PARTS] == [8, 12, 4]
     assert {*tenth} < {*published_worlds()}
 
 
 def test_every_world_is_played_under_both_cameras_at_one_per_cent():
     tasks = tasks_of(Entry("care"), quick_tenth(published_worlds()))
-    assert len(tasks) == len({task.config for task in tasks}) == 2 * 28
+    assert len(tasks) == len({task.config for task in tasks}) == 2 * 24
     assert {task.config.budget for task in tasks} == {BENCHMARK_BUDGET} == {0.01}
     for part in PARTS:
         own = [task for task in tasks if task.world.part == part]
@@ -82,12 +82,16 @@ def test_films_know_no_late_camera():
 
 
 def test_the_screening_finds_what_is_published(tmp_path):
-    """The first drive and test that count, with all that were passed over before them."""
+    """The first drive and test that count, with all that were passed over before them, and the
+    first street.
+    """
     with player_in(tmp_path, 1) as player:
         for part in (DRIVES, TESTS):
             first = next(world for world in published_worlds() if world.part == part)
             seeds = list(range(FIRST_SEED, first.seed + 1))
             assert reachable(part, seeds, player) == [0] * (len(seeds) - 1) + [1]
+        street = next(world for world in published_worlds() if world.part == STREETS)
+        assert reachable(STREETS, [street.seed], player) == [street.reachable]
 
 
 def test_a_salt_draws_seeds_beyond_all_splits_that_nobody_can_tell_without_it(salt, tmp_path):
@@ -121,7 +125,8 @@ def test_what_is_no_salt_is_refused_in_one_line(tmp_path, content):
 
 @pytest.mark.parametrize("camera", CAMERAS)
 def test_every_control_but_those_of_one_scenario_can_enter(camera):
-    worlds = [next(w for w in published_worlds() if w.part == part) for part in PARTS]
+    # Streets first: what knows one scenario is refused there before it learns it.
+    worlds = [next(w for w in published_worlds() if w.part == part) for part in PARTS[::-1]]
     refused = []
     for policy in controls():
         try:
