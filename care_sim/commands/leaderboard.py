@@ -22,6 +22,7 @@ from care_sim.study.benchmark.replay import replayed
 from care_sim.study.benchmark.result import BenchmarkResult, is_result, read_result
 from care_sim.study.benchmark.worlds import Salt
 from care_sim.study.executors import CORES, MOST_WORKERS
+from care_sim.study.provenance import code_digest
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,10 +99,16 @@ class Leaderboard:
             problems += [
                 f"{path}: of {drawn} {len(replay.differing)} did not go as it says, the first "
                 f"world {row.world} of the {row.part} with the {row.camera} camera"
+                + ("" if _is_of_this_code(result) else "; it was played by other code than is here")
                 for row in replay.differing[:1]
             ]
             problems += [f"{path}: {failure}" for failure in replay.failures[:1]]
         return problems
+
+
+def _is_of_this_code(result: BenchmarkResult) -> bool:
+    told = result.made_by.get("versions")
+    return isinstance(told, dict) and told.get("code") == code_digest()
 
 
 def _read(places: Sequence[Path]) -> tuple[dict[Path, BenchmarkResult], list[str]]:

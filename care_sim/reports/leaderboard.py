@@ -8,13 +8,12 @@ from care_sim.reports.formatting import MARKS, bounds, marked, tag_notes
 from care_sim.reports.table import Bold, Table, TableRow
 from care_sim.study.benchmark.result import BenchmarkResult
 from care_sim.study.benchmark.tasks import CAMERAS, IDEAL, Entry
-from care_sim.study.benchmark.worlds import BENCHMARK_VERSION, PARTS
+from care_sim.study.benchmark.worlds import BENCHMARK_VERSION
 
 CONTROL = Entry("place")
 """A map of the places where things first appeared on 20 other streets; it has no camera and no
 tracks. Of the controls it was the best on the training seeds of the drives and on the published
 streets, before there was a benchmark."""
-_COLUMNS = ("", "policy", "score", f"minus {CONTROL.name}", *PARTS, "ideal camera")
 _SCORE = (
     "Score: of what a full scan reaches in the same worlds, the share that the policy reaches with "
     "1% of the cells, in percent: the mean of collisions avoided in drives, collisions avoided in "
@@ -38,7 +37,9 @@ def leaderboard_table(results: Sequence[BenchmarkResult]) -> Table:
     contenders = [each for each in ranked if not is_beyond(each)]
     numbers = {id(each): f"{number}" for number, each in enumerate(contenders, 1)}
     rows = tuple(_line(each, numbers.get(id(each), ""), control) for each in ranked)
-    return Table(title(results), _COLUMNS, rows, notes_on(results), whole=("", "score"))
+    parts = results[0].parts
+    columns = ("", "policy", "score", f"minus {CONTROL.name}", *parts, "ideal camera")
+    return Table(title(results), columns, rows, notes_on(results), whole=("", "score"))
 
 
 def title(results: Sequence[BenchmarkResult]) -> str:
@@ -67,7 +68,7 @@ def _line(result: BenchmarkResult, number: str, control: BenchmarkResult | None)
         marked(result.entry.name, result.tags),
         _with_ends(result.score()),
         _lead(result, control),
-        *(f"{result.part_score(part):.1f}" for part in PARTS),
+        *(f"{result.part_score(part):.1f}" for part in result.parts),
         f"{result.score(IDEAL).mean:.1f}",
     )
 

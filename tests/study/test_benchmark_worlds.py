@@ -8,12 +8,10 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.base.seed_ranges import LAST, split_of
-from care_sim.policies import controls
 from care_sim.study.benchmark.player import player_in
 from care_sim.study.benchmark.screening import reachable
 from care_sim.study.benchmark.tasks import (
     BENCHMARK_BUDGET,
-    CAMERAS,
     Entry,
     camera_conditions,
     tasks_of,
@@ -121,16 +119,3 @@ def test_what_is_no_salt_is_refused_in_one_line(tmp_path, content):
         path.write_bytes(content)
     with pytest.raises(InvalidInput, match=r"salt.*token_hex"):
         Salt.read(path)
-
-
-@pytest.mark.parametrize("camera", CAMERAS)
-def test_every_control_but_those_of_one_scenario_can_enter(camera):
-    # Streets first: what knows one scenario is refused there before it learns it.
-    worlds = [next(w for w in published_worlds() if w.part == part) for part in PARTS[::-1]]
-    refused = []
-    for policy in controls():
-        try:
-            tasks_of(Entry(policy), worlds, [camera])
-        except InvalidInput:
-            refused.append(policy)
-    assert refused == ["learned-place", "history-learned-place"]

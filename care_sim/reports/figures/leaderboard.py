@@ -7,7 +7,6 @@ from matplotlib.figure import Figure
 from care_sim.reports.figures.styles import bare_axes
 from care_sim.reports.formatting import marked
 from care_sim.study.benchmark.result import BenchmarkResult
-from care_sim.study.benchmark.worlds import PARTS
 
 LEADERBOARD_FIGURE = "leaderboard"
 _PARTS = {"drives": ("#D55E00", "v"), "tests": ("#E69F00", "s"), "streets": ("#0072B2", "^")}
@@ -21,7 +20,7 @@ def leaderboard_figure(results: Sequence[BenchmarkResult]) -> Figure:
     figure = Figure(figsize=(8.0, 1.4 + _LINE_INCHES * len(ranked)), layout="constrained")
     axes = figure.subplots()
     lines = range(len(ranked))
-    for part in PARTS:
+    for part in results[0].parts:
         colour, marker = _PARTS[part]
         shares = [result.part_score(part) for result in ranked]
         axes.scatter(shares, lines, s=22, color=colour, marker=marker, label=part, zorder=3)

@@ -65,6 +65,11 @@ class BenchmarkResult:
     sealed: str | None
     made_by: Mapping[str, Any]
 
+    @property
+    def parts(self) -> list[str]:
+        """The parts of the benchmark that its rows are of: all, where it is whole."""
+        return [*dict.fromkeys(row.part for row in self.rows)]
+
     def of_part(self, part: str, camera: str) -> list[ResultRow]:
         """Its rows, in the order of their worlds."""
         return [row for row in self.rows if (row.part, row.camera) == (part, camera)]
@@ -79,7 +84,7 @@ class BenchmarkResult:
         return mean_of_ratios(
             [
                 ([100 * row.reached for row in rows], [row.reachable for row in rows])
-                for rows in (self.of_part(part, camera) for part in PARTS)
+                for rows in (self.of_part(part, camera) for part in self.parts)
             ]
         )
 
@@ -87,7 +92,7 @@ class BenchmarkResult:
         """Its score less that of another in the same worlds, in points, paired by world."""
         pairs = [
             list(zip(self.of_part(part, camera), other.of_part(part, camera), strict=True))
-            for part in PARTS
+            for part in self.parts
         ]
         return mean_of_ratios(
             [
@@ -125,7 +130,7 @@ class BenchmarkResult:
 
     def _told(self, camera: str) -> dict[str, Any]:
         mean, low, high = (round(value, 2) for value in self.score(camera))
-        parts = {part: round(self.part_score(part, camera), 2) for part in PARTS}
+        parts = {part: round(self.part_score(part, camera), 2) for part in self.parts}
         return {"score": mean, "interval": [low, high], **parts}
 
 
