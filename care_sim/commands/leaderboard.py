@@ -60,13 +60,13 @@ class Leaderboard:
         else:
             kept, trials = _of_whole(found, self.quick)
             problems += trials
+            if not kept:
+                raise InvalidInput("; ".join(problems))
             self._show(kept)
         report_problems(problems)
         return FAILED if problems else DONE
 
     def _show(self, results: Sequence[BenchmarkResult]) -> None:
-        if not results:
-            raise InvalidInput("no result is left for a table")
         # One table for the published worlds, one for every sealed set.
         sets = {
             each.sealed: [one for one in results if one.sealed == each.sealed] for each in results
@@ -125,11 +125,12 @@ def _read(places: Sequence[Path]) -> tuple[dict[Path, BenchmarkResult], list[str
             found[path] = read_result(path)
         except InvalidInput as error:
             problems.append(f"left out: {error}")
-    if not found and not problems:
-        raise InvalidInput(
+    if not found:
+        none = (
             f"no result of care-sim benchmark in {', '.join(map(str, places))}: play one with "
             "care-sim benchmark --policy NAME"
         )
+        raise InvalidInput("; ".join(problems) or none)
     return found, problems
 
 
