@@ -67,8 +67,7 @@ def reordered(
     ranks = _ranks(size if number == RANDOM else 0)
     most = len(given.cells) if most is None else most
     cells, sizes = _by_head(given, grid)
-    heads = np.array([(*head.rows, head.grid.turn) for head in grid.heads])
-    told = grid.columns, heads, margins, ranks, most
+    told = grid.columns, grid.head_rows, margins, ranks, most
     return CellSets(*sort_sets(cells, sizes, number, *told))
 
 

@@ -60,6 +60,11 @@ class AngularGrid(GridRays):
         return (Head(self, (0.0, 0.0, 0.0), 0),)
 
     @cached_property
+    def head_rows(self) -> Integers:
+        """(1, 3) the first row and the last, and how many columns a whole turn would have."""
+        return np.array([(0, self.rows - 1, self.turn)])
+
+    @cached_property
     def spacing(self) -> GridSpacing:
         """The spacing of the grid, in the form that compiled code takes."""
         top = float(self.top)

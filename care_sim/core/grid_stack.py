@@ -76,6 +76,13 @@ class GridStack:
         firsts = np.cumsum([0, *(grid.size for grid in self.grids)]).tolist()
         return tuple(map(Head, self.grids, self.places, firsts))
 
+    @cached_property
+    def head_rows(self) -> Integers:
+        """(heads, 3) the first row and the last of each, and how many of its columns a whole turn
+        would have.
+        """
+        return np.array([(*head.rows, head.grid.turn) for head in self.heads])
+
     @property
     def columns(self) -> int:
         """Columns of each."""

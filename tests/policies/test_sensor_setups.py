@@ -86,10 +86,12 @@ def test_within_the_budget_and_the_same_after_reset(
 
 
 @pytest.mark.parametrize("name", OF_A_GRID)
-@pytest.mark.parametrize(("setup", "columns"), [("os1-64", 1024), ("corners", 64)])
-def test_weights_of_another_grid_are_refused_in_one_line(environments, name, setup, columns):
+@pytest.mark.parametrize(
+    ("setup", "needed"), [("os1-64", "columns 1024"), ("corners", "3 LiDARs: columns 64")]
+)
+def test_weights_of_another_grid_are_refused_in_one_line(environments, name, setup, needed):
     env = environments("CARE-Dense-v0", setup, 0.05)
-    with pytest.raises(InvalidInput, match=rf"grid is columns 512 .*needed is columns {columns}"):
+    with pytest.raises(InvalidInput, match=rf"grid is columns 512 .*needed is {needed}"):
         care_sim.make_policy(name, env)
 
 

@@ -102,7 +102,9 @@ def test_the_full_scan_fires_everything_with_any_hardware(firing):
 def test_weights_of_another_grid_are_refused_in_one_line(setup, name):
     with (
         gymnasium.make("CARE-Dense-v0", sensor=SETUPS[setup], firing="rows", budget=0.1) as env,
-        pytest.raises(InvalidInput, match=r"grid is columns 512 .*needed is columns") as refused,
+        pytest.raises(
+            InvalidInput, match=r"grid is columns 512 .*needed is (3 LiDARs: )?columns"
+        ) as refused,
     ):
         care_sim.make_policy(name, env)
     assert "\n" not in str(refused.value)

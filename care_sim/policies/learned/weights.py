@@ -231,7 +231,8 @@ def _told(name: str, value: Any, rig: Rig) -> str:
     if name == "budget":
         return f"{value} cells ({value / rig.grid.size:.4g})"
     if isinstance(value, GridStack):
-        return "; ".join(_told(name, head.grid, rig) for head in value.heads)
+        told_each = "; ".join(_told(name, head.grid, rig) for head in value.heads)
+        return f"{len(value.heads)} LiDARs: {told_each}"
     if isinstance(value, AngularGrid):
         told = asdict(value)
         rows = ", rows listed" if told.pop("listed") else ""
