@@ -29,8 +29,13 @@ def tilted_bounds(boxes: Floats, axes: Floats) -> Bounds:
     """The bounds of boxes (n, 7) on a grid whose forward, left and up are the rows of `axes` (3, 3)
     in the sensor frame.
     """
-    corners = box_corners(boxes) @ axes.T
-    centres = boxes[:, :3] @ axes.T
+    return corner_bounds(boxes[:, :3] @ axes.T, box_corners(boxes) @ axes.T)
+
+
+def corner_bounds(centres: Floats, corners: Floats) -> Bounds:
+    """The bounds of convex bodies with `corners` (n, 8, 3), joined as those of a box, and points
+    `centres` (n, 3) in their midst, all along the axes of the grid.
+    """
     points = np.concatenate([centres[:, None], corners], axis=1)
     azimuths = np.arctan2(points[..., 1], points[..., 0])
 

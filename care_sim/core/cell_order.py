@@ -17,7 +17,7 @@ from care_sim.core.arrays import Integers
 from care_sim.core.cell_order_kernels import RANDOM, SetMargins, sort_sets
 from care_sim.core.cell_sets import CellSets
 from care_sim.core.grid import Cells
-from care_sim.core.grid_kernels import GridSpacing
+from care_sim.core.grid_stack import Grid
 
 AS_DEMANDED = "as-demanded"
 CELL_ORDERS = (
@@ -45,7 +45,7 @@ CELL_ORDERS = (
 def reordered(
     sets: Sequence[Cells],
     order: str,
-    spacing: GridSpacing,
+    grid: Grid,
     margins: SetMargins,
     most: int | None = None,
 ) -> CellSets:
@@ -54,18 +54,35 @@ def reordered(
 
     A set lies on an arc of columns: from its first to its last, or, if it has cells on both sides
     of the seam at azimuth -pi, from the end of its widest gap. `columns` and the spread orders
-    count from the right end of the arc, so that the seam makes no difference. Raises InvalidInput
-    for another order, and for a cell that the grid does not have.
+    count from the right end of the arc, so that the seam makes no difference. A set of several
+    LiDARs has an arc for each, and a core: `columns` and the spread orders go through all of them
+    at a time. Raises InvalidInput for another order, and for a cell that the grid does not have.
     """
     check_known("order", order, CELL_ORDERS[1:])
     given = CellSets.of(sets)
-    size = spacing.columns * spacing.rows
+    size = grid.size
     if len(given.cells) and not (given.cells.min() >= 0 and given.cells.max() < size):
         raise InvalidInput(f"cells must lie in 0..{size - 1}")
     number = CELL_ORDERS.index(order) - 1
     ranks = _ranks(size if number == RANDOM else 0)
     most = len(given.cells) if most is None else most
-    return CellSets(*sort_sets(given.cells, given.sizes, number, spacing, margins, ranks, most))
+    cells, sizes = _by_head(given, grid)
+    told = grid.columns, grid.head_rows, margins, ranks, most
+    return CellSets(*sort_sets(cells, sizes, number, *told))
+
+
+def _by_head(sets: CellSets, grid: Grid) -> tuple[Integers, Integers]:
+    """The cells of sets, those of a set one LiDAR after the other, and (n, heads) how many there
+    are of each.
+    """
+    heads = len(grid.heads)
+    if heads == 1:
+        return sets.cells, sets.sizes[:, None]
+    begins = [head.first for head in grid.heads]
+    own = np.searchsorted(begins, sets.cells, side="right") - 1
+    part = np.repeat(np.arange(len(sets)), sets.sizes) * heads + own
+    sizes = np.bincount(part, minlength=len(sets) * heads)
+    return sets.cells[np.argsort(part, kind="stable")], sizes.reshape(-1, heads)
 
 
 @cache

@@ -7,7 +7,6 @@ import numpy as np
 
 from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Integers
-from care_sim.core.grid_kernels import GridSpacing
 from care_sim.core.grid_rays import MOST_COLUMNS, MOST_ROWS
 
 ROWS_DOWN, ROWS_UP, COLUMNS, RANDOM, SPREAD, CORE_SPREAD = range(6)
@@ -41,6 +40,18 @@ class SetMargins(NamedTuple):
     rows: int
 
 
+class _HeadRows(NamedTuple):
+    """The rows of one LiDAR, `first` to `last`, amid all `rows` of `columns` cells; of its columns
+    a whole `turn` would have so many.
+    """
+
+    columns: int
+    rows: int
+    first: int
+    last: int
+    turn: int
+
+
 class _Arc(NamedTuple):
     """The rows and columns of a set: `width` columns from `first` on, over the seam; `upper` to
     `lower` row, both included.
@@ -66,18 +77,25 @@ def sort_sets(
     cells: Integers,
     sizes: Integers,
     order: int,
-    grid: GridSpacing,
+    columns: int,
+    heads: Integers,
     margins: SetMargins,
     ranks: Integers,
     most: int,
 ) -> tuple[Integers, Integers]:
-    """The first `most` cells of every set in their order, and their sizes; sets are given and
-    returned as in `care_sim.core.cell_sets.CellSets`.
+    """The first `most` cells of each of n sets in their order, and their sizes, as in
+    `care_sim.core.cell_sets.CellSets`.
+
+    `cells` are given set after set, and of a set one LiDAR after the other, so many as `sizes`
+    (n, heads) tells. `heads` (heads, 3) are the first and the last row of each, and how many of its
+    columns a whole turn would have; `columns` are those of all.
     """
+    rows = heads[-1, 1] + 1
+    whole_sizes = sizes.sum(axis=1)
     longest = 0
-    for size in sizes:
+    for size in whole_sizes:
         longest = max(longest, size)
-    listed_sizes = np.minimum(sizes, most)
+    listed_sizes = np.minimum(whole_sizes, most)
     listed = np.empty(listed_sizes.sum(), np.int64)
     room = _Room(
         np.empty(longest, np.int64),
@@ -86,11 +104,19 @@ def sort_sets(
         np.empty(longest, np.int64),
     )
     start = place = 0
-    for n, size in enumerate(sizes):
+    for n, size in enumerate(whole_sizes):
+        # Every LiDAR sees the set as an arc of its own. Keys of the spread orders are shares of a
+        # turn, so that sorted together all arcs are begun, and their cores, before any is done.
+        early = done = 0
+        for h, (first, last, turn) in enumerate(heads):
+            own = slice(done, done + sizes[n, h])
+            done += sizes[n, h]
+            rays = _HeadRows(columns, rows, first, last, turn)
+            part, keys = cells[start:][own], room.keys[own]
+            early += _write_keys(part, keys, order, rays, margins, ranks)
         part = cells[start : start + size]
         start += size
-        early = _write_keys(part, room.keys, order, grid, margins, ranks)
-        early_bound = grid.columns * grid.rows if order < SPREAD else _TURN
+        early_bound = columns * rows if order < SPREAD else _TURN
         count, below = _keep_lowest(part, early, early_bound, most, room)
         _sort(count, below, room)
         for number in room.sorted_numbers[: listed_sizes[n]]:
@@ -104,12 +130,12 @@ def _write_keys(
     cells: Integers,
     keys: Integers,
     order: int,
-    grid: GridSpacing,
+    rays: _HeadRows,
     margins: SetMargins,
     ranks: Integers,
 ) -> int:
-    """The number by which each cell of a set comes in its order. Returns how many come early: with
-    `core-spread` those of the core, else all.
+    """The number by which each cell of a set comes in its order; all are of one LiDAR. Returns how
+    many come early: with `core-spread` those of the core, else all.
     """
     if order == ROWS_DOWN:
         keys[: len(cells)] = cells
@@ -118,18 +144,18 @@ def _write_keys(
         for n, cell in enumerate(cells):
             keys[n] = ranks[cell]
         return len(cells)
-    arc = _arc(cells, grid)
-    left, right, upper, lower = _core(arc, grid, margins)
+    arc = _arc(cells, rays)
+    left, right, upper, lower = _core(arc, rays, margins)
     early = len(cells)
-    columns, first = _short(grid.columns), _short(arc.first)
+    columns, first = _short(rays.columns), _short(arc.first)
     for n in range(len(cells)):
-        row, column = _row_and_column(cells[n], grid.columns)
+        row, column = _row_and_column(cells[n], rays.columns)
         column = _short(column - first)
         column = _short(column + (columns if column < 0 else 0))
         if order == ROWS_UP:
-            keys[n] = cells[n] + (grid.rows - 1 - 2 * row) * grid.columns
+            keys[n] = cells[n] + (rays.rows - 1 - 2 * row) * rays.columns
         elif order == COLUMNS:
-            keys[n] = column * grid.rows + row
+            keys[n] = column * rays.rows + row
         else:
             # Where the sequence stands after so many steps, modulo a whole turn. The cells whose
             # number is below t lie evenly, as the share t of the plane, in any rectangle.
@@ -159,10 +185,10 @@ def _row_and_column(cell: int, columns: int) -> tuple[int, int]:
 
 
 @compiled()
-def _arc(cells: Integers, grid: GridSpacing) -> _Arc:
+def _arc(cells: Integers, rays: _HeadRows) -> _Arc:
     """Where a set lies."""
-    columns = grid.columns
-    first, last, upper, lower = _short(columns), _short(-1), _short(grid.rows), _short(-1)
+    columns = rays.columns
+    first, last, upper, lower = _short(columns), _short(-1), _short(rays.rows), _short(-1)
     for n in range(len(cells)):
         row, column = _row_and_column(cells[n], columns)
         first, last = min(first, column), max(last, column)
@@ -171,7 +197,7 @@ def _arc(cells: Integers, grid: GridSpacing) -> _Arc:
 
     # A set that touches the seam from both sides begins where its widest gap ends. A grid that does
     # not go all round has no seam.
-    if first == 0 and last == columns - 1 and grid.turn == columns:
+    if first == 0 and last == columns - 1 and rays.turn == columns:
         occupied = np.zeros(columns, np.bool_)
         for cell in cells:
             occupied[_row_and_column(cell, columns)[1]] = True
@@ -184,23 +210,23 @@ def _arc(cells: Integers, grid: GridSpacing) -> _Arc:
 
 
 @compiled()
-def _core(arc: _Arc, grid: GridSpacing, margins: SetMargins) -> tuple[int, int, int, int]:
+def _core(arc: _Arc, rays: _HeadRows, margins: SetMargins) -> tuple[int, int, int, int]:
     """The set without its margins: columns left and right of which it ends, counted on the arc,
     then rows; the first of each pair excluded.
     """
     # All round there is no margin. Else the middle column stays, or the two middle ones.
-    side = 0 if arc.width >= grid.columns else min(margins.columns, (arc.width - 1) // 2)
+    side = 0 if arc.width >= rays.columns else min(margins.columns, (arc.width - 1) // 2)
 
     # What the margin would have beyond the grid was cut, and what is left of it is unknown: the
     # outermost row counts as core, and so does the outermost column where the grid does not go all
     # round. The middle stays here, too.
-    has_ends = grid.turn > grid.columns
+    has_ends = rays.turn > rays.columns
     right = 0 if has_ends and arc.first == 0 else side
-    left = 0 if has_ends and arc.first + arc.width == grid.columns else side
+    left = 0 if has_ends and arc.first + arc.width == rays.columns else side
     height = arc.lower - arc.upper + 1
     inner = min(margins.rows, (height - 1) // 2)
-    upper = arc.upper + (0 if arc.upper == 0 else inner)
-    lower = arc.lower + 1 - (0 if arc.lower == grid.rows - 1 else inner)
+    upper = arc.upper + (0 if arc.upper == rays.first else inner)
+    lower = arc.lower + 1 - (0 if arc.lower == rays.last else inner)
     return arc.width - left, right, upper, lower
 
 

@@ -10,8 +10,9 @@ import numpy as np
 
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.boxes import planar_ranges
 from care_sim.core.cell_sets import CellSets
-from care_sim.core.grid import Cells
+from care_sim.core.grid import Cells, Head
 from care_sim.core.rig import Rig
 from care_sim.core.types import Ego, Tracks
 
@@ -86,11 +87,12 @@ class Forgetting:
         low = streaks > 0
 
         # The margin shrinks with the streak, but never below what the uncertainty of the position
-        # needs (Eq. 4), and never beyond that of a full hull.
+        # needs (Eq. 4), and never beyond that of a full hull. Of several LiDARs the one that needs
+        # the most decides.
         margin = self._rig.azimuth_margin
         decayed = np.ceil(margin - self.rules.decay_per_keyframe * streaks)
-        width = self._rig.grid.column_width
-        needed = uncertainty_columns(self.rules.position_sigma_m, tracks.ranges, width)
+        sigma = self.rules.position_sigma_m
+        needed = np.max([_needed(sigma, tracks.boxes, head) for head in self._rig.grid.heads], 0)
         shrunk = np.clip(np.maximum(decayed, needed), 0, margin)
         return np.where(low, shrunk, margin).astype(np.int64), low
 
@@ -105,6 +107,12 @@ class Forgetting:
         # A track seen once has no velocity yet: its 0 says nothing.
         harmless: Mask = (receding | static) & (tracks.hits > 1)
         return harmless & (ranges > self.rules.guard_distance(ego.speed))
+
+
+def _needed(position_sigma_m: float, boxes: Floats, head: Head) -> Floats:
+    """(n,) columns of one LiDAR that Eq. 4 needs for boxes (n, 7)."""
+    ranges = planar_ranges(head.boxes(boxes))
+    return uncertainty_columns(position_sigma_m, ranges, head.grid.column_width)
 
 
 def uncertainty_columns(position_sigma_m: float, ranges: Floats, column_width: float) -> Floats:

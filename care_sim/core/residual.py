@@ -62,7 +62,9 @@ def wedges(detections: ImageDetections, rig: Rig) -> CellSets:
     if not len(detections):
         return CellSets.of([])
     rays = wedge_rays(detections, rig)
-    return rig.grid.wedges(rays, rig.azimuth_margin, rig.elevation_margin)
+    places = rig.wedge_starts
+    starts = None if places is None else places[detections.cameras]
+    return rig.grid.wedges(rays, rig.azimuth_margin, rig.elevation_margin, starts)
 
 
 def wedge_rays(detections: ImageDetections, rig: Rig) -> Floats:

@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
+import numpy as np
+
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.checks import check_known, check_whole
 from care_sim.base.errors import InvalidInput, shown
@@ -15,8 +17,15 @@ from care_sim.core.cell_order_kernels import SetMargins
 from care_sim.core.cell_sets import CellSets
 from care_sim.core.firing.base import Hardware
 from care_sim.core.firing.listing import CELLS, hardware_of, settled
-from care_sim.core.grid import AZIMUTH_MARGIN, ELEVATION_MARGIN, AngularGrid, Cells
+from care_sim.core.grid import (
+    AT_LIDAR_M,
+    AZIMUTH_MARGIN,
+    ELEVATION_MARGIN,
+    AngularGrid,
+    Cells,
+)
 from care_sim.core.grid_rays import MOST_COLUMNS, MOST_ROWS
+from care_sim.core.grid_stack import Grid, GridStack
 from care_sim.core.pinhole import PinholeCamera, camera_models
 from care_sim.core.pinhole_kernels import CameraModels
 from care_sim.core.return_settings import RAYS, FilmedReturns
@@ -37,16 +46,16 @@ class Rig:
 
     `budget` is B in cells and `reserve_fraction` rho of Algorithm 1; `keyframe_s` is the time
     between two decisions. Hulls and wedges are dilated by `azimuth_margin` columns and
-    `elevation_margin` rows. The LiDAR stands `sensor_height_m` above the road, `sensor_x_m` before
-    and `sensor_y_m` left of the car's middle. The sets that a policy demands are listed in a
-    `cell_order` (`care_sim.core.cell_order.CELL_ORDERS`) before cells are chosen. `firing` names
-    the hardware that fires them (`care_sim.core.firing`), and `returns` how their pulses return,
-    without crosstalk. `setup` tells the set-up by name and hash
+    `elevation_margin` rows. The LiDAR, of several the first, stands `sensor_height_m` above the
+    road, `sensor_x_m` before and `sensor_y_m` left of the car's middle. The sets that a policy
+    demands are listed in a `cell_order` (`care_sim.core.cell_order.CELL_ORDERS`) before cells are
+    chosen. `firing` names the hardware that fires them (`care_sim.core.firing`), and `returns` how
+    their pulses return, without crosstalk. `setup` tells the set-up by name and hash
     (`care_sim.core.sensor_setup`); nothing of recordings, and of rigs that were made without one.
     Raises InvalidInput for a value out of its bounds.
     """
 
-    grid: AngularGrid = field(default_factory=AngularGrid)
+    grid: Grid = field(default_factory=AngularGrid)
     cameras: tuple[PinholeCamera, ...] = ()
     budget: int = bounded(budget_cells(0.1, AngularGrid().size), 0, MOST_COLUMNS * MOST_ROWS)
     reserve_fraction: float = bounded(RESERVE_FRACTION, 0, 1)
@@ -63,8 +72,10 @@ class Rig:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        if not isinstance(self.grid, AngularGrid):
-            raise InvalidInput(f"grid must be an AngularGrid, got {shown(self.grid)}")
+        if not isinstance(self.grid, AngularGrid | GridStack):
+            raise InvalidInput(
+                f"grid must be an AngularGrid or a GridStack, got {shown(self.grid)}"
+            )
         check_known("cell_order", self.cell_order, CELL_ORDERS)
         object.__setattr__(self, "firing", settled(self.firing))
         if not isinstance(self.returns, FilmedReturns):
@@ -109,6 +120,15 @@ class Rig:
         """The cameras as one table."""
         return camera_models(self.cameras)
 
+    @cached_property
+    def wedge_starts(self) -> Floats | None:
+        """(k, 3) where the cameras stand, as `AngularGrid.wedges` asks for it; None where all count
+        as standing at the one LiDAR.
+        """
+        places = self.camera_models.positions
+        apart = np.linalg.norm(places, axis=1) > AT_LIDAR_M
+        return places if len(self.grid.heads) > 1 or apart.any() else None
+
     def hulls(self, boxes: Floats, azimuth_margins: Integers | None = None) -> CellSets:
         """The cells of sensor-frame boxes (n, 7), one ascending array per box. They are dilated by
         the rig's margins, or by `azimuth_margins` (n,) columns and the rig's rows.
@@ -142,4 +162,4 @@ class Rig:
             given = CellSets.of(sets)
             return given if most is None else given.part(0, most)
         margins = SetMargins(self.azimuth_margin, self.elevation_margin)
-        return reordered(sets, order, self.grid.spacing, margins, most)
+        return reordered(sets, order, self.grid, margins, most)

@@ -1,20 +1,23 @@
-"""What is mounted on the car: the grid of its LiDAR, where that stands, and the cameras."""
+"""What is mounted on the car: the grids of its LiDARs, where these stand, and the cameras."""
 
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
+from typing import Any
+
+import numpy as np
 
 from care_sim.base.checks import check_number
 from care_sim.base.digests import combined_digest
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.json_text import parsed_json
-from care_sim.core.grid import AngularGrid
+from care_sim.core.grid import AngularGrid, Place
+from care_sim.core.grid_stack import Grid, GridStack
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.rig import LIDAR_HEIGHT_M, LIDAR_X_M, MOST_SHIFT_M
 
-Position = tuple[float, float, float]
-LIDAR_POSITION: Position = (LIDAR_X_M, 0.0, LIDAR_HEIGHT_M)
+LIDAR_POSITION: Place = (LIDAR_X_M, 0.0, LIDAR_HEIGHT_M)
 """Metres in the frame of the car: LIDAR_TOP of nuScenes, the default."""
 _LONGEST_NAME = 60
 _LOWEST_M, _HIGHEST_M = 0.1, 10.0
@@ -23,10 +26,11 @@ _LOWEST_M, _HIGHEST_M = 0.1, 10.0
 
 @dataclass(frozen=True)
 class SensorSetup:
-    """One LiDAR and its cameras, by name.
+    """A LiDAR and its cameras, by name; several LiDARs are made one by `of_lidars`.
 
     `position` is the LiDAR's x, y and z in the frame of the car: metres before, left of and above
-    the point on the road below the car's middle. The axes of the sensor frame are those of the car:
+    the point on the road below the car's middle. Of several it is that of the first, in whose frame
+    the `grid` tells the places of the others. The axes of the sensor frame are those of the car:
     the grid's `heading`, `pitch` and `roll` turn the rays in it. So boxes and cameras stay upright,
     however the LiDAR is mounted. `cameras` are placed in the sensor frame; without any, those of
     the scenario stay where they are on the car. Raises InvalidInput for a value out of its bounds,
@@ -34,8 +38,8 @@ class SensorSetup:
     """
 
     name: str
-    grid: AngularGrid = field(default_factory=AngularGrid)
-    position: Position = LIDAR_POSITION
+    grid: Grid = field(default_factory=AngularGrid)
+    position: Place = LIDAR_POSITION
     cameras: tuple[PinholeCamera, ...] = ()
 
     def __post_init__(self) -> None:
@@ -46,18 +50,44 @@ class SensorSetup:
                 f"{shown(self.name)}"
             )
         of = f" of the sensor set-up {self.name}"
-        if not isinstance(self.grid, AngularGrid):
-            raise InvalidInput(f"grid{of} must be an AngularGrid, got {shown(self.grid)}")
-        if not (isinstance(self.position, tuple | list) and len(self.position) == 3):
+        if not isinstance(self.grid, AngularGrid | GridStack):
             raise InvalidInput(
-                f"position{of} must be x, y and z in metres, got {shown(self.position)}"
+                f"grid{of} must be an AngularGrid or a GridStack, got {shown(self.grid)}"
             )
-        x, y, z = self.position
-        check_number(f"x of the position{of}", x, -MOST_SHIFT_M, MOST_SHIFT_M)
-        check_number(f"y of the position{of}", y, -MOST_SHIFT_M, MOST_SHIFT_M)
-        check_number(f"z of the position{of}", z, _LOWEST_M, _HIGHEST_M)
+        _check_position(f"the position{of}", self.position)
         object.__setattr__(self, "position", _unsigned(self.position))
+        for number, position in enumerate(self.positions[1:], 2):
+            _check_position(f"the position of LiDAR {number}{of}", position)
         self._check_cameras(of)
+
+    @classmethod
+    def of_lidars(
+        cls,
+        name: str,
+        lidars: Sequence[tuple[AngularGrid, Place]],
+        cameras: Sequence[PinholeCamera] = (),
+    ) -> "SensorSetup":
+        """A set-up of one or several LiDARs, each a grid and its x, y and z in the frame of the
+        car. `cameras` are placed in the sensor frame, which is that of the first. Raises
+        InvalidInput as the set-up and `GridStack` do.
+        """
+        if not (
+            isinstance(lidars, tuple | list)
+            and lidars
+            and all(isinstance(lidar, tuple | list) and len(lidar) == 2 for lidar in lidars)
+        ):
+            raise InvalidInput(
+                f"lidars of the sensor set-up {name} must be pairs of a grid and a position, got "
+                f"{shown(lidars)}"
+            )
+        (grid, first), *others = lidars
+        if not others:
+            return cls(name, grid, first, tuple(cameras))
+        for position in (first, *(position for _, position in others)):
+            _check_position(f"a position of the sensor set-up {name}", position)
+        places = [between(first, position) for _, position in lidars]
+        stack = GridStack(tuple(grid for grid, _ in lidars), tuple(places))
+        return cls(name, stack, first, tuple(cameras))
 
     def to_json(self) -> str:
         """As one line of text, from which `from_json` makes an equal one."""
@@ -69,9 +99,14 @@ class SensorSetup:
         try:
             plain = parsed_json(text)
             cameras = tuple(PinholeCamera(**camera) for camera in plain.pop("cameras"))
-            return cls(grid=AngularGrid(**plain.pop("grid")), cameras=cameras, **plain)
+            return cls(grid=grid_of(plain.pop("grid")), cameras=cameras, **plain)
         except (ValueError, TypeError, AttributeError, KeyError) as error:
             raise InvalidInput(f"no text of a sensor set-up ({error})") from error
+
+    @property
+    def positions(self) -> tuple[Place, ...]:
+        """Where its LiDARs stand in the frame of the car, the first one first; metres."""
+        return tuple(_sum(self.position, head.place) for head in self.grid.heads)
 
     @property
     def label(self) -> str:
@@ -84,7 +119,7 @@ class SensorSetup:
         plain = asdict(self)
         del plain["name"]
         # There was a time before grids could be tilted: a level one keeps the hash that it had.
-        if not self.grid.is_tilted:
+        if isinstance(self.grid, AngularGrid) and not self.grid.is_tilted:
             del plain["grid"]["pitch"], plain["grid"]["roll"]
         return combined_digest([json.dumps(plain)])
 
@@ -110,7 +145,7 @@ class SensorSetup:
             raise InvalidInput(f"cameras{of} must be PinholeCameras, got {shown(cameras)}")
         for number, camera in enumerate(cameras):
             picture = camera.box_rays([[0.0, 0.0, camera.width, camera.height]])
-            (seen,) = self.grid.wedges(picture, 0, 0)
+            (seen,) = self.grid.wedges(picture, 0, 0, np.array([camera.position], float))
             if not len(seen):
                 raise InvalidInput(f"camera {number}{of} sees nothing of the grid")
         # As plain numbers in a tuple: equal set-ups then have equal hashes.
@@ -121,19 +156,40 @@ def _plain(camera: PinholeCamera) -> PinholeCamera:
     return replace(camera, position=_unsigned(camera.position))
 
 
-def _unsigned(position: Sequence[float]) -> Position:
+def grid_of(plain: dict[str, Any]) -> Grid:
+    """The grid of one or several LiDARs from plain data, as `dataclasses.asdict` tells it."""
+    if "grids" not in plain:
+        return AngularGrid(**plain)
+    return GridStack(**plain | {"grids": tuple(AngularGrid(**grid) for grid in plain["grids"])})
+
+
+def _check_position(what: str, position: object) -> None:
+    if not (isinstance(position, tuple | list) and len(position) == 3):
+        raise InvalidInput(f"{what} must be x, y and z in metres, got {shown(position)}")
+    x, y, z = position
+    check_number(f"x of {what}", x, -MOST_SHIFT_M, MOST_SHIFT_M)
+    check_number(f"y of {what}", y, -MOST_SHIFT_M, MOST_SHIFT_M)
+    check_number(f"z of {what}", z, _LOWEST_M, _HIGHEST_M)
+
+
+def _sum(one: Place, other: Place) -> Place:
+    x, y, z = (a + b for a, b in zip(one, other, strict=True))
+    return x, y, z
+
+
+def _unsigned(position: Sequence[float]) -> Place:
     """Plain numbers; zero has no sign, which equality does not tell but a hash would."""
     x, y, z = (float(metres) + 0.0 for metres in position)
     return x, y, z
 
 
-def on_car(lidar: Position, camera: PinholeCamera) -> Position:
+def on_car(lidar: Place, camera: PinholeCamera) -> Place:
     """Where a camera stands in the frame of the car, whose LiDAR is at `lidar`."""
     x, y, z = (float(a + b) for a, b in zip(lidar, camera.position, strict=True))
     return x, y, z
 
 
-def between(lidar: Position, camera: Position) -> Position:
-    """The way from the LiDAR to a camera, both places in the frame of the car."""
-    x, y, z = (b - a for a, b in zip(lidar, camera, strict=True))
+def between(lidar: Place, other: Place) -> Place:
+    """The way from the LiDAR to a camera or another LiDAR, both told in the frame of the car."""
+    x, y, z = (b - a for a, b in zip(lidar, other, strict=True))
     return x, y, z

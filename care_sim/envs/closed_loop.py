@@ -112,8 +112,8 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     | `scoring_info` | True | whether `info` holds what is for scoring alone |
 
     A `sensor` is the name of a set-up (`care_sim.sensors.setups.setup_names`), the path of a TOML
-    file of one, or a `care_sim.SensorSetup`. It says the grid, where the LiDAR stands, and the
-    cameras, if it has its own.
+    file of one, or a `care_sim.SensorSetup`. It says the grid of every LiDAR, where it stands, and
+    the cameras, if it has its own.
 
     A `secret` is a text that enters everything that a seed draws
     (`care_sim.base.random_streams`). An agent that holds this package can then not look its

@@ -13,10 +13,10 @@ from care_sim.base.checks import check_arguments, check_choice
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.arrays import Mask
 from care_sim.core.conditions import IDEAL_CAMERA
-from care_sim.core.grid import AngularGrid
+from care_sim.core.grid import Place
+from care_sim.core.grid_stack import Grid
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.return_settings import changed_settings
-from care_sim.core.sensor_setup import Position
 from care_sim.core.types import Action
 from care_sim.envs.detection import detector_of
 from care_sim.envs.sensing import Observed, SensingEnv, arguments_of, split_conditions
@@ -82,9 +82,9 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
 
     def __init__(
         self,
-        grid: AngularGrid,
+        grid: Grid,
         cameras: tuple[PinholeCamera, ...],
-        position: Position,
+        position: Place,
         keyframe_s: float,
         setup: str = "",
         *,

@@ -19,11 +19,11 @@ from care_sim.base.random_streams import check_secret, streams
 from care_sim.core.belief import OBSERVED
 from care_sim.core.conditions import Conditions
 from care_sim.core.firing.listing import hardware_of
-from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.grid import Cells, Place
+from care_sim.core.grid_stack import Grid
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.random_floor import RandomFloor
 from care_sim.core.rig import Rig
-from care_sim.core.sensor_setup import Position
 from care_sim.core.types import Action
 from care_sim.envs.spaces import checked_scores, observation_space
 from care_sim.loops.truth import EpisodeTruth, Loop, Truth
@@ -50,9 +50,9 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
     def __init__(
         self,
         conditions: Conditions,
-        grid: AngularGrid,
+        grid: Grid,
         cameras: tuple[PinholeCamera, ...],
-        position: Position,
+        position: Place,
         budget: float,
         keyframe_s: float,
         secret: str | bool,

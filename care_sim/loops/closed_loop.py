@@ -39,7 +39,7 @@ from care_sim.sensors.camera import (
     seen_of_classes,
     window_on,
 )
-from care_sim.sensors.engines import ENGINES
+from care_sim.sensors.engines import make_engine
 from care_sim.sensors.lidar import Lidar
 from care_sim.world.approach import ClosestApproach
 from care_sim.world.world import WORLD_STEP_S, World
@@ -87,7 +87,7 @@ class ClosedLoop:
         labels = world.labels()
         self._classes = class_table(labels)
         self._reported = np.array(list(labels), np.int64)
-        self._engine = ENGINES[conditions.engine](world.bullet, rig.grid)
+        self._engine = make_engine(conditions.engine, world.bullet, rig.grid)
         beams = (
             Beams(world.bullet, rig.grid, conditions, conditions.engine, world.linear_motion)
             if conditions.shapes_beams

@@ -8,10 +8,11 @@ recorded clouds. Nothing in it depends on a policy. It holds truth; policies see
 from dataclasses import dataclass, field
 
 from care_sim.core.frames import Frame
-from care_sim.core.grid import AngularGrid
+from care_sim.core.grid import AngularGrid, Place
+from care_sim.core.grid_stack import Grid
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.return_settings import RAYS, FilmedReturns
-from care_sim.core.sensor_setup import LIDAR_POSITION, Position
+from care_sim.core.sensor_setup import LIDAR_POSITION
 from care_sim.core.types import Ego
 from care_sim.sensors.annotated import NO_ANNOTATIONS, Annotations, Cloud, IdentifiedDetections
 
@@ -48,9 +49,9 @@ class Shot:
 @dataclass(frozen=True, eq=False)
 class Film:
     """A scene: its name, the cameras of its car, the LiDAR's height above the road, seconds between
-    keyframes, the grid whose cells its clouds hold, the LiDAR's `place` (x, y) on the car, the
-    default one where a recording does not tell it, and the settings of the `returns` that its
-    clouds hold.
+    keyframes, the grid whose cells its clouds hold, the `place` (x, y) of the LiDAR, of several the
+    first, on the car, the default one where a recording does not tell it, and the settings of the
+    `returns` that its clouds hold.
 
     `hidden` are the objects that its source annotates at the first keyframe though no sensor tells
     of them there: neither a return nor a pixel. No shot annotates them, so nobody has to find them;
@@ -64,12 +65,12 @@ class Film:
     keyframe_s: float
     shots: tuple[Shot, ...]
     hidden: Annotations = NO_ANNOTATIONS
-    grid: AngularGrid = field(default_factory=AngularGrid)
+    grid: Grid = field(default_factory=AngularGrid)
     place: tuple[float, float] = LIDAR_POSITION[:2]
     detected: bool = False
     returns: FilmedReturns = RAYS
 
     @property
-    def position(self) -> Position:
+    def position(self) -> Place:
         """The LiDAR's x, y and z in the frame of the car, metres."""
         return *self.place, self.sensor_height_m

@@ -12,7 +12,8 @@ from care_sim.core.actions import shares_of
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.belief import Belief
 from care_sim.core.frames import Frame, Pose
-from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.grid import Cells
+from care_sim.core.grid_stack import Grid
 from care_sim.core.residual import explained
 from care_sim.core.types import Action, Demand, ImageDetections
 from care_sim.loops.closed_loop import ClosedLoop
@@ -98,12 +99,12 @@ class WatchedKeyframe:
     record: Keyframe
     """For the scoring."""
 
-    def returned(self, grid: AngularGrid) -> tuple[Cells, Floats]:
+    def returned(self, grid: Grid) -> tuple[Cells, Floats]:
         """The cells (n,) that returned, ascending, and the points (n, 3), sensor frame."""
         ranges = self.ranges.ravel()
         # Neither not fired (0) nor without return (the reach).
         cells = np.flatnonzero((ranges > 0) & (ranges < grid.range_m))
-        return cells, grid.directions[cells] * ranges[cells, None]
+        return cells, grid.points(cells, ranges[cells].astype(np.float64))
 
 
 def _way(world: World, sensor_x: float) -> Floats:

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from care_sim.core.arrays import Floats, Integers, Mask
-from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.grid import Cells
+from care_sim.core.grid_stack import Grid
 from care_sim.core.types import ImageDetections, Scan
 
 NO_OBJECT = -1
@@ -95,12 +96,12 @@ def _column(columns: Sequence[Floats | None], order: Integers) -> Floats | None:
     return np.concatenate(known)[order] if len(known) == len(columns) else None
 
 
-def cloud_of(scan: Scan, objects: Integers, grid: AngularGrid) -> Cloud:
+def cloud_of(scan: Scan, objects: Integers, grid: Grid) -> Cloud:
     """The returns of a scan of a grid; `objects` (n,) are those behind its rows."""
     returned = np.isfinite(scan.ranges)
     points = scan.points
     if points is None:
-        points = grid.directions[scan.cells] * np.where(returned, scan.ranges, 0.0)[:, None]
+        points = grid.points(scan.cells, np.where(returned, scan.ranges, 0.0))
     return Cloud(scan.cells, points, objects, scan.intensities, scan.times).take(returned)
 
 

@@ -9,12 +9,13 @@ import numpy as np
 
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.frames import Frame
-from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.grid import Cells
+from care_sim.core.grid_stack import Grid
 from care_sim.core.return_settings import ReturnSettings
 from care_sim.core.types import Scan
 from care_sim.sensors.bundle import bundle
 from care_sim.sensors.echoes import Echoes, echoes_of, reported
-from care_sim.sensors.engines import ENGINES, Engine
+from care_sim.sensors.engines import Engine, make_engine
 from care_sim.sensors.signal import Signal
 from care_sim.sensors.surfaces import brightness
 from care_sim.sensors.sweep import RollingSweep
@@ -30,7 +31,7 @@ class Beams:
     def __init__(
         self,
         world: BulletWorld,
-        grid: AngularGrid,
+        grid: Grid,
         settings: ReturnSettings,
         engine: str,
         motion: Callable[[], LinearMotion],
@@ -40,7 +41,7 @@ class Beams:
         divergence = settings.lidar_divergence_mrad
         # The rays of each beam: a grid and an engine for the first, the second, ...
         grids = bundle(grid, divergence) if divergence else [grid]
-        self._rays = [(one, ENGINES[engine](world, one)) for one in grids]
+        self._rays = [(one, make_engine(engine, world, one)) for one in grids]
         self._kept = settings.lidar_returns
         self._signal = Signal(settings)
         rolling = settings.lidar_sweep_s > 0
@@ -73,7 +74,7 @@ class Beams:
         if not self._compensates or scan.times is None:
             return scan
         ranges = np.where(np.isfinite(scan.ranges), scan.ranges, 0.0)
-        points = self._grid.directions[scan.cells] * ranges[:, None]
+        points = self._grid.points(scan.cells, ranges)
         return replace(scan, points=self._motion().compensated(points, sensor, scan.times))
 
     def _cast_at_once(self, sensor: Frame, cells: Cells, shots: Integers | None) -> Echoes:
@@ -92,12 +93,13 @@ class Beams:
         return reported(echoes, self._kept) if len(met) > 1 else echoes
 
     def _meet(
-        self, sensor: Frame, cells: Cells, grid: AngularGrid, engine: Engine
+        self, sensor: Frame, cells: Cells, grid: Grid, engine: Engine
     ) -> tuple[Floats, Floats, Integers]:
         """Ranges (n,), intensities (n,) and bodies (n,) of one ray of every cell."""
         ranges, bodies = engine.cast(sensor, cells)
         rays = sensor.vectors_to_world(grid.directions[cells])
-        bright = brightness(self._world.primitives, sensor.origin, rays, ranges, bodies)
+        origins = sensor.origin + sensor.vectors_to_world(grid.origins_of(cells))
+        bright = brightness(self._world.primitives, origins, rays, ranges, bodies)
         return ranges, self._signal.intensities(bright, ranges), bodies
 
     def _scan(self, cells: Cells, echoes: Echoes) -> tuple[Scan, Integers]:

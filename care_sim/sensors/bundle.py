@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from care_sim.core.grid import AngularGrid
+from care_sim.core.grid_stack import Grid
 
 _RING = np.sqrt(7 / 12)
 """How far from the middle the six lie, in half beams. So the seven rays, of equal weight, have the
@@ -14,12 +15,20 @@ _CUT_APART = 1e-9
 """Radians between rows that are cut: rows of a grid descend."""
 
 
-def bundle(grid: AngularGrid, divergence_mrad: float) -> list[AngularGrid]:
+def bundle(grid: Grid, divergence_mrad: float) -> list[Grid]:
     """Grids whose cells hold one ray of each cell's beam; the grid itself, then those of the ring.
 
     `divergence_mrad` is the angle between opposite edges of the beam in milliradians. At rows that
     look up or down by e, beams are narrower across by cos(e).
     """
+    if not isinstance(grid, AngularGrid):
+        each = [_bundle(one, divergence_mrad) for one in grid.grids]
+        return [replace(grid, grids=rays) for rays in zip(*each, strict=True)]
+    return [*_bundle(grid, divergence_mrad)]
+
+
+def _bundle(grid: AngularGrid, divergence_mrad: float) -> list[AngularGrid]:
+    """The same of one LiDAR."""
     radius = _RING * divergence_mrad / 2000
     angles = np.arange(6) * np.pi / 3
     around = zip(

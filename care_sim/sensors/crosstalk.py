@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from care_sim.core.arrays import Floats, Integers, Mask
-from care_sim.core.grid import AngularGrid
+from care_sim.core.grid_stack import Grid
 from care_sim.core.return_settings import ReturnSettings
 from care_sim.core.types import Scan
 from care_sim.sensors.annotated import NO_OBJECT, Cloud, joined
@@ -29,7 +29,7 @@ class Crosstalk:
     numbers).
     """
 
-    def __init__(self, grid: AngularGrid, settings: ReturnSettings, seed: np.random.SeedSequence):
+    def __init__(self, grid: Grid, settings: ReturnSettings, seed: np.random.SeedSequence):
         self._grid = grid
         self._rate = settings.lidar_crosstalk
         self._sweep = RollingSweep(grid, settings.lidar_sweep_s)
@@ -54,7 +54,7 @@ class Crosstalk:
         cells = np.flatnonzero(ghosts & answering)
         feigned = Cloud(
             cells,
-            self._grid.directions[cells] * ranges[cells, None],
+            self._grid.points(cells, ranges[cells]),
             np.full(len(cells), NO_OBJECT),
             None if cloud.intensities is None else np.full(len(cells), FULL_INTENSITY),
             None if cloud.times is None else self._sweep.seconds(cells),
@@ -64,12 +64,12 @@ class Crosstalk:
     def _draw(self) -> tuple[Mask, Floats]:
         """(N,) which cells have a ghost at this keyframe, and (N,) how far off it seems."""
         ghosts = self._random.random(self._grid.size) < self._rate
-        span = self._grid.range_m - 2 * NEAREST_M
+        span = self._grid.reach_of(np.arange(self._grid.size)) - 2 * NEAREST_M
         return ghosts, NEAREST_M + span * self._random.random(self._grid.size)
 
 
 def crosstalk_of(
-    grid: AngularGrid, settings: ReturnSettings, seed: np.random.SeedSequence
+    grid: Grid, settings: ReturnSettings, seed: np.random.SeedSequence
 ) -> Crosstalk | None:
     """The crosstalk of a LiDAR with this `seed`, if there is any. It has a stream of its own: noise
     and dropout are drawn as without it.

@@ -8,7 +8,8 @@ from care_sim.core.arrays import Integers, Mask
 from care_sim.core.conditions import Sensing
 from care_sim.core.firing.shots import shots_by_cell
 from care_sim.core.frames import Frame
-from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.grid import Cells
+from care_sim.core.grid_stack import Grid
 from care_sim.core.types import Scan
 from care_sim.sensors.beams import Beams
 from care_sim.sensors.crosstalk import crosstalk_of
@@ -24,7 +25,7 @@ class Lidar:
 
     def __init__(
         self,
-        grid: AngularGrid,
+        grid: Grid,
         engine: RayEngine,
         sensing: Sensing,
         seed: np.random.SeedSequence,

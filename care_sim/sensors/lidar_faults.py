@@ -7,7 +7,8 @@ import numpy as np
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.conditions import LidarFaults
-from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.grid import Cells
+from care_sim.core.grid_stack import Grid
 
 NEAREST_M = 0.01
 """A noisy return stays this far from 0 m (not fired) and from the reach (no return)."""
@@ -20,7 +21,7 @@ class CellFaults:
     (common random numbers). Raises InvalidInput for a dead row that the grid does not have.
     """
 
-    def __init__(self, grid: AngularGrid, faults: LidarFaults, seed: np.random.SeedSequence):
+    def __init__(self, grid: Grid, faults: LidarFaults, seed: np.random.SeedSequence):
         check_dead_rows(grid, faults.lidar_dead_rows)
         self.dead: Mask = np.isin(np.arange(grid.size) // grid.columns, faults.lidar_dead_rows)
         self.is_noisy = faults.lidar_range_sigma > 0
@@ -42,7 +43,7 @@ class CellFaults:
         # No return stays no return: noise is that of a measured range.
         (hit,) = np.isfinite(ranges).nonzero()
         measured = ranges.copy()
-        measured[hit] = noisy(ranges[hit], errors[hit], self._grid.range_m)
+        measured[hit] = noisy(ranges[hit], errors[hit], self._grid.reach_of(cells[hit]))
         return measured
 
     def draw_lost(self, cells: Cells) -> Mask:
@@ -54,8 +55,8 @@ class CellFaults:
         return lost
 
 
-def noisy(ranges: Floats, errors: Floats, reach: float) -> Floats:
-    """(n,) `ranges` with `errors`, metres.
+def noisy(ranges: Floats, errors: Floats, reach: float | Floats) -> Floats:
+    """(n,) `ranges` with `errors`, metres; the `reach` is that of all, or (n,) of each.
 
     What would come within NEAREST_M of 0 or of the reach, or beyond, is folded back. If it were cut
     instead, ranges would heap up at one number, which would tell a policy that they were cut.
@@ -69,7 +70,7 @@ def noisy(ranges: Floats, errors: Floats, reach: float) -> Floats:
     return np.where(np.abs(erring - reach / 2) <= span / 2, erring, folded)
 
 
-def check_dead_rows(grid: AngularGrid, rows: Sequence[int]) -> None:
+def check_dead_rows(grid: Grid, rows: Sequence[int]) -> None:
     """Raise InvalidInput for a row that the grid does not have."""
     for row in rows:
         if row >= grid.rows:

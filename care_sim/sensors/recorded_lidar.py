@@ -7,7 +7,8 @@ import numpy as np
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.conditions import Sensing
 from care_sim.core.firing.shots import shots_by_cell
-from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.grid import Cells
+from care_sim.core.grid_stack import Grid
 from care_sim.sensors.annotated import Cloud
 from care_sim.sensors.crosstalk import crosstalk_of
 from care_sim.sensors.lidar_faults import CellFaults
@@ -16,7 +17,7 @@ from care_sim.sensors.lidar_faults import CellFaults
 class RecordedLidar:
     """Hands out the returns of fired cells; `CellFaults` and `Crosstalk` are applied to them."""
 
-    def __init__(self, grid: AngularGrid, sensing: Sensing, seed: np.random.SeedSequence):
+    def __init__(self, grid: Grid, sensing: Sensing, seed: np.random.SeedSequence):
         self.grid = grid
         self._faults = CellFaults(grid, sensing, seed)
         self._crosstalk = crosstalk_of(grid, sensing, seed)
@@ -45,11 +46,12 @@ class RecordedLidar:
         nearest = np.full(self.grid.size, np.inf)
         # Cells come ascending, so the returns of each are one stretch.
         cells, starts = np.unique(cloud.cells, return_index=True)
-        nearest[cells] = np.minimum.reduceat(np.linalg.norm(cloud.points, axis=1), starts)
+        ranges = self.grid.ranges_to(cloud.cells, cloud.points)
+        nearest[cells] = np.minimum.reduceat(ranges, starts)
         return nearest
 
     def _noisy(self, cloud: Cloud, shots: Integers | None) -> Cloud:
         # Noise is along the ray: a point moves with its range, and stays in its cell.
-        ranges = np.linalg.norm(cloud.points, axis=1)
+        ranges = self.grid.ranges_to(cloud.cells, cloud.points)
         moved = self._faults.draw_noisy(ranges, cloud.cells, shots) / ranges
-        return replace(cloud, points=cloud.points * moved[:, None])
+        return replace(cloud, points=self.grid.stretched(cloud.cells, cloud.points, moved))

@@ -17,9 +17,9 @@ import numpy as np
 from care_sim.base.checks import check_arguments, check_number, check_path
 from care_sim.base.digests import content_digest
 from care_sim.base.errors import InvalidInput, shown
-from care_sim.core.grid import AngularGrid
+from care_sim.core.grid import AngularGrid, Place
 from care_sim.core.pinhole import PinholeCamera
-from care_sim.core.sensor_setup import LIDAR_POSITION, Position, SensorSetup, between
+from care_sim.core.sensor_setup import LIDAR_POSITION, SensorSetup, between
 
 DEFAULT_SETUP = "hdl-32e"
 """What the paper's data were taken with, and what is mounted where nothing else is said."""
@@ -27,7 +27,7 @@ Sensor = str | PathLike[str] | SensorSetup
 """A set-up, its name, or a TOML file of one."""
 
 _SHIPPED = Path(__file__).parent / "shipped"
-_TABLES = ("name", "lidar", "cameras")
+_TABLES = ("name", "lidar", "lidars", "cameras")
 _EQUAL_ROWS = ("rows", "top_deg", "bottom_deg")
 _LIDAR = (
     "columns",
@@ -117,14 +117,15 @@ def sensor_columns(sensor: Sensor) -> dict[str, str]:
 
 
 def _line(setup: SensorSetup) -> str:
-    grid = setup.grid
+    lidars = "; ".join(_rays_line(head.grid) for head in setup.grid.heads)
+    cameras = f"{len(setup.cameras)} of its own" if setup.cameras else "the scenario's"
+    return f"{setup.name:14} {lidars}; cameras: {cameras}"
+
+
+def _rays_line(grid: AngularGrid) -> str:
     rows = f"{np.rad2deg(grid.top):+.4g} to {np.rad2deg(grid.bottom):+.4g} degrees"
     around = f"{np.rad2deg(grid.field_of_view):.4g} degrees"
-    cameras = f"{len(setup.cameras)} of its own" if setup.cameras else "the scenario's"
-    return (
-        f"{setup.name:14} {grid.columns} columns in {around}, {grid.rows} rows from {rows}, "
-        f"{grid.range_m:g} m; cameras: {cameras}"
-    )
+    return f"{grid.columns} columns in {around}, {grid.rows} rows from {rows}, {grid.range_m:g} m"
 
 
 def _read(path: Path) -> SensorSetup:
@@ -146,17 +147,33 @@ def _read_once(path: Path, _digest: str) -> SensorSetup:
 
 def _setup_of(plain: Mapping[str, Any]) -> SensorSetup:
     check_arguments("a set-up", plain, _TABLES)
-    lidar = _table("lidar", plain.get("lidar", {}), _LIDAR)
-    cameras = plain.get("cameras", [])
-    if not isinstance(cameras, list):
-        raise InvalidInput("cameras must be tables, each [[cameras]]")
-    position = _position("lidar", lidar)
-    return SensorSetup(
-        plain.get("name", ""),
-        _grid(lidar),
-        position,
-        tuple(_camera(_table("cameras", camera, _CAMERA), position) for camera in cameras),
-    )
+    lidars = _lidars(plain)
+    (_, position), *_ = lidars
+    cameras = [
+        _camera(_table("cameras", camera, _CAMERA), position)
+        for camera in _tables(plain, "cameras")
+    ]
+    return SensorSetup.of_lidars(plain.get("name", ""), lidars, cameras)
+
+
+def _lidars(plain: Mapping[str, Any]) -> list[tuple[AngularGrid, Place]]:
+    """The grid of each LiDAR, and its place in the frame of the car."""
+    if "lidars" not in plain:
+        lidar = _table("lidar", plain.get("lidar", {}), _LIDAR)
+        return [(_grid(lidar), _position("lidar", lidar))]
+    if "lidar" in plain:
+        raise InvalidInput("a set-up has either [lidar] or [[lidars]], got both")
+    lidars = [_table("lidars", lidar, _LIDAR) for lidar in _tables(plain, "lidars")]
+    if not lidars:
+        raise InvalidInput("lidars must be one table or more, each [[lidars]], got none")
+    return [(_grid(lidar), _position("lidars", lidar)) for lidar in lidars]
+
+
+def _tables(plain: Mapping[str, Any], name: str) -> list[Any]:
+    tables = plain.get(name, [])
+    if not isinstance(tables, list):
+        raise InvalidInput(f"{name} must be tables, each [[{name}]]")
+    return tables
 
 
 def _grid(lidar: Mapping[str, Any]) -> AngularGrid:
@@ -184,7 +201,7 @@ def _grid(lidar: Mapping[str, Any]) -> AngularGrid:
     return AngularGrid(rows=lidar["rows"], top=top, bottom=bottom, **given)
 
 
-def _camera(camera: Mapping[str, Any], lidar: Position) -> PinholeCamera:
+def _camera(camera: Mapping[str, Any], lidar: Place) -> PinholeCamera:
     usual = PinholeCamera()
     angles = {name: _radians(camera, f"{name}_deg", 0.0) for name in ("yaw", "pitch", "roll")}
     return PinholeCamera(
@@ -203,7 +220,7 @@ def _table(name: str, table: object, known: tuple[str, ...]) -> Mapping[str, Any
     return table
 
 
-def _position(name: str, table: Mapping[str, Any]) -> Position:
+def _position(name: str, table: Mapping[str, Any]) -> Place:
     if "position_m" not in table and name == "lidar":
         return LIDAR_POSITION
     position = table.get("position_m")

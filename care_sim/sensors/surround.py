@@ -11,7 +11,8 @@ import numpy as np
 
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.frames import Frame
-from care_sim.core.grid import AngularGrid
+from care_sim.core.grid import AngularGrid, Cells, Head
+from care_sim.core.grid_stack import Grid
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.sensors.annotated import NO_OBJECT, Cloud, IdentifiedDetections
 from care_sim.sensors.camera import (
@@ -61,7 +62,7 @@ def surround_detections(
 
 
 def full_sweep(
-    world: BulletWorld, grid: AngularGrid, sensor: Frame, boxes: Floats, height_m: float
+    world: BulletWorld, grid: Grid, sensor: Frame, boxes: Floats, height_m: float
 ) -> Cloud:
     """The returns of every cell, fired from the frame `sensor`.
 
@@ -70,21 +71,31 @@ def full_sweep(
     meet the road, a plane `height_m` below the sensor and parallel to its x, y plane. In a world
     without ground the road hides nothing.
     """
+    parts = [_own_sweep(world, head, sensor, boxes, height_m) for head in grid.heads]
+    cells, ranges, bodies = map(np.concatenate, zip(*parts, strict=True))
+    return Cloud(cells, grid.points(cells, ranges), bodies)
+
+
+def _own_sweep(
+    world: BulletWorld, head: Head, sensor: Frame, boxes: Floats, height_m: float
+) -> tuple[Cells, Floats, Integers]:
+    """Cells, ranges and bodies of what one LiDAR gives to the sweep."""
+    grid, own = head.grid, head.frame(sensor)
     # Hulls hold every cell that can hit a body, and their margin is room for rounding.
     covered = np.zeros(grid.size, dtype=bool)
-    for hull in grid.hulls(boxes):
+    for hull in grid.hulls(head.boxes(boxes)):
         covered[hull] = True
 
     # Every other cell meets the road, at a distance that a formula gives. So does a ray that was
     # cast at a body and missed it.
-    ranges = road_ranges(grid, height_m)
+    ranges = road_ranges(grid, height_m + head.place[2])
     bodies = np.full(grid.size, NO_BODY)
-    directions = sensor.vectors_to_world(grid.directions[covered])
-    cast, hit = world.cast(sensor.origin, directions, grid.range_m)
+    directions = own.vectors_to_world(grid.directions[covered])
+    cast, hit = world.cast(own.origin, directions, grid.range_m)
     ranges[covered] = np.where(hit == NO_BODY, ranges[covered], cast)
     bodies[covered] = hit
     (cells,) = np.nonzero(np.isfinite(ranges))
-    return Cloud(cells, grid.directions[cells] * ranges[cells, None], bodies[cells])
+    return cells + head.first, ranges[cells], bodies[cells]
 
 
 def road_ranges(grid: AngularGrid, height_m: float) -> Floats:

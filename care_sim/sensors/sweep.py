@@ -8,7 +8,8 @@ nothing is known of what comes after.
 import numpy as np
 
 from care_sim.core.arrays import Floats, Integers
-from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.grid import Cells
+from care_sim.core.grid_stack import Grid
 
 MOST_INSTANTS = 64
 """Columns share an instant with their neighbours, 64 in a sweep. In 0.1 s and 512 columns that is
@@ -19,7 +20,7 @@ MOST_INSTANTS = 64
 class RollingSweep:
     """The instants at which the columns of a grid fire in a sweep of `sweep_s` seconds."""
 
-    def __init__(self, grid: AngularGrid, sweep_s: float):
+    def __init__(self, grid: Grid, sweep_s: float):
         self._columns = grid.columns
         # The last columns come first: azimuths grow to the left, and the sensor turns to the right.
         columns = np.arange(grid.columns)

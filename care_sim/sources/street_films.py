@@ -103,7 +103,8 @@ class _StreetBodies:
         self._world = world
         self._setup = setup
         # What is farther than the LiDAR reaches is met by no ray.
-        self._sight_m = max(SIGHT_M, setup.grid.range_m)
+        reaches = [head.grid.range_m + np.hypot(*head.place[:2]) for head in setup.grid.heads]
+        self._sight_m = max(SIGHT_M, *reaches)
         self._sizes = np.array([CATALOGUE[kind].size for kind in street.kinds]).reshape(-1, 3)
         labels = [CATALOGUE[kind].label for kind in street.kinds]
         self._classes = np.array(

@@ -29,7 +29,7 @@ def rectangle(first, width, upper, height):
 
 
 def listed(cells, order, margins=MARGINS):
-    (found,) = reordered([cells], order, GRID.spacing, margins)
+    (found,) = reordered([cells], order, GRID, margins)
     return found
 
 
@@ -57,8 +57,8 @@ def test_every_order_lists_the_cells_of_the_set(cells, order):
 )
 def test_the_first_few_cells_are_those_of_the_whole_order(where, most, order):
     sets = [rectangle(*each) for each in where]
-    whole = reordered(sets, order, GRID.spacing, MARGINS)
-    first = reordered(sets, order, GRID.spacing, MARGINS, most)
+    whole = reordered(sets, order, GRID, MARGINS)
+    first = reordered(sets, order, GRID, MARGINS, most)
     assert [cells.tolist() for cells in first] == [cells[:most].tolist() for cells in whole]
 
 
@@ -157,7 +157,7 @@ def test_random_is_one_permutation_of_the_grid():
 def test_sets_are_ordered_one_by_one():
     sets = [rectangle(5, 9, 2, 4), np.empty(0, np.int64), rectangle(500, 30, 20, 12)]
     for order in ORDERS:
-        together = reordered(sets, order, GRID.spacing, MARGINS)
+        together = reordered(sets, order, GRID, MARGINS)
         assert [a.tolist() for a in together] == [
             listed(cells, order).tolist() if len(cells) else [] for cells in sets
         ]
@@ -166,7 +166,7 @@ def test_sets_are_ordered_one_by_one():
 @pytest.mark.parametrize("cell", [-1, GRID.size])
 def test_a_cell_beyond_the_grid_is_refused(cell):
     with pytest.raises(InvalidInput, match="cells must lie in"):
-        reordered([np.array([0, cell])], "spread", GRID.spacing, MARGINS)
+        reordered([np.array([0, cell])], "spread", GRID, MARGINS)
 
 
 def test_the_rig_lists_all_sets_of_a_demand():
@@ -250,7 +250,7 @@ def free_runs(runs):
 @given(grids_and_sets(), st.sampled_from([name for name in ORDERS if name != "random"]))
 def test_agrees_with_the_orders_by_the_letter(made, order):
     grid, sets, margins = made
-    for ours, cells in zip(reordered(sets, order, grid.spacing, margins), sets, strict=True):
+    for ours, cells in zip(reordered(sets, order, grid, margins), sets, strict=True):
         expected = by_the_letter(cells.tolist(), order, grid, margins) if len(cells) else []
         assert ours.tolist() == expected
 
@@ -258,7 +258,7 @@ def test_agrees_with_the_orders_by_the_letter(made, order):
 @pytest.mark.parametrize("order", [AS_DEMANDED, "backwards", None])
 def test_only_an_order_can_be_asked_for(order):
     with pytest.raises(InvalidInput, match=r"unknown order .*; known: columns, core-spread"):
-        reordered([np.arange(9)], order, GRID.spacing, MARGINS)
+        reordered([np.arange(9)], order, GRID, MARGINS)
 
 
 @pytest.mark.parametrize("demand", [None, Demand(None), Demand((), None), Demand((), [None])])

@@ -119,13 +119,13 @@ def test_a_hull_holds_every_cell_that_meets_its_box_once(grid, placed, seed):
 def test_cut_margins_at_the_edge_of_the_grid_are_core():
     """Columns 0 to 5 of all rows: only the left margin of two columns is known to be one."""
     cells = (np.arange(5)[:, None] * 120 + np.arange(6)).ravel()
-    (found,) = reordered([cells], "core-spread", FORWARD.spacing, SetMargins(2, 0))
+    (found,) = reordered([cells], "core-spread", FORWARD, SetMargins(2, 0))
     assert set((found[: 4 * 5] % 120).tolist()) == {0, 1, 2, 3}
 
 
 def test_a_set_at_both_ends_has_no_seam_to_run_over():
     cells = np.array([0, 1, 118, 119])
-    (found,) = reordered([cells], "columns", FORWARD.spacing, SetMargins(0, 0))
+    (found,) = reordered([cells], "columns", FORWARD, SetMargins(0, 0))
     assert found.tolist() == [0, 1, 118, 119]
 
 

@@ -11,6 +11,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.grid import AngularGrid
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.policies import BUILT_IN
+from tests.helpers.lidars import CORNERS
 from tests.helpers.played_keyframes import played
 
 SMALL = SensorSetup(
@@ -24,7 +25,7 @@ SMALL = SensorSetup(
     (1.8, 0.4, 0.7),
 )
 """Listed rows and a gap behind on the right, from a corner of the bumper."""
-SETUPS = {"m1-forward": "m1-forward", "os1-64": "os1-64", "small": SMALL}
+SETUPS = {"m1-forward": "m1-forward", "os1-64": "os1-64", "small": SMALL, "corners": CORNERS}
 OF_A_GRID = (
     "place",
     "place-hulls",
@@ -39,7 +40,10 @@ KEYFRAMES = 3
 # A film of a street takes seconds on a large grid, too.
 CASES = [
     pytest.param(environment, setup, name, id=f"{environment}-{setup}-{name}")
-    for environment, setup in [("CARE-Street-v0", "small"), *product(["CARE-Dense-v0"], SETUPS)]
+    for environment, setup in [
+        *product(["CARE-Street-v0"], ["small", "corners"]),
+        *product(["CARE-Dense-v0"], SETUPS),
+    ]
     for name in BUILT_IN
     if name not in OF_A_GRID and (setup == "small" or name not in SLOW)
 ]
@@ -82,9 +86,12 @@ def test_within_the_budget_and_the_same_after_reset(
 
 
 @pytest.mark.parametrize("name", OF_A_GRID)
-def test_weights_of_another_grid_are_refused_in_one_line(environments, name):
-    env = environments("CARE-Dense-v0", "os1-64", 0.05)
-    with pytest.raises(InvalidInput, match=r"grid is columns 512 .*needed is columns 1024"):
+@pytest.mark.parametrize(
+    ("setup", "needed"), [("os1-64", "columns 1024"), ("corners", "3 LiDARs: columns 64")]
+)
+def test_weights_of_another_grid_are_refused_in_one_line(environments, name, setup, needed):
+    env = environments("CARE-Dense-v0", setup, 0.05)
+    with pytest.raises(InvalidInput, match=rf"grid is columns 512 .*needed is {needed}"):
         care_sim.make_policy(name, env)
 
 

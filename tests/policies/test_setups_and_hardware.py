@@ -12,6 +12,7 @@ from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.measure.certify.design import AS_LISTED
 from care_sim.policies import BUILT_IN
+from tests.helpers.lidars import CORNERS
 from tests.helpers.played_keyframes import played
 from tests.policies.test_sensor_setups import OF_A_GRID
 
@@ -33,7 +34,7 @@ FORWARD = SensorSetup(
     (PinholeCamera(position=(-0.4, 0.0, 0.8)),),
 )
 """Ten rows that are not equally spaced, in the bumper, with a camera of its own."""
-SETUPS = {"hdl-32e": "hdl-32e", "tilted": TILTED, "forward": FORWARD}
+SETUPS = {"hdl-32e": "hdl-32e", "tilted": TILTED, "forward": FORWARD, "corners": CORNERS}
 FIRINGS = (*HARDWARE, "tiles:2x5")
 UNFIT = {
     ("tilted", "tiles:2x5"): "columns of firing tiles must divide the 128 of the grid, got 5",
@@ -41,6 +42,10 @@ UNFIT = {
     ("forward", "tiles"): "rows of firing tiles must divide the 10 of the grid, got 4",
     ("forward", "segments"): "columns of firing segments must divide the 90 of the grid, got 16",
     ("forward", "azimuth-window"): "firing azimuth-window turns all round, and the grid has no",
+    ("corners", "tiles:2x5"): "columns of firing tiles must divide the 64 of the grid, got 5",
+    ("corners", "columns"): "firing columns needs LiDARs of as many rows each, got 4 and 8",
+    ("corners", "vertical-window"): "window of one LiDAR, and the set-up has 3",
+    ("corners", "azimuth-window"): "window of one LiDAR, and the set-up has 3",
 }
 """What does not divide the grid."""
 OF_ANOTHER_BUDGET = ("full",)
@@ -93,11 +98,13 @@ def test_the_full_scan_fires_everything_with_any_hardware(firing):
 
 
 @pytest.mark.parametrize("name", OF_A_GRID)
-@pytest.mark.parametrize("setup", ["tilted", "forward"])
+@pytest.mark.parametrize("setup", ["tilted", "corners"])
 def test_weights_of_another_grid_are_refused_in_one_line(setup, name):
     with (
         gymnasium.make("CARE-Dense-v0", sensor=SETUPS[setup], firing="rows", budget=0.1) as env,
-        pytest.raises(InvalidInput, match=r"grid is columns 512 .*needed is columns") as refused,
+        pytest.raises(
+            InvalidInput, match=r"grid is columns 512 .*needed is (3 LiDARs: )?columns"
+        ) as refused,
     ):
         care_sim.make_policy(name, env)
     assert "\n" not in str(refused.value)

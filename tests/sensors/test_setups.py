@@ -89,8 +89,8 @@ def test_what_comes_with_the_package_is_as_its_data_sheet_says(
 
 
 def test_these_are_all_and_no_two_have_one_hash():
-    assert len(setup_names()) == 5
-    assert len({sensor_setup(name).digest for name in setup_names()}) == 5
+    assert len(setup_names()) == 6
+    assert len({sensor_setup(name).digest for name in setup_names()}) == 6
 
 
 def test_a_file_is_read_in_metres_and_degrees_of_the_car(written):

@@ -3,6 +3,7 @@ import numpy as np
 from care_sim.core.grid import AngularGrid
 from care_sim.viewer.recording.entities import ROW_PIXELS
 from care_sim.viewer.recording.picture_log import outlines
+from tests.helpers.lidars import STACK
 
 GRID = AngularGrid(columns=8, rows=4)
 
@@ -26,3 +27,12 @@ def test_all_around_is_one_outline_and_nothing_is_none():
         [0, 3 * ROW_PIXELS, 8, 4 * ROW_PIXELS]
     ]
     assert outlines([], GRID).shape == (0, 4)
+
+
+def test_a_sector_of_two_lidars_has_an_outline_in_each():
+    """Rows 6 and 7 are the last of the first, and row 8 is the first of the second."""
+    cells = np.array([6 * 64 + 3, 7 * 64 + 3, 8 * 64 + 40])
+    assert sorted(outlines([cells], STACK).tolist()) == [
+        [23, 8 * ROW_PIXELS, 24, 9 * ROW_PIXELS],
+        [60, 6 * ROW_PIXELS, 61, 8 * ROW_PIXELS],
+    ]

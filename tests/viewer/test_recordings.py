@@ -18,6 +18,7 @@ from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.episode_play import run_episode, trace
 from care_sim.viewer.recording import entities
 from care_sim.viewer.recording.layout import blueprint
+from tests.helpers.lidars import CORNERS
 
 CONFIG = EpisodeConfig("dense", "care", 0.05, 1, false_negative_rate=0.2, false_positive_rate=0.3)
 
@@ -50,6 +51,24 @@ def test_recording_changes_nothing_in_any_world(scenario, tmp_path, read):
     assert found.numbers("care/measures/speed") == [frame.speed_mps for frame in keyframes]
     (text,) = found.fixed["care/outcome"]["TextDocument:text"]
     assert f"| rays_fired | {row['rays_fired']} |" in text
+
+
+def test_the_returns_of_several_lidars_are_recorded_in_the_frame_of_the_first(tmp_path, read):
+    short = (("duration_s", 0.2),)
+    config = EpisodeConfig("dense", "care", 0.2, 2, sensor=CORNERS, scenario_parameters=short)
+    path = tmp_path / "out.rrd"
+    seen = []
+    trace(
+        config,
+        lambda loop, _frame: seen.append(loop.belief.ranges.ravel()),
+        wrap=lambda env, policy: RecordRerun(env, path, policy),
+    )
+    grid = CORNERS.grid
+    for ranges, cloud in zip(
+        seen, read(path).column("care/world/lidar/returns", "Points3D:positions"), strict=True
+    ):
+        cells = np.flatnonzero((ranges > 0) & (ranges < grid.range_m))
+        np.testing.assert_allclose(cloud, grid.points(cells, ranges[cells]), rtol=1e-5, atol=1e-4)
 
 
 def test_every_entity_is_documented_and_every_documented_one_is_there(episode):

@@ -8,7 +8,7 @@ from care_sim.base.checks import check_number
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Integers
 from care_sim.core.firing.window import Window
-from care_sim.core.grid import AngularGrid
+from care_sim.core.grid_stack import Grid
 
 _LAST_BITS = 1e-9
 """What rounding may take from a number of columns."""
@@ -34,15 +34,15 @@ class AzimuthWindow(Window):
         "firing"
     )
 
-    def __init__(self, grid: AngularGrid, degrees: float):
+    def __init__(self, grid: Grid, degrees: float):
         check_number("degrees of firing azimuth-window", degrees, 0, 180)
-        if not grid.goes_round:
+        super().__init__(grid, grid.rows)
+        if not self.lidar.goes_round:
             raise InvalidInput(
                 "firing azimuth-window turns all round, and the grid has no more than "
-                f"{np.rad2deg(grid.field_of_view):g} degrees"
+                f"{np.rad2deg(self.lidar.field_of_view):g} degrees"
             )
-        super().__init__(grid, grid.rows)
-        self.reach = int(np.deg2rad(degrees) / grid.column_width + _LAST_BITS)
+        self.reach = int(np.deg2rad(degrees) / self.lidar.column_width + _LAST_BITS)
         """Columns by which it turns at most."""
 
     @cached_property
@@ -58,5 +58,5 @@ class AzimuthWindow(Window):
 
     def _start(self, width: int) -> int:
         # Column 0 begins at the right end of the grid.
-        ahead = round(-self.grid.right / self.grid.column_width)
+        ahead = round(-self.lidar.right / self.lidar.column_width)
         return (ahead - width // 2) % self.units

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from care_sim.core.allocation import budget_cells
 from care_sim.core.arrays import Floats, Integers
-from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.grid import Cells
+from care_sim.core.grid_stack import Grid
 
 Floor: TypeAlias = Callable[[], Cells] | None
 """Draws the random floor of a keyframe, a permutation of all cells; None of an environment without
@@ -37,7 +38,7 @@ class Hardware(ABC):
     counted: ClassVar[str] = "cell"
     most_shots: int = 1
 
-    def __init__(self, grid: AngularGrid, unit_cells: int):
+    def __init__(self, grid: Grid, unit_cells: int):
         self.grid = grid
         self.unit_cells = unit_cells
 

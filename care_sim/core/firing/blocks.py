@@ -10,7 +10,8 @@ from care_sim.base.compiled import compiled
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.firing.base import Floor, Hardware, demanded, ranked
-from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.grid import Cells
+from care_sim.core.grid_stack import Grid
 
 
 class Blocks(Hardware):
@@ -21,12 +22,16 @@ class Blocks(Hardware):
     takes what is left. Raises InvalidInput for blocks that do not divide the grid.
     """
 
-    def __init__(self, grid: AngularGrid, rows: int, columns: int):
-        for size, whole, what in ((rows, grid.rows, "rows"), (columns, grid.columns, "columns")):
-            if size < 1 or whole % size:
-                raise InvalidInput(
-                    f"{what} of firing {self.name} must divide the {whole} of the grid, got {size}"
-                )
+    def __init__(self, grid: Grid, rows: int, columns: int):
+        # A block lies in one LiDAR: the rows of each are whole blocks.
+        for head in grid.heads:
+            sides = (rows, head.grid.rows, "rows"), (columns, grid.columns, "columns")
+            for size, whole, what in sides:
+                if size < 1 or whole % size:
+                    raise InvalidInput(
+                        f"{what} of firing {self.name} must divide the {whole} of the grid, got "
+                        f"{size}"
+                    )
         super().__init__(grid, rows * columns)
         self.rows = rows
         self.columns = columns

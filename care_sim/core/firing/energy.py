@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from care_sim.base.checks import check_number
 from care_sim.core.firing.base import Floor, demanded
 from care_sim.core.firing.free_cells import FreeCells
-from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.grid import Cells
+from care_sim.core.grid_stack import Grid
 
 MOST_SHOTS = 100
 """Ten times the reach, as far as reach grows with the root of the shots."""
@@ -37,7 +38,7 @@ class Energy(FreeCells):
         "abstract, for counts added up over laser cycles"
     )
 
-    def __init__(self, grid: AngularGrid, shots: int):
+    def __init__(self, grid: Grid, shots: int):
         check_number("shots of firing energy", shots, 1, MOST_SHOTS)
         super().__init__(grid)
         self.most_shots = shots

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.firing.base import Floor, Hardware, demanded, ranked
-from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.grid import Cells
+from care_sim.core.grid_stack import Grid
 
 _NO_FLOOR = np.empty(0, np.int64)
 
@@ -25,7 +26,7 @@ class FreeCells(Hardware):
         "RRRWP_19_0812, 2019"
     )
 
-    def __init__(self, grid: AngularGrid):
+    def __init__(self, grid: Grid):
         super().__init__(grid, unit_cells=1)
 
     @cached_property

@@ -13,7 +13,7 @@ from care_sim.core.firing.tiles import Tiles
 from care_sim.core.firing.vertical_window import VerticalWindow
 from care_sim.core.firing.whole_columns import WholeColumns
 from care_sim.core.firing.whole_rows import WholeRows
-from care_sim.core.grid import AngularGrid
+from care_sim.core.grid_stack import Grid
 
 CELLS = FreeCells.name
 HARDWARE: dict[str, type[Hardware]] = {
@@ -54,7 +54,7 @@ def most_shots(firing: str) -> int:
     return int(numbers[0]) if kind is Energy else kind.most_shots
 
 
-def hardware_of(firing: str, grid: AngularGrid) -> Hardware:
+def hardware_of(firing: str, grid: Grid) -> Hardware:
     """The hardware that a text names, over a grid. Raises InvalidInput for what names none, and
     for units that do not divide the grid.
     """

@@ -1,7 +1,7 @@
 """Ring segments: pieces of one row, as a spinning sensor with masked channels has them."""
 
 from care_sim.core.firing.blocks import Blocks
-from care_sim.core.grid import AngularGrid
+from care_sim.core.grid_stack import Grid
 
 
 class RingSegments(Blocks):
@@ -19,5 +19,5 @@ class RingSegments(Blocks):
         "multi-section FOV, not opened)"
     )
 
-    def __init__(self, grid: AngularGrid, columns: int):
+    def __init__(self, grid: Grid, columns: int):
         super().__init__(grid, 1, columns)

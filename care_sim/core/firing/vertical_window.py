@@ -6,7 +6,7 @@ import numpy as np
 
 from care_sim.core.arrays import Integers
 from care_sim.core.firing.window import Window
-from care_sim.core.grid import AngularGrid
+from care_sim.core.grid_stack import Grid
 
 
 class VerticalWindow(Window):
@@ -21,7 +21,7 @@ class VerticalWindow(Window):
         "Luminar, Iris product sheet: vertical field of view dynamically adjustable (not opened)"
     )
 
-    def __init__(self, grid: AngularGrid):
+    def __init__(self, grid: Grid):
         super().__init__(grid, grid.columns)
 
     @cached_property
@@ -35,5 +35,5 @@ class VerticalWindow(Window):
         return places[np.argsort(np.abs(places - stood), kind="stable")]
 
     def _start(self, width: int) -> int:
-        horizon = int(np.argmin(np.abs(self.grid.elevations_ahead)))
+        horizon = int(np.argmin(np.abs(self.lidar.elevations_ahead)))
         return min(max(horizon - width // 2, 0), self.units - width)

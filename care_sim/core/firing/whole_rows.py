@@ -1,7 +1,7 @@
 """Whole rows: scan lines all the way across, as an oscillating mirror draws them."""
 
 from care_sim.core.firing.blocks import Blocks
-from care_sim.core.grid import AngularGrid
+from care_sim.core.grid_stack import Grid
 
 
 class WholeRows(Blocks):
@@ -15,5 +15,5 @@ class WholeRows(Blocks):
         "mirror; their number and foveation"
     )
 
-    def __init__(self, grid: AngularGrid):
+    def __init__(self, grid: Grid):
         super().__init__(grid, 1, grid.columns)

@@ -7,9 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.compiled import compiled
+from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.firing.base import Floor, Hardware, demanded, ranked
 from care_sim.core.grid import Cells
+from care_sim.core.grid_stack import Grid
 
 
 class Window(Hardware):
@@ -19,9 +21,21 @@ class Window(Hardware):
     cell as well as those before it. A cell that no such place holds is passed over, as is one out
     of reach. Of the places that are left the window takes the one nearest to where it stood, so it
     stays where nothing is demanded. It always fires as a whole: nothing is left for the floor.
+    Raises InvalidInput for several LiDARs.
     """
 
     spends_floor = False
+
+    def __init__(self, grid: Grid, unit_cells: int):
+        # What one window serves cannot be weighed against another's: which LiDAR gets how much of
+        # the budget is no question that hardware answers.
+        if len(grid.heads) > 1:
+            raise InvalidInput(
+                f"firing {self.name} is the window of one LiDAR, and the set-up has "
+                f"{len(grid.heads)}"
+            )
+        super().__init__(grid, unit_cells)
+        self.lidar = grid.heads[0].grid
 
     def fire(self, scores: NDArray[Any], budget: int, floor: Floor, last: Cells) -> Cells:
         """The window that serves the demand."""

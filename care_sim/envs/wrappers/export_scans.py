@@ -32,8 +32,9 @@ _UNITS_NOTE = (
     "z up; sensor_in_world is its origin, then yaw, pitch and roll, turned about z, then y, then "
     "x. Cells: row * columns + column; row 0 is the highest, column 0 begins at the azimuth "
     "heading - field_of_view / 2, straight behind on a grid that goes all round, and the others "
-    "follow to the left; pitch raises the heading, roll lowers its right. Ego and bodies are "
-    "truth, in the world frame."
+    "follow to the left; pitch raises the heading, roll lowers its right. Of several LiDARs rows "
+    "are numbered on from grid to grid, and places tell where each stands in the sensor frame, "
+    "which is that of the first. Ego and bodies are truth, in the world frame."
 )
 POINT_BYTES = 4 * 3 + 4 + 1
 """Bytes per point of a cloud: three coordinates, cell and share."""

@@ -17,7 +17,7 @@ from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.perception.proxy import ReturnsRule
 from care_sim.perception.tracker import TrackMemory
 from care_sim.sensors.camera import CameraDetector, Picture, faultless_detections, window_on
-from care_sim.sensors.engines import ENGINES
+from care_sim.sensors.engines import make_engine
 from care_sim.sensors.lidar import Lidar
 from care_sim.study.episode_config import EpisodeConfig
 
@@ -101,7 +101,7 @@ class StageByStage:
         self._bodies = np.array(list(self._labels), np.int64)
         # Sensors without faults draw nothing from their seeds, so that any seeds give the episode.
         camera_seed, lidar_seed = np.random.SeedSequence(0).spawn(2)
-        self._engine = ENGINES[env.conditions.engine](world.bullet, rig.grid)
+        self._engine = make_engine(env.conditions.engine, world.bullet, rig.grid)
         self._lidar = Lidar(rig.grid, self._engine, env.conditions, lidar_seed)
         self._camera = CameraDetector(
             list(self._labels), env.conditions, rig.keyframe_s, camera_seed, rig.cameras

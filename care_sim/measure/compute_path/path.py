@@ -163,7 +163,7 @@ class _Path:
         self._ranges[self._fired] = np.minimum(ranges, self._rig.grid.range_m)
         (back,) = np.isfinite(ranges).nonzero()
         cells = self._fired[back]
-        points = self._rig.grid.directions[cells] * ranges[back, None]
+        points = self._rig.grid.points(cells, ranges[back])
         return Cloud(cells, points, np.full(len(cells), NO_OBJECT))
 
 

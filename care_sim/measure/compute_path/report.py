@@ -44,7 +44,9 @@ def sensors() -> dict[str, Sensor]:
     return {
         DEFAULT_SETUP: DEFAULT_SETUP,
         "os1-128": "os1-128",
-        "os1-128, 2,048 columns": replace(finest, grid=replace(finest.grid, columns=2048)),
+        "os1-128, 2,048 columns": replace(
+            finest, grid=replace(finest.grid.heads[0].grid, columns=2048)
+        ),
     }
 
 

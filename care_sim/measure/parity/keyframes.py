@@ -93,8 +93,9 @@ def compare_episode(config: EpisodeConfig, compared: KeyframeAgreement) -> None:
         ended = False
         with closing(_exact(loop)) as exact:
             bullet = loop.world.bullet
-            fast = ENGINES["fast"](bullet, loop.rig.grid)
-            reference = ENGINES["bullet"](bullet, loop.rig.grid)
+            grid = loop.rig.grid.heads[0].grid
+            fast = ENGINES["fast"](bullet, grid)
+            reference = ENGINES["bullet"](bullet, grid)
             engines = Engines(fast, reference, exact)
             while True:
                 _compare_scans(loop, engines, exact, config.seed, compared.rays)
@@ -108,7 +109,8 @@ def compare_episode(config: EpisodeConfig, compared: KeyframeAgreement) -> None:
 def _exact(loop: ClosedLoop) -> Millimetres:
     """The same bodies, in the order of their ids: the car, which no ray hits, is kept away."""
     world = loop.world
-    return Millimetres([world.ego_kind, *(actor.kind for actor in world.actors)], loop.rig.grid)
+    kinds = [world.ego_kind, *(actor.kind for actor in world.actors)]
+    return Millimetres(kinds, loop.rig.grid.heads[0].grid)
 
 
 def _compare_scans(

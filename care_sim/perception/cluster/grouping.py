@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from care_sim.core.arrays import Floats, Integers
-from care_sim.core.grid import AngularGrid
+from care_sim.core.grid_stack import Grid
 
 NEAR_RADIUS_M = 0.3
 """Two people a metre apart, each 0.66 m wide, leave 0.34 m between them: the radius must stay
@@ -21,12 +21,12 @@ COLUMNS_APART = 2.0
 return, or the surface be seen at 60 degrees."""
 
 
-def cluster_radius(grid: AngularGrid, range_m: float) -> float:
+def cluster_radius(grid: Grid, range_m: float) -> float:
     """The distance, metres, up to which two points at `range_m` belong together."""
     return max(NEAR_RADIUS_M, COLUMNS_APART * grid.column_width * range_m)
 
 
-def clusters_of(plan: Floats, grid: AngularGrid) -> list[Integers]:
+def clusters_of(plan: Floats, grid: Grid) -> list[Integers]:
     """The clusters of points (P, 2) x, y in the sensor frame, as indices; every point is in one.
 
     Two points nearer than `cluster_radius` belong together, and so do those that others connect.
@@ -48,7 +48,7 @@ def clusters_of(plan: Floats, grid: AngularGrid) -> list[Integers]:
     return np.split(order, np.flatnonzero(np.diff(labels[order])) + 1)
 
 
-def _even(plan: Floats, grid: AngularGrid) -> Floats:
+def _even(plan: Floats, grid: Grid) -> Floats:
     """(P, 3) where `cluster_radius` is 1 everywhere.
 
     A disc as far as the radius is constant; beyond, where it is a share of the range, the disc goes

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from care_sim.core.arrays import Floats, Integers
-from care_sim.core.grid import AngularGrid
+from care_sim.core.grid_stack import Grid
 from care_sim.core.types import CLASSES
 from care_sim.perception.cluster.box_fitting import DECIMALS, Sides
 from care_sim.perception.cluster.grouping import COLUMNS_APART, NEAR_RADIUS_M, cluster_radius
@@ -53,7 +53,7 @@ class Guess:
 
 
 def best_guess(
-    sides: Sides, top_m: float, road_z: float, sensor_height_m: float, grid: AngularGrid
+    sides: Sides, top_m: float, road_z: float, sensor_height_m: float, grid: Grid
 ) -> Guess:
     """The class and box for `sides` whose highest point is `top_m` above the road, itself at
     `road_z`.
@@ -66,12 +66,12 @@ def best_guess(
     return Guess(int(_CLASSES[best]), _completed(sides, seen, best, road_z), float(misfits[best]))
 
 
-def _hidden_ends(sides: Sides, grid: AngularGrid) -> Floats:
+def _hidden_ends(sides: Sides, grid: Grid) -> Floats:
     """(2,) a side ends half a column, on average, beyond its last point at either end."""
     return np.asarray(grid.column_width * np.abs(sides.middle[::-1]))
 
 
-def _misfits(sides: Sides, seen: Floats, sensor_height_m: float, grid: AngularGrid) -> Floats:
+def _misfits(sides: Sides, seen: Floats, sensor_height_m: float, grid: Grid) -> Floats:
     """(2k,) sum of the squared deviations of `seen` (3,) from each typical size, in standard
     deviations.
 
@@ -97,7 +97,7 @@ def _misfits(sides: Sides, seen: Floats, sensor_height_m: float, grid: AngularGr
     return np.asarray((deviation**2 / variance).sum(axis=1))
 
 
-def _hanging(sides: Sides, grid: AngularGrid) -> Floats:
+def _hanging(sides: Sides, grid: Grid) -> Floats:
     """(2,) how much of the side along each axis may be seen in one piece, metres.
 
     At the range r, the points of a side that lies d off the sensor are r^2 / d columns apart; they

@@ -4,6 +4,8 @@ import numpy as np
 
 from care_sim.base.checks import check_whole
 from care_sim.core.belief import Belief
+from care_sim.core.grid import Cells
+from care_sim.core.grid_stack import Grid
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
@@ -17,7 +19,7 @@ follow the rig's `sensor_height_m`."""
 class Fan(Policy):
     """Fires what lies ahead, between the horizon and `LOWEST_DEG`, the columns nearest to straight
     ahead first: at 3% of the paper's grid 20 degrees to either side. When the fan has gone all
-    round, the other rows follow in the same way.
+    round, the other rows follow in the same way. Several LiDARs make one fan.
 
     With `shots` it asks for as many times fewer cells, each of which hardware that fires cells
     several times then fires as often. Raises InvalidInput for less than one.
@@ -32,13 +34,25 @@ class Fan(Policy):
         super().__init__(rig)
         check_whole("shots", shots, 1)
         self._shots = shots
-        grid = rig.grid
-        elevations = grid.elevations_ahead
-        is_low = (elevations < grid.row_height / 2) & (elevations > np.deg2rad(LOWEST_DEG))
-        ahead = np.argsort(grid.from_ahead, kind="stable")
-        parts = [np.flatnonzero(rows) * grid.columns + ahead[:, None] for rows in (is_low, ~is_low)]
-        self._pattern = np.concatenate([part.ravel() for part in parts])
+        self._pattern = np.concatenate([fanned(rig.grid, is_low) for is_low in (True, False)])
 
     def demand(self, belief: Belief) -> Demand:
         """The same cells at every keyframe."""
         return Demand(layers=[[self._pattern[: belief.budget // self._shots]]])
+
+
+def fanned(grid: Grid, is_low: bool) -> Cells:
+    """The cells between the horizon and `LOWEST_DEG`, or all others, the columns nearest to
+    straight ahead first.
+    """
+    columns, off_ahead = [], []
+    for head in grid.heads:
+        own = head.grid
+        elevations = own.elevations_ahead
+        low = (elevations < own.row_height / 2) & (elevations > np.deg2rad(LOWEST_DEG))
+        rows = head.first + np.flatnonzero(low == is_low) * own.columns
+        columns += [rows + column for column in range(own.columns)]
+        # In columns of the first LiDAR, whose own are whole ones and a half.
+        off_ahead.append(own.from_ahead * (own.column_width / grid.heads[0].grid.column_width))
+    nearest = np.argsort(np.concatenate(off_ahead), kind="stable")
+    return np.concatenate([columns[place] for place in nearest])

@@ -6,7 +6,7 @@ import numpy as np
 
 from care_sim.base.checks import check_number, check_whole
 from care_sim.core.belief import Belief
-from care_sim.core.grid import Cells
+from care_sim.core.grid import Cells, Head
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
@@ -43,32 +43,43 @@ class Rows(Policy):
         return Demand(layers=[[self._pattern[: belief.budget // self._shots]]])
 
 
-def entry_elevation_deg(rig: Rig) -> float:
+def entry_elevation_deg(rig: Rig, above_m: float = 0.0) -> float:
     """Where the middle of a car stands that enters the range of scoring, seen from the LiDAR of a
-    rig: -1.25 degrees from the default one, 1.84 m above the road.
+    rig: -1.25 degrees from the default one, 1.84 m above the road. Of several that is the first;
+    another stands `above_m` higher.
     """
     # To a hundredth of a degree: results were published for -1.25 degrees, not for -1.2488.
-    rise = (ENTRY_HEIGHT_M - rig.sensor_height_m) / ENTRY_DISTANCE_M
+    rise = (ENTRY_HEIGHT_M - (rig.sensor_height_m + above_m)) / ENTRY_DISTANCE_M
     return round(math.degrees(math.atan(rise)), 2)
 
 
 def cells_by_row(rig: Rig, elevation_deg: float | None = None) -> Cells:
     """(N,) all cells, row after row, the row nearest to an elevation first: the given one, else
     `entry_elevation_deg`. Every first few cells of a row lie evenly over it. On a tilted grid every
-    column gives its own nearest cell to the first such row, and so on.
+    column gives its own nearest cell to the first such row, and so on. Of several LiDARs each gives
+    a cell of its own in turn, so that all begin with their nearest rows.
     """
-    grid = rig.grid
-    wanted = entry_elevation_deg(rig) if elevation_deg is None else elevation_deg
+    parts = [_own_cells_by_row(rig, head, elevation_deg) for head in rig.grid.heads]
+    turns = np.concatenate([np.arange(len(part)) for part in parts])
+    cells: Cells = np.concatenate(parts)[np.argsort(turns, kind="stable")]
+    return cells
+
+
+def _own_cells_by_row(rig: Rig, head: Head, elevation_deg: float | None) -> Cells:
+    """The cells of one LiDAR in that order."""
+    grid = head.grid
+    wanted = entry_elevation_deg(rig, head.place[2]) if elevation_deg is None else elevation_deg
     off = np.abs(np.rad2deg(grid.elevations_everywhere) - wanted)
     rows = np.broadcast_to(np.argsort(off, axis=0, kind="stable"), grid.shape)
     columns = np.argsort(np.arange(grid.columns) * GOLDEN % 1)
-    cells: Cells = (rows[:, columns] * grid.columns + columns).ravel()
+    cells: Cells = (rows[:, columns] * grid.columns + columns).ravel() + head.first
     return cells
 
 
 def entry_cells(rig: Rig) -> Cells:
-    """(columns,) the cell of every column at which things enter the range of scoring."""
+    """(lidars * columns,) the cell of every column at which things enter the range of scoring; of
+    several LiDARs one after the other.
+    """
     columns = rig.grid.columns
-    nearest = cells_by_row(rig)[:columns]
-    cells: Cells = nearest[np.argsort(nearest % columns)]
-    return cells
+    nearest = [_own_cells_by_row(rig, head, None)[:columns] for head in rig.grid.heads]
+    return np.concatenate([cells[np.argsort(cells % columns)] for cells in nearest])

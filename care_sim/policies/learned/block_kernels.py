@@ -21,8 +21,9 @@ class LastScan(NamedTuple):
     """(N,) metres."""
     rises: NDArray[np.float64]
     """(N,) how far each ray rises per metre of range."""
+    heights_m: NDArray[np.float64]
+    """(N,) where each ray begins above the road."""
     reach_m: float
-    sensor_height_m: float
     lowest_m: float
     highest_m: float
 
@@ -65,6 +66,6 @@ def add_returns(
         # A ray without a return reads the reach.
         if distance < scan.reach_m:
             out[0, block] = max(out[0, block], np.float32(1 - distance / scan.reach_m))
-            height = scan.sensor_height_m + distance * scan.rises[cell]
+            height = scan.heights_m[cell] + distance * scan.rises[cell]
             if not marks[cell] & 1 and scan.lowest_m < height < scan.highest_m:
                 out[2, block] += part

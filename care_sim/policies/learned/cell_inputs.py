@@ -92,24 +92,29 @@ class CellInputs:
         )
         # Sets first: a return in a hull does not count as standing.
         mark_sets(seen.codes, seen.sizes, *self._sets(belief, hulls))
-        rules = ScanRules(
-            np.float32(rig.grid.range_m),
-            np.float32(GROUND_CLEARANCE_M - rig.sensor_height_m),
-            rig.azimuth_margin,
-            rig.elevation_margin,
-            rig.grid.turn,
-        )
-        mark_scan(seen.codes, seen.nearnesses, belief.ranges, self._heights, rules)
+        for head in rig.grid.heads:
+            rules = ScanRules(
+                np.float32(rig.grid.range_m),
+                np.float32(GROUND_CLEARANCE_M - (rig.sensor_height_m + head.place[2])),
+                rig.azimuth_margin,
+                rig.elevation_margin,
+                head.grid.turn,
+            )
+            own, (first, last) = head.cells, head.rows
+            ranges = belief.ranges[first : last + 1]
+            mark_scan(seen.codes[own], seen.nearnesses[own], ranges, self._heights[own], rules)
         return seen
 
     @cached_property
     def rig_inputs(self) -> Float32s:
         """(N, `RIG_INPUTS`) what is known of every cell without a keyframe."""
-        x, y, z = self.rig.grid.directions.T
+        grid = self.rig.grid
+        x, y, z = grid.directions.T
         flat = np.hypot(x, y)
         # Where a ray meets a level road; one that does not fall never does.
-        road = np.divide(self.rig.sensor_height_m, -z, out=np.full(len(z), np.inf), where=z < 0)
-        ground = 1 - np.minimum(road / self.rig.grid.range_m, 1)
+        height = self.rig.sensor_height_m + grid.origins_of(np.arange(grid.size))[..., 2]
+        road = np.divide(height, -z, out=np.full(len(z), np.inf), where=z < 0)
+        ground = 1 - np.minimum(road / grid.range_m, 1)
         return np.stack(
             [np.arcsin(z) / 0.5, ground, x / flat, np.abs(y) / flat, self._covered()], 1
         ).astype(np.float32)
@@ -138,8 +143,10 @@ class CellInputs:
         """(N,) whether a point at the end of a cell's ray lies in a picture. So far out the offset
         of a camera from the LiDAR no longer matters.
         """
-        covered = np.zeros(self.rig.grid.size, bool)
+        grid = self.rig.grid
+        covered = np.zeros(grid.size, bool)
+        ends = grid.points(np.arange(grid.size), np.full(grid.size, grid.range_m))
         for camera in self.rig.cameras:
-            pixels, _ = camera.project(self.rig.grid.directions * self.rig.grid.range_m)
+            pixels, _ = camera.project(ends)
             covered |= ((pixels >= 0) & (pixels <= (camera.width, camera.height))).all(axis=1)
         return covered

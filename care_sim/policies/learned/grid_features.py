@@ -77,7 +77,7 @@ class GridFeatures:
 
     def _draw_returns(self, ranges: NDArray[np.float32], out: NDArray[np.float32]) -> None:
         rig = self.rig
-        scan = LastScan(ranges, self._rises, rig.grid.range_m, rig.sensor_height_m, *STANDING_M)
+        scan = LastScan(ranges, self._rises, self._heights, rig.grid.range_m, *STANDING_M)
         add_returns(np.flatnonzero(ranges > 0), scan, self._blocks, self._marks, out)
 
     def _ego(self, belief: Belief) -> NDArray[np.float32]:
@@ -89,6 +89,14 @@ class GridFeatures:
     @cached_property
     def _rises(self) -> NDArray[np.float64]:
         return np.ascontiguousarray(self.rig.grid.directions[:, 2])
+
+    @cached_property
+    def _heights(self) -> NDArray[np.float64]:
+        rig = self.rig
+        heights = np.empty(rig.grid.size)
+        for head in rig.grid.heads:
+            heights[head.cells] = rig.sensor_height_m + head.place[2]
+        return heights
 
     @cached_property
     def _blocks(self) -> Cells:

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from care_sim.base.checks import check_whole
 from care_sim.base.errors import InvalidInput
 from care_sim.core.belief import Belief
-from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.grid import Cells
+from care_sim.core.grid_stack import Grid
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 
@@ -25,7 +26,7 @@ class Tiling:
     and azimuth 0 begins straight behind, at -pi. `shape` is that of a picture of the tiles.
     """
 
-    grid: AngularGrid
+    grid: Grid
     azimuths: int = 32
     elevations: int = 4
 
@@ -38,6 +39,14 @@ class Tiling:
             check_whole(name, count, 1, cells)
             if cells % count:
                 raise InvalidInput(f"{name} must divide the {cells} of the grid, got {count}")
+        # A tile of two LiDARs would be no place.
+        tall, _ = self.tile_shape
+        if any(head.grid.rows % tall for head in self.grid.heads):
+            rows = ", ".join(str(head.grid.rows) for head in self.grid.heads)
+            raise InvalidInput(
+                f"elevations must make tiles that lie in one LiDAR each: {self.elevations} of them "
+                f"are {tall} rows tall, and the LiDARs have {rows} rows"
+            )
 
     @property
     def shape(self) -> tuple[int, int]:

@@ -21,6 +21,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.base.files import ZIP, replacing
 from care_sim.base.json_text import parsed_json
 from care_sim.core.grid import AngularGrid
+from care_sim.core.grid_stack import Grid, GridStack
 from care_sim.core.rig import Rig
 from care_sim.policies.learned.wrapping import Wrapping, wrapping_of_line
 
@@ -48,7 +49,7 @@ class Card:
     """
 
     kind: str
-    grid: AngularGrid
+    grid: Grid
     budget: int | None = None
     setup: str = ""
     wrapper: Wrapping | None = None
@@ -191,7 +192,13 @@ def _check_contents(entries: list[ZipInfo]) -> None:
         raise ValueError(f"unpacked it is larger than {MOST_UNPACKED_BYTES} bytes")
 
 
-def _grid(plain: dict[str, Any]) -> AngularGrid:
+def _grid(plain: dict[str, Any]) -> Grid:
+    if set(plain) != {column.name for column in fields(GridStack)}:
+        return _own_grid(plain)
+    return GridStack(tuple(map(_own_grid, plain["grids"])), plain["places"])
+
+
+def _own_grid(plain: dict[str, Any]) -> AngularGrid:
     # Cards of earlier versions are of level grids all round in equal steps, and say no more.
     usual = {"field_of_view": 2 * np.pi, "heading": 0.0, "pitch": 0.0, "roll": 0.0}
     numbers = usual | plain
@@ -223,6 +230,9 @@ def _told(name: str, value: Any, rig: Rig) -> str:
     """A value of a card as a reader wants it."""
     if name == "budget":
         return f"{value} cells ({value / rig.grid.size:.4g})"
+    if isinstance(value, GridStack):
+        told_each = "; ".join(_told(name, head.grid, rig) for head in value.heads)
+        return f"{len(value.heads)} LiDARs: {told_each}"
     if isinstance(value, AngularGrid):
         told = asdict(value)
         rows = ", rows listed" if told.pop("listed") else ""

@@ -41,7 +41,9 @@ class CareSector(Policy):
         self._hull_round = HULL_CELLS_PER_RETURN * min_returns
         self._wedge_round = WEDGE_CELLS_PER_RETURN * min_returns
         self._rows = cells_by_row(rig)
-        self._sector = entry_cells(rig)[columns_ahead(rig.grid)]
+        entries = entry_cells(rig)
+        self._entries = len(entries)
+        self._sector = entries[columns_ahead(rig.grid)]
 
     def demand(self, belief: Belief) -> Demand:
         """Layers in order of priority; see the class."""
@@ -56,7 +58,7 @@ class CareSector(Policy):
                 hulls.part(0, few),
                 self.rig.listed(known, CORE_FIRST, few),
                 wedges.part(more, WEDGE_ROUNDS * more),
-                [self._rows[: self.rig.grid.columns]],
+                [self._rows[: self._entries]],
                 hulls.part(few, few + more),
                 [self._rows[: belief.budget]],
             ]

@@ -100,7 +100,7 @@ class CareSightlines(Policy):
                 rechecked,
                 [self._lines.cells()] if self._watches else [],
                 [] if self._is_late(belief) else wedges.part(more, self._wedge_most),
-                self._rows.part(0, self.rig.grid.columns),
+                self._rows.part(0, len(self._entries)),
                 hulls.part(few, few + more),
                 self._rows.part(0, belief.budget),
             ]

@@ -30,6 +30,7 @@ _LAST_BITS = 1e-9
 
 class SightLines:
     """A memory of the last range along one of the `cells` (A,) of every column, moved with the car.
+    The columns of several LiDARs come one LiDAR after the other, and each has a memory of its own.
 
     What drives into the range enters it at the end of an open line of sight; what was hidden shows
     itself at an edge. A line along which nothing is remembered counts as open. `ranges` (A,) are
@@ -45,15 +46,18 @@ class SightLines:
     def __init__(self, rig: Rig, cells: Cells):
         self._lines = cells
         self._keyframe_s = rig.keyframe_s
-        self._spacing = rig.grid.spacing
-        self._azimuths = rig.grid.azimuths
+        columns = rig.grid.columns
+        self._heads = [
+            (slice(columns * n, columns * (n + 1)), head.grid.spacing, head.grid.azimuths)
+            for n, head in enumerate(rig.grid.heads)
+        ]
         self._sector = columns_ahead(rig.grid)
         # Of a line without a return a scan says the reach in float32, which can be less than it.
         self._reach = float(np.float32(rig.grid.range_m))
         # On a grid of shorter reach, a line without a return is open all the same.
         self._open_m = min(OPEN_M, self._reach / 2)
-        self.ranges = np.full(rig.grid.columns, self._reach)
-        self._watched = _open_or_edge(self.ranges, self._open_m, self._spacing)
+        self.ranges = np.full(len(cells), self._reach)
+        self._watched = self._worth_a_look()
 
     def update(self, belief: Belief) -> None:
         """Take in the last scan, and move what is remembered by what the car has driven since."""
@@ -62,8 +66,9 @@ class SightLines:
         driven = belief.ego.speed * self._keyframe_s
         turned = belief.ego.yaw_rate * self._keyframe_s
         way = driven, turned
-        self.ranges = _moved(self.ranges, self._azimuths, way, self._reach, self._spacing)
-        self._watched = _open_or_edge(self.ranges, self._open_m, self._spacing)
+        for own, spacing, azimuths in self._heads:
+            self.ranges[own] = _moved(self.ranges[own], azimuths, way, self._reach, spacing)
+        self._watched = self._worth_a_look()
 
     def ahead(self) -> Cells:
         """What is worth a look in the sector ahead, the nearest to straight ahead first."""
@@ -72,6 +77,12 @@ class SightLines:
     def cells(self) -> Cells:
         """All that is worth a look, by ascending column."""
         return self._cells(np.flatnonzero(self._watched))
+
+    def _worth_a_look(self) -> Mask:
+        """(A,) which lines are open, or near an edge."""
+        return np.concatenate(
+            [_open_or_edge(self.ranges[own], self._open_m, grid) for own, grid, _ in self._heads]
+        )
 
     def _cells(self, columns: Cells) -> Cells:
         cells: Cells = self._lines[columns]

@@ -3,7 +3,8 @@
 import numpy as np
 
 from care_sim.core.belief import Belief
-from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.grid import Cells
+from care_sim.core.grid_stack import Grid
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
@@ -29,15 +30,18 @@ class BeamReduce(Policy):
         return Demand(layers=[[cells] for cells in self._rows])
 
 
-def horizon_rows(grid: AngularGrid, count: int) -> list[Cells]:
+def horizon_rows(grid: Grid, count: int) -> list[Cells]:
     """The cells of the rows nearest the horizon, nearest first, `count` in all.
 
     The last row is evenly thinned.
     """
     # The height of a row's unit ray straight ahead orders rows as their elevation does. Rows as far
     # above the horizon as below keep the order of their index: the upper one first.
-    ahead = int(np.argmin(grid.from_ahead))
-    nearest = np.argsort(np.abs(grid.directions[ahead :: grid.columns, 2]), kind="stable")
+    rises = [
+        head.grid.directions[int(np.argmin(head.grid.from_ahead)) :: grid.columns, 2]
+        for head in grid.heads
+    ]
+    nearest = np.argsort(np.abs(np.concatenate(rises)), kind="stable")
     whole, rest = divmod(count, grid.columns)
     # Whole rows, then the rest in one more, if there is any.
     widths = [grid.columns] * whole + [rest] * (rest > 0)

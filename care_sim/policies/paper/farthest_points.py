@@ -1,5 +1,8 @@
 """Farthest point sampling of the full scan: saves no sensing."""
 
+import numpy as np
+from scipy.spatial import cKDTree
+
 from care_sim.base.extras import import_open3d
 from care_sim.core.arrays import Floats
 from care_sim.core.grid import Cells
@@ -31,5 +34,8 @@ class FarthestPoints(MatchedFraction):
             return cells[:0]
         open3d = import_open3d()
         cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(points))
-        # A point lies on the ray through the centre of its cell.
-        return self.rig.grid.cells_of(cloud.farthest_point_down_sample(count).points)
+        # The sample holds points, not their places. Each is its own nearest one.
+        _, places = cKDTree(points).query(
+            np.asarray(cloud.farthest_point_down_sample(count).points)
+        )
+        return cells[places]

@@ -5,7 +5,8 @@ from functools import lru_cache
 import numpy as np
 
 from care_sim.core.belief import Belief
-from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.grid import Cells
+from care_sim.core.grid_stack import Grid
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
@@ -36,7 +37,7 @@ class HistoryUniform(Policy):
 
 
 @lru_cache(maxsize=8)
-def uniform_pattern(grid: AngularGrid, count: int) -> Cells:
+def uniform_pattern(grid: Grid, count: int) -> Cells:
     """`count` different cells, ascending: as many in every row, evenly spaced. Read-only, since the
     pattern is kept for the next keyframe.
 

@@ -30,7 +30,7 @@ class MatchedFraction(PrivilegedPolicy):
         scan = self.truth.full_scan()
         returned = np.isfinite(scan.ranges)
         cells = scan.cells[returned]
-        points = self.rig.grid.directions[cells] * scan.ranges[returned, None]
+        points = self.rig.grid.points(cells, scan.ranges[returned])
         # beta is the budget over all cells: the belief tells the budget in cells.
         kept = self.kept(cells, points, round(belief.budget * len(cells) / self.rig.grid.size))
         silent = scan.cells[~returned][: belief.budget - len(kept)]

@@ -46,7 +46,7 @@ class Uncertainty(Policy):
         # 0 was not fired, and the range of the grid returned nothing.
         cells = np.flatnonzero((belief.ranges > 0) & (belief.ranges < self.rig.grid.range_m))
         ranges = belief.ranges.ravel()[cells].astype(np.float64)
-        points = self.rig.grid.directions[cells] * ranges[:, None]
+        points = self.rig.grid.points(cells, ranges)
         unexplained = points[:, 2] + self.rig.sensor_height_m >= GROUND_CLEARANCE_M
         for box in self._detected_boxes(belief):
             unexplained &= ~_inside(points, box)

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from care_sim.core.arrays import Floats, Mask
 from care_sim.core.frames import Pose
-from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.grid import Cells
+from care_sim.core.grid_stack import Grid
 from care_sim.core.residual import explained
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES, ImageDetections
@@ -203,13 +204,19 @@ def _way(loop: ClosedLoop) -> list[list[int]] | None:
     return points
 
 
-def fullness(fired: Cells, grid: AngularGrid) -> str:
+def fullness(fired: Cells, grid: Grid) -> str:
     """How much of every sector fires, one digit per sector."""
-    sectors = np.floor((grid.azimuths + np.pi) / (2 * np.pi) * SECTORS).astype(np.int64)
-    # Cells are numbered row by row, so that the remainder is the column.
     # A cell that was fired several times is as full as one that was fired once.
-    counts = np.bincount(sectors[np.unique(fired) % grid.columns], minlength=SECTORS)
-    cells = np.maximum(np.bincount(sectors, minlength=SECTORS), 1) * grid.rows
+    once = np.unique(fired)
+    counts, cells = np.zeros((2, SECTORS), np.int64)
+    for head in grid.heads:
+        own = head.grid
+        sectors = np.floor((own.azimuths + np.pi) / (2 * np.pi) * SECTORS).astype(np.int64)
+        # Cells are numbered row by row, so that the remainder is the column.
+        columns = once[(once >= head.first) & (once < head.cells.stop)] % own.columns
+        counts += np.bincount(sectors[columns], minlength=SECTORS)
+        cells += np.bincount(sectors, minlength=SECTORS) * own.rows
+    cells = np.maximum(cells, 1)
     return "".join(
         _DIGITS[round(digit)] for digit in (counts / cells * (len(_DIGITS) - 1)).tolist()
     )

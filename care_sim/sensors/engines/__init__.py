@@ -11,9 +11,11 @@ from care_sim.base.checks import check_known
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.grid_stack import Grid
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.sensors.engines.bullet import Bullet
 from care_sim.sensors.engines.fast import Fast
+from care_sim.sensors.engines.heads import HeadEngines
 from care_sim.world.bullet import BulletWorld, PixelWindow
 
 
@@ -40,7 +42,13 @@ class Engine(RayEngine, Protocol):
 
 
 ENGINES: dict[str, Callable[[BulletWorld, AngularGrid], Engine]] = {"bullet": Bullet, "fast": Fast}
-"""Engine makers by name."""
+"""Engine makers by name, each for the grid of one LiDAR."""
+
+
+def make_engine(name: str, world: BulletWorld, grid: Grid) -> Engine:
+    """The engine of a name for a world and the LiDARs of a grid."""
+    make = ENGINES[name]
+    return make(world, grid) if isinstance(grid, AngularGrid) else HeadEngines(make, world, grid)
 
 
 def check_engine(name: str) -> None:

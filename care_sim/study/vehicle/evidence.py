@@ -35,11 +35,11 @@ class Evidence:
         if not turned.any():
             return
         boxes = loop.world.boxes_of(loop.detected_bodies[turned])
-        cells = loop.rig.grid.cells_of(loop.sensor.boxes_to_local(boxes)[:, :3])
+        cells = loop.rig.grid.cells_at(loop.sensor.boxes_to_local(boxes)[:, :3])
         held = [
             sum(
-                cell in wedge.tolist()
-                for cell, wedge in zip(cells.tolist(), each.take(turned), strict=True)
+                bool(np.isin(own, wedge).any())
+                for own, wedge in zip(cells, each.take(turned), strict=True)
             )
             for each in (wedges(detections, loop.rig), wedges(detections.unturned(), loop.rig))
         ]

@@ -3,6 +3,7 @@ and whether the first-sighting actor is detected.
 """
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from PIL import Image, ImageDraw
@@ -22,6 +23,8 @@ _CAMERA = PinholeCamera(*_VIEW_SIZE, np.deg2rad(52.0), (-11.0, 0.0, 3.8), 0.0, n
 _TOP = 36
 _CELLS_SIZE = (512, 96)
 """Of the picture of any grid: three pixels a row for the paper's."""
+_APART = 4
+"""Pixels between the pictures of two LiDARs."""
 _GRID_TOP = _TOP + _VIEW_SIZE[1] + 22
 COMPARISON_WIDTH = _VIEW_SIZE[0]
 _COMPARISON_HEIGHT = 508
@@ -72,14 +75,22 @@ def _chase_view(loop: ClosedLoop, frame: Keyframe) -> Image.Image:
 
 
 def _cells_ahead(loop: ClosedLoop) -> Image.Image:
-    """The columns of the front half, from its left to its right."""
+    """The columns of the front half, from its left to its right; several LiDARs one below the
+    other.
+    """
     grid = loop.rig.grid
-    azimuths = grid.azimuths
-    ahead = np.argsort(azimuths, kind="stable")
-    ahead = ahead[np.abs(azimuths[ahead]) < np.pi / 2]
-    if not len(ahead):
-        return Image.new("RGB", _CELLS_SIZE, BACKGROUND)
-    return drawing.fitted(drawing.grid_picture(grid, loop.belief.ranges[:, ahead]), _CELLS_SIZE)
+    width, height = _CELLS_SIZE
+    cells = Image.new("RGB", _CELLS_SIZE, BACKGROUND)
+    tops = np.linspace(0, height + _APART, len(grid.heads) + 1).astype(int).tolist()
+    for head, (upper, below) in zip(grid.heads, pairwise(tops), strict=True):
+        azimuths = head.grid.azimuths
+        ahead = np.argsort(azimuths, kind="stable")
+        ahead = ahead[np.abs(azimuths[ahead]) < np.pi / 2]
+        if len(ahead):
+            first, last = head.rows
+            picture = drawing.grid_picture(grid, loop.belief.ranges[first : last + 1, ahead])
+            cells.paste(drawing.fitted(picture, (width, below - _APART - upper)), (0, upper))
+    return cells
 
 
 def verdict_text(frames: Sequence[Keyframe], keyframe_s: float) -> tuple[str, drawing.Colour]:

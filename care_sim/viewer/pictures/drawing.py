@@ -9,7 +9,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from care_sim.core.arrays import Floats
 from care_sim.core.boxes import BOX_EDGES, box_corners
-from care_sim.core.grid import AngularGrid
+from care_sim.core.grid_stack import Grid
 from care_sim.core.pinhole import NEAR_M, PinholeCamera
 
 Colour = tuple[int, int, int]
@@ -77,7 +77,7 @@ def image_boxes(
             label(draw, ((box[0] + box[2]) / 2, box[1]), name, colour, 11)
 
 
-def grid_picture(grid: AngularGrid, ranges: NDArray[np.floating]) -> Image.Image:
+def grid_picture(grid: Grid, ranges: NDArray[np.floating]) -> Image.Image:
     """The scan (E, n) of the grid, or of some of its columns, as the car sees it: its left is left.
     A pixel a cell.
     """

@@ -8,6 +8,7 @@ from PIL import Image, ImageDraw
 
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
+from care_sim.core.grid_stack import Grid
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import CLASSES, Tracks
 from care_sim.loops.closed_loop import ClosedLoop
@@ -47,6 +48,8 @@ GRID_LEFT = 392
 _GRID_MIDDLE = 224
 _GRID_SIZE = (512, 128)
 """Of the picture of any grid: four pixels a row for the paper's."""
+_NAMES_HEIGHT = 22
+"""Of the names of directions between the pictures of two LiDARs."""
 _DIRECTIONS = {
     "behind": np.pi,
     "left": np.pi / 2,
@@ -141,26 +144,37 @@ def mark_tracks(draw: ImageDraw.ImageDraw, camera: PinholeCamera, tracks: Tracks
 
 
 def draw_grid(
-    canvas: Image.Image, at: tuple[int, int], grid: AngularGrid, ranges: NDArray[np.floating]
+    canvas: Image.Image, at: tuple[int, int], grid: Grid, ranges: NDArray[np.floating]
 ) -> None:
     """The angular grid with a scan (E, A), with its left and top words `at` a pixel of a picture,
-    its directions and a legend of its colours.
+    its directions and a legend of its colours. Several LiDARs come one below the other.
     """
     left, top = at
     draw = ImageDraw.Draw(canvas)
-    picture = drawing.fitted(drawing.grid_picture(grid, ranges), _GRID_SIZE)
-    canvas.paste(picture, (left, top + 44))
-    bottom = top + 44 + picture.height
-    view_deg = np.rad2deg(grid.field_of_view)
-    view = "all around the car" if grid.turn == grid.columns else f"{view_deg:.0f} degrees wide"
-    draw.text(
-        (left, top + 8), f"LiDAR: cells fired in the last scan, {view}", INK, drawing.font(14)
-    )
-    for share, name in directions(grid):
-        place = (left + share * picture.width, bottom + 4)
-        anchor = {0.0: "la", 1.0: "ra"}.get(share, "ma")
-        draw.text(place, name, FAINT_INK, drawing.font(13), anchor=anchor)
-    _draw_legend(canvas, draw, left, bottom + 26, grid.range_m)
+    draw.text((left, top + 8), _grid_words(grid), INK, drawing.font(14))
+    # All share the room of one, and every one has its own directions.
+    count = len(grid.heads)
+    width, height = _GRID_SIZE
+    strip = max(1, (height - (count - 1) * _NAMES_HEIGHT) // count)
+    for number, head in enumerate(grid.heads):
+        first, last = head.rows
+        picture = drawing.grid_picture(grid, ranges[first : last + 1])
+        upper = top + 44 + number * (strip + _NAMES_HEIGHT)
+        canvas.paste(drawing.fitted(picture, (width, strip)), (left, upper))
+        for share, name in directions(head.grid):
+            anchor = {0.0: "la", 1.0: "ra"}.get(share, "ma")
+            place = (left + share * width, upper + strip + 4)
+            draw.text(place, name, FAINT_INK, drawing.font(13), anchor=anchor)
+    _draw_legend(canvas, draw, left, upper + strip + 26, grid.range_m)
+
+
+def _grid_words(grid: Grid) -> str:
+    first, *others = grid.heads
+    if others:
+        return f"{len(grid.heads)} LiDARs: cells fired in the last scan, one below the other"
+    view_deg = np.rad2deg(first.grid.field_of_view)
+    view = "all around the car" if first.grid.goes_round else f"{view_deg:.0f} degrees wide"
+    return f"LiDAR: cells fired in the last scan, {view}"
 
 
 def directions(grid: AngularGrid) -> list[tuple[float, str]]:

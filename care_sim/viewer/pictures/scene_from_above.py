@@ -165,5 +165,5 @@ def _ranges(
     if record is not None:
         # A recording may hold several points of one cell: the nearest counts.
         ranges[record.fired] = grid.range_m
-        np.minimum.at(ranges, returned.cells, np.linalg.norm(returned.points, axis=1))
+        np.minimum.at(ranges, returned.cells, grid.ranges_to(returned.cells, returned.points))
     return ranges.reshape(grid.shape)

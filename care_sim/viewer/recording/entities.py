@@ -58,7 +58,8 @@ ENTITIES = {
         "the middle and behind at both ends"
     ),
     "grid/cells": (
-        f"share of every cell; pixel x = A - 1 - column, y = {ROW_PIXELS} * row (row 0 the highest)"
+        f"share of every cell; pixel x = A - 1 - column, y = {ROW_PIXELS} * row (row 0 the "
+        "highest); several LiDARs one below the other"
     ),
     "grid/hulls": "dilated hulls of the forecasts, as outlines; pixels of `grid/cells`",
     "grid/wedges/residual": "dilated wedges of the residual, as outlines; pixels of `grid/cells`",

@@ -10,7 +10,8 @@ from PIL import Image
 
 from care_sim.core.actions import SHARES
 from care_sim.core.arrays import Floats
-from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.grid import Cells
+from care_sim.core.grid_stack import Grid
 from care_sim.core.residual import wedges
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES, ImageDetections
@@ -150,16 +151,22 @@ def photograph(loop: ClosedLoop) -> bytes:
     return file.getvalue()
 
 
-def outlines(sectors: Sequence[Cells], grid: AngularGrid) -> Floats:
+def outlines(sectors: Sequence[Cells], grid: Grid) -> Floats:
     """(n, 4: left, top, right, bottom in pixels) boxes around angular rectangles of cells, over the
     picture of the grid: two for one that lies across the seam of the grid, none for one without
     cells.
     """
-    boxes = [box for cells in sectors if len(cells) for box in _cell_boxes(cells, grid)]
+    # Of several LiDARs each has a rectangle of its own.
+    parts = [
+        cells[slice(*np.searchsorted(cells, (head.first, head.cells.stop)))]
+        for cells in sectors
+        for head in grid.heads
+    ]
+    boxes = [box for cells in parts if len(cells) for box in _cell_boxes(cells, grid)]
     return np.array(boxes, float).reshape(-1, 4)
 
 
-def _cell_boxes(cells: Cells, grid: AngularGrid) -> list[tuple[float, ...]]:
+def _cell_boxes(cells: Cells, grid: Grid) -> list[tuple[float, ...]]:
     top = int(cells[0]) // grid.columns
     bottom = int(cells[-1]) // grid.columns + 1
     # Cells ascend row by row, and every row has the columns of the first. These have a gap where

@@ -9,7 +9,9 @@ import pytest
 import care_sim
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
+from care_sim.core.sensor_setup import grid_of
 from care_sim.wrappers import ExportScans
+from tests.helpers.lidars import CORNERS
 
 
 @pytest.fixture(scope="module")
@@ -106,3 +108,20 @@ def test_a_folder_that_holds_scans_is_refused_before_play(open3d, tmp_path):
             env.step(np.zeros(env.action_space.shape, np.float32))
         assert env.unwrapped.loop.index == 0
     assert [path.name for path in tmp_path.iterdir()] == ["000.pcd"]
+
+
+def test_scans_of_several_lidars_are_one_cloud_in_the_frame_of_the_first(open3d, tmp_path):
+    env = gymnasium.make("CARE-Dense-v0", sensor=CORNERS, budget=1.0, disable_env_checker=True)
+    with ExportScans(env, tmp_path / "scans", care_sim.make_policy("full", env)) as env:
+        env.reset(seed=0)
+        env.step(np.ones(env.action_space.shape, np.float32))
+        ranges = env.unwrapped.loop.belief.ranges.ravel()
+    grid = grid_of(beside(tmp_path / "scans", "episode")["grid"])
+    assert grid == CORNERS.grid
+    cloud = open3d.t.io.read_point_cloud(str(tmp_path / "scans" / "000.pcd")).point
+    cells = cloud["cell"].numpy().ravel()
+    points = cloud["positions"].numpy()
+    assert {*np.searchsorted([512, 768], cells, side="right").tolist()} == {0, 1, 2}
+    np.testing.assert_allclose(points, grid.points(cells, ranges[cells]), rtol=1e-5, atol=1e-4)
+    # The corners stand lower than the roof, and all meet the same road.
+    assert points[:, 2].min() == pytest.approx(-1.8, abs=0.01)

@@ -23,6 +23,7 @@ from care_sim.scenarios import SCENARIOS
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.episode_play import run_episode, trace
 from care_sim.study.executors import processes
+from tests.helpers.lidars import STACK
 
 CONFIG = EpisodeConfig("dartout", "care", 0.1, seed=3)
 
@@ -158,6 +159,18 @@ def test_fullness_counts_the_cells_of_a_sector_in_all_rows():
     assert fullness(np.arange(grid.size), grid) == "z" * SECTORS
     assert fullness(np.repeat(np.arange(grid.size), 4), grid) == "z" * SECTORS
     assert fullness(np.array(third[: len(third) // 7]), grid)[2] == "5"
+
+
+def test_fullness_is_that_of_the_cells_of_all_lidars():
+    """The left corner of 120 degrees is a third of what lies there: four rows of narrow columns."""
+    left = STACK.heads[1]
+    ahead_left = SECTORS * 200 // 360
+    # Sectors are narrower than the columns of the roof: some hold no cell.
+    assert {*fullness(np.arange(STACK.size), STACK)} == {"0", "z"}
+    alone = fullness(np.arange(left.first, left.cells.stop), STACK)
+    assert {*alone} > {"0"}
+    assert alone[ahead_left] not in "0z"
+    assert alone[0] == "0"
 
 
 def test_a_box_in_the_middle_of_the_picture_is_straight_ahead(seen):

@@ -5,6 +5,7 @@ from dataclasses import replace
 import gymnasium
 import numpy as np
 import pytest
+from PIL import Image
 
 import care_sim
 from care_sim.core.grid import AngularGrid
@@ -21,9 +22,11 @@ from care_sim.viewer.pictures.keyframe import (
     PICTURE_WIDTH,
     SURROUND_HEIGHT,
     directions,
+    draw_grid,
     draw_keyframe,
 )
 from care_sim.viewer.pictures.sought import DETECTED, IN_VIEW, OUT_OF_VIEW
+from tests.helpers.lidars import CORNERS, STACK
 
 
 def make(name, **arguments):
@@ -148,6 +151,36 @@ def test_a_setting_with_another_sensor_is_drawn_within_the_picture():
     assert (picture[PANELS_TOP + 44 : -30, 376 : GRID_LEFT - 2] == background).all()
     assert (picture[PANELS_TOP + 44 : -30, GRID_LEFT + 514 :] == background).all()
     assert panel.size == (512, 508)
+
+
+def test_several_lidars_are_drawn_one_below_the_other_within_the_room_of_one():
+    """All cells of the third have returned; of the second none was fired."""
+    canvas = Image.new("RGB", (PICTURE_WIDTH, PICTURE_HEIGHT), drawing.BACKGROUND)
+    ranges = np.zeros(STACK.shape)
+    ranges[:8] = STACK.range_m
+    ranges[12:] = 10.0
+    draw_grid(canvas, (GRID_LEFT, PANELS_TOP), STACK, ranges)
+    picture = np.asarray(canvas)
+    assert (picture[:, : GRID_LEFT - 2] == drawing.BACKGROUND).all()
+    colours = [tuple(pixel) for pixel in picture[PANELS_TOP + 44 :, GRID_LEFT + 256]]
+    near = tuple(drawing.range_colours(np.array([10 / 80]))[0])
+    where = [colours.index(one) for one in (drawing.NO_RETURN_COLOUR, near)]
+    between = colours[where[0] : where[1]]
+    assert drawing.NOT_FIRED_COLOUR in between
+    assert where[1] < 128
+    # One that goes all round names its ends, and the others what lies in their view.
+    assert [name for _, name in directions(STACK.grids[1])] == ["left", "ahead"]
+
+
+def test_a_panel_of_several_lidars_shows_what_each_has_ahead():
+    with gymnasium.make("CARE-Dense-v0", sensor=CORNERS, budget=1.0) as env:
+        env.reset(seed=0)
+        env.step(np.ones(env.action_space.shape, np.float32))
+        panel = draw_panel("care", env.unwrapped.loop, env.unwrapped.keyframes)
+    # Four pixels of background lie between two of them.
+    column = [tuple(pixel) for pixel in np.asarray(panel)[378:474, 300]]
+    assert panel.size == (512, 508)
+    assert column.count((0, 0, 0)) + column.count(drawing.BACKGROUND) == 8
 
 
 @pytest.mark.parametrize("heading", [-np.pi, np.pi])

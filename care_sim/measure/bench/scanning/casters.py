@@ -10,9 +10,10 @@ from care_sim.base.errors import MissingExtra
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.grid_stack import Grid
 from care_sim.measure.bench.scanning.embree import Embree
 from care_sim.measure.bench.scanning.mujoco import MuJoCo
-from care_sim.sensors.engines import ENGINES
+from care_sim.sensors.engines import ENGINES, make_engine
 from care_sim.world.bodies import BodyKind
 from care_sim.world.bullet import BulletWorld
 
@@ -41,10 +42,10 @@ PEER_CASTERS: dict[str, Callable[[Sequence[BodyKind], AngularGrid], Caster]] = {
 class EngineCaster:
     """An engine of the benchmark over a PyBullet world with these bodies."""
 
-    def __init__(self, engine: str, kinds: Sequence[BodyKind], grid: AngularGrid):
+    def __init__(self, engine: str, kinds: Sequence[BodyKind], grid: Grid):
         self.world = BulletWorld()
         self._bodies = np.array([self.world.add(kind, (0.0, 0.0, 0.0)) for kind in kinds])
-        self._engine = ENGINES[engine](self.world, grid)
+        self._engine = make_engine(engine, self.world, grid)
 
     def place(self, poses: Floats) -> None:
         """Move all bodies: (n, 3) x, y, heading."""
