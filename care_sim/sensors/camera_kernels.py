@@ -26,7 +26,7 @@ def reported_boxes(
     count = 0
     for n in range(len(bodies)):
         body = bodies[n]
-        if body < len(classes) and classes[body] >= 0 and pixels[n] >= MIN_PIXELS:
+        if 0 <= body < len(classes) and classes[body] >= 0 and pixels[n] >= MIN_PIXELS:
             one = rows[count]
             one[_CLASS] = classes[body]
             # As `care_sim.sensors.confidence.confidence_of` has it.

@@ -73,8 +73,10 @@ class StraightVehicle(Vehicle):  # type: ignore[misc]
 
 
 class LaneDriver(StraightVehicle, IDMVehicle):  # type: ignore[misc]
-    """An IDM driver, to the last bit, who neither steers nor looks for the nearest lane in the
-    middle of one. Its numbers are plain floats, which NumPy would clip one by one.
+    """An IDM driver who neither steers nor looks for the nearest lane in the middle of one. Its
+    numbers are plain floats, which NumPy would clip one by one. It moves as highway-env's, to the
+    last bit, as long as it neither changes lanes by itself nor is asked whether it crashed: then
+    nothing reads the timer and the flag that are left alone here.
     """
 
     def act(self, action: dict[str, float] | str | None = None) -> None:

@@ -202,7 +202,8 @@ class World:
 
     def advance(self, acceleration: float, duration: float) -> ClosestApproach:
         """Move everything by `duration` seconds, a whole number of world steps. The ego holds
-        `acceleration` (m/s^2) meanwhile.
+        `acceleration` (m/s^2) meanwhile. Clearance and distance are those of the first-sighting
+        actor at its beginning.
         """
         # Looked at after every step: between two keyframes the car may hit something and be past
         # it, or come closest to it.

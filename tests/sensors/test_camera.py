@@ -12,7 +12,7 @@ from care_sim.sensors.camera import (
     faultless_detections,
     window_on,
 )
-from care_sim.sensors.confidence import FULL_CONFIDENCE, MIN_PIXELS
+from care_sim.sensors.confidence import FULL_CONFIDENCE, MIN_PIXELS, confidence_of
 from care_sim.world.bodies import CATALOGUE
 
 SENSOR = Frame(0.0, 0.0, 1.84, 0.0)
@@ -146,6 +146,8 @@ def test_confidence_grows_with_the_visible_pixels_from_a_quarter():
         return detector({3: 0}).detect(picture((3, 0, 0, pixels, 1)), 0.0).confidences[0]
 
     assert confidence(MIN_PIXELS) == pytest.approx(0.25)
+    for pixels in (MIN_PIXELS, 13, 77, 57_600):
+        assert confidence(pixels) == confidence_of(float(pixels))
     assert confidence(FULL_CONFIDENCE) == pytest.approx(0.5)
     assert confidence(300) > confidence(200)
 

@@ -45,7 +45,8 @@ class Energy(FreeCells):
 
     def fire(self, scores: NDArray[Any], budget: int, floor: Floor, last: Cells) -> Cells:
         """A cell for every shot, ascending: one that is fired n times stands there n times."""
-        flat = scores.ravel().astype(np.float64)
+        # A score is what an action holds, float32; a share of it needs more bits.
+        flat = scores.ravel().astype(np.float32).astype(np.float64)
         cells = demanded(scores)
         # The nth shot of a cell comes after n shots of every cell before it, so that no more cells
         # than the budget holds n times can have an nth shot.

@@ -127,6 +127,7 @@ class _Path:
         cells = watch(ALLOCATION, allocate, demand, self._rig.budget, reserve)
         self._fired = watch(FIRING, self._chosen, cells, number)
 
+        # The rig fires free cells, none of them twice.
         self.caster.place(self._bodies.at(number / _SLOWER))
         ranges, _ = watch(SCAN, self.caster.cast, SENSOR, self._fired)
         cloud = self._returns(ranges)
