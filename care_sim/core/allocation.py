@@ -37,7 +37,7 @@ def budget_cells(budget: float, cells: int, unit: str = "cell") -> int:
         raise InvalidInput(f"budget must lie in (0, 1], got {shown(budget)}")
     if round(float(budget) * cells) < 1:
         raise InvalidInput(
-            f"budget {budget} leaves no {unit} of {cells}; the least is {1 / cells:.2g}"
+            f"budget {budget} leaves no {unit} of {cells}; {1 / cells:.2g} is one"
         )
     return round(float(budget) * cells)
 

@@ -146,7 +146,7 @@ def test_confidence_grows_with_the_visible_pixels_from_a_quarter():
         return detector({3: 0}).detect(picture((3, 0, 0, pixels, 1)), 0.0).confidences[0]
 
     assert confidence(MIN_PIXELS) == pytest.approx(0.25)
-    for pixels in (MIN_PIXELS, 13, 77, 57_600):
+    for pixels in (MIN_PIXELS, 13, 77, 319):
         assert confidence(pixels) == confidence_of(float(pixels))
     assert confidence(FULL_CONFIDENCE) == pytest.approx(0.5)
     assert confidence(300) > confidence(200)

@@ -239,7 +239,7 @@ def test_the_budget_is_rounded_in_units():
     assert hardware_of("rows", AngularGrid()).budget_cells(0.03) == 512
     assert hardware_of("tiles", AngularGrid()).budget_cells(0.03) == 15 * 32
     assert hardware_of("cells", AngularGrid()).budget_cells(0.03) == 492
-    with pytest.raises(InvalidInput, match=r"budget 0.01 leaves no row of 32; the least is 0.031"):
+    with pytest.raises(InvalidInput, match=r"budget 0.01 leaves no row of 32; 0.031 is one"):
         hardware_of("rows", AngularGrid()).budget_cells(0.01)
 
 
