@@ -1,7 +1,9 @@
 """The result file of the benchmark: what its score is, and what is refused."""
 
 import json
+import re
 from dataclasses import replace
+from math import comb
 
 import pytest
 from hypothesis import given, settings
@@ -10,9 +12,16 @@ from hypothesis import strategies as st
 from care_sim.base.errors import InvalidInput
 from care_sim.policies import tags_of
 from care_sim.study.benchmark.made_by import is_of_this_code, made_by, own_code_of
+from care_sim.study.benchmark.replay import ONE_IN
 from care_sim.study.benchmark.result_file import read_result
 from care_sim.study.benchmark.tasks import Entry
-from care_sim.study.benchmark.worlds import BENCHMARK_VERSION, PARTS, STREETS, published_worlds
+from care_sim.study.benchmark.worlds import (
+    BENCHMARK_VERSION,
+    PARTS,
+    SIZES,
+    STREETS,
+    published_worlds,
+)
 from tests.helpers.made_results import made_result
 from tests.helpers.places import ROOT
 
@@ -231,3 +240,18 @@ def test_the_numbers_of_sealed_worlds_ascend(tmp_path, spoil):
     others = [world for world in worlds if world.part != STREETS]
     made_result(sealed=SEAL, worlds=[*others, *spoil(streets)]).write(tmp_path / "mine.json")
     assert "must ascend" in refusal(tmp_path / "mine.json")
+
+
+def test_the_page_tells_how_often_made_up_rows_pass():
+    """Drawn without being put back, of the rows that make the score."""
+    rows = sum(SIZES.values())
+    drawn = -(-rows // ONE_IN["measured"])
+    assert drawn + -(-rows // ONE_IN["ideal"]) == 2 * rows // 10
+    page = (ROOT / "docs" / "benchmark.md").read_text()
+    told = re.findall(r"^\| (\d+) \| ([\d.,]+) times \|$", page, re.M)
+    assert len(told) == 3
+    for made_up, times in told:
+        chance = comb(rows - int(made_up), drawn) / comb(rows, drawn)
+        assert float(times.replace(",", "")) == pytest.approx(1 / chance, rel=0.01)
+    ten = comb(rows - 10, drawn) / comb(rows, drawn)
+    assert f"three calls once in {ten**-3:.0f} times" in page
