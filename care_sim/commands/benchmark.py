@@ -29,6 +29,8 @@ from care_sim.study.benchmark.worlds import (
 from care_sim.study.executors import CORES, MOST_WORKERS, processes
 from care_sim.study.run_config import parameters_for
 
+_OUT = Path("runs/benchmark")
+
 
 @dataclass(frozen=True, kw_only=True)
 class Benchmark:
@@ -44,12 +46,14 @@ class Benchmark:
     cell_order: str = AS_DEMANDED
     """In which order the cells of a set are taken, a part of the entry: the policy's own, or one of
     rows-down, rows-up, columns, random, spread, core-spread."""
+    name: str = ""
+    """What you call the entry, for its line in tables, where one policy is played alone."""
     quick: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """The first tenth of the worlds alone: a trial, and no line of the leaderboard."""
     sealed: Path | None = None
     """For whoever runs a competition: a file with a secret salt, which draws other worlds. The
     journal in the folder holds their seeds; the result files do not."""
-    out: Path = Path("runs/benchmark")
+    out: Path = _OUT
     """Folder of the result files; what is finished stays there, and the same command goes on."""
     workers: int = bounded(CORES, 1, MOST_WORKERS)
     """Processes that play at the same time."""
@@ -62,6 +66,11 @@ class Benchmark:
         check_values(self, "policy")
         if self.quick and self.sealed:
             raise InvalidInput("a sealed set is played whole: give either quick or sealed")
+        if self.sealed and self.out == _OUT:
+            raise InvalidInput(
+                f"a sealed set leaves its seeds in the folder: give --out one that only you read, "
+                f"not {_OUT}"
+            )
         salt = Salt.read(self.sealed) if self.sealed else None
         entries, left_out = self._entries()
         for entry in entries:
@@ -86,16 +95,21 @@ class Benchmark:
         given = policy_parameters(self.policy_parameters, self.policy)
 
         def entry(name: str) -> Entry:
-            return Entry(name, parameters_for(name, given), self.cell_order)
+            return Entry(name, parameters_for(name, given), self.cell_order, self.name)
 
         # One world of every part is enough to see whether a policy can be made.
         tried = [*{world.part: world for world in published_worlds()}.values()]
         policies, left_out = playable(self.policy, lambda name: tasks_of(entry(name), tried))
         if not policies:
             raise InvalidInput("none of the policies can be played")
-        return [entry(name) for name in policies], left_out
+        entries = [entry(name) for name in policies]
+        if self.name and len(entries) > 1:
+            raise InvalidInput("--name names one entry, and several policies are given")
+        for each in entries:
+            each.check()
+        return entries, left_out
 
     def _file(self, entry: Entry) -> Path:
         kind = ".quick" if self.quick else ".sealed" if self.sealed else ""
-        name = re.sub(r"[^\w.=-]+", "-", entry.name)
+        name = re.sub(r"[^\w.=-]+", "-", entry.full_name)
         return self.out / f"{name}{kind}.json"

@@ -1,6 +1,7 @@
 """`care-sim leaderboard`: results of the benchmark in one table, or a tenth of them again."""
 
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from random import SystemRandom
@@ -10,19 +11,21 @@ from typing import Annotated
 import tyro
 
 from care_sim.base.bounds import bounded, check_fields
-from care_sim.base.errors import InvalidInput, counted, report_problems
+from care_sim.base.errors import InvalidInput, MissingExtra, counted, report_problems
 from care_sim.base.files import check_output, write_text
 from care_sim.base.json_text import json_content
 from care_sim.commands.shared.study_command import DONE, FAILED, console
 from care_sim.reports.figures.files import check_figure, save
 from care_sim.reports.figures.leaderboard import LEADERBOARD_FIGURE, leaderboard_figure
 from care_sim.reports.leaderboard import leaderboard_table
-from care_sim.study.benchmark.player import player_in
-from care_sim.study.benchmark.replay import replayed
-from care_sim.study.benchmark.result import BenchmarkResult, is_result, read_result
-from care_sim.study.benchmark.worlds import Salt
+from care_sim.study.benchmark.made_by import is_of_this_code, own_code_of
+from care_sim.study.benchmark.player import Player, player_in
+from care_sim.study.benchmark.replay import Replay, replayed
+from care_sim.study.benchmark.result import BenchmarkResult
+from care_sim.study.benchmark.result_file import is_result, read_result
+from care_sim.study.benchmark.screening import screened_worlds
+from care_sim.study.benchmark.worlds import Salt, World
 from care_sim.study.executors import CORES, MOST_WORKERS
-from care_sim.study.provenance import code_digest
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,7 +37,7 @@ class Leaderboard:
     results: Annotated[
         tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER...")
     ] = ()
-    """Folders with result files, or such files. Of two with one name the first counts."""
+    """Folders with result files, or such files. Of two with one name and code the first counts."""
     quick: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """Compare on the tenth of the worlds that `benchmark --quick` plays: a trial."""
     verify: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
@@ -68,9 +71,9 @@ class Leaderboard:
 
     def _show(self, results: Sequence[BenchmarkResult]) -> None:
         # One table for the published worlds, one for every sealed set.
-        sets = {
-            each.sealed: [one for one in results if one.sealed == each.sealed] for each in results
-        }
+        sets: dict[object, list[BenchmarkResult]] = {}
+        for each in results:
+            sets.setdefault((each.sealed, each.worlds), []).append(each)
         tables = [leaderboard_table(own) for own in sets.values()]
         page = self.out / f"{LEADERBOARD_FIGURE}.md"
         check_output(page)
@@ -83,32 +86,49 @@ class Leaderboard:
         print(f"Page: {page}")
 
     def _verified(self, results: dict[Path, BenchmarkResult]) -> list[str]:
-        """Print how each result holds; a line for each that does not."""
+        """Print how each result holds; a line for each that does not, or cannot be played."""
         salt = Salt.read(self.sealed) if self.sealed else None
+        worlds: list[World] = []
+        if salt and any(result.sealed == salt.digest for result in results.values()):
+            # Which worlds count is worked out again, once for all results.
+            with self._player() as player:
+                worlds = screened_worlds(player, salt)
         problems = []
         for path, result in results.items():
-            # A journal that lasts would answer with what was played before.
-            with (
-                TemporaryDirectory(prefix="care-sim-") as folder,
-                player_in(Path(folder), self.workers) as player,
-            ):
-                replay = replayed(result, player, SystemRandom(), salt)
-            drawn = f"{counted(replay.played, 'episode')} of {len(result.rows)}, drawn by lot,"
+            try:
+                with self._player() as player:
+                    replay = replayed(result, player, SystemRandom(), salt, worlds)
+            except (InvalidInput, MissingExtra) as error:
+                problems.append(f"{path} cannot be verified: {error}")
+                continue
             if replay.holds:
-                print(f"{path}: {drawn} went again as it says")
-            problems += [
-                f"{path}: of {drawn} {len(replay.differing)} did not go as it says, the first "
-                f"world {row.world} of the {row.part} with the {row.camera} camera"
-                + ("" if _is_of_this_code(result) else "; it was played by other code than is here")
-                for row in replay.differing[:1]
-            ]
-            problems += [f"{path}: {failure}" for failure in replay.failures[:1]]
+                print(f"{path}: {_drawn(replay, result)} went again as it says")
+            problems += [f"{path}: {problem}" for problem in _told(replay, result)]
         return problems
 
+    @contextmanager
+    def _player(self) -> Iterator[Player]:
+        # A journal that lasts would answer with what was played before.
+        with (
+            TemporaryDirectory(prefix="care-sim-") as folder,
+            player_in(Path(folder), self.workers) as player,
+        ):
+            yield player
 
-def _is_of_this_code(result: BenchmarkResult) -> bool:
-    told = result.made_by.get("versions")
-    return isinstance(told, dict) and told.get("code") == code_digest()
+
+def _told(replay: Replay, result: BenchmarkResult) -> list[str]:
+    """A line for each kind of thing in which a result does not hold."""
+    other = "" if is_of_this_code(result) else "; it was played by other code than is here"
+    differing = [
+        f"of {_drawn(replay, result)} {len(replay.differing)} did not go as it says, the first "
+        f"world {row.world} of the {row.part} with the {row.camera} camera{other}"
+        for row in replay.differing[:1]
+    ]
+    return [*replay.false, *differing, *map(str, replay.failures[:1])]
+
+
+def _drawn(replay: Replay, result: BenchmarkResult) -> str:
+    return f"{counted(replay.played, 'episode')} of {len(result.rows)}, drawn by lot,"
 
 
 def _read(places: Sequence[Path]) -> tuple[dict[Path, BenchmarkResult], list[str]]:
@@ -153,8 +173,9 @@ def _files(places: Sequence[Path]) -> Iterator[Path]:
 def _of_whole(
     found: dict[Path, BenchmarkResult], quick: bool
 ) -> tuple[list[BenchmarkResult], list[str]]:
-    """Those that belong in one table, each name once, and a line for each of the others."""
-    kept: dict[tuple[str | None, str], tuple[Path, BenchmarkResult]] = {}
+    """Those that belong in tables, each entry once, and a line for each of the others."""
+    kept: dict[tuple[object, ...], tuple[Path, BenchmarkResult]] = {}
+    first_of: dict[str | None, tuple[Path, BenchmarkResult]] = {}
     problems = []
     for path, result in found.items():
         if result.quick and not quick:
@@ -163,11 +184,18 @@ def _of_whole(
                 "compare tenths with care-sim leaderboard --quick"
             )
             continue
-        key = result.sealed, result.entry.name
+        first, other = first_of.setdefault(result.sealed, (path, result))
+        if result.sealed and result.worlds != other.worlds:
+            problems.append(
+                f"{path} has a table of its own: its worlds are not those of {first}, which names "
+                "the same salt; verify both with it"
+            )
+        # Two people may call theirs mine:Mine; of one policy, code and files are the same.
+        key = result.sealed, result.entry.name, own_code_of(result)
         if key in kept:
             # The same policy, whole and as a trial, lies in one folder without harm.
             if not quick:
-                problems.append(f"left out: {path}, since {kept[key][0]} has its name")
+                problems.append(f"left out: {path}, since {kept[key][0]} has its name and its code")
             continue
         kept[key] = path, result.cut_to_tenth() if quick else result
     return [result for _, result in kept.values()], problems

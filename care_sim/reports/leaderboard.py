@@ -1,11 +1,13 @@
 """The leaderboard: results of the benchmark in a table, and the page that explains it."""
 
+from collections import Counter
 from collections.abc import Sequence
 
 from care_sim.base.errors import counted
 from care_sim.evaluation.bootstrap import Interval
 from care_sim.reports.formatting import MARKS, bounds, marked, tag_notes
 from care_sim.reports.table import Bold, Table, TableRow
+from care_sim.study.benchmark.made_by import code_of
 from care_sim.study.benchmark.result import BenchmarkResult
 from care_sim.study.benchmark.tasks import CAMERAS, IDEAL, Entry
 from care_sim.study.benchmark.worlds import BENCHMARK_VERSION
@@ -26,6 +28,10 @@ _MINUS = (
 )
 _IDEAL = "Ideal camera: the score with a camera that reports whatever shows enough pixels."
 _UNRANKED = "No number: no policy that a car can have."
+_CODES = (
+    "Played by {} versions of the code of CARE-Sim: care-sim leaderboard --verify says whether "
+    "rows come out the same with the one that is here."
+)
 _TRIAL = "Only the tenth of the worlds that --quick plays: a trial, and no leaderboard."
 
 
@@ -36,10 +42,31 @@ def leaderboard_table(results: Sequence[BenchmarkResult]) -> Table:
     # What no car can have stands where its score puts it, and takes no place.
     contenders = [each for each in ranked if not is_beyond(each)]
     numbers = {id(each): f"{number}" for number, each in enumerate(contenders, 1)}
-    rows = tuple(_line(each, numbers.get(id(each), ""), control) for each in ranked)
+    names = names_in(ranked)
+    rows = tuple(
+        _line(each, name, numbers.get(id(each), ""), control)
+        for each, name in zip(ranked, names, strict=True)
+    )
     parts = results[0].parts
     columns = ("", "policy", "score", f"minus {CONTROL.name}", *parts, "ideal camera")
     return Table(title(results), columns, rows, notes_on(results), whole=("", "score"))
+
+
+def names_in(results: Sequence[BenchmarkResult]) -> list[str]:
+    """The name of each, marked where no car can have it; with the start of the hash of its code
+    where several have the name.
+    """
+    times = Counter(each.entry.name for each in results)
+    return [
+        marked(
+            each.entry.name
+            + (
+                f" #{each.made_by.get('policy_code', '')}"[:9] if times[each.entry.name] > 1 else ""
+            ),
+            each.tags,
+        )
+        for each in results
+    ]
 
 
 def title(results: Sequence[BenchmarkResult]) -> str:
@@ -54,7 +81,10 @@ def notes_on(results: Sequence[BenchmarkResult]) -> tuple[str, ...]:
     """What the columns and marks mean."""
     beyond = (_UNRANKED,) if any(map(is_beyond, results)) else ()
     trial = (_TRIAL,) if results[0].quick else ()
-    return (*trial, _SCORE, _MINUS, _IDEAL, *beyond, *tag_notes(each.tags for each in results))
+    codes = {*map(code_of, results)}
+    several = (_CODES.format(len(codes)),) if len(codes) > 1 else ()
+    tags = tag_notes(each.tags for each in results)
+    return (*trial, _SCORE, _MINUS, _IDEAL, *beyond, *tags, *several)
 
 
 def is_beyond(result: BenchmarkResult) -> bool:
@@ -62,10 +92,12 @@ def is_beyond(result: BenchmarkResult) -> bool:
     return bool({*result.tags} & {*MARKS}) or result.entry.policy == "full"
 
 
-def _line(result: BenchmarkResult, number: str, control: BenchmarkResult | None) -> TableRow:
+def _line(
+    result: BenchmarkResult, name: str, number: str, control: BenchmarkResult | None
+) -> TableRow:
     return (
         number,
-        marked(result.entry.name, result.tags),
+        name,
         _with_ends(result.score()),
         _lead(result, control),
         *(f"{result.part_score(part):.1f}" for part in result.parts),

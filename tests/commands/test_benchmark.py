@@ -10,7 +10,8 @@ import pytest
 
 from care_sim.cli import main
 from care_sim.study.benchmark import worlds
-from care_sim.study.benchmark.result import read_result
+from care_sim.study.benchmark.result_file import read_result
+from care_sim.study.benchmark.tasks import Entry
 from care_sim.study.benchmark.worlds import published_worlds
 from tests.helpers.made_results import made_result
 from tests.helpers.places import ROOT
@@ -25,8 +26,10 @@ TRANSCRIPT = [
     for line in text.splitlines()
     if "--quick" in line
 ]
-LOT = next(n for n in range(99) if Random(n).sample(range(6), 1) == [2])
-"""Rows of the trial are two a part: drive, test, street."""
+LOT = next(
+    n for n in range(99) if (r := Random(n)).sample(range(3), 1) == r.sample(range(3), 1) == [1]
+)
+"""Rows of the trial are one a part with each camera: drive, test, street."""
 THROWING = """
 import care_sim
 
@@ -50,7 +53,7 @@ def one_of_each(monkeypatch):
 
 @pytest.fixture
 def lot_of_a_test(monkeypatch):
-    """The lot of one in six falls on the test, which takes less time than a street or a drive."""
+    """Both lots fall on the test, which takes less time than a street or a drive."""
     monkeypatch.setattr("care_sim.commands.leaderboard.SystemRandom", lambda: Random(LOT))
 
 
@@ -77,7 +80,7 @@ def test_a_newcomer_gets_a_line(capsys, here, library, one_of_each, lot_of_a_tes
     assert code == 0
     assert re.search(r"^1 +corridor:Corridor +\d", out, re.M)
     assert "Result: runs/benchmark/corridor-Corridor.quick.json" in out
-    code, out, _ = run(capsys, *shlex.split(leaderboard)[1:])
+    code, out, _ = run(capsys, *shlex.split(leaderboard)[1:], library)
     assert code == 0
     assert {*re.findall(r"^\d +(\S+)", out, re.M)} == {"corridor:Corridor", "care", "place"}
     assert "Only the tenth of the worlds" in out
@@ -100,11 +103,18 @@ def test_a_newcomer_gets_a_line(capsys, here, library, one_of_each, lot_of_a_tes
 
     # Verified it holds; with every row made up it does not.
     code, out, _ = run(capsys, "leaderboard", "--verify", file)
-    assert (code, "1 episode of 6, drawn by lot, went again as it says" in out) == (0, True)
+    assert (code, "2 episodes of 6, drawn by lot, went again as it says" in out) == (0, True)
     result = read_result(file)
+    # The others are verified, whatever one is.
+    replace(result, tags=("learned",)).write(here / "a.json")
+    replace(result, entry=Entry("absent:Mine")).write(here / "b.json")
+    code, out, err = run(capsys, "leaderboard", "--verify", "a.json", "b.json", file)
+    assert (code, f"{file.name}: 2 episodes" in out) == (1, True)
+    assert "a.json: it says that the policy is learned, and it is causal" in err
+    assert "b.json cannot be verified: policy absent:Mine cannot be loaded" in err
     replace(result, rows=tuple(row._replace(hash="0" * 16) for row in result.rows)).write(file)
     code, _, err = run(capsys, "leaderboard", "--verify", file)
-    assert (code, "1 did not go as it says, the first world" in err) == (1, True)
+    assert (code, "2 did not go as it says, the first world" in err) == (1, True)
 
 
 def test_one_that_throws_is_named_and_the_other_has_its_file(capsys, here, monkeypatch):
@@ -125,11 +135,12 @@ def test_one_that_throws_is_named_and_the_other_has_its_file(capsys, here, monke
 
 
 def test_a_sealed_set_is_played_and_verified_by_its_salt_alone(capsys, here, monkeypatch):
-    monkeypatch.setattr(
-        "care_sim.commands.benchmark.screened_worlds",
-        lambda _player, salt: [worlds.World("tests", 0, salt.seed("tests", 0), 1)],
-    )
-    monkeypatch.setattr("care_sim.study.benchmark.result.SIZES", {"tests": 1})
+    for command in ("benchmark", "leaderboard"):
+        monkeypatch.setattr(
+            f"care_sim.commands.{command}.screened_worlds",
+            lambda _player, salt: [worlds.World("tests", 0, salt.seed("tests", 0), 1)],
+        )
+    monkeypatch.setattr("care_sim.study.benchmark.result_file.SIZES", {"tests": 1})
     (here / "salt.txt").write_text("0123456789abcdef" * 4)
     (here / "other.txt").write_text("fedcba9876543210" * 4)
     played = run(
@@ -144,7 +155,20 @@ def test_a_sealed_set_is_played_and_verified_by_its_salt_alone(capsys, here, mon
     assert run(capsys, "leaderboard", "--verify", "sealed", "--sealed", "salt.txt")[0] == 0
     for words in ([], ["--sealed", "other.txt"]):
         code, _, err = run(capsys, "leaderboard", "--verify", "sealed", *words)
-        assert (code, "sealed by the salt" in err) == (2, True)
+        assert (code, "sealed by the salt" in err) == (1, True)
+
+    # A world that the salt draws, and the screening passed over.
+    other = text.replace('"measured", 0,', '"measured", 1,').replace('"ideal", 0,', '"ideal", 1,')
+    (here / "sealed" / "other.json").write_text(other)
+    code, _, err = run(
+        capsys, "leaderboard", "--verify", "sealed/other.json", "--sealed", "salt.txt"
+    )
+    assert code == 1
+    assert "other.json: 1 of its worlds are not what the salt draws" in err
+    (here / "sealed" / "other.json").write_text(other.replace('"history"', '"care"'))
+    code, out, err = run(capsys, "leaderboard", "sealed")
+    assert (code, out.count("CARE-Sim benchmark 1:")) == (1, 2)
+    assert "other.json has a table of its own" in err
 
 
 def test_a_file_of_another_version_is_left_out_and_the_others_are_shown(capsys, library):
@@ -163,8 +187,18 @@ def test_of_two_results_of_one_name_the_first_counts(capsys, library, here):
     made_result("care", 0.1).write(here / "mine.json")
     code, out, err = run(capsys, "leaderboard", library, "mine.json")
     assert code == 1
-    assert f"left out: mine.json, since {library / 'care.json'} has its name" in err
+    assert f"left out: mine.json, since {library / 'care.json'} has its name and its code" in err
     assert out.count("care ") == 1
+
+
+def test_two_of_one_name_and_different_code_are_two_entries(capsys, here):
+    for n, code in enumerate(("aaaaaaaaaaaa", "bbbbbbbbbbbb")):
+        made = {"policy_code": code, "versions": {"code": code}}
+        made_result("mine:Mine", n, made_by=made).write(here / f"{n}.json")
+    code, out, _ = run(capsys, "leaderboard", ".")
+    assert code == 0
+    assert re.findall(r"mine:Mine (#\w+)", out) == ["#bbbbbbb", "#aaaaaaa"]
+    assert "Played by 2 versions of the code" in " ".join(out.split())
 
 
 @pytest.mark.parametrize(
@@ -175,9 +209,15 @@ def test_of_two_results_of_one_name_the_first_counts(capsys, library, here):
         (["benchmark", "--policy", "absent:Mine"], "No module named 'absent'"),
         (["benchmark", "--policy", "math:pi"], "is no Policy"),
         (["benchmark", "--policy", "care", "--cell-order", "best"], "cell_order"),
-        (["benchmark", "--policy", "care", "--sealed", "none.txt"], "none.txt holds no salt"),
+        (
+            ["benchmark", "--policy", "care", "--sealed", "none.txt", "--out", "s"],
+            "none.txt holds no salt",
+        ),
         (["benchmark", "--policy", "care", "--quick", "--sealed", "x"], "either quick or sealed"),
         (["benchmark", "--policy", "care", "--policy-parameters", "k=1"], "k"),
+        (["benchmark", "--policy", "care", "--sealed", "x"], "give --out"),
+        (["benchmark", "--policy", "care", "place", "--name", "Ours"], "names one entry"),
+        (["benchmark", "--policy", "care", "--name", "a|b"], "without | <"),
         (["leaderboard"], "name a folder"),
         (["leaderboard", "."], "no result of care-sim benchmark in ."),
         (["leaderboard", "none"], "none cannot be read"),

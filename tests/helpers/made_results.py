@@ -1,14 +1,17 @@
 """Results of the benchmark that nobody played."""
 
+from care_sim.policies import BUILT_IN, tags_of
 from care_sim.study.benchmark.result import BenchmarkResult, ResultRow
 from care_sim.study.benchmark.tasks import CAMERAS, Entry
 from care_sim.study.benchmark.worlds import PARTS, published_worlds
 
 
-def made_result(policy="mine", share=0.5, tags=("causal",), worlds=None, **given):
+def made_result(policy="mine", share=0.5, tags=None, worlds=None, **given):
     """One that reaches everything in the first `share` of the worlds of every part, and nothing in
     the others.
     """
+    if tags is None:
+        tags = tags_of(policy) if policy in BUILT_IN else ("causal",)
     rows = []
     for part in PARTS:
         own = [world for world in worlds or published_worlds() if world.part == part]

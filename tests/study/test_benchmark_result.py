@@ -1,17 +1,29 @@
 """The result file of the benchmark: what its score is, and what is refused."""
 
 import json
+import re
 from dataclasses import replace
+from math import comb
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
-from care_sim.study.benchmark.result import read_result
+from care_sim.policies import tags_of
+from care_sim.study.benchmark.made_by import is_of_this_code, made_by, own_code_of
+from care_sim.study.benchmark.replay import ONE_IN
+from care_sim.study.benchmark.result_file import read_result
 from care_sim.study.benchmark.tasks import Entry
-from care_sim.study.benchmark.worlds import BENCHMARK_VERSION, PARTS, STREETS, published_worlds
+from care_sim.study.benchmark.worlds import (
+    BENCHMARK_VERSION,
+    PARTS,
+    SIZES,
+    STREETS,
+    published_worlds,
+)
 from tests.helpers.made_results import made_result
+from tests.helpers.places import ROOT
 
 SEAL = "5" * 64
 
@@ -128,11 +140,69 @@ def test_other_worlds_are_refused(file, spoil):
         {"rows": [["drives", "measured", 201, 0.5, 1, "h"]]},
         {"rows": [["drives", "measured", 201, 0, 0, "h"]]},
         {"made_by": None},
+        {"rows": [["drives", "measured", 201, 2, 1, "h"]]},
+        {"policy": "# care"},
+        {"policy": "<b>care</b>"},
+        {"policy": "math:pi|"},
+        {"label": "a | b"},
+        {"label": "a\nb"},
+        {"label": "long" * 40},
+        {"parameters": [["k", "<img src=x>"]]},
     ],
 )
 def test_a_damaged_file_is_named(file, values):
     told = refusal(changed(file, **values))
     assert told.startswith(f"{file} is damaged: ")
+
+
+@pytest.mark.parametrize("n", [2, 3, 4])
+def test_an_endless_number_is_refused_in_one_line(file, n):
+    rows = json.loads(file.read_text())["rows"]
+    changed(file, rows=[[*rows[0][:n], "ENDLESS", *rows[0][n + 1 :]], *rows[1:]])
+    file.write_text(file.read_text().replace('"ENDLESS"', "1e999"))
+    assert "a row must hold whole numbers" in refusal(file)
+
+
+def test_a_built_in_policy_has_its_own_tags_and_nobody_others_than_there_are(tmp_path, file):
+    """Without its tag the oracle would take the first place."""
+    path = tmp_path / "oracle.json"
+    made_result("history-oracle", tags=("causal",)).write(path)
+    assert "history-oracle" in refusal(path)
+    assert "it is" in refusal(path)
+    made_result("history-oracle").write(path)
+    assert read_result(path).tags == tags_of("history-oracle")
+    assert "unknown tags ['best']" in refusal(changed(file, tags=["best"]))
+
+
+def test_an_entry_shows_the_name_of_a_file_and_not_where_it_lies():
+    entry = Entry("mine:Mine", (("weights", "/home/me/w.npz"), ("maps", ("a/b.npz", "c"))))
+    assert entry.name == "mine:Mine weights=w.npz maps=('b.npz', 'c')"
+    assert "/home/me/w.npz" in entry.full_name
+    assert replace(entry, parameters=(), label="Ours").name == "Ours (mine:Mine)"
+
+
+def test_a_result_is_of_the_files_that_its_parameters_name(tmp_path):
+    weights = tmp_path / "w.txt"
+    weights.write_text("1")
+    entry = Entry("care", (("weights", str(weights)),))
+    result = replace(made_result("care"), entry=entry, made_by=made_by(entry))
+    result.write(tmp_path / "care.json")
+    assert is_of_this_code(read_result(tmp_path / "care.json"))
+    weights.write_text("2")
+    assert not is_of_this_code(result)
+    assert own_code_of(replace(result, made_by=made_by(entry))) != own_code_of(result)
+
+
+def test_a_result_is_of_the_code_of_its_policy(tmp_path):
+    made = made_by(Entry("care"))
+    assert is_of_this_code(made_result("care", made_by=made))
+    assert not is_of_this_code(made_result("care", made_by=made | {"policy_code": "5"}))
+    assert not is_of_this_code(made_result("care"))
+
+
+def test_the_results_of_this_repository_can_be_read():
+    for path in (ROOT / "results" / "leaderboard").glob("*.json"):
+        assert read_result(path).rows, path
 
 
 def test_what_is_no_result_is_named(tmp_path):
@@ -160,3 +230,28 @@ def test_a_sealed_result_holds_no_seed_and_must_be_whole(tmp_path):
     assert read_result(tmp_path / "mine.json").sealed == SEAL
     made_result(sealed=SEAL, worlds=worlds[1:]).write(tmp_path / "less.json")
     assert "lacks sealed worlds" in refusal(tmp_path / "less.json")
+
+
+@pytest.mark.parametrize("spoil", [lambda own: [own[0], *own[:-1]], lambda own: own[::-1]])
+def test_the_numbers_of_sealed_worlds_ascend(tmp_path, spoil):
+    """One good world, told again and again, would make a score."""
+    worlds = [world._replace(number=n) for n, world in enumerate(published_worlds())]
+    streets = [world for world in worlds if world.part == STREETS]
+    others = [world for world in worlds if world.part != STREETS]
+    made_result(sealed=SEAL, worlds=[*others, *spoil(streets)]).write(tmp_path / "mine.json")
+    assert "must ascend" in refusal(tmp_path / "mine.json")
+
+
+def test_the_page_tells_how_often_made_up_rows_pass():
+    """Drawn without being put back, of the rows that make the score."""
+    rows = sum(SIZES.values())
+    drawn = -(-rows // ONE_IN["measured"])
+    assert drawn + -(-rows // ONE_IN["ideal"]) == 2 * rows // 10
+    page = (ROOT / "docs" / "benchmark.md").read_text()
+    told = re.findall(r"^\| (\d+) \| ([\d.,]+) times \|$", page, re.M)
+    assert len(told) == 3
+    for made_up, times in told:
+        chance = comb(rows - int(made_up), drawn) / comb(rows, drawn)
+        assert float(times.replace(",", "")) == pytest.approx(1 / chance, rel=0.01)
+    ten = comb(rows - 10, drawn) / comb(rows, drawn)
+    assert f"three calls once in {ten**-3:.0f} times" in page

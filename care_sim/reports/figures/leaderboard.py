@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from matplotlib.figure import Figure
 
 from care_sim.reports.figures.styles import bare_axes
-from care_sim.reports.formatting import marked
+from care_sim.reports.leaderboard import names_in
 from care_sim.study.benchmark.result import BenchmarkResult
 
 LEADERBOARD_FIGURE = "leaderboard"
@@ -33,7 +33,7 @@ def leaderboard_figure(results: Sequence[BenchmarkResult]) -> Figure:
     axes.errorbar(
         means, lines, xerr=ends, fmt="o", color="black", capsize=3, label="score, 95% interval"
     )
-    axes.set_yticks(lines, [marked(result.entry.name, result.tags) for result in ranked])
+    axes.set_yticks(lines, names_in(ranked))
     axes.set_xlim(-2, 102)
     axes.set_xlabel("% of what a full scan reaches")
     bare_axes(axes, "0.93", "both")

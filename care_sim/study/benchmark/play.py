@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 
 from care_sim.policies import tags_of
+from care_sim.study.benchmark.made_by import made_by
 from care_sim.study.benchmark.player import Player
 from care_sim.study.benchmark.result import BenchmarkResult, ResultRow
 from care_sim.study.benchmark.tasks import Entry, tasks_of
 from care_sim.study.benchmark.worlds import World
-from care_sim.study.provenance import machine, policy_digest, versions
 
 
 def played(
@@ -31,15 +31,6 @@ def played(
         if all(row for _, row in rows):
             kept = tuple(ResultRow.of(task, row) for task, row in rows if row)
             results.append(
-                BenchmarkResult(entry, tags_of(entry.policy), kept, quick, sealed, _made_by(entry))
+                BenchmarkResult(entry, tags_of(entry.policy), kept, quick, sealed, made_by(entry))
             )
     return results
-
-
-def _made_by(entry: Entry) -> dict[str, object]:
-    """Versions and machine, and a hash of the policy's own code, empty for a built-in one."""
-    return {
-        "versions": versions(),
-        "policy_code": policy_digest(entry.policy) or "",
-        "machine": machine(),
-    }

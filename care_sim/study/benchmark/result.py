@@ -1,35 +1,24 @@
-"""The result file of an entry: what it reached world by world, and what made it.
+"""The result of an entry: what it reached world by world, and what made it. Its file is read by
+`care_sim.study.benchmark.result_file`.
 
 The score is worked out of the rows whenever a file is read; the one that stands in it is for
 people.
 """
 
 import json
-from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
-from care_sim.base.checks import is_number
-from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.files import JSON, replacing
-from care_sim.base.json_text import json_content
 from care_sim.evaluation.bootstrap import Interval, mean_of_ratios
 from care_sim.study.benchmark.tasks import CAMERAS, MEASURED, Entry, Task, reached
-from care_sim.study.benchmark.worlds import (
-    BENCHMARK_VERSION,
-    PARTS,
-    SIZES,
-    published_worlds,
-    quick_tenth,
-)
-from care_sim.study.rows.parquet import with_tuples
+from care_sim.study.benchmark.worlds import BENCHMARK_VERSION, quick_tenth
 from care_sim.study.run_config import Row
 
 RESULT_MARK = "care_sim_benchmark"
 """The key by which a file is known; its value is the version."""
-_MOST_BYTES = 2**24
 
 
 class ResultRow(NamedTuple):
@@ -69,6 +58,12 @@ class BenchmarkResult:
     def parts(self) -> list[str]:
         """The parts of the benchmark that its rows are of: all, where it is whole."""
         return [*dict.fromkeys(row.part for row in self.rows)]
+
+    @property
+    def worlds(self) -> tuple[tuple[str, int, int], ...]:
+        """Part, number and reachable of the worlds that it says it was played in, in order."""
+        seen = [row for row in self.rows if row.camera == MEASURED]
+        return tuple((row.part, row.world, row.reachable) for row in seen)
 
     def of_part(self, part: str, camera: str) -> list[ResultRow]:
         """Its rows, in the order of their worlds."""
@@ -132,93 +127,3 @@ class BenchmarkResult:
         mean, low, high = (round(value, 2) for value in self.score(camera))
         parts = {part: round(self.part_score(part, camera), 2) for part in self.parts}
         return {"score": mean, "interval": [low, high], **parts}
-
-
-def read_result(path: Path) -> BenchmarkResult:
-    """The result in a file. Raises InvalidInput for a file that holds none, is of another version
-    of the benchmark, or lacks worlds.
-    """
-    try:
-        content = json_content(path, _MOST_BYTES)
-    except (OSError, ValueError) as error:
-        raise InvalidInput(f"{path} cannot be read: {error}") from error
-    if not is_result(content):
-        raise InvalidInput(f"{path} holds no result of care-sim benchmark")
-    _check_version(path, content)
-    try:
-        result = _result(content)
-    except (KeyError, TypeError, ValueError) as error:
-        raise InvalidInput(
-            f"{path} is damaged: {type(error).__name__} {shown(str(error))}"
-        ) from error
-    _check_worlds(path, result)
-    return result
-
-
-def is_result(content: object) -> bool:
-    """Whether a file of this content is meant as a result."""
-    return isinstance(content, dict) and RESULT_MARK in content
-
-
-def _check_version(path: Path, content: Mapping[str, Any]) -> None:
-    version = content[RESULT_MARK]
-    if version != BENCHMARK_VERSION:
-        raise InvalidInput(
-            f"{path} is of version {shown(version)} of the benchmark, this care-sim scores version "
-            f"{BENCHMARK_VERSION}: play it again with care-sim benchmark --policy "
-            f"{content.get('policy', 'NAME')}"
-        )
-
-
-def _result(content: Mapping[str, Any]) -> BenchmarkResult:
-    """The result as it is told. Raises KeyError, TypeError or ValueError where it is damaged."""
-    if content["columns"] != list(ResultRow._fields):
-        raise ValueError("its columns are others")
-    given = with_tuples({"given": content["parameters"]})["given"]
-    texts = content["policy"], content["cell_order"]
-    if not all(isinstance(text, str) for text in texts):
-        raise TypeError("policy and cell_order must be texts")
-    return BenchmarkResult(
-        Entry(texts[0], tuple((str(name), value) for name, value in given), texts[1]),
-        tuple(map(str, content["tags"])),
-        tuple(_row(values) for values in content["rows"]),
-        bool(content["quick"]),
-        None if content["sealed"] is None else str(content["sealed"]),
-        dict(content["made_by"]),
-    )
-
-
-def _row(values: Sequence[Any]) -> ResultRow:
-    row = ResultRow(*values)
-    counts = row.world, row.reached, row.reachable
-    if not all(is_number(count) and count == int(count) >= 0 for count in counts):
-        raise ValueError(f"a row must hold whole numbers, got {shown(values)}")
-    if not (row.reachable and isinstance(row.hash, str)):
-        raise ValueError(f"a row must hold something to reach and a hash, got {shown(values)}")
-    return row
-
-
-def _check_worlds(path: Path, result: BenchmarkResult) -> None:
-    """Raise InvalidInput unless the result is of exactly the worlds that it should be of."""
-    if result.sealed is None:
-        worlds = quick_tenth(published_worlds()) if result.quick else published_worlds()
-        due = [(world.part, world.number, world.reachable) for world in worlds]
-    else:
-        # Which they are the salt alone tells; there are as many, the same under every camera.
-        seen = [row for row in result.rows if row.camera == MEASURED]
-        due = [(row.part, row.world, row.reachable) for row in seen]
-        if Counter(row.part for row in seen) != SIZES:
-            raise InvalidInput(f"{path} lacks sealed worlds: there are {SIZES}")
-    expected = [
-        (part, camera, number, most)
-        for part in PARTS
-        for camera in CAMERAS
-        for own, number, most in due
-        if own == part
-    ]
-    there = [(row.part, row.camera, row.world, row.reachable) for row in result.rows]
-    if there != expected:
-        raise InvalidInput(
-            f"{path} holds other worlds than version {BENCHMARK_VERSION} of the benchmark: play it "
-            f"again with care-sim benchmark --policy {result.entry.policy}"
-        )

@@ -1,9 +1,12 @@
 """What the benchmark plays: an entry in every world, under every camera."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from care_sim.base.errors import InvalidInput, shown
+from care_sim.base.plugins import is_place
 from care_sim.core.cell_order import AS_DEMANDED
 from care_sim.sources.scenes import Scene, Streets
 from care_sim.streets.street import street_name
@@ -20,6 +23,11 @@ MEASURED, IDEAL = CAMERAS = ("measured", "ideal")
 _YOLOX = {"camera_profile": "yolox"}
 _LATE = {"camera_latency_s": 0.12}
 """The paper's evidence is 0.11 to 0.14 s old on average."""
+_PACKAGED = re.compile(r"\w[\w.-]*")
+"""The form of a policy's name that is no MODULE:OBJECT."""
+_LONGEST_NAME = 120
+_UNTABLED = "|<>$`"
+"""What tables, pages and figures take for more than text."""
 _SCENARIOS: dict[str, tuple[str, Parameters]] = {
     DRIVES: ("drive", ()),
     TESTS: ("ncap", (("test", "drawn"), ("speed_kph", 0))),
@@ -28,16 +36,42 @@ _SCENARIOS: dict[str, tuple[str, Parameters]] = {
 
 @dataclass(frozen=True)
 class Entry:
-    """What takes part: a policy with its parameters, and the order of the cells in its sets."""
+    """What takes part: a policy with its parameters, and the order of the cells in its sets; the
+    `label` is what its people call it.
+    """
 
     policy: str
     parameters: Parameters = ()
     cell_order: str = AS_DEMANDED
+    label: str = ""
 
     @property
     def name(self) -> str:
-        """What its line in a table begins with."""
-        given = [f"{name}={value}" for name, value in self.parameters]
+        """What its line in a table begins with: of files the names alone, not where they lie."""
+        played = self._told([(name, _file_name(value)) for name, value in self.parameters])
+        return f"{self.label} ({played})" if self.label else played
+
+    @property
+    def full_name(self) -> str:
+        """What tells it from every other entry."""
+        return " ".join([self.label, self._told(self.parameters)]).strip()
+
+    def check(self) -> None:
+        """Raise InvalidInput for names that a table cannot hold, or that no policy can have."""
+        if not (_PACKAGED.fullmatch(self.policy) or is_place(self.policy)):
+            raise InvalidInput(
+                f"the policy must be a name of letters, digits, . and -, or MODULE:OBJECT, got "
+                f"{shown(self.policy)}"
+            )
+        name = self.name
+        if not (len(name) <= _LONGEST_NAME and name.isprintable()) or {*name} & {*_UNTABLED}:
+            raise InvalidInput(
+                f"the name of an entry must be printable, at most {_LONGEST_NAME} characters and "
+                f"without {' '.join(_UNTABLED)}, got {shown(name)}"
+            )
+
+    def _told(self, parameters: Sequence[tuple[str, Any]]) -> str:
+        given = [f"{name}={value}" for name, value in parameters]
         order = [self.cell_order] if self.cell_order != AS_DEMANDED else []
         return " ".join([self.policy, *given, *order])
 
@@ -96,6 +130,13 @@ def tasks_of(entry: Entry, worlds: Sequence[World], cameras: Sequence[str] = CAM
                 Task(world, camera, config) for world, config in zip(own, configs, strict=True)
             ]
     return tasks
+
+
+def _file_name(value: Any) -> Any:
+    """The last part of a path, of either kind of system; any other value as it is."""
+    if isinstance(value, tuple):
+        return tuple(map(_file_name, value))
+    return re.split(r"[/\\]", value.rstrip("/\\"))[-1] if isinstance(value, str) else value
 
 
 def reached(part: str, row: Row) -> int:

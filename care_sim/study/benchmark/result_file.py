@@ -1,0 +1,138 @@
+"""The result file of an entry is read, and checked: what cannot be so is refused in one line."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+from care_sim.base.checks import LARGEST_INTEGER
+from care_sim.base.errors import InvalidInput, shown
+from care_sim.base.json_text import json_content
+from care_sim.policies import POLICIES, tags_of
+from care_sim.policies.base import TAGS
+from care_sim.study.benchmark.result import RESULT_MARK, BenchmarkResult, ResultRow
+from care_sim.study.benchmark.tasks import CAMERAS, Entry
+from care_sim.study.benchmark.worlds import (
+    BENCHMARK_VERSION,
+    PARTS,
+    SIZES,
+    published_worlds,
+    quick_tenth,
+)
+from care_sim.study.rows.parquet import with_tuples
+
+_MOST_BYTES = 2**24
+
+
+def read_result(path: Path) -> BenchmarkResult:
+    """The result in a file. Raises InvalidInput for a file that holds none, is of another version
+    of the benchmark, or lacks worlds.
+    """
+    try:
+        content = json_content(path, _MOST_BYTES)
+    except (OSError, ValueError) as error:
+        raise InvalidInput(f"{path} cannot be read: {error}") from error
+    if not is_result(content):
+        raise InvalidInput(f"{path} holds no result of care-sim benchmark")
+    _check_version(path, content)
+    try:
+        result = _result(content)
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
+        raise InvalidInput(
+            f"{path} is damaged: {type(error).__name__} {shown(str(error))}"
+        ) from error
+    _check_tags(path, result)
+    _check_worlds(path, result)
+    return result
+
+
+def is_result(content: object) -> bool:
+    """Whether a file of this content is meant as a result."""
+    return isinstance(content, dict) and RESULT_MARK in content
+
+
+def _check_version(path: Path, content: Mapping[str, Any]) -> None:
+    version = content[RESULT_MARK]
+    if version != BENCHMARK_VERSION:
+        raise InvalidInput(
+            f"{path} is of version {shown(version)} of the benchmark, this care-sim scores version "
+            f"{BENCHMARK_VERSION}: play it again with care-sim benchmark --policy "
+            f"{content.get('policy', 'NAME')}"
+        )
+
+
+def _result(content: Mapping[str, Any]) -> BenchmarkResult:
+    """The result as it is told. Raises KeyError, TypeError or ValueError where it is damaged."""
+    if content["columns"] != list(ResultRow._fields):
+        raise ValueError("its columns are others")
+    given = with_tuples({"given": content["parameters"]})["given"]
+    texts = content["policy"], content["cell_order"], content.get("label", "")
+    if not all(isinstance(text, str) for text in texts):
+        raise TypeError("policy, cell_order and label must be texts")
+    policy, order, label = texts
+    entry = Entry(policy, tuple((str(name), value) for name, value in given), order, label)
+    entry.check()
+    return BenchmarkResult(
+        entry,
+        tuple(map(str, content["tags"])),
+        tuple(_row(values) for values in content["rows"]),
+        bool(content["quick"]),
+        None if content["sealed"] is None else str(content["sealed"]),
+        dict(content["made_by"]),
+    )
+
+
+def _row(values: Sequence[Any]) -> ResultRow:
+    row = ResultRow(*values)
+    counts = row.world, row.reached, row.reachable
+    if not all(type(count) is int and 0 <= count <= LARGEST_INTEGER for count in counts):
+        raise ValueError(f"a row must hold whole numbers, got {shown(values)}")
+    if not (row.reachable and isinstance(row.hash, str)):
+        raise ValueError(f"a row must hold something to reach and a hash, got {shown(values)}")
+    if row.reached > row.reachable:
+        raise ValueError(f"a row must reach at most what there is, got {shown(values)}")
+    return row
+
+
+def _check_tags(path: Path, result: BenchmarkResult) -> None:
+    """Raise InvalidInput for tags that there are not, or that a built-in policy has not."""
+    policy, tags = result.entry.policy, result.tags
+    if unknown := {*tags} - {*TAGS}:
+        raise InvalidInput(f"{path} has unknown tags {shown(sorted(unknown))}; known: {TAGS}")
+    if policy in POLICIES.built_in and {*tags} != {*tags_of(policy)}:
+        raise InvalidInput(
+            f"{path} says that {policy} is {shown(tags)}, and it is {tags_of(policy)}"
+        )
+
+
+def _check_worlds(path: Path, result: BenchmarkResult) -> None:
+    """Raise InvalidInput unless the result is of exactly the worlds that it should be of."""
+    if result.sealed is None:
+        worlds = quick_tenth(published_worlds()) if result.quick else published_worlds()
+        due = [(world.part, world.number, world.reachable) for world in worlds]
+    else:
+        # Which they are the salt alone tells; there are as many, the same under every camera, each
+        # once and in the order in which the salt draws them.
+        due = [*result.worlds]
+        if Counter(part for part, _, _ in due) != SIZES:
+            raise InvalidInput(f"{path} lacks sealed worlds: there are {SIZES}")
+        for (part, number, _), (following, later, _) in pairwise(due):
+            if part == following and number >= later:
+                raise InvalidInput(
+                    f"{path}: the numbers of sealed worlds must ascend, got {later} after {number} "
+                    f"in the {part}"
+                )
+    expected = [
+        (part, camera, number, most)
+        for part in PARTS
+        for camera in CAMERAS
+        for own, number, most in due
+        if own == part
+    ]
+    there = [(row.part, row.camera, row.world, row.reachable) for row in result.rows]
+    if there != expected:
+        raise InvalidInput(
+            f"{path} holds other worlds than version {BENCHMARK_VERSION} of the benchmark: play it "
+            f"again with care-sim benchmark --policy {result.entry.policy}"
+        )
