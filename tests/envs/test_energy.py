@@ -70,9 +70,12 @@ def test_every_shot_is_paid(loop, policy):
 
 @pytest.mark.parametrize("policy", ["care-units", "fan"])
 def test_several_lidars_share_the_shots_of_a_street(policy):
-    with few_and_short(3), gymnasium.make(
-        "CARE-Street-v0", budget=0.2, firing="energy", sensor=CORNERS, **FAINT
-    ) as env:
+    with (
+        few_and_short(3),
+        gymnasium.make(
+            "CARE-Street-v0", budget=0.2, firing="energy", sensor=CORNERS, **FAINT
+        ) as env,
+    ):
         chosen = care_sim.make_policy(policy, env)
         observation, _ = env.reset(seed=0)
         ended, fired = False, []
@@ -81,7 +84,7 @@ def test_several_lidars_share_the_shots_of_a_street(policy):
             ended = terminated or truncated
             assert len(info["fired"]) <= 205
             assert np.bincount(info["fired"]).max() <= 4
-            fired += info["fired"]
+            fired.extend(info["fired"])
     assert {*CORNERS.grid.lidars_of(np.array(fired)).tolist()} == {0, 1, 2}
 
 
