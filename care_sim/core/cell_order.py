@@ -78,9 +78,7 @@ def _by_head(sets: CellSets, grid: Grid) -> tuple[Integers, Integers]:
     heads = len(grid.heads)
     if heads == 1:
         return sets.cells, sets.sizes[:, None]
-    begins = [head.first for head in grid.heads]
-    own = np.searchsorted(begins, sets.cells, side="right") - 1
-    part = np.repeat(np.arange(len(sets)), sets.sizes) * heads + own
+    part = np.repeat(np.arange(len(sets)), sets.sizes) * heads + grid.lidars_of(sets.cells)
     sizes = np.bincount(part, minlength=len(sets) * heads)
     return sets.cells[np.argsort(part, kind="stable")], sizes.reshape(-1, heads)
 

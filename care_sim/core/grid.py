@@ -34,9 +34,10 @@ AT_LIDAR_M = 1.5
 """A camera within this of a LiDAR is taken to stand at it, as the paper's wedges do without a word
 on it: the six of nuScenes are 0.5 to 1.0 m from LIDAR_TOP."""
 LEAST_DEPTH_M = 5.0
-"""What a camera farther from a LiDAR shows is sought from this depth on, along its optical axis. A
-car needs 4.3 m to stop from 30 km/h at 8 m/s^2: what is first seen nearer comes too late for any
-LiDAR, and every metre less widens the wedges of all that is farther."""
+"""What a camera farther from a LiDAR shows is sought from this depth on. It is along the optical
+axis of that camera, so that beside the middle of a picture it begins farther away. A car needs
+4.3 m to stop from 30 km/h at 8 m/s^2: what is first seen nearer comes too late for any LiDAR, and
+every metre less widens the wedges of all that is farther."""
 _ORIGIN = np.zeros(3)
 _ORIGIN.flags.writeable = False
 
@@ -94,6 +95,10 @@ class AngularGrid(GridRays):
         view.
         """
         return self.cells_of(points)[:, None]
+
+    def lidars_of(self, cells: Cells) -> Integers:
+        """(n,) the number of the LiDAR of each of `cells` (n,): that of the only one, 0."""
+        return np.zeros(len(cells), np.int64)
 
     def origins_of(self, cells: Cells) -> Floats:
         """(3,) where the rays of `cells` (n,) begin in the sensor frame: all at its origin."""

@@ -135,11 +135,6 @@ class GridStack:
         directions.flags.writeable = False
         return directions
 
-    @cached_property
-    def _lidar_of(self) -> Integers:
-        """(N,) the number of the LiDAR of every cell."""
-        return np.repeat(np.arange(len(self.grids)), [grid.size for grid in self.grids])
-
     def cells_at(self, points: Floats) -> Cells:
         """(n, heads) the cell of each LiDAR in which a point (n, 3) lies, -1 beyond its rows or its
         field of view.
@@ -147,9 +142,19 @@ class GridStack:
         found = [(head.grid.cells_of(head.points(points)), head.first) for head in self.heads]
         return np.stack([np.where(own >= 0, own + first, -1) for own, first in found], axis=1)
 
+    def lidars_of(self, cells: Cells) -> Integers:
+        """(n,) the number, from 0, of the LiDAR of each of `cells` (n,)."""
+        numbers: Integers = self._lidars[cells]
+        return numbers
+
+    @cached_property
+    def _lidars(self) -> Integers:
+        # A table, since a search takes several times as long.
+        return np.repeat(np.arange(len(self.grids)), [grid.size for grid in self.grids])
+
     def origins_of(self, cells: Cells) -> Floats:
         """(n, 3) where the rays of `cells` (n,) begin in the sensor frame."""
-        return np.array(self.places)[self._lidar_of[cells]]
+        return np.array(self.places)[self.lidars_of(cells)]
 
     def points(self, cells: Cells, ranges: Floats) -> Floats:
         """(n, 3) where rays of `cells` (n,) end after `ranges` (n,) metres, in the sensor frame."""
@@ -170,7 +175,7 @@ class GridStack:
 
     def reach_of(self, cells: Cells) -> Floats:
         """(n,) the reach of the rays of `cells` (n,), metres."""
-        return np.array([grid.range_m for grid in self.grids], float)[self._lidar_of[cells]]
+        return np.array([grid.range_m for grid in self.grids], float)[self.lidars_of(cells)]
 
     def hulls(
         self,

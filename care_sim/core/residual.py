@@ -62,8 +62,7 @@ def wedges(detections: ImageDetections, rig: Rig) -> CellSets:
     if not len(detections):
         return CellSets.of([])
     rays = wedge_rays(detections, rig)
-    places = rig.wedge_starts
-    starts = None if places is None else places[detections.cameras]
+    starts = ray_starts(detections, rig)
     return rig.grid.wedges(rays, rig.azimuth_margin, rig.elevation_margin, starts)
 
 
@@ -73,9 +72,27 @@ def wedge_rays(detections: ImageDetections, rig: Rig) -> Floats:
     """
     boxes = np.ascontiguousarray(detections.boxes)
     rays = box_rays(boxes, np.ascontiguousarray(detections.cameras), rig.camera_models)
-    # Since the picture was taken the car has turned, so its directions have turned the other way.
+    return _turned_since(rays, detections)
+
+
+def ray_starts(detections: ImageDetections, rig: Rig) -> Floats | None:
+    """(n, 3) where the rays of every detection begin, in the sensor frame of now; None where all
+    count as beginning at the one LiDAR.
+    """
+    places = rig.wedge_starts
+    if places is None:
+        return None
+    # The camera has gone round with the car since its picture.
+    starts: Floats = _turned_since(places[detections.cameras, None], detections)[:, 0]
+    return starts
+
+
+def _turned_since(vectors: Floats, detections: ImageDetections) -> Floats:
+    """Vectors (n, k, 3) of the sensor frames in which the pictures were taken, along the axes of
+    now: since then the car has turned, so they have turned the other way.
+    """
     angles = -detections.yaw_changes
-    turned: Floats = _turned_bundles(rays, np.cos(angles), np.sin(angles))
+    turned: Floats = _turned_bundles(vectors, np.cos(angles), np.sin(angles))
     return turned
 
 

@@ -32,6 +32,8 @@ class Crosstalk:
     def __init__(self, grid: Grid, settings: ReturnSettings, seed: np.random.SeedSequence):
         self._grid = grid
         self._rate = settings.lidar_crosstalk
+        # The same at every keyframe, and as large as the grid.
+        self._spans_m = grid.reach_of(np.arange(grid.size)) - 2 * NEAREST_M
         self._sweep = RollingSweep(grid, settings.lidar_sweep_s)
         self._random = np.random.default_rng(seed)
 
@@ -64,8 +66,7 @@ class Crosstalk:
     def _draw(self) -> tuple[Mask, Floats]:
         """(N,) which cells have a ghost at this keyframe, and (N,) how far off it seems."""
         ghosts = self._random.random(self._grid.size) < self._rate
-        span = self._grid.reach_of(np.arange(self._grid.size)) - 2 * NEAREST_M
-        return ghosts, NEAREST_M + span * self._random.random(self._grid.size)
+        return ghosts, NEAREST_M + self._spans_m * self._random.random(self._grid.size)
 
 
 def crosstalk_of(

@@ -53,7 +53,7 @@ def first_returns(film: Film) -> Iterator[Cells]:
             observation, *_ = env.step(full(observation))
         score = env.score
     for row in score.sightings.events[score.delays == 0]:
-        cloud = film.shots[score.sightings.frames.keyframes[row]].cloud
+        cloud = film.shots[score.sightings.frames.keyframes[row]].cloud.to_shots()
         yield np.unique(cloud.cells[cloud.objects == score.sightings.frames.objects[row]])
 
 

@@ -90,7 +90,7 @@ def untracked_cells(loop: OpenLoop) -> tuple[Cells, Float32s]:
     In the full scan they have a return from an object in range that has no track and can be
     detected.
     """
-    cloud = loop.shot.cloud
+    cloud = loop.shot.cloud.to_shots()
     annotations = loop.shot.annotations
     in_range = planar_ranges(annotations.boxes) <= RANGE_M
     tracked = np.isin(annotations.objects, loop.true_objects(loop.belief.tracks))

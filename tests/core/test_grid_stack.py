@@ -233,6 +233,29 @@ def test_the_cores_of_all_lidars_come_before_all_margins():
     assert {*listed[: len(core)].tolist()} == core
 
 
+def test_a_camera_apart_goes_round_with_the_car_after_its_picture():
+    """The car has turned 90 degrees to the left since: the camera that was 2 m ahead stood where is
+    now 2 m to the right, and what it saw straight ahead is there.
+    """
+    then = PinholeCamera(position=(2.0, 0.0, 0.0))
+    now = PinholeCamera(position=(0.0, -2.0, 0.0), yaw=-np.pi / 2)
+    seen = detection([(150.0, 80.0, 200.0, 110.0)])
+    turned = ImageDetections(
+        seen.classes, seen.confidences, seen.boxes, seen.cameras, seen.ages, seen.ages + np.pi / 2
+    )
+    for grid in (ROOF, STACK):
+        (old,) = wedges(turned, Rig(grid, (then,)))
+        (new,) = wedges(seen, Rig(grid, (now,)))
+        assert old.tolist() == new.tolist()
+        assert len(old)
+
+
+def test_every_cell_has_the_number_of_its_lidar():
+    cells = np.array([900, 0, 511, 512, 767, 768])
+    assert STACK.lidars_of(cells).tolist() == [2, 0, 0, 1, 1, 2]
+    assert ROOF.lidars_of(cells[1:3]).tolist() == [0, 0]
+
+
 def test_forgetting_keeps_what_the_lidar_with_the_narrowest_columns_needs():
     """A track 20 m ahead, 0.7 m uncertain: 2.0 degrees, one column of the roof's 5.6. From the
     corner it is 17.7 m and 2.3 degrees away: two of its columns of 1.9.

@@ -8,6 +8,8 @@ import care_sim
 from care_sim.base.errors import InvalidInput
 from care_sim.core.actions import scores_of
 from care_sim.envs.scenes import FilmEnv
+from tests.helpers.lidars import CORNERS
+from tests.helpers.short_streets import few_and_short
 
 LOOPS = ("CARE-Dense-v0", "CARE-Street-v0")
 FAINT = {"lidar_stated_range_m": 15.0, "visibility_m": 200.0}
@@ -64,6 +66,26 @@ def test_every_shot_is_paid(loop, policy):
         for _ in range(3):
             observation, *_, info = env.step(chosen(observation))
             assert len(info["fired"]) == 492
+
+
+@pytest.mark.parametrize("policy", ["care-units", "fan"])
+def test_several_lidars_share_the_shots_of_a_street(policy):
+    with (
+        few_and_short(3),
+        gymnasium.make(
+            "CARE-Street-v0", budget=0.2, firing="energy", sensor=CORNERS, **FAINT
+        ) as env,
+    ):
+        chosen = care_sim.make_policy(policy, env)
+        observation, _ = env.reset(seed=0)
+        ended, fired = False, []
+        while not ended:
+            observation, _, terminated, truncated, info = env.step(chosen(observation))
+            ended = terminated or truncated
+            assert len(info["fired"]) <= 205
+            assert np.bincount(info["fired"]).max() <= 4
+            fired.extend(info["fired"])
+    assert {*CORNERS.grid.lidars_of(np.array(fired)).tolist()} == {0, 1, 2}
 
 
 def test_pictures_and_vectors_take_repeated_cells(loop):

@@ -40,6 +40,19 @@ def test_one_that_it_detects_a_keyframe_later_is_left_out():
     assert sorted(found) == sorted(returns_of(*each).tolist() for each in expected)
 
 
+def test_returns_that_one_shot_does_not_show_are_left_out():
+    film = handmade_film(4)
+    shots = [*film.shots]
+    cloud = shots[1].cloud
+    # Four shots for all but five returns of the person.
+    needed = np.where(cloud.objects == WALKER, 4.0, 1.0)
+    kept = np.flatnonzero(cloud.objects == WALKER)[:5]
+    needed[kept] = 1.0
+    shots[1] = replace(shots[1], cloud=replace(cloud, shots=needed))
+    found = [cells.tolist() for cells in first_returns(replace(film, shots=tuple(shots)))]
+    assert cloud.cells[kept].tolist() in found
+
+
 def test_a_sighting_straight_behind_is_smoothed_over_the_seam():
     sightings = sighting_map([cells_at(9, [0])], GRID)
     assert sightings.sum() == pytest.approx(1)

@@ -1,5 +1,7 @@
 """What the learned scorer learns from, on a street that belongs to no list."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -46,6 +48,15 @@ def test_before_the_first_scan_every_object_is_untracked_and_weighs_1(film):
     assert {n: c for n, c in of_objects(env.loop.shot, cells).items() if c} == expected
     assert len(cells) == sum(expected.values())
     assert shares.sum() == pytest.approx(len(expected))
+
+
+def test_returns_that_one_shot_does_not_show_are_no_examples(film):
+    def faint(shot):
+        return replace(shot, cloud=replace(shot.cloud, shots=np.full(len(shot.cloud), 2.0)))
+
+    env = FilmEnv(replace(film, shots=tuple(map(faint, film.shots))), budget=0.1)
+    env.reset(seed=0)
+    assert not len(untracked_cells(env.loop)[0])
 
 
 def test_what_a_full_scan_found_is_tracked_and_only_what_is_new_is_not(film):

@@ -64,11 +64,22 @@ def test_the_returns_of_several_lidars_are_recorded_in_the_frame_of_the_first(tm
         wrap=lambda env, policy: RecordRerun(env, path, policy),
     )
     grid = CORNERS.grid
-    for ranges, cloud in zip(
-        seen, read(path).column("care/world/lidar/returns", "Points3D:positions"), strict=True
-    ):
+    found = read(path)
+    clouds = found.column("care/world/lidar/returns", "Points3D:positions")
+    for ranges, cloud in zip(seen, clouds, strict=True):
         cells = np.flatnonzero((ranges > 0) & (ranges < grid.range_m))
         np.testing.assert_allclose(cloud, grid.points(cells, ranges[cells]), rtol=1e-5, atol=1e-4)
+    # What stands above the road is a body where it is drawn; all of them stand along the road.
+    origin = found.column("care/world/lidar", "Transform3D:translation")[-1][0]
+    centres, halves = (
+        np.array(found.column("care/world/bodies", f"Boxes3D:{name}")[-1])
+        for name in ("centers", "half_sizes")
+    )
+    points = np.add(clouds[-1], origin)
+    high = points[:, 2] > 0.05
+    inside = np.abs(points[high, None] - centres) < np.hypot(halves[:, :1], halves[:, 1:2]) + 0.02
+    assert inside.all(axis=2).any(axis=1).all()
+    assert {*grid.lidars_of(cells[high]).tolist()} == {0, 1, 2}
 
 
 def test_every_entity_is_documented_and_every_documented_one_is_there(episode):

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from care_sim.base.errors import InvalidInput
 from care_sim.core.frames import Frame
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.loops.closed_loop import ClosedLoop
@@ -86,10 +87,14 @@ def keyframes(scenario: str, episodes: int, done: Callable[[int], None]) -> Keyf
 
 
 def compare_episode(config: EpisodeConfig, compared: KeyframeAgreement) -> None:
-    """Compare one episode, from its first keyframe to the state after its last."""
+    """Compare one episode, from its first keyframe to the state after its last. Raises
+    InvalidInput for a set-up of several LiDARs: of each the engines are those of one.
+    """
     with driven(config) as env:
         env.reset(seed=config.seed)
         loop: ClosedLoop = env.unwrapped.loop  # type: ignore[attr-defined]
+        if (count := len(loop.rig.grid.heads)) > 1:
+            raise InvalidInput(f"engines are compared with one LiDAR, got {count}")
         ended = False
         with closing(_exact(loop)) as exact:
             bullet = loop.world.bullet

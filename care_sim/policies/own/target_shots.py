@@ -4,9 +4,10 @@ import numpy as np
 
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.belief import Belief
-from care_sim.core.residual import wedge_rays, wedges
+from care_sim.core.boxes import planar_ranges
+from care_sim.core.residual import ray_starts, wedge_rays, wedges
 from care_sim.core.rig import Rig
-from care_sim.core.types import CLASSES, ImageDetections
+from care_sim.core.types import CLASSES, ImageDetections, Tracks
 from care_sim.sensors.signal import Signal
 from care_sim.world.bodies import CATALOGUE
 
@@ -22,7 +23,8 @@ class TargetShots:
 
     A target is taken to face the LiDAR. A person is as dark as one may be. Paint can be anything,
     so that a vehicle is taken for the target at which the data sheet states its range. A forecast
-    is as far as its centre, an image box as far as the typical height of its class makes it.
+    is as far as its centre, an image box as far as the typical height of its class makes it, from
+    each LiDAR.
     """
 
     def __init__(self, rig: Rig):
@@ -39,25 +41,40 @@ class TargetShots:
         """
         shots = np.ones(self._rig.grid.size, np.int64)
         detections, tracks = belief.detections, belief.tracks
-        for sets, classes, ranges in (
-            (self._rig.hulls(tracks.boxes), tracks.classes, tracks.ranges),
-            (wedges(detections, self._rig), detections.classes, self._ranges(detections)),
+        for sets, classes, apart in (
+            (self._rig.hulls(tracks.boxes), tracks.classes, self._to_tracks(tracks)),
+            (wedges(detections, self._rig), detections.classes, self._to_pictured(detections)),
         ):
-            intensities = self._signal.intensities(self._brightness[classes], ranges)
-            needed = self._signal.shots_needed(intensities, ranges)
-            useful = np.where(needed <= self._most, needed, 1).astype(np.int64)
-            np.maximum.at(shots, sets.cells, np.repeat(useful, sets.sizes))
+            brightness = self._brightness[classes]
+            useful = np.stack([self._useful(brightness, ranges) for ranges in apart])
+            of_set = np.repeat(np.arange(len(sets)), sets.sizes)
+            lidars = self._rig.grid.lidars_of(sets.cells)
+            np.maximum.at(shots, sets.cells, useful[lidars, of_set])
         return shots
 
-    def _ranges(self, detections: ImageDetections) -> Floats:
-        """(n,) metres to what image boxes show, by their heights."""
+    def _useful(self, brightness: Floats, ranges: Floats) -> Integers:
+        """(n,) the shots of one LiDAR for targets of this `brightness` (n,) at these `ranges` (n,)
+        from it.
+        """
+        needed = self._signal.shots_needed(self._signal.intensities(brightness, ranges), ranges)
+        return np.where(needed <= self._most, needed, 1).astype(np.int64)
+
+    def _to_tracks(self, tracks: Tracks) -> list[Floats]:
+        """From each LiDAR, (n,) metres to forecasts."""
+        return [planar_ranges(head.boxes(tracks.boxes)) for head in self._rig.grid.heads]
+
+    def _to_pictured(self, detections: ImageDetections) -> list[Floats]:
+        """From each LiDAR, (n,) metres to what image boxes show, by their heights."""
+        heads = self._rig.grid.heads
         if not len(detections):
-            return np.empty(0)
+            return [np.empty(0)] * len(heads)
         cameras = self._rig.camera_models
         pixels = detections.boxes[:, 3] - detections.boxes[:, 1]
         focal = cameras.focals[detections.cameras]
         depths = focal * _HEIGHTS_M[detections.classes] / np.maximum(pixels, 1.0)
         # A depth is along the optical axis; the ray through the middle of the box is longer.
-        middles = wedge_rays(detections, self._rig)[:, 0]
-        ranges: Floats = depths * np.linalg.norm(middles, axis=1)
-        return ranges
+        places = depths[:, None] * wedge_rays(detections, self._rig)[:, 0]
+        starts = ray_starts(detections, self._rig)
+        if starts is not None:
+            places += starts
+        return [np.linalg.norm(head.points(places), axis=1) for head in heads]

@@ -209,11 +209,12 @@ def fullness(fired: Cells, grid: Grid) -> str:
     # A cell that was fired several times is as full as one that was fired once.
     once = np.unique(fired)
     counts, cells = np.zeros((2, SECTORS), np.int64)
-    for head in grid.heads:
+    lidars = grid.lidars_of(once)
+    for number, head in enumerate(grid.heads):
         own = head.grid
         sectors = np.floor((own.azimuths + np.pi) / (2 * np.pi) * SECTORS).astype(np.int64)
         # Cells are numbered row by row, so that the remainder is the column.
-        columns = once[(once >= head.first) & (once < head.cells.stop)] % own.columns
+        columns = once[lidars == number] % own.columns
         counts += np.bincount(sectors[columns], minlength=SECTORS)
         cells += np.bincount(sectors, minlength=SECTORS) * own.rows
     cells = np.maximum(cells, 1)

@@ -32,14 +32,16 @@ class HeadEngines:
         world: BulletWorld,
         grid: GridStack,
     ):
+        self._grid = grid
         self._engines = [(head, make(world, head.grid)) for head in grid.heads]
 
     def cast(self, sensor: Frame, cells: Cells) -> tuple[Floats, Integers]:
         """Ranges and body ids; see `care_sim.sensors.engines.RayEngine`."""
         ranges = np.full(len(cells), np.inf)
         ids = np.full(len(cells), NO_BODY)
-        for head, engine in self._engines:
-            own = np.flatnonzero((cells >= head.first) & (cells < head.cells.stop))
+        lidars = self._grid.lidars_of(cells)
+        for number, (head, engine) in enumerate(self._engines):
+            own = np.flatnonzero(lidars == number)
             ranges[own], ids[own] = engine.cast(head.frame(sensor), cells[own] - head.first)
         return ranges, ids
 

@@ -158,9 +158,9 @@ def outlines(sectors: Sequence[Cells], grid: Grid) -> Floats:
     """
     # Of several LiDARs each has a rectangle of its own.
     parts = [
-        cells[slice(*np.searchsorted(cells, (head.first, head.cells.stop)))]
+        cells[grid.lidars_of(cells) == number]
         for cells in sectors
-        for head in grid.heads
+        for number in range(len(grid.heads))
     ]
     boxes = [box for cells in parts if len(cells) for box in _cell_boxes(cells, grid)]
     return np.array(boxes, float).reshape(-1, 4)

@@ -123,5 +123,18 @@ def test_scans_of_several_lidars_are_one_cloud_in_the_frame_of_the_first(open3d,
     points = cloud["positions"].numpy()
     assert {*np.searchsorted([512, 768], cells, side="right").tolist()} == {0, 1, 2}
     np.testing.assert_allclose(points, grid.points(cells, ranges[cells]), rtol=1e-5, atol=1e-4)
+    # Every LiDAR meets cars where they stand in the world.
+    text = beside(tmp_path / "scans", "000")
+    x, y, z, yaw, pitch, roll = text["sensor_in_world"]
+    sensor = Frame(x, y, z, yaw, roll, pitch)
+    world = sensor.origin + sensor.vectors_to_world(points.astype(float))
+    on_body = np.zeros(len(points), bool)
+    for body in text["bodies"]:
+        box = np.array(body["box"])
+        here = Frame(*box[:3], box[6]).vectors_to_local(world - box[:3])
+        on_body |= (np.abs(here) < box[3:6] / 2 + 0.01).all(axis=1)
+    high = world[:, 2] > 0.05
+    assert {*grid.lidars_of(cells[high]).tolist()} == {0, 1, 2}
+    assert on_body[high].all()
     # The corners stand lower than the roof, and all meet the same road.
     assert points[:, 2].min() == pytest.approx(-1.8, abs=0.01)

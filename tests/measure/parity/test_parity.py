@@ -4,6 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from care_sim.base.errors import InvalidInput
 from care_sim.cli import main
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
@@ -21,6 +22,7 @@ from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.sensors.engines import ENGINES
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.world.bodies import CATALOGUE
+from tests.helpers.lidars import CORNERS
 
 GRID = AngularGrid(columns=180, rows=24)
 LEVEL = AngularGrid(columns=4, rows=3, top=0.5, bottom=-0.5)
@@ -139,6 +141,11 @@ def test_every_keyframe_of_an_episode_is_scanned_in_full():
     assert on_exact.tolist() == [3 * 16384, 0, 0, 0, 0]
     assert on_bullet[UNEXPLAINED] == 0
     assert on_bullet[[GRAZING, TOLERANCE]].sum() < 1e-3 * 3 * 16384
+
+
+def test_several_lidars_are_refused_in_one_line():
+    with pytest.raises(InvalidInput, match="engines are compared with one LiDAR, got 3"):
+        compare_episode(EpisodeConfig("dense", "care", 0.1, 0, sensor=CORNERS), KeyframeAgreement())
 
 
 def test_the_command_prints_and_writes(tmp_path, capsys):

@@ -9,6 +9,8 @@ import pytest
 import care_sim
 from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import Conditions
+from care_sim.core.grid import AngularGrid
+from care_sim.core.grid_stack import GridStack
 from care_sim.core.residual import wedges
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
@@ -16,6 +18,7 @@ from care_sim.policies.base import Policy
 from care_sim.policies.own.care_units import CareUnits
 from care_sim.policies.own.target_shots import TargetShots
 from care_sim.sensors.camera import FRONT_CAMERA
+from care_sim.world.bodies import CATALOGUE
 
 FOG = {"lidar_stated_range_m": 20.0, "visibility_m": 50.0}
 
@@ -67,6 +70,24 @@ def test_a_cell_of_two_targets_has_the_shots_of_the_one_that_needs_more(belief_o
     near, far = foggy.hulls(belief.tracks.boxes)
     assert shots(foggy, far, belief) == {4}
     assert shots(foggy, np.setdiff1d(near, far), belief) <= {1}
+
+
+def test_each_lidar_has_the_shots_of_its_own_distance(belief_of, car, seen):
+    """A car 13.5 m from the roof is 8 m from the LiDAR in the bumper; so is what a camera shows."""
+    grid = AngularGrid(64, 8)
+    pair = GridStack((grid, grid), ((0.0, 0.0, 0.0), (5.5, 0.0, -1.0)))
+    foggy = replace(rig(**FOG), grid=pair)
+    tracked = belief_of([car(1, 13.5)])
+    half = FRONT_CAMERA.focal * CATALOGUE["car"].size[2] / (13.5 - FRONT_CAMERA.position[0]) / 2
+    boxes = seen(("car", 158.0, 90.0 - half, 162.0, 90.0 + half))
+    pictured = replace(belief_of(), detections=boxes)
+    for sets, belief in (
+        (foggy.hulls(tracked.tracks.boxes), tracked),
+        (wedges(boxes, foggy), pictured),
+    ):
+        lidars = pair.lidars_of(sets[0])
+        assert shots(foggy, sets[0][lidars == 0], belief) == {4}
+        assert shots(foggy, sets[0][lidars == 1], belief) == {1}
 
 
 def test_where_pulses_have_no_strength_one_shot_is_enough(belief_of, car):
