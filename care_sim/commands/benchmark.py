@@ -34,8 +34,10 @@ _OUT = Path("runs/benchmark")
 
 @dataclass(frozen=True, kw_only=True)
 class Benchmark:
-    """Play the official suite: drives, Euro NCAP tests and streets at 1% of the cells. Writes a
-    result file for every policy, from which `care-sim leaderboard` makes the table.
+    """Play the official suite and write a result file for every policy: one score and its parts.
+
+    The suite is drives, Euro NCAP tests and streets at 1% of the cells. `care-sim leaderboard`
+    makes the table.
     """
 
     policy: tuple[str, ...] = ()

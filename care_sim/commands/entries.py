@@ -46,12 +46,14 @@ COMMANDS = {
     "benchmark": CommandEntry(
         "benchmark",
         "Benchmark",
-        "Play the official suite and write a result file for every policy: one score, its parts.",
+        "Play the official suite and write a result file for every policy: one score and its "
+        "parts.",
     ),
     "leaderboard": CommandEntry(
         "leaderboard",
         "Leaderboard",
-        "Make one table of results of `benchmark`, or verify them: a random tenth played again.",
+        "Make one table of results of `benchmark`, or verify them by playing a random tenth of "
+        "their episodes again.",
     ),
     "sweep": CommandEntry(
         "sweep",

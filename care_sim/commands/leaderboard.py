@@ -30,8 +30,10 @@ from care_sim.study.executors import CORES, MOST_WORKERS
 
 @dataclass(frozen=True, kw_only=True)
 class Leaderboard:
-    """Make one table, its figure and its page of results of `care-sim benchmark`; or verify them,
-    by playing a random tenth of their episodes again.
+    """Make one table of results of `benchmark`, or verify them by playing a random tenth of their
+    episodes again.
+
+    Page and figure of the table go to `out`.
     """
 
     results: Annotated[

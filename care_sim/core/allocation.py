@@ -36,9 +36,7 @@ def budget_cells(budget: float, cells: int, unit: str = "cell") -> int:
     if not (is_number(budget) and 0 < budget <= 1):
         raise InvalidInput(f"budget must lie in (0, 1], got {shown(budget)}")
     if round(float(budget) * cells) < 1:
-        raise InvalidInput(
-            f"budget {budget} leaves no {unit} of {cells}; {1 / cells:.2g} is one"
-        )
+        raise InvalidInput(f"budget {budget} leaves no {unit} of {cells}; {1 / cells:.2g} is one")
     return round(float(budget) * cells)
 
 

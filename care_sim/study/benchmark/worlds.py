@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import NamedTuple, Protocol, TypeVar
 
 from care_sim.base.errors import InvalidInput
+from care_sim.base.files import write_text
 from care_sim.base.json_text import check_file_size, parsed_json
 from care_sim.base.random_streams import check_secret, secret_entropy
 
@@ -111,7 +112,7 @@ def publish_worlds(worlds: Sequence[World]) -> None:
         f' "{part}": {json.dumps([[w.seed, w.reachable] for w in worlds if w.part == part])}'
         for part in PARTS
     )
-    _PUBLISHED.write_text("{\n" + ",\n".join(parts) + "\n}\n", encoding="utf-8")
+    write_text(_PUBLISHED, "{\n" + ",\n".join(parts) + "\n}\n")
 
 
 def quick_tenth(things: Sequence[OfPart]) -> list[OfPart]:
