@@ -8,6 +8,7 @@ from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.belief import Belief
 from care_sim.core.cell_sets import CellSets
+from care_sim.core.frames import turned
 from care_sim.core.pinhole_kernels import CameraModels, box_rays, model_of, pixel
 from care_sim.core.rig import Rig
 from care_sim.core.types import ImageDetections, Tracks
@@ -91,21 +92,7 @@ def _turned_since(vectors: Floats, detections: ImageDetections) -> Floats:
     """Vectors (n, k, 3) of the sensor frames in which the pictures were taken, along the axes of
     now: since then the car has turned, so they have turned the other way.
     """
-    angles = -detections.yaw_changes
-    turned: Floats = _turned_bundles(vectors, np.cos(angles), np.sin(angles))
-    return turned
-
-
-@compiled()
-def _turned_bundles(rays: Floats, cosines: Floats, sines: Floats) -> Floats:
-    """Bundles of rays (n, k, 3), each turned about z by the angle with this cosine and sine."""
-    turned = rays.copy()
-    for n in range(len(rays)):
-        cos, sin = cosines[n], sines[n]
-        for ray in turned[n]:
-            x, y = ray[0], ray[1]
-            ray[0], ray[1] = cos * x - sin * y, sin * x + cos * y
-    return turned
+    return turned(vectors, -detections.yaw_changes[:, None])
 
 
 @compiled()

@@ -36,7 +36,7 @@ from care_sim.sensors.camera import (
     CameraDetector,
     Picture,
     class_table,
-    seen_of_classes,
+    faultless_detections,
     window_on,
 )
 from care_sim.sensors.engines import make_engine
@@ -248,7 +248,7 @@ class ClosedLoop:
         sensor = Frame.mounted(self.world.ego.pose, self.rig.sensor_position)
         boxes = sensor.boxes_to_local(self.world.boxes_of(self._reported))
         taken = [self._photograph(camera, sensor, boxes) for camera in self._camera.mounted]
-        seen = seen_of_classes(taken, self._classes)
+        seen = faultless_detections(taken, self._classes)
         yaw = self._localisation.taken_for(sensor).yaw
         self._camera.take(seen, yaw, boxes, self.world.time)
         rest = self.world.advance(acceleration, self.rig.keyframe_s - after_s)
@@ -270,7 +270,7 @@ class ClosedLoop:
                 self.pictures, self.rig.cameras, self._camera.mounted, strict=True
             )
         ]
-        self.seen = seen_of_classes(taken, self._classes)
+        self.seen = faultless_detections(taken, self._classes)
 
         # The boxes that arrive, late and with errors, and the forecasts: all that is known when the
         # next cells are chosen.

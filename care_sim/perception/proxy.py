@@ -49,15 +49,9 @@ def _hit_often(bodies: Integers, hits: Integers, least: int) -> tuple[Integers, 
     counts = np.zeros(len(bodies), np.int64)
     row = 0
     for hit in hits:
-        # Neighbouring rays mostly hit the same body. Else it is found by bisection.
+        # Neighbouring rays mostly hit the same body.
         if row == len(bodies) or bodies[row] != hit:
-            row, end = 0, len(bodies)
-            while row < end:
-                middle = (row + end) // 2
-                if bodies[middle] < hit:
-                    row = middle + 1
-                else:
-                    end = middle
+            row = np.searchsorted(bodies, hit)
         if row < len(bodies) and bodies[row] == hit:
             counts[row] += 1
     kept = np.empty(len(bodies), np.int64)

@@ -72,17 +72,6 @@ class Picture:
         return frozenset(self.bodies[self.pixels >= MIN_PIXELS].tolist())
 
 
-def faultless_detections(
-    pictures: Sequence[Picture], labels: Mapping[int, int]
-) -> IdentifiedDetections:
-    """What the camera detector reports without faults: a box for every body that `labels` maps to a
-    class and that shows enough pixels.
-
-    `pictures` are one per camera of the rig, in its order.
-    """
-    return seen_of_classes(pictures, class_table(labels))
-
-
 def class_table(labels: Mapping[int, int]) -> Integers:
     """The class of every body by its id, -1 of those that `labels` does not map to one."""
     table = np.full(max(labels, default=-1) + 1, -1)
@@ -90,8 +79,12 @@ def class_table(labels: Mapping[int, int]) -> Integers:
     return table
 
 
-def seen_of_classes(pictures: Sequence[Picture], classes: Integers) -> IdentifiedDetections:
-    """`faultless_detections`, with the labels as a `class_table`."""
+def faultless_detections(pictures: Sequence[Picture], classes: Integers) -> IdentifiedDetections:
+    """What the camera detector reports without faults: a box for every body that has a class in the
+    `class_table` and shows enough pixels.
+
+    `pictures` are one per camera of the rig, in its order.
+    """
     parts = [
         reported_boxes(picture.bodies, picture.boxes, picture.pixels, classes, camera)
         for camera, picture in enumerate(pictures)

@@ -20,6 +20,7 @@ from care_sim.sensors.camera import (
     CAMERA_HEIGHT,
     CAMERA_WIDTH,
     Picture,
+    class_table,
     faultless_detections,
     window_on,
 )
@@ -57,7 +58,7 @@ def surround_detections(
     views = zip(cameras, windows, strict=True)
     return faultless_detections(
         [Picture.of(world.body_ids(camera, sensor, window), window) for camera, window in views],
-        labels,
+        class_table(labels),
     )
 
 

@@ -16,7 +16,13 @@ from care_sim.core.rig import Rig
 from care_sim.core.sensor_setup import LIDAR_POSITION
 from care_sim.core.types import Demand
 from care_sim.scenarios import make_scenario
-from care_sim.sensors.camera import FRONT_CAMERA, CameraDetector, Picture, faultless_detections
+from care_sim.sensors.camera import (
+    FRONT_CAMERA,
+    CameraDetector,
+    Picture,
+    class_table,
+    faultless_detections,
+)
 
 pytestmark = pytest.mark.slow
 GRID = AngularGrid()
@@ -62,7 +68,9 @@ def scene(world, sensor, person):
     picture = Picture.of(world.bullet.body_ids(FRONT_CAMERA, sensor))
     camera = CameraDetector(list(labels), Sensing(), 0.1, np.random.SeedSequence(0), [FRONT_CAMERA])
     anywhere = np.zeros((len(labels), 7))
-    seen = camera.detect(faultless_detections([picture], labels), 0.0, anywhere, 0.0).detections
+    seen = camera.detect(
+        faultless_detections([picture], class_table(labels)), 0.0, anywhere, 0.0
+    ).detections
     (of_person,) = [n for n in range(len(seen)) if seen.classes[n] == person.label]
     cells = wedges(seen, RIG)
     return GRID.hulls(nearest_first), cells, cells[of_person]

@@ -9,6 +9,7 @@ from care_sim.sensors.camera import (
     FRONT_CAMERA,
     CameraDetector,
     Picture,
+    class_table,
     faultless_detections,
     window_on,
 )
@@ -30,7 +31,7 @@ class Detector(CameraDetector):
 
     def detect(self, picture, heading):
         self.frame += 1
-        seen = faultless_detections([picture], self.labels)
+        seen = faultless_detections([picture], class_table(self.labels))
         time_s = self.frame * self.keyframe_s
         return super().detect(seen, heading, self.boxes, time_s).detections
 

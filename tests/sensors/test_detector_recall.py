@@ -11,7 +11,7 @@ from care_sim.core.frames import Frame
 from care_sim.core.types import CLASSES, ImageDetections
 from care_sim.sensors.annotated import IdentifiedDetections
 from care_sim.sensors.box_pool import box_areas
-from care_sim.sensors.camera import FRONT_CAMERA, Picture, faultless_detections
+from care_sim.sensors.camera import FRONT_CAMERA, Picture, class_table, faultless_detections
 from care_sim.sensors.camera_profiles import YOLOX
 from care_sim.sensors.detector_recall import UNHIDDEN, RecallTable, seen_as, whole_boxes
 from care_sim.world.bodies import CATALOGUE
@@ -91,7 +91,7 @@ def ratio_from_all_sides(bullet, kind):
         bullet.move_all(np.array([body]), np.array([(metres, 2.0, yaw)]))
         local = SENSOR.boxes_to_local(np.array([[metres, 2.0, size[2] / 2, *size, yaw]]))
         picture = Picture.of(bullet.body_ids(FRONT_CAMERA, SENSOR))
-        seen = faultless_detections([picture], {body: label}).detections
+        seen = faultless_detections([picture], class_table({body: label})).detections
         ratios += (box_areas(seen.boxes) / box_areas(whole_boxes(FRONT_CAMERA, local))).tolist()
     bullet.move_all(np.array([body]), np.array([(-99.0, 0.0, 0.0)]))
     return ratios
@@ -110,5 +110,7 @@ def test_what_hides_the_lower_part_leaves_the_upper_one(bullet):
     bullet.add(CATALOGUE["skip"], (12.0, 0.0, 1.57))
     local = SENSOR.boxes_to_local(np.array([[15.0, 0.0, size[2] / 2, *size, 0.0]]))
     picture = Picture.of(bullet.body_ids(FRONT_CAMERA, SENSOR))
-    _, (share,) = seen_as(faultless_detections([picture], {body: 4}), local, [FRONT_CAMERA], 480.0)
+    _, (share,) = seen_as(
+        faultless_detections([picture], class_table({body: 4})), local, [FRONT_CAMERA], 480.0
+    )
     assert 0.05 < share < 0.4

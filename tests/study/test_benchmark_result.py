@@ -200,9 +200,13 @@ def test_a_result_is_of_the_code_of_its_policy(tmp_path):
     assert not is_of_this_code(made_result("care"))
 
 
-def test_the_results_of_this_repository_can_be_read():
-    for path in (ROOT / "results" / "leaderboard").glob("*.json"):
-        assert read_result(path).rows, path
+@pytest.mark.parametrize(
+    "path",
+    sorted((ROOT / "results" / "leaderboard").glob("*.json")),
+    ids=lambda path: path.stem,
+)
+def test_the_results_of_this_repository_can_be_read(path):
+    assert read_result(path).rows
 
 
 def test_what_is_no_result_is_named(tmp_path):

@@ -16,7 +16,13 @@ from care_sim.envs.sensing import SensingEnv, sensing
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.perception.proxy import ReturnsRule
 from care_sim.perception.tracker import TrackMemory
-from care_sim.sensors.camera import CameraDetector, Picture, faultless_detections, window_on
+from care_sim.sensors.camera import (
+    CameraDetector,
+    Picture,
+    class_table,
+    faultless_detections,
+    window_on,
+)
 from care_sim.sensors.engines import make_engine
 from care_sim.sensors.lidar import Lidar
 from care_sim.study.episode_config import EpisodeConfig
@@ -98,6 +104,7 @@ class StageByStage:
         self.world = world = env.loop.world
         self._sensor = env.loop.sensor
         self._labels = world.labels()
+        self._classes = class_table(self._labels)
         self._bodies = np.array(list(self._labels), np.int64)
         # Sensors without faults draw nothing from their seeds, so that any seeds give the episode.
         camera_seed, lidar_seed = np.random.SeedSequence(0).spawn(2)
@@ -144,7 +151,7 @@ class StageByStage:
         window = window_on(camera, boxes)
         ids = watch("camera", self._engine.body_ids, camera, self._sensor, window)
         picture = watch("camera", Picture.of, ids, window)
-        seen = faultless_detections([picture], self._labels)
+        seen = faultless_detections([picture], self._classes)
         heading = self._sensor.yaw
         arrived = watch("camera", self._camera.detect, seen, heading, boxes, self.world.time)
         return arrived.detections
