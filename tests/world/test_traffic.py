@@ -152,6 +152,18 @@ def test_all_vehicles_go_as_those_of_highway_env_to_the_last_bit(monkeypatch):
     assert np.ptp(poses[:, 3:, 1], axis=0) == pytest.approx(3.5, abs=0.1)
 
 
+def test_who_is_faster_than_any_vehicle_goes_as_in_highway_env(monkeypatch):
+    def run():
+        road = Traffic((1,), 0, 3.5, 14.0)
+        ego = road.add_ego(0.0, traffic.Vehicle.MAX_SPEED + 4.0, EGO)
+        poses = drive(road, 1.0, ego, ego=ego, acceleration=lambda time: 2.0)
+        return ego.speed, poses.tobytes()
+
+    speed, poses = run()
+    assert speed == pytest.approx(traffic.Vehicle.MAX_SPEED, abs=2.0)
+    assert (speed, poses) == as_highway_env_drives(monkeypatch, run)
+
+
 DIRECTIONS = (1, 1, -1, -1)
 PLACES = st.floats(-60.0, 60.0)
 LANES_THERE = st.integers(0, len(DIRECTIONS) - 1)
