@@ -20,7 +20,8 @@ _F = TypeVar("_F", bound=Callable[..., Any])
 
 
 def compiled(**options: Any) -> Callable[[_F], _F]:
-    """Compile a function at its first call; `options` are those of `numba.njit`.
+    """Compile a function at its first call; `options` are those of `numba.njit`. While it runs,
+    other threads of Python may run, too.
 
     The code is kept beside the file, or in the user's cache folder, or where NUMBA_CACHE_DIR says.
     Where none of these can be written, every process compiles anew.
@@ -28,9 +29,9 @@ def compiled(**options: Any) -> Callable[[_F], _F]:
 
     def make(function: _F) -> Any:
         try:
-            kernel = njit(cache=True, **options)(function)
+            kernel = njit(cache=True, nogil=True, **options)(function)
         except RuntimeError:  # nowhere to keep it
-            return njit(**options)(function)
+            return njit(nogil=True, **options)(function)
         # Numba reads the version before anything else of what is kept, and drops code of another
         # one. So code from other sources is never even unpickled: the classes of its arguments may
         # be gone by now.

@@ -1,0 +1,1 @@
+"""Closed-loop worlds in batches: the keyframe of `care_sim.loops.closed_loop` over arrays."""

@@ -1,0 +1,181 @@
+"""The state of a batch of worlds, as arrays with a row per world that compiled code takes whole.
+
+W worlds, each with its own numbers of bodies, parts, tracks: tables are as long as the longest
+needs, and `counts` (W,) says how many rows of a world's table are in use. What lies beyond them
+means nothing. World frame, metres and radians, unless it says otherwise.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.belief import MAX_TRACKS
+from care_sim.core.types import Tracks
+
+_BODIES, _PARTS, _CORNERS = 32, 128, 1024
+"""Rows with which tables begin; they grow with what comes."""
+
+
+class Bodies(NamedTuple):
+    """By body id: `boxes` (W, B, 7) as in `care_sim.world.body_tables.Footprints`, `before`
+    (W, B, 7) those of a world step ago, and `poses` (W, B, 7) as in `Primitives.poses`.
+    """
+
+    counts: Integers
+    boxes: Floats
+    before: Floats
+    poses: Floats
+
+
+class Solids(NamedTuple):
+    """The parts that rays can hit; columns as in `care_sim.world.body_tables.Primitives`: `shapes`
+    (W, P), `halves` (W, P, 3), `offsets` (W, P, 3), `owners` (W, P).
+    """
+
+    counts: Integers
+    shapes: Integers
+    halves: Floats
+    offsets: Floats
+    owners: Integers
+
+
+class Outlines(NamedTuple):
+    """The parts that cameras see; columns as in `care_sim.sensors.engines.picture_kernels.Meshes`:
+    `corners` (W, C, 3), `faces` (W, F, 4), `edges` (W, D, 2), `starts` (W, K + 1, 3), `owners`
+    (W, K), `reaches` (W, K).
+    """
+
+    counts: Integers
+    corners: Floats
+    faces: Floats
+    edges: Integers
+    starts: Integers
+    owners: Integers
+    reaches: Floats
+
+
+class Reported(NamedTuple):
+    """The bodies that perception reports, by ascending id: `bodies` (W, R) and their `classes`
+    (W, R); and `by_body` (W, B) the class of every body, -1 without one.
+    """
+
+    counts: Integers
+    bodies: Integers
+    classes: Integers
+    by_body: Integers
+
+
+class TrackTables(NamedTuple):
+    """`rows` (W, T, 13) as in `care_sim.perception.track_kernels`, and the `next_ids` (W,)."""
+
+    counts: Integers
+    rows: Floats
+    next_ids: Integers
+
+
+class Sensors(NamedTuple):
+    """Where the LiDAR of each car is now: `poses` (W, 6), x, y, z, yaw, roll, pitch; the cosine and
+    sine of yaw, `turns` (W, 2), and of -yaw, `turns_back` (W, 2). NumPy's, as in
+    `care_sim.core.frames`.
+    """
+
+    poses: Floats
+    turns: Floats
+    turns_back: Floats
+
+
+class Egos(NamedTuple):
+    """Each car's own motion: `speeds`, `yaw_rates`, `accelerations` (W,) as in
+    `care_sim.core.types.Ego`; its `bodies` (W,), and the `targets` (W,), the first-sighting actor's
+    body or NO_BODY.
+    """
+
+    speeds: Floats
+    yaw_rates: Floats
+    accelerations: Floats
+    bodies: Integers
+    targets: Integers
+
+
+class Fired(NamedTuple):
+    """The cells of a keyframe: `cells` (W, F), ascending in each row."""
+
+    counts: Integers
+    cells: Integers
+
+
+class Passages(NamedTuple):
+    """What happened while the worlds moved on to the next keyframe; (W,) each, columns as in
+    `care_sim.world.approach.ClosestApproach`: `nearest_m`, `clearance_m`; whether there was an
+    impact, `hit`, and of the first one the ego's speed `impact_speed_mps`, the `body`, and whether
+    it lay `ahead`.
+    """
+
+    nearest_m: Floats
+    clearance_m: Floats
+    hit: Mask
+    impact_speed_mps: Floats
+    body: Integers
+    ahead: Mask
+
+
+class BatchState:
+    """The tables of `worlds` worlds."""
+
+    def __init__(self, worlds: int):
+        self.worlds = worlds
+        self.live = np.zeros(worlds, np.bool_)
+        """(W,) whose episode is running: the others are left alone."""
+        self.keyframes = np.zeros(worlds, np.int64)
+        """(W,) the number of each world's coming keyframe, from 0."""
+        self.times = np.zeros(worlds)
+        """(W,) seconds from the start."""
+        self.bodies = Bodies(
+            _counts(worlds), *(np.full((worlds, _BODIES, 7), np.nan) for _ in range(3))
+        )
+        self.solids = Solids(
+            _counts(worlds),
+            np.zeros((worlds, _PARTS), np.int64),
+            np.zeros((worlds, _PARTS, 3)),
+            np.zeros((worlds, _PARTS, 3)),
+            np.zeros((worlds, _PARTS), np.int64),
+        )
+        self.outlines = Outlines(
+            _counts(worlds),
+            np.zeros((worlds, _CORNERS, 3)),
+            np.zeros((worlds, _CORNERS, 4)),
+            np.zeros((worlds, _CORNERS, 2), np.int64),
+            np.zeros((worlds, _PARTS, 3), np.int64),
+            np.zeros((worlds, _PARTS), np.int64),
+            np.zeros((worlds, _PARTS)),
+        )
+        self.reported = Reported(
+            _counts(worlds),
+            np.zeros((worlds, _BODIES), np.int64),
+            np.zeros((worlds, _BODIES), np.int64),
+            np.full((worlds, _BODIES), -1),
+        )
+        self.tracks = TrackTables(
+            _counts(worlds), np.zeros((worlds, MAX_TRACKS, len(Tracks.COLUMNS))), _counts(worlds)
+        )
+        self.sensors = Sensors(
+            np.zeros((worlds, 6)), np.zeros((worlds, 2)), np.zeros((worlds, 2))
+        )
+        self.egos = Egos(*(np.zeros(worlds) for _ in range(3)), _counts(worlds), _counts(worlds))
+
+
+def filled(table: np.ndarray, world: int, rows: np.ndarray) -> np.ndarray:
+    """The table (W, n, ...) with `rows` (k, ...) at the beginning of a world's; a longer table, if
+    they need more room than there is.
+    """
+    if len(rows) > table.shape[1]:
+        longer = np.zeros((len(table), 2 * len(rows), *table.shape[2:]), table.dtype)
+        longer[:, : table.shape[1]] = table
+        table = longer
+    table[world, : len(rows)] = rows
+    return table
+
+
+def _counts(worlds: int) -> Integers:
+    return np.zeros(worlds, np.int64)
