@@ -34,8 +34,8 @@ def compiled(**options: Any) -> Callable[[_F], _F]:
             return njit(nogil=True, **options)(function)
         # Numba reads the version before anything else of what is kept, and drops code of another
         # one. So code from other sources is never even unpickled: the classes of its arguments may
-        # be gone by now.
-        kernel._cache._cache_file._version += f" {_sources_digest(function.__module__)}"
+        # be gone by now. Numba does not keep options apart, either.
+        kernel._cache._cache_file._version += f" {_sources_digest(function.__module__)} nogil"
         return kernel
 
     return make
