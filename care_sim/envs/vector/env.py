@@ -20,6 +20,8 @@ from care_sim.core.types import Action
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.envs.sensing import Observed
 from care_sim.envs.spaces import checked_scores
+from care_sim.envs.vector.compiled_worlds import CompiledWorlds
+from care_sim.envs.vector.coverage import why_separate
 from care_sim.envs.vector.infos import kept
 from care_sim.envs.vector.separate_worlds import SeparateWorlds
 from care_sim.envs.vector.threads import Threads
@@ -165,6 +167,8 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
 
     def _made(self, share: slice, arguments: dict[str, Any]) -> Worlds:
         rows = {name: values[share] for name, values in self._observed.items()}
+        if why_separate(self._model) is None:
+            return CompiledWorlds(self._model, rows)
         return SeparateWorlds(partial(self.single, **arguments), rows)
 
     def _played(self, scores: NDArray[np.float32], who: Mask) -> Stepped:
@@ -190,10 +194,9 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
     ) -> dict[str, Any]:
         """Begin episodes in the worlds `who`, and add their infos."""
         for worlds, share in zip(self._worlds, self._shares, strict=True):
-            for world in np.flatnonzero(who[share]).tolist():
-                number = share.start + world
-                info = worlds.begin(world, seeds[number])
-                infos = self._add_info(infos, info, number)
+            beginning = {world: seeds[share.start + world] for world in _places(who[share])}
+            for world, info in (worlds.begin(beginning) if beginning else {}).items():
+                infos = self._add_info(infos, info, share.start + world)
         self._over[who] = False
         self._begun[who] = True
         return infos
@@ -208,7 +211,7 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
 
     def _with_finals(self, infos: dict[str, Any], stepped: Stepped, over: Mask) -> dict[str, Any]:
         finals = np.full(self.num_envs, None, object)
-        for world in np.flatnonzero(over).tolist():
+        for world in _places(over):
             finals[world] = {name: rows[world].copy() for name, rows in self._observed.items()}
         told = {
             "final_obs": finals,
@@ -249,6 +252,11 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
                 f"reset_mask must be {self.num_envs} flags, at least one of them True"
             )
         return mask
+
+
+def _places(who: Mask) -> list[int]:
+    places: list[int] = np.flatnonzero(who).tolist()
+    return places
 
 
 def _autoreset(mode: AutoresetMode | str) -> AutoresetMode:

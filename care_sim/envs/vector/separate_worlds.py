@@ -2,7 +2,7 @@
 `care_sim.batch` do not know.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -21,11 +21,13 @@ class SeparateWorlds:
         self.observed = observed
         self._envs = [make() for _ in range(len(observed["budget"]))]
 
-    def begin(self, world: int, seed: int | None) -> dict[str, Any]:
+    def begin(self, seeds: Mapping[int, int | None]) -> dict[int, dict[str, Any]]:
         """See `care_sim.envs.vector.worlds.Worlds`."""
-        observation, info = self._envs[world].reset(seed=seed)
-        self._show(world, observation)
-        return info
+        infos = {}
+        for world, seed in seeds.items():
+            observation, infos[world] = self._envs[world].reset(seed=seed)
+            self._show(world, observation)
+        return infos
 
     def step(self, actions: NDArray[np.float32], who: Mask) -> Stepped:
         """See `care_sim.envs.vector.worlds.Worlds`."""

@@ -1,5 +1,6 @@
 """What plays some of the worlds of a vector environment, in one thread."""
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -35,8 +36,10 @@ class Worlds(Protocol):
 
     observed: Observed
 
-    def begin(self, world: int, seed: int | None) -> dict[str, Any]:
-        """Begin an episode in one of them, as `reset` of the single environment does; its info."""
+    def begin(self, seeds: Mapping[int, int | None]) -> dict[int, dict[str, Any]]:
+        """Begin an episode in those that have a seed or None here, as `reset` of the single
+        environment does with it; their infos.
+        """
         ...
 
     def step(self, actions: NDArray[np.float32], who: Mask) -> Stepped:
