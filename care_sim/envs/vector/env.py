@@ -118,9 +118,7 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         infos = self._begin(who, seeds, {})
         return self._handed_out(), infos
 
-    def step(
-        self, actions: Action
-    ) -> tuple[Observed, Floats, Mask, Mask, dict[str, Any]]:
+    def step(self, actions: Action) -> tuple[Observed, Floats, Mask, Mask, dict[str, Any]]:
         """Fire the cells that each world's row of `actions` (W, E, A) scores highest.
 
         Raises InvalidInput for actions of the wrong shape or with values that are not finite, and
@@ -185,9 +183,11 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
             for share, part in zip(self._shares, parts, strict=True)
             for world, info in part.single.items()
         }
+        rewards, terminated, truncated = (
+            np.concatenate(column) for column in zip(*(part[:3] for part in parts), strict=True)
+        )
         columns = _joined([part.columns for part in parts])
-        flat = (np.concatenate(column) for column in zip(*(part[:3] for part in parts), strict=True))
-        return Stepped(*flat, columns, single)
+        return Stepped(rewards, terminated, truncated, columns, single)
 
     def _begin(
         self, who: Mask, seeds: Sequence[int | None], infos: dict[str, Any]
