@@ -1,7 +1,5 @@
 """A vector environment played beside the single environments that it stands for."""
 
-from itertools import count
-
 import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode
@@ -43,10 +41,7 @@ def difference(one, other, place=""):
         if (one.dtype, one.shape) != (other.dtype, other.shape):
             return f"{place}: {one.dtype} {one.shape}, {other.dtype} {other.shape}"
         if one.dtype == object:
-            pairs = zip(count(), one.ravel(), other.ravel(), strict=False)
-            return next(
-                filter(None, (difference(a, b, f"{place}[{n}]") for n, a, b in pairs)), None
-            )
+            return difference(*(dict(enumerate(table.ravel())) for table in (one, other)), place)
         return None if one.tobytes() == other.tobytes() else f"{place}: {one} {other}"
     same = type(one) is type(other) and (one == other or (one != one and other != other))
     return None if same else f"{place}: {one!r} {other!r}"
