@@ -86,6 +86,11 @@ class BulletWorld:
         stand_at(self.primitives.poses, bodies, poses, np.sin(half), np.cos(half))
         self._bodies.moved(bodies.tolist())
 
+    def put(self, bodies: Sequence[int], poses: Floats) -> None:
+        """Put bodies (n,) at `poses` (n, 7), as `Primitives.poses` has them."""
+        self.primitives.poses[[*bodies]] = poses
+        self._bodies.moved(bodies)
+
     @contextmanager
     def placed(self, poses: Floats) -> Iterator[None]:
         """While it lasts, the bodies at `poses` (m, 7) in the place of `primitives.poses`."""
