@@ -68,7 +68,14 @@ def range_image(size: int, cells: Integers, ranges: Floats, reach: float) -> NDA
     """(N,) metres of the fired `cells` (n,), `reach` where nothing returned, 0 of cells that were
     not fired. Of a cell with several returns the first counts.
     """
-    image = np.zeros(size, np.float32)
+    image = np.empty(size, np.float32)
+    lay_ranges(image, cells, ranges, reach)
+    return image
+
+
+@compiled()
+def lay_ranges(image: NDArray[np.float32], cells: Integers, ranges: Floats, reach: float) -> None:
+    """Make `image` (N,) what `range_image` gives."""
+    image[:] = 0.0
     for n in range(len(cells) - 1, -1, -1):
         image[cells[n]] = min(ranges[n], reach)
-    return image

@@ -75,18 +75,45 @@ def cast_rays(
     """
     # Fields get their names here: numba takes microseconds to type each named tuple of Python,
     # which is much of the time of a scan, and next to none for plain ones.
-    rays = Fan(*fan)
-    solids = Parts(*parts)
+    ranges = np.empty(len(cells))
+    ids = np.empty(len(cells), np.int64)
+    returns = ranges, ids
+    cast_into(
+        returns,
+        cells,
+        reach,
+        Fan(*fan),
+        GridSpacing(*spacing),
+        sensor,
+        Parts(*parts),
+        poses,
+        ground,
+    )
+    return returns
+
+
+@compiled(error_model="numpy")
+def cast_into(
+    returns: tuple[Floats, Integers],
+    cells: Cells,
+    reach: float,
+    rays: Fan,
+    grid: GridSpacing,
+    sensor: Floats,
+    solids: Parts,
+    poses: Floats,
+    ground: int,
+) -> None:
+    """Fill `returns` (n,), (n,) with what `cast_rays` gives."""
+    ranges, ids = returns
     x, y, z, yaw, roll, pitch = sensor
-    pose = SensorPose(x, y, z, yaw, roll, pitch)
-    grid = GridSpacing(*spacing)
-    placed = place_parts(pose, solids, poses, grid, reach)
+    placed = place_parts(SensorPose(x, y, z, yaw, roll, pitch), solids, poses, grid, reach)
 
     # The road first, then part after part: what is nearer takes the ray. So no list of hits is
     # sorted, and the order of parts matters only where two are equally far.
     columns = len(rays.across)
     starts = _row_starts(cells, len(rays.down), columns)
-    ranges, ids = _road_hits(cells, starts, rays, reach, RoadPlane(placed.up, z, ground))
+    _hit_road(returns, cells, starts, rays, reach, RoadPlane(placed.up, z, ground))
 
     for part, (first, last, upper, lower) in enumerate(placed.windows):
         if upper > lower:
@@ -106,16 +133,21 @@ def cast_rays(
                         ranges[place] = distance
                         ids[place] = solids.owners[part]
                     place += 1
-    return ranges, ids
 
 
 @compiled(error_model="numpy")
-def _road_hits(
-    cells: Cells, starts: Integers, fan: Fan, reach: float, road: RoadPlane
-) -> tuple[Floats, Integers]:
-    """Ranges and body ids in a world of road alone."""
-    ranges = np.full(len(cells), math.inf)
-    ids = np.full(len(cells), NO_BODY)
+def _hit_road(
+    returns: tuple[Floats, Integers],
+    cells: Cells,
+    starts: Integers,
+    fan: Fan,
+    reach: float,
+    road: RoadPlane,
+) -> None:
+    """Fill `returns` with those of a world of road alone."""
+    ranges, ids = returns
+    ranges[:] = math.inf
+    ids[:] = NO_BODY
     if road.body != NO_BODY:
         for row in range(len(starts) - 1):
             for n in range(starts[row], starts[row + 1]):
@@ -126,7 +158,6 @@ def _road_hits(
                 if 0.0 <= distance <= reach:
                     ranges[n] = distance
                     ids[n] = road.body
-    return ranges, ids
 
 
 @compiled()
