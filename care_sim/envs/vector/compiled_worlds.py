@@ -26,7 +26,7 @@ class CompiledWorlds:
         worlds = len(observed["budget"])
         self.observed = observed
         self._model = model
-        self._loop = BatchLoop(model.rig, model.conditions, observed)
+        self._loop = BatchLoop(model.rig, model.conditions, model.scenario.duration_s, observed)
         self._rewards = Rewards(model.reward_weights, worlds)
         longest = int(np.ceil(model.scenario.duration_s / model.rig.keyframe_s)) + 1
         self._history = History(worlds, longest)
