@@ -27,8 +27,11 @@ from care_sim.world.bullet import NO_BODY
 
 
 class BatchLoop:
-    """W worlds, their sensors and the software of their cars. Observations are written into
-    `observed`, arrays with a row per world.
+    """W worlds, their sensors and the software of their cars, over episodes of up to `duration_s`
+    seconds. Observations are written into `observed`, arrays with a row per world.
+
+    Unless `exact`, records tell the clearance as `Motion.advance` does, and `least_clearance_m`
+    has to be asked for that of an episode.
     """
 
     fired: Fired
@@ -40,6 +43,7 @@ class BatchLoop:
         conditions: ClosedLoopConditions,
         duration_s: float,
         observed: Observations,
+        exact: bool = True,
     ):
         worlds = len(observed["budget"])
         self.state = BatchState(worlds)
@@ -49,6 +53,7 @@ class BatchLoop:
         self._scanning = Scanning(rig, conditions)
         self._tracking = Tracking(rig.keyframe_s)
         self._braking = Braking(rig, conditions, worlds)
+        self._exact = exact
         self._motion = Motion(worlds, steps_of(duration_s, rig.keyframe_s))
         self._sight = Sight(rig, conditions, worlds)
         self._observing = Observing(rig)
@@ -90,7 +95,7 @@ class BatchLoop:
         detected = self._is_found(found)
 
         # The command holds until the next keyframe; then the cameras look and forecasts are due.
-        passages = self._motion.advance(state, accelerations, self._rig.keyframe_s)
+        passages = self._motion.advance(state, accelerations, self._rig.keyframe_s, self._exact)
         state.keyframes[who] += 1
         self._tracking.predict(state)
         self._scanning.image(fired, returns, self._observed["ranges"], who)
@@ -130,6 +135,10 @@ class BatchLoop:
         hits = ((returns.ids == state.egos.targets[:, None]) & in_use).sum(axis=1)
         result: Mask = self._has_target & (hits >= self._min_returns)
         return result
+
+    def least_clearance_m(self, world: int, since_s: float) -> float:
+        """The least clearance of a world's episode from a time on; see `Motion.settle`."""
+        return self._motion.settle(world, since_s)
 
     def close(self) -> None:
         """Free what the stages hold."""

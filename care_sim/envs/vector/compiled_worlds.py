@@ -1,7 +1,7 @@
 """Worlds that are played as arrays, all at once."""
 
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from care_sim.envs.sensing import Observed
 from care_sim.envs.vector.rewards import Rewards
 from care_sim.envs.vector.worlds import Stepped
 from care_sim.evaluation.metrics import outcome
+from care_sim.loops.records import Outcome
 
 
 class CompiledWorlds:
@@ -63,7 +64,7 @@ class CompiledWorlds:
         over = terminated | truncated
         rewards, terms = self._rewards.of(records, detectable, over, who)
         single: dict[int, dict[str, Any]] = {
-            world: {"outcome": asdict(outcome(self._history.episode(world, keyframes[world] + 1)))}
+            world: {"outcome": asdict(self._outcome(world, keyframes[world] + 1))}
             for world in np.flatnonzero(over).tolist()
         }
         if not self._model.conditions.floor:
@@ -74,6 +75,15 @@ class CompiledWorlds:
     def close(self) -> None:
         """Free what the loop holds."""
         self._loop.close()
+
+    def _outcome(self, world: int, keyframes: int) -> Outcome:
+        """The result of a world's episode of so many keyframes."""
+        episode = self._history.episode(world, keyframes)
+        result = outcome(episode)
+        if self._exact or result.clearance_m is None:
+            return result
+        appeared = next(record.time_s for record in episode if record.in_view)
+        return replace(result, clearance_m=self._loop.least_clearance_m(world, appeared))
 
     def _columns(self, records: Records, terms: dict[str, Any]) -> dict[str, Any]:
         """What `info` says of all worlds, in the order of the single environment."""
