@@ -27,7 +27,10 @@ class CompiledWorlds:
         worlds = len(observed["budget"])
         self.observed = observed
         self._model = model
-        self._loop = BatchLoop(model.rig, model.conditions, model.scenario.duration_s, observed)
+        # Where no info tells of clearances, few of them are needed.
+        self._exact = model.scoring_info
+        duration_s = model.scenario.duration_s
+        self._loop = BatchLoop(model.rig, model.conditions, duration_s, observed, self._exact)
         self._rewards = Rewards(model.reward_weights, worlds)
         longest = int(np.ceil(model.scenario.duration_s / model.rig.keyframe_s)) + 1
         self._history = History(worlds, longest)
