@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from care_sim.batch.lane_columns import SPEED, LaneColumns
@@ -31,6 +31,8 @@ def road(speed, drivers, width, limit):
     return traffic, [ego, *(traffic.add_driver(x, lane, mps, CAR) for x, lane, mps in drivers)]
 
 
+# Of two who are equally near ahead, one counts.
+@example([(8.0, [(0.0, 0, 3.0), (-20.0, 0, 8.0)], 3.5, 14.0, [0.0])])
 @settings(max_examples=60)
 @given(st.lists(ROADS, min_size=1, max_size=4))
 def test_columns_go_as_highway_env_moves_vehicles(roads):
