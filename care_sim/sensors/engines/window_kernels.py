@@ -77,20 +77,30 @@ def place_parts(
     nearest = np.zeros(len(parts.owners))
     corners = np.empty((8, 3))
     sensor_axes = _sensor_axes(sensor.yaw, sensor.roll, sensor.pitch)
+    last = -1
     for part, owner in enumerate(parts.owners):
-        pose = poses[owner]
-        away = (pose[0] - sensor.x, pose[1] - sensor.y, pose[2] - sensor.z)
+        # The parts of a body lie side by side.
+        if owner != last or part == 0:
+            pose = poses[owner]
+            away = (pose[0] - sensor.x, pose[1] - sensor.y, pose[2] - sensor.z)
+            body = body_axes(pose[3], pose[4], pose[5], pose[6])
+            origin = _along(sensor_axes, away)
+            turn = (
+                _along(sensor_axes, body[0]),
+                _along(sensor_axes, body[1]),
+                _along(sensor_axes, body[2]),
+            )
+            last = owner
         if _is_beyond(away, parts.offsets[part], parts.halves[part], reach):
             windows[part] = NO_CELLS
             continue
-        body = body_axes(pose[3], pose[4], pose[5], pose[6])
         # Into the frame of the sensor: the origin of the body first, then the part's offset along
         # the axes of the body.
-        for j, axis in enumerate(sensor_axes):
-            centres[part, j] = dot(axis, away)
+        for j in range(3):
+            centres[part, j] = origin[j]
             for i in range(3):
-                axes[part, i, j] = dot(axis, body[i])
-                centres[part, j] += parts.offsets[part, i] * axes[part, i, j]
+                axes[part, i, j] = turn[i][j]
+                centres[part, j] += parts.offsets[part, i] * turn[i][j]
         _lay_corners(centres[part], axes[part], parts.halves[part], corners)
         # The sides of an upright box are seen along its edges below: those above lie over them.
         is_upright = axes[part, 2, 0] == 0.0 and axes[part, 2, 1] == 0.0
@@ -99,6 +109,12 @@ def place_parts(
 
     up = np.array((sensor_axes[0][2], sensor_axes[1][2], sensor_axes[2][2]))
     return PlacedParts(centres, axes, windows, nearest, up)
+
+
+@compiled()
+def _along(axes: Axes, vector: Vector) -> Vector:
+    """A vector told along these axes."""
+    return dot(axes[0], vector), dot(axes[1], vector), dot(axes[2], vector)
 
 
 @compiled()
