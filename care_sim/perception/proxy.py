@@ -16,7 +16,6 @@ from care_sim.core.conditions import MIN_RETURNS
 from care_sim.core.types import Detections
 from care_sim.sensors.annotated import Annotations, Cloud
 
-
 _WIDEST = 4096
 """Hits are counted by body id in tables that are no wider."""
 

@@ -178,8 +178,10 @@ def _first_places(cells: Cells, size: int) -> Integers:
     firsts = np.full((size >> _STRIDE_BITS) + 2, len(cells))
     for n in range(len(cells) - 1, -1, -1):
         firsts[cells[n] >> _STRIDE_BITS] = n
-    for k in range(len(firsts) - 2, -1, -1):
-        firsts[k] = min(firsts[k], firsts[k + 1])
+    first = len(cells)
+    for k in range(len(firsts) - 1, -1, -1):
+        first = min(first, firsts[k])
+        firsts[k] = first
     return firsts
 
 

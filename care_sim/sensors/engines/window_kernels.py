@@ -180,7 +180,8 @@ def _spread(centre: Floats, corners: Floats) -> tuple[float, float, float]:
     rightmost = (1.0, 0.0)
     leftmost = (1.0, 0.0)
     least, most = 0.0, 0.0
-    for x, y, _ in corners:
+    for n in range(len(corners)):
+        x, y = corners[n, 0], corners[n, 1]
         # The corner in the plane turned so that the centre lies straight ahead. Angles are compared
         # by a measure that is cheap, and only the two extreme ones are computed.
         along, across = centre[0] * x + centre[1] * y, centre[0] * y - centre[1] * x
@@ -223,7 +224,8 @@ def _rows(corners: Floats, near: float, grid: GridSpacing) -> tuple[int, int]:
     # How far in that plane, how low and how high the box is.
     far = 0.0
     lowest, highest = math.inf, -math.inf
-    for x, y, z in corners:
+    for n in range(len(corners)):
+        x, y, z = corners[n, 0], corners[n, 1], corners[n, 2]
         far = max(far, x * x + y * y)
         lowest, highest = min(lowest, z), max(highest, z)
     far = math.sqrt(far)
@@ -247,17 +249,21 @@ def _nearest(corners: Floats) -> float:
         for i in range(3):
             # An edge joins two corners that differ in one bit.
             if not n >> i & 1 and n | 1 << i < len(corners):
-                least = min(least, _to_edge(corners[n], corners[n | 1 << i]))
+                other = n | 1 << i
+                edge = corners[n, 0], corners[n, 1], corners[other, 0], corners[other, 1]
+                least = min(least, _to_edge(edge))
     return math.sqrt(least)
 
 
 @compiled()
-def _to_edge(one: Floats, other: Floats) -> float:
-    """Squared distance in the x, y plane from the origin to the stretch between two corners."""
+def _to_edge(edge: tuple[float, float, float, float]) -> float:
+    """Squared distance in the x, y plane from the origin to the stretch between two corners, x and
+    y of each.
+    """
     # The nearest point of the line, at the share of the way where the connection to the origin is
     # at a right angle, and held between the ends.
-    x, y = one[0], one[1]
-    along, across = other[0] - x, other[1] - y
+    x, y = edge[0], edge[1]
+    along, across = edge[2] - x, edge[3] - y
     length = along * along + across * across
     share = min(1.0, max(0.0, -(x * along + y * across) / length)) if length > 0.0 else 0.0
     squared: float = (x + share * along) ** 2 + (y + share * across) ** 2
