@@ -20,7 +20,8 @@ from care_sim.world.bullet import NO_BODY
 BOX, CYLINDER, SPHERE = range(3)
 """Places in `care_sim.world.body_tables.SHAPES`."""
 
-_STRIDE = 32
+_X, _Y, _Z = np.uintp(0), np.uintp(1), np.uintp(2)
+_STRIDE_BITS = 5
 """Cells among which the first fired one is known; more are searched one by one."""
 Stretch = tuple[float, float]
 """Where a ray enters and leaves, as distances along it; the first is the larger where it misses."""
@@ -34,28 +35,6 @@ class Fan(NamedTuple):
 
     across: Floats
     down: Floats
-
-
-class Salvo(NamedTuple):
-    """Ascending `cells` (n,) that are fired along a fan of `rays`, and the `ranges` (n,) at which
-    they have met something so far, inf of those that have not. `firsts` are those of
-    `_first_places`.
-    """
-
-    cells: Cells
-    firsts: Integers
-    rays: Fan
-    ranges: Floats
-
-
-class Picked(NamedTuple):
-    """Room for the rays of a salvo that may meet a part: their `places` (n,) in it, unit `rays`
-    (3, n) in the frame of the sensor, and the `distances` (n,) to the part.
-    """
-
-    places: Integers
-    rays: Floats
-    distances: Floats
 
 
 class RoadPlane(NamedTuple):
@@ -132,39 +111,50 @@ def cast_into(
     ranges, ids = returns
     x, y, z, yaw, roll, pitch = sensor
     placed = place_parts(SensorPose(x, y, z, yaw, roll, pitch), solids, poses, grid, reach)
-    salvo = Salvo(cells, _first_places(cells, grid.rows * grid.columns), rays, ranges)
+    firsts = _first_places(cells, grid.rows * grid.columns)
 
     # The road first, then part after part: what is nearer takes the ray. So no list of hits is
     # sorted, and the order of parts matters only where two are equally far.
-    _hit_road(salvo, ids, reach, RoadPlane(placed.up, z, ground))
-    picked = Picked(np.empty(len(cells), np.int64), np.empty((3, len(cells))), np.empty(len(cells)))
+    road = RoadPlane(placed.up, z, ground)
+    _hit_road(ranges, ids, cells, firsts, rays.across, rays.down, reach, road)
+    places = np.empty(len(cells), np.int64)
+    picked = np.empty((3, len(cells)))
+    distances = np.empty(len(cells))
     for part, (first, last, upper, lower) in enumerate(placed.windows):
-        # A window that runs over a turn has two stretches of columns: up to its last one, and from
-        # its first one on.
-        nearest = placed.nearest[part]
-        count = 0
-        for row in range(upper, lower + 1):
-            count = _pick(picked, count, salvo, (row, 0, last - grid.turn), nearest)
-            count = _pick(picked, count, salvo, (row, first, last), nearest)
+        if upper > lower:
+            continue
+        window = first, last, upper, lower, grid.turn, placed.nearest[part]
+        count = _pick(window, cells, firsts, rays.across, rays.down, ranges, places, picked)
         if count:
-            _meet(_solid(part, solids, placed.centres, placed.axes), picked, count)
-            _take(ranges, ids, picked, count, solids.owners[part], reach)
+            solid = _solid(part, solids, placed.centres, placed.axes)
+            _meet(solid, picked, distances, count)
+            _take(ranges, ids, places, distances, count, solids.owners[part], reach)
 
 
+# Arrays are handed over one by one from here on, and not as fields of tuples: to take one out of a
+# tuple counts its references, which takes longer than to follow a ray.
 @compiled(error_model="numpy")
-def _hit_road(salvo: Salvo, ids: Integers, reach: float, road: RoadPlane) -> None:
+def _hit_road(
+    ranges: Floats,
+    ids: Integers,
+    cells: Cells,
+    firsts: Integers,
+    across: Floats,
+    down: Floats,
+    reach: float,
+    road: RoadPlane,
+) -> None:
     """Fill ranges and body ids with those of a world of road alone."""
-    ranges, cells, rays = salvo.ranges, salvo.cells, salvo.rays
-    columns = len(rays.across)
     is_level = road.up[0] == 0.0 and road.up[1] == 0.0
     begin = 0
-    for row in range(len(rays.down)):
+    for row in range(len(down)):
         # Over a level road all rays of a row are alike, but for the sign of zeros.
-        end = _place_of(salvo, (row + 1) * columns)
-        distance = _to_road(road, (0.0, 0.0, rays.down[row, 1]))
+        end = _place_of(row * len(across) + len(across), cells, firsts)
+        distance = _to_road(road, (0.0, 0.0, down[row, 1]))
         for n in range(begin, end):
             if not is_level:
-                distance = _to_road(road, _ray(rays, row, cells[n] - row * columns))
+                ray = _ray(across, down, row, cells[n] - row * len(across))
+                distance = _to_road(road, ray)
             is_hit = 0.0 <= distance <= reach and road.body != NO_BODY
             ranges[n] = distance if is_hit else math.inf
             ids[n] = road.body if is_hit else NO_BODY
@@ -180,26 +170,27 @@ def _to_road(road: RoadPlane, ray: Vector) -> float:
 
 @compiled()
 def _first_places(cells: Cells, size: int) -> Integers:
-    """(m,) where among ascending `cells` those from `_STRIDE` times 0, 1, ... on begin; the grid
-    has `size` cells.
+    """(m,) where among ascending `cells` those from 0, 1, ... strides on begin; the grid has `size`
+    cells.
     """
     # From the last one back, each cell is the first of its stride so far. A stride without cells
     # begins where the next one does.
-    firsts = np.full(size // _STRIDE + 2, len(cells))
+    firsts = np.full((size >> _STRIDE_BITS) + 2, len(cells))
     for n in range(len(cells) - 1, -1, -1):
-        firsts[cells[n] // _STRIDE] = n
-    for k in range(len(firsts) - 2, -1, -1):
-        firsts[k] = min(firsts[k], firsts[k + 1])
+        firsts[cells[n] >> _STRIDE_BITS] = n
+    first = len(cells)
+    for k in range(len(firsts) - 1, -1, -1):
+        first = min(first, firsts[k])
+        firsts[k] = first
     return firsts
 
 
 @compiled()
-def _place_of(salvo: Salvo, cell: int) -> int:
+def _place_of(cell: int, cells: Cells, firsts: Integers) -> int:
     """Where a cell of the grid or the next later one is among those fired; behind the last one, if
     there is none.
     """
-    cells = salvo.cells
-    place: int = salvo.firsts[cell // _STRIDE]
+    place: int = firsts[cell >> _STRIDE_BITS]
     while place < len(cells) and cells[place] < cell:
         place += 1
     return place
@@ -207,58 +198,74 @@ def _place_of(salvo: Salvo, cell: int) -> int:
 
 @compiled()
 def _pick(
-    picked: Picked, count: int, salvo: Salvo, stretch: tuple[int, int, int], nearest: float
+    window: tuple[int, int, int, int, int, float],
+    cells: Cells,
+    firsts: Integers,
+    across: Floats,
+    down: Floats,
+    ranges: Floats,
+    places: Integers,
+    picked: Floats,
 ) -> int:
-    """Add the fired cells of a `stretch`, a row and its first and last column, to the `count` ones
-    that are picked already; how many there are then. Who has met something before `nearest` is left
-    out.
+    """Pick the rays of a window that have met nothing before `nearest`; how many they are. Their
+    `places` (n,) among the cells and their directions `picked` (3, n) are filled in.
     """
-    cells, ranges = salvo.cells, salvo.ranges
-    row, first, last = stretch
-    # A window may run on into columns that the grid does not have.
-    columns = len(salvo.rays.across)
-    last = min(last, columns - 1)
-    if first > last:
-        return count
-    begin = row * columns
-    place = _place_of(salvo, begin + first)
-    while place < len(cells) and cells[place] <= begin + last:
-        # Written in any case, and counted if it is to be kept.
-        x, y, z = _ray(salvo.rays, row, cells[place] - begin)
-        picked.places[count] = place
-        picked.rays[0, count], picked.rays[1, count], picked.rays[2, count] = x, y, z
-        count += ranges[place] > nearest
-        place += 1
+    first, last, upper, lower, turn, nearest = window
+    count = 0
+    for row in range(upper, lower + 1):
+        # A window that runs over a turn has two stretches of columns: up to its last one, and from
+        # its first one on. It may run on into columns that the grid does not have.
+        begin = row * len(across)
+        level, height = down[row, 0], down[row, 1]
+        for left, right in ((0, last - turn), (first, last)):
+            end = begin + min(right, len(across) - 1)
+            if begin + left > end:
+                continue
+            place = _place_of(begin + left, cells, firsts)
+            while place < len(cells) and cells[place] <= end:
+                # Written in any case, and counted if it is to be kept. An index without a sign is
+                # never counted from the end of an array, and need not be looked at.
+                own, column = np.uintp(count), np.uintp(cells[np.uintp(place)] - begin)
+                places[own] = place
+                picked[_X, own] = level * across[column, _X]
+                picked[_Y, own] = level * across[column, _Y]
+                picked[_Z, own] = height
+                count += ranges[np.uintp(place)] > nearest
+                place += 1
     return count
 
 
 @compiled()
-def _meet(solid: Solid, picked: Picked, count: int) -> None:
+def _meet(solid: Solid, picked: Floats, distances: Floats, count: int) -> None:
     """Fill in how far the first `count` of the picked rays go to a solid."""
     if solid.shape == BOX:
-        _enter_box(solid.axes, solid.half, solid.start, picked.rays, picked.distances[:count])
+        _enter_box(solid.axes, solid.half, solid.start, picked, distances, count)
         return
     for n in range(count):
-        ray = picked.rays[0, n], picked.rays[1, n], picked.rays[2, n]
-        picked.distances[n] = _entry_of_round(solid, ray)
+        distances[n] = _entry_of_round(solid, (picked[0, n], picked[1, n], picked[2, n]))
 
 
 @compiled()
 def _take(
-    ranges: Floats, ids: Integers, picked: Picked, count: int, owner: int, reach: float
+    ranges: Floats,
+    ids: Integers,
+    places: Integers,
+    distances: Floats,
+    count: int,
+    owner: int,
+    reach: float,
 ) -> None:
     """Let the first `count` of the picked rays end at the solid of a body where it is nearer."""
     for n in range(count):
-        place, distance = picked.places[n], picked.distances[n]
+        place, distance = places[n], distances[n]
         is_nearer = distance < ranges[place] and distance <= reach
         ranges[place] = distance if is_nearer else ranges[place]
         ids[place] = owner if is_nearer else ids[place]
 
 
 @compiled()
-def _ray(fan: Fan, row: int, column: int) -> Vector:
+def _ray(across: Floats, down: Floats, row: int, column: int) -> Vector:
     """The direction of a cell, a unit vector in the frame of the sensor."""
-    across, down = fan.across, fan.down
     return down[row, 0] * across[column, 0], down[row, 0] * across[column, 1], down[row, 1]
 
 
@@ -279,11 +286,13 @@ def _triple(row: Floats) -> Vector:
 
 
 @compiled(error_model="numpy")
-def _enter_box(axes: Axes, half: Vector, start: Vector, rays: Floats, distances: Floats) -> None:
-    """Fill in the distances (n,) along unit `rays` (3, n) to a box, inf without an entry."""
+def _enter_box(
+    axes: Axes, half: Vector, start: Vector, picked: Floats, distances: Floats, count: int
+) -> None:
+    """Fill in the `distances` (n,) along unit rays (3, n) to a box, inf without an entry."""
     # Without branches, so that the compiler computes several rays at once.
-    for n in range(len(distances)):
-        ray = rays[0, n], rays[1, n], rays[2, n]
+    for n in range(count):
+        ray = picked[0, n], picked[1, n], picked[2, n]
         sides = _common(
             _slab(start[0], dot(axes[0], ray), half[0]), _slab(start[1], dot(axes[1], ray), half[1])
         )

@@ -77,20 +77,30 @@ def place_parts(
     nearest = np.zeros(len(parts.owners))
     corners = np.empty((8, 3))
     sensor_axes = _sensor_axes(sensor.yaw, sensor.roll, sensor.pitch)
+    last = -1
     for part, owner in enumerate(parts.owners):
-        pose = poses[owner]
-        away = (pose[0] - sensor.x, pose[1] - sensor.y, pose[2] - sensor.z)
+        # The parts of a body lie side by side.
+        if owner != last or part == 0:
+            pose = poses[owner]
+            away = (pose[0] - sensor.x, pose[1] - sensor.y, pose[2] - sensor.z)
+            body = body_axes(pose[3], pose[4], pose[5], pose[6])
+            origin = _along(sensor_axes, away)
+            turn = (
+                _along(sensor_axes, body[0]),
+                _along(sensor_axes, body[1]),
+                _along(sensor_axes, body[2]),
+            )
+            last = owner
         if _is_beyond(away, parts.offsets[part], parts.halves[part], reach):
             windows[part] = NO_CELLS
             continue
-        body = body_axes(pose[3], pose[4], pose[5], pose[6])
         # Into the frame of the sensor: the origin of the body first, then the part's offset along
         # the axes of the body.
-        for j, axis in enumerate(sensor_axes):
-            centres[part, j] = dot(axis, away)
+        for j in range(3):
+            centres[part, j] = origin[j]
             for i in range(3):
-                axes[part, i, j] = dot(axis, body[i])
-                centres[part, j] += parts.offsets[part, i] * axes[part, i, j]
+                axes[part, i, j] = turn[i][j]
+                centres[part, j] += parts.offsets[part, i] * turn[i][j]
         _lay_corners(centres[part], axes[part], parts.halves[part], corners)
         # The sides of an upright box are seen along its edges below: those above lie over them.
         is_upright = axes[part, 2, 0] == 0.0 and axes[part, 2, 1] == 0.0
@@ -99,6 +109,12 @@ def place_parts(
 
     up = np.array((sensor_axes[0][2], sensor_axes[1][2], sensor_axes[2][2]))
     return PlacedParts(centres, axes, windows, nearest, up)
+
+
+@compiled()
+def _along(axes: Axes, vector: Vector) -> Vector:
+    """A vector told along these axes."""
+    return dot(axes[0], vector), dot(axes[1], vector), dot(axes[2], vector)
 
 
 @compiled()
@@ -164,7 +180,8 @@ def _spread(centre: Floats, corners: Floats) -> tuple[float, float, float]:
     rightmost = (1.0, 0.0)
     leftmost = (1.0, 0.0)
     least, most = 0.0, 0.0
-    for x, y, _ in corners:
+    for n in range(len(corners)):
+        x, y = corners[n, 0], corners[n, 1]
         # The corner in the plane turned so that the centre lies straight ahead. Angles are compared
         # by a measure that is cheap, and only the two extreme ones are computed.
         along, across = centre[0] * x + centre[1] * y, centre[0] * y - centre[1] * x
@@ -207,7 +224,8 @@ def _rows(corners: Floats, near: float, grid: GridSpacing) -> tuple[int, int]:
     # How far in that plane, how low and how high the box is.
     far = 0.0
     lowest, highest = math.inf, -math.inf
-    for x, y, z in corners:
+    for n in range(len(corners)):
+        x, y, z = corners[n, 0], corners[n, 1], corners[n, 2]
         far = max(far, x * x + y * y)
         lowest, highest = min(lowest, z), max(highest, z)
     far = math.sqrt(far)
@@ -231,17 +249,21 @@ def _nearest(corners: Floats) -> float:
         for i in range(3):
             # An edge joins two corners that differ in one bit.
             if not n >> i & 1 and n | 1 << i < len(corners):
-                least = min(least, _to_edge(corners[n], corners[n | 1 << i]))
+                other = n | 1 << i
+                edge = corners[n, 0], corners[n, 1], corners[other, 0], corners[other, 1]
+                least = min(least, _to_edge(edge))
     return math.sqrt(least)
 
 
 @compiled()
-def _to_edge(one: Floats, other: Floats) -> float:
-    """Squared distance in the x, y plane from the origin to the stretch between two corners."""
+def _to_edge(edge: tuple[float, float, float, float]) -> float:
+    """Squared distance in the x, y plane from the origin to the stretch between two corners, x and
+    y of each.
+    """
     # The nearest point of the line, at the share of the way where the connection to the origin is
     # at a right angle, and held between the ends.
-    x, y = one[0], one[1]
-    along, across = other[0] - x, other[1] - y
+    x, y = edge[0], edge[1]
+    along, across = edge[2] - x, edge[3] - y
     length = along * along + across * across
     share = min(1.0, max(0.0, -(x * along + y * across) / length)) if length > 0.0 else 0.0
     squared: float = (x + share * along) ** 2 + (y + share * across) ** 2
