@@ -36,31 +36,25 @@ class Beliefs:
 
     @classmethod
     def from_observation(cls, observation: Observation, rig: Rig, live: Mask) -> "Beliefs":
-        """Read an observation of a vector environment; of worlds that are not `live` (W,) there are
-        no rows.
+        """Read an observation of a vector environment, all but its ranges; of worlds that are not
+        `live` (W,) there are no rows.
 
         Raises InvalidInput as `care_sim.core.rig.Rig.read` does for the observation of one.
         """
         check_observed(observation, rig, len(live))
-        # NaN fails every comparison.
-        vectors = [array_of(observation, name, 2, None)[live] for name in ("ego", "budget")]
-        pictures = array_of(observation, "ranges", 3, None)
-        pictures = pictures if live.all() else pictures[live]
-        fits = lie_between(pictures.reshape(-1, rig.grid.columns), 0.0, HIGHEST)
-        if not (
-            fits and lie_between(vectors[0], -HIGHEST, HIGHEST) and lie_between(vectors[1], 0, 1)
-        ):
+        egos, budgets = (array_of(observation, name, 2, None)[live] for name in ("ego", "budget"))
+        if not (lie_between(egos, -HIGHEST, HIGHEST) and lie_between(budgets, 0.0, 1.0)):
             raise InvalidInput(
-                "an observation's ego must hold numbers, its budget lie in [0, 1], its ranges be "
-                "numbers of 0 or more"
+                f"an observation's ego must hold numbers up to {HIGHEST:g}, its budget lie in "
+                "[0, 1]"
             )
         found, detected = _table(observation, "detections", ImageDetections.COLUMNS, live)
         known, tracked = _table(observation, "tracks", Tracks.COLUMNS, live)
         detections = ImageDetections.from_checked_rows(found)
         rig.check_cameras(detections)
-        budgets = np.zeros(len(live), np.int64)
-        budgets[live] = np.rint(vectors[1][:, 0].astype(np.float64) * rig.grid.size)
-        return cls(detections, Tracks.from_checked_rows(known), detected, tracked, budgets)
+        cells = np.zeros(len(live), np.int64)
+        cells[live] = np.rint(budgets[:, 0].astype(np.float64) * rig.grid.size)
+        return cls(detections, Tracks.from_checked_rows(known), detected, tracked, cells)
 
     def unturned(self) -> "Beliefs":
         """The same as if no car had turned since its pictures."""

@@ -6,6 +6,7 @@ for all keyframes. Of any other there is a policy for every world.
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,21 +73,22 @@ class VectorPolicy(ABC):
 def vector_policy(make: Callable[[], Policy], worlds: int) -> VectorPolicy:
     """What plays so many worlds, each as a policy that `make` makes would play it alone."""
     first = make()
-    if _is_told_by(first, RowPolicy):
+    # Along the axes of a tilted grid boxes are told by a product of matrices, whose last bits hang
+    # on how many rows there are.
+    is_tilted = any(head.grid.is_tilted for head in first.rig.grid.heads)
+    if isinstance(first, RowPolicy) and _asks_as(first, RowPolicy) and not is_tilted:
         return _ByRows(first, worlds)
-    if _is_told_by(first, FixedPolicy):
+    if isinstance(first, FixedPolicy) and _asks_as(first, FixedPolicy):
         return _Fixed(first, worlds)
     return _OneEach([first, *(make() for _ in range(worlds - 1))])
 
 
-def _is_told_by(policy: Policy, kind: type[Policy]) -> bool:
-    """Whether a policy has its idea where policies of this kind have it, and no memory: a subclass
-    may have changed what the kind is asked for.
+def _asks_as(policy: Policy, kind: Any) -> bool:
+    """Whether a policy of a kind has its idea where the kind has it alone, and no memory: somebody
+    may have changed it elsewhere.
     """
     asked = ("__call__", "_cells", "demand", "remember", "reset")
-    return isinstance(policy, kind) and all(
-        getattr(type(policy), name) is getattr(kind, name) for name in asked
-    )
+    return all(getattr(type(policy), name) is getattr(kind, name) for name in asked)
 
 
 class _ByRows(VectorPolicy):

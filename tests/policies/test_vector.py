@@ -209,7 +209,6 @@ def test_what_somebody_changed_is_asked_for_in_every_world(make, dense):
     [
         ("ego", np.full((WORLDS, 3), np.nan, np.float32)),
         ("budget", np.full((WORLDS, 1), 1.5, np.float32)),
-        ("ranges", np.full((WORLDS, 32, 512), -1.0, np.float32)),
         ("ranges", np.zeros((WORLDS, 16, 512), np.float32)),
         ("tracks", np.full((WORLDS, 2, 13), np.inf, np.float32)),
         ("tracks", np.zeros((2, 4, 13), np.float32)),
