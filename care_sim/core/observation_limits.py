@@ -61,6 +61,11 @@ class Limits:
         least, most = self._pictured
         return np.stack([np.r_[-1.0, least[1:]], most.max(axis=0)])
 
+    @property
+    def most_by_camera(self) -> Floats:
+        """(k, 9) the most of a detection of each camera."""
+        return self._pictured[1]
+
     @cached_property
     def tracks(self) -> Floats:
         """Of `Tracks.COLUMNS`; id -1 pads."""

@@ -16,6 +16,13 @@ OPEN_LOOP = {
 }
 IDS = CLOSED_LOOP | OPEN_LOOP
 """Entry points of all environments, by id."""
+_VECTORS = {
+    entry_point: entry_point.replace("envs.scenarios", "envs.vector.scenarios").replace(
+        "Env", "VectorEnv"
+    )
+    for entry_point in CLOSED_LOOP.values()
+}
+"""Entry points of many worlds of each at once."""
 
 
 def register_all() -> None:
@@ -23,4 +30,6 @@ def register_all() -> None:
     # As strings: an environment and what it needs are imported when one is made.
     for name, entry_point in IDS.items():
         if name not in gymnasium.registry:
-            gymnasium.register(name, entry_point=entry_point)
+            gymnasium.register(
+                name, entry_point=entry_point, vector_entry_point=_VECTORS.get(entry_point)
+            )

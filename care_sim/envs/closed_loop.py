@@ -17,6 +17,7 @@ from care_sim.envs.detection import detector_of
 from care_sim.envs.sensing import Observed, SensingEnv, arguments_of, split_conditions
 from care_sim.evaluation.metrics import outcome
 from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.loops.episode import Episode
 from care_sim.loops.false_box_pools import pool_of_another_drive
 from care_sim.loops.records import Keyframe, Outcome
 from care_sim.loops.seeds import SensorSeeds
@@ -27,7 +28,7 @@ from care_sim.sensors.camera_profiles import invents_boxes
 from care_sim.sensors.engines import check_engine
 from care_sim.sensors.setups import DEFAULT_SETUP, Sensor, sensor_setup
 from care_sim.viewer.pictures.keyframe import draw_keyframe
-from care_sim.world.world import WORLD_STEP_S, whole_steps
+from care_sim.world.world import WORLD_STEP_S, World, whole_steps
 
 KEYFRAME_S = 0.1
 """Between two decisions, unless another time is given: a turn of a spinning LiDAR."""
@@ -224,8 +225,13 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         self.metadata = {**self.metadata, "render_fps": round(1 / keyframe_s)}
         self.render_mode = render_mode
         self.keyframes: list[Keyframe] = []
-        self._weights = rewards.weights(reward_weights)
-        self._reward = rewards.EpisodeReward(self._weights)
+        self.reward_weights = rewards.weights(reward_weights)
+        self._reward = rewards.EpisodeReward(self.reward_weights)
+
+    @property
+    def detects_by_returns(self) -> bool:
+        """Whether the detector is the paper's proxy."""
+        return self._detector is None
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -237,16 +243,24 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         """
         self._reseed(seed, options)
         entropy = self._draw_entropy(seed)
-        scenario, camera, lidar, floor, odometry = self._streams(entropy, count=5)
-        seeds = SensorSeeds(camera, lidar, odometry)
         self.close()
         pool = self._pool(entropy)
-        world = self.scenario.build(np.random.default_rng(scenario))
-        self._reward = rewards.EpisodeReward(self._weights)
+        world, seeds, floor = self.episode(entropy)
+        self._reward = rewards.EpisodeReward(self.reward_weights)
         self.keyframes = []
         loop = ClosedLoop(world, self.rig, self.conditions, seeds, pool, self._detector)
+        return self._begin(loop, floor), self.first_info(entropy, world)
+
+    def episode(self, entropy: int) -> Episode:
+        """What an episode begins with. The caller closes its world."""
+        scenario, camera, lidar, floor, odometry = self._streams(entropy, count=5)
+        world = self.scenario.build(np.random.default_rng(scenario))
+        return Episode(world, SensorSeeds(camera, lidar, odometry), floor)
+
+    def first_info(self, entropy: int, world: World) -> dict[str, Any]:
+        """The info of `reset`."""
         drawn = {"drawn": dict(world.drawn)} if world.drawn else {}
-        return self._begin(loop, floor), self._info_of({}, {"seed": entropy, **drawn})
+        return self._info_of({}, {"seed": entropy, **drawn})
 
     def step(self, action: Action) -> tuple[Observed, float, bool, bool, dict[str, Any]]:
         """Fire the cells that `action` scores highest and go on to the next keyframe.

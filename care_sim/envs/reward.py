@@ -4,10 +4,14 @@ Each is at most 0, so that 0 is the best return there is.
 """
 
 from collections.abc import Mapping
+from typing import Any, TypeVar
 
 from care_sim.base.checks import check_known, check_number
 from care_sim.base.errors import InvalidInput, shown
+from care_sim.core.arrays import Floats
 from care_sim.loops.records import Keyframe
+
+_Number = TypeVar("_Number", float, Floats)
 
 KEEP_CLEAR_M = 2.0
 """Clearance below which it costs: the standstill distance s_0 of the controller."""
@@ -127,4 +131,14 @@ class EpisodeReward:
         measured = bool(self._weights["gain"])
         lost = self._potential.advance(record, detectable, over) if measured else 0.0
         earned = terms(record, self._in_view, self._detected, lost)
-        return sum(self._weights[name] * value for name, value in earned.items()), earned
+        return weighted(self._weights, earned), earned
+
+
+def weighted(weights: Mapping[str, float], earned: Mapping[str, _Number]) -> _Number:
+    """The weighted sum of terms: numbers, or columns of numbers."""
+    # Not `sum`, which adds floats in another way from Python 3.12 on.
+    total: Any = 0.0
+    for name, value in earned.items():
+        total = total + weights[name] * value
+    result: _Number = total
+    return result

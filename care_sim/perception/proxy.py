@@ -46,6 +46,19 @@ def _hit_often(bodies: Integers, hits: Integers, least: int) -> tuple[Integers, 
     """The rows (k,) of those of `bodies` (n,), ascending ids, that are at least so often among the
     `hits`, and how often they are.
     """
+    counts = count_hits(bodies, hits)
+    kept = np.empty(len(bodies), np.int64)
+    count = 0
+    for body in range(len(bodies)):
+        if counts[body] >= least:
+            kept[count], counts[count] = body, counts[body]
+            count += 1
+    return kept[:count], counts[:count]
+
+
+@compiled()
+def count_hits(bodies: Integers, hits: Integers) -> Integers:
+    """(n,) how often each of `bodies` (n,), ascending ids, is among the `hits`."""
     counts = np.zeros(len(bodies), np.int64)
     row = 0
     for hit in hits:
@@ -54,13 +67,7 @@ def _hit_often(bodies: Integers, hits: Integers, least: int) -> tuple[Integers, 
             row = np.searchsorted(bodies, hit)
         if row < len(bodies) and bodies[row] == hit:
             counts[row] += 1
-    kept = np.empty(len(bodies), np.int64)
-    count = 0
-    for body in range(len(bodies)):
-        if counts[body] >= least:
-            kept[count], counts[count] = body, counts[body]
-            count += 1
-    return kept[:count], counts[:count]
+    return counts
 
 
 class ReturnsProxy:

@@ -7,6 +7,7 @@ the right.
 
 from collections.abc import Sequence
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from highway_env.road.lane import StraightLane
@@ -25,6 +26,8 @@ MAX_STEERING = np.deg2rad(35.0)
 """Lock of a passenger car's front wheels. highway-env allows 60 degrees, at which a car slides out
 sideways.
 """
+_NEAR_LANE_M = 1.0
+"""What highway-env adds to either side of a lane to find who drives ahead in it."""
 STANDING_GAP_M = float(IDMVehicle.DISTANCE_WANTED)
 """From centre to centre, what an IDM driver leaves before what stands ahead."""
 
@@ -131,6 +134,21 @@ class LaneDriver(StraightVehicle, IDMVehicle):  # type: ignore[misc]
         )
 
 
+class LaneKeeper(NamedTuple):
+    """A vehicle that goes straight along x in the middle of its lane: `x`, speed, the speed that an
+    IDM driver wants there, and of the lane its middle y, where it starts, and how far to either
+    side of its middle highway-env counts who is near it as in it. Metres and m/s, highway-env's
+    axes.
+    """
+
+    x: float
+    speed: float
+    wanted_mps: float
+    lane_y: float
+    lane_start_x: float
+    lane_reach_m: float
+
+
 class Traffic:
     """A straight road and the vehicles that drive on it.
 
@@ -205,6 +223,20 @@ class Traffic:
         """Put a vehicle on the road."""
         self._road.vehicles.append(vehicle)
 
+    def lane_keepers(
+        self, vehicles: "Sequence[RoadVehicle]", seconds: float
+    ) -> list[LaneKeeper] | None:
+        """What `vehicles` go by, if they are all that is on the road, in the order in which they
+        came there, and can do nothing for `seconds` but keep their lanes along x. Else None.
+        """
+        found = [vehicle.keeping_lane(seconds) for vehicle in vehicles]
+        keepers = [keeper for keeper in found if keeper is not None]
+        all_keep = len(keepers) == len(found) == len(self._road.vehicles)
+        if not all_keep or self._road.objects:
+            return None
+        in_order = zip(vehicles, self._road.vehicles, strict=True)
+        return keepers if all(one.is_of(vehicle) for one, vehicle in in_order) else None
+
     def step(self, dt: float) -> None:
         """Let every driver decide, then move everything by `dt` seconds."""
         self._road.act()
@@ -248,6 +280,29 @@ class RoadVehicle:
     def yaw_rate(self) -> float:
         """rad/s: 0, since what asks for it, the ego, drives straight ahead."""
         return 0.0
+
+    def is_of(self, vehicle: Vehicle) -> bool:
+        """Whether it is this one of highway-env."""
+        return self._vehicle is vehicle
+
+    def keeping_lane(self, seconds: float) -> LaneKeeper | None:
+        """What it goes by if it can do nothing for `seconds` but keep its lane, else None."""
+        vehicle, lane = self._vehicle, self._vehicle.lane
+        x, speed = float(vehicle.position[0]), float(vehicle.speed)
+        # A driver looks for another lane 2.5 m before the end of its own. Who is faster than any
+        # vehicle may be becomes slower.
+        way = max(abs(speed), vehicle.MAX_SPEED + 1.0) * seconds
+        stays = abs(x) + way < _ROAD_LENGTH_M - lane.VEHICLE_LENGTH
+        changes = isinstance(vehicle, LaneDriver) and (
+            vehicle.lane_index != vehicle.target_lane_index
+        )
+        along_x = vehicle.heading == lane.heading == 0.0 and vehicle.position[1] == lane.start[1]
+        if not stays or changes or not along_x:
+            return None
+        wanted = min(max(getattr(vehicle, "target_speed", 0.0), 0), lane.speed_limit)
+        reach = lane.width / 2 + _NEAR_LANE_M
+        start_x, lane_y = lane.start.tolist()
+        return LaneKeeper(x, speed, abs(not_zero(wanted)), lane_y, start_x, reach)
 
     def enter(self) -> None:
         """Join the traffic: from now on the vehicle moves, and others see it."""

@@ -20,6 +20,8 @@ from care_sim.world.bullet import NO_BODY
 BOX, CYLINDER, SPHERE = range(3)
 """Places in `care_sim.world.body_tables.SHAPES`."""
 
+_STRIDE = 32
+"""Cells among which the first fired one is known; more are searched one by one."""
 Stretch = tuple[float, float]
 """Where a ray enters and leaves, as distances along it; the first is the larger where it misses."""
 
@@ -32,6 +34,28 @@ class Fan(NamedTuple):
 
     across: Floats
     down: Floats
+
+
+class Salvo(NamedTuple):
+    """Ascending `cells` (n,) that are fired along a fan of `rays`, and the `ranges` (n,) at which
+    they have met something so far, inf of those that have not. `firsts` are those of
+    `_first_places`.
+    """
+
+    cells: Cells
+    firsts: Integers
+    rays: Fan
+    ranges: Floats
+
+
+class Picked(NamedTuple):
+    """Room for the rays of a salvo that may meet a part: their `places` (n,) in it, unit `rays`
+    (3, n) in the frame of the sensor, and the `distances` (n,) to the part.
+    """
+
+    places: Integers
+    rays: Floats
+    distances: Floats
 
 
 class RoadPlane(NamedTuple):
@@ -75,83 +99,160 @@ def cast_rays(
     """
     # Fields get their names here: numba takes microseconds to type each named tuple of Python,
     # which is much of the time of a scan, and next to none for plain ones.
-    rays = Fan(*fan)
-    solids = Parts(*parts)
-    x, y, z, yaw, roll, pitch = sensor
-    pose = SensorPose(x, y, z, yaw, roll, pitch)
-    grid = GridSpacing(*spacing)
-    placed = place_parts(pose, solids, poses, grid, reach)
-
-    # The road first, then part after part: what is nearer takes the ray. So no list of hits is
-    # sorted, and the order of parts matters only where two are equally far.
-    columns = len(rays.across)
-    starts = _row_starts(cells, len(rays.down), columns)
-    ranges, ids = _road_hits(cells, starts, rays, reach, RoadPlane(placed.up, z, ground))
-
-    for part, (first, last, upper, lower) in enumerate(placed.windows):
-        if upper > lower:
-            continue
-        solid = _solid(part, solids, placed.centres, placed.axes)
-        for row in range(upper, lower + 1):
-            # The fired cells of this row that lie in the window. A window that runs over a turn has
-            # two stretches of columns: from the row's begin, and from its first column on.
-            begin = row * columns
-            low = starts[row]
-            high = starts[row + 1]
-            ahead = _first_from(cells, begin + first, low, high)
-            for place, end in ((low, begin + last - grid.turn), (ahead, begin + last)):
-                while place < high and cells[place] <= end:
-                    distance = _entry(solid, _ray(rays, row, cells[place] - begin))
-                    if distance < ranges[place] and distance <= reach:
-                        ranges[place] = distance
-                        ids[place] = solids.owners[part]
-                    place += 1
-    return ranges, ids
+    ranges = np.empty(len(cells))
+    ids = np.empty(len(cells), np.int64)
+    returns = ranges, ids
+    cast_into(
+        returns,
+        cells,
+        reach,
+        Fan(*fan),
+        GridSpacing(*spacing),
+        sensor,
+        Parts(*parts),
+        poses,
+        ground,
+    )
+    return returns
 
 
 @compiled(error_model="numpy")
-def _road_hits(
-    cells: Cells, starts: Integers, fan: Fan, reach: float, road: RoadPlane
-) -> tuple[Floats, Integers]:
-    """Ranges and body ids in a world of road alone."""
-    ranges = np.full(len(cells), math.inf)
-    ids = np.full(len(cells), NO_BODY)
-    if road.body != NO_BODY:
-        for row in range(len(starts) - 1):
-            for n in range(starts[row], starts[row + 1]):
-                # A ray falls by -up . ray per metre. Above the horizon the distance is negative,
-                # and along it infinite.
-                ray = _ray(fan, row, cells[n] - row * len(fan.across))
-                distance = -road.height / dot(road.up, ray)
-                if 0.0 <= distance <= reach:
-                    ranges[n] = distance
-                    ids[n] = road.body
-    return ranges, ids
+def cast_into(
+    returns: tuple[Floats, Integers],
+    cells: Cells,
+    reach: float,
+    rays: Fan,
+    grid: GridSpacing,
+    sensor: Floats,
+    solids: Parts,
+    poses: Floats,
+    ground: int,
+) -> None:
+    """Fill `returns` (n,), (n,) with what `cast_rays` gives."""
+    ranges, ids = returns
+    x, y, z, yaw, roll, pitch = sensor
+    placed = place_parts(SensorPose(x, y, z, yaw, roll, pitch), solids, poses, grid, reach)
+    salvo = Salvo(cells, _first_places(cells, grid.rows * grid.columns), rays, ranges)
+
+    # The road first, then part after part: what is nearer takes the ray. So no list of hits is
+    # sorted, and the order of parts matters only where two are equally far.
+    _hit_road(salvo, ids, reach, RoadPlane(placed.up, z, ground))
+    picked = Picked(np.empty(len(cells), np.int64), np.empty((3, len(cells))), np.empty(len(cells)))
+    for part, (first, last, upper, lower) in enumerate(placed.windows):
+        # A window that runs over a turn has two stretches of columns: up to its last one, and from
+        # its first one on.
+        nearest = placed.nearest[part]
+        count = 0
+        for row in range(upper, lower + 1):
+            count = _pick(picked, count, salvo, (row, 0, last - grid.turn), nearest)
+            count = _pick(picked, count, salvo, (row, first, last), nearest)
+        if count:
+            _meet(_solid(part, solids, placed.centres, placed.axes), picked, count)
+            _take(ranges, ids, picked, count, solids.owners[part], reach)
+
+
+@compiled(error_model="numpy")
+def _hit_road(salvo: Salvo, ids: Integers, reach: float, road: RoadPlane) -> None:
+    """Fill ranges and body ids with those of a world of road alone."""
+    ranges, cells, rays = salvo.ranges, salvo.cells, salvo.rays
+    columns = len(rays.across)
+    is_level = road.up[0] == 0.0 and road.up[1] == 0.0
+    begin = 0
+    for row in range(len(rays.down)):
+        # Over a level road all rays of a row are alike, but for the sign of zeros.
+        end = _place_of(salvo, (row + 1) * columns)
+        distance = _to_road(road, (0.0, 0.0, rays.down[row, 1]))
+        for n in range(begin, end):
+            if not is_level:
+                distance = _to_road(road, _ray(rays, row, cells[n] - row * columns))
+            is_hit = 0.0 <= distance <= reach and road.body != NO_BODY
+            ranges[n] = distance if is_hit else math.inf
+            ids[n] = road.body if is_hit else NO_BODY
+        begin = end
+
+
+@compiled(error_model="numpy")
+def _to_road(road: RoadPlane, ray: Vector) -> float:
+    """How far a ray goes to the road: below 0 above the horizon, and infinite along it."""
+    # A ray falls by -up . ray per metre.
+    return -road.height / dot(road.up, ray)
 
 
 @compiled()
-def _row_starts(cells: Cells, rows: int, columns: int) -> Integers:
-    """(rows + 1,) where each row begins among ascending `cells`."""
-    # Each search goes on from the row before, since cells ascend.
-    starts = np.zeros(rows + 1, np.int64)
-    for row in range(1, rows + 1):
-        starts[row] = _first_from(cells, row * columns, starts[row - 1], len(cells))
-    return starts
-
-
-@compiled()
-def _first_from(cells: Cells, cell: int, low: int, high: int) -> int:
-    """The first place in low..high of ascending `cells` that holds `cell` or a later one, else
-    `high`.
+def _first_places(cells: Cells, size: int) -> Integers:
+    """(m,) where among ascending `cells` those from `_STRIDE` times 0, 1, ... on begin; the grid
+    has `size` cells.
     """
-    # Bisection: all before `low` are lower, all from `high` on are not.
-    while low < high:
-        middle = (low + high) // 2
-        if cells[middle] < cell:
-            low = middle + 1
-        else:
-            high = middle
-    return low
+    # From the last one back, each cell is the first of its stride so far. A stride without cells
+    # begins where the next one does.
+    firsts = np.full(size // _STRIDE + 2, len(cells))
+    for n in range(len(cells) - 1, -1, -1):
+        firsts[cells[n] // _STRIDE] = n
+    for k in range(len(firsts) - 2, -1, -1):
+        firsts[k] = min(firsts[k], firsts[k + 1])
+    return firsts
+
+
+@compiled()
+def _place_of(salvo: Salvo, cell: int) -> int:
+    """Where a cell of the grid or the next later one is among those fired; behind the last one, if
+    there is none.
+    """
+    cells = salvo.cells
+    place: int = salvo.firsts[cell // _STRIDE]
+    while place < len(cells) and cells[place] < cell:
+        place += 1
+    return place
+
+
+@compiled()
+def _pick(
+    picked: Picked, count: int, salvo: Salvo, stretch: tuple[int, int, int], nearest: float
+) -> int:
+    """Add the fired cells of a `stretch`, a row and its first and last column, to the `count` ones
+    that are picked already; how many there are then. Who has met something before `nearest` is left
+    out.
+    """
+    cells, ranges = salvo.cells, salvo.ranges
+    row, first, last = stretch
+    # A window may run on into columns that the grid does not have.
+    columns = len(salvo.rays.across)
+    last = min(last, columns - 1)
+    if first > last:
+        return count
+    begin = row * columns
+    place = _place_of(salvo, begin + first)
+    while place < len(cells) and cells[place] <= begin + last:
+        # Written in any case, and counted if it is to be kept.
+        x, y, z = _ray(salvo.rays, row, cells[place] - begin)
+        picked.places[count] = place
+        picked.rays[0, count], picked.rays[1, count], picked.rays[2, count] = x, y, z
+        count += ranges[place] > nearest
+        place += 1
+    return count
+
+
+@compiled()
+def _meet(solid: Solid, picked: Picked, count: int) -> None:
+    """Fill in how far the first `count` of the picked rays go to a solid."""
+    if solid.shape == BOX:
+        _enter_box(solid.axes, solid.half, solid.start, picked.rays, picked.distances[:count])
+        return
+    for n in range(count):
+        ray = picked.rays[0, n], picked.rays[1, n], picked.rays[2, n]
+        picked.distances[n] = _entry_of_round(solid, ray)
+
+
+@compiled()
+def _take(
+    ranges: Floats, ids: Integers, picked: Picked, count: int, owner: int, reach: float
+) -> None:
+    """Let the first `count` of the picked rays end at the solid of a body where it is nearer."""
+    for n in range(count):
+        place, distance = picked.places[n], picked.distances[n]
+        is_nearer = distance < ranges[place] and distance <= reach
+        ranges[place] = distance if is_nearer else ranges[place]
+        ids[place] = owner if is_nearer else ids[place]
 
 
 @compiled()
@@ -178,21 +279,36 @@ def _triple(row: Floats) -> Vector:
 
 
 @compiled(error_model="numpy")
-def _entry(solid: Solid, ray: Vector) -> float:
-    """Distance along a unit ray of the sensor's frame to a solid, inf without an entry."""
+def _enter_box(axes: Axes, half: Vector, start: Vector, rays: Floats, distances: Floats) -> None:
+    """Fill in the distances (n,) along unit `rays` (3, n) to a box, inf without an entry."""
+    # Without branches, so that the compiler computes several rays at once.
+    for n in range(len(distances)):
+        ray = rays[0, n], rays[1, n], rays[2, n]
+        sides = _common(
+            _slab(start[0], dot(axes[0], ray), half[0]), _slab(start[1], dot(axes[1], ray), half[1])
+        )
+        distances[n] = _if_entered(_common(sides, _slab(start[2], dot(axes[2], ray), half[2])))
+
+
+@compiled(error_model="numpy")
+def _entry_of_round(solid: Solid, ray: Vector) -> float:
+    """Distance along a unit ray of the sensor's frame to a cylinder or a sphere, inf without an
+    entry.
+    """
     # The ray in the frame of the part: from (u, v, w) along (x, y, z).
     u, v, w = solid.start
     x, y, z = dot(solid.axes[0], ray), dot(solid.axes[1], ray), dot(solid.axes[2], ray)
     half = solid.half
-    if solid.shape == BOX:
-        sides = _common(_slab(u, x, half[0]), _slab(v, y, half[1]))
-        near, far = _common(sides, _slab(w, z, half[2]))
-    elif solid.shape == CYLINDER:
-        near, far = _common(_tube(u, v, x, y, half[0]), _slab(w, z, half[2]))
-    else:
-        near, far = _ball(u, v, w, x, y, z, half[0])
+    if solid.shape == CYLINDER:
+        return _if_entered(_common(_tube(u, v, x, y, half[0]), _slab(w, z, half[2])))
+    return _if_entered(_ball(u, v, w, x, y, z, half[0]))
 
+
+@compiled()
+def _if_entered(stretch: Stretch) -> float:
+    """Where a ray enters, inf where it does not."""
     # Negative where the ray starts inside or beyond: neither is an entry.
+    near, far = stretch
     return near if 0.0 <= near <= far else math.inf
 
 
@@ -205,11 +321,13 @@ def _common(one: Stretch, other: Stretch) -> Stretch:
 @compiled(error_model="numpy")
 def _slab(start: float, along: float, half: float) -> Stretch:
     """The stretch of a ray between the planes at -half and half."""
+    one, other = (-half - start) / along, (half - start) / along
+    near, far = min(one, other), max(one, other)
     # A ray along the planes is between them everywhere or nowhere; 0 / 0 must not decide it.
     if along == 0.0:
-        return _all_or_nothing(abs(start) <= half)
-    one, other = (-half - start) / along, (half - start) / along
-    return min(one, other), max(one, other)
+        near = -math.inf if abs(start) <= half else math.inf
+        far = -near
+    return near, far
 
 
 @compiled(error_model="numpy")

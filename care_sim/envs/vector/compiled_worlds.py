@@ -1,0 +1,121 @@
+"""Worlds that are played as arrays, all at once."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, replace
+from typing import Any
+
+import numpy as np
+from gymnasium.utils import seeding
+from numpy.typing import NDArray
+
+from care_sim.base.times import LAST_BITS_S
+from care_sim.batch.loop import BatchLoop
+from care_sim.batch.records import History, Records
+from care_sim.core.arrays import Mask
+from care_sim.envs.closed_loop import ClosedLoopEnv
+from care_sim.envs.sensing import Observed
+from care_sim.envs.vector.rewards import Rewards
+from care_sim.envs.vector.worlds import Stepped
+from care_sim.evaluation.metrics import outcome
+from care_sim.loops.records import Outcome
+
+
+class CompiledWorlds:
+    """A batch of worlds of the environment `model`, one for every row of `observed`."""
+
+    def __init__(self, model: ClosedLoopEnv, observed: Observed):
+        worlds = len(observed["budget"])
+        self.observed = observed
+        self._model = model
+        # Where no info tells of clearances, few of them are needed.
+        self._exact = model.scoring_info
+        duration_s = model.scenario.duration_s
+        self._loop = BatchLoop(model.rig, model.conditions, duration_s, observed, self._exact)
+        self._rewards = Rewards(model.reward_weights, worlds)
+        longest = int(np.ceil(model.scenario.duration_s / model.rig.keyframe_s)) + 1
+        self._history = History(worlds, longest)
+        # Each world draws the seeds of its later episodes as a single environment does.
+        self._generators: list[np.random.Generator | None] = [None] * worlds
+
+    def begin(self, seeds: Mapping[int, int | None]) -> dict[int, dict[str, Any]]:
+        """See `care_sim.envs.vector.worlds.Worlds`."""
+        infos = dict[int, dict[str, Any]]()
+        episodes = {}
+        for world, seed in seeds.items():
+            entropy = self._entropy(world, seed)
+            episodes[world] = self._model.episode(entropy)
+            self._rewards.begin(world)
+            infos[world] = self._model.first_info(entropy, episodes[world].world)
+        self._loop.begin(episodes)
+        return infos
+
+    def step(self, actions: NDArray[np.float32], who: Mask) -> Stepped:
+        """See `care_sim.envs.vector.worlds.Worlds`."""
+        if not who.any():
+            return Stepped.nothing(len(who))
+        # Asked before the keyframe, which moves the worlds on, and only while it is needed: it
+        # costs rays.
+        state = self._loop.state
+        needed = self._rewards.need_bound & who
+        detectable = self._loop.detectable(needed) if needed.any() else needed
+        keyframes = state.keyframes.copy()
+        records = self._loop.keyframe(actions, who)
+        self._history.note(who, keyframes, records)
+
+        terminated = who & ~np.isnan(records.impact_speed_mps)
+        truncated = who & (state.times >= self._model.scenario.duration_s - LAST_BITS_S)
+        over = terminated | truncated
+        rewards, terms = self._rewards.of(records, detectable, over, who)
+        single: dict[int, dict[str, Any]] = {
+            world: {"outcome": asdict(self._outcome(world, keyframes[world] + 1))}
+            for world in np.flatnonzero(over).tolist()
+        }
+        if not self._model.conditions.floor:
+            self._list_fired(single, who)
+        columns = self._columns(records, terms)
+        return Stepped(np.where(who, rewards, 0.0), terminated, truncated, columns, single)
+
+    def close(self) -> None:
+        """Free what the loop holds."""
+        self._loop.close()
+
+    def _outcome(self, world: int, keyframes: int) -> Outcome:
+        """The result of a world's episode of so many keyframes."""
+        episode = self._history.episode(world, keyframes)
+        result = outcome(episode)
+        if self._exact or result.clearance_m is None:
+            return result
+        appeared = next(record.time_s for record in episode if record.in_view)
+        return replace(result, clearance_m=self._loop.least_clearance_m(world, appeared))
+
+    def _columns(self, records: Records, terms: dict[str, Any]) -> dict[str, Any]:
+        """What `info` says of all worlds, in the order of the single environment."""
+        fired = self._loop.fired.cells
+        own = {"braking": records.braking, "time_s": records.time_s}
+        if self._model.conditions.floor:
+            own = {"fired": fired[:, : self._model.rig.budget].copy(), **own}
+        scoring = {
+            "detected": records.detected,
+            "in_view": records.in_view,
+            "clearance_m": records.clearance_m,
+            "speed_mps": records.speed_mps,
+            "reward_terms": terms,
+        }
+        return own | scoring if self._model.scoring_info else own
+
+    def _list_fired(self, single: dict[int, dict[str, Any]], who: Mask) -> None:
+        """Cells of different numbers, as lists: they are no column."""
+        counts, cells = self._loop.fired
+        for world in np.flatnonzero(who).tolist():
+            fired = cells[world, : counts[world]].tolist()
+            single[world] = {"fired": fired, **single.get(world, {})}
+
+    def _entropy(self, world: int, seed: int | None) -> int:
+        if seed is not None:
+            self._generators[world], _ = seeding.np_random(int(seed))
+            return int(seed)
+        generator = self._generators[world]
+        if generator is None:
+            generator, _ = seeding.np_random()
+            self._generators[world] = generator
+        return int(generator.integers(2**32))

@@ -1,0 +1,285 @@
+"""The vector environments of the closed loop: thin Gymnasium adapters around `Worlds`."""
+
+import os
+from collections.abc import Sequence
+from functools import partial
+from typing import Any, ClassVar
+
+import gymnasium
+import numpy as np
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space, create_empty_array
+from numpy.typing import NDArray
+
+from care_sim.base.checks import as_array, check_flag, check_seed, check_whole
+from care_sim.base.errors import InvalidInput, shown
+from care_sim.core.arrays import Floats, Mask
+from care_sim.core.conditions import ClosedLoopConditions
+from care_sim.core.rig import Rig
+from care_sim.core.types import Action
+from care_sim.envs.closed_loop import ClosedLoopEnv
+from care_sim.envs.sensing import Observed
+from care_sim.envs.spaces import checked_scores
+from care_sim.envs.vector.compiled_worlds import CompiledWorlds
+from care_sim.envs.vector.coverage import why_separate
+from care_sim.envs.vector.infos import kept
+from care_sim.envs.vector.separate_worlds import SeparateWorlds
+from care_sim.envs.vector.threads import Threads
+from care_sim.envs.vector.worlds import Stepped, Worlds
+from care_sim.scenarios.base import Scenario
+
+MOST_WORLDS = 2**16
+MOST_THREADS = 1024
+CORES = os.cpu_count() or 1
+
+
+class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
+    """Worlds of one environment, played together: `num_envs` of them on up to `threads` threads.
+
+    World i, begun with a seed, is the single environment begun with it, to the last bit, whatever
+    the other worlds do and however many threads there are. All keyword arguments of the single
+    environment are taken but `render_mode`.
+
+    Observations, rewards and infos are those that `gymnasium.vector.SyncVectorEnv` gives, in all
+    three of its modes of `autoreset_mode`: "NextStep", "SameStep" and "Disabled". With `copy=False`
+    the observations that are handed out are written over by the next step.
+    """
+
+    single: ClassVar[type[ClosedLoopEnv]]
+    """The environment of which these are many."""
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        threads: int | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        copy: bool = True,
+        **arguments: Any,
+    ):
+        check_whole("num_envs", num_envs, 1, MOST_WORLDS)
+        threads = CORES if threads is None else threads
+        check_whole("threads", threads, 1, MOST_THREADS)
+        check_flag("copy", copy)
+        if arguments.get("render_mode") is not None:
+            raise InvalidInput("render_mode is of the single environment; many draw no pictures")
+        self.num_envs = num_envs
+        self.autoreset_mode = _autoreset(autoreset_mode)
+        self.metadata = {**self.single.metadata, "autoreset_mode": self.autoreset_mode}
+        self.copy = copy
+        self._model = self.single(**arguments)
+        self.single_observation_space = self._model.observation_space
+        self.single_action_space = self._model.action_space
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+
+        # Every thread has worlds of its own, and works on nothing else.
+        self._observed: Observed = create_empty_array(self.single_observation_space, num_envs)
+        count = min(num_envs, threads)
+        ends = [num_envs * k // count for k in range(count + 1)]
+        self._shares = [slice(*ends[k : k + 2]) for k in range(count)]
+        self._worlds = [self._made(share, arguments) for share in self._shares]
+        self._threads = Threads(count)
+        self._over = np.zeros(num_envs, np.bool_)
+        self._begun = np.zeros(num_envs, np.bool_)
+
+    @property
+    def rig(self) -> Rig:
+        """What is fixed about the sensing task; the same in all worlds."""
+        return self._model.rig
+
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario of all worlds."""
+        return self._model.scenario
+
+    @property
+    def conditions(self) -> ClosedLoopConditions:
+        """The conditions of all worlds."""
+        return self._model.conditions
+
+    @property
+    def min_returns(self) -> int:
+        """See `care_sim.envs.sensing.SensingEnv.min_returns`."""
+        return self._model.min_returns
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[Observed, dict[str, Any]]:
+        """Begin an episode in every world, or in those of `options["reset_mask"]` (W,).
+
+        With a whole number for a `seed` world i takes `seed + i`; a list has one for each.
+        """
+        seeds = self._seeds(seed)
+        who = self._to_reset(options)
+        infos = self._begin(who, seeds, {})
+        return self._handed_out(), infos
+
+    def step(self, actions: Action) -> tuple[Observed, Floats, Mask, Mask, dict[str, Any]]:
+        """Fire the cells that each world's row of `actions` (W, E, A) scores highest.
+
+        Raises InvalidInput for actions of the wrong shape or with values that are not finite, and
+        gymnasium.error.ResetNeeded before `reset`, and for a world that is over in the mode
+        "Disabled".
+        """
+        if not self._begun.all():
+            raise gymnasium.error.ResetNeeded("call reset() before stepping")
+        disabled = self.autoreset_mode == AutoresetMode.DISABLED
+        if disabled and self._over.any():
+            over = np.flatnonzero(self._over).tolist()
+            raise gymnasium.error.ResetNeeded(
+                f"worlds {shown(over)} are over: call reset() with a reset_mask"
+            )
+        scores = checked_scores(as_array("actions", actions), self.action_space.shape or ())
+        begins = self._over.copy()
+        stepped = self._played(scores, ~begins)
+        infos = self._infos(stepped, ~begins)
+        over = stepped.terminated | stepped.truncated
+
+        # What is over begins anew, now or at the next step. In the mode "SameStep" its last
+        # observation and info are told apart from the first ones of the new episode.
+        if self.autoreset_mode == AutoresetMode.SAME_STEP and over.any():
+            infos = self._infos(stepped, ~over)
+            infos = self._with_finals(infos, stepped, over)
+            infos = self._begin(over, [None] * self.num_envs, infos)
+            self._over[:] = False
+        else:
+            infos = self._begin(begins, [None] * self.num_envs, infos)
+            self._over = over
+        return (
+            self._handed_out(),
+            stepped.rewards,
+            stepped.terminated,
+            stepped.truncated,
+            infos,
+        )
+
+    def close_extras(self, **_: Any) -> None:
+        """Free the worlds and end the threads."""
+        for worlds in self._worlds:
+            worlds.close()
+        self._threads.close()
+
+    def _made(self, share: slice, arguments: dict[str, Any]) -> Worlds:
+        rows = {name: values[share] for name, values in self._observed.items()}
+        if why_separate(self._model) is None:
+            return CompiledWorlds(self._model, rows)
+        return SeparateWorlds(partial(self.single, **arguments), rows)
+
+    def _played(self, scores: NDArray[np.float32], who: Mask) -> Stepped:
+        parts = self._threads.all(
+            [
+                partial(worlds.step, scores[share], who[share])
+                for worlds, share in zip(self._worlds, self._shares, strict=True)
+            ]
+        )
+        if len(parts) == 1:
+            return parts[0]
+        single = {
+            share.start + world: info
+            for share, part in zip(self._shares, parts, strict=True)
+            for world, info in part.single.items()
+        }
+        rewards, terminated, truncated = (
+            np.concatenate(column) for column in zip(*(part[:3] for part in parts), strict=True)
+        )
+        columns = _joined([part.columns for part in parts])
+        return Stepped(rewards, terminated, truncated, columns, single)
+
+    def _begin(
+        self, who: Mask, seeds: Sequence[int | None], infos: dict[str, Any]
+    ) -> dict[str, Any]:
+        """Begin episodes in the worlds `who`, and add their infos."""
+        tasks = [
+            partial(
+                worlds.begin, {world: seeds[share.start + world] for world in _places(who[share])}
+            )
+            for worlds, share in zip(self._worlds, self._shares, strict=True)
+            if who[share].any()
+        ]
+        starts = [share.start for share in self._shares if who[share].any()]
+        for start, begun in zip(starts, self._threads.all(tasks), strict=True):
+            for world, info in begun.items():
+                infos = self._add_info(infos, info, start + world)
+        self._over[who] = False
+        self._begun[who] = True
+        return infos
+
+    def _infos(self, stepped: Stepped, who: Mask) -> dict[str, Any]:
+        """What a step tells of the worlds `who` (W,)."""
+        infos = kept(stepped.columns, who) if who.any() else {}
+        for world, info in stepped.single.items():
+            if who[world]:
+                infos = self._add_info(infos, info, world)
+        return infos
+
+    def _with_finals(self, infos: dict[str, Any], stepped: Stepped, over: Mask) -> dict[str, Any]:
+        finals = np.full(self.num_envs, None, object)
+        for world in _places(over):
+            finals[world] = {name: rows[world].copy() for name, rows in self._observed.items()}
+        told = {
+            "final_obs": finals,
+            "_final_obs": over.copy(),
+            "final_info": self._infos(stepped, over),
+            "_final_info": over.copy(),
+        }
+        return infos | told
+
+    def _handed_out(self) -> Observed:
+        if not self.copy:
+            return self._observed
+        return {name: values.copy() for name, values in self._observed.items()}
+
+    def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
+        if seed is None:
+            return [None] * self.num_envs
+        if isinstance(seed, int | np.integer):
+            check_seed(seed)
+            return [int(seed) + world for world in range(self.num_envs)]
+        seeds = [*seed]
+        if len(seeds) != self.num_envs:
+            raise InvalidInput(f"seed must be one for each of {self.num_envs}, got {len(seeds)}")
+        for one in seeds:
+            if one is not None:
+                check_seed(one)
+        return seeds
+
+    def _to_reset(self, options: dict[str, Any] | None) -> Mask:
+        everybody = np.ones(self.num_envs, np.bool_)
+        if not options:
+            return everybody
+        if [*options] != ["reset_mask"]:
+            raise InvalidInput(f"reset takes no options but reset_mask, got {shown(options)}")
+        mask = as_array("reset_mask", options["reset_mask"])
+        if mask.dtype != np.bool_ or mask.shape != everybody.shape or not mask.any():
+            raise InvalidInput(
+                f"reset_mask must be {self.num_envs} flags, at least one of them True"
+            )
+        return mask
+
+
+def _places(who: Mask) -> list[int]:
+    places: list[int] = np.flatnonzero(who).tolist()
+    return places
+
+
+def _autoreset(mode: AutoresetMode | str) -> AutoresetMode:
+    allowed = {one.value: one for one in AutoresetMode}
+    if isinstance(mode, AutoresetMode):
+        return mode
+    if mode not in allowed:
+        raise InvalidInput(f"autoreset_mode must be one of {', '.join(allowed)}, got {shown(mode)}")
+    return allowed[mode]
+
+
+def _joined(columns: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """The columns of the shares, one after the other."""
+    return {
+        name: _joined([part[name] for part in columns])
+        if isinstance(column, dict)
+        else np.concatenate([part[name] for part in columns])
+        for name, column in columns[0].items()
+    }
