@@ -27,7 +27,7 @@ class _Sectors(gymnasium.ActionWrapper[Any, NDArray[np.float32], Action], Record
         self._choice = SectorChoice(self._rig, self.sectors)
         RecordConstructorArgs.__init__(self, azimuths=azimuths, elevations=elevations)
         gymnasium.ActionWrapper.__init__(self, env)
-        self.action_space = spaces.Box(-1.0, 1.0, self.sectors.shape, np.float32)
+        self.action_space = sectors_space(self.sectors)
 
 
 class SectorReserve(_Sectors):
@@ -139,6 +139,11 @@ class SectorScores(_Sectors):
     def action(self, action: NDArray[np.float32]) -> Action:
         """Scores (E, A) of the cells that the shared allocator takes."""
         return self._choice.alone(checked_scores(action, self.sectors.shape)[None])[0]
+
+
+def sectors_space(sectors: Tiling) -> spaces.Box:
+    """The space of one score per sector."""
+    return spaces.Box(-1.0, 1.0, sectors.shape, np.float32)
 
 
 def _pictures_inside(env: gymnasium.Env[Any, Any]) -> GridObservation:
