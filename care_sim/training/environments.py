@@ -75,7 +75,7 @@ def many(config: AgentConfig) -> list[AnyVector]:
     """The training environments as vector environments, one for each budget: together, one world of
     each in turn, they are as many as `training` makes one by one.
     """
-    vectors = []
+    vectors = list[AnyVector]()
     wrapper = VECTOR_ACTIONS[config.action]
     for place, budget in enumerate(config.budget):
         worlds = len(range(config.environments)[place :: len(config.budget)])

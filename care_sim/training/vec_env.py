@@ -19,8 +19,8 @@ from stable_baselines3.common.vec_env.base_vec_env import (
 )
 
 from care_sim.base.errors import InvalidInput, shown
+from care_sim.envs.wrappers.vectors import AnyVector
 
-AnyVector = VectorEnv[Any, Any, Any]
 Infos = list[dict[str, Any]]
 
 
@@ -29,9 +29,10 @@ class GymnasiumVecEnv(VecEnv):
     them: what `DummyVecEnv` of the single environments answers.
 
     The worlds of several vector environments of the same spaces come in turn: with two vectors of
-    three worlds each, 0, 2 and 4 are those of the first. Learners need the mode "SameStep"
-    of `autoreset_mode`. Attributes of a world are those of its vector environment, which has no
-    methods for one world alone. Raises InvalidInput for other modes, sizes and spaces.
+    three worlds each, 0, 2 and 4 are those of the first. Learners need the mode "SameStep" of
+    `autoreset_mode`. In infos None may read NaN, as in all of Gymnasium's vectors. Attributes of a
+    world are those of its vector environment, which has no methods for one world alone. Raises
+    InvalidInput for other modes, sizes and spaces.
     """
 
     def __init__(self, *envs: AnyVector):
@@ -54,7 +55,8 @@ class GymnasiumVecEnv(VecEnv):
         # Seeds are for one reset.
         self._reset_seeds()
         self.reset_infos = self._each([infos for _, infos in begun])
-        return self._joined([observation for observation, _ in begun])
+        seen: VecEnvObs = self._joined([observation for observation, _ in begun])
+        return seen
 
     def step_async(self, actions: NDArray[Any]) -> None:
         """Take the actions (W, ...) of the next `step_wait`."""
@@ -67,13 +69,13 @@ class GymnasiumVecEnv(VecEnv):
         actions, self._actions = self._actions, None
         rewards = np.empty(self.num_envs, np.float32)
         terminated, truncated = np.empty((2, self.num_envs), np.bool_)
-        observations, told = [], []
+        observations, told = list[Any](), list[dict[str, Any]]()
         for env, place in zip(self.envs, self._places, strict=True):
-            seen, rewards[place], terminated[place], truncated[place], infos = env.step(
+            seen, rewards[place], terminated[place], truncated[place], own = env.step(
                 actions[place]
             )
             observations.append(seen)
-            told.append(infos)
+            told.append(own)
         over = terminated | truncated
         infos = self._infos(told, over)
         for info, late in zip(infos, (truncated & ~terminated).tolist(), strict=True):
@@ -113,7 +115,9 @@ class GymnasiumVecEnv(VecEnv):
         )
 
     def env_is_wrapped(
-        self, wrapper_class: type[gymnasium.Wrapper[Any, Any, Any, Any]], indices: VecEnvIndices = None
+        self,
+        wrapper_class: type[gymnasium.Wrapper[Any, Any, Any, Any]],
+        indices: VecEnvIndices = None,
     ) -> list[bool]:
         """Whether the vector environment of every world stands in a wrapper of that class, or in
         the one that is its like for vectors.
@@ -176,7 +180,7 @@ def info_of_each(infos: Mapping[str, Any], worlds: int) -> Infos:
         if who is None or name in ("final_obs", "final_info"):
             continue
         if isinstance(column, dict):
-            rows: list[Any] = info_of_each(column, worlds)  # type: ignore[assignment]
+            rows: list[Any] = info_of_each(column, worlds)
         else:
             # Numbers become those of Python, which the single environments tell.
             rows = column.tolist() if column.ndim == 1 else [*column]

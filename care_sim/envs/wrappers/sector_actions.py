@@ -98,7 +98,8 @@ class SectorReserve(_Sectors):
         scores = checked_scores(action, self.sectors.shape)
         if self._beliefs is None:
             raise gymnasium.error.ResetNeeded("call reset() before stepping")
-        return self._choice.reserve(self._beliefs, scores[None])[0]
+        cells: Action = self._choice.reserve(self._beliefs, scores[None])[0]
+        return cells
 
     def _read(self, observation: Any) -> None:
         # At once, not when the next action comes: until then the observation is the caller's, who
@@ -138,10 +139,12 @@ class SectorScores(_Sectors):
 
     def action(self, action: NDArray[np.float32]) -> Action:
         """Scores (E, A) of the cells that the shared allocator takes."""
-        return self._choice.alone(checked_scores(action, self.sectors.shape)[None])[0]
+        scores = checked_scores(action, self.sectors.shape)
+        cells: Action = self._choice.alone(scores[None])[0]
+        return cells
 
 
-def sectors_space(sectors: Tiling) -> spaces.Box:
+def sectors_space(sectors: Tiling) -> spaces.Space[Any]:
     """The space of one score per sector."""
     return spaces.Box(-1.0, 1.0, sectors.shape, np.float32)
 

@@ -31,9 +31,7 @@ class _VectorSectors(VectorWrapper[Any, NDArray[np.float32], Any, Action, Any]):
         self.single_action_space = sectors_space(self.sectors)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
 
-    def step(
-        self, actions: NDArray[np.float32]
-    ) -> tuple[Any, Floats, Mask, Mask, dict[str, Any]]:
+    def step(self, actions: NDArray[np.float32]) -> tuple[Any, Floats, Mask, Mask, dict[str, Any]]:
         """Fire what the scores `actions` (W, elevations, azimuths) make of the grid and go on to
         the next keyframe.
         """
@@ -85,9 +83,7 @@ class VectorSectorReserve(_VectorSectors):
         self._read(observation)
         return observation, infos
 
-    def step(
-        self, actions: NDArray[np.float32]
-    ) -> tuple[Any, Floats, Mask, Mask, dict[str, Any]]:
+    def step(self, actions: NDArray[np.float32]) -> tuple[Any, Floats, Mask, Mask, dict[str, Any]]:
         """As `VectorSectorReserve` says."""
         answer = super().step(actions)
         self._read(answer[0])

@@ -106,7 +106,9 @@ class Beliefs:
         if not len(detections):
             return np.zeros(0, np.bool_)
         explained: Mask = _explained(
-            *map(np.ascontiguousarray, (detections.boxes, detections.classes, detections.cameras)),
+            np.ascontiguousarray(detections.boxes),
+            np.ascontiguousarray(detections.classes),
+            np.ascontiguousarray(detections.cameras),
             np.ascontiguousarray(detections.yaw_changes),
             self.detection_ends,
             np.ascontiguousarray(tracks.boxes[:, :3]),
