@@ -4,11 +4,12 @@ from typing import Any
 
 import gymnasium
 import numpy as np
-from gymnasium.vector import AutoresetMode, VectorEnv, VectorWrapper
+from gymnasium.vector import AutoresetMode, VectorEnv
 
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.seed_ranges import LAST, TRAINING, VALIDATION
 from care_sim.envs.vector.same_step import last_rows, same_step
+from care_sim.envs.wrappers.vectors import WorldsWrapper
 
 
 class TrainingSeeds(gymnasium.Wrapper[Any, Any, Any, Any]):
@@ -31,7 +32,7 @@ class TrainingSeeds(gymnasium.Wrapper[Any, Any, Any, Any]):
         return self.env.reset(seed=self._seeds.next(seed), options=options)
 
 
-class VectorTrainingSeeds(VectorWrapper[Any, Any, Any, Any, Any]):
+class VectorTrainingSeeds(WorldsWrapper):
     """`TrainingSeeds` over a vector environment in the mode "Disabled". It begins the episodes
     itself, and so is in the mode "SameStep".
 

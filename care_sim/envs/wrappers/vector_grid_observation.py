@@ -5,7 +5,6 @@ from typing import Any
 
 import gymnasium
 import numpy as np
-from gymnasium.vector import VectorWrapper
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
@@ -13,12 +12,12 @@ from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.arrays import Floats, Mask
 from care_sim.core.belief import OBSERVED, Observation
 from care_sim.envs.wrappers.grid_observation import GridArrays, GridObservation, pictures_space
-from care_sim.envs.wrappers.vectors import AnyVector, rig_of, shows_beliefs
+from care_sim.envs.wrappers.vectors import AnyVector, WorldsWrapper, rig_of, shows_beliefs
 from care_sim.policies.learned.beliefs import Beliefs
 from care_sim.policies.learned.grid_features import GridFeatures
 
 
-class VectorGridObservation(VectorWrapper[GridArrays, Any, Any, Any, Any]):
+class VectorGridObservation(WorldsWrapper):
     """`GridObservation` over a vector environment: what it shows of a world is what
     `GridObservation` shows of the single environment, to the last bit.
 

@@ -14,13 +14,13 @@ from care_sim.core.types import Action
 from care_sim.envs.spaces import checked_scores
 from care_sim.envs.wrappers.sector_actions import SectorReserve, SectorScores, sectors_space
 from care_sim.envs.wrappers.vector_grid_observation import VectorGridObservation
-from care_sim.envs.wrappers.vectors import AnyVector, rig_of, shows_beliefs
+from care_sim.envs.wrappers.vectors import AnyVector, WorldsWrapper, rig_of, shows_beliefs
 from care_sim.policies.learned.beliefs import Beliefs
 from care_sim.policies.learned.sector_choice import SectorChoice
 from care_sim.policies.learned.tiling import Tiling
 
 
-class _VectorSectors(VectorWrapper[Any, NDArray[np.float32], Any, Action, Any]):
+class _VectorSectors(WorldsWrapper):
     """One score per world and sector, from -1 to 1."""
 
     def __init__(self, env: AnyVector, azimuths: int = 32, elevations: int = 4):

@@ -3,13 +3,23 @@
 from typing import Any
 
 from gymnasium import spaces
-from gymnasium.vector import VectorEnv
+from gymnasium.vector import AutoresetMode, VectorEnv, VectorWrapper
 
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.belief import OBSERVED
 from care_sim.core.rig import Rig
 
 AnyVector = VectorEnv[Any, Any, Any]
+
+
+class WorldsWrapper(VectorWrapper[Any, Any, Any, Any, Any]):
+    """A wrapper of a vector environment."""
+
+    @property
+    def autoreset_mode(self) -> AutoresetMode:
+        """Where Gymnasium's own vector environments tell it, too; TorchRL asks for it there."""
+        mode: AutoresetMode = self.metadata["autoreset_mode"]
+        return mode
 
 
 def rig_of(env: AnyVector) -> Rig:
