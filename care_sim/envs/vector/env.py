@@ -166,7 +166,8 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
     def _made(self, share: slice, arguments: dict[str, Any]) -> Worlds:
         rows = {name: values[share] for name, values in self._observed.items()}
         if why_separate(self._model) is None:
-            return CompiledWorlds(self._model, rows)
+            # Where no info tells of clearances, few of them are needed.
+            return CompiledWorlds(self._model, rows, exact=self._model.scoring_info)
         return SeparateWorlds(partial(self.single, **arguments), rows)
 
     def _played(self, scores: NDArray[np.float32], who: Mask) -> Stepped:
