@@ -6,7 +6,7 @@ from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import asdict, dataclass, field
 from itertools import product
 from math import prod
-from typing import Any, Self
+from typing import Any, Self, cast
 
 import gymnasium
 
@@ -14,8 +14,10 @@ from care_sim.base.checks import check_known, check_seed
 from care_sim.core.conditions import COLUMNS_WHERE_CHANGED, DEFAULTS, ClosedLoopConditions
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.envs import CLOSED_LOOP
-from care_sim.envs.closed_loop import KEYFRAME_S
+from care_sim.envs.closed_loop import KEYFRAME_S, ClosedLoopEnv
+from care_sim.envs.vector.coverage import why_separate
 from care_sim.perception.detectors import PROXY
+from care_sim.policies.base import PrivilegedPolicy
 from care_sim.scenarios import make_scenario
 from care_sim.sensors.setups import DEFAULT_SETUP, sensor_columns
 from care_sim.study.parameters import Parameters
@@ -68,7 +70,12 @@ class EpisodeConfig(ClosedLoopConditions, RunConfig):
         # Making the environment and the policy is the check of all other fields: they alone know
         # what they accept.
         with self.make_env() as env:
-            self.make_policy(env)
+            policy = self.make_policy(env)
+            alone = (
+                isinstance(policy, PrivilegedPolicy) or why_separate(closed_loop(env)) is not None
+            )
+        # No field: it follows from them, and is nothing that decides the row.
+        object.__setattr__(self, "_alone", alone)
         super().__post_init__()
 
     def with_seed(self, seed: int) -> Self:
@@ -138,15 +145,27 @@ class EpisodeConfig(ClosedLoopConditions, RunConfig):
         return self.seed
 
     @property
+    def alone(self) -> bool:
+        """Whether it is played by itself: for a privileged policy, which asks its own world for the
+        truth, and in worlds that are not played as arrays (`care_sim.envs.vector.coverage`).
+        """
+        return bool(vars(self)["_alone"])
+
+    @property
     def batch(self) -> Hashable:
-        """Every episode has a world of its own."""
-        return self
+        """Everything but the seed, of those that can be played together."""
+        return self if self.alone else self.changed(seed=0)
 
     @property
     def similarity_keys(self) -> tuple[SimilarityKey, ...]:
         """Everything but the seed; scenario, policy and budget; the policy; nothing."""
         all_but_seed = tuple(item for item in self.row().items() if item[0] != "seed")
         return all_but_seed, (self.scenario, self.policy, self.budget), (self.policy,), ()
+
+
+def closed_loop(env: gymnasium.Env[Any, Any]) -> ClosedLoopEnv:
+    """The environment of an episode without what Gymnasium puts around it."""
+    return cast(ClosedLoopEnv, env.unwrapped)
 
 
 PLAIN_FIELDS = ["scenario", "policy", "budget", "seed", *CONDITION_NAMES]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from care_sim.base.times import LAST_BITS_S
 from care_sim.batch.loop import BatchLoop
 from care_sim.batch.records import History, Records
-from care_sim.core.arrays import Mask
+from care_sim.core.arrays import Floats, Mask
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.envs.sensing import Observed
 from care_sim.envs.vector.rewards import Rewards
@@ -21,14 +21,16 @@ from care_sim.loops.records import Outcome
 
 
 class CompiledWorlds:
-    """A batch of worlds of the environment `model`, one for every row of `observed`."""
+    """A batch of worlds of the environment `model`, one for every row of `observed`.
 
-    def __init__(self, model: ClosedLoopEnv, observed: Observed):
+    Unless `exact`, clearances that no reward needs are bounds (`BatchLoop`); outcomes are exact.
+    """
+
+    def __init__(self, model: ClosedLoopEnv, observed: Observed, exact: bool):
         worlds = len(observed["budget"])
         self.observed = observed
         self._model = model
-        # Where no info tells of clearances, few of them are needed.
-        self._exact = model.scoring_info
+        self._exact = exact
         duration_s = model.scenario.duration_s
         self._loop = BatchLoop(model.rig, model.conditions, duration_s, observed, self._exact)
         self._rewards = Rewards(model.reward_weights, worlds)
@@ -74,6 +76,14 @@ class CompiledWorlds:
             self._list_fired(single, who)
         columns = self._columns(records, terms)
         return Stepped(np.where(who, rewards, 0.0), terminated, truncated, columns, single)
+
+    def boxes(self, world: int) -> Floats:
+        """(n, 7) of the ego and then every actor of a world, in the world frame. Truth."""
+        state = self._loop.state
+        # Ids count up as bodies are added. Before the ego there is the ground alone.
+        bodies = slice(state.egos.bodies[world], state.bodies.counts[world])
+        boxes: Floats = state.bodies.boxes[world, bodies]
+        return boxes
 
     def close(self) -> None:
         """Free what the loop holds."""

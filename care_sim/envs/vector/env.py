@@ -20,6 +20,8 @@ from care_sim.core.types import Action
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.envs.sensing import Observed
 from care_sim.envs.spaces import checked_scores
+from care_sim.envs.vector.compiled_worlds import CompiledWorlds
+from care_sim.envs.vector.coverage import why_separate
 from care_sim.envs.vector.infos import kept
 from care_sim.envs.vector.separate_worlds import SeparateWorlds
 from care_sim.envs.vector.threads import Threads
@@ -163,6 +165,9 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
 
     def _made(self, share: slice, arguments: dict[str, Any]) -> Worlds:
         rows = {name: values[share] for name, values in self._observed.items()}
+        if why_separate(self._model) is None:
+            # Where no info tells of clearances, few of them are needed.
+            return CompiledWorlds(self._model, rows, exact=self._model.scoring_info)
         return SeparateWorlds(partial(self.single, **arguments), rows)
 
     def _played(self, scores: NDArray[np.float32], who: Mask) -> Stepped:
