@@ -159,7 +159,9 @@ class BatchState:
         self.tracks = TrackTables(
             _counts(worlds), np.zeros((worlds, MAX_TRACKS, len(Tracks.COLUMNS))), _counts(worlds)
         )
-        self.sensors = Sensors(np.zeros((worlds, 6)), np.zeros((worlds, 2)), np.zeros((worlds, 2)))
+        self.sensors = Sensors(
+            np.zeros((worlds, 6)), np.zeros((worlds, 2)), np.zeros((worlds, 2))
+        )
         self.egos = Egos(*(np.zeros(worlds) for _ in range(3)), _counts(worlds), _counts(worlds))
 
 
