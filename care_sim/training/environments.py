@@ -7,10 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import gymnasium
 
-import care_sim
-from care_sim.base.checks import check_known
 from care_sim.base.processes import following, starting
-from care_sim.envs import CLOSED_LOOP
+from care_sim.envs import OPEN_LOOP, make_env
 from care_sim.envs.wrappers.grid_observation import GridObservation
 from care_sim.envs.wrappers.sector_actions import SectorReserve, SectorScores
 from care_sim.training.config import AgentConfig
@@ -28,16 +26,14 @@ def plain(config: AgentConfig, budget: float | None = None) -> gymnasium.Env[Any
     Its budget is `budget`, or the first of the configuration. Raises InvalidInput for an unknown
     environment or a wrong argument.
     """
-    known = care_sim.envs.IDS
-    check_known("environment", config.env, known)
     # Only the closed loop has a reward of weighted terms.
     reward: dict[str, Any] = (
-        {"reward_weights": {"gain": config.gain}} if config.env in CLOSED_LOOP else {}
+        {} if config.env in OPEN_LOOP else {"reward_weights": {"gain": config.gain}}
     )
     arguments = (
         {"budget": config.budget[0] if budget is None else budget} | reward | config.arguments
     )
-    return gymnasium.make(f"care_sim:{config.env}", disable_env_checker=True, **arguments)
+    return make_env(config.env, **arguments)
 
 
 def wrapped(config: AgentConfig, budget: float | None = None) -> gymnasium.Env[Any, Any]:
