@@ -68,8 +68,10 @@ class Plugins(Generic[Made]):
         return EntryPoint(name, name, self.group) if is_place(name) else self.entries()[name]
 
     def all_entries(self) -> list[EntryPoint]:
-        """Every entry of installed packages in order of name; of one name in order of the path."""
-        return sorted(entry_points(group=self.group), key=lambda entry: entry.name)
+        """Every entry of installed packages in order of what it is called; of one name in order of
+        the path.
+        """
+        return sorted(entry_points(group=self.group), key=lambda entry: self.called(entry.name))
 
     def entries(self) -> dict[str, EntryPoint]:
         """The entry that counts, by name."""

@@ -138,15 +138,15 @@ def recordings_in(
     if not Path(folder).is_dir():
         raise InvalidInput(f"source {name}:{folder}: {folder} is no folder")
     given = {name: value for name, value in options.items() if value is not None}
-    for name in given:
-        if name not in {field.name for field in fields(kind)}:
-            raise InvalidInput(f"{name} has no meaning for {name} recordings")
+    for option in given:
+        if option not in {field.name for field in fields(kind)}:
+            raise InvalidInput(f"{option} has no meaning for {name} recordings")
     if "camera_detections" in given:
         check_path("camera_detections", given["camera_detections"])
         given["camera_detections"] = Path(str(given["camera_detections"]))
-    for name in {"split", "version"} & set(given):
-        if not isinstance(given[name], str):
-            raise InvalidInput(f"{name} must be a name, got {shown(given[name])}")
+    for option in {"split", "version"} & set(given):
+        if not isinstance(given[option], str):
+            raise InvalidInput(f"{option} must be a name, got {shown(given[option])}")
     return kind(Path(folder), **given)
 
 
