@@ -7,9 +7,10 @@ from care_sim.base.scenario_names import is_environment_id, scenario_of
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.envs.sensing import arguments_of
 from care_sim.evaluation.drives import drive_outcome
-from care_sim.loops.records import DriveOutcome
+from care_sim.loops.records import DriveOutcome, Outcome
 from care_sim.scenarios import PLUGINS, scenario_class
 from care_sim.scenarios.base import Scenario
+from care_sim.scenarios.drive import DriveScenario
 
 
 class DartoutEnv(ClosedLoopEnv):
@@ -89,9 +90,7 @@ class DriveEnv(ClosedLoopEnv):
     scenario_name = "drive"
 
     def _outcome(self) -> DriveOutcome:
-        world = self.loop.world
-        kinds = {actor.body: actor.kind.name for actor in world.actors}
-        return drive_outcome(self.keyframes, world.meetings, kinds, world.along_m / world.goal_m)
+        return _of_drive(self)
 
 
 class ScenarioEnv(ClosedLoopEnv):
@@ -117,6 +116,16 @@ class ScenarioEnv(ClosedLoopEnv):
                 )
         self.scenario_name = scenario
         super().__init__(**parameters)
+
+    def _outcome(self) -> Outcome:
+        # As the drive that it derives from is scored.
+        return _of_drive(self) if isinstance(self.scenario, DriveScenario) else super()._outcome()
+
+
+def _of_drive(env: ClosedLoopEnv) -> DriveOutcome:
+    world = env.loop.world
+    kinds = {actor.body: actor.kind.name for actor in world.actors}
+    return drive_outcome(env.keyframes, world.meetings, kinds, world.along_m / world.goal_m)
 
 
 def _check_counts(environment: str) -> None:

@@ -62,8 +62,8 @@ class Scenario(ABC):
             raise BrokenScenario(f"{own} cannot be built: {error_line(error)}") from error
         if not isinstance(world, World):
             raise BrokenScenario(f"{own}: build must return a World, got {type(world).__name__}")
-        # A drive has meetings in its place, or nobody to meet.
-        if world.first_sighting is None and world.route is None:
+        # A drive has meetings in its place, or on its route nobody to meet.
+        if not (world.first_sighting or world.meetings or world.route):
             world.close()
             raise BrokenScenario(f"{own}: build sets no first_sighting, the actor that is scored")
         return world

@@ -16,6 +16,7 @@ from care_sim.envs.scenarios import ScenarioEnv
 from care_sim.reports.report import read_results
 from care_sim.scenarios import PLUGINS, SCENARIOS, make_scenario, scenario_names
 from care_sim.scenarios.dartout import Dartout
+from care_sim.scenarios.drive import DriveScenario
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.training.config import PpoConfig
 from care_sim.training.environments import plain
@@ -132,6 +133,7 @@ BROKEN = """
 from dataclasses import dataclass, field
 from care_sim.scenarios.base import Scenario
 from care_sim.scenarios.dartout import Dartout
+from care_sim.scenarios.drive import DriveScenario
 
 module = "a string"
 
@@ -291,6 +293,24 @@ def test_an_unknown_scenario_of_a_class_is_one_line():
     kind = type("Lost", (care_sim.envs.closed_loop.ClosedLoopEnv,), {"scenario_name": "nowhere"})
     with pytest.raises(InvalidInput, match="unknown scenario 'nowhere'"):
         kind()
+
+
+def test_a_drive_of_ones_own_is_scored_as_a_drive():
+    own = type("OwnDrive", (DriveScenario,), {})
+    outcomes = []
+    for env in (
+        ScenarioEnv(scenario=own, duration_s=1.0),
+        gymnasium.make("CARE-Drive-v0", duration_s=1.0),
+    ):
+        env.reset(seed=0)
+        over = False
+        while not over:
+            *_, terminated, truncated, info = env.step(np.zeros(env.action_space.shape, np.float32))
+            over = terminated or truncated
+        outcomes.append(info["outcome"])
+        env.close()
+    assert outcomes[0] == outcomes[1]
+    assert "progress" in outcomes[0]
 
 
 def test_a_class_is_played_without_a_name():
