@@ -57,12 +57,21 @@ def explaining_tracks(detections: ImageDetections, tracks: Tracks, rig: Rig) -> 
     a detection of a camera that the rig does not have.
     """
     counts = np.array([len(detections), len(tracks)])
-    return _explaining(Beliefs(detections, tracks, counts[:1], counts[1:], counts[:0]), rig)
+    return explaining_rows((detections, counts[:1]), (tracks, counts[1:]), rig)
 
 
 def _explaining(beliefs: Beliefs, rig: Rig) -> Integers:
-    """`explaining_tracks` of several worlds: a row is that among the forecasts of all."""
-    detections, tracks = beliefs.detections, beliefs.tracks
+    detected, tracked = beliefs.detected, beliefs.tracked
+    return explaining_rows((beliefs.detections, detected), (beliefs.tracks, tracked), rig)
+
+
+def explaining_rows(
+    seen: tuple[ImageDetections, Integers], known: tuple[Tracks, Integers], rig: Rig
+) -> Integers:
+    """`explaining_tracks` of several worlds: a row is that among the forecasts of all. Detections
+    and tracks come world after world, with how many (W,) are of each.
+    """
+    (detections, detected), (tracks, tracked) = seen, known
     if not len(detections):
         return np.zeros(0, np.int64)
     # One layout of all arrays, so that compiled code is compiled once.
@@ -73,8 +82,8 @@ def _explaining(beliefs: Beliefs, rig: Rig) -> Integers:
         np.ascontiguousarray(detections.yaw_changes),
         np.ascontiguousarray(tracks.boxes[:, :3]),
         np.ascontiguousarray(tracks.classes),
-        beliefs.detected,
-        beliefs.tracked,
+        detected,
+        tracked,
         rig.camera_models,
     )
 
