@@ -118,14 +118,8 @@ class RowPolicy(Policy):
 
     def demand(self, belief: Belief) -> Demand:
         """The stages of one world."""
-        exploitation, *layers = (stage.sets for stage in self.stages(Beliefs.of(belief)))
+        exploitation, *layers = (stage.sets for stage in self.stages(Beliefs.of(belief, self.rig)))
         return Demand(exploitation, layers)
-
-    def hulls(self, beliefs: Beliefs) -> WorldSets:
-        """The hulls of all forecasts. The tracks of a belief come nearest first, and their hulls
-        keep that order.
-        """
-        return WorldSets(self.rig.hulls(beliefs.tracks.boxes), beliefs.tracked)
 
 
 class FixedPolicy(Policy):

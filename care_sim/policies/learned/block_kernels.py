@@ -17,15 +17,15 @@ BlockPictures = NDArray[np.float32]
 
 class Objects(NamedTuple):
     """The objects of W worlds, world after world: the cells of their `hulls` and `wedges`, with the
-    sizes of these sets and (W,) at which set each world's end; and which wedges are explained.
+    sizes of these sets and (W,) how many of them each world has; and which wedges are explained.
     """
 
     hulls: Cells
     hull_sizes: Integers
-    hull_ends: Integers
+    hull_counts: Integers
     wedges: Cells
     wedge_sizes: Integers
-    wedge_ends: Integers
+    wedge_counts: Integers
     explained: Mask
 
 
@@ -59,11 +59,11 @@ def draw_pictures(
     for world in range(len(out)):
         # The hulls first: where they are is asked again when the returns are drawn.
         marks[:] = 0
-        while hull < objects.hull_ends[world]:
+        for _ in range(objects.hull_counts[world]):
             end = hull_place + objects.hull_sizes[hull]
             _add_object(objects.hulls[hull_place:end], 0, blocks, marks, out[world])
             hull, hull_place = hull + 1, end
-        while wedge < objects.wedge_ends[world]:
+        for _ in range(objects.wedge_counts[world]):
             end = wedge_place + objects.wedge_sizes[wedge]
             group = 2 if objects.explained[wedge] else 1
             _add_object(objects.wedges[wedge_place:end], group, blocks, marks, out[world])

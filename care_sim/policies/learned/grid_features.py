@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from care_sim.base.checks import check_whole
 from care_sim.core.belief import Belief, Observation
+from care_sim.core.beliefs import Beliefs
 from care_sim.core.grid import Cells
+from care_sim.core.residual import explained_of, wedges_of
 from care_sim.core.rig import Rig
 from care_sim.perception.cluster.road import KERB_CLEARANCE_M
-from care_sim.policies.learned.beliefs import Beliefs
 from care_sim.policies.learned.block_kernels import AboveRoad, Objects, draw_pictures
 from care_sim.policies.learned.tiling import Tiling
 
@@ -65,11 +66,11 @@ class GridFeatures:
     def of_all(self, beliefs: Beliefs) -> dict[str, NDArray[np.float32]]:
         """The same of W worlds: `grid` (W, channels * rows * columns) and `ego` (W, 4)."""
         out = np.zeros((len(beliefs), len(CHANNELS), self.rows * self.columns), np.float32)
-        hulls, wedges = beliefs.hulls, beliefs.wedges
+        hulls, wedges = beliefs.hulls, wedges_of(beliefs)
         objects = Objects(
-            *(hulls.cells, hulls.sizes, beliefs.track_ends),
-            *(wedges.cells, wedges.sizes, beliefs.detection_ends),
-            beliefs.explained,
+            *(hulls.sets.cells, hulls.sets.sizes, hulls.counts),
+            *(wedges.sets.cells, wedges.sets.sizes, wedges.counts),
+            explained_of(beliefs),
         )
         draw_pictures(objects, beliefs.ranges, self._above, self._blocks, self._marks, out)
         # Shares are sums of float32 parts, and a full block may end a little above 1.

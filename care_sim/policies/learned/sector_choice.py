@@ -1,7 +1,5 @@
-"""What scores of sectors fire, in several worlds at once.
-
-It is what the shared allocator makes of `care_sim.policies.learned.tiling.reserve_demand` and
-`sector_demand`.
+"""What scores of sectors ask of the shared allocator, and what it then fires, in any number of
+worlds.
 """
 
 from functools import cached_property
@@ -9,49 +7,48 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.base.compiled import compiled
-from care_sim.core.allocation import _fill_stages
-from care_sim.core.arrays import Integers
+from care_sim.core.allocator import Allocator
+from care_sim.core.beliefs import Beliefs
 from care_sim.core.cell_sets import CellSets
 from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
-from care_sim.policies.learned.beliefs import Beliefs
-from care_sim.policies.learned.tiling import Tiling, enough_beside_hulls
+from care_sim.core.types import Action
+from care_sim.core.world_sets import WorldSets
+from care_sim.policies.learned.tiling import Tiling
 
 
 class SectorChoice:
-    """Actions of a rig from scores of `sectors`."""
+    """The stages of Algorithm 1 for scores (W, ...) of the `sectors` of W worlds. All sets are
+    listed in the rig's `cell_order` already.
+    """
 
     def __init__(self, rig: Rig, sectors: Tiling):
         self._rig = rig
         self._sectors = sectors
 
-    def reserve(self, beliefs: Beliefs, scores: NDArray[np.floating]) -> NDArray[np.float32]:
-        """Scores (W, E, A) of the cells of `reserve_demand`, from those of the sectors (W,
-        elevations, azimuths).
+    def reserve(self, beliefs: Beliefs, scores: NDArray[np.floating]) -> list[WorldSets]:
+        """The forecasts' hulls, then the sectors with a positive score as layers of the reserve,
+        best first.
         """
-        enough = enough_beside_hulls(self._rig)
-        return self._actions(scores, enough, beliefs.hulls, beliefs.track_ends)
+        hulls = beliefs.hulls
+        # At most one budget of the cells of sectors is taken by hulls.
+        layers = self._layers(scores, 2 * self._rig.budget)
+        return [WorldSets(self._rig.listed(hulls.sets), hulls.counts), *layers]
 
-    def alone(self, scores: NDArray[np.floating]) -> NDArray[np.float32]:
-        """The same of `sector_demand`."""
-        none = np.zeros(len(scores), np.int64)
-        return self._actions(scores, self._rig.budget, CellSets.of([]), none)
+    def alone(self, scores: NDArray[np.floating]) -> list[WorldSets]:
+        """The sectors with a positive score alone, best first."""
+        return [WorldSets.nothing(len(scores)), *self._layers(scores, self._rig.budget)]
 
-    def _actions(
-        self, scores: NDArray[np.floating], enough: int, hulls: CellSets, ends: Integers
-    ) -> NDArray[np.float32]:
-        rig = self._rig
-        ranked, counts = self._sectors.best(scores, enough)
-        hulls = rig.listed(hulls)
-        exploited = round((1 - rig.reserve_fraction) * rig.budget)
-        actions = np.zeros((len(scores), rig.grid.size), np.float32)
-        _score_cells(
-            *(hulls.cells, hulls.sizes, ends, exploited),
-            *(self._listed, ranked, counts, rig.budget),
-            actions,
-        )
-        return actions.reshape(-1, *rig.grid.shape)
+    def _layers(self, scores: NDArray[np.floating], enough: int) -> list[WorldSets]:
+        """The best sector of every world that has one, then the next of each, and so on."""
+        ranked, counts = self._sectors.ranked(scores, enough)
+        layers = []
+        for place in range(counts.max(initial=0)):
+            has = counts > place
+            cells = self._listed[ranked[has, place]]
+            sets = CellSets(cells.ravel(), np.full(*cells.shape))
+            layers.append(WorldSets(sets, has.astype(np.int64)))
+        return layers
 
     @cached_property
     def _listed(self) -> Cells:
@@ -60,46 +57,20 @@ class SectorChoice:
         return self._rig.listed(list(cells)).cells.reshape(cells.shape)
 
 
-@compiled()
-def _score_cells(
-    hulls: Cells,
-    hull_sizes: Integers,
-    hull_ends: Integers,
-    exploited: int,
-    sectors: Cells,
-    ranked: Integers,
-    counts: Integers,
-    budget: int,
-    out: NDArray[np.float32],
-) -> None:
-    """Fill `out` (W, N), zeros before, with scores of the cells that each world's hulls take, at
-    most `exploited`, and then the first `counts` (W,) of its `ranked` (W, m) sectors, up to the
-    budget.
+class SectorActions:
+    """The actions (W, E, A) for scores (W, ...) of the `sectors` of W worlds, each with the budget
+    of the rig. They are read-only, and the next call overwrites them.
     """
-    width = sectors.shape[1]
-    place = first = 0
-    for world in range(len(out)):
-        # Exploitation is one stage of all hulls, every sector a stage of its own.
-        sizes = np.full(hull_ends[world] - first + counts[world], width)
-        held = len(sizes) - counts[world]
-        sizes[:held] = hull_sizes[first : first + held]
-        inside = sizes[:held].sum()
-        cells = np.empty(sizes.sum(), np.int64)
-        cells[:inside] = hulls[place : place + inside]
-        for n in range(counts[world]):
-            begin = inside + n * width
-            cells[begin : begin + width] = sectors[ranked[world, n]]
-        limits = np.full(counts[world] + 1, budget)
-        limits[0] = exploited
-        ends = held + np.arange(counts[world] + 1)
-        chosen = _fill_stages(cells, sizes, ends, limits, 0, out.shape[1] - 1)
-        _lay_scores(chosen, out[world])
-        first, place = first + held, place + inside
 
+    def __init__(self, rig: Rig, sectors: Tiling, worlds: int):
+        self._choice = SectorChoice(rig, sectors)
+        self._allocator = Allocator(rig, worlds)
+        self._budgets = np.full(worlds, rig.budget)
 
-@compiled()
-def _lay_scores(cells: Cells, out: NDArray[np.float32]) -> None:
-    """Write into `out` (N,) what `care_sim.core.actions.scores_of` gives cells of one shot each."""
-    whole = np.float32(2 * max(len(cells), 1))
-    for n in range(len(cells)):
-        out[cells[n]] = (whole - np.float32(n)) / whole
+    def reserve(self, beliefs: Beliefs, scores: NDArray[np.floating]) -> Action:
+        """See `SectorChoice.reserve`."""
+        return self._allocator.scores(self._choice.reserve(beliefs, scores), self._budgets)
+
+    def alone(self, scores: NDArray[np.floating]) -> Action:
+        """See `SectorChoice.alone`."""
+        return self._allocator.scores(self._choice.alone(scores), self._budgets)
