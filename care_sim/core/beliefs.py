@@ -67,7 +67,7 @@ class Beliefs:
         egos, budgets = (array_of(observation, name, 2, None)[live] for name in ("ego", "budget"))
         if not (lie_between(egos, -HIGHEST, HIGHEST) and lie_between(budgets, 0.0, 1.0)):
             raise InvalidInput(
-                f"an observation's ego must hold numbers up to {HIGHEST:g}, its budget lie in "
+                f"ego of an observation must hold numbers up to {HIGHEST:g}, its budget lie in "
                 "[0, 1]"
             )
         found, detected = _table(observation, "detections", ImageDetections.COLUMNS, live)
@@ -91,7 +91,7 @@ class Beliefs:
         """
         ranges = self.scans.reshape(len(self), -1)
         if not lie_between(ranges if self.live.all() else ranges[self.live], 0.0, HIGHEST):
-            raise InvalidInput("an observation's ranges must be numbers of 0 or more")
+            raise InvalidInput("ranges of an observation must be numbers of 0 or more")
         return ranges
 
     @cached_property

@@ -3,6 +3,7 @@ worlds.
 """
 
 from functools import cached_property
+from itertools import accumulate, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,13 +43,14 @@ class SectorChoice:
     def _layers(self, scores: NDArray[np.floating], enough: int) -> list[WorldSets]:
         """The best sector of every world that has one, then the next of each, and so on."""
         ranked, counts = self._sectors.ranked(scores, enough)
-        layers = []
-        for place in range(counts.max(initial=0)):
-            has = counts > place
-            cells = self._listed[ranked[has, place]]
-            sets = CellSets(cells.ravel(), np.full(*cells.shape))
-            layers.append(WorldSets(sets, has.astype(np.int64)))
-        return layers
+        has = np.arange(counts.max(initial=0))[:, None] < counts
+        cells = self._listed[ranked.T[: len(has)][has]]
+        sizes = np.full(*cells.shape)
+        ends = accumulate(np.count_nonzero(has, axis=1).tolist(), initial=0)
+        return [
+            WorldSets(CellSets(cells[first:last].ravel(), sizes[first:last]), told)
+            for (first, last), told in zip(pairwise(ends), has.astype(np.int64), strict=True)
+        ]
 
     @cached_property
     def _listed(self) -> Cells:
