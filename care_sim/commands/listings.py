@@ -1,6 +1,8 @@
 """`care-sim policies`, `detectors`, `sensors` and `scenarios`: what can be named."""
 
 import inspect
+import shutil
+import textwrap
 from dataclasses import Field, dataclass, fields
 from typing import Any
 
@@ -19,7 +21,7 @@ from care_sim.streets.encounters import COMERS
 
 @dataclass(frozen=True)
 class Policies:
-    """List the policies with their tags, parameters and sources."""
+    """List the policies: tags, parameters, sources."""
 
     def __call__(self) -> int:
         """Run it."""
@@ -33,7 +35,7 @@ class Detectors:
 
     def __call__(self) -> int:
         """Run it."""
-        print(*detector_lines(), sep="\n")
+        print(*map(_wrapped, detector_lines()), sep="\n")
         return 0
 
 
@@ -43,7 +45,7 @@ class Sensors:
 
     def __call__(self) -> int:
         """Run it."""
-        print(*setup_lines(), sep="\n")
+        print(*map(_wrapped, setup_lines()), sep="\n")
         return 0
 
 
@@ -67,11 +69,22 @@ class Scenarios:
     def __call__(self) -> int:
         """Run it."""
         for name, scenario in SCENARIOS.items():
-            print(f"{name:12} {_summary(scenario)}")
+            print(_wrapped(f"{name:12} {_summary(scenario)}"))
             for field in fields(scenario):
-                print(f"    {field.name}={_rounded(field.default)}{_choices(field)}")
+                print(_wrapped(f"    {field.name}={_rounded(field.default)}{_choices(field)}"))
             print()
         return 0
+
+
+def _wrapped(line: str) -> str:
+    """The line, broken at words where the terminal is narrower; what goes on is indented."""
+    return textwrap.fill(
+        line,
+        shutil.get_terminal_size().columns,
+        subsequent_indent=" " * 8,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
 
 
 def _choices(field: Field[Any]) -> str:
