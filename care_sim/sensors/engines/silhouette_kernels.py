@@ -41,7 +41,8 @@ class Meshes(NamedTuple):
     `care_sim.world.polyhedra.Polyhedra.tables`: `corners` (c, 3); `faces` (f, 4), outward normals
     and distances from the body's origin; `edges` (e, 2), the two faces that meet in each, counted
     within the part; `starts` (k + 1, 3), where the rows of a part begin in these three; `owners`
-    (k,) body ids; `reaches` (k,) how far each part reaches from the body's origin.
+    (k,) body ids, the parts of a body side by side; `reaches` (k,) how far each part reaches from
+    the body's origin.
     """
 
     corners: Floats
@@ -145,8 +146,12 @@ def lay_silhouettes(
 
         faces = starts[part + 1, 1] - starts[part, 1]
         _lay_planes(table.faces, starts[part, 1], faces, body, optics, seen.planes)
-        seen.owners[place] = owner
-        seen.starts[place + 1] = _take_facing(seen.planes, faces, seen.starts[place], seen.facing)
+        begin = seen.starts[place]
+        end = _take_facing(seen.planes, faces, begin, seen.facing)
+        # A camera inside of a body looks through it.
+        if begin == end:
+            continue
+        seen.owners[place], seen.starts[place + 1] = owner, end
         _begin_outline(upper, lower - upper, left, right, seen.outline)
         edges = starts[part, 2], starts[part + 1, 2]
         lines = _lay_lines(table.edges, *edges, seen.planes, seen.lines)
