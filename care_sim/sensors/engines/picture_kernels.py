@@ -14,13 +14,11 @@ from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers
 from care_sim.sensors.engines.box_kernels import moved_up, note_pixels
 from care_sim.sensors.engines.silhouette_kernels import (
-    Lens,
-    Meshes,
-    PlacedCamera,
     Silhouettes,
     lay_silhouettes,
     room_for,
 )
+from care_sim.sensors.engines.view_kernels import Lens, Meshes, PlacedCamera
 from care_sim.world.bullet import NO_BODY, PixelWindow
 from care_sim.world.polyhedra import Tables
 
