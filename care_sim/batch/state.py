@@ -41,9 +41,9 @@ class Solids(NamedTuple):
 
 
 class Outlines(NamedTuple):
-    """The parts that cameras see; columns as in `care_sim.sensors.engines.picture_kernels.Meshes`:
-    `corners` (W, C, 3), `faces` (W, F, 4), `edges` (W, D, 2), `starts` (W, K + 1, 3), `owners`
-    (W, K), `reaches` (W, K).
+    """The parts that cameras see; columns as in
+    `care_sim.sensors.engines.view_kernels.Meshes`: `corners` (W, C, 3), `faces` (W, F, 4), `edges`
+    (W, D, 2), `starts` (W, K + 1, 3), `owners` (W, K), `reaches` (W, K).
     """
 
     counts: Integers
