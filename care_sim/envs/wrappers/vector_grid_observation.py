@@ -84,7 +84,9 @@ class VectorGridObservation(WorldsWrapper):
         return self._shown(observation), rewards, terminated, truncated, infos
 
     def _shown(self, observation: Observation) -> GridArrays:
-        self._given = Beliefs.read(observation, self._rig)
+        # What stands directly inside may have read the same.
+        read = self.env.read if isinstance(self.env, WorldsWrapper) else None
+        self._given = Beliefs.read(observation, self._rig) if read is None else read
         return self.features.of_all(self._given)
 
     def _finals(self, given: Sequence[Any]) -> NDArray[np.object_]:
