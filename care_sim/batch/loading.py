@@ -1,8 +1,10 @@
 """A world as a scenario built it, taken into the tables of a batch."""
 
+from collections.abc import Iterable, Iterator
+
 import numpy as np
 
-from care_sim.batch.state import BatchState, filled
+from care_sim.batch.state import BatchState, Outlines, Solids, filled
 from care_sim.world.bullet import NO_BODY
 from care_sim.world.world import World
 
@@ -33,16 +35,11 @@ def load(state: BatchState, world: int, built: World) -> None:
     )
     state.solids.counts[world] = len(primitives.owners)
     columns = primitives.shapes, primitives.halves, primitives.offsets, primitives.owners
-    state.solids = type(state.solids)(
-        state.solids.counts,
-        *(filled(table, world, rows) for table, rows in zip(state.solids[1:], columns, strict=True)),
-    )
+    state.solids = Solids(state.solids.counts, *_all_filled(state.solids[1:], world, columns))
     meshes = built.bullet.polyhedra.tables
     state.outlines.counts[world] = len(meshes[-1])
-    state.outlines = type(state.outlines)(
-        state.outlines.counts,
-        *(filled(table, world, rows) for table, rows in zip(state.outlines[1:], meshes, strict=True)),
-    )
+    outlines = _all_filled(state.outlines[1:], world, meshes)
+    state.outlines = Outlines(state.outlines.counts, *outlines)
 
     # Ids count up in the order in which bodies were added, and so do those that are reported.
     labels = built.labels()
@@ -55,3 +52,10 @@ def load(state: BatchState, world: int, built: World) -> None:
         classes=filled(reported.classes, world, np.array([*labels.values()], np.int64)),
         by_body=filled(reported.by_body, world, by_body),
     )
+
+
+def _all_filled(
+    tables: Iterable[np.ndarray], world: int, columns: Iterable[np.ndarray]
+) -> Iterator[np.ndarray]:
+    for table, rows in zip(tables, columns, strict=True):
+        yield filled(table, world, rows)

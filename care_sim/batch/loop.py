@@ -11,40 +11,53 @@ from numpy.typing import NDArray
 from care_sim.batch.braking import Braking
 from care_sim.batch.choice import Choice
 from care_sim.batch.loading import load
-from care_sim.batch.motion import Motion
+from care_sim.batch.motion import Motion, steps_of
 from care_sim.batch.observing import Observations, Observing
 from care_sim.batch.records import Records
-from care_sim.batch.scanning import Scanning
+from care_sim.batch.scanning import Found, Scanning
 from care_sim.batch.sight import Sight
 from care_sim.batch.state import BatchState, Fired
 from care_sim.batch.tracking import Tracking
-from care_sim.core.arrays import Floats, Mask
+from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.conditions import ClosedLoopConditions
+from care_sim.core.frames import Frame
 from care_sim.core.rig import Rig
 from care_sim.loops.episode import Episode
 from care_sim.world.bullet import NO_BODY
 
 
 class BatchLoop:
-    """W worlds, their sensors and the software of their cars. Observations are written into
-    `observed`, arrays with a row per world.
+    """W worlds, their sensors and the software of their cars, over episodes of up to `duration_s`
+    seconds. Observations are written into `observed`, arrays with a row per world.
+
+    Unless `exact`, records tell the clearance as `Motion.advance` does, and `least_clearance_m`
+    has to be asked for that of an episode.
     """
 
     fired: Fired
     """What was fired at the last keyframe."""
 
-    def __init__(self, rig: Rig, conditions: ClosedLoopConditions, observed: Observations):
+    def __init__(
+        self,
+        rig: Rig,
+        conditions: ClosedLoopConditions,
+        duration_s: float,
+        observed: Observations,
+        exact: bool = True,
+    ):
         worlds = len(observed["budget"])
         self.state = BatchState(worlds)
         self._rig = rig
         self._observed = observed
         self._choice = Choice(rig, conditions, worlds)
         self._scanning = Scanning(rig, conditions)
-        self._tracking = Tracking(rig)
+        self._tracking = Tracking(rig.keyframe_s)
         self._braking = Braking(rig, conditions, worlds)
-        self._motion = Motion(worlds)
+        self._exact = exact
+        self._motion = Motion(worlds, steps_of(duration_s, rig.keyframe_s))
         self._sight = Sight(rig, conditions, worlds)
         self._observing = Observing(rig)
+        self._min_returns = conditions.min_returns
         self._in_view = np.zeros(worlds, np.bool_)
 
     def begin(self, episodes: Mapping[int, Episode]) -> None:
@@ -54,7 +67,7 @@ class BatchLoop:
             built = episode.world
             load(self.state, world, built)
             self._choice.begin(world, episode.floor)
-            self._braking.begin(world, built)
+            self._braking.begin(world, built.ego_motion.speed, built.has_oncoming)
             self._motion.begin(world, built)
             self._sight.begin(world, built, episode.seeds.camera)
             self._observed["ranges"][world] = 0.0
@@ -78,21 +91,21 @@ class BatchLoop:
         returns = self._scanning.scan(state, fired)
         found = self._scanning.found(state, returns)
         self._tracking.update(state, found)
-        command = self._braking.command(who, *self._tracking.seen(state), speed)
-        detected = self._is_found(*found)
+        accelerations, braking = self._braking.command(who, *self._tracking.seen(state), speed)
+        detected = self._is_found(found)
 
         # The command holds until the next keyframe; then the cameras look and forecasts are due.
-        passages = self._motion.advance(state, command.accelerations, self._rig.keyframe_s)
+        passages = self._motion.advance(state, accelerations, self._rig.keyframe_s, self._exact)
         state.keyframes[who] += 1
         self._tracking.predict(state)
         self._scanning.image(fired, returns, self._observed["ranges"], who)
         self._look(who)
         return Records(
             time,
-            fired.counts,
+            fired.counts.copy(),
             in_view,
             detected,
-            command.braking,
+            braking.copy(),
             speed,
             distance,
             passages.nearest_m,
@@ -108,7 +121,7 @@ class BatchLoop:
         state = self.state
         asked = np.flatnonzero(who & self._has_target)
         targets = state.egos.targets[asked]
-        hulls = self._rig.hulls(self._scanning.local_boxes(state, asked, targets))
+        hulls = self._rig.hulls(self._boxes_from_sensors(asked, targets))
         most = int(hulls.sizes.max(initial=0))
         cells = np.zeros((state.worlds, most), np.int64)
         counts = np.zeros(state.worlds, np.int64)
@@ -120,8 +133,12 @@ class BatchLoop:
         returns = self._scanning.scan(state, Fired(counts, cells))
         in_use = np.arange(most) < counts[:, None]
         hits = ((returns.ids == state.egos.targets[:, None]) & in_use).sum(axis=1)
-        result: Mask = self._has_target & (hits >= self._scanning.min_returns)
+        result: Mask = self._has_target & (hits >= self._min_returns)
         return result
+
+    def least_clearance_m(self, world: int, since_s: float) -> float:
+        """The least clearance of a world's episode from a time on; see `Motion.settle`."""
+        return self._motion.settle(world, since_s)
 
     def close(self) -> None:
         """Free what the stages hold."""
@@ -151,6 +168,14 @@ class BatchLoop:
         sensors.turns[:, 0], sensors.turns[:, 1] = cos, sin
         sensors.turns_back[:, 0], sensors.turns_back[:, 1] = np.cos(-yaw), np.sin(-yaw)
 
+    def _boxes_from_sensors(self, worlds: Integers, bodies: Integers) -> Floats:
+        """(n, 7) a body of each of some worlds, in the frame of its sensor."""
+        sensors = self.state.sensors
+        boxes = self.state.bodies.boxes[worlds, bodies].copy()
+        for box, world in zip(boxes, worlds.tolist(), strict=True):
+            box[:] = Frame(*sensors.poses[world].tolist()).boxes_to_local(box[None])
+        return boxes
+
     @property
     def _has_target(self) -> Mask:
         """(W,) which episodes are about somebody."""
@@ -164,10 +189,11 @@ class BatchLoop:
         away = centres - state.sensors.poses[:, :2]
         return np.where(self._has_target, np.hypot(away[:, 0], away[:, 1]), np.inf)
 
-    def _is_found(self, counts: NDArray[np.int64], rows: NDArray[np.int64]) -> Mask:
-        """(W,) whether the first-sighting actor is among the `rows` (W, R) of reported bodies."""
+    def _is_found(self, found: Found) -> Mask:
+        """(W,) whether the first-sighting actor is among the bodies that are detected."""
         state = self.state
+        in_use = np.arange(found.rows.shape[1]) < found.counts[:, None]
+        rows = np.where(in_use, found.rows, 0)
         bodies = np.take_along_axis(state.reported.bodies, rows, axis=1)
-        in_use = np.arange(rows.shape[1]) < counts[:, None]
-        found: Mask = ((bodies == state.egos.targets[:, None]) & in_use).any(axis=1)
-        return found & self._has_target
+        targeted: Mask = ((bodies == state.egos.targets[:, None]) & in_use).any(axis=1)
+        return targeted & self._has_target

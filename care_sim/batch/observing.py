@@ -10,6 +10,9 @@ from care_sim.core.observation_limits import Limits
 from care_sim.core.rig import Rig
 from care_sim.core.types import Ego, ImageDetections, Tracks
 
+# Which column of a table tells the camera, by which bounds differ.
+_CAMERA, _NO_CAMERA = ImageDetections.CAMERA, -1
+
 Observations = dict[str, NDArray[np.float32]]
 
 
@@ -39,8 +42,8 @@ class Observing:
         numbers = np.stack([egos.speeds, egos.yaw_rates, egos.accelerations], axis=1)
         observed["ego"][who] = np.clip(numbers, *self._limits.ego)[who]
         observed["budget"][who] = self._share
-        fits = _put(*detections, *self._detection_bounds, Tables.CAMERA, observed["detections"], who)
-        fits &= _put(*tracks, *self._track_bounds, Tables.NO_CAMERA, observed["tracks"], who)
+        fits = _put(*detections, *self._detection_bounds, _CAMERA, observed["detections"], who)
+        fits &= _put(*tracks, *self._track_bounds, _NO_CAMERA, observed["tracks"], who)
         for world in np.flatnonzero(who & ~fits).tolist():
             self._mend(world, detections, tracks, observed)
 
@@ -62,12 +65,6 @@ class Observing:
         told = belief.to_observation()
         for name in ("detections", "tracks"):
             observed[name][world] = told[name]
-
-
-class Tables:
-    """Which column of a table tells the camera, by which bounds differ."""
-
-    CAMERA, NO_CAMERA = ImageDetections.CAMERA, -1
 
 
 @compiled()

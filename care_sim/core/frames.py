@@ -27,7 +27,7 @@ def turned(vectors: Floats, yaw: float | Floats) -> Floats:
     if not isinstance(yaw, np.ndarray):
         table = np.ascontiguousarray(vectors, dtype=float)
         turn = float(cos), float(sin)
-        return _turned_alike(table.reshape(-1, table.shape[-1]), turn).reshape(table.shape)
+        return turned_alike(table.reshape(-1, table.shape[-1]), turn).reshape(table.shape)
     result: Floats = np.array(vectors, dtype=float)
     x, y = vectors[..., 0], vectors[..., 1]
     result[..., 0] = cos * x - sin * y
@@ -36,7 +36,7 @@ def turned(vectors: Floats, yaw: float | Floats) -> Floats:
 
 
 @compiled()
-def _turned_alike(vectors: Floats, turn: tuple[float, float]) -> Floats:
+def turned_alike(vectors: Floats, turn: tuple[float, float]) -> Floats:
     """Vectors (n, k) turned by the angle with this cosine and sine; see `turned`."""
     result = vectors.copy()
     cos, sin = turn
@@ -130,7 +130,7 @@ class Frame:
         """
         if self._upright:
             table = np.ascontiguousarray(boxes, dtype=float)
-            return _seen_from(table, self.turn_back, self._place)
+            return seen_from(table, self.turn_back, self._place)
         centres = self.vectors_to_local(boxes[:, :3] - self.origin)
         return _boxes_turned(boxes, centres, self.vectors_to_local)
 
@@ -140,7 +140,7 @@ class Frame:
         """
         if self._upright:
             turn = float(np.cos(self.yaw)), float(np.sin(self.yaw))
-            return _placed_at(np.ascontiguousarray(boxes, dtype=float), turn, self._place)
+            return placed_at(np.ascontiguousarray(boxes, dtype=float), turn, self._place)
         centres = self.origin + self.vectors_to_world(boxes[:, :3])
         return _boxes_turned(boxes, centres, self.vectors_to_world)
 
@@ -157,7 +157,7 @@ class Frame:
 
 # The sines and cosines are handed over: as in `turned` they are NumPy's, on every machine.
 @compiled()
-def _seen_from(boxes: Floats, turn: tuple[float, float], place: _Place) -> Floats:
+def seen_from(boxes: Floats, turn: tuple[float, float], place: _Place) -> Floats:
     """World boxes (n, 7) seen from a `place` (x, y, z, yaw) on the ground; `turn` is the cosine and
     the sine of -yaw.
     """
@@ -172,7 +172,7 @@ def _seen_from(boxes: Floats, turn: tuple[float, float], place: _Place) -> Float
 
 
 @compiled()
-def _placed_at(boxes: Floats, turn: tuple[float, float], place: _Place) -> Floats:
+def placed_at(boxes: Floats, turn: tuple[float, float], place: _Place) -> Floats:
     """Boxes (n, 7) seen from a `place` (x, y, z, yaw) in the world; `turn` is the cosine and the
     sine of yaw.
     """

@@ -1,7 +1,7 @@
 """The shared random floor, line 6 of Algorithm 1: a random order of all cells at every keyframe.
 
 The order is that of `numpy.random.Generator.permutation`, to the last cell. It is drawn here, in
-less than half of the time, because it takes an eighth of a keyframe there.
+less than a third of the time, because it takes an eighth of a keyframe there.
 """
 
 import numpy as np
@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from care_sim.base.compiled import compiled
 from care_sim.core.grid import Cells
+from care_sim.core.pcg64 import WordStreams, refill, seed_stream, word_streams
 
-_DRAWN = 4096
-"""Numbers of 64 bits that are taken from the generator at a time; a floor takes about 11,000."""
+_LOOKED_AT = 128
+"""Words that are looked at together."""
 
 
 class RandomFloor:
@@ -21,35 +22,43 @@ class RandomFloor:
     """
 
     def __init__(self, seed: np.random.SeedSequence, number: int, cells: int):
-        # What `seed.spawn` would give its child `number - 1`, without spawning those before it and
-        # without moving the seed's own count of children.
-        children = (number - 1,) if number else ()
-        own = np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, *children))
-        self._bits = np.random.PCG64(own)
-        self._words = np.empty(0, np.uint32)
-        self._ordered = np.arange(cells)
-        self._floor = np.empty(0, np.int64)
+        self._streams = word_streams(1)
+        seed_stream(self._streams, 0, floor_seed(seed, number))
+        self._floor = np.empty(cells, np.int64)
         self._keyframe = -1
 
     def at(self, keyframe: int) -> Cells:
         """The floor of a keyframe, counted from 0, that is not before the last one asked for."""
         # Those that nobody spent are drawn all the same, so that no action moves the later ones.
+        if self._keyframe < keyframe:
+            self._floor = np.empty_like(self._floor)
         for _ in range(self._keyframe, keyframe):
-            self._floor = self._permutation()
+            draw_floor(self._streams, 0, self._floor)
         self._keyframe = keyframe
         return self._floor
 
-    def _permutation(self) -> Cells:
-        cells = self._ordered.copy()
-        last = len(cells) - 1
-        while last > 0:
-            # NumPy takes the lower half of a number first, then the upper one. What is left over
-            # begins the next floor.
-            if not len(self._words):
-                self._words = self._bits.random_raw(_DRAWN).astype("<u8", copy=False).view("<u4")
-            last, used = _shuffle(cells, last, self._words)
-            self._words = self._words[used:]
-        return cells
+
+def floor_seed(seed: np.random.SeedSequence, number: int) -> np.random.SeedSequence:
+    """The seed of the floor of this number."""
+    # What `seed.spawn` would give its child `number - 1`, without spawning those before it and
+    # without moving the seed's own count of children.
+    children = (number - 1,) if number else ()
+    return np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, *children))
+
+
+@compiled()
+def draw_floor(streams: WordStreams, world: int, cells: Cells) -> None:
+    """Fill `cells` (N,) with the next floor of a world."""
+    for cell in range(len(cells)):
+        cells[cell] = cell
+    last = len(cells) - 1
+    while last > 0:
+        # What is left over begins the next floor.
+        if streams.used[world] == streams.words.shape[1]:
+            refill(streams, world)
+        words = streams.words[world, streams.used[world] :]
+        last, used = _shuffle(cells, last, words)
+        streams.used[world] += used
 
 
 @compiled()
@@ -60,6 +69,7 @@ def _shuffle(cells: Cells, last: int, words: NDArray[np.uint32]) -> tuple[int, i
     Returns the place to go on with, and how many words were used.
     """
     used = 0
+    kept = np.empty(_LOOKED_AT, np.uint32)
     while last > 0 and used < len(words):
         # A place from 0 to `last` is drawn as the fewest bits that hold `last`. Places down to half
         # of the mask, rounded up, have the same one.
@@ -67,14 +77,18 @@ def _shuffle(cells: Cells, last: int, words: NDArray[np.uint32]) -> tuple[int, i
         while mask < last:
             mask = 2 * mask + 1
         while last > mask // 2 and used < len(words):
-            # A draw beyond `last` is drawn again. Half of them may be: no branch could foretell
-            # which, so the last cell changes places with itself instead.
-            drawn = words[used] & mask
-            used += 1
-            fits = drawn <= last
-            place = drawn if fits else last
-            held = cells[last]
-            cells[last] = cells[place]
-            cells[place] = held
-            last -= fits
+            # A draw beyond `last` is drawn again. Half of them may be, and no branch could foretell
+            # which: of so many words as surely have this mask, those within it are put together
+            # without one. As `last` falls on the way a few more are beyond it, seldom enough for a
+            # branch.
+            looked_at = min(_LOOKED_AT, last - mask // 2, len(words) - used)
+            most, count = np.uint32(last), 0
+            for word in words[used : used + looked_at]:
+                kept[count] = word & np.uint32(mask)
+                count += kept[count] <= most
+            used += looked_at
+            for place in kept[:count]:
+                if place <= last:
+                    cells[last], cells[place] = cells[place], cells[last]
+                    last -= 1
     return last, used

@@ -21,12 +21,9 @@ the strip instead.
 
 import numpy as np
 
-from care_sim.base.times import LAST_BITS_S
-from care_sim.core.arrays import Floats
-from care_sim.core.boxes import half_extents
 from care_sim.core.driver_settings import DriverSettings
 from care_sim.core.types import Command, Ego, Tracks
-from care_sim.driving.corridor import enters_strip, leaves_strip_s
+from care_sim.driving.braking_kernels import BRAKE_OFF, Rules, decided
 
 
 class BrakingController:
@@ -42,59 +39,46 @@ class BrakingController:
         keyframe_s: float,
         rules: DriverSettings,
     ):
-        self.guarded_m = 2 * (half_width_m + rules.brake_side_margin_m)
-        self._cruise_mps = cruise_mps
-        self._front_m = front_m
-        self._keyframe_s = keyframe_s
-        self._rules = rules
-        self._braking_s: float | None = None
-        self._free_s = 0.0
+        self.guarded_m = guarded_m(half_width_m, rules)
+        self._cruise_mps = float(cruise_mps)
+        self._for_oncoming = rules.brake_for_oncoming
+        self._rules = braking_rules(front_m, half_width_m, keyframe_s, rules)
+        self._brake = BRAKE_OFF
 
     def command(self, tracks: Tracks, ego: Ego) -> Command:
         """Decide from the tracks of this keyframe, as they lie before a car that drives straight
         ahead, and the ego's motion.
         """
-        counting = enters_strip(
-            tracks, self._front_m, self.guarded_m / 2, self._rules.brake_horizon_s
+        rows = tracks.rows()
+        headings = rows[:, Tracks.YAW]
+        # The sines and cosines are NumPy's, on every machine, and the square is Python's.
+        turns = np.cos(headings), np.sin(headings)
+        speed = float(ego.speed), float(ego.speed) ** 2
+        self._brake, acceleration, braking = decided(
+            self._brake, rows, turns, speed, self._cruise_mps, self._for_oncoming, self._rules
         )
-        if self._braking_s is None:
-            if counting.any() and self._is_due(tracks.take(counting), ego.speed):
-                self._braking_s = 0.0
-                self._free_s = 0.0
-        else:
-            self._braking_s += self._keyframe_s
-            blocked = bool(np.any(counting & (tracks.velocities[:, 0] <= ego.speed)))
-            self._free_s = 0.0 if blocked else self._free_s + self._keyframe_s
-            if self._free_s > self._rules.brake_release_s - LAST_BITS_S:
-                self._braking_s = None
-        return self._act(ego.speed)
+        return Command(acceleration, braking)
 
-    def _is_due(self, counting: Tracks, speed: float) -> bool:
-        """Whether the gap to a track that counts is at most what the ego needs to stop."""
-        return bool(np.any(self._gaps(counting) <= self._stopping_distances(counting, speed)))
 
-    def _act(self, speed: float) -> Command:
-        if self._braking_s is None:
-            wanted = (self._cruise_mps - speed) / self._keyframe_s
-            comfort = self._rules.comfort_mps2
-            return Command(float(min(max(wanted, -comfort), comfort)), False)
-        acting = self._braking_s >= self._rules.brake_reaction_s - LAST_BITS_S
-        return Command(-self._rules.brake_mps2 if acting else 0.0, True)
+def guarded_m(half_width_m: float, rules: DriverSettings) -> float:
+    """Width of the strip ahead that a car guards, metres."""
+    return 2 * (half_width_m + rules.brake_side_margin_m)
 
-    def _gaps(self, tracks: Tracks) -> Floats:
-        """(n,) metres between the front bumper and tracks that count."""
-        half_x, _ = half_extents(tracks.boxes)
-        gaps = tracks.boxes[:, 0] - half_x - self._front_m
-        if not self._rules.brake_for_oncoming:
-            return gaps
-        in_strip_s = leaves_strip_s(tracks, self.guarded_m / 2, self._rules.brake_horizon_s)
-        nearer: Floats = np.minimum(tracks.velocities[:, 0], 0.0) * in_strip_s
-        return gaps + nearer
 
-    def _stopping_distances(self, tracks: Tracks, speed: float) -> Floats:
-        """(n,) gaps in metres at which the ego must begin to brake."""
-        rules = self._rules
-        braking = speed**2 / (2 * rules.brake_mps2)
-        own = speed * rules.brake_reaction_s + braking + rules.brake_standstill_m
-        theirs = np.maximum(tracks.velocities[:, 0], 0.0) ** 2 / (2 * rules.brake_mps2)
-        return own - theirs
+def braking_rules(
+    front_m: float, half_width_m: float, keyframe_s: float, rules: DriverSettings
+) -> Rules:
+    """The fields of `care_sim.driving.braking_kernels.BrakingRules`, as compiled code takes them at
+    once; what is given is as in `BrakingController`.
+    """
+    return (
+        float(front_m),
+        float(guarded_m(half_width_m, rules) / 2),
+        float(keyframe_s),
+        float(rules.brake_mps2),
+        float(rules.brake_reaction_s),
+        float(rules.brake_standstill_m),
+        float(rules.brake_horizon_s),
+        float(rules.brake_release_s),
+        float(rules.comfort_mps2),
+    )

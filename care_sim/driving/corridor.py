@@ -6,13 +6,19 @@ import numpy as np
 
 from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Mask
-from care_sim.core.boxes import half_extents
 from care_sim.core.frames import Frame, turned
 from care_sim.core.types import Tracks
 from care_sim.world.route import Route
 
 _NO_PACE_MPS = 1e-6
 """Who goes sideways no faster does not leave."""
+
+Turns = tuple[Floats, Floats]
+"""Cosines and sines (n,) of headings."""
+Strip = tuple[float, float, float]
+"""Where a strip begins, its reach to either side, and the horizon: metres and seconds."""
+Footprint = tuple[float, float, float, float]
+"""x and y of the middle of a box, and half of how far it reaches along x and along y; metres."""
 
 
 def along_route(tracks: Tracks, route: Route, sensor: Frame) -> Tracks:
@@ -48,39 +54,8 @@ def enters_strip(ahead: Tracks, front_m: float, reach_m: float, horizon_s: float
     """(n,) which tracks lie ahead of `front_m` within `reach_m` to either side of the way, or will
     within `horizon_s` if they keep their velocities. Tracks as `along_route` gives them.
     """
-    boxes = np.ascontiguousarray(ahead.boxes)
-    # The sines and cosines are NumPy's, on every machine.
-    turns = np.cos(boxes[:, 6]), np.sin(boxes[:, 6])
-    velocities = np.ascontiguousarray(ahead.velocities)
     strip = float(front_m), float(reach_m), float(horizon_s)
-    found: Mask = _enters(boxes, turns, velocities, strip)
-    return found
-
-
-@compiled()
-def _enters(
-    boxes: Floats,
-    turns: tuple[Floats, Floats],
-    velocities: Floats,
-    strip: tuple[float, float, float],
-) -> Mask:
-    """See `enters_strip`. `turns` are cosines and sines (n,) of the headings; `strip` is where it
-    begins, its reach to either side, and the horizon.
-    """
-    front_m, reach_m, horizon_s = strip
-    found = np.empty(len(boxes), np.bool_)
-    for n in range(len(boxes)):
-        length, width = boxes[n, 3], boxes[n, 4]
-        cos, sin = abs(turns[0][n]), abs(turns[1][n])
-        half_x, half_y = (length * cos + width * sin) / 2, (length * sin + width * cos) / 2
-        reach = reach_m + half_y
-        # Sideways motion is even, so that a track is in the strip at some time of the horizon
-        # exactly if the stretch between where it is now and where it is then meets the strip.
-        now = boxes[n, 1]
-        then = now + velocities[n, 1] * horizon_s
-        found[n] = (
-            boxes[n, 0] + half_x > front_m and min(now, then) <= reach and max(now, then) >= -reach
-        )
+    found: Mask = _all_enter(*_as_arrays(ahead), strip)
     return found
 
 
@@ -89,11 +64,75 @@ def leaves_strip_s(ahead: Tracks, reach_m: float, horizon_s: float) -> Floats:
     at most `horizon_s` after they have entered it. Of tracks that never enter it says nothing. The
     strip and the tracks are those of `enters_strip`.
     """
-    _, half_y = half_extents(ahead.boxes)
-    reach = reach_m + half_y
-    sideways = ahead.velocities[:, 1]
-    to_middle = -np.sign(sideways) * ahead.boxes[:, 1]
-    pace = np.maximum(np.abs(sideways), _NO_PACE_MPS)
-    enters_s = np.maximum(to_middle - reach, 0.0) / pace
-    leaves: Floats = np.minimum((to_middle + reach) / pace, enters_s + horizon_s)
+    strip = 0.0, float(reach_m), float(horizon_s)
+    leaves: Floats = _all_leave_s(*_as_arrays(ahead), strip)
     return leaves
+
+
+def _as_arrays(tracks: Tracks) -> tuple[Floats, Turns, Floats]:
+    """Boxes (n, 7), the cosines and sines (n,) of their headings, and velocities (n, 2)."""
+    boxes = np.ascontiguousarray(tracks.boxes)
+    # The sines and cosines are NumPy's, on every machine.
+    turns = np.cos(boxes[:, 6]), np.sin(boxes[:, 6])
+    return boxes, turns, np.ascontiguousarray(tracks.velocities)
+
+
+@compiled()
+def _all_enter(boxes: Floats, turns: Turns, velocities: Floats, strip: Strip) -> Mask:
+    """See `enters_strip`."""
+    found = np.empty(len(boxes), np.bool_)
+    for n in range(len(boxes)):
+        found[n] = enters(_footprint_of(boxes[n], turns, n), velocities[n, 1], strip)
+    return found
+
+
+@compiled()
+def _all_leave_s(boxes: Floats, turns: Turns, velocities: Floats, strip: Strip) -> Floats:
+    """See `leaves_strip_s`."""
+    seconds = np.empty(len(boxes))
+    for n in range(len(boxes)):
+        seconds[n] = leaves_s(_footprint_of(boxes[n], turns, n), velocities[n, 1], strip)
+    return seconds
+
+
+@compiled()
+def _footprint_of(box: Floats, turns: Turns, n: int) -> Footprint:
+    return footprint((box[0], box[1]), (box[3], box[4]), (turns[0][n], turns[1][n]))
+
+
+@compiled()
+def footprint(
+    centre: tuple[float, float], size: tuple[float, float], turn: tuple[float, float]
+) -> Footprint:
+    """The footprint of a box with this `centre` x, y and length and width; `turn` is the cosine and
+    the sine of its heading.
+    """
+    length, width = size
+    # The sides of a turned rectangle, each projected on the axis.
+    cos, sin = abs(turn[0]), abs(turn[1])
+    return *centre, (length * cos + width * sin) / 2, (length * sin + width * cos) / 2
+
+
+@compiled()
+def enters(of: Footprint, sideways: float, strip: Strip) -> bool:
+    """Whether a footprint that moves `sideways`, m/s, is in the strip now or will be."""
+    x, now, half_x, half_y = of
+    front_m, reach_m, horizon_s = strip
+    reach = reach_m + half_y
+    # Sideways motion is even, so that a track is in the strip at some time of the horizon exactly
+    # if the stretch between where it is now and where it is then meets the strip.
+    then = now + sideways * horizon_s
+    return x + half_x > front_m and min(now, then) <= reach and max(now, then) >= -reach
+
+
+@compiled(error_model="numpy")
+def leaves_s(of: Footprint, sideways: float, strip: Strip) -> float:
+    """When a footprint that enters the strip has left it; see `leaves_strip_s`."""
+    _, y, _, half_y = of
+    _, reach_m, horizon_s = strip
+    reach = reach_m + half_y
+    to_middle = -np.sign(sideways) * y
+    pace = max(abs(sideways), _NO_PACE_MPS)
+    enters_s = max(to_middle - reach, 0.0) / pace
+    seconds: float = min((to_middle + reach) / pace, enters_s + horizon_s)
+    return seconds

@@ -40,10 +40,16 @@ class Life(NamedTuple):
 def forecast(tracks: Floats, seconds: float) -> Floats:
     """The tracks `seconds` later, at constant velocity."""
     moved = tracks.copy()
-    for m in range(len(moved)):
-        moved[m, _X] += moved[m, _VX] * seconds
-        moved[m, _Y] += moved[m, _VY] * seconds
+    forecast_in_place(moved, seconds)
     return moved
+
+
+@compiled()
+def forecast_in_place(tracks: Floats, seconds: float) -> None:
+    """Let the tracks be `forecast`."""
+    for m in range(len(tracks)):
+        tracks[m, _X] += tracks[m, _VX] * seconds
+        tracks[m, _Y] += tracks[m, _VY] * seconds
 
 
 @compiled()

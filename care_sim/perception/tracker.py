@@ -27,6 +27,18 @@ class MemoryRules:
     for 3 of the open one (CenterPoint's tracker: 3 frames at 2 Hz).
     """
 
+    def life(self, keyframe_s: float) -> kernels.Rules:
+        """These rules where keyframes are `keyframe_s` seconds apart, as compiled code takes
+        them.
+        """
+        # Plain numbers, which compiled code takes at once.
+        return (
+            float(keyframe_s),
+            float(self.gate_m),
+            float(self.first_speed_mps),
+            float(self.coast_s),
+        )
+
 
 class TrackMemory:
     """The tracks of an episode.
@@ -37,13 +49,7 @@ class TrackMemory:
 
     def __init__(self, keyframe_s: float, rules: MemoryRules = MemoryRules()):
         self._keyframe_s = float(keyframe_s)
-        # Plain numbers, which compiled code takes at once.
-        self._life = (
-            self._keyframe_s,
-            float(rules.gate_m),
-            float(rules.first_speed_mps),
-            float(rules.coast_s),
-        )
+        self._life = rules.life(keyframe_s)
         self._table = np.empty((0, len(Tracks.COLUMNS)))
         self._next_id = 0
 
@@ -69,7 +75,7 @@ class TrackMemory:
         """
         classes = np.ascontiguousarray(detections.classes, np.int64)
         seen = sensor.boxes_to_world(detections.boxes)
-        pairs = self._assign(classes, seen)
+        pairs = assigned(self._table, classes, seen, self._life)
         self._table, ids = kernels.lived_on(
             self._table, classes, seen, pairs, self._life, self._next_id
         )
@@ -84,20 +90,20 @@ class TrackMemory:
         rows = np.searchsorted(self._table[:, Tracks.ID], ids)
         return turned(self._table[rows, Tracks.VELOCITY], -sensor.yaw)
 
-    def _assign(self, classes: Integers, seen: Floats) -> kernels.Pairs:
-        """The rows (k,) of the forecasts and of the detections that belong together, pair by pair.
 
-        Detections have `classes` (n,) and stand at `seen` (n, 7) in the world.
-        """
-        distances, possible, pairs, alone = kernels.possible_pairs(
-            self._table, classes, seen, self._life
-        )
-        # Nearly always each can be one alone, and all pairs belong together.
-        if alone:
-            return pairs
+def assigned(tracks: Floats, classes: Integers, seen: Floats, life: kernels.Rules) -> kernels.Pairs:
+    """The rows (k,) of forecasts and of detections that belong together, pair by pair.
 
-        # Impossible pairs cost more than any sum of possible ones, so the most pairs are matched,
-        # and of all such matchings the one with the least sum of distances is taken.
-        rows, columns = linear_sum_assignment(np.where(possible, distances, _IMPOSSIBLE_M))
-        kept = possible[rows, columns]
-        return rows[kept], columns[kept]
+    The forecasts are a table of `care_sim.perception.track_kernels`. Detections have `classes` (n,)
+    and stand at `seen` (n, 7) in the world.
+    """
+    distances, possible, pairs, alone = kernels.possible_pairs(tracks, classes, seen, life)
+    # Nearly always each can be one alone, and all pairs belong together.
+    if alone:
+        return pairs
+
+    # Impossible pairs cost more than any sum of possible ones, so the most pairs are matched, and
+    # of all such matchings the one with the least sum of distances is taken.
+    rows, columns = linear_sum_assignment(np.where(possible, distances, _IMPOSSIBLE_M))
+    kept = possible[rows, columns]
+    return rows[kept], columns[kept]

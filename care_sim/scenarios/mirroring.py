@@ -64,12 +64,20 @@ class MirroredWorld(World):
         return super().add(name, kind, reflected, reported=reported, backdrop=backdrop)
 
 
+@dataclass(frozen=True)
+class Reflection:
+    """The motion on the other side of the x axis of a function of time, or of a vehicle."""
+
+    of: Motion | RoadVehicle
+
+    def __call__(self, time: float) -> Pose:
+        """The pose at `time`."""
+        pose = self.of.pose if isinstance(self.of, RoadVehicle) else self.of(time)
+        return _on_the_other_side(pose)
+
+
 def _reflected(pose: Pose | Motion | RoadVehicle) -> Pose | Motion:
-    if isinstance(pose, RoadVehicle):
-        return lambda _time: _on_the_other_side(pose.pose)
-    if callable(pose):
-        return lambda time: _on_the_other_side(pose(time))
-    return _on_the_other_side(pose)
+    return _on_the_other_side(pose) if isinstance(pose, tuple) else Reflection(pose)
 
 
 def _on_the_other_side(pose: Pose) -> Pose:

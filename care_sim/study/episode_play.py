@@ -4,37 +4,30 @@ import hashlib
 import resource
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from traceback import extract_tb
-from typing import Any, TypeVar, cast
+from typing import Any, NamedTuple, TypeVar, cast
 
 import gymnasium
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 import care_sim
 from care_sim.base.errors import InvalidInput, one_line
 from care_sim.base.portable_hash import portable_bytes
-from care_sim.core.belief import Observation
+from care_sim.core.arrays import Floats
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.records import Keyframe
 from care_sim.policies.base import Policy
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.run_config import Row, flat
-from care_sim.world.world import World
 
 _Result = TypeVar("_Result")
 Watcher = Callable[[ClosedLoop, Keyframe], None]
 GymEnv = gymnasium.Env[Any, Any]
 _KIB_MB = 1024 / 1e6
-
-
-def play_episodes(batch: Sequence[EpisodeConfig]) -> list[Row | str]:
-    """What a worker does: play episodes, and give for each its row, or in one line why there is
-    none.
-    """
-    return [result_or_reason(run_episode, config) for config in batch]
 
 
 def result_or_reason(play: Callable[..., _Result], *arguments: object) -> _Result | str:
@@ -89,24 +82,42 @@ def trace(
         ended = False
         while not ended:
             observation, _, terminated, truncated, info = env.step(policy(observation))
-            digest.add(info["fired"], observation, played.loop.world)
+            digest.add(info["fired"], observation["ranges"], _boxes(played.loop))
             for watch in watchers:
                 watch(played.loop, played.keyframes[-1])
             ended = terminated or truncated
         keyframes = played.keyframes
         drawn = played.loop.world.drawn
-    row = {
-        **told,
-        "version": care_sim.__version__,
-        "digest": config.digest(),
-        **flat("drawn", tuple(drawn.items())),
-        **info["outcome"],
-        "keyframes": len(keyframes),
-        "wall_s": time.perf_counter() - started,
-        "peak_rss_mb": peak_rss_mb(),
-        "episode_hash": digest.hexdigest(),
-    }
-    return row, keyframes
+    wall_s = time.perf_counter() - started
+    found = Played(told, drawn, info["outcome"], len(keyframes), wall_s, digest.hexdigest())
+    return found.row(config), keyframes
+
+
+class Played(NamedTuple):
+    """What an episode leaves behind: its parameters as they were `told` when it began, and the rest
+    of what `run_episode` names.
+    """
+
+    told: Row
+    drawn: Mapping[str, float | str]
+    outcome: Row
+    keyframes: int
+    wall_s: float
+    episode_hash: str
+
+    def row(self, config: EpisodeConfig) -> Row:
+        """The row, with the digest as it is now."""
+        return {
+            **self.told,
+            "version": care_sim.__version__,
+            "digest": config.digest(),
+            **flat("drawn", tuple(self.drawn.items())),
+            **self.outcome,
+            "keyframes": self.keyframes,
+            "wall_s": self.wall_s,
+            "peak_rss_mb": peak_rss_mb(),
+            "episode_hash": self.episode_hash,
+        }
 
 
 class EpisodeHash:
@@ -115,17 +126,22 @@ class EpisodeHash:
     def __init__(self) -> None:
         self._content = hashlib.sha256()
 
-    def add(self, fired: np.ndarray, observation: Observation, world: World) -> None:
-        """Include one keyframe: cells, returned ranges, poses of the ego and every actor."""
-        bodies = np.array([world.ego_body, *(actor.body for actor in world.actors)])
-        poses = world.boxes_of(bodies)[:, [0, 1, 6]]
-        self._content.update(
-            portable_bytes(np.asarray(fired, np.int64), observation["ranges"], poses)
-        )
+    def add(self, fired: ArrayLike, ranges: NDArray[np.float32], boxes: Floats) -> None:
+        """Include one keyframe: cells, returned ranges (E, A), and the poses in the boxes (n, 7) of
+        the ego and then every actor.
+        """
+        poses = boxes[:, [0, 1, 6]]
+        self._content.update(portable_bytes(np.asarray(fired, np.int64), ranges, poses))
 
     def hexdigest(self) -> str:
         """The hash so far."""
         return self._content.hexdigest()[:16]
+
+
+def _boxes(loop: ClosedLoop) -> Floats:
+    """(n, 7) of the ego and then every actor."""
+    world = loop.world
+    return world.boxes_of(np.array([world.ego_body, *(actor.body for actor in world.actors)]))
 
 
 def _place(error: BaseException) -> str:

@@ -52,7 +52,11 @@ def processes(workers: int) -> Executor:
     # everything again. The fork server imports once and has no threads.
     context = get_context("forkserver")
     context.set_forkserver_preload(
-        ["care_sim.study.episode_play", "care_sim.envs.closed_loop", "care_sim.study.scene_play"]
+        [
+            "care_sim.study.episodes_together",
+            "care_sim.envs.closed_loop",
+            "care_sim.study.scene_play",
+        ]
     )
     return Processes(workers, context)
 

@@ -42,7 +42,9 @@ def run_with_progress(
     unit = kind.unit
     with shown_progress(len(configs), unit) as show:
         reporter = ProgressReporter(remaining, show, len(configs))
-        failures = run_all(configs, journal, workers, make_executor, reporter, kind.play_batch)
+        failures = run_all(
+            configs, journal, workers, make_executor, reporter, kind.play_batch, kind.most
+        )
     if len(found) < len(configs):
         print(reporter.summary(unit), file=sys.stderr)
     return failures

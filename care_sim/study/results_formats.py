@@ -9,7 +9,7 @@ from typing import Any
 
 from care_sim.core.conditions import COLUMNS_WHERE_CHANGED, OF_BOTH_LOOPS
 from care_sim.study.episode_config import PLAIN_FIELDS, listed_episodes
-from care_sim.study.episode_play import play_episodes
+from care_sim.study.episodes_together import MOST_TOGETHER, play_episodes
 from care_sim.study.mechanism_play import (
     ACCOUNT_COLUMNS,
     BELIEF_MARKS,
@@ -58,6 +58,8 @@ class ResultsFormat:
     """What its tasks are called."""
     play_batch: PlayBatch
     """Plays a batch of tasks."""
+    most: int | None
+    """So many tasks are a batch at most; None where all belong together that share something."""
     kept_rows: Callable[[Sequence[Row]], list[Row]]
     """The rows that are kept, made of all rows as they were played: some columns compare a row with
     others.
@@ -161,6 +163,7 @@ _VEHICLE = Schema(
 EPISODES = ResultsFormat(
     unit="episodes",
     play_batch=play_episodes,
+    most=MOST_TOGETHER,
     kept_rows=with_added_columns,
     file="episodes.parquet",
     schema=_EPISODES,
@@ -169,6 +172,7 @@ EPISODES = ResultsFormat(
 VEHICLE = ResultsFormat(
     unit="watched episodes",
     play_batch=play_vehicle,
+    most=1,
     kept_rows=with_added_columns,
     file="vehicle.parquet",
     schema=_VEHICLE,
@@ -177,6 +181,7 @@ VEHICLE = ResultsFormat(
 PLAYS = ResultsFormat(
     unit="plays",
     play_batch=play_scene,
+    most=None,
     # The events have a file of their own, one row per event and play.
     kept_rows=lambda rows: [without_events(row) for row in with_tags(rows)],
     file="plays.parquet",
@@ -187,6 +192,7 @@ PLAYS = ResultsFormat(
 MECHANISM = ResultsFormat(
     unit="accounted plays",
     play_batch=play_mechanism,
+    most=None,
     kept_rows=with_tags,
     file="mechanism.parquet",
     schema=_MECHANISM,

@@ -63,7 +63,7 @@ class RunConfig(ABC):
     @property
     @abstractmethod
     def batch(self) -> Hashable:
-        """Tasks with equal ones are handed to one worker together."""
+        """Tasks with equal ones may be handed to one worker together."""
 
     @property
     @abstractmethod
@@ -200,13 +200,20 @@ def check_size(tasks: int) -> None:
         )
 
 
-def in_batches(tasks: Sequence[RunConfig]) -> list[list[RunConfig]]:
-    """The tasks in the order in which they are played; tasks of one batch stand together."""
-    together: dict[Hashable, list[RunConfig]] = {}
-    # The sort is stable and a dict keeps its order: a batch is played when its first task is due.
+def in_batches(tasks: Sequence[RunConfig], most: int | None = None) -> list[list[RunConfig]]:
+    """The tasks in the order in which they are played; tasks of one batch stand together, up to
+    `most` of them.
+    """
+    batches: list[list[RunConfig]] = []
+    begun: dict[Hashable, list[RunConfig]] = {}
+    # The sort is stable: a batch is played when its first task is due.
     for task in sorted(tasks, key=lambda task: task.order):
-        together.setdefault(task.batch, []).append(task)
-    return list(together.values())
+        key = task.batch
+        if key not in begun or len(begun[key]) == most:
+            begun[key] = []
+            batches.append(begun[key])
+        begun[key].append(task)
+    return batches
 
 
 def collected(plain: Sequence[dict[str, Any]], axis: str, plural: str) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future
 from dataclasses import dataclass
 from typing import Any
 
-from care_sim.study.episode_play import play_episodes
+from care_sim.study.episodes_together import MOST_TOGETHER, play_episodes
 from care_sim.study.executors import ClusterLost, ExecutorFactory, parallel_batches, processes
 from care_sim.study.journal import Journal
 from care_sim.study.run_config import Row, RunConfig, in_batches
@@ -60,16 +60,21 @@ def run_all(
     make_executor: ExecutorFactory = processes,
     listener: RunListener | None = None,
     play_batch: PlayBatch = play_episodes,
+    most: int | None = MOST_TOGETHER,
 ) -> list[Failure]:
     """Run every task that the journal does not hold yet, in their order; returns those that failed.
+
+    A batch has up to `most` tasks, and the last ones are shared out among all workers; None keeps
+    all together that belong together.
 
     An interrupt waits for the batches in flight and leaves all that is finished in the journal.
     When a worker dies, the batches then in flight are run again one by one, and in halves, so that
     only the guilty task fails; when a policy has killed `_DEADLY` workers, its other tasks are not
     tried. Raises ClusterLost when the scheduler of a cluster is gone.
     """
-    run = _Run(journal, workers, make_executor, listener or RunListener(), play_batch)
-    waiting = deque(in_batches([config for config in configs if config.key not in journal]))
+    run = _Run(journal, workers, make_executor, listener or RunListener(), play_batch, most)
+    due = [config for config in configs if config.key not in journal]
+    waiting = deque(in_batches(due, most))
     while waiting:
         # A pool does not say which of its processes died of which batch. All that it had are
         # suspects, and each is tried on its own before the rest goes on.
@@ -86,10 +91,12 @@ class _Run:
         make_executor: ExecutorFactory,
         listener: RunListener,
         play_batch: PlayBatch,
+        most: int | None,
     ):
         self.failures: list[Failure] = []
         self._deaths: Counter[str] = Counter()
         self._play_batch = play_batch
+        self._parts_last = most is not None
         self._journal = journal
         self._workers = workers
         self._make_executor = make_executor
@@ -155,6 +162,8 @@ class _Run:
         self._listener.playing(workers)
         while waiting and len(in_flight) < max(workers, 1):
             waiting[0] = self._without_deadly(waiting[0])
+            if self._parts_last:
+                _part_last(waiting, workers)
             if waiting[0]:
                 in_flight[self._submit(executor, waiting[0])] = waiting[0]
             waiting.popleft()
@@ -208,6 +217,18 @@ class _Run:
             except (ConnectionError, EOFError):
                 time.sleep(wait_s)
         return executor.submit(self._play_batch, batch)
+
+
+def _part_last(waiting: "deque[list[RunConfig]]", workers: int) -> None:
+    """Cut the first of the last batches to a worker's share of what waits, so that none of them
+    stands idle while another has much to do.
+    """
+    if len(waiting) < 2 * workers:
+        share = -(-sum(map(len, waiting)) // workers)
+        first = waiting.popleft()
+        if rest := first[share:]:
+            waiting.appendleft(rest)
+        waiting.appendleft(first[:share])
 
 
 def _is_cut_off(future: Future[list[Row | str]]) -> bool:

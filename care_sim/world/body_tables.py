@@ -41,7 +41,7 @@ class Footprints:
         """Ids of the other bodies that may be within `within` metres of one. None of those is
         missing; some may be further away, since rectangles along x and y stand for the footprints.
         """
-        return _near(self.boxes, body, within)
+        return bodies_near(self.boxes, body, within)
 
 
 @compiled()
@@ -66,7 +66,7 @@ def stand_at(
 
 
 @compiled()
-def _near(boxes: Floats, body: int, within: float) -> Integers:
+def bodies_near(boxes: Floats, body: int, within: float) -> Integers:
     """See `Footprints.near`."""
     found = np.empty(len(boxes), np.int64)
     count = 0

@@ -6,7 +6,6 @@ World frame: x along the road, y left, z up; metres and radians.
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
-from weakref import finalize
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +16,7 @@ from care_sim.core.pinhole import NEAR_M, PinholeCamera
 from care_sim.world.bodies import BodyKind
 from care_sim.world.body_tables import Primitives, stand_at
 from care_sim.world.bullet_bodies import NO_BODY, OPAQUE, TRANSPARENT, BulletBodies
-from care_sim.world.bullet_clients import borrow, give_back, leave, pybullet
+from care_sim.world.bullet_clients import LentClient, pybullet
 from care_sim.world.polyhedra import Polyhedra
 
 __all__ = ["FAR_M", "NO_BODY", "RAYS_PER_CALL", "BulletWorld", "PixelWindow"]
@@ -34,22 +33,18 @@ FAR_M = 120.0
 class BulletWorld:
     """Bodies in one DIRECT client, over a ground plane at z = 0 unless `ground` is False.
 
-    It is not to be shared between processes. Where it is not closed, the client is given back with
+    It is not to be shared between processes. Where it is not closed, its client is given back with
     the last reference.
 
     The ground, transparent bodies and backdrops are not drawn: no camera needs their ids, and
     rendering them costs more than everything else in the picture.
 
     `primitives` and `polyhedra` know every body and pose at once. PyBullet learns of a body, and of
-    its pose, when it is asked about it.
+    its pose, when it is asked about it, and a client is borrowed when PyBullet is first asked.
     """
 
     def __init__(self, ground: bool = True) -> None:
-        # A world that nobody closes leaves its client to others when it is collected. At the end of
-        # the process there are none.
-        self._client = borrow()
-        self._abandoned = finalize(self, leave, self._client)
-        self._abandoned.atexit = False
+        self._client = LentClient()
         self.primitives = Primitives()
         self.polyhedra = Polyhedra()
         self._bodies = BulletBodies(self._client, ground)
@@ -57,9 +52,7 @@ class BulletWorld:
 
     def close(self) -> None:
         """Give the client back; calling it again does nothing."""
-        if self._abandoned.detach():
-            give_back(self._client)
-            self._client = -1
+        self._client.close()
 
     def add(
         self,
@@ -132,7 +125,7 @@ class BulletWorld:
             batch = targets[start : start + RAYS_PER_CALL]
             sources = np.broadcast_to(origin, batch.shape)
             hits += pybullet.rayTestBatch(
-                sources, batch, collisionFilterMask=OPAQUE, physicsClientId=self._client
+                sources, batch, collisionFilterMask=OPAQUE, physicsClientId=self._client.number
             )
         # It fails by answering too little, not by an error.
         if len(hits) != len(targets):
@@ -166,9 +159,8 @@ class BulletWorld:
         """Smallest distance between two hulls, metres; negative when they overlap, inf beyond
         `within`.
         """
-        numbers = self._bodies.tell([body, other], self.primitives.poses)
-        points = pybullet.getClosestPoints(*numbers, within, physicsClientId=self._client)
-        return float(min((point[8] for point in points), default=np.inf))
+        own, others = self._bodies.tell([body, other], self.primitives.poses)
+        return self._bodies.clearance(own, others, within)
 
     def _render(self, camera: PinholeCamera, sensor: Frame, window: PixelWindow) -> tuple[Any, ...]:
         self._bodies.tell_all(self.primitives.poses)
@@ -185,7 +177,7 @@ class BulletWorld:
             pybullet.computeProjectionMatrix(*across, *upward, NEAR_M, FAR_M),
             shadow=0,
             renderer=pybullet.ER_TINY_RENDERER,
-            physicsClientId=self._client,
+            physicsClientId=self._client.number,
         )
         return picture
 

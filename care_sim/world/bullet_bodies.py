@@ -11,7 +11,7 @@ import numpy as np
 
 from care_sim.core.arrays import Floats, Integers
 from care_sim.world.bodies import Part
-from care_sim.world.bullet_clients import pybullet
+from care_sim.world.bullet_clients import LentClient, pybullet
 
 NO_BODY = -1
 """The id where there is no body, ours and PyBullet's."""
@@ -36,18 +36,19 @@ class _Unmade(NamedTuple):
 class BulletBodies:
     """Bodies by id, which count from 0 in the order in which they are added, the ground first."""
 
-    def __init__(self, client: int, ground: bool) -> None:
+    def __init__(self, client: LentClient, ground: bool) -> None:
         self._client = client
+        self._ground = ground
         self._unmade: dict[int, _Unmade] = {}
         self._moved: set[int] = set()
         # By id the numbers of PyBullet, which counts in the order in which it learns of bodies.
         self._numbers: dict[int, int] = {}
-        if ground:
-            self._numbers[0] = self._make_ground()
+        self._count = int(ground)
 
     def add(self, parts: Sequence[Part], seen: Sequence[Part], group: int) -> int:
         """Take in a body of `parts`, of which cameras are to see `seen`; its id."""
-        body = len(self._numbers) + len(self._unmade)
+        body = self._count
+        self._count += 1
         self._unmade[body] = _Unmade(parts, seen, group)
         self._moved.add(body)
         return body
@@ -72,17 +73,35 @@ class BulletBodies:
         ids[list(self._numbers.values())] = list(self._numbers)
         return np.asarray(ids[numbers])
 
+    def put(self, body: int, pose: Sequence[float]) -> int:
+        """Let PyBullet know of a body, and that it is at `pose`: x, y, z and the quaternion x, y,
+        z, w. Its number of it.
+        """
+        if body in self._unmade:
+            self._numbers[body] = self._make(self._unmade.pop(body))
+        number = self._numbers[body]
+        pybullet.resetBasePositionAndOrientation(
+            number, pose[:3], pose[3:], physicsClientId=self._client.number
+        )
+        self._moved.discard(body)
+        return number
+
+    def clearance(self, number: int, other: int, within: float) -> float:
+        """Smallest distance between two hulls where PyBullet has them, by its numbers; see
+        `care_sim.world.bullet.BulletWorld.clearance`.
+        """
+        points = pybullet.getClosestPoints(
+            number, other, within, physicsClientId=self._client.number
+        )
+        return float(min((point[8] for point in points), default=np.inf))
+
     def _tell(self, moved: Iterable[int], poses: Floats) -> None:
+        if self._ground and 0 not in self._numbers:
+            self._numbers[0] = self._make_ground()
         # A copy: `moved` may be the very set that shrinks here. In the order of ids, so that what
         # PyBullet holds depends on no order of a set.
         for body in sorted(moved):
-            if body in self._unmade:
-                self._numbers[body] = self._make(self._unmade.pop(body))
-            pose = poses[body].tolist()
-            pybullet.resetBasePositionAndOrientation(
-                self._numbers[body], pose[:3], pose[3:], physicsClientId=self._client
-            )
-            self._moved.discard(body)
+            self.put(body, poses[body].tolist())
 
     def _make(self, body: _Unmade) -> int:
         # Mass 0: bodies stand where they are put, and nothing ever falls or is pushed.
@@ -90,27 +109,35 @@ class BulletBodies:
             0,
             self._collision_shape(body.parts),
             self._visual_shape(body.seen) if body.seen else self._no_visual_shape(),
-            physicsClientId=self._client,
+            physicsClientId=self._client.number,
         )
         self._set_group(number, body.group)
         return int(number)
 
     def _make_ground(self) -> int:
-        plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=self._client)
+        plane = pybullet.createCollisionShape(
+            pybullet.GEOM_PLANE, physicsClientId=self._client.number
+        )
         unseen = self._no_visual_shape()
-        ground = pybullet.createMultiBody(0, plane, unseen, physicsClientId=self._client)
+        ground = pybullet.createMultiBody(0, plane, unseen, physicsClientId=self._client.number)
         self._set_group(ground, OPAQUE)
         return int(ground)
 
     def _set_group(self, number: int, group: int) -> None:
-        pybullet.setCollisionFilterGroupMask(number, -1, group, group, physicsClientId=self._client)
+        pybullet.setCollisionFilterGroupMask(
+            number, -1, group, group, physicsClientId=self._client.number
+        )
 
     def _collision_shape(self, parts: Sequence[Part]) -> int:
         shapes = _collision(parts)
-        return int(pybullet.createCollisionShapeArray(physicsClientId=self._client, **shapes))
+        return int(
+            pybullet.createCollisionShapeArray(physicsClientId=self._client.number, **shapes)
+        )
 
     def _visual_shape(self, parts: Sequence[Part]) -> int:
-        return int(pybullet.createVisualShapeArray(physicsClientId=self._client, **_visual(parts)))
+        return int(
+            pybullet.createVisualShapeArray(physicsClientId=self._client.number, **_visual(parts))
+        )
 
     def _no_visual_shape(self) -> int:
         """A speck deep below: without a visual shape PyBullet would draw the collision shape."""

@@ -3,12 +3,14 @@
 To connect a client costs more than to empty one.
 """
 
+from weakref import finalize
+
 from care_sim.base.extras import STANDARD_ERROR, silenced
 
 with silenced(STANDARD_ERROR):  # where it prints its build time
     import pybullet
 
-__all__ = ["borrow", "give_back", "leave", "pybullet"]
+__all__ = ["LentClient", "borrow", "give_back", "leave", "pybullet"]
 
 MOST_FREE = 4
 """Clients kept for whoever borrows next. Each holds 28 MB, and another one takes 14 ms."""
@@ -16,12 +18,39 @@ MOST_FREE = 4
 _free: list[int] = []
 
 
+class LentClient:
+    """A client that is borrowed when it is first asked for: to empty one takes a millisecond, and
+    many a world never needs it. Where it is not closed, it is given back with the last reference.
+    """
+
+    def __init__(self) -> None:
+        self._number: int | None = None
+        self._abandoned: finalize[[int], LentClient] | None = None
+
+    @property
+    def number(self) -> int:
+        """What PyBullet calls it."""
+        if self._number is None:
+            # Whoever does not close leaves the client to others when it is collected. At the end of
+            # the process there are none.
+            self._number = borrow()
+            self._abandoned = finalize(self, leave, self._number)
+            self._abandoned.atexit = False
+        return self._number
+
+    def close(self) -> None:
+        """Give the client back; calling it again does nothing."""
+        if self._abandoned is not None and self._abandoned.detach():
+            give_back(self.number)
+        # PyBullet refuses whoever asks it now.
+        self._number = -1
+
+
 def borrow() -> int:
     """An empty client. One that somebody else has closed or filled meanwhile is no trouble."""
     # Whatever finalisers have left is looked at only here, where PyBullet may be called.
     _end_surplus()
-    while _free:
-        client = _free.pop()
+    while (client := _next_free()) is not None:
         if pybullet.isConnected(client):
             pybullet.resetSimulation(physicsClientId=client)
             return client
@@ -41,8 +70,15 @@ def leave(client: int) -> None:
     _free.append(client)
 
 
+def _next_free() -> int | None:
+    # Another thread may take the last one between a look and a grasp.
+    try:
+        return _free.pop()
+    except IndexError:
+        return None
+
+
 def _end_surplus() -> None:
-    while len(_free) > MOST_FREE:
-        client = _free.pop()
+    while len(_free) > MOST_FREE and (client := _next_free()) is not None:
         if pybullet.isConnected(client):
             pybullet.disconnect(client)

@@ -13,13 +13,13 @@ import numpy as np
 from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats
 
-_MOST_MPS2 = 6.0
-_GAINING_MPS2 = 3.0
-_BRAKING_MPS2 = 5.0
+MOST_MPS2 = 6.0
+GAINING_MPS2 = 3.0
+BRAKING_MPS2 = 5.0
 STANDING_GAP_M = 10.0
 """From centre to centre."""
-_TIME_GAP_S = 1.5
-_EXPONENT = 4.0
+TIME_GAP_S = 1.5
+EXPONENT = 4.0
 
 
 class LaneFlow:
@@ -47,7 +47,7 @@ class LaneFlow:
     def _accelerations(self, others: Sequence[tuple[float, float]]) -> Floats:
         """(n,) m/s^2."""
         # The power is NumPy's, as compiled code may round it differently.
-        free = 1 - (self.speeds / self._wanted) ** _EXPONENT
+        free = 1 - (self.speeds / self._wanted) ** EXPONENT
         ahead = np.array(others, float).reshape(-1, 2)
         return np.asarray(_following(free, self.places, self.speeds, ahead))
 
@@ -74,9 +74,9 @@ def _following(free: Floats, places: Floats, speeds: Floats, others: Floats) -> 
         closing = speeds[n] * (speeds[n] - lead_mps)
         wished = (
             STANDING_GAP_M
-            + speeds[n] * _TIME_GAP_S
-            + closing / (2 * math.sqrt(_GAINING_MPS2 * _BRAKING_MPS2))
+            + speeds[n] * TIME_GAP_S
+            + closing / (2 * math.sqrt(GAINING_MPS2 * BRAKING_MPS2))
         )
-        wanted = _GAINING_MPS2 * (free[n] - (wished / gap) ** 2)
-        accelerations[n] = min(max(wanted, -_MOST_MPS2), _MOST_MPS2)
+        wanted = GAINING_MPS2 * (free[n] - (wished / gap) ** 2)
+        accelerations[n] = min(max(wanted, -MOST_MPS2), MOST_MPS2)
     return accelerations

@@ -6,6 +6,7 @@ nearer it is needed of the last moment alone.
 
 import math
 
+from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats
 from care_sim.world.bullet import BulletWorld
 
@@ -39,17 +40,16 @@ class LeastClearance:
         return least
 
 
+@compiled()
 def least_gap(box: Floats, other: Floats) -> float:
     """What two boxes (7,) on the ground are apart at least, metres; -inf where they may overlap."""
     # In the plane, and in the axes of the first: there an upright rectangle holds the other.
-    x, y, _, length, width, _, yaw = box.tolist()
-    other_x, other_y, _, other_length, other_width, _, other_yaw = other.tolist()
-    cos, sin = math.cos(yaw), math.sin(yaw)
-    ahead = cos * (other_x - x) + sin * (other_y - y)
-    aside = cos * (other_y - y) - sin * (other_x - x)
-    cos, sin = abs(math.cos(other_yaw - yaw)), abs(math.sin(other_yaw - yaw))
-    along = abs(ahead) - (length + other_length * cos + other_width * sin) / 2
-    across = abs(aside) - (width + other_length * sin + other_width * cos) / 2
+    dx, dy, turned = other[0] - box[0], other[1] - box[1], other[6] - box[6]
+    cos, sin = math.cos(box[6]), math.sin(box[6])
+    ahead, aside = cos * dx + sin * dy, cos * dy - sin * dx
+    cos, sin = abs(math.cos(turned)), abs(math.sin(turned))
+    along = abs(ahead) - (box[3] + other[3] * cos + other[4] * sin) / 2
+    across = abs(aside) - (box[4] + other[3] * sin + other[4] * cos) / 2
     if along <= 0 and across <= 0:
         return -math.inf
     return math.hypot(max(along, 0.0), max(across, 0.0))

@@ -6,129 +6,43 @@ the right.
 """
 
 from collections.abc import Sequence
-from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
-from highway_env.road.lane import StraightLane
 from highway_env.road.road import Road, RoadNetwork
 from highway_env.utils import not_zero
 from highway_env.vehicle.behavior import IDMVehicle
 from highway_env.vehicle.kinematics import Vehicle
 from highway_env.vehicle.objects import Obstacle
 
-from care_sim.core.arrays import Floats
 from care_sim.core.frames import Pose
 from care_sim.world.bodies import BodyKind
+from care_sim.world.lane_driver import LaneAlongX, LaneDriver, StraightVehicle
 
 _ROAD_LENGTH_M = 1000.0
 MAX_STEERING = np.deg2rad(35.0)
 """Lock of a passenger car's front wheels. highway-env allows 60 degrees, at which a car slides out
 sideways.
 """
+_NEAR_LANE_M = 1.0
+"""What highway-env adds to either side of a lane to find who drives ahead in it."""
 STANDING_GAP_M = float(IDMVehicle.DISTANCE_WANTED)
 """From centre to centre, what an IDM driver leaves before what stands ahead."""
 
 
-class LaneAlongX(StraightLane):  # type: ignore[misc]
-    """A lane from (-x, y) to (x, y) or back."""
-
-    def local_coordinates(self, position: Sequence[float]) -> tuple[float, float]:
-        """Metres along the lane and to its side: those of `StraightLane`, to the last bit, without
-        its dot products of axes that are 0 and 1 or -1.
-        """
-        # The 0.0 stands for the product with the other axis: without it the side could be -0.0.
-        x, y = position
-        start_x, start_y, sign = self._origin
-        return (float(x) - start_x) * sign, (float(y) - start_y) * sign + 0.0
-
-    @cached_property
-    def _origin(self) -> tuple[float, float, float]:
-        return float(self.start[0]), float(self.start[1]), float(self.direction[0])
-
-
-class StraightVehicle(Vehicle):  # type: ignore[misc]
-    """A vehicle of highway-env, to the last bit, that asks for no sine and no cosine while it goes
-    straight ahead.
+class LaneKeeper(NamedTuple):
+    """A vehicle that goes straight along x in the middle of its lane: `x`, speed, the speed that an
+    IDM driver wants there, and of the lane its middle y, where it starts, and how far to either
+    side of its middle highway-env counts who is near it as in it. Metres and m/s, highway-env's
+    axes.
     """
 
-    _headed: tuple[float, Floats] | None = None
-
-    @property
-    def direction(self) -> Floats:
-        """(2,) unit vector along the heading."""
-        if self._headed is None or self._headed[0] != self.heading:
-            self._headed = self.heading, super().direction
-        return self._headed[1]
-
-    def step(self, dt: float) -> None:
-        """Move by `dt` seconds."""
-        if self.action["steering"] != 0.0 or self.impact is not None:
-            super().step(dt)
-            return
-        # With its wheels straight a vehicle does not slip sideways, and its heading stays.
-        self.clip_actions()
-        self.position += self.speed * self.direction * dt
-        self.speed += self.action["acceleration"] * dt
-        self.on_state_update()
-
-
-class LaneDriver(StraightVehicle, IDMVehicle):  # type: ignore[misc]
-    """An IDM driver who neither steers nor looks for the nearest lane in the middle of one. Its
-    numbers are plain floats, which NumPy would clip one by one. It moves as highway-env's, to the
-    last bit, as long as it neither changes lanes by itself nor is asked whether it crashed: then
-    nothing reads the timer and the flag that are left alone here.
-    """
-
-    def act(self, action: dict[str, float] | str | None = None) -> None:
-        """Decide on the next step."""
-        # Who changes lanes, or has come to the end of one, decides as highway-env does.
-        lane = self.lane
-        along = lane.local_coordinates(self.position)[0]
-        if (
-            self.lane_index != self.target_lane_index
-            or lane.after_end(self.position, along)
-            or not self._follows(lane)
-        ):
-            super().act(action)
-            return
-        ahead, _ = self.road.neighbour_vehicles(self, self.lane_index)
-        wanted = self.acceleration(self, ahead)
-        held = min(max(wanted, -self.ACC_MAX), self.ACC_MAX)
-        self.action = {"steering": 0.0, "acceleration": held}
-
-    def acceleration(
-        self,
-        ego_vehicle: Vehicle,
-        front_vehicle: Vehicle | None = None,
-        rear_vehicle: Vehicle | None = None,
-    ) -> float:
-        """m/s^2 that `ego_vehicle` wishes for behind `front_vehicle`, if any."""
-        # The powers are NumPy's: Python's round otherwise.
-        limit = ego_vehicle.lane.speed_limit
-        wanted_mps = min(max(ego_vehicle.target_speed, 0), limit)
-        share = max(ego_vehicle.speed, 0) / abs(not_zero(wanted_mps))
-        wish = self.COMFORT_ACC_MAX * (1 - np.power(share, self.DELTA))
-        if front_vehicle:
-            gap = self.desired_gap(ego_vehicle, front_vehicle)
-            apart = not_zero(ego_vehicle.lane_distance_to(front_vehicle))
-            wish -= self.COMFORT_ACC_MAX * np.power(gap / apart, 2)
-        return float(wish)
-
-    def steering_control(self, target_lane_index: tuple[str, str, int]) -> float:
-        """Angle of the front wheels, radians."""
-        # In the middle of a straight lane and along it, the steering that IDM computes is 0.
-        follows = self._follows(self.road.network.get_lane(target_lane_index))
-        return 0.0 if follows else float(super().steering_control(target_lane_index))
-
-    def on_state_update(self) -> None:
-        """Note the lane."""
-        if not self._follows(self.lane):
-            super().on_state_update()
-
-    def _follows(self, lane: LaneAlongX) -> bool:
-        return bool(
-            self.heading == lane.heading and lane.local_coordinates(self.position)[1] == 0.0
-        )
+    x: float
+    speed: float
+    wanted_mps: float
+    lane_y: float
+    lane_start_x: float
+    lane_reach_m: float
 
 
 class Traffic:
@@ -205,6 +119,20 @@ class Traffic:
         """Put a vehicle on the road."""
         self._road.vehicles.append(vehicle)
 
+    def lane_keepers(
+        self, vehicles: "Sequence[RoadVehicle]", seconds: float
+    ) -> list[LaneKeeper] | None:
+        """What `vehicles` go by, if they are all that is on the road, in the order in which they
+        came there, and can do nothing for `seconds` but keep their lanes along x. Else None.
+        """
+        found = [vehicle.keeping_lane(seconds) for vehicle in vehicles]
+        keepers = [keeper for keeper in found if keeper is not None]
+        all_keep = len(keepers) == len(found) == len(self._road.vehicles)
+        if not all_keep or self._road.objects:
+            return None
+        in_order = zip(vehicles, self._road.vehicles, strict=True)
+        return keepers if all(one.is_of(vehicle) for one, vehicle in in_order) else None
+
     def step(self, dt: float) -> None:
         """Let every driver decide, then move everything by `dt` seconds."""
         self._road.act()
@@ -248,6 +176,29 @@ class RoadVehicle:
     def yaw_rate(self) -> float:
         """rad/s: 0, since what asks for it, the ego, drives straight ahead."""
         return 0.0
+
+    def is_of(self, vehicle: Vehicle) -> bool:
+        """Whether it is this one of highway-env."""
+        return self._vehicle is vehicle
+
+    def keeping_lane(self, seconds: float) -> LaneKeeper | None:
+        """What it goes by if it can do nothing for `seconds` but keep its lane, else None."""
+        vehicle, lane = self._vehicle, self._vehicle.lane
+        x, speed = float(vehicle.position[0]), float(vehicle.speed)
+        # A driver looks for another lane 2.5 m before the end of its own. Who is faster than any
+        # vehicle may be becomes slower.
+        way = max(abs(speed), vehicle.MAX_SPEED + 1.0) * seconds
+        stays = abs(x) + way < _ROAD_LENGTH_M - lane.VEHICLE_LENGTH
+        changes = isinstance(vehicle, LaneDriver) and (
+            vehicle.lane_index != vehicle.target_lane_index
+        )
+        along_x = vehicle.heading == lane.heading == 0.0 and vehicle.position[1] == lane.start[1]
+        if not stays or changes or not along_x:
+            return None
+        wanted = min(max(getattr(vehicle, "target_speed", 0.0), 0), lane.speed_limit)
+        reach = lane.width / 2 + _NEAR_LANE_M
+        start_x, lane_y = lane.start.tolist()
+        return LaneKeeper(x, speed, abs(not_zero(wanted)), lane_y, start_x, reach)
 
     def enter(self) -> None:
         """Join the traffic: from now on the vehicle moves, and others see it."""

@@ -36,13 +36,16 @@ Motion = Callable[[float], Pose]
 
 @dataclass(frozen=True)
 class Actor:
-    """A body with a pose at any time. `reported` says whether perception knows its class."""
+    """A body with a pose at any time. `reported` says whether perception knows its class, and
+    `moved_by` is what its pose comes from: one pose, a function of time, or a vehicle.
+    """
 
     name: str
     kind: BodyKind
     body: int
     pose_at: Motion
     reported: bool
+    moved_by: Pose | Motion | RoadVehicle
 
     @property
     def label(self) -> int | None:
@@ -139,7 +142,7 @@ class World:
         body = self.bullet.add(kind, place, backdrop=backdrop)
         self._footprints.add(body, kind.size, place)
         self._before = self._footprints.boxes.copy()
-        actor = Actor(name, kind, body, pose_at, reported)
+        actor = Actor(name, kind, body, pose_at, reported, pose)
         self.actors.append(actor)
         if not isinstance(pose, tuple):
             self._moving.append(actor)
@@ -153,6 +156,11 @@ class World:
     def at_every_step(self, event: "Callable[[World], None]") -> None:
         """Call `event` with this world at every step, when ego and clock have moved on."""
         self._every_step.append(event)
+
+    @property
+    def scripted(self) -> bool:
+        """Whether something is called while it moves: events, or looks at every step."""
+        return bool(self._events or self._every_step)
 
     def is_over(self) -> bool:
         """Whether nothing can happen any more that the episode is about."""
@@ -212,7 +220,7 @@ class World:
         target = self.first_sighting
         least = LeastClearance(self.bullet, self.ego_body, target.body) if target else None
         for _ in range(whole_steps(duration)):
-            self._step(acceleration)
+            self.step(acceleration)
             impacts.append(self._impact())
             if target is not None and least is not None:
                 own, other = self.boxes_of(np.array([self.ego_body, target.body]))
@@ -224,12 +232,8 @@ class World:
         first = next((impact for impact in impacts if impact is not None), None)
         return ClosestApproach(nearest, clearance, first)
 
-    def close(self) -> None:
-        """Free the simulator."""
-        self.bullet.close()
-
-    def _step(self, acceleration: float) -> None:
-        """Move everything by a world step."""
+    def step(self, acceleration: float) -> None:
+        """Move everything by a world step, as `advance` does, and look at nothing."""
         # The traffic moves first, the ego in it, then the clock; events are of the new time.
         before = self.ego.speed
         self.ego.accelerate(acceleration, WORLD_STEP_S)
@@ -258,6 +262,10 @@ class World:
         self._before = self._footprints.boxes.copy()
         self.bullet.move_all(bodies, table)
         self._footprints.move_all(bodies, table)
+
+    def close(self) -> None:
+        """Free the simulator."""
+        self.bullet.close()
 
     def _impact(self) -> Impact | None:
         """The ego's contact with a body now."""

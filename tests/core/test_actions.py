@@ -31,7 +31,7 @@ DEMAND = Demand([np.array([0, 1, 2, 3, 4])], [[np.array([2, 3])]])
 def shares(demand, behind, rig=RIG):
     """Of the cells that `demand` fires; `behind` is the demand that the watcher believes in."""
     action = scores_of(allocate(demand, rig.budget, rig.reserve_fraction), rig.grid.shape)
-    return shares_of(fired_cells(action, rig.budget, FLOOR_ORDER), action, behind, rig)
+    return shares_of(fired_cells(action, rig.budget, lambda: FLOOR_ORDER), action, behind, rig)
 
 
 def test_every_cell_has_the_share_that_took_it():
@@ -49,7 +49,7 @@ def test_without_the_demand_behind_it_an_action_tells_no_more_than_what_it_chose
 
 def test_scored_cells_beyond_the_budget_have_no_share():
     action = np.linspace(1, 0.1, 12, dtype=np.float32).reshape(3, 4)
-    found = shares_of(fired_cells(action, 6, FLOOR_ORDER), action, None, RIG)
+    found = shares_of(fired_cells(action, 6, lambda: FLOOR_ORDER), action, None, RIG)
     np.testing.assert_array_equal(found.ravel(), [CHOSEN] * 6 + [NOT_FIRED] * 6)
 
 

@@ -75,7 +75,7 @@ def test_incidence_is_that_of_the_normals_of_pybullet(bullet, grid):
     ours = brightness(bullet.primitives, EYE, grid.directions, ranges, bodies)
     checked = np.flatnonzero((bodies != NO_BODY) & (bodies != bullet.ground))[::7]
     hits = [
-        pybullet.rayTest(EYE.tolist(), ends[n].tolist(), physicsClientId=bullet._client)[0]
+        pybullet.rayTest(EYE.tolist(), ends[n].tolist(), physicsClientId=bullet._client.number)[0]
         for n in checked
     ]
     normals = np.array([hit[4] for hit in hits])

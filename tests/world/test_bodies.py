@@ -26,7 +26,7 @@ def test_the_parts_fill_the_stated_size_exactly(kind):
 def test_the_simulator_holds_a_body_of_that_size(kind, bullet):
     body = bullet.add(kind, (20.0, -3.0, 0.0))
     bullet.cast([0.0, 0.0, 1.0], np.empty((0, 3)), 50.0)  # lets PyBullet know of all bodies
-    low, high = pybullet.getAABB(body, physicsClientId=bullet._client)
+    low, high = pybullet.getAABB(body, physicsClientId=bullet._client.number)
     length, width, height = kind.size
     assert low == pytest.approx([20 - length / 2, -3 - width / 2, 0], abs=1e-3)
     assert high == pytest.approx([20 + length / 2, -3 + width / 2, height], abs=1e-3)

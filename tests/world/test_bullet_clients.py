@@ -42,7 +42,7 @@ def test_a_world_answers_as_in_a_fresh_client_whatever_was_there_before(monkeypa
     after = answers(again)
     monkeypatch.setattr("care_sim.world.bullet_clients._free", [])
     fresh = BulletWorld(ground)
-    assert again._client != fresh._client
+    assert again._client.number != fresh._client.number
     assert after == answers(fresh)
     again.close()
     fresh.close()
@@ -65,6 +65,39 @@ def test_a_client_that_somebody_filled_or_closed_is_no_trouble():
     pybullet.createMultiBody(0, physicsClientId=filled)
     pybullet.disconnect(physicsClientId=closed)
     first, second = BulletWorld(), BulletWorld()
-    assert first.ground == second.ground == 0
+    for world in (first, second):
+        assert world.cast(SENSOR.origin, AHEAD, 50.0)[1].tolist() == [NO_BODY, world.ground]
     first.close()
     second.close()
+
+
+def test_a_world_that_is_not_asked_borrows_no_client(monkeypatch):
+    monkeypatch.setattr("care_sim.world.bullet_clients._free", free := [borrow()])
+    world = BulletWorld()
+    bus = world.add(CATALOGUE["bus"], (30.0, 0.0, 0.0))
+    world.move(bus, (10.0, 0.0, 0.0))
+    assert len(free) == 1
+    ranges, ids = world.cast(SENSOR.origin, AHEAD[:1], 50.0)
+    assert (ids.tolist(), free) == ([bus], [])
+    assert ranges[0] < 10.0
+    world.close()
+    assert len(free) == 1
+
+
+@pytest.mark.parametrize("asked", [True, False])
+def test_who_has_closed_is_refused_and_takes_no_client(asked):
+    world = BulletWorld()
+    if asked:
+        world.cast(SENSOR.origin, AHEAD, 50.0)
+    world.close()
+    with pytest.raises(pybullet.error):
+        world.cast(SENSOR.origin, AHEAD, 50.0)
+
+
+def test_whoever_does_not_close_gives_the_client_back_with_the_last_reference(monkeypatch):
+    monkeypatch.setattr("care_sim.world.bullet_clients._free", free := [])
+    world = BulletWorld()
+    world.cast(SENSOR.origin, AHEAD, 50.0)
+    number = world._client.number
+    del world
+    assert free == [number]

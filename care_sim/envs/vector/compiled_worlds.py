@@ -1,7 +1,7 @@
 """Worlds that are played as arrays, all at once."""
 
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -11,22 +11,28 @@ from numpy.typing import NDArray
 from care_sim.base.times import LAST_BITS_S
 from care_sim.batch.loop import BatchLoop
 from care_sim.batch.records import History, Records
-from care_sim.core.arrays import Mask
+from care_sim.core.arrays import Floats, Mask
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.envs.sensing import Observed
 from care_sim.envs.vector.rewards import Rewards
 from care_sim.envs.vector.worlds import Stepped
 from care_sim.evaluation.metrics import outcome
+from care_sim.loops.records import Outcome
 
 
 class CompiledWorlds:
-    """A batch of worlds of the environment `model`, one for every row of `observed`."""
+    """A batch of worlds of the environment `model`, one for every row of `observed`.
 
-    def __init__(self, model: ClosedLoopEnv, observed: Observed):
+    Unless `exact`, clearances that no reward needs are bounds (`BatchLoop`); outcomes are exact.
+    """
+
+    def __init__(self, model: ClosedLoopEnv, observed: Observed, exact: bool):
         worlds = len(observed["budget"])
         self.observed = observed
         self._model = model
-        self._loop = BatchLoop(model.rig, model.conditions, observed)
+        self._exact = exact
+        duration_s = model.scenario.duration_s
+        self._loop = BatchLoop(model.rig, model.conditions, duration_s, observed, self._exact)
         self._rewards = Rewards(model.reward_weights, worlds)
         longest = int(np.ceil(model.scenario.duration_s / model.rig.keyframe_s)) + 1
         self._history = History(worlds, longest)
@@ -63,7 +69,7 @@ class CompiledWorlds:
         over = terminated | truncated
         rewards, terms = self._rewards.of(records, detectable, over, who)
         single: dict[int, dict[str, Any]] = {
-            world: {"outcome": asdict(outcome(self._history.episode(world, keyframes[world] + 1)))}
+            world: {"outcome": asdict(self._outcome(world, keyframes[world] + 1))}
             for world in np.flatnonzero(over).tolist()
         }
         if not self._model.conditions.floor:
@@ -71,9 +77,26 @@ class CompiledWorlds:
         columns = self._columns(records, terms)
         return Stepped(np.where(who, rewards, 0.0), terminated, truncated, columns, single)
 
+    def boxes(self, world: int) -> Floats:
+        """(n, 7) of the ego and then every actor of a world, in the world frame. Truth."""
+        state = self._loop.state
+        # Ids count up as bodies are added. Before the ego there is the ground alone.
+        bodies = slice(state.egos.bodies[world], state.bodies.counts[world])
+        boxes: Floats = state.bodies.boxes[world, bodies]
+        return boxes
+
     def close(self) -> None:
         """Free what the loop holds."""
         self._loop.close()
+
+    def _outcome(self, world: int, keyframes: int) -> Outcome:
+        """The result of a world's episode of so many keyframes."""
+        episode = self._history.episode(world, keyframes)
+        result = outcome(episode)
+        if self._exact or result.clearance_m is None:
+            return result
+        appeared = next(record.time_s for record in episode if record.in_view)
+        return replace(result, clearance_m=self._loop.least_clearance_m(world, appeared))
 
     def _columns(self, records: Records, terms: dict[str, Any]) -> dict[str, Any]:
         """What `info` says of all worlds, in the order of the single environment."""

@@ -20,6 +20,8 @@ from care_sim.core.types import Action
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.envs.sensing import Observed
 from care_sim.envs.spaces import checked_scores
+from care_sim.envs.vector.compiled_worlds import CompiledWorlds
+from care_sim.envs.vector.coverage import why_separate
 from care_sim.envs.vector.infos import kept
 from care_sim.envs.vector.separate_worlds import SeparateWorlds
 from care_sim.envs.vector.threads import Threads
@@ -116,9 +118,7 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         infos = self._begin(who, seeds, {})
         return self._handed_out(), infos
 
-    def step(
-        self, actions: Action
-    ) -> tuple[Observed, Floats, Mask, Mask, dict[str, Any]]:
+    def step(self, actions: Action) -> tuple[Observed, Floats, Mask, Mask, dict[str, Any]]:
         """Fire the cells that each world's row of `actions` (W, E, A) scores highest.
 
         Raises InvalidInput for actions of the wrong shape or with values that are not finite, and
@@ -165,6 +165,9 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
 
     def _made(self, share: slice, arguments: dict[str, Any]) -> Worlds:
         rows = {name: values[share] for name, values in self._observed.items()}
+        if why_separate(self._model) is None:
+            # Where no info tells of clearances, few of them are needed.
+            return CompiledWorlds(self._model, rows, exact=self._model.scoring_info)
         return SeparateWorlds(partial(self.single, **arguments), rows)
 
     def _played(self, scores: NDArray[np.float32], who: Mask) -> Stepped:
@@ -181,18 +184,27 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
             for share, part in zip(self._shares, parts, strict=True)
             for world, info in part.single.items()
         }
+        rewards, terminated, truncated = (
+            np.concatenate(column) for column in zip(*(part[:3] for part in parts), strict=True)
+        )
         columns = _joined([part.columns for part in parts])
-        flat = (np.concatenate(column) for column in zip(*(part[:3] for part in parts), strict=True))
-        return Stepped(*flat, columns, single)
+        return Stepped(rewards, terminated, truncated, columns, single)
 
     def _begin(
         self, who: Mask, seeds: Sequence[int | None], infos: dict[str, Any]
     ) -> dict[str, Any]:
         """Begin episodes in the worlds `who`, and add their infos."""
-        for worlds, share in zip(self._worlds, self._shares, strict=True):
-            beginning = {world: seeds[share.start + world] for world in _places(who[share])}
-            for world, info in (worlds.begin(beginning) if beginning else {}).items():
-                infos = self._add_info(infos, info, share.start + world)
+        tasks = [
+            partial(
+                worlds.begin, {world: seeds[share.start + world] for world in _places(who[share])}
+            )
+            for worlds, share in zip(self._worlds, self._shares, strict=True)
+            if who[share].any()
+        ]
+        starts = [share.start for share in self._shares if who[share].any()]
+        for start, begun in zip(starts, self._threads.all(tasks), strict=True):
+            for world, info in begun.items():
+                infos = self._add_info(infos, info, start + world)
         self._over[who] = False
         self._begun[who] = True
         return infos

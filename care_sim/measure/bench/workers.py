@@ -14,8 +14,10 @@ from care_sim.measure.bench.config import BenchConfig
 from care_sim.measure.driven import driven
 from care_sim.study.designs.paper import paper_study
 from care_sim.study.episode_config import EpisodeConfig
-from care_sim.study.episode_play import peak_rss_mb, play_episodes
+from care_sim.study.episode_play import peak_rss_mb
+from care_sim.study.episodes_together import MOST_TOGETHER, play_episodes
 from care_sim.study.executors import processes
+from care_sim.study.run_config import in_batches
 
 _Memory = dict[str, float]
 
@@ -81,7 +83,7 @@ def study(seeds: int) -> dict[str, float]:
     with processes(_STUDY_WORKERS) as pool:
         answers = [
             answer
-            for batch in pool.map(play_episodes, [[config] for config in configs])
+            for batch in pool.map(play_episodes, in_batches(configs, MOST_TOGETHER))
             for answer in batch
         ]
     seconds = time.perf_counter() - started

@@ -1,8 +1,4 @@
-"""Rays of a scan against the road and the parts of bodies: boxes, cylinders and spheres, compiled.
-
-A box is cut out by three slabs (Kay and Kajiya 1986), a cylinder by a tube and a slab. A ray that
-starts inside a solid does not enter it: Bullet's rays answer the same.
-"""
+"""Rays of a scan against the road and the parts of bodies, compiled."""
 
 import math
 from typing import NamedTuple
@@ -13,15 +9,16 @@ from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.grid import Cells
 from care_sim.core.grid_kernels import GridSpacing
-from care_sim.sensors.engines.geometry_kernels import Axes, Vector, dot
+from care_sim.sensors.engines.geometry_kernels import Vector, dot
+from care_sim.sensors.engines.solid_kernels import meet, solid_of
 from care_sim.sensors.engines.window_kernels import Parts, SensorPose, place_parts
 from care_sim.world.bullet import NO_BODY
 
-BOX, CYLINDER, SPHERE = range(3)
-"""Places in `care_sim.world.body_tables.SHAPES`."""
-
-Stretch = tuple[float, float]
-"""Where a ray enters and leaves, as distances along it; the first is the larger where it misses."""
+_X, _Y, _Z = np.uintp(0), np.uintp(1), np.uintp(2)
+_STRIDE_BITS = 5
+"""A stride is 2 to the power of this many cells. Of each the first fired cell is known; within one
+they are searched one by one.
+"""
 
 
 class Fan(NamedTuple):
@@ -44,17 +41,6 @@ class RoadPlane(NamedTuple):
     body: int
 
 
-class Solid(NamedTuple):
-    """A part as rays meet it: its `axes` in the frame of the sensor, its half extents `half`, and
-    the sensor in the frame of the part, `start`.
-    """
-
-    shape: int
-    axes: Axes
-    half: Vector
-    start: Vector
-
-
 @compiled(error_model="numpy")
 def cast_rays(
     cells: Cells,
@@ -75,175 +61,182 @@ def cast_rays(
     """
     # Fields get their names here: numba takes microseconds to type each named tuple of Python,
     # which is much of the time of a scan, and next to none for plain ones.
-    rays = Fan(*fan)
-    solids = Parts(*parts)
+    ranges = np.empty(len(cells))
+    ids = np.empty(len(cells), np.int64)
+    returns = ranges, ids
+    cast_into(
+        returns,
+        cells,
+        reach,
+        Fan(*fan),
+        GridSpacing(*spacing),
+        sensor,
+        Parts(*parts),
+        poses,
+        ground,
+    )
+    return returns
+
+
+@compiled(error_model="numpy")
+def cast_into(
+    returns: tuple[Floats, Integers],
+    cells: Cells,
+    reach: float,
+    rays: Fan,
+    grid: GridSpacing,
+    sensor: Floats,
+    solids: Parts,
+    poses: Floats,
+    ground: int,
+) -> None:
+    """Fill `returns` (n,), (n,) with what `cast_rays` gives."""
+    ranges, ids = returns
     x, y, z, yaw, roll, pitch = sensor
-    pose = SensorPose(x, y, z, yaw, roll, pitch)
-    grid = GridSpacing(*spacing)
-    placed = place_parts(pose, solids, poses, grid, reach)
+    placed = place_parts(SensorPose(x, y, z, yaw, roll, pitch), solids, poses, grid, reach)
+    firsts = _first_places(cells, grid.rows * grid.columns)
 
     # The road first, then part after part: what is nearer takes the ray. So no list of hits is
     # sorted, and the order of parts matters only where two are equally far.
-    columns = len(rays.across)
-    starts = _row_starts(cells, len(rays.down), columns)
-    ranges, ids = _road_hits(cells, starts, rays, reach, RoadPlane(placed.up, z, ground))
-
+    road = RoadPlane(placed.up, z, ground)
+    _hit_road(ranges, ids, cells, firsts, rays.across, rays.down, reach, road)
+    places = np.empty(len(cells), np.int64)
+    picked = np.empty((3, len(cells)))
+    distances = np.empty(len(cells))
     for part, (first, last, upper, lower) in enumerate(placed.windows):
         if upper > lower:
             continue
-        solid = _solid(part, solids, placed.centres, placed.axes)
-        for row in range(upper, lower + 1):
-            # The fired cells of this row that lie in the window. A window that runs over a turn has
-            # two stretches of columns: from the row's begin, and from its first column on.
-            begin = row * columns
-            low = starts[row]
-            high = starts[row + 1]
-            ahead = _first_from(cells, begin + first, low, high)
-            for place, end in ((low, begin + last - grid.turn), (ahead, begin + last)):
-                while place < high and cells[place] <= end:
-                    distance = _entry(solid, _ray(rays, row, cells[place] - begin))
-                    if distance < ranges[place] and distance <= reach:
-                        ranges[place] = distance
-                        ids[place] = solids.owners[part]
-                    place += 1
-    return ranges, ids
+        window = first, last, upper, lower, grid.turn, placed.nearest[part]
+        count = _pick(window, cells, firsts, rays.across, rays.down, ranges, places, picked)
+        if count:
+            solid = solid_of(part, solids, placed.centres, placed.axes)
+            meet(solid, picked, distances, count)
+            _take(ranges, ids, places, distances, count, solids.owners[part], reach)
+
+
+# Arrays are handed over one by one from here on, and not as fields of tuples: to take one out of a
+# tuple counts its references, which takes longer than to follow a ray.
+@compiled(error_model="numpy")
+def _hit_road(
+    ranges: Floats,
+    ids: Integers,
+    cells: Cells,
+    firsts: Integers,
+    across: Floats,
+    down: Floats,
+    reach: float,
+    road: RoadPlane,
+) -> None:
+    """Fill ranges and body ids with those of a world of road alone."""
+    is_level = road.up[0] == 0.0 and road.up[1] == 0.0
+    begin = 0
+    for row in range(len(down)):
+        # Over a level road all rays of a row are alike, but for the sign of zeros.
+        end = _place_of(row * len(across) + len(across), cells, firsts)
+        distance = _to_road(road, (0.0, 0.0, down[row, 1]))
+        for n in range(begin, end):
+            if not is_level:
+                ray = _ray(across, down, row, cells[n] - row * len(across))
+                distance = _to_road(road, ray)
+            is_hit = 0.0 <= distance <= reach and road.body != NO_BODY
+            ranges[n] = distance if is_hit else math.inf
+            ids[n] = road.body if is_hit else NO_BODY
+        begin = end
 
 
 @compiled(error_model="numpy")
-def _road_hits(
-    cells: Cells, starts: Integers, fan: Fan, reach: float, road: RoadPlane
-) -> tuple[Floats, Integers]:
-    """Ranges and body ids in a world of road alone."""
-    ranges = np.full(len(cells), math.inf)
-    ids = np.full(len(cells), NO_BODY)
-    if road.body != NO_BODY:
-        for row in range(len(starts) - 1):
-            for n in range(starts[row], starts[row + 1]):
-                # A ray falls by -up . ray per metre. Above the horizon the distance is negative,
-                # and along it infinite.
-                ray = _ray(fan, row, cells[n] - row * len(fan.across))
-                distance = -road.height / dot(road.up, ray)
-                if 0.0 <= distance <= reach:
-                    ranges[n] = distance
-                    ids[n] = road.body
-    return ranges, ids
+def _to_road(road: RoadPlane, ray: Vector) -> float:
+    """How far a ray goes to the road: below 0 above the horizon, and infinite along it."""
+    # A ray falls by -up . ray per metre.
+    return -road.height / dot(road.up, ray)
 
 
 @compiled()
-def _row_starts(cells: Cells, rows: int, columns: int) -> Integers:
-    """(rows + 1,) where each row begins among ascending `cells`."""
-    # Each search goes on from the row before, since cells ascend.
-    starts = np.zeros(rows + 1, np.int64)
-    for row in range(1, rows + 1):
-        starts[row] = _first_from(cells, row * columns, starts[row - 1], len(cells))
-    return starts
-
-
-@compiled()
-def _first_from(cells: Cells, cell: int, low: int, high: int) -> int:
-    """The first place in low..high of ascending `cells` that holds `cell` or a later one, else
-    `high`.
+def _first_places(cells: Cells, size: int) -> Integers:
+    """(m,) where among ascending `cells` those from 0, 1, ... strides on begin; the grid has `size`
+    cells.
     """
-    # Bisection: all before `low` are lower, all from `high` on are not.
-    while low < high:
-        middle = (low + high) // 2
-        if cells[middle] < cell:
-            low = middle + 1
-        else:
-            high = middle
-    return low
+    # From the last one back, each cell is the first of its stride so far. A stride without cells
+    # begins where the next one does.
+    firsts = np.full((size >> _STRIDE_BITS) + 2, len(cells))
+    for n in range(len(cells) - 1, -1, -1):
+        firsts[cells[n] >> _STRIDE_BITS] = n
+    first = len(cells)
+    for k in range(len(firsts) - 1, -1, -1):
+        first = min(first, firsts[k])
+        firsts[k] = first
+    return firsts
 
 
 @compiled()
-def _ray(fan: Fan, row: int, column: int) -> Vector:
+def _place_of(cell: int, cells: Cells, firsts: Integers) -> int:
+    """Where a cell of the grid or the next later one is among those fired; behind the last one, if
+    there is none.
+    """
+    place: int = firsts[cell >> _STRIDE_BITS]
+    while place < len(cells) and cells[place] < cell:
+        place += 1
+    return place
+
+
+@compiled()
+def _pick(
+    window: tuple[int, int, int, int, int, float],
+    cells: Cells,
+    firsts: Integers,
+    across: Floats,
+    down: Floats,
+    ranges: Floats,
+    places: Integers,
+    picked: Floats,
+) -> int:
+    """Pick the rays of a window that have met nothing before `nearest`; how many they are. Their
+    `places` (n,) among the cells and their directions `picked` (3, n) are filled in.
+    """
+    first, last, upper, lower, turn, nearest = window
+    count = 0
+    for row in range(upper, lower + 1):
+        # A window that runs over a turn has two stretches of columns: up to its last one, and from
+        # its first one on. It may run on into columns that the grid does not have.
+        begin = row * len(across)
+        level, height = down[row, 0], down[row, 1]
+        for left, right in ((0, last - turn), (first, last)):
+            end = begin + min(right, len(across) - 1)
+            if begin + left > end:
+                continue
+            place = _place_of(begin + left, cells, firsts)
+            while place < len(cells) and cells[place] <= end:
+                # Written in any case, and counted if it is to be kept. An index without a sign is
+                # never counted from the end of an array, and need not be looked at.
+                own, column = np.uintp(count), np.uintp(cells[np.uintp(place)] - begin)
+                places[own] = place
+                picked[_X, own] = level * across[column, _X]
+                picked[_Y, own] = level * across[column, _Y]
+                picked[_Z, own] = height
+                count += ranges[np.uintp(place)] > nearest
+                place += 1
+    return count
+
+
+@compiled()
+def _take(
+    ranges: Floats,
+    ids: Integers,
+    places: Integers,
+    distances: Floats,
+    count: int,
+    owner: int,
+    reach: float,
+) -> None:
+    """Let the first `count` of the picked rays end at the solid of a body where it is nearer."""
+    for n in range(count):
+        place, distance = places[n], distances[n]
+        is_nearer = distance < ranges[place] and distance <= reach
+        ranges[place] = distance if is_nearer else ranges[place]
+        ids[place] = owner if is_nearer else ids[place]
+
+
+@compiled()
+def _ray(across: Floats, down: Floats, row: int, column: int) -> Vector:
     """The direction of a cell, a unit vector in the frame of the sensor."""
-    across, down = fan.across, fan.down
     return down[row, 0] * across[column, 0], down[row, 0] * across[column, 1], down[row, 1]
-
-
-@compiled()
-def _solid(part: int, parts: Parts, centres: Floats, axes: Floats) -> Solid:
-    """A part with its numbers at hand: views on arrays would count references, ray by ray."""
-    # The sensor is the origin of its own frame, so seen from the part it is at minus the centre.
-    turn = _triple(axes[part, 0]), _triple(axes[part, 1]), _triple(axes[part, 2])
-    centre = _triple(centres[part])
-    start = -dot(turn[0], centre), -dot(turn[1], centre), -dot(turn[2], centre)
-    return Solid(parts.shapes[part], turn, _triple(parts.halves[part]), start)
-
-
-@compiled()
-def _triple(row: Floats) -> Vector:
-    """The numbers of an array (3,)."""
-    return row[0], row[1], row[2]
-
-
-@compiled(error_model="numpy")
-def _entry(solid: Solid, ray: Vector) -> float:
-    """Distance along a unit ray of the sensor's frame to a solid, inf without an entry."""
-    # The ray in the frame of the part: from (u, v, w) along (x, y, z).
-    u, v, w = solid.start
-    x, y, z = dot(solid.axes[0], ray), dot(solid.axes[1], ray), dot(solid.axes[2], ray)
-    half = solid.half
-    if solid.shape == BOX:
-        sides = _common(_slab(u, x, half[0]), _slab(v, y, half[1]))
-        near, far = _common(sides, _slab(w, z, half[2]))
-    elif solid.shape == CYLINDER:
-        near, far = _common(_tube(u, v, x, y, half[0]), _slab(w, z, half[2]))
-    else:
-        near, far = _ball(u, v, w, x, y, z, half[0])
-
-    # Negative where the ray starts inside or beyond: neither is an entry.
-    return near if 0.0 <= near <= far else math.inf
-
-
-@compiled()
-def _common(one: Stretch, other: Stretch) -> Stretch:
-    """The stretch that two have in common."""
-    return max(one[0], other[0]), min(one[1], other[1])
-
-
-@compiled(error_model="numpy")
-def _slab(start: float, along: float, half: float) -> Stretch:
-    """The stretch of a ray between the planes at -half and half."""
-    # A ray along the planes is between them everywhere or nowhere; 0 / 0 must not decide it.
-    if along == 0.0:
-        return _all_or_nothing(abs(start) <= half)
-    one, other = (-half - start) / along, (half - start) / along
-    return min(one, other), max(one, other)
-
-
-@compiled(error_model="numpy")
-def _tube(u: float, v: float, x: float, y: float, radius: float) -> Stretch:
-    """The stretch of a ray within `radius` of the z axis, from (u, v) along (x, y) in the plane
-    across it.
-    """
-    # The distance t solves |(u, v) + t (x, y)|^2 = radius^2. Its discriminant is written with the
-    # cross product, which keeps digits that u * u + v * v of a far start would lose.
-    speed = x * x + y * y
-    cross = u * y - v * x
-    inside = radius * radius * speed - cross * cross
-    if speed == 0.0 or inside < 0.0:
-        return _all_or_nothing(speed == 0.0 and u * u + v * v <= radius * radius)
-
-    # The middle is where the ray is nearest to the axis; it enters and leaves half a chord away.
-    middle = -(u * x + v * y) / speed
-    half = math.sqrt(inside) / speed
-    return middle - half, middle + half
-
-
-@compiled(error_model="numpy")
-def _ball(u: float, v: float, w: float, x: float, y: float, z: float, radius: float) -> Stretch:
-    """The stretch of a ray from (u, v, w) along (x, y, z) within `radius` of the origin."""
-    # (a, b, c) is the point of the ray that is nearest to the origin.
-    middle = -(u * x + v * y + w * z)
-    a, b, c = u + middle * x, v + middle * y, w + middle * z
-    inside = radius * radius - (a * a + b * b + c * c)
-    if inside < 0.0:
-        return _all_or_nothing(False)
-    return middle - math.sqrt(inside), middle + math.sqrt(inside)
-
-
-@compiled()
-def _all_or_nothing(everything: bool) -> Stretch:
-    """The whole ray, or a stretch that is empty."""
-    return (-math.inf, math.inf) if everything else (math.inf, -math.inf)

@@ -1,0 +1,113 @@
+"""From the ego to the first-sighting actor, hull to hull, in many worlds.
+
+PyBullet's exact distance costs more than all else that is scored. So the moments are kept, with a
+bound that is no greater, and it is asked about those alone that matter.
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from care_sim.base.compiled import compiled
+from care_sim.batch.state import BatchState, Bodies
+from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.world.bullet import NO_BODY
+from care_sim.world.clearance_judge import ClearanceJudge
+from care_sim.world.least_clearance import PADDING_M, least_gap
+from care_sim.world.world import World
+
+
+class Clearances:
+    """At every world step of an episode, up to `steps`, in each of `worlds` worlds."""
+
+    def __init__(self, worlds: int, steps: int, judge: ClearanceJudge):
+        self._judge = judge
+        self._pairs: list[tuple[int, int] | None] = [None] * worlds
+        # By world and step, of which the first is 1: the poses of the two, what they are apart at
+        # least, and exactly where it is known, else NaN.
+        self._poses = np.zeros((worlds, steps + 1, 2, 7))
+        self._bounds = np.full((worlds, steps + 1), np.inf)
+        self._known = np.full((worlds, steps + 1), np.nan)
+
+    def begin(self, world: int, built: World) -> None:
+        """Forget the episode that was, and take in the two bodies of a new one."""
+        target = built.first_sighting
+        self._pairs[world] = (
+            None if target is None else self._judge.stand_ins(built.ego_kind, target.kind)
+        )
+        self._bounds[world] = np.inf
+        self._known[world] = np.nan
+
+    def note(self, state: BatchState, steps: Integers) -> None:
+        """Note where the bodies are at the `steps` (W,) to which the worlds have come."""
+        egos = state.egos
+        _note(state.live, steps, state.bodies, egos.bodies, egos.targets, self._poses, self._bounds)
+
+    def least_since(self, steps: Integers, count: int, live: Mask, exact_below: float) -> Floats:
+        """(W,) the least clearance of the last `count` of all `steps` (W,) so far, metres. What is
+        above `exact_below` may be a bound that is above it, too, and no greater than the clearance.
+        """
+        rows = np.arange(len(steps))[:, None]
+        recent = steps[:, None] - np.arange(count)
+        bounds = self._bounds[rows, recent]
+        order = np.argsort(bounds, axis=1)
+        recent, bounds = recent[rows, order], bounds[rows, order]
+        least: Floats = bounds[:, 0].copy()
+        asked = np.flatnonzero(live & (least <= exact_below) & (least < np.inf))
+        moments = zip(recent[asked].tolist(), bounds[asked].tolist(), strict=True)
+        least[asked] = [
+            self._least(world, *moment, exact_below)
+            for world, moment in zip(asked.tolist(), moments, strict=True)
+        ]
+        return least
+
+    def least(self, world: int, begin: int, end: int) -> float:
+        """The least clearance of a world from its step `begin` to the one before `end`."""
+        bounds = self._bounds[world, begin:end]
+        order = np.argsort(bounds)
+        return self._least(world, (begin + order).tolist(), bounds[order].tolist(), math.inf)
+
+    def _least(
+        self, world: int, steps: Sequence[int], bounds: Sequence[float], exact_below: float
+    ) -> float:
+        """The least clearance at some `steps`, whose `bounds` ascend."""
+        # First the moment at which they could be nearest. Whoever was farther apart than what is
+        # found by then need not be asked about.
+        least = math.inf
+        for step, bound in zip(steps, bounds, strict=True):
+            if bound > least or bound == math.inf:
+                break
+            if bound > exact_below:
+                return min(least, bound)
+            least = min(least, self._exact(world, step))
+        return least
+
+    def _exact(self, world: int, step: int) -> float:
+        known = float(self._known[world, step])
+        pair = self._pairs[world]
+        if math.isnan(known) and pair is not None:
+            known = self._judge.clearance(pair, self._poses[world, step].tolist())
+            self._known[world, step] = known
+        return known
+
+
+@compiled()
+def _note(
+    live: Mask,
+    steps: Integers,
+    bodies: Bodies,
+    egos: Integers,
+    targets: Integers,
+    poses: Floats,
+    bounds: Floats,
+) -> None:
+    """See `Clearances.note`."""
+    for world in range(len(live)):
+        if not live[world] or targets[world] == NO_BODY:
+            continue
+        ego, target, step = egos[world], targets[world], steps[world]
+        boxes = bodies.boxes[world]
+        bounds[world, step] = least_gap(boxes[ego], boxes[target]) - PADDING_M
+        poses[world, step, 0] = bodies.poses[world, ego]
+        poses[world, step, 1] = bodies.poses[world, target]

@@ -1,0 +1,248 @@
+"""Many worlds move on: what `World.advance` does, with no Python per world in the common case.
+
+Common is a world whose ego and drivers keep their lanes and whose other bodies stand, or go where
+the time alone tells. Any other moves by its own Python.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import TypeGuard
+
+import numpy as np
+
+from care_sim.base.compiled import compiled
+from care_sim.base.times import LAST_BITS_S
+from care_sim.batch.clearances import Clearances
+from care_sim.batch.impacts import Impacts
+from care_sim.batch.lane_columns import SPEED, LaneColumns
+from care_sim.batch.state import BatchState, Bodies, Egos, Passages, filled
+from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.scenarios.mirroring import Reflection
+from care_sim.world.bullet import NO_BODY
+from care_sim.world.clearance_judge import ClearanceJudge
+from care_sim.world.lane_change import LaneChange
+from care_sim.world.route_car import RouteCar
+from care_sim.world.traffic import LaneKeeper, RoadVehicle
+from care_sim.world.walker import Walk
+from care_sim.world.world import WORLD_STEP_S, Actor, World, whole_steps
+
+KNOWN_BELOW_M = 2.0
+"""Clearances below this are exact in any case: the reward reads them."""
+_BY_TIME_ALONE = (Walk, LaneChange)
+"""Frozen: where they are depends on nothing but the time."""
+
+
+def steps_of(duration_s: float, keyframe_s: float) -> int:
+    """World steps of an episode of `duration_s` seconds, which ends with a whole keyframe."""
+    return math.ceil((duration_s - LAST_BITS_S) / keyframe_s) * whole_steps(keyframe_s)
+
+
+class Motion:
+    """The motion of `worlds` worlds, whose episodes last `steps` world steps at most."""
+
+    def __init__(self, worlds: int, steps: int):
+        self._judge = ClearanceJudge()
+        self._clearances = Clearances(worlds, steps, self._judge)
+        self._impacts = Impacts(worlds, self._judge)
+        # The world steps that each has done, and their times, counted and rounded as its own.
+        self._steps = np.zeros(worlds, np.int64)
+        self._times = np.array([round(n * WORLD_STEP_S, 9) for n in range(steps + 1)])
+        self._lanes = LaneColumns(worlds)
+        # The body of each vehicle in the lanes, and of what goes by time alone, with its ways.
+        self._drivers = np.zeros((worlds, 2), np.int64)
+        self._timed_counts = np.zeros(worlds, np.int64)
+        self._timed = np.zeros((worlds, 1), np.int64)
+        self._ways = np.zeros((worlds, 1, steps + 1, 5))
+        self._by_itself: dict[int, World] = {}
+
+    def begin(self, world: int, built: World) -> None:
+        """Move a fresh world from now on. Its tables lie in the state by the first `advance`.
+
+        The world is left as it is unless it moves by its own Python. No body may be added later.
+        """
+        self._steps[world] = 0
+        self._clearances.begin(world, built)
+        self._impacts.begin(world, built)
+        self._by_itself.pop(world, None)
+        drivers = [actor for actor in built.actors if _is_driver(actor)]
+        others = [actor for actor in built.actors if not _is_driver(actor)]
+        keepers = self._keepers(built, drivers)
+        timed = [actor for actor in others if not isinstance(actor.moved_by, tuple)]
+        if keepers is None or not all(map(_goes_by_time, timed)):
+            self._by_itself[world] = built
+            return
+        self._lanes.begin(world, keepers)
+        bodies = np.array([built.ego_body, *(actor.body for actor in drivers)])
+        self._drivers = filled(self._drivers, world, bodies)
+        self._timed_counts[world] = len(timed)
+        if timed:
+            self._timed = filled(self._timed, world, np.array([actor.body for actor in timed]))
+            self._ways = filled(self._ways, world, self._tabulated(timed))
+
+    def advance(
+        self, state: BatchState, accelerations: Floats, duration_s: float, exact: bool = True
+    ) -> Passages:
+        """Move the worlds that are live by `duration_s` seconds, a whole number of world steps. The
+        egos hold `accelerations` (W,), m/s^2, meanwhile.
+
+        Unless `exact`, a clearance above `KNOWN_BELOW_M` may be a bound that is above it, too, and
+        no greater than the clearance; `settle` tells the least of an episode then.
+        """
+        worlds = state.worlds
+        passages = Passages(
+            np.full(worlds, np.inf),
+            np.full(worlds, np.inf),
+            np.zeros(worlds, np.bool_),
+            np.zeros(worlds),
+            np.full(worlds, NO_BODY),
+            np.zeros(worlds, np.bool_),
+        )
+        targeted = state.live & (state.egos.targets != NO_BODY)
+        count = whole_steps(duration_s)
+        for _ in range(count):
+            self._step(state, accelerations)
+            self._clearances.note(state, self._steps)
+            away = _away(targeted, state)
+            np.minimum(passages.nearest_m, away, out=passages.nearest_m)
+            self._note_impacts(state, passages)
+        below = np.inf if exact else KNOWN_BELOW_M
+        passages.clearance_m[:] = self._clearances.least_since(self._steps, count, targeted, below)
+        return passages
+
+    def settle(self, world: int, since_s: float = 0.0) -> float:
+        """The least clearance of a world's episode, metres, from the time `since_s` on; inf without
+        a first-sighting actor.
+        """
+        begin = round(since_s / WORLD_STEP_S) + 1
+        return self._clearances.least(world, begin, int(self._steps[world]) + 1)
+
+    def close(self) -> None:
+        """Free the simulator. The worlds are their owner's to close."""
+        self._judge.close()
+
+    def _keepers(self, built: World, drivers: Sequence[Actor]) -> list[LaneKeeper] | None:
+        """What ego and drivers of a world go by, if they are to keep their lanes, else None."""
+        if built.scripted or isinstance(built.ego, RouteCar):
+            return None
+        vehicles = [built.ego, *filter(_is_vehicle, map(_source, drivers))]
+        return built.traffic.lane_keepers(vehicles, float(self._times[-1]))
+
+    def _tabulated(self, actors: Sequence[Actor]) -> Floats:
+        """(n, steps + 1, 5) x, y, heading, and sine and cosine of half of it, of actors at every
+        world step.
+        """
+        times = self._times.tolist()
+        poses = np.array([[actor.pose_at(time) for time in times] for actor in actors])
+        half = poses[..., 2] / 2
+        return np.concatenate([poses, np.stack([np.sin(half), np.cos(half)], axis=-1)], axis=-1)
+
+    def _step(self, state: BatchState, accelerations: Floats) -> None:
+        """Move all by a world step."""
+        self._steps += state.live
+        itself = np.zeros(state.worlds, np.bool_)
+        itself[list(self._by_itself)] = True
+        together = state.live & ~itself
+        speeds = self._lanes.rows[:, 0, SPEED].copy()
+        self._lanes.step(together, accelerations, WORLD_STEP_S)
+        state.times[state.live] = self._times[self._steps[state.live]]
+        state.bodies.before[state.live] = state.bodies.boxes[state.live]
+        _place_drivers(together, self._lanes.counts, self._lanes.rows, self._drivers, state.bodies)
+        _place_timed(
+            together, self._steps, self._timed_counts, self._timed, self._ways, state.bodies
+        )
+        _tell_egos(together, speeds, self._lanes.rows, WORLD_STEP_S, state.egos)
+        for world, built in self._by_itself.items():
+            if state.live[world]:
+                built.step(float(accelerations[world]))
+                _copy(built, world, state)
+
+    def _note_impacts(self, state: BatchState, passages: Passages) -> None:
+        """Write the first impact of each world into `passages`."""
+        for world, impact in self._impacts.now(state, state.live & ~passages.hit):
+            passages.hit[world] = True
+            passages.impact_speed_mps[world] = impact.speed_mps
+            passages.body[world] = impact.body
+            passages.ahead[world] = impact.at_front
+
+
+def _source(actor: Actor) -> object:
+    """What moves an actor, on either side of the street."""
+    moved_by = actor.moved_by
+    return moved_by.of if isinstance(moved_by, Reflection) else moved_by
+
+
+def _is_driver(actor: Actor) -> bool:
+    return _is_vehicle(_source(actor))
+
+
+def _is_vehicle(source: object) -> TypeGuard[RoadVehicle]:
+    return isinstance(source, RoadVehicle)
+
+
+def _goes_by_time(actor: Actor) -> bool:
+    return isinstance(getattr(_source(actor), "__self__", None), _BY_TIME_ALONE)
+
+
+def _copy(built: World, world: int, state: BatchState) -> None:
+    """Write where all is in a world that moved by itself into the state."""
+    count = state.bodies.counts[world]
+    state.bodies.boxes[world, :count] = built.boxes_of(np.arange(count))
+    state.bodies.poses[world, :count] = built.bullet.primitives.poses
+    motion = built.ego_motion
+    state.egos.speeds[world] = motion.speed
+    state.egos.yaw_rates[world] = motion.yaw_rate
+    state.egos.accelerations[world] = motion.acceleration
+
+
+def _away(targeted: Mask, state: BatchState) -> Floats:
+    """(W,) from centre to centre of the egos and the first-sighting actors, inf without one."""
+    rows = np.arange(state.worlds)
+    boxes, egos = state.bodies.boxes, state.egos
+    apart = boxes[rows, egos.targets, :2] - boxes[rows, egos.bodies, :2]
+    return np.where(targeted, np.hypot(apart[:, 0], apart[:, 1]), np.inf)
+
+
+@compiled()
+def _place_drivers(
+    moved: Mask, counts: Integers, rows: Floats, drivers: Integers, bodies: Bodies
+) -> None:
+    """Put the bodies `drivers` (W, V) where their vehicles are: who keeps a lane along x changes
+    nothing but x.
+    """
+    for world in range(len(moved)):
+        if moved[world]:
+            for n in range(counts[world]):
+                body, x = drivers[world, n], rows[world, n, 0]
+                bodies.boxes[world, body, 0] = x
+                bodies.poses[world, body, 0] = x
+
+
+@compiled()
+def _place_timed(
+    moved: Mask,
+    steps: Integers,
+    counts: Integers,
+    timed: Integers,
+    ways: Floats,
+    bodies: Bodies,
+) -> None:
+    """Put the bodies `timed` (W, P) where their `ways` (W, P, steps, 5) tell."""
+    for world in range(len(moved)):
+        if moved[world]:
+            for n in range(counts[world]):
+                row = ways[world, n, steps[world]]
+                box = bodies.boxes[world, timed[world, n]]
+                pose = bodies.poses[world, timed[world, n]]
+                box[0], box[1], box[6] = row[0], row[1], row[2]
+                pose[0], pose[1], pose[5], pose[6] = row[0], row[1], row[3], row[4]
+
+
+@compiled()
+def _tell_egos(moved: Mask, before: Floats, rows: Floats, dt: float, egos: Egos) -> None:
+    """Write the motion of the egos, whose speeds were `before` (W,) a world step ago."""
+    for world in range(len(moved)):
+        if moved[world]:
+            speed = rows[world, 0, SPEED]
+            egos.speeds[world] = speed
+            egos.yaw_rates[world] = 0.0
+            egos.accelerations[world] = (speed - before[world]) / dt

@@ -1,0 +1,101 @@
+"""Episodes that differ in nothing but the seed, played together. Each has the row that it has
+alone.
+"""
+
+import time
+from collections.abc import Sequence
+from contextlib import closing
+from typing import cast
+
+import numpy as np
+from gymnasium.vector.utils import create_empty_array
+from numpy.typing import NDArray
+
+from care_sim.core.arrays import Mask
+from care_sim.envs.sensing import Observed
+from care_sim.envs.spaces import checked_scores
+from care_sim.envs.vector.compiled_worlds import CompiledWorlds
+from care_sim.envs.vector.worlds import Stepped
+from care_sim.policies.base import Policy
+from care_sim.study.episode_config import EpisodeConfig, closed_loop
+from care_sim.study.episode_play import EpisodeHash, Played, result_or_reason, run_episode
+from care_sim.study.run_config import Row
+
+MOST_TOGETHER = 16
+"""Episodes that are played together."""
+
+
+def play_episodes(batch: Sequence[EpisodeConfig]) -> list[Row | str]:
+    """What a worker does: play episodes, and give for each its row, or in one line why there is
+    none. Those of an `EpisodeConfig.batch` are played together.
+    """
+    if len(batch) > 1 and not batch[0].alone and len({config.batch for config in batch}) == 1:
+        rows = result_or_reason(play_together, batch)
+        if not isinstance(rows, str):
+            return [*rows]
+    # What is raised among many is not told: whose it is shows where each is played alone.
+    return [result_or_reason(run_episode, config) for config in batch]
+
+
+def play_together(configs: Sequence[EpisodeConfig]) -> list[Row]:
+    """The rows of episodes of one `EpisodeConfig.batch`, of whose time each has an even share.
+    Raises what any of them raises.
+    """
+    started = time.perf_counter()
+    # The file of a set-up may be written anew while the episodes run.
+    told = [config.row() for config in configs]
+    count = len(configs)
+    hashes = [EpisodeHash() for _ in configs]
+    keyframes = np.zeros(count, np.int64)
+    outcomes = dict[int, Row]()
+    with configs[0].make_env() as env:
+        model = closed_loop(env)
+        observed = cast(Observed, create_empty_array(model.observation_space, count))
+        policies = [config.make_policy(env) for config in configs]
+        with closing(CompiledWorlds(model, observed, exact=False)) as worlds:
+            infos = worlds.begin({world: config.seed for world, config in enumerate(configs)})
+            for policy in policies:
+                policy.reset()
+            live = np.ones(count, np.bool_)
+            # Worlds that are over rest until the last one is.
+            while live.any():
+                stepped = worlds.step(_actions(policies, observed, live), live)
+                for world in np.flatnonzero(live).tolist():
+                    fired = _fired(stepped, world)
+                    hashes[world].add(fired, observed["ranges"][world], worlds.boxes(world))
+                over = stepped.terminated | stepped.truncated
+                outcomes |= {w: stepped.single[w]["outcome"] for w in np.flatnonzero(over).tolist()}
+                keyframes += live
+                live &= ~over
+    wall_s = (time.perf_counter() - started) / count
+    return [
+        Played(
+            told[world],
+            infos[world].get("drawn", {}),
+            outcomes[world],
+            int(keyframes[world]),
+            wall_s,
+            hashes[world].hexdigest(),
+        ).row(config)
+        for world, config in enumerate(configs)
+    ]
+
+
+def _actions(policies: Sequence[Policy], observed: Observed, live: Mask) -> NDArray[np.float32]:
+    """(W, E, A) what the policy of every world that is `live` makes of its observation."""
+    tables = observed["ranges"]
+    actions = np.zeros_like(tables)
+    for world in np.flatnonzero(live).tolist():
+        # In copies, since a policy may keep what it is shown, and write into it.
+        own = {name: rows[world].copy() for name, rows in observed.items()}
+        actions[world] = checked_scores(policies[world](own), tables.shape[1:])
+    return actions
+
+
+def _fired(stepped: Stepped, world: int) -> NDArray[np.int64] | list[int]:
+    """The cells that a world fired: a list of its own where numbers differ."""
+    column: NDArray[np.int64] | None = stepped.columns.get("fired")
+    cells: NDArray[np.int64] | list[int] = (
+        column[world] if column is not None else stepped.single[world]["fired"]
+    )
+    return cells

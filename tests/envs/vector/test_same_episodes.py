@@ -1,0 +1,45 @@
+"""World i of a vector environment is the single environment, to the last bit."""
+
+import pytest
+
+from care_sim.envs import CLOSED_LOOP
+from tests.helpers.vectors import MODES, played_alike
+
+LATE = {"camera_latency": 2, "camera_jitter": 1}
+BLIND = {"blackout_start_s": 1.0, "blackout_s": 1.5}
+MISSING = {"false_negative_rate": 0.3, "false_negative_per_m": 0.01, "false_negative_burst": 4}
+CONDITIONS = {
+    "late": LATE,
+    "missing": MISSING,
+    "blind, late and missing": LATE | BLIND | MISSING,
+    "unsure": {"camera_confidence": 0.7},
+    "listed otherwise": {"cell_order": "core-spread", "reserve_fraction": 0.5, "floor_seed": 2},
+    "without a floor": {"floor": False, "budget": 0.2},
+    "thorough": {"min_returns": 8, "brake_for_oncoming": True, "brake_side_margin_m": 1.0},
+    "slow": {"keyframe_s": 0.2, "duration_s": 4.0, "brake_reaction_s": 0.3},
+    "on the other side": {"mirrored": "drawn"},
+    "on a collision course": {"encroachment_s": (-0.2, -0.1), "ego_speed_mps": (12.0, 13.0)},
+    "with all that a learner gains": {"reward_weights": {"gain": 2.0}},
+    "without scoring": {"scoring_info": False, "secret": "a text that nobody knows"},
+    # These are played one after the other.
+    "noisy": {"lidar_range_sigma": 0.05, "lidar_dropout": 0.2},
+    "by tiles": {"firing": "tiles:4x8"},
+}
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("name", CLOSED_LOOP)
+def test_every_world_in_every_mode(name, mode):
+    steps = 8 if name == "CARE-Drive-v0" else 64
+    assert played_alike(name, worlds=3, steps=steps, mode=mode, threads=2) is None
+
+
+@pytest.mark.parametrize("conditions", CONDITIONS.values(), ids=CONDITIONS)
+def test_conditions(conditions):
+    arguments = {"budget": 0.03} | conditions
+    assert played_alike("CARE-Dense-v0", worlds=2, steps=62, **arguments) is None
+
+
+@pytest.mark.parametrize(("worlds", "threads"), [(1, 1), (5, 1), (5, 2), (5, 8)])
+def test_numbers_of_worlds_and_threads(worlds, threads):
+    assert played_alike("CARE-CutIn-v0", worlds=worlds, steps=30, threads=threads) is None

@@ -1,0 +1,147 @@
+"""What a vector environment promises besides the episodes."""
+
+import gc
+import multiprocessing
+import threading
+import time
+
+import gymnasium
+import numpy as np
+import pytest
+
+from care_sim import InvalidInput
+from tests.helpers.vectors import native
+
+NAME = "CARE-Dartout-v0"
+
+
+@pytest.fixture
+def vector():
+    env = native(NAME, 3, threads=2, budget=0.03)
+    yield env
+    env.close()
+
+
+def zeros(env):
+    return np.zeros(env.action_space.shape, np.float32)
+
+
+def test_it_is_what_gymnasium_makes_unless_it_is_asked_otherwise():
+    env = gymnasium.make_vec(f"care_sim:{NAME}", num_envs=2)
+    assert type(env).__name__ == "DartoutVectorEnv"
+    assert env.observation_space.contains(env.reset(seed=0)[0])
+    env.close()
+
+
+def test_observations_that_were_handed_out_stay(vector):
+    first, _ = vector.reset(seed=0)
+    kept = {name: rows.copy() for name, rows in first.items()}
+    vector.step(zeros(vector))
+    assert all(np.array_equal(first[name], kept[name]) for name in kept)
+
+
+def test_observations_in_place():
+    env = native(NAME, 2, copy=False)
+    first, _ = env.reset(seed=0)
+    second = env.step(zeros(env))[0]
+    assert all(first[name] is second[name] for name in first)
+    env.close()
+
+
+def test_seeds_count_up_or_are_told_one_by_one(vector):
+    counted, _ = vector.reset(seed=5)
+    told, infos = vector.reset(seed=[5, 6, 7])
+    assert infos["seed"].tolist() == [5, 6, 7]
+    assert all(np.array_equal(counted[name], told[name]) for name in told)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"num_envs": 0}, "num_envs"),
+        ({"threads": 0}, "threads"),
+        ({"autoreset_mode": "Sometimes"}, "NextStep, SameStep, Disabled"),
+        ({"copy": 1}, "copy"),
+        ({"render_mode": "rgb_array"}, "render_mode"),
+        ({"budget": 2.0}, "budget"),
+        ({"vehicels": 2}, "vehicels"),
+    ],
+)
+def test_wrong_arguments_are_named(wrong, message):
+    arguments = {"num_envs": 2} | wrong
+    with pytest.raises(InvalidInput, match=message):
+        native(NAME, arguments.pop("num_envs"), **arguments)
+
+
+def test_wrong_seeds_and_masks_are_named(vector):
+    with pytest.raises(InvalidInput, match="one for each of 3"):
+        vector.reset(seed=[1, 2])
+    with pytest.raises(InvalidInput, match="seed"):
+        vector.reset(seed=-1)
+    with pytest.raises(InvalidInput, match="reset_mask"):
+        vector.reset(options={"reset_mask": np.zeros(3, bool)})
+    with pytest.raises(InvalidInput, match="no options but reset_mask"):
+        vector.reset(options={"slow": True})
+
+
+def test_wrong_actions_are_named_and_nothing_moves(vector):
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        vector.step(zeros(vector))
+    vector.reset(seed=0)
+    with pytest.raises(InvalidInput, match="shape"):
+        vector.step(zeros(vector)[:2])
+    broken = zeros(vector)
+    broken[1, 0, 0] = np.nan
+    with pytest.raises(InvalidInput, match="NaN"):
+        vector.step(broken)
+    assert vector.step(zeros(vector))[4]["time_s"].tolist() == [0.0, 0.0, 0.0]
+
+
+def test_what_is_over_waits_for_a_reset_where_that_is_asked_for():
+    env = native(NAME, 2, autoreset_mode="Disabled", duration_s=0.1)
+    env.reset(seed=0)
+    assert env.step(zeros(env))[3].all()
+    with pytest.raises(gymnasium.error.ResetNeeded, match="reset_mask"):
+        env.step(zeros(env))
+    env.reset(options={"reset_mask": np.array([True, True])})
+    env.step(zeros(env))
+    env.close()
+
+
+def test_threads_end_with_the_environment():
+    before = threading.active_count()
+    env = native(NAME, 4, threads=4)
+    env.reset(seed=0)
+    env.step(zeros(env))
+    assert threading.active_count() > before
+    env.close()
+    assert threading.active_count() == before
+    env = native(NAME, 4, threads=4)
+    env.reset(seed=0)
+    env.step(zeros(env))
+    del env
+    gc.collect()
+    wait_for(lambda: threading.active_count() == before)
+
+
+def test_a_fork_plays_on(vector):
+    def played():
+        vector.reset(seed=0)
+        vector.step(zeros(vector))
+        return vector.step(zeros(vector))[0]["tracks"].tobytes()
+
+    here = played()
+    processes = multiprocessing.get_context("fork")
+    mine, theirs = processes.Pipe()
+    process = processes.Process(target=lambda: theirs.send(played()))
+    process.start()
+    assert mine.poll(60)
+    assert mine.recv() == here
+    process.join()
+
+
+def wait_for(holds, seconds=5.0):
+    end = time.monotonic() + seconds
+    while not holds() and time.monotonic() < end:
+        time.sleep(0.01)
+    assert holds()
