@@ -15,8 +15,8 @@ from care_sim.envs.spaces import checked_scores
 from care_sim.envs.wrappers.sector_actions import SectorReserve, SectorScores, sectors_space
 from care_sim.envs.wrappers.vector_grid_observation import VectorGridObservation
 from care_sim.envs.wrappers.vectors import AnyVector, WorldsWrapper, rig_of, shows_beliefs
-from care_sim.policies.learned.beliefs import Beliefs
 from care_sim.policies.learned.sector_choice import SectorChoice
+from care_sim.policies.learned.seen import Seen
 from care_sim.policies.learned.tiling import Tiling
 
 
@@ -27,7 +27,7 @@ class _VectorSectors(WorldsWrapper):
         self._rig = rig_of(env)
         super().__init__(env)
         self.sectors = Tiling(self._rig.grid, azimuths, elevations)
-        self._choice = SectorChoice(self._rig, self.sectors)
+        self._choice = SectorChoice(self._rig, self.sectors, self.num_envs)
         self.single_action_space = sectors_space(self.sectors)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
 
@@ -96,7 +96,7 @@ class VectorSectorReserve(_VectorSectors):
     def _look(self, observation: Any) -> None:
         # At once, for the reason that `SectorReserve` has.
         pictures = self._pictures
-        self.read = Beliefs.read(observation, self._rig) if pictures is None else pictures.beliefs
+        self.read = Seen.read(observation, self._rig) if pictures is None else pictures.seen
 
 
 class VectorSectorScores(_VectorSectors):

@@ -8,7 +8,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv, VectorWrapper
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.belief import OBSERVED
 from care_sim.core.rig import Rig
-from care_sim.policies.learned.beliefs import Beliefs
+from care_sim.policies.learned.seen import Seen
 
 AnyVector = VectorEnv[Any, Any, Any]
 
@@ -19,7 +19,7 @@ class WorldsWrapper(VectorWrapper[Any, Any, Any, Any, Any]):
     `read` is what it last read of the observation, if it hands that on as it is.
     """
 
-    read: Beliefs | None = None
+    read: Seen | None = None
 
     @property
     def autoreset_mode(self) -> AutoresetMode:

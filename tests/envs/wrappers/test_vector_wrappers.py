@@ -219,13 +219,13 @@ def test_wrong_actions_are_refused(wrapper):
 @pytest.mark.parametrize(
     ("spoil", "message"),
     [
-        (lambda seen: seen | {"ranges": seen["ranges"][:, :-1]}, "ranges of the observations"),
-        (lambda seen: seen | {"ego": seen["ego"] * np.nan}, "ego of an observation"),
+        (lambda seen: seen | {"ranges": seen["ranges"][:, :-1]}, "ranges of an observation"),
+        (lambda seen: seen | {"ego": seen["ego"] * np.nan}, "ego must hold numbers"),
         (lambda seen: seen | {"budget": seen["budget"] + 1}, "budget lie in"),
-        (lambda seen: seen | {"ranges": -1 - seen["ranges"]}, "ranges be numbers of 0 or more"),
+        (lambda seen: seen | {"ranges": -1 - seen["ranges"]}, "ranges must be numbers"),
         (lambda seen: seen | {"detections": np.full((WORLDS, 1, 9), 3.0)}, "of cameras 0 to"),
         (lambda seen: seen | {"tracks": np.full((WORLDS, 1, 13), 9.0)}, "tracks of an observ"),
-        (lambda seen: {"ego": seen["ego"]}, "an observation of CARE-Sim's environments"),
+        (lambda seen: {"ego": seen["ego"]}, "an observation of CARE-Sim"),
     ],
 )
 def test_an_observation_that_no_sensor_gives_is_refused(spoil, message):
