@@ -13,8 +13,8 @@ from care_sim.core.types import Action
 from care_sim.envs.sensing import sensing, shows_belief
 from care_sim.envs.spaces import checked_scores
 from care_sim.envs.wrappers.grid_observation import GridObservation
-from care_sim.policies.learned.beliefs import Beliefs
 from care_sim.policies.learned.sector_choice import SectorChoice
+from care_sim.policies.learned.seen import Seen
 from care_sim.policies.learned.tiling import Tiling
 
 
@@ -75,7 +75,7 @@ class SectorReserve(_Sectors):
     def __init__(self, env: gymnasium.Env[Any, Any], azimuths: int = 32, elevations: int = 4):
         super().__init__(env, azimuths, elevations)
         self._pictures = None if shows_belief(env) else _pictures_inside(env)
-        self._beliefs: Beliefs | None = None
+        self._seen: Seen | None = None
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -96,9 +96,9 @@ class SectorReserve(_Sectors):
     def action(self, action: NDArray[np.float32]) -> Action:
         """Scores (E, A) of the cells that the shared allocator takes."""
         scores = checked_scores(action, self.sectors.shape)
-        if self._beliefs is None:
+        if self._seen is None:
             raise gymnasium.error.ResetNeeded("call reset() before stepping")
-        cells: Action = self._choice.reserve(self._beliefs, scores[None])[0]
+        cells: Action = self._choice.reserve(self._seen, scores[None])[0].copy()
         return cells
 
     def _read(self, observation: Any) -> None:
@@ -106,7 +106,7 @@ class SectorReserve(_Sectors):
         # may write into it.
         pictures = self._pictures
         belief = self._rig.read(observation) if pictures is None else pictures.belief
-        self._beliefs = Beliefs.of(belief, self._rig)
+        self._seen = Seen.of(belief, self._rig)
 
 
 class SectorScores(_Sectors):
@@ -140,7 +140,7 @@ class SectorScores(_Sectors):
     def action(self, action: NDArray[np.float32]) -> Action:
         """Scores (E, A) of the cells that the shared allocator takes."""
         scores = checked_scores(action, self.sectors.shape)
-        cells: Action = self._choice.alone(scores[None])[0]
+        cells: Action = self._choice.alone(scores[None])[0].copy()
         return cells
 
 

@@ -13,8 +13,8 @@ from care_sim.core.arrays import Floats, Mask
 from care_sim.core.belief import OBSERVED, Observation
 from care_sim.envs.wrappers.grid_observation import GridArrays, GridObservation, pictures_space
 from care_sim.envs.wrappers.vectors import AnyVector, WorldsWrapper, rig_of, shows_beliefs
-from care_sim.policies.learned.beliefs import Beliefs
 from care_sim.policies.learned.grid_features import GridFeatures
+from care_sim.policies.learned.seen import Seen
 
 
 class VectorGridObservation(WorldsWrapper):
@@ -55,12 +55,12 @@ class VectorGridObservation(WorldsWrapper):
             )
         super().__init__(env)
         self.features = GridFeatures(self._rig, columns, rows)
-        self._given: Beliefs | None = None
+        self._given: Seen | None = None
         self.single_observation_space = pictures_space(self.features)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
 
     @property
-    def beliefs(self) -> Beliefs:
+    def seen(self) -> Seen:
         """What the pictures were last drawn of, for wrappers outside.
 
         Raises gymnasium.error.ResetNeeded before the first reset.
@@ -84,14 +84,16 @@ class VectorGridObservation(WorldsWrapper):
         return self._shown(observation), rewards, terminated, truncated, infos
 
     def _shown(self, observation: Observation) -> GridArrays:
-        self._given = Beliefs.read(observation, self._rig)
+        # What stands directly inside may have read the same.
+        read = self.env.read if isinstance(self.env, WorldsWrapper) else None
+        self._given = Seen.read(observation, self._rig) if read is None else read
         return self.features.of_all(self._given)
 
     def _finals(self, given: Sequence[Any]) -> NDArray[np.object_]:
         """(W,) pictures of the last observations of those worlds that have one, else None."""
         over = [world for world, last in enumerate(given) if last is not None]
         stacked = {name: np.stack([given[world][name] for world in over]) for name in OBSERVED}
-        drawn = self.features.of_all(Beliefs.read(stacked, self._rig))
+        drawn = self.features.of_all(Seen.read(stacked, self._rig))
         finals = np.full(len(given), None, object)
         for row, world in enumerate(over):
             finals[world] = {name: rows[row] for name, rows in drawn.items()}

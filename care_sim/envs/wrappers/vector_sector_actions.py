@@ -15,8 +15,8 @@ from care_sim.envs.spaces import checked_scores
 from care_sim.envs.wrappers.sector_actions import SectorReserve, SectorScores, sectors_space
 from care_sim.envs.wrappers.vector_grid_observation import VectorGridObservation
 from care_sim.envs.wrappers.vectors import AnyVector, WorldsWrapper, rig_of, shows_beliefs
-from care_sim.policies.learned.beliefs import Beliefs
 from care_sim.policies.learned.sector_choice import SectorChoice
+from care_sim.policies.learned.seen import Seen
 from care_sim.policies.learned.tiling import Tiling
 
 
@@ -27,7 +27,7 @@ class _VectorSectors(WorldsWrapper):
         self._rig = rig_of(env)
         super().__init__(env)
         self.sectors = Tiling(self._rig.grid, azimuths, elevations)
-        self._choice = SectorChoice(self._rig, self.sectors)
+        self._choice = SectorChoice(self._rig, self.sectors, self.num_envs)
         self.single_action_space = sectors_space(self.sectors)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
 
@@ -73,33 +73,30 @@ class VectorSectorReserve(_VectorSectors):
     def __init__(self, env: AnyVector, azimuths: int = 32, elevations: int = 4):
         super().__init__(env, azimuths, elevations)
         self._pictures = None if shows_beliefs(env) else _pictures_inside(env)
-        self._beliefs: Beliefs | None = None
 
     def reset(
         self, *, seed: Any = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         """Begin episodes."""
         observation, infos = self.env.reset(seed=seed, options=options)
-        self._read(observation)
+        self._look(observation)
         return observation, infos
 
     def step(self, actions: NDArray[np.float32]) -> tuple[Any, Floats, Mask, Mask, dict[str, Any]]:
         """As `VectorSectorReserve` says."""
         answer = super().step(actions)
-        self._read(answer[0])
+        self._look(answer[0])
         return answer
 
     def _cells(self, scores: NDArray[np.float32]) -> Action:
-        if self._beliefs is None:
+        if self.read is None:
             raise gymnasium.error.ResetNeeded("call reset() before stepping")
-        return self._choice.reserve(self._beliefs, scores)
+        return self._choice.reserve(self.read, scores)
 
-    def _read(self, observation: Any) -> None:
+    def _look(self, observation: Any) -> None:
         # At once, for the reason that `SectorReserve` has.
         pictures = self._pictures
-        self._beliefs = (
-            Beliefs.read(observation, self._rig) if pictures is None else pictures.beliefs
-        )
+        self.read = Seen.read(observation, self._rig) if pictures is None else pictures.seen
 
 
 class VectorSectorScores(_VectorSectors):

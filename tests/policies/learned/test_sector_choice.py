@@ -9,11 +9,12 @@ from care_sim.core.actions import scores_of
 from care_sim.core.allocation import allocate
 from care_sim.core.belief import Belief
 from care_sim.core.grid import AngularGrid
+from care_sim.core.residual import camera_layers
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES, Ego, ImageDetections, Tracks
-from care_sim.policies.learned.beliefs import Beliefs
 from care_sim.policies.learned.grid_features import GridFeatures
 from care_sim.policies.learned.sector_choice import SectorChoice
+from care_sim.policies.learned.seen import Seen
 from care_sim.policies.learned.tiling import Tiling, reserve_demand, sector_demand
 from care_sim.sensors.camera import FRONT_CAMERA
 
@@ -51,6 +52,7 @@ RIGS = {
     "3%": Rig(cameras=(FRONT_CAMERA,), budget=492),
     "no reserve": Rig(cameras=(FRONT_CAMERA,), budget=200, reserve_fraction=0.0),
     "ordered": Rig(cameras=(FRONT_CAMERA,), budget=492, cell_order="core-spread"),
+    "tilted": Rig(AngularGrid(pitch=0.05, roll=-0.02), (FRONT_CAMERA,), budget=492),
     "full": Rig(AngularGrid(columns=64, rows=8), (FRONT_CAMERA,), budget=512),
 }
 
@@ -61,14 +63,14 @@ def test_every_world_acts_and_sees_as_if_it_were_alone(name, seed, worlds):
     rng = np.random.default_rng(seed)
     rig = RIGS[name]
     sectors, features = Tiling(rig.grid, 32, 4), GridFeatures(rig, 32, 4)
-    choice = SectorChoice(rig, sectors)
+    choice = SectorChoice(rig, sectors, worlds)
     alone = [a_belief(rng, rig) for _ in range(worlds)]
     scores = np.round(rng.uniform(-1, 1, (worlds, 4, 32)), 1).astype(np.float32)
     scores[0] *= rng.integers(-1, 2)
 
-    together = Beliefs.read(stacked(alone), rig)
+    together = Seen.read(stacked(alone), rig)
     pictures = features.of_all(together)
-    reserved, only = choice.reserve(together, scores), choice.alone(scores)
+    reserved, only = choice.reserve(together, scores).copy(), choice.alone(scores)
     for world, belief in enumerate(alone):
         for drawn, rows in pictures.items():
             assert features(belief)[drawn].tobytes() == rows[world].tobytes()
@@ -84,9 +86,7 @@ def test_a_forecast_of_another_world_explains_nothing():
     rig = RIGS["3%"]
     rng = np.random.default_rng(0)
     beliefs = [a_belief(rng, rig) for _ in range(200)]
-    together = Beliefs.read(stacked(beliefs), rig)
-    ends = together.detection_ends
-    found = [Beliefs.of(belief, rig).explained.tolist() for belief in beliefs]
-    assert np.concatenate(found).tolist() == together.explained.tolist()
-    assert together.explained.any()
-    assert ends[-1] == len(together.explained)
+    _, explained = Seen.read(stacked(beliefs), rig).camera_layers
+    alone = [len(camera_layers(belief, rig)[1]) for belief in beliefs]
+    assert explained.counts.tolist() == alone
+    assert explained.counts.any()
