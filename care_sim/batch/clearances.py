@@ -5,6 +5,7 @@ bound that is no greater, and it is asked about those alone that matter.
 """
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -48,32 +49,47 @@ class Clearances:
         above `exact_below` may be a bound that is above it, too, and no greater than the clearance.
         """
         rows = np.arange(len(steps))[:, None]
-        bounds = self._bounds[rows, steps[:, None] - np.arange(count)].min(axis=1)
-        for world in np.flatnonzero(live & (bounds <= exact_below) & (bounds < np.inf)).tolist():
-            end = int(steps[world]) + 1
-            bounds[world] = self.least(world, end - count, end, exact_below)
-        return np.asarray(bounds)
+        recent = steps[:, None] - np.arange(count)
+        bounds = self._bounds[rows, recent]
+        order = np.argsort(bounds, axis=1)
+        recent, bounds = recent[rows, order], bounds[rows, order]
+        least: Floats = bounds[:, 0].copy()
+        asked = np.flatnonzero(live & (least <= exact_below) & (least < np.inf))
+        moments = zip(recent[asked].tolist(), bounds[asked].tolist(), strict=True)
+        least[asked] = [
+            self._least(world, *moment, exact_below)
+            for world, moment in zip(asked.tolist(), moments, strict=True)
+        ]
+        return least
 
-    def least(self, world: int, begin: int, end: int, exact_below: float = math.inf) -> float:
+    def least(self, world: int, begin: int, end: int) -> float:
         """The least clearance of a world from its step `begin` to the one before `end`."""
+        bounds = self._bounds[world, begin:end]
+        order = np.argsort(bounds)
+        return self._least(world, (begin + order).tolist(), bounds[order].tolist(), math.inf)
+
+    def _least(
+        self, world: int, steps: Sequence[int], bounds: Sequence[float], exact_below: float
+    ) -> float:
+        """The least clearance at some `steps`, whose `bounds` ascend."""
         # First the moment at which they could be nearest. Whoever was farther apart than what is
         # found by then need not be asked about.
         least = math.inf
-        bounds, known = self._bounds[world], self._known[world]
-        for step in (begin + np.argsort(bounds[begin:end], kind="stable")).tolist():
-            bound = float(bounds[step])
+        for step, bound in zip(steps, bounds, strict=True):
             if bound > least or bound == math.inf:
                 break
             if bound > exact_below:
                 return min(least, bound)
-            if math.isnan(known[step]):
-                known[step] = self._exact(world, step)
-            least = min(least, float(known[step]))
+            least = min(least, self._exact(world, step))
         return least
 
     def _exact(self, world: int, step: int) -> float:
+        known = float(self._known[world, step])
         pair = self._pairs[world]
-        return math.inf if pair is None else self._judge.clearance(pair, self._poses[world, step])
+        if math.isnan(known) and pair is not None:
+            known = self._judge.clearance(pair, self._poses[world, step].tolist())
+            self._known[world, step] = known
+        return known
 
 
 @compiled()

@@ -1,5 +1,6 @@
 """What the episodes of a batch leave behind for the scoring."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -48,11 +49,12 @@ class History:
         as many numbers.
         """
         columns = [table[:keyframes, world].tolist() for table in self._columns]
+        cells = np.zeros(self._columns.fired[:keyframes, world].max(), np.int64)
         return [
             Keyframe(
                 index=index,
                 time_s=one.time_s,
-                fired=np.broadcast_to(np.int64(0), one.fired),
+                fired=cells[: one.fired],
                 in_view=one.in_view,
                 detected=one.detected,
                 braking=one.braking,
@@ -60,7 +62,7 @@ class History:
                 distance_m=one.distance_m,
                 nearest_m=one.nearest_m,
                 clearance_m=one.clearance_m,
-                impact_speed_mps=None if np.isnan(one.impact_speed_mps) else one.impact_speed_mps,
+                impact_speed_mps=None if math.isnan(one.impact_speed_mps) else one.impact_speed_mps,
             )
             for index, one in enumerate(map(Records, *columns))
         ]

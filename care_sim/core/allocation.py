@@ -10,6 +10,7 @@ from itertools import accumulate
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from care_sim.base.checks import check_number, check_whole, is_number
 from care_sim.base.compiled import compiled
@@ -18,6 +19,7 @@ from care_sim.core.arrays import Integers, Mask
 from care_sim.core.cell_sets import CellSets, cell_indices
 from care_sim.core.grid import Cells
 from care_sim.core.types import Demand
+from care_sim.core.world_sets import WorldSets
 
 RESERVE_FRACTION = 0.3
 """rho, the share of the budget kept for the reserve (paper, Remark 2)."""
@@ -64,6 +66,34 @@ def allocate(
     if floor is None:
         return chosen
     return np.concatenate([chosen, _free(floor, chosen, budget - len(chosen))])
+
+
+class Allocator:
+    """Algorithm 1 for `worlds` worlds over a grid of so many `cells`, and the scores of what it
+    takes (`care_sim.core.actions.scores_of`), in one table that is used again.
+    """
+
+    def __init__(self, worlds: int, cells: int, reserve_fraction: float):
+        self._reserve_fraction = reserve_fraction
+        self._scores = np.zeros((worlds, cells), np.float32)
+        # Memory is taken for what is written alone.
+        self._chosen = np.empty((worlds, cells), np.int64)
+        self._counts = np.zeros(worlds, np.int64)
+
+    def scores(self, stages: Sequence[WorldSets], budgets: Integers) -> NDArray[np.float32]:
+        """(W, N) the scores of the cells that `allocate` chooses of each world's sets, those of
+        exploitation and of each layer in order, with the `budgets` (W,); read-only, and
+        overwritten by the next call.
+        """
+        sets = CellSets.joined([stage.sets for stage in stages])
+        counts = np.array([stage.counts for stage in stages])
+        limits = np.tile(budgets, (len(stages), 1))
+        limits[:1] = np.rint((1 - self._reserve_fraction) * budgets)
+        told = sets.cells, sets.sizes, counts, limits
+        _fill_worlds(*told, self._chosen, self._counts, self._scores)
+        shown = self._scores.view()
+        shown.flags.writeable = False
+        return shown
 
 
 def stages_of(demand: Demand) -> list[Sequence[Cells]]:
@@ -190,6 +220,45 @@ def _fill_stages(
         count = _round_robin(sets, open_sets, selection, count, limits[stage])
         first_set = end
     return chosen[:count]
+
+
+@compiled()
+def _fill_worlds(
+    cells: Cells,
+    sizes: Integers,
+    counts: Integers,
+    limits: Integers,
+    chosen: Cells,
+    chosen_counts: Integers,
+    scores: NDArray[np.float32],
+) -> None:
+    """Replace what is scored in `scores` (W, N) by what each world takes; see `Allocator`. Stage k
+    of world w has `counts[k, w]` sets and fills up to `limits[k, w]` cells in all.
+    """
+    ends = np.cumsum(sizes)
+    sets = _Sets(cells, ends - sizes, ends)
+    taken = np.zeros(scores.shape[1], np.bool_)
+    # The first set of every stage that is yet to be served; worlds follow each other in each.
+    firsts = counts.sum(axis=1)
+    firsts = np.cumsum(firsts) - firsts
+    for world in range(len(scores)):
+        own = chosen[world]
+        for cell in own[: chosen_counts[world]]:
+            scores[world, cell] = 0
+        count = 0
+        selection = _Selection(own, taken, 0)
+        for stage in range(len(counts)):
+            end = firsts[stage] + counts[stage, world]
+            open_sets = np.arange(firsts[stage], end)
+            count = _round_robin(sets, open_sets, selection, count, limits[stage, world])
+            firsts[stage] = end
+        chosen_counts[world] = count
+
+        # The arithmetic of `care_sim.core.actions.scores_of`, in float32 as there.
+        whole = np.float32(2 * max(count, 1))
+        for place in range(count):
+            scores[world, own[place]] = (whole - np.float32(place)) / whole
+            taken[own[place]] = False
 
 
 @compiled()

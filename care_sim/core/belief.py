@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from care_sim.base.checks import as_array
 from care_sim.base.errors import InvalidInput
-from care_sim.core.arrays import Floats
+from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.belief_kernels import BEYOND, NO_ROW, lie_between, read_rows
 from care_sim.core.types import CLASSES, Ego, ImageDetections, Tracks
 
@@ -22,6 +22,8 @@ OBSERVED = ("ego", "budget", "detections", "tracks", "ranges")
 HIGHEST = 2.0**24
 """No number of an observation is larger: the largest whole number that float32 holds beside all
 smaller ones."""
+
+_ONE = np.ones(1, np.bool_)
 
 Observation = Mapping[str, NDArray[np.float32]]
 
@@ -56,7 +58,7 @@ class Belief:
             )
         ego = _vector(observation, "ego", 3)
         (budget,) = _vector(observation, "budget", 1)
-        ranges = _array(observation, "ranges", 2, None).astype(np.float32, copy=False)
+        ranges = array_of(observation, "ranges", 2, None).astype(np.float32, copy=False)
         if not ranges.size:
             raise InvalidInput("ranges of an observation must hold a cell at least")
         fits = lie_between(np.ascontiguousarray(ranges), 0.0, HIGHEST)
@@ -90,7 +92,7 @@ class Belief:
         }
 
 
-def _array(observation: Observation, key: str, axes: int, width: int | None) -> NDArray[Any]:
+def array_of(observation: Observation, key: str, axes: int, width: int | None) -> NDArray[Any]:
     """An array of an observation with so many axes, the last `width` long; None is any length.
     Raises InvalidInput for another shape or type.
     """
@@ -106,7 +108,7 @@ def _array(observation: Observation, key: str, axes: int, width: int | None) -> 
 
 def _vector(observation: Observation, key: str, size: int) -> list[float]:
     """A vector of an observation. Raises InvalidInput for what no sensor says."""
-    numbers: list[float] = _array(observation, key, 1, size).tolist()
+    numbers: list[float] = array_of(observation, key, 1, size).tolist()
     if not all(-HIGHEST <= number <= HIGHEST for number in numbers):
         raise _beyond(key)
     return numbers
@@ -114,14 +116,23 @@ def _vector(observation: Observation, key: str, size: int) -> list[float]:
 
 def _rows(observation: Observation, key: str, columns: Sequence[str]) -> Floats:
     """The rows of a table that are no padding, checked here once and for all. Raises InvalidInput
-    for rows that are neither padding nor of a known class, and for what no sensor says.
+    as `rows_of` does.
     """
-    table = _array(observation, key, 2, len(columns))
+    return rows_of(array_of(observation, key, 2, len(columns))[None], _ONE, key, columns)[0]
+
+
+def rows_of(
+    tables: NDArray[Any], wanted: Mask, key: str, columns: Sequence[str]
+) -> tuple[Floats, Integers]:
+    """The rows (n, k) that are no padding of those of the tables (W, m, k) that are `wanted` (W,),
+    and how many there are of each (W,). Raises InvalidInput for rows that are neither padding nor
+    of a known class, and for what no sensor says.
+    """
     # What an environment shows is compiled for; anything else is made the same first.
-    if table.dtype != np.float32:
-        table = table.astype(np.float64)
-    rows, verdict = read_rows(
-        np.ascontiguousarray(table), columns.index("class"), len(CLASSES), HIGHEST
+    if tables.dtype != np.float32:
+        tables = tables.astype(np.float64)
+    rows, counts, verdict = read_rows(
+        np.ascontiguousarray(tables), wanted, columns.index("class"), len(CLASSES), HIGHEST
     )
     if verdict == BEYOND:
         raise _beyond(key)
@@ -130,8 +141,7 @@ def _rows(observation: Observation, key: str, columns: Sequence[str]) -> Floats:
             f"{key} of an observation: a row must begin with a whole number, -1 where it is"
             f" padding, and be of a class 0 to {len(CLASSES) - 1}"
         )
-    read: Floats = rows
-    return read
+    return rows, counts
 
 
 def _beyond(key: str) -> InvalidInput:

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.compiled import compiled
-from care_sim.core.arrays import Floats, Integers
+from care_sim.core.arrays import Floats, Integers, Mask
 
 SOUND, BEYOND, NO_ROW = range(3)
 """What the rows of a table can be: in order; with a number beyond the bound, or NaN; neither
@@ -13,31 +13,45 @@ padding nor of a known class."""
 
 @compiled()
 def read_rows(
-    table: NDArray[np.floating], label: int, labels: int, highest: float
-) -> tuple[Floats, int]:
-    """The rows (n, k) of a table (m, k) that do not begin with -1, which is padding, and whether
-    they are `SOUND`.
+    tables: NDArray[np.floating], wanted: Mask, label: int, labels: int, highest: float
+) -> tuple[Floats, Integers, int]:
+    """The rows (n, k) of those of the tables (W, m, k) that are `wanted` (W,) which do not begin
+    with -1, which is padding, table after table; how many there are of each (W,); and whether they
+    are `SOUND`.
 
     Numbers go up to `highest`. Rows begin with a whole number of 0 or more, and have a class below
     `labels` in the column `label`.
     """
-    rows = np.empty(table.shape)
+    counts = np.zeros(len(tables), np.int64)
+    for w in range(len(tables)):
+        if wanted[w]:
+            for m in range(tables.shape[1]):
+                counts[w] += tables[w, m, 0] != -1
+
+    rows = np.empty((counts.sum(), tables.shape[2]))
     verdict = SOUND
-    count = 0
-    for m in range(len(table)):
-        if table[m, 0] == -1:
-            continue
-        for k in range(table.shape[1]):
-            number = np.float64(table[m, k])
-            rows[count, k] = number
-            if not -highest <= number <= highest:
-                verdict = BEYOND
-        lead, own = rows[count, 0], rows[count, label]
-        known = lead >= 0 and lead == np.floor(lead) and 0 <= own < labels and own == np.floor(own)
-        if not known and verdict == SOUND:
-            verdict = NO_ROW
-        count += 1
-    return rows[:count].copy(), verdict
+    n = 0
+    for w in range(len(tables)):
+        end, m = n + counts[w], 0
+        while n < end:
+            if tables[w, m, 0] != -1:
+                for k in range(tables.shape[2]):
+                    rows[n, k] = tables[w, m, k]
+                verdict = _worse(verdict, rows[n], label, labels, highest)
+                n += 1
+            m += 1
+    return rows, counts, verdict
+
+
+@compiled()
+def _worse(verdict: int, row: Floats, label: int, labels: int, highest: float) -> int:
+    """The verdict on the rows so far, and one more; a number beyond the bound is the worst."""
+    for number in row:
+        if not -highest <= number <= highest:
+            return BEYOND
+    lead, own = row[0], row[label]
+    known = lead >= 0 and lead == np.floor(lead) and 0 <= own < labels and own == np.floor(own)
+    return verdict if known or verdict == BEYOND else NO_ROW
 
 
 @compiled()

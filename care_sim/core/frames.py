@@ -27,7 +27,7 @@ def turned(vectors: Floats, yaw: float | Floats) -> Floats:
     if not isinstance(yaw, np.ndarray):
         table = np.ascontiguousarray(vectors, dtype=float)
         turn = float(cos), float(sin)
-        return _turned_alike(table.reshape(-1, table.shape[-1]), turn).reshape(table.shape)
+        return turned_alike(table.reshape(-1, table.shape[-1]), turn).reshape(table.shape)
     result: Floats = np.array(vectors, dtype=float)
     x, y = vectors[..., 0], vectors[..., 1]
     result[..., 0] = cos * x - sin * y
@@ -36,7 +36,7 @@ def turned(vectors: Floats, yaw: float | Floats) -> Floats:
 
 
 @compiled()
-def _turned_alike(vectors: Floats, turn: tuple[float, float]) -> Floats:
+def turned_alike(vectors: Floats, turn: tuple[float, float]) -> Floats:
     """Vectors (n, k) turned by the angle with this cosine and sine; see `turned`."""
     result = vectors.copy()
     cos, sin = turn

@@ -7,11 +7,13 @@ import numpy as np
 from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.belief import Belief
+from care_sim.core.beliefs import Beliefs
 from care_sim.core.cell_sets import CellSets
 from care_sim.core.frames import turned
 from care_sim.core.pinhole_kernels import CameraModels, box_rays, model_of, pixel
 from care_sim.core.rig import Rig
 from care_sim.core.types import ImageDetections, Tracks
+from care_sim.core.world_sets import WorldSets, kept_of_each
 
 
 def camera_layers(belief: Belief, rig: Rig) -> tuple[CellSets, CellSets]:
@@ -19,15 +21,27 @@ def camera_layers(belief: Belief, rig: Rig) -> tuple[CellSets, CellSets]:
 
     Both are in the order of the detections.
     """
-    every = wedges(belief.detections, rig)
-    known = explained(belief.detections, belief.tracks, rig)
-    return every.take(~known), every.take(known)
+    unexplained, known = camera_layers_of(Beliefs.of(belief), rig)
+    return unexplained.sets, known.sets
 
 
 def unexplained_layer(belief: Belief, rig: Rig) -> CellSets:
     """U of Algorithm 2 alone, the reserve layer of CARE; nothing is laid for what is explained."""
-    known = explained(belief.detections, belief.tracks, rig)
-    return wedges(belief.detections.take(~known), rig)
+    return unexplained_layer_of(Beliefs.of(belief), rig).sets
+
+
+def camera_layers_of(beliefs: Beliefs, rig: Rig) -> tuple[WorldSets, WorldSets]:
+    """`camera_layers` of several worlds."""
+    every = WorldSets(wedges(beliefs.detections, rig), beliefs.detected)
+    known = _explaining(beliefs, rig) >= 0
+    return every.take(~known), every.take(known)
+
+
+def unexplained_layer_of(beliefs: Beliefs, rig: Rig) -> WorldSets:
+    """`unexplained_layer` of several worlds."""
+    new = _explaining(beliefs, rig) < 0
+    counts = kept_of_each(new, beliefs.detected)
+    return WorldSets(wedges(beliefs.detections.take(new), rig), counts)
 
 
 def explained(detections: ImageDetections, tracks: Tracks, rig: Rig) -> Mask:
@@ -42,6 +56,13 @@ def explaining_tracks(detections: ImageDetections, tracks: Tracks, rig: Rig) -> 
     Matching uses the full forecasts, never hulls that forgetting has shrunk. Raises IndexError for
     a detection of a camera that the rig does not have.
     """
+    counts = np.array([len(detections), len(tracks)])
+    return _explaining(Beliefs(detections, tracks, counts[:1], counts[1:], counts[:0]), rig)
+
+
+def _explaining(beliefs: Beliefs, rig: Rig) -> Integers:
+    """`explaining_tracks` of several worlds: a row is that among the forecasts of all."""
+    detections, tracks = beliefs.detections, beliefs.tracks
     if not len(detections):
         return np.zeros(0, np.int64)
     # One layout of all arrays, so that compiled code is compiled once.
@@ -52,6 +73,8 @@ def explaining_tracks(detections: ImageDetections, tracks: Tracks, rig: Rig) -> 
         np.ascontiguousarray(detections.yaw_changes),
         np.ascontiguousarray(tracks.boxes[:, :3]),
         np.ascontiguousarray(tracks.classes),
+        beliefs.detected,
+        beliefs.tracked,
         rig.camera_models,
     )
 
@@ -103,26 +126,37 @@ def _first_explaining(
     yaw_changes: Floats,
     centres: Floats,
     labels: Integers,
+    detected: Integers,
+    tracked: Integers,
     models: CameraModels,
 ) -> Integers:
     """Eq. 2: (n,) the row of the first forecast of the class of each detection whose centre lies in
     its image box, -1 without one.
 
     Detections are image `boxes` (n, 4) with their `classes`, `cameras` and `yaw_changes` since
-    their pictures. Forecasts are `centres` (m, 3) with their classes, `labels`.
+    their pictures. Forecasts are `centres` (m, 3) with their classes, `labels`. World after world
+    has so many `detected` (W,) and `tracked` (W,), and is matched by itself.
     """
     # Forecasts come nearest first, so the first match is the nearest one.
     found = np.full(len(boxes), -1)
-    for n, (left, top, right, bottom) in enumerate(boxes):
-        camera = model_of(models, cameras[n])
-        cos, sin = math.cos(yaw_changes[n]), math.sin(yaw_changes[n])
-        for m, (x, y, z) in enumerate(centres):
-            if labels[m] == classes[n]:
-                # The forecast is of now and the picture older: the centre is turned back to where
-                # the car's axes were then.
-                u, v, _ = pixel(cos * x - sin * y, sin * x + cos * y, z, camera)
-                # Behind the camera a pixel is NaN, which lies in no box.
-                if left <= u <= right and top <= v <= bottom:
-                    found[n] = m
-                    break
+    n = first = 0
+    for world in range(len(detected)):
+        last = n + detected[world]
+        end = first + tracked[world]
+        while n < last:
+            left, top, right, bottom = boxes[n]
+            camera = model_of(models, cameras[n])
+            cos, sin = math.cos(yaw_changes[n]), math.sin(yaw_changes[n])
+            for m in range(first, end):
+                if labels[m] == classes[n]:
+                    # The forecast is of now and the picture older: the centre is turned back to
+                    # where the car's axes were then.
+                    x, y, z = centres[m]
+                    u, v, _ = pixel(cos * x - sin * y, sin * x + cos * y, z, camera)
+                    # Behind the camera a pixel is NaN, which lies in no box.
+                    if left <= u <= right and top <= v <= bottom:
+                        found[n] = m
+                        break
+            n += 1
+        first = end
     return found

@@ -29,7 +29,7 @@ from care_sim.core.grid_stack import Grid, GridStack
 from care_sim.core.pinhole import PinholeCamera, camera_models
 from care_sim.core.pinhole_kernels import CameraModels
 from care_sim.core.return_settings import RAYS, FilmedReturns
-from care_sim.core.types import Demand
+from care_sim.core.types import Demand, ImageDetections
 
 LIDAR_X_M = -0.445
 """Of the LiDAR before the car's middle: LIDAR_TOP of nuScenes, 0.94 m before the rear axle of a
@@ -105,10 +105,14 @@ class Rig:
             raise InvalidInput(
                 f"ranges of an observation must be {self.grid.shape}, got {belief.ranges.shape}"
             )
-        count = len(self.cameras)
-        if not all(0 <= number < count for number in belief.detections.cameras.tolist()):
-            raise InvalidInput(f"detections of an observation must be of cameras 0 to {count - 1}")
+        self.check_cameras(belief.detections)
         return belief
+
+    def check_cameras(self, detections: ImageDetections) -> None:
+        """Raise InvalidInput for detections of other cameras."""
+        count = len(self.cameras)
+        if not all(0 <= number < count for number in detections.cameras.tolist()):
+            raise InvalidInput(f"detections of an observation must be of cameras 0 to {count - 1}")
 
     @cached_property
     def hardware(self) -> Hardware:

@@ -33,7 +33,7 @@ def observation_space(rig: Rig) -> spaces.Space[Any]:
     )
 
 
-def checked_scores(action: NDArray[np.floating], shape: tuple[int, int]) -> NDArray[np.float32]:
+def checked_scores(action: NDArray[np.floating], shape: tuple[int, ...]) -> NDArray[np.float32]:
     """The action as float32 scores; a boolean mask is one too. Raises InvalidInput otherwise."""
     scores = as_array("action", action)
     if scores.shape != shape:

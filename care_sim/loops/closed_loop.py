@@ -286,7 +286,7 @@ class ClosedLoop:
 
     def _photograph(self, camera: PinholeCamera, sensor: Frame, boxes: Floats) -> Picture:
         window = window_on(camera, boxes)
-        return Picture.of(self._engine.body_ids(camera, sensor, window), window)
+        return Picture.listed(self._engine.visible_boxes(camera, sensor, window))
 
     def _range_image(self, scan: Scan) -> NDArray[np.float32]:
         grid = self.rig.grid

@@ -16,6 +16,9 @@ from care_sim.core.conditions import MIN_RETURNS
 from care_sim.core.types import Detections
 from care_sim.sensors.annotated import Annotations, Cloud
 
+_WIDEST = 4096
+"""Hits are counted by body id in tables that are no wider."""
+
 
 class ReturnsRule:
     """Every reported body hit by at least `min_returns` fired rays is detected, with its true box.
@@ -60,13 +63,25 @@ def _hit_often(bodies: Integers, hits: Integers, least: int) -> tuple[Integers, 
 def count_hits(bodies: Integers, hits: Integers) -> Integers:
     """(n,) how often each of `bodies` (n,), ascending ids, is among the `hits`."""
     counts = np.zeros(len(bodies), np.int64)
-    row = 0
-    for hit in hits:
-        # Neighbouring rays mostly hit the same body.
-        if row == len(bodies) or bodies[row] != hit:
-            row = np.searchsorted(bodies, hit)
-        if row < len(bodies) and bodies[row] == hit:
-            counts[row] += 1
+    if len(bodies) == 0:
+        return counts
+    first = bodies[0]
+    span = bodies[-1] - first + 1
+    if span > _WIDEST:
+        # Places among the bodies stand for numbers that lie far apart.
+        at = np.searchsorted(bodies, hits)
+        known = bodies[np.minimum(at, len(bodies) - 1)] == hits
+        return count_hits(np.arange(len(bodies)), np.where(known, at, -1))
+
+    # Neighbouring rays mostly hit the same body, and to count it again waits for the count before:
+    # so they count in turn in one of four tables. Others count in the last column.
+    table = np.zeros((4, span + 1), np.int64)
+    for n in range(len(hits)):
+        place = hits[n] - first
+        table[n & 3, place if 0 <= place < span else span] += 1
+    for row in range(len(bodies)):
+        for k in range(4):
+            counts[row] += table[k, bodies[row] - first]
     return counts
 
 

@@ -2,9 +2,13 @@
 (`care_sim.policies.makers`).
 """
 
+from collections.abc import Mapping, Sequence
+from functools import partial
 from importlib.metadata import EntryPoint
+from typing import TypeAlias, overload
 
 import gymnasium
+import gymnasium.vector
 
 from care_sim.base.errors import BrokenPolicy, InvalidInput, MissingExtra, shown
 from care_sim.base.plugins import Plugins
@@ -42,6 +46,7 @@ from care_sim.policies.paper.history_uniform import HistoryUniform
 from care_sim.policies.paper.random import Random
 from care_sim.policies.paper.random_points import RandomPoints
 from care_sim.policies.paper.uncertainty import Uncertainty
+from care_sim.policies.vector import VectorPolicy, vector_policy
 
 __all__ = [
     "BUILT_IN",
@@ -54,6 +59,8 @@ __all__ = [
     "policy_names",
     "tags_of",
 ]
+
+_AnyEnv: TypeAlias = gymnasium.Env | gymnasium.vector.VectorEnv
 
 BUILT_IN: dict[str, PolicyMaker | EntryPoint] = {
     policy.name: policy
@@ -144,13 +151,20 @@ def is_pattern(name: str) -> bool:
         return False
 
 
-def make_policy(name: str, env: gymnasium.Env, /, **parameters: object) -> Policy:
-    """A policy for an environment of CARE-Sim. A privileged one is handed the truth, the others the
-    rig alone.
+@overload
+def make_policy(
+    name: str, env: gymnasium.vector.VectorEnv, /, **parameters: object
+) -> VectorPolicy: ...
+@overload
+def make_policy(name: str, env: gymnasium.Env, /, **parameters: object) -> Policy: ...
+def make_policy(name: str, env: _AnyEnv, /, **parameters: object) -> Policy | VectorPolicy:
+    """A policy for an environment of CARE-Sim, or one for all worlds of a vector environment. A
+    privileged one is handed the truth, the others the rig alone.
 
     Raises InvalidInput for an unknown name or parameter, a value that the policy does not allow, an
-    environment without a rig, or one behind wrappers that change what is seen or done; BrokenPolicy
-    for one that cannot be loaded or made; MissingExtra for one whose library is not installed.
+    environment without a rig, one behind wrappers that change what is seen or done, or a privileged
+    policy for many worlds; BrokenPolicy for one that cannot be loaded or made; MissingExtra for one
+    whose library is not installed.
     """
     check_policy(name)
     try:
@@ -162,9 +176,24 @@ def make_policy(name: str, env: gymnasium.Env, /, **parameters: object) -> Polic
     _check_unwrapped(name, env)
     check_parameters(name, make, parameters)
     if is_privileged(make):
+        if isinstance(env, gymnasium.vector.VectorEnv):
+            raise InvalidInput(
+                f"policy {name} is handed the truth of one world: it plays a single environment, "
+                "no vector of them"
+            )
         given.append(_of_environment(name, env, "truth"))
     for parameter, attribute in getattr(make, "told", Policy.told).items():
         parameters.setdefault(parameter, getattr(env.unwrapped, attribute, None))
+    made = partial(_made, name, make, given, parameters)
+    if isinstance(env, gymnasium.vector.VectorEnv):
+        return vector_policy(made, env.num_envs)
+    return made()
+
+
+def _made(
+    name: str, make: PolicyMaker, given: Sequence[object], parameters: Mapping[str, object]
+) -> Policy:
+    """What `make` makes. Raises BrokenPolicy for what is no policy."""
     # Whatever else somebody's code raises is a fault of the policy and named as such.
     try:
         policy = make(*given, **parameters)
@@ -185,7 +214,7 @@ def maker(name: str) -> PolicyMaker:
     return POLICIES.maker(name)
 
 
-def _check_unwrapped(name: str, env: gymnasium.Env) -> None:
+def _check_unwrapped(name: str, env: _AnyEnv) -> None:
     # Wrappers that leave both spaces as they are may stay: they watch, or count steps.
     inner = env.unwrapped
     if (env.observation_space, env.action_space) != (inner.observation_space, inner.action_space):
@@ -195,9 +224,12 @@ def _check_unwrapped(name: str, env: gymnasium.Env) -> None:
         )
 
 
-def _of_environment(name: str, env: gymnasium.Env, attribute: str) -> object:
+def _of_environment(name: str, env: _AnyEnv, attribute: str) -> object:
+    # A vector environment has no door for what lies under wrappers but this one.
+    asked = env.unwrapped if isinstance(env, gymnasium.vector.VectorEnv) else env
+    get = getattr(asked, "get_wrapper_attr", partial(getattr, asked))
     try:
-        return env.get_wrapper_attr(attribute)
+        return get(attribute)
     except AttributeError as error:
         raise InvalidInput(
             f"policy {name} needs an environment of CARE-Sim with a {attribute}, got {shown(env)}"

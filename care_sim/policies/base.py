@@ -14,9 +14,11 @@ from care_sim.core.actions import scores_of
 from care_sim.core.allocation import allocate
 from care_sim.core.arrays import Integers
 from care_sim.core.belief import Belief, Observation
+from care_sim.core.beliefs import Beliefs
 from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
 from care_sim.core.types import Action, Demand
+from care_sim.core.world_sets import WorldSets
 from care_sim.loops.truth import Truth
 
 TAGS = ("causal", "privileged", "non-causal", "learned", "generator", "control")
@@ -103,6 +105,39 @@ class Policy(ABC):
             )
         possible: Integers = np.minimum(shots[cells], self.rig.hardware.most_shots)
         return possible
+
+
+class RowPolicy(Policy):
+    """A policy without a memory, whose idea goes by the rows of a belief alone: told once, for any
+    number of worlds. `care_sim.policies.vector` asks it for all worlds of a vector environment.
+    """
+
+    @abstractmethod
+    def stages(self, beliefs: Beliefs) -> list[WorldSets]:
+        """The sets of exploitation, then those of each reserve layer, of all worlds."""
+
+    def demand(self, belief: Belief) -> Demand:
+        """The stages of one world."""
+        exploitation, *layers = (stage.sets for stage in self.stages(Beliefs.of(belief)))
+        return Demand(exploitation, layers)
+
+    def hulls(self, beliefs: Beliefs) -> WorldSets:
+        """The hulls of all forecasts. The tracks of a belief come nearest first, and their hulls
+        keep that order.
+        """
+        return WorldSets(self.rig.hulls(beliefs.tracks.boxes), beliefs.tracked)
+
+
+class FixedPolicy(Policy):
+    """A policy that asks for the same at every keyframe, whatever is believed."""
+
+    @abstractmethod
+    def fixed(self, budget: int) -> Demand:
+        """What it asks for with a budget of so many cells."""
+
+    def demand(self, belief: Belief) -> Demand:
+        """The same at every keyframe."""
+        return self.fixed(belief.budget)
 
 
 class PrivilegedPolicy(Policy):

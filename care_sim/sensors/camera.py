@@ -17,7 +17,7 @@ from care_sim.sensors.camera_faults import Delay, Misses, mounted
 from care_sim.sensors.camera_kernels import reported_boxes, surest_first
 from care_sim.sensors.camera_profiles import PROFILES
 from care_sim.sensors.confidence import MIN_PIXELS
-from care_sim.sensors.engines.box_kernels import visible_boxes
+from care_sim.sensors.engines.box_kernels import boxes_of_window, visible_boxes
 from care_sim.sensors.false_boxes import FalseBoxes
 from care_sim.sensors.picture_timing import picture_timing
 from care_sim.sensors.profiled_detector import ProfiledDetector
@@ -56,12 +56,12 @@ class Picture:
         """Read the box of every body off a picture of ids (height, width), all of it or that of a
         window.
         """
-        # Pixels of a window are counted from its own corner, boxes from that of the picture.
-        table = visible_boxes(ids)
-        left, top = window[:2] if window is not None else (0, 0)
-        return cls(
-            table[:, 0], table[:, 1:5] + np.array([left, top, left, top], float), table[:, 5]
-        )
+        return cls.listed(visible_boxes(ids) if window is None else boxes_of_window(ids, window))
+
+    @classmethod
+    def listed(cls, table: Integers) -> "Picture":
+        """What a table of an engine's `visible_boxes` tells."""
+        return cls(table[:, 0], table[:, 1:5].astype(np.float64), table[:, 5])
 
     def shows(self, body: int) -> bool:
         """Whether enough of a body is visible for a box."""

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from care_sim.core.arrays import Floats, Mask
+from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.conditions import CameraFaults
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import ImageDetections
@@ -38,38 +38,49 @@ class Misses:
         faults = self._faults
         if not (faults.false_negative_rate or faults.false_negative_per_m):
             return np.zeros(len(ranges), bool)
-        rates = faults.false_negative_rate + faults.false_negative_per_m * ranges
-        rates = np.minimum(rates, 1.0)
+        rates = miss_rates(faults, ranges)
         # One draw per object decides all: whether it is missed, and at the start for how long.
         draws = self._rng.random(len(rates))
+        burst = faults.false_negative_burst
         if self._started:
-            self._continue(rates, draws)
+            self._lasting = later_bursts(self._lasting, rates, draws, burst)
         else:
-            self._start(rates, draws)
+            self._lasting = first_bursts(rates, draws, burst)
+        self._started = True
         missed = self._lasting > 0
         self._lasting -= missed
         return missed
 
-    def _start(self, rates: Floats, draws: Floats) -> None:
-        """The first keyframe shows the long run: an object is missed at its rate, and whoever is
-        missed is at any keyframe of its burst with equal chance.
-        """
-        burst = self._faults.false_negative_burst
-        hit = draws < rates
-        # A draw below the rate, divided by it, is again evenly distributed from 0 to 1.
-        share = np.divide(draws, rates, out=np.zeros_like(draws), where=hit)
-        served = np.floor(burst * share).astype(np.int64)
-        self._lasting = np.where(hit, burst - served, 0)
-        self._started = True
 
-    def _continue(self, rates: Floats, draws: Floats) -> None:
-        """Bursts begin among the objects that are in none."""
-        burst = self._faults.false_negative_burst
-        # With the chance p that a burst of L keyframes begins, (1 - p) / p keyframes without one
-        # lie between two bursts on the mean. The share of missed keyframes is
-        # L / (L + (1 - p) / p); it is the rate r for p = r / (L - (L - 1) r).
-        begins = (self._lasting == 0) & (draws < rates / (burst - (burst - 1) * rates))
-        self._lasting = np.where(begins, burst, self._lasting)
+def miss_rates(faults: CameraFaults, ranges: Floats) -> Floats:
+    """The share of keyframes at which objects so many metres away are missed, in any shape."""
+    rates = faults.false_negative_rate + faults.false_negative_per_m * ranges
+    return np.minimum(rates, 1.0)
+
+
+def first_bursts(rates: Floats, draws: Floats, burst: int) -> Integers:
+    """For how many keyframes, from the first on, objects are missed that have these rates and
+    draws. Arrays of one shape.
+
+    The first keyframe shows the long run: an object is missed at its rate, and whoever is missed is
+    at any keyframe of its burst with equal chance.
+    """
+    hit = draws < rates
+    # A draw below the rate, divided by it, is again evenly distributed from 0 to 1.
+    share = np.divide(draws, rates, out=np.zeros_like(draws), where=hit)
+    served = np.floor(burst * share).astype(np.int64)
+    return np.where(hit, burst - served, 0)
+
+
+def later_bursts(lasting: Integers, rates: Floats, draws: Floats, burst: int) -> Integers:
+    """The same at a later keyframe, before which they were missed for `lasting` more: bursts begin
+    among the objects that are in none.
+    """
+    # With the chance p that a burst of L keyframes begins, (1 - p) / p keyframes without one lie
+    # between two bursts on the mean. The share of missed keyframes is L / (L + (1 - p) / p); it is
+    # the rate r for p = r / (L - (L - 1) r).
+    begins = (lasting == 0) & (draws < rates / (burst - (burst - 1) * rates))
+    return np.where(begins, burst, lasting)
 
 
 class _SentPicture(NamedTuple):

@@ -51,9 +51,10 @@ class AgentConfig:
     seed: int = bounded(0, 0, LARGEST_INTEGER)
     """Seed of the first weights, the exploration and the training episodes."""
     environments: int = bounded(8, 1, 1024)
-    """Environments side by side."""
+    """Environments, or worlds, side by side."""
     processes: bool = False
-    """Give every environment a process of its own."""
+    """Give every environment a process of its own. Without it they are the worlds of one vector
+    environment for each budget, on a thread for every core; what is learned is the same."""
     threads: int = bounded(1, 1, 1024)
     """Threads of PyTorch."""
     learning_rate: float = bounded(1e-3, 1e-8, 1)

@@ -6,6 +6,7 @@ from itertools import cycle, islice
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 import care_sim
 from care_sim.base.checks import check_known
@@ -13,13 +14,19 @@ from care_sim.base.processes import following, starting
 from care_sim.envs import CLOSED_LOOP
 from care_sim.envs.wrappers.grid_observation import GridObservation
 from care_sim.envs.wrappers.sector_actions import SectorReserve, SectorScores
+from care_sim.envs.wrappers.vector_grid_observation import VectorGridObservation
+from care_sim.envs.wrappers.vector_sector_actions import VectorSectorReserve, VectorSectorScores
+from care_sim.envs.wrappers.vectors import AnyVector
 from care_sim.training.config import AgentConfig
-from care_sim.training.seeds import TrainingSeeds
+from care_sim.training.seeds import TrainingSeeds, VectorTrainingSeeds
 
 if TYPE_CHECKING:
     from stable_baselines3.common.vec_env import VecEnv
 
 ACTIONS = {wrapper.__name__: wrapper for wrapper in (SectorReserve, SectorScores)}
+VECTOR_ACTIONS = {
+    wrapper.single.__name__: wrapper for wrapper in (VectorSectorReserve, VectorSectorScores)
+}
 
 
 def plain(config: AgentConfig, budget: float | None = None) -> gymnasium.Env[Any, Any]:
@@ -30,13 +37,7 @@ def plain(config: AgentConfig, budget: float | None = None) -> gymnasium.Env[Any
     """
     known = care_sim.envs.IDS
     check_known("environment", config.env, known)
-    # Only the closed loop has a reward of weighted terms.
-    reward: dict[str, Any] = (
-        {"reward_weights": {"gain": config.gain}} if config.env in CLOSED_LOOP else {}
-    )
-    arguments = (
-        {"budget": config.budget[0] if budget is None else budget} | reward | config.arguments
-    )
+    arguments = _arguments(config, config.budget[0] if budget is None else budget)
     return gymnasium.make(f"care_sim:{config.env}", disable_env_checker=True, **arguments)
 
 
@@ -53,16 +54,55 @@ def training(config: AgentConfig, budget: float) -> gymnasium.Env[Any, Any]:
 
 def side_by_side(config: AgentConfig) -> "VecEnv":
     """The training environments as one vector, which reports episodes to the learner's log."""
-    from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv, VecMonitor
+    from stable_baselines3.common.vec_env import SubprocVecEnv, VecMonitor
 
+    from care_sim.training.vec_env import GymnasiumVecEnv
+
+    if not config.processes:
+        return VecMonitor(GymnasiumVecEnv(*many(config)))
     budgets = islice(cycle(config.budget), config.environments)
     makers: list[Callable[[], gymnasium.Env[Any, Any]]] = [
         partial(training, config, budget) for budget in budgets
     ]
-    if config.processes:
-        # Spawned, not forked: PyTorch has threads by now, and a fork copies their locks.
-        with starting():
-            return VecMonitor(
-                SubprocVecEnv([partial(following, maker) for maker in makers], start_method="spawn")
-            )
-    return VecMonitor(DummyVecEnv(makers))
+    # Spawned, not forked: PyTorch has threads by now, and a fork copies their locks.
+    with starting():
+        return VecMonitor(
+            SubprocVecEnv([partial(following, maker) for maker in makers], start_method="spawn")
+        )
+
+
+def many(config: AgentConfig) -> list[AnyVector]:
+    """The training environments as vector environments, one for each budget: together, one world of
+    each in turn, they are as many as `training` makes one by one.
+    """
+    vectors = list[AnyVector]()
+    wrapper = VECTOR_ACTIONS[config.action]
+    for place, budget in enumerate(config.budget):
+        worlds = len(range(config.environments)[place :: len(config.budget)])
+        seeded = VectorTrainingSeeds(_plain_vector(config, budget, worlds), config.seed)
+        acting = wrapper(seeded, config.azimuths, config.elevations)
+        vectors.append(VectorGridObservation(acting, config.columns, config.rows))
+    return vectors
+
+
+def _plain_vector(config: AgentConfig, budget: float, worlds: int) -> AnyVector:
+    # The pictures that learners see are drawn at once, and need no copies of what they show.
+    if config.env in CLOSED_LOOP:
+        return gymnasium.make_vec(
+            f"care_sim:{config.env}",
+            worlds,
+            "vector_entry_point",
+            autoreset_mode=AutoresetMode.DISABLED,
+            copy=False,
+            **_arguments(config, budget),
+        )
+    makers = [partial(plain, config, budget)] * worlds
+    return SyncVectorEnv(makers, copy=False, autoreset_mode=AutoresetMode.DISABLED)
+
+
+def _arguments(config: AgentConfig, budget: float) -> dict[str, Any]:
+    # Only the closed loop has a reward of weighted terms.
+    reward: dict[str, Any] = (
+        {"reward_weights": {"gain": config.gain}} if config.env in CLOSED_LOOP else {}
+    )
+    return {"budget": budget} | reward | config.arguments

@@ -4,9 +4,12 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+from gymnasium.vector import AutoresetMode, VectorEnv
 
-from care_sim.base.errors import InvalidInput
+from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.seed_ranges import LAST, TRAINING, VALIDATION
+from care_sim.envs.vector.same_step import last_rows, same_step
+from care_sim.envs.wrappers.vectors import WorldsWrapper
 
 
 class TrainingSeeds(gymnasium.Wrapper[Any, Any, Any, Any]):
@@ -20,16 +23,80 @@ class TrainingSeeds(gymnasium.Wrapper[Any, Any, Any, Any]):
 
     def __init__(self, env: gymnasium.Env[Any, Any], learner: int = 0):
         super().__init__(env)
-        self._learner = learner
-        self._rng = np.random.default_rng()
+        self._seeds = _Sequence(learner)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         """Begin the next episode."""
+        return self.env.reset(seed=self._seeds.next(seed), options=options)
+
+
+class VectorTrainingSeeds(WorldsWrapper):
+    """`TrainingSeeds` over a vector environment in the mode "Disabled". It begins the episodes
+    itself, and so is in the mode "SameStep".
+
+    Raises InvalidInput for another mode, and for a mask of worlds that are to be reset.
+    """
+
+    single = TrainingSeeds
+
+    def __init__(self, env: VectorEnv[Any, Any, Any], learner: int = 0):
+        super().__init__(env)
+        if env.metadata.get("autoreset_mode") != AutoresetMode.DISABLED:
+            raise InvalidInput("autoreset_mode must be Disabled for VectorTrainingSeeds")
+        self.metadata = {**env.metadata, "autoreset_mode": AutoresetMode.SAME_STEP}
+        self._seeds = [_Sequence(learner) for _ in range(self.num_envs)]
+
+    def reset(
+        self, *, seed: Any = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Begin the next episode in every world; `seed` is one number, to which world i adds i, or
+        a list of one each.
+        """
+        if options:
+            raise InvalidInput(f"reset takes no options, got {shown(options)}")
+        given = (
+            [seed] * self.num_envs
+            if seed is None
+            else [seed + world for world in range(self.num_envs)]
+            if isinstance(seed, int | np.integer)
+            else [*seed]
+        )
+        drawn = [own.next(one) for own, one in zip(self._seeds, given, strict=True)]
+        return self.env.reset(seed=drawn)  # type: ignore[arg-type]
+
+    def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
+        """Go on to the next keyframe; where an episode ends, the next one begins."""
+        observation, rewards, terminated, truncated, infos = self.env.step(actions)
+        over = terminated | truncated
+        if over.any():
+            # Before the reset, which may write over them.
+            last = last_rows(observation, over)
+            drawn = [
+                own.next() if ends else None
+                for own, ends in zip(self._seeds, over.tolist(), strict=True)
+            ]
+            observation, begun = self.env.reset(
+                seed=drawn,  # type: ignore[arg-type]
+                options={"reset_mask": over.copy()},
+            )
+            infos = same_step(infos, begun, last, over)
+        return observation, rewards, terminated, truncated, infos
+
+
+class _Sequence:
+    """The training seeds of one world."""
+
+    def __init__(self, learner: int):
+        self._learner = learner
+        self._rng = np.random.default_rng()
+
+    def next(self, seed: int | None = None) -> int:
+        """The next one; with a `seed` the first of another sequence."""
         if seed is not None:
             self._rng = np.random.default_rng((seed, self._learner))
-        return self.env.reset(seed=int(self._rng.integers(TRAINING, LAST)), options=options)
+        return int(self._rng.integers(TRAINING, LAST))
 
 
 def validation_seeds(episodes: int) -> range:

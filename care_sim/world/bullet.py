@@ -86,11 +86,6 @@ class BulletWorld:
         stand_at(self.primitives.poses, bodies, poses, np.sin(half), np.cos(half))
         self._bodies.moved(bodies.tolist())
 
-    def put(self, bodies: Sequence[int], poses: Floats) -> None:
-        """Put bodies (n,) at `poses` (n, 7), as `Primitives.poses` has them."""
-        self.primitives.poses[[*bodies]] = poses
-        self._bodies.moved(bodies)
-
     @contextmanager
     def placed(self, poses: Floats) -> Iterator[None]:
         """While it lasts, the bodies at `poses` (m, 7) in the place of `primitives.poses`."""
@@ -164,9 +159,8 @@ class BulletWorld:
         """Smallest distance between two hulls, metres; negative when they overlap, inf beyond
         `within`.
         """
-        numbers = self._bodies.tell([body, other], self.primitives.poses)
-        points = pybullet.getClosestPoints(*numbers, within, physicsClientId=self._client.number)
-        return float(min((point[8] for point in points), default=np.inf))
+        own, others = self._bodies.tell([body, other], self.primitives.poses)
+        return self._bodies.clearance(own, others, within)
 
     def _render(self, camera: PinholeCamera, sensor: Frame, window: PixelWindow) -> tuple[Any, ...]:
         self._bodies.tell_all(self.primitives.poses)

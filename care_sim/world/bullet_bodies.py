@@ -73,19 +73,35 @@ class BulletBodies:
         ids[list(self._numbers.values())] = list(self._numbers)
         return np.asarray(ids[numbers])
 
+    def put(self, body: int, pose: Sequence[float]) -> int:
+        """Let PyBullet know of a body, and that it is at `pose`: x, y, z and the quaternion x, y,
+        z, w. Its number of it.
+        """
+        if body in self._unmade:
+            self._numbers[body] = self._make(self._unmade.pop(body))
+        number = self._numbers[body]
+        pybullet.resetBasePositionAndOrientation(
+            number, pose[:3], pose[3:], physicsClientId=self._client.number
+        )
+        self._moved.discard(body)
+        return number
+
+    def clearance(self, number: int, other: int, within: float) -> float:
+        """Smallest distance between two hulls where PyBullet has them, by its numbers; see
+        `care_sim.world.bullet.BulletWorld.clearance`.
+        """
+        points = pybullet.getClosestPoints(
+            number, other, within, physicsClientId=self._client.number
+        )
+        return float(min((point[8] for point in points), default=np.inf))
+
     def _tell(self, moved: Iterable[int], poses: Floats) -> None:
         if self._ground and 0 not in self._numbers:
             self._numbers[0] = self._make_ground()
         # A copy: `moved` may be the very set that shrinks here. In the order of ids, so that what
         # PyBullet holds depends on no order of a set.
         for body in sorted(moved):
-            if body in self._unmade:
-                self._numbers[body] = self._make(self._unmade.pop(body))
-            pose = poses[body].tolist()
-            pybullet.resetBasePositionAndOrientation(
-                self._numbers[body], pose[:3], pose[3:], physicsClientId=self._client.number
-            )
-            self._moved.discard(body)
+            self.put(body, poses[body].tolist())
 
     def _make(self, body: _Unmade) -> int:
         # Mass 0: bodies stand where they are put, and nothing ever falls or is pushed.

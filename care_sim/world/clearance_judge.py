@@ -1,8 +1,10 @@
 """How far bodies of any world are apart, asked of one client of PyBullet for them all."""
 
-from care_sim.core.arrays import Floats
+from collections.abc import Sequence
+
 from care_sim.world.bodies import BodyKind
-from care_sim.world.bullet import BulletWorld
+from care_sim.world.bullet_bodies import OPAQUE, BulletBodies
+from care_sim.world.bullet_clients import LentClient
 
 
 class ClearanceJudge:
@@ -11,7 +13,8 @@ class ClearanceJudge:
     """
 
     def __init__(self) -> None:
-        self._bullet = BulletWorld(ground=False)
+        self._client = LentClient()
+        self._bodies = BulletBodies(self._client, ground=False)
         self._egos: dict[BodyKind, int] = {}
         self._others: dict[BodyKind, int] = {}
 
@@ -19,18 +22,20 @@ class ClearanceJudge:
         """The bodies that stand in for an ego of one kind and another body of the other."""
         return self._known(self._egos, ego), self._known(self._others, other)
 
-    def clearance(self, bodies: tuple[int, int], poses: Floats, within: float = 100.0) -> float:
-        """Smallest distance between the hulls of two stand-ins at `poses` (2, 7) as in
-        `Primitives.poses`, metres; negative when they overlap, inf beyond `within`.
+    def clearance(
+        self, bodies: tuple[int, int], poses: Sequence[Sequence[float]], within: float = 100.0
+    ) -> float:
+        """Smallest distance between the hulls of two stand-ins at `poses`, of each its seven
+        numbers as in `Primitives.poses`, metres; negative when they overlap, inf beyond `within`.
         """
-        self._bullet.put(bodies, poses)
-        return self._bullet.clearance(*bodies, within)
+        ego, other = map(self._bodies.put, bodies, poses)
+        return self._bodies.clearance(ego, other, within)
 
     def close(self) -> None:
         """Free the simulator."""
-        self._bullet.close()
+        self._client.close()
 
     def _known(self, bodies: dict[BodyKind, int], kind: BodyKind) -> int:
         if kind not in bodies:
-            bodies[kind] = self._bullet.add(kind, (0.0, 0.0, 0.0))
+            bodies[kind] = self._bodies.add(kind.parts, (), OPAQUE)
         return bodies[kind]

@@ -1,6 +1,7 @@
 """A person on foot: waits, then runs straight until the way is done."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -44,8 +45,9 @@ class Walk:
     def pose(self, time: float) -> Pose:
         """Pose at `time`."""
         way = self.covered(time)
-        return (
-            self.start[0] + way * float(np.cos(self.heading)),
-            self.start[1] + way * float(np.sin(self.heading)),
-            self.heading,
-        )
+        cos, sin = self._direction
+        return self.start[0] + way * cos, self.start[1] + way * sin, self.heading
+
+    @cached_property
+    def _direction(self) -> tuple[float, float]:
+        return float(np.cos(self.heading)), float(np.sin(self.heading))

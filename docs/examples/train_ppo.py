@@ -16,7 +16,7 @@ from torch.distributions import Normal
 from torch.nn.functional import pad
 
 import care_sim  # noqa: F401 (registers the environments)
-from care_sim.wrappers import GridObservation, SectorReserve
+from care_sim.wrappers import VectorGridObservation, VectorSectorReserve
 
 ENVIRONMENTS, ROLLOUT, UPDATES = 8, 128, 50
 EPOCHS, BATCH, CLIP = 4, 256, 0.2
@@ -61,12 +61,17 @@ class Agent(nn.Module):
         return Normal(scores, self.log_noise.exp()), self.worth(pooled).squeeze(1)
 
 
-def make_env() -> gym.Env:
-    """The dense street at 3% of the cells, rewarded for detecting as early as a full scan would."""
-    env = gym.make(
-        "CARE-Dense-v0", budget=0.03, reward_weights={"gain": 10.0}, disable_env_checker=True
+def make_envs() -> gym.vector.VectorEnv:
+    """Dense streets at 3% of the cells, rewarded for detecting as early as a full scan would."""
+    envs = gym.make_vec(
+        "CARE-Dense-v0",
+        num_envs=ENVIRONMENTS,
+        autoreset_mode="SameStep",
+        budget=0.03,
+        reward_weights={"gain": 10.0},
     )
-    return gym.wrappers.RecordEpisodeStatistics(GridObservation(SectorReserve(env)))
+    pictured = VectorGridObservation(VectorSectorReserve(envs))
+    return gym.wrappers.vector.RecordEpisodeStatistics(pictured)
 
 
 def tensors(observation: dict[str, np.ndarray]) -> tuple[torch.Tensor, torch.Tensor]:
@@ -101,8 +106,7 @@ def main() -> None:
     torch.set_num_threads(1)
     agent = Agent()
     optimiser = torch.optim.Adam(agent.parameters(), lr=RATE)
-    same_step = gym.vector.AutoresetMode.SAME_STEP
-    envs = gym.vector.SyncVectorEnv([make_env] * ENVIRONMENTS, autoreset_mode=same_step)
+    envs = make_envs()
     observation, _ = envs.reset(seed=TRAINING_SEEDS)
     for update in range(UPDATES):
         steps, returns = [], []
@@ -127,8 +131,8 @@ def main() -> None:
                     value,
                 )
             )
-            if "final_info" in info:
-                returns += info["final_info"]["episode"]["r"][info["_final_info"]].tolist()
+            if "episode" in info:
+                returns += info["episode"]["r"][info["_episode"]].tolist()
         grid, ego, action, before, rewards, ends, values = (
             torch.stack(column) for column in zip(*steps, strict=True)
         )

@@ -1,6 +1,6 @@
 """Worlds in a batch move as each does alone, to the last bit."""
 
-from contextlib import ExitStack, closing
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -10,6 +10,10 @@ from care_sim.batch.motion import KNOWN_BELOW_M, Motion, steps_of
 from care_sim.batch.state import BatchState
 from care_sim.core.types import Ego
 from care_sim.scenarios import make_scenario
+from care_sim.world.bodies import CATALOGUE
+from care_sim.world.clearance_judge import ClearanceJudge
+from care_sim.world.traffic import Traffic
+from care_sim.world.world import World
 
 KEYFRAME_S = 0.1
 KEYFRAMES = 60
@@ -27,25 +31,32 @@ NOT_TOGETHER = {"cutin"}
 
 
 class Batch:
-    """Worlds of a scenario, moved in a batch, and their like, each moved alone."""
+    """Worlds, moved in a batch, and their like, each moved alone."""
 
-    def __init__(self, scenario, seeds):
-        self.state = BatchState(len(seeds))
-        self.motion = Motion(len(seeds), steps_of(KEYFRAMES * KEYFRAME_S, KEYFRAME_S))
-        self.alone = [None] * len(seeds)
-        self._scenario = scenario
-        for world, seed in enumerate(seeds):
-            self.begin(world, seed)
+    def __init__(self, *builds):
+        self.state = BatchState(len(builds))
+        self.motion = Motion(len(builds), steps_of(KEYFRAMES * KEYFRAME_S, KEYFRAME_S))
+        self.alone = [None] * len(builds)
+        for world, build in enumerate(builds):
+            self.begin(world, build)
 
-    def begin(self, world, seed):
+    def begin(self, world, build):
         if self.alone[world] is not None:
             self.alone[world].close()
-        self.alone[world], built = (
-            self._scenario.build(np.random.default_rng(seed)) for _ in range(2)
-        )
+        self.alone[world], built = build(), build()
         load(self.state, world, built)
         self.motion.begin(world, built)
         self.state.live[world] = True
+
+    def advance(self, accelerations):
+        """Move the worlds that are live, in the batch and alone; the passages."""
+        passages = self.motion.advance(self.state, accelerations, KEYFRAME_S)
+        for world in np.flatnonzero(self.state.live).tolist():
+            passage = self.alone[world].advance(float(accelerations[world]), KEYFRAME_S)
+            assert_passage(passages, world, passage)
+        for world in range(self.state.worlds):
+            self.assert_same(world)
+        return passages
 
     def assert_same(self, world):
         alone, state = self.alone[world], self.state
@@ -66,6 +77,11 @@ class Batch:
             world.close()
 
 
+def of(name, seed, **physics):
+    scenario = make_scenario(name, **physics)
+    return lambda: scenario.build(np.random.default_rng(seed))
+
+
 def assert_passage(passages, world, passage):
     assert passages.nearest_m[world] == passage.nearest_m
     assert passages.clearance_m[world] == passage.clearance_m
@@ -81,28 +97,51 @@ def test_worlds_move_as_alone_whatever_their_egos_do(name, physics):
     """Half of the worlds begin anew on the way, and not all are live at every keyframe."""
     rng = np.random.default_rng(5)
     worlds, hits = 8, 0
-    with closing(Batch(make_scenario(name, **physics), range(worlds))) as batch:
+    with closing(Batch(*(of(name, seed, **physics) for seed in range(worlds)))) as batch:
         assert len(batch.motion._by_itself) == (worlds if name in NOT_TOGETHER else 0)
         steady = np.arange(worlds) % 2 == 0
         for keyframe in range(KEYFRAMES):
             if keyframe == 25:
                 for world in range(0, worlds, 3):
-                    batch.begin(world, 100 + world)
+                    batch.begin(world, of(name, 100 + world, **physics))
             batch.state.live[:] = rng.random(worlds) < 0.95
-            accelerations = np.where(steady, 0.0, rng.uniform(-4.0, 3.5, worlds))
-            passages = batch.motion.advance(batch.state, accelerations, KEYFRAME_S)
-            for world in np.flatnonzero(batch.state.live).tolist():
-                passage = batch.alone[world].advance(float(accelerations[world]), KEYFRAME_S)
-                assert_passage(passages, world, passage)
-                hits += passage.impact is not None
-            for world in range(worlds):
-                batch.assert_same(world)
+            passages = batch.advance(np.where(steady, 0.0, rng.uniform(-4.0, 3.5, worlds)))
+            hits += passages.hit[batch.state.live].sum()
     assert hits or physics is not COLLISION_COURSE
 
 
+def test_worlds_of_all_scenarios_take_turns_in_one_batch():
+    names = sorted({name for name, _ in SCENARIOS})
+    with closing(Batch(*(of(name, 7) for name in names))) as batch:
+        for turn in range(1, 4):
+            for _ in range(5):
+                batch.advance(np.linspace(-2.0, 1.0, len(names)))
+            for world in range(len(names)):
+                batch.begin(world, of(names[(world + turn) % len(names)], 20 + turn))
+
+
+@pytest.mark.parametrize(("gap_m", "hit"), [(0.01, False), (-0.01, True)])
+def test_only_a_contact_is_an_impact(gap_m, hit):
+    def street():
+        world = World(Traffic((1, -1), 0, 3.5, 14.0), ego_speed=10.0)
+        aside = (world.ego_kind.size[1] + CATALOGUE["bus"].size[1]) / 2 + gap_m
+        world.first_sighting = world.add("bus", "bus", (10.0, aside, 0.0))
+        return world
+
+    with closing(Batch(street)) as batch:
+        passages = [batch.advance(np.zeros(1)) for _ in range(10)]
+    assert any(passage.hit[0] for passage in passages) == hit
+    assert min(passage.clearance_m[0] for passage in passages) == pytest.approx(gap_m, abs=5e-3)
+
+
 @pytest.mark.parametrize("name", ["dartout", "cutin"])
-def test_clearances_that_are_put_off_are_settled_in_the_end(name):
-    with closing(Batch(make_scenario(name), range(4))) as batch:
+def test_clearances_that_are_put_off_are_settled_in_the_end(name, monkeypatch):
+    asked = []
+    exact_clearance = ClearanceJudge.clearance
+    monkeypatch.setattr(
+        ClearanceJudge, "clearance", lambda *its: asked.append(1) or exact_clearance(*its)
+    )
+    with closing(Batch(*(of(name, seed) for seed in range(4)))) as batch:
         clearances, bounds = [], []
         for _ in range(KEYFRAMES):
             passages = batch.motion.advance(batch.state, np.zeros(4), KEYFRAME_S, exact=False)
@@ -116,16 +155,26 @@ def test_clearances_that_are_put_off_are_settled_in_the_end(name):
             for begin in (0, 20, 55):
                 least = batch.motion.settle(world, since_s=begin * KEYFRAME_S)
                 assert least == exact[begin:, world].min()
+    assert len(asked) < exact.size
 
 
 def test_of_a_world_without_somebody_it_is_about_nothing_is_near():
-    with ExitStack() as stack:
-        batch = stack.enter_context(closing(Batch(make_scenario("dartout"), [3])))
-        built = make_scenario("dartout").build(np.random.default_rng(3))
-        stack.callback(built.close)
-        built.first_sighting = None
-        load(batch.state, 0, built)
-        batch.motion.begin(0, built)
-        passages = batch.motion.advance(batch.state, np.zeros(1), KEYFRAME_S)
+    def nobody():
+        world = of("dartout", 3)()
+        world.first_sighting = None
+        return world
+
+    with closing(Batch(of("dartout", 3))) as batch:
+        batch.advance(np.zeros(1))
+        batch.begin(0, nobody)
+        passages = batch.advance(np.zeros(1))
         assert (passages.nearest_m[0], passages.clearance_m[0]) == (np.inf, np.inf)
         assert batch.motion.settle(0) == np.inf
+
+
+@pytest.mark.parametrize(
+    ("duration_s", "keyframe_s", "steps"),
+    [(6.0, 0.1, 120), (6.0, 0.7, 126), (0.05, 1.0, 20), (10.0, 0.05, 200)],
+)
+def test_an_episode_ends_with_a_whole_keyframe(duration_s, keyframe_s, steps):
+    assert steps_of(duration_s, keyframe_s) == steps

@@ -3,7 +3,7 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import Sensing
-from care_sim.perception.proxy import ReturnsRule
+from care_sim.perception.proxy import ReturnsRule, count_hits
 
 LABELS = {4: 0, 9: 4}
 
@@ -45,3 +45,11 @@ def test_no_returns_no_detections():
 def test_an_impossible_threshold_is_refused_by_name(min_returns):
     with pytest.raises(InvalidInput, match="min_returns"):
         Sensing(min_returns=min_returns)
+
+
+@pytest.mark.parametrize("apart", [1, 3, 10**12])
+def test_bodies_are_counted_however_far_their_numbers_lie_apart(apart):
+    hits = np.random.default_rng(0).integers(-1, 9, 500) * apart
+    bodies = np.array([0, 2, 3, 7]) * apart
+    counts = count_hits(bodies, hits)
+    assert counts.tolist() == [np.count_nonzero(hits == body) for body in bodies]

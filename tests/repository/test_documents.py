@@ -29,7 +29,12 @@ from tests.helpers.pages import PAGES, README, SITE, fenced, links, name_of
 from tests.helpers.places import ROOT
 
 NOTEBOOK = ROOT / "docs" / "quickstart.ipynb"
-FURTHER = {"RecordVideo": "moviepy", "RecordRerun": "rerun", "import polars": "polars"}
+FURTHER = {
+    "RecordVideo": "moviepy",
+    "RecordRerun": "rerun",
+    "import polars": "polars",
+    "from torchrl": "torchrl",
+}
 """What a block names, and the library that it then needs beside the installation."""
 STRATUM_SUM = re.compile(r"[^/]+/[^/]+/(delay|events|found|frames|sighted)")
 """KIND/STRATUM/NAME, which a page explains in one line for all strata."""

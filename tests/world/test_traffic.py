@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from highway_env.road.lane import StraightLane
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -141,7 +142,7 @@ def as_highway_env_drives(monkeypatch, run):
     with monkeypatch.context() as patch:
         patch.setattr(traffic, "LaneDriver", traffic.IDMVehicle)
         patch.setattr(traffic, "StraightVehicle", traffic.Vehicle)
-        patch.setattr(traffic, "LaneAlongX", traffic.StraightLane)
+        patch.setattr(traffic, "LaneAlongX", StraightLane)
         patch.setattr(traffic.RoadVehicle, "forget_lane", lambda vehicle: None)
         return run()
 

@@ -12,6 +12,9 @@ from care_sim.core.firing.base import Floor, Hardware, ranked
 from care_sim.core.grid import Cells
 from care_sim.core.grid_stack import Grid
 
+_DIGIT = 11
+"""Bits that are counted at a time; three times as many hold every score."""
+
 
 class FreeCells(Hardware):
     """A sensor that aims every shot, in any order. The paper assumes it (Sec. 3)."""
@@ -110,16 +113,28 @@ def _nth_highest(numbers: NDArray[np.int32], n: int) -> tuple[int, int]:
     """The nth highest of `numbers`, of which n or more are above 0; and how many of those that
     equal it are among the n highest.
     """
-    # Byte by byte: of those whose bytes before are the same, its own are found by counting.
-    before = 0
-    for shift in (24, 16, 8, 0):
-        counts = np.zeros(256, np.int64)
-        for number in numbers:
-            if number >> (shift + 8) == before:
-                counts[number >> shift & 255] += 1
-        byte = 255
-        while counts[byte] < n:
-            n -= counts[byte]
-            byte -= 1
-        before = before << 8 | byte
-    return before, n
+    # All are written, and the next one over what is not kept: that needs no branch.
+    kept = np.empty(len(numbers) + 1, np.int32)
+    count = 0
+    for number in numbers:
+        kept[count] = number
+        count += number > 0
+
+    # Its bits are found a few at a time, the highest first, by counting how many numbers have which
+    # of them; only those with the same bits so far are counted.
+    known = 0
+    for shift in (_DIGIT * 2, _DIGIT, 0):
+        holding = np.zeros(1 << _DIGIT, np.int64)
+        for number in kept[:count]:
+            holding[number >> shift & (1 << _DIGIT) - 1] += 1
+        digit = len(holding) - 1
+        while holding[digit] < n:
+            n -= holding[digit]
+            digit -= 1
+        known = known << _DIGIT | digit
+        same = 0
+        for number in kept[:count]:
+            kept[same] = number
+            same += number >> shift == known
+        count = same
+    return known, n

@@ -194,10 +194,17 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         self, who: Mask, seeds: Sequence[int | None], infos: dict[str, Any]
     ) -> dict[str, Any]:
         """Begin episodes in the worlds `who`, and add their infos."""
-        for worlds, share in zip(self._worlds, self._shares, strict=True):
-            beginning = {world: seeds[share.start + world] for world in _places(who[share])}
-            for world, info in (worlds.begin(beginning) if beginning else {}).items():
-                infos = self._add_info(infos, info, share.start + world)
+        tasks = [
+            partial(
+                worlds.begin, {world: seeds[share.start + world] for world in _places(who[share])}
+            )
+            for worlds, share in zip(self._worlds, self._shares, strict=True)
+            if who[share].any()
+        ]
+        starts = [share.start for share in self._shares if who[share].any()]
+        for start, begun in zip(starts, self._threads.all(tasks), strict=True):
+            for world, info in begun.items():
+                infos = self._add_info(infos, info, start + world)
         self._over[who] = False
         self._begun[who] = True
         return infos

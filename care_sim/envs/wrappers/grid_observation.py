@@ -77,13 +77,7 @@ class GridObservation(gymnasium.ObservationWrapper[GridArrays, Any, Any], Record
         self._given: Belief | None = None
         RecordConstructorArgs.__init__(self, columns=columns, rows=rows)
         gymnasium.ObservationWrapper.__init__(self, env)
-        pictures: spaces.Space[Any] = spaces.Dict(
-            {
-                "grid": spaces.Box(0.0, 1.0, (int(np.prod(self.features.shape)),), np.float32),
-                "ego": spaces.Box(-1.0, 1.0, (len(EGO_INPUTS),), np.float32),
-            }
-        )
-        self.observation_space = pictures
+        self.observation_space = pictures_space(self.features)
 
     @property
     def belief(self) -> Belief:
@@ -99,3 +93,14 @@ class GridObservation(gymnasium.ObservationWrapper[GridArrays, Any, Any], Record
         """The pictures of the observation that was given. Raises InvalidInput for another form."""
         self._given = self._rig.read(observation)
         return dict(self.features(self._given))
+
+
+def pictures_space(features: GridFeatures) -> spaces.Space[Any]:
+    """The space of the pictures and the motion that `features` tell."""
+    cells = int(np.prod(features.shape))
+    return spaces.Dict(
+        {
+            "grid": spaces.Box(0.0, 1.0, (cells,), np.float32),
+            "ego": spaces.Box(-1.0, 1.0, (len(EGO_INPUTS),), np.float32),
+        }
+    )

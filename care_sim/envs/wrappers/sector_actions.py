@@ -9,14 +9,13 @@ from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
 from care_sim.base.errors import InvalidInput, shown
-from care_sim.core.actions import scores_of
-from care_sim.core.allocation import allocate
-from care_sim.core.belief import Belief
-from care_sim.core.types import Action, Demand
+from care_sim.core.types import Action
 from care_sim.envs.sensing import sensing, shows_belief
 from care_sim.envs.spaces import checked_scores
 from care_sim.envs.wrappers.grid_observation import GridObservation
-from care_sim.policies.learned.tiling import Tiling, reserve_demand, sector_demand
+from care_sim.policies.learned.beliefs import Beliefs
+from care_sim.policies.learned.sector_choice import SectorChoice
+from care_sim.policies.learned.tiling import Tiling
 
 
 class _Sectors(gymnasium.ActionWrapper[Any, NDArray[np.float32], Action], RecordConstructorArgs):
@@ -25,15 +24,10 @@ class _Sectors(gymnasium.ActionWrapper[Any, NDArray[np.float32], Action], Record
     def __init__(self, env: gymnasium.Env[Any, Any], azimuths: int = 32, elevations: int = 4):
         self._rig = sensing(env).rig
         self.sectors = Tiling(self._rig.grid, azimuths, elevations)
+        self._choice = SectorChoice(self._rig, self.sectors)
         RecordConstructorArgs.__init__(self, azimuths=azimuths, elevations=elevations)
         gymnasium.ActionWrapper.__init__(self, env)
-        self.action_space = spaces.Box(-1.0, 1.0, self.sectors.shape, np.float32)
-
-    def _cells(self, demand: Demand) -> Action:
-        """Scores (E, A) of the cells that the shared allocator takes."""
-        rig = self._rig
-        cells = allocate(rig.in_cell_order(demand), rig.budget, rig.reserve_fraction)
-        return scores_of(cells, rig.grid.shape)
+        self.action_space = sectors_space(self.sectors)
 
 
 class SectorReserve(_Sectors):
@@ -81,7 +75,7 @@ class SectorReserve(_Sectors):
     def __init__(self, env: gymnasium.Env[Any, Any], azimuths: int = 32, elevations: int = 4):
         super().__init__(env, azimuths, elevations)
         self._pictures = None if shows_belief(env) else _pictures_inside(env)
-        self._belief: Belief | None = None
+        self._beliefs: Beliefs | None = None
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -102,15 +96,17 @@ class SectorReserve(_Sectors):
     def action(self, action: NDArray[np.float32]) -> Action:
         """Scores (E, A) of the cells that the shared allocator takes."""
         scores = checked_scores(action, self.sectors.shape)
-        if self._belief is None:
+        if self._beliefs is None:
             raise gymnasium.error.ResetNeeded("call reset() before stepping")
-        return self._cells(reserve_demand(self._belief, self._rig, self.sectors, scores))
+        cells: Action = self._choice.reserve(self._beliefs, scores[None])[0]
+        return cells
 
     def _read(self, observation: Any) -> None:
         # At once, not when the next action comes: until then the observation is the caller's, who
         # may write into it.
         pictures = self._pictures
-        self._belief = self._rig.read(observation) if pictures is None else pictures.belief
+        belief = self._rig.read(observation) if pictures is None else pictures.belief
+        self._beliefs = Beliefs.of(belief, self._rig)
 
 
 class SectorScores(_Sectors):
@@ -143,9 +139,14 @@ class SectorScores(_Sectors):
 
     def action(self, action: NDArray[np.float32]) -> Action:
         """Scores (E, A) of the cells that the shared allocator takes."""
-        return self._cells(
-            sector_demand(self._rig, self.sectors, checked_scores(action, self.sectors.shape))
-        )
+        scores = checked_scores(action, self.sectors.shape)
+        cells: Action = self._choice.alone(scores[None])[0]
+        return cells
+
+
+def sectors_space(sectors: Tiling) -> spaces.Space[Any]:
+    """The space of one score per sector."""
+    return spaces.Box(-1.0, 1.0, sectors.shape, np.float32)
 
 
 def _pictures_inside(env: gymnasium.Env[Any, Any]) -> GridObservation:

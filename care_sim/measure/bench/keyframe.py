@@ -149,8 +149,8 @@ class StageByStage:
         (camera,) = self._rig.cameras
         boxes = self._local_boxes(self._bodies)
         window = window_on(camera, boxes)
-        ids = watch("camera", self._engine.body_ids, camera, self._sensor, window)
-        picture = watch("camera", Picture.of, ids, window)
+        table = watch("camera", self._engine.visible_boxes, camera, self._sensor, window)
+        picture = watch("camera", Picture.listed, table)
         seen = faultless_detections([picture], self._classes)
         heading = self._sensor.yaw
         arrived = watch("camera", self._camera.detect, seen, heading, boxes, self.world.time)

@@ -3,12 +3,11 @@
 import numpy as np
 
 from care_sim.base.checks import check_whole
-from care_sim.core.belief import Belief
 from care_sim.core.grid import Cells
 from care_sim.core.grid_stack import Grid
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
-from care_sim.policies.base import Policy
+from care_sim.policies.base import FixedPolicy
 
 LOWEST_DEG = -10.7
 """The fan reaches from the horizon down to here. The lowest row of the default grid above it, at
@@ -16,7 +15,7 @@ LOWEST_DEG = -10.7
 follow the rig's `sensor_height_m`."""
 
 
-class Fan(Policy):
+class Fan(FixedPolicy):
     """Fires what lies ahead, between the horizon and `LOWEST_DEG`, the columns nearest to straight
     ahead first: at 3% of the paper's grid 20 degrees to either side. When the fan has gone all
     round, the other rows follow in the same way. Several LiDARs make one fan.
@@ -36,9 +35,9 @@ class Fan(Policy):
         self._shots = shots
         self._pattern = np.concatenate([fanned(rig.grid, is_low) for is_low in (True, False)])
 
-    def demand(self, belief: Belief) -> Demand:
+    def fixed(self, budget: int) -> Demand:
         """The same cells at every keyframe."""
-        return Demand(layers=[[self._pattern[: belief.budget // self._shots]]])
+        return Demand(layers=[[self._pattern[: budget // self._shots]]])
 
 
 def fanned(grid: Grid, is_low: bool) -> Cells:

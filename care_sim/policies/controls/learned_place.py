@@ -12,17 +12,16 @@ import numpy as np
 
 from care_sim.base.checks import check_whole
 from care_sim.base.seed_ranges import training_seeds
-from care_sim.core.belief import Belief
 from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
-from care_sim.policies.base import Policy
+from care_sim.policies.base import FixedPolicy
 from care_sim.policies.controls.place import likeliest_first
 from care_sim.policies.controls.rehearsal import known_scenario, rehearsal
 from care_sim.scenarios.base import Scenario
 
 
-class LearnedPlace(Policy):
+class LearnedPlace(FixedPolicy):
     """Fires the cells in which a full scan first detected the first-sighting actor in the first
     `seeds` training seeds of the scenario: the pattern that is learned here, and no other.
 
@@ -40,9 +39,9 @@ class LearnedPlace(Policy):
         super().__init__(rig)
         self._pattern = learned_cells(rig, scenario, seeds)
 
-    def demand(self, belief: Belief) -> Demand:
+    def fixed(self, budget: int) -> Demand:
         """The same cells at every keyframe."""
-        return Demand(layers=[[self._pattern[: belief.budget]]])
+        return Demand(layers=[[self._pattern[:budget]]])
 
 
 def learned_cells(rig: Rig, scenario: Scenario | str | None, seeds: int) -> Cells:

@@ -5,16 +5,15 @@ from os import PathLike
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.core.belief import Belief
 from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
-from care_sim.policies.base import Policy
+from care_sim.policies.base import FixedPolicy
 from care_sim.policies.controls.rows import cells_by_row
 from care_sim.policies.learned.weights import load_weights, shipped_weights
 
 
-class Place(Policy):
+class Place(FixedPolicy):
     """Fires the cells in which most first sightings were detected in the calibration's streets. It
     knows a place and sees nothing: what a policy with a camera must beat.
 
@@ -31,9 +30,9 @@ class Place(Policy):
         super().__init__(rig)
         self._pattern = likeliest_cells(rig, path)
 
-    def demand(self, belief: Belief) -> Demand:
+    def fixed(self, budget: int) -> Demand:
         """The same cells at every keyframe."""
-        return Demand(layers=[[self._pattern[: belief.budget]]])
+        return Demand(layers=[[self._pattern[:budget]]])
 
 
 def likeliest_cells(rig: Rig, path: str | PathLike[str] | None) -> Cells:

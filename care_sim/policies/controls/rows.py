@@ -5,11 +5,10 @@ import math
 import numpy as np
 
 from care_sim.base.checks import check_number, check_whole
-from care_sim.core.belief import Belief
 from care_sim.core.grid import Cells, Head
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
-from care_sim.policies.base import Policy
+from care_sim.policies.base import FixedPolicy
 from care_sim.policies.paper.history_uniform import GOLDEN
 
 ENTRY_HEIGHT_M = 0.75
@@ -18,7 +17,7 @@ ENTRY_DISTANCE_M = 50.0
 """The range of scoring: what enters it by driving enters it there."""
 
 
-class Rows(Policy):
+class Rows(FixedPolicy):
     """Fires the rows nearest to the elevation at which things enter the range, nearest first; the
     last row is thinned evenly. That elevation follows from the rig (`entry_elevation_deg`), unless
     one is given. `shots` are as of `care_sim.policies.controls.fan`. Raises InvalidInput for an
@@ -38,9 +37,9 @@ class Rows(Policy):
             check_number("elevation_deg", elevation_deg, -90, 90)
         self._pattern = cells_by_row(rig, elevation_deg)
 
-    def demand(self, belief: Belief) -> Demand:
+    def fixed(self, budget: int) -> Demand:
         """The same cells at every keyframe."""
-        return Demand(layers=[[self._pattern[: belief.budget // self._shots]]])
+        return Demand(layers=[[self._pattern[: budget // self._shots]]])
 
 
 def entry_elevation_deg(rig: Rig, above_m: float = 0.0) -> float:

@@ -8,17 +8,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.compiled import compiled
+from care_sim.core.arrays import Integers, Mask
 from care_sim.core.grid import Cells
 
 BlockPictures = NDArray[np.float32]
-"""(3, B) one number per block, for three pictures."""
+"""(k, B) one number per block, for k pictures."""
 
 
-class LastScan(NamedTuple):
-    """The last scan, and the heights between which a return stands above the road."""
+class Objects(NamedTuple):
+    """The objects of W worlds, world after world: the cells of their `hulls` and `wedges`, with the
+    sizes of these sets and (W,) at which set each world's end; and which wedges are explained.
+    """
 
-    ranges: NDArray[np.float32]
-    """(N,) metres."""
+    hulls: Cells
+    hull_sizes: Integers
+    hull_ends: Integers
+    wedges: Cells
+    wedge_sizes: Integers
+    wedge_ends: Integers
+    explained: Mask
+
+
+class AboveRoad(NamedTuple):
+    """What tells how far above the road a ray ends, and between which heights a return stands."""
+
     rises: NDArray[np.float64]
     """(N,) how far each ray rises per metre of range."""
     heights_m: NDArray[np.float64]
@@ -29,43 +42,74 @@ class LastScan(NamedTuple):
 
 
 @compiled()
-def add_object_shares(
-    sets: Cells, ends: Cells, blocks: Cells, marks: NDArray[np.uint8], out: BlockPictures
+def draw_pictures(
+    objects: Objects,
+    scans: NDArray[np.float32],
+    above: AboveRoad,
+    blocks: Cells,
+    marks: NDArray[np.uint8],
+    out: NDArray[np.float32],
 ) -> None:
-    """Add to `out` the share of each block's cells that lie in three groups of `sets`.
+    """Fill `out` (W, 6, B), zeros before, with the six pictures of W worlds: of `objects`, and of
+    their last `scans` (W, N) in metres.
 
-    The groups end at `ends` (3,). `blocks` (N,) is the block of every cell. `marks` (N,) is memory
-    to work in; afterwards its bit g says whether a cell lies in group g.
+    `blocks` (N,) is the block of every cell, `marks` (N,) memory to work in.
     """
-    # What one cell adds to the share of its block: blocks per cell.
-    part = np.float32(out.shape[1] / len(blocks))
-    marks[:] = 0
-    start = 0
-    for group, end in enumerate(ends):
-        for cell in sets[start:end]:
-            # Sets of a group overlap; a cell counts once per group.
-            if not marks[cell] >> group & 1:
-                marks[cell] |= 1 << group
-                out[group, blocks[cell]] += part
-        start = end
+    hull = wedge = hull_place = wedge_place = 0
+    for world in range(len(out)):
+        # The hulls first: where they are is asked again when the returns are drawn.
+        marks[:] = 0
+        while hull < objects.hull_ends[world]:
+            end = hull_place + objects.hull_sizes[hull]
+            _add_object(objects.hulls[hull_place:end], 0, blocks, marks, out[world])
+            hull, hull_place = hull + 1, end
+        while wedge < objects.wedge_ends[world]:
+            end = wedge_place + objects.wedge_sizes[wedge]
+            group = 2 if objects.explained[wedge] else 1
+            _add_object(objects.wedges[wedge_place:end], group, blocks, marks, out[world])
+            wedge, wedge_place = wedge + 1, end
+        _add_returns(scans[world], above, blocks, marks, out[world, 3:])
 
 
 @compiled()
-def add_returns(
-    fired: Cells, scan: LastScan, blocks: Cells, marks: NDArray[np.uint8], out: BlockPictures
+def _add_object(
+    cells: Cells, group: int, blocks: Cells, marks: NDArray[np.uint8], out: BlockPictures
 ) -> None:
-    """Fill `out` from the cells that fired: the nearness of each block's nearest return, the share
-    of its cells that fired, and the share of those with a return that stands above the road outside
-    every hull. The hulls are the first group of `marks`.
+    """Add to `out[group]` the share of each block's cells that are among `cells` and are not in the
+    group yet: bit g of a cell's mark says whether it is in group g.
+    """
+    # What one cell adds to the share of its block: blocks per cell.
+    part = np.float32(out.shape[1] / len(blocks))
+    for cell in cells:
+        # Sets of a group overlap; a cell counts once per group.
+        if not marks[cell] >> group & 1:
+            marks[cell] |= 1 << group
+            out[group, blocks[cell]] += part
+
+
+@compiled()
+def _add_returns(
+    ranges: NDArray[np.float32],
+    above: AboveRoad,
+    blocks: Cells,
+    marks: NDArray[np.uint8],
+    out: BlockPictures,
+) -> None:
+    """Fill `out` from a scan (N,): the nearness of each block's nearest return, the share of its
+    cells that fired, and the share of those with a return that stands above the road outside every
+    hull. The hulls are the first group of `marks`.
     """
     part = np.float32(out.shape[1] / len(blocks))
-    for cell in fired:
+    for cell in range(len(ranges)):
+        distance = ranges[cell]
+        # A cell that did not fire reads 0.
+        if not distance > 0:
+            continue
         block = blocks[cell]
-        distance = scan.ranges[cell]
         out[1, block] += part
         # A ray without a return reads the reach.
-        if distance < scan.reach_m:
-            out[0, block] = max(out[0, block], np.float32(1 - distance / scan.reach_m))
-            height = scan.heights_m[cell] + distance * scan.rises[cell]
-            if not marks[cell] & 1 and scan.lowest_m < height < scan.highest_m:
+        if distance < above.reach_m:
+            out[0, block] = max(out[0, block], np.float32(1 - distance / above.reach_m))
+            height = above.heights_m[cell] + distance * above.rises[cell]
+            if not marks[cell] & 1 and above.lowest_m < height < above.highest_m:
                 out[2, block] += part

@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 
 from care_sim.base.checks import check_whole
 from care_sim.core.belief import Belief, Observation
-from care_sim.core.cell_sets import CellSets
 from care_sim.core.grid import Cells
-from care_sim.core.residual import camera_layers
 from care_sim.core.rig import Rig
 from care_sim.perception.cluster.road import KERB_CLEARANCE_M
-from care_sim.policies.learned.block_kernels import LastScan, add_object_shares, add_returns
+from care_sim.policies.learned.beliefs import Beliefs
+from care_sim.policies.learned.block_kernels import AboveRoad, Objects, draw_pictures
 from care_sim.policies.learned.tiling import Tiling
 
 CHANNELS = ("forecast", "residual", "explained", "nearness", "fired", "undetected")
@@ -61,30 +60,31 @@ class GridFeatures:
 
     def __call__(self, belief: Belief) -> Observation:
         """`grid` (channels * rows * columns,) and `ego` (4,), both float32."""
-        out = np.zeros((len(CHANNELS), self.rows * self.columns), np.float32)
-        self._draw_objects(belief, out[:3])
-        self._draw_returns(belief.ranges.ravel(), out[3:])
+        return {name: rows[0] for name, rows in self.of_all(Beliefs.of(belief, self.rig)).items()}
+
+    def of_all(self, beliefs: Beliefs) -> dict[str, NDArray[np.float32]]:
+        """The same of W worlds: `grid` (W, channels * rows * columns) and `ego` (W, 4)."""
+        out = np.zeros((len(beliefs), len(CHANNELS), self.rows * self.columns), np.float32)
+        hulls, wedges = beliefs.hulls, beliefs.wedges
+        objects = Objects(
+            *(hulls.cells, hulls.sizes, beliefs.track_ends),
+            *(wedges.cells, wedges.sizes, beliefs.detection_ends),
+            beliefs.explained,
+        )
+        draw_pictures(objects, beliefs.ranges, self._above, self._blocks, self._marks, out)
         # Shares are sums of float32 parts, and a full block may end a little above 1.
-        return {"grid": np.minimum(out, 1, out=out).ravel(), "ego": self._ego(belief)}
+        grid = np.minimum(out, 1, out=out).reshape(len(beliefs), -1)
+        return {"grid": grid, "ego": self._egos(beliefs)}
 
-    def _draw_objects(self, belief: Belief, out: NDArray[np.float32]) -> None:
-        # In the order of the first three channels; the marks of the first, the hulls, are read
-        # again when the returns are drawn.
-        groups = [self.rig.hulls(belief.tracks.boxes), *camera_layers(belief, self.rig)]
-        cells = CellSets.joined(groups).cells
-        ends = np.cumsum([len(group.cells) for group in groups])
-        add_object_shares(cells, ends, self._blocks, self._marks, out)
+    def _egos(self, beliefs: Beliefs) -> NDArray[np.float32]:
+        """(W, 4) the `EGO_INPUTS`, scaled and clipped to -1 to 1."""
+        shares = beliefs.budgets[:, None] / self.rig.grid.size
+        values = np.concatenate([beliefs.egos, shares], axis=1).astype(np.float32)
+        return np.asarray(np.clip(values / EGO_SCALES, -1, 1))
 
-    def _draw_returns(self, ranges: NDArray[np.float32], out: NDArray[np.float32]) -> None:
-        rig = self.rig
-        scan = LastScan(ranges, self._rises, self._heights, rig.grid.range_m, *STANDING_M)
-        add_returns(np.flatnonzero(ranges > 0), scan, self._blocks, self._marks, out)
-
-    def _ego(self, belief: Belief) -> NDArray[np.float32]:
-        """(4,) the `EGO_INPUTS`, scaled and clipped to -1 to 1."""
-        ego = belief.ego
-        values = [ego.speed, ego.yaw_rate, ego.acceleration, belief.budget / self.rig.grid.size]
-        return np.asarray(np.clip(np.array(values, np.float32) / EGO_SCALES, -1, 1))
+    @cached_property
+    def _above(self) -> AboveRoad:
+        return AboveRoad(self._rises, self._heights, self.rig.grid.range_m, *STANDING_M)
 
     @cached_property
     def _rises(self) -> NDArray[np.float64]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from care_sim.base.checks import check_whole
 from care_sim.base.errors import InvalidInput
+from care_sim.core.arrays import Integers
 from care_sim.core.belief import Belief
 from care_sim.core.grid import Cells
 from care_sim.core.grid_stack import Grid
@@ -71,10 +72,18 @@ class Tiling:
         """The cells of the tiles with a strictly positive score (`shape`), best first, ties by
         ascending index; no more tiles than hold `enough` cells.
         """
+        (best,), (count,) = self.best(np.reshape(scores, (1, -1)), enough)
+        return list(self.cells[best[:count]])
+
+    def best(self, scores: NDArray[np.floating], enough: int) -> tuple[Integers, Integers]:
+        """Of the tiles of W pictures of `scores` (W, ...) the best (W, m), ties by ascending index,
+        and how many (W,) of these are as in `ranked`.
+        """
+        flat = scores.reshape(len(scores), -1)
+        most = min(-(-enough // self.cells.shape[1]), len(self.cells))
         # A stable sort of the negated scores: among equals the lower index comes first.
-        flat = np.ravel(scores)
-        many = min(np.count_nonzero(flat > 0), -(-enough // self.cells.shape[1]))
-        return list(self.cells[np.argsort(-flat, kind="stable")[:many]])
+        best = np.argsort(-flat, axis=1, kind="stable")[:, :most]
+        return best, np.minimum(np.count_nonzero(flat > 0, axis=1), most)
 
 
 def reserve_demand(
@@ -83,9 +92,14 @@ def reserve_demand(
     """The forecasts' hulls, then the sectors with a positive score as layers of the reserve, best
     first.
     """
-    # Sectors of twice the budget are enough: at most one budget of their cells is taken by hulls.
-    layers = [[cells] for cells in sectors.ranked(scores, 2 * rig.budget)]
+    layers = [[cells] for cells in sectors.ranked(scores, enough_beside_hulls(rig))]
     return Demand(rig.hulls(belief.tracks.boxes), layers)
+
+
+def enough_beside_hulls(rig: Rig) -> int:
+    """Cells of sectors that fill the budget, whatever the hulls take."""
+    # At most one budget of the cells of sectors is taken by hulls.
+    return 2 * rig.budget
 
 
 def sector_demand(rig: Rig, sectors: Tiling, scores: NDArray[np.floating]) -> Demand:

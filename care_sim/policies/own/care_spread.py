@@ -4,12 +4,12 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from care_sim.base.checks import check_whole
-from care_sim.core.belief import Belief
+from care_sim.core.beliefs import Beliefs
 from care_sim.core.conditions import MIN_RETURNS
-from care_sim.core.residual import unexplained_layer
+from care_sim.core.residual import unexplained_layer_of
 from care_sim.core.rig import Rig
-from care_sim.core.types import Demand
-from care_sim.policies.base import Policy
+from care_sim.core.world_sets import WorldSets
+from care_sim.policies.base import RowPolicy
 
 CORE_FIRST = "core-spread"
 """The order of the cells in hulls and wedges (`care_sim.core.cell_order`), unless the rig has one:
@@ -22,7 +22,7 @@ chosen on the calibration's streets 1000 to 1007 and on streets 2000 to 2007, no
 scored."""
 
 
-class CareSpread(Policy):
+class CareSpread(RowPolicy):
     """The reserve of CARE, spent otherwise. It asks no more of a set than a detection needs, before
     another set has had as much.
 
@@ -44,17 +44,19 @@ class CareSpread(Policy):
         self._wedge_round = WEDGE_CELLS_PER_RETURN * min_returns
         self._hull_round = HULL_CELLS_PER_RETURN * min_returns
 
-    def demand(self, belief: Belief) -> Demand:
+    def stages(self, beliefs: Beliefs) -> list[WorldSets]:
         """Layers: a round of wedges, a round of hulls, and both again."""
-        unexplained = unexplained_layer(belief, self.rig)
-        hulls = self.rig.hulls(belief.tracks.boxes)
-        wedges = self.rig.listed(unexplained, CORE_FIRST, 2 * self._wedge_round)
-        hulls = self.rig.listed(hulls, CORE_FIRST, 2 * self._hull_round)
-        return Demand(
-            layers=[
-                wedges.part(0, self._wedge_round),
-                hulls.part(0, self._hull_round),
-                wedges.part(self._wedge_round, 2 * self._wedge_round),
-                hulls.part(self._hull_round, 2 * self._hull_round),
-            ]
-        )
+        unexplained = unexplained_layer_of(beliefs, self.rig)
+        wedges = self._listed(unexplained, 2 * self._wedge_round)
+        hulls = self._listed(self.hulls(beliefs), 2 * self._hull_round)
+        return [
+            WorldSets.nothing(len(beliefs.tracked)),
+            wedges.part(0, self._wedge_round),
+            hulls.part(0, self._hull_round),
+            wedges.part(self._wedge_round, 2 * self._wedge_round),
+            hulls.part(self._hull_round, 2 * self._hull_round),
+        ]
+
+    def _listed(self, given: WorldSets, most: int) -> WorldSets:
+        """The first `most` cells of every set, the core first."""
+        return WorldSets(self.rig.listed(given.sets, CORE_FIRST, most), given.counts)

@@ -1,12 +1,12 @@
 """A reserve for everything the camera sees, tracked or not."""
 
-from care_sim.core.belief import Belief
+from care_sim.core.beliefs import Beliefs
 from care_sim.core.residual import wedges
-from care_sim.core.types import Demand
-from care_sim.policies.base import Policy
+from care_sim.core.world_sets import WorldSets
+from care_sim.policies.base import RowPolicy
 
 
-class AllCamera(Policy):
+class AllCamera(RowPolicy):
     """The all-camera control of the paper (Sec. 5.1).
 
     It is history plus one reserve layer with the wedges of every camera detection. It lacks only
@@ -16,7 +16,7 @@ class AllCamera(Policy):
     name = "all-camera"
     source = "CARE paper, Sec. 5.1"
 
-    def demand(self, belief: Belief) -> Demand:
+    def stages(self, beliefs: Beliefs) -> list[WorldSets]:
         """Hulls, then the wedges of all detections."""
-        hulls = self.rig.hulls(belief.tracks.boxes)
-        return Demand(hulls, [wedges(belief.detections, self.rig)])
+        every = WorldSets(wedges(beliefs.detections, self.rig), beliefs.detected)
+        return [self.hulls(beliefs), every]

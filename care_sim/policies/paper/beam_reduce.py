@@ -2,15 +2,14 @@
 
 import numpy as np
 
-from care_sim.core.belief import Belief
 from care_sim.core.grid import Cells
 from care_sim.core.grid_stack import Grid
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
-from care_sim.policies.base import Policy
+from care_sim.policies.base import FixedPolicy
 
 
-class BeamReduce(Policy):
+class BeamReduce(FixedPolicy):
     """Beam reduction of LiDAR Distillation (Wei et al., ECCV 2022), as a causal scan policy.
 
     The original drops scan lines from a cloud. The paper (Sec. 5.1) adapts it: whole rows are
@@ -25,7 +24,7 @@ class BeamReduce(Policy):
         super().__init__(rig)
         self._rows = horizon_rows(rig.grid, rig.budget)
 
-    def demand(self, belief: Belief) -> Demand:
+    def fixed(self, budget: int) -> Demand:
         """One layer per row; no exploitation."""
         return Demand(layers=[[cells] for cells in self._rows])
 

@@ -1,16 +1,14 @@
 """CARE: the reserve goes to camera detections that no track explains."""
 
-from dataclasses import replace
-
 from care_sim.base.checks import check_flag
-from care_sim.core.belief import Belief
-from care_sim.core.residual import unexplained_layer
+from care_sim.core.beliefs import Beliefs
+from care_sim.core.residual import unexplained_layer_of
 from care_sim.core.rig import Rig
-from care_sim.core.types import Demand
-from care_sim.policies.base import Policy
+from care_sim.core.world_sets import WorldSets
+from care_sim.policies.base import RowPolicy
 
 
-class Care(Policy):
+class Care(RowPolicy):
     """The camera-residual reserve of the paper (Sec. 4.2, Algorithm 2).
 
     It is history plus the layer U of unexplained wedges. Without a camera detection it is the
@@ -28,9 +26,8 @@ class Care(Policy):
         check_flag("yaw_compensation", yaw_compensation)
         self._yaw_compensation = yaw_compensation
 
-    def demand(self, belief: Belief) -> Demand:
+    def stages(self, beliefs: Beliefs) -> list[WorldSets]:
         """Hulls, then the wedges of the residual."""
         if not self._yaw_compensation:
-            belief = replace(belief, detections=belief.detections.unturned())
-        unexplained = unexplained_layer(belief, self.rig)
-        return Demand(self.rig.hulls(belief.tracks.boxes), [unexplained])
+            beliefs = beliefs.unturned()
+        return [self.hulls(beliefs), unexplained_layer_of(beliefs, self.rig)]

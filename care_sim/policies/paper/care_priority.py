@@ -1,12 +1,12 @@
 """CARE with a second reserve layer: what tracks explain comes after what they do not."""
 
-from care_sim.core.belief import Belief
-from care_sim.core.residual import camera_layers
-from care_sim.core.types import Demand
-from care_sim.policies.base import Policy
+from care_sim.core.beliefs import Beliefs
+from care_sim.core.residual import camera_layers_of
+from care_sim.core.world_sets import WorldSets
+from care_sim.policies.base import RowPolicy
 
 
-class CarePriority(Policy):
+class CarePriority(RowPolicy):
     """The priority-ordering variant of the paper (Sec. 4.2): CARE with the layers (U, M).
 
     The wedges of unexplained detections fill first, then those of explained ones. Nothing is
@@ -16,6 +16,6 @@ class CarePriority(Policy):
     name = "care-priority"
     source = "CARE paper, Sec. 4.2"
 
-    def demand(self, belief: Belief) -> Demand:
+    def stages(self, beliefs: Beliefs) -> list[WorldSets]:
         """Hulls, then the layers (U, M)."""
-        return Demand(self.rig.hulls(belief.tracks.boxes), camera_layers(belief, self.rig))
+        return [self.hulls(beliefs), *camera_layers_of(beliefs, self.rig)]

@@ -3,13 +3,12 @@
 import numpy as np
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.belief import Belief
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
-from care_sim.policies.base import Policy
+from care_sim.policies.base import FixedPolicy
 
 
-class Full(Policy):
+class Full(FixedPolicy):
     """Fires every cell. Belongs in an environment made with `budget=1.0` and refuses another."""
 
     name = "full"
@@ -23,6 +22,6 @@ class Full(Policy):
                 f"{rig.grid.size} cells"
             )
 
-    def demand(self, belief: Belief) -> Demand:
+    def fixed(self, budget: int) -> Demand:
         """All cells, as one reserve layer: exploitation alone would stop at (1 - rho) B."""
         return Demand(layers=[[np.arange(self.rig.grid.size)]])

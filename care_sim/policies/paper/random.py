@@ -1,16 +1,15 @@
 """The seeded random floor alone."""
 
-from care_sim.core.belief import Belief
 from care_sim.core.types import Demand
-from care_sim.policies.base import Policy
+from care_sim.policies.base import FixedPolicy
 
 
-class Random(Policy):
+class Random(FixedPolicy):
     """Asks for nothing, so that the shared random floor spends the whole budget."""
 
     name = "random"
     source = "CARE paper, Sec. 4.1, Algorithm 1 (the floor alone)"
 
-    def demand(self, belief: Belief) -> Demand:
+    def fixed(self, budget: int) -> Demand:
         """Nothing."""
         return Demand()

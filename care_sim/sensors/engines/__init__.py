@@ -40,6 +40,13 @@ class Engine(RayEngine, Protocol):
         """
         ...
 
+    def visible_boxes(self, camera: PinholeCamera, sensor: Frame, window: PixelWindow) -> Integers:
+        """(n, 6) the bodies in a window of `camera` in ascending order: id; left, top, right,
+        bottom of the box that holds all its pixels, counted from the corner of the picture; their
+        number.
+        """
+        ...
+
 
 ENGINES: dict[str, Callable[[BulletWorld, AngularGrid], Engine]] = {"bullet": Bullet, "fast": Fast}
 """Engine makers by name, each for the grid of one LiDAR."""

@@ -1,17 +1,19 @@
-"""The boxes of what a picture of body ids shows, compiled."""
+"""The boxes of what a picture of body ids shows, compiled.
+
+A table of boxes is (n, 6): the id of a body; left, top, right and bottom of the box that holds all
+its pixels; their number.
+"""
 
 import numpy as np
 
 from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Integers
-from care_sim.world.bullet import NO_BODY
+from care_sim.world.bullet import NO_BODY, PixelWindow
 
 
 @compiled()
 def visible_boxes(ids: Integers) -> Integers:
-    """(n, 6) the bodies in a picture of ids (height, width) in ascending order: id; left, top,
-    right, bottom of the box that holds all its pixels; their number.
-    """
+    """The table of the boxes in a picture of ids (height, width), in ascending order."""
     # One row per possible id: ids are small, and a table is faster than a search.
     rows, columns = ids.shape
     highest = NO_BODY
@@ -28,12 +30,38 @@ def visible_boxes(ids: Integers) -> Integers:
             while column < columns and ids[row, column] == body:
                 column += 1
             if body != NO_BODY:
-                one = found[body]
-                if one[5] == 0:
-                    one[:3] = body, first, row
-                # Rows come in order, so the top stays as it began, and the bottom is this row's.
-                one[1] = min(one[1], first)
-                one[3] = max(one[3], column)
-                one[4] = row + 1
-                one[5] += column - first
+                note_pixels(found, body, row, first, column, column - first)
     return found[found[:, 5] > 0]
+
+
+def boxes_of_window(ids: Integers, window: PixelWindow) -> Integers:
+    """The table of the boxes in the ids of a window, counted from the corner of the picture."""
+    left, top, _, _ = window
+    boxes: Integers = visible_boxes(ids) + np.array([0, left, top, left, top, 0])
+    return boxes
+
+
+@compiled()
+def note_pixels(found: Integers, body: int, row: int, first: int, end: int, pixels: int) -> None:
+    """Take into the table `found`, which has a row for every possible id, zeros at first, that a
+    body has so many `pixels` from the column `first` to the one before `end`. Rows come in order.
+    """
+    if found[body, 5] == 0:
+        found[body, 0], found[body, 1], found[body, 2] = body, first, row
+    # The top stays as it began, and the bottom is this row's.
+    found[body, 1] = min(found[body, 1], first)
+    found[body, 3] = max(found[body, 3], end)
+    found[body, 4] = row + 1
+    found[body, 5] += pixels
+
+
+@compiled()
+def moved_up(found: Integers) -> int:
+    """Move the rows of `found` that have pixels to its beginning; how many they are."""
+    filled = 0
+    for n in range(len(found)):
+        if found[n, 5] > 0:
+            for k in range(6):
+                found[filled, k] = found[n, k]
+            filled += 1
+    return filled

@@ -4,6 +4,7 @@ from care_sim.core.arrays import Floats, Integers
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.pinhole import PinholeCamera
+from care_sim.sensors.engines.box_kernels import boxes_of_window
 from care_sim.world.bullet import BulletWorld, PixelWindow
 
 
@@ -22,3 +23,7 @@ class Bullet:
     def body_ids(self, camera: PinholeCamera, sensor: Frame, window: PixelWindow) -> Integers:
         """Body ids of pixels; see `care_sim.sensors.engines.Engine`."""
         return self._world.body_ids(camera, sensor, window)
+
+    def visible_boxes(self, camera: PinholeCamera, sensor: Frame, window: PixelWindow) -> Integers:
+        """The bodies in a window; see `care_sim.sensors.engines.Engine`."""
+        return boxes_of_window(self.body_ids(camera, sensor, window), window)

@@ -8,7 +8,7 @@ from care_sim.core.arrays import Floats, Integers
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.pinhole import NEAR_M, PinholeCamera
-from care_sim.sensors.engines.picture_kernels import render_bodies
+from care_sim.sensors.engines.picture_kernels import View, bodies_in_view, render_bodies
 from care_sim.sensors.engines.ray_kernels import cast_rays
 from care_sim.world.bullet import FAR_M, BulletWorld, PixelWindow
 
@@ -48,13 +48,19 @@ class Fast:
 
     def body_ids(self, camera: PinholeCamera, sensor: Frame, window: PixelWindow) -> Integers:
         """Body ids of pixels; see `care_sim.sensors.engines.Engine`."""
+        return render_bodies(self._view(camera, sensor, window))
+
+    def visible_boxes(self, camera: PinholeCamera, sensor: Frame, window: PixelWindow) -> Integers:
+        """The bodies in a window; see `care_sim.sensors.engines.Engine`."""
+        return bodies_in_view(self._view(camera, sensor, window))
+
+    def _view(self, camera: PinholeCamera, sensor: Frame, window: PixelWindow) -> View:
+        """What the kernels of pictures ask for."""
         world = self._world
         lens = camera.focal, camera.width / 2, camera.height / 2
         depths = NEAR_M, FAR_M
         placed = camera.stance(sensor)
-        return render_bodies(
-            placed, lens, window, depths, world.polyhedra.tables, world.primitives.poses
-        )
+        return placed, lens, window, depths, world.polyhedra.tables, world.primitives.poses
 
     def _cast_ascending(self, sensor: Frame, cells: Cells) -> tuple[Floats, Integers]:
         world = self._world

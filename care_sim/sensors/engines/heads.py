@@ -20,6 +20,10 @@ class _Engine(Protocol):
 
     def body_ids(self, camera: PinholeCamera, sensor: Frame, window: PixelWindow) -> Integers: ...
 
+    def visible_boxes(
+        self, camera: PinholeCamera, sensor: Frame, window: PixelWindow
+    ) -> Integers: ...
+
 
 class HeadEngines:
     """An engine of one kind, which `make` makes, for each LiDAR of a stack. The cameras are told in
@@ -49,3 +53,8 @@ class HeadEngines:
         """Body ids of pixels; see `care_sim.sensors.engines.Engine`."""
         _, first = self._engines[0]
         return first.body_ids(camera, sensor, window)
+
+    def visible_boxes(self, camera: PinholeCamera, sensor: Frame, window: PixelWindow) -> Integers:
+        """The bodies in a window; see `care_sim.sensors.engines.Engine`."""
+        _, first = self._engines[0]
+        return first.visible_boxes(camera, sensor, window)

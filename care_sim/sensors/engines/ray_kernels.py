@@ -20,6 +20,9 @@ from care_sim.world.bullet import NO_BODY
 BOX, CYLINDER, SPHERE = range(3)
 """Places in `care_sim.world.body_tables.SHAPES`."""
 
+_X, _Y, _Z = np.uintp(0), np.uintp(1), np.uintp(2)
+_STRIDE_BITS = 5
+"""Cells among which the first fired one is known; more are searched one by one."""
 Stretch = tuple[float, float]
 """Where a ray enters and leaves, as distances along it; the first is the larger where it misses."""
 
@@ -108,87 +111,161 @@ def cast_into(
     ranges, ids = returns
     x, y, z, yaw, roll, pitch = sensor
     placed = place_parts(SensorPose(x, y, z, yaw, roll, pitch), solids, poses, grid, reach)
+    firsts = _first_places(cells, grid.rows * grid.columns)
 
     # The road first, then part after part: what is nearer takes the ray. So no list of hits is
     # sorted, and the order of parts matters only where two are equally far.
-    columns = len(rays.across)
-    starts = _row_starts(cells, len(rays.down), columns)
-    _hit_road(returns, cells, starts, rays, reach, RoadPlane(placed.up, z, ground))
-
+    road = RoadPlane(placed.up, z, ground)
+    _hit_road(ranges, ids, cells, firsts, rays.across, rays.down, reach, road)
+    places = np.empty(len(cells), np.int64)
+    picked = np.empty((3, len(cells)))
+    distances = np.empty(len(cells))
     for part, (first, last, upper, lower) in enumerate(placed.windows):
         if upper > lower:
             continue
-        solid = _solid(part, solids, placed.centres, placed.axes)
-        for row in range(upper, lower + 1):
-            # The fired cells of this row that lie in the window. A window that runs over a turn has
-            # two stretches of columns: from the row's begin, and from its first column on.
-            begin = row * columns
-            low = starts[row]
-            high = starts[row + 1]
-            ahead = _first_from(cells, begin + first, low, high)
-            for place, end in ((low, begin + last - grid.turn), (ahead, begin + last)):
-                while place < high and cells[place] <= end:
-                    distance = _entry(solid, _ray(rays, row, cells[place] - begin))
-                    if distance < ranges[place] and distance <= reach:
-                        ranges[place] = distance
-                        ids[place] = solids.owners[part]
-                    place += 1
+        window = first, last, upper, lower, grid.turn, placed.nearest[part]
+        count = _pick(window, cells, firsts, rays.across, rays.down, ranges, places, picked)
+        if count:
+            solid = _solid(part, solids, placed.centres, placed.axes)
+            _meet(solid, picked, distances, count)
+            _take(ranges, ids, places, distances, count, solids.owners[part], reach)
 
 
+# Arrays are handed over one by one from here on, and not as fields of tuples: to take one out of a
+# tuple counts its references, which takes longer than to follow a ray.
 @compiled(error_model="numpy")
 def _hit_road(
-    returns: tuple[Floats, Integers],
+    ranges: Floats,
+    ids: Integers,
     cells: Cells,
-    starts: Integers,
-    fan: Fan,
+    firsts: Integers,
+    across: Floats,
+    down: Floats,
     reach: float,
     road: RoadPlane,
 ) -> None:
-    """Fill `returns` with those of a world of road alone."""
-    ranges, ids = returns
-    ranges[:] = math.inf
-    ids[:] = NO_BODY
-    if road.body != NO_BODY:
-        for row in range(len(starts) - 1):
-            for n in range(starts[row], starts[row + 1]):
-                # A ray falls by -up . ray per metre. Above the horizon the distance is negative,
-                # and along it infinite.
-                ray = _ray(fan, row, cells[n] - row * len(fan.across))
-                distance = -road.height / dot(road.up, ray)
-                if 0.0 <= distance <= reach:
-                    ranges[n] = distance
-                    ids[n] = road.body
+    """Fill ranges and body ids with those of a world of road alone."""
+    is_level = road.up[0] == 0.0 and road.up[1] == 0.0
+    begin = 0
+    for row in range(len(down)):
+        # Over a level road all rays of a row are alike, but for the sign of zeros.
+        end = _place_of(row * len(across) + len(across), cells, firsts)
+        distance = _to_road(road, (0.0, 0.0, down[row, 1]))
+        for n in range(begin, end):
+            if not is_level:
+                ray = _ray(across, down, row, cells[n] - row * len(across))
+                distance = _to_road(road, ray)
+            is_hit = 0.0 <= distance <= reach and road.body != NO_BODY
+            ranges[n] = distance if is_hit else math.inf
+            ids[n] = road.body if is_hit else NO_BODY
+        begin = end
+
+
+@compiled(error_model="numpy")
+def _to_road(road: RoadPlane, ray: Vector) -> float:
+    """How far a ray goes to the road: below 0 above the horizon, and infinite along it."""
+    # A ray falls by -up . ray per metre.
+    return -road.height / dot(road.up, ray)
 
 
 @compiled()
-def _row_starts(cells: Cells, rows: int, columns: int) -> Integers:
-    """(rows + 1,) where each row begins among ascending `cells`."""
-    # Each search goes on from the row before, since cells ascend.
-    starts = np.zeros(rows + 1, np.int64)
-    for row in range(1, rows + 1):
-        starts[row] = _first_from(cells, row * columns, starts[row - 1], len(cells))
-    return starts
-
-
-@compiled()
-def _first_from(cells: Cells, cell: int, low: int, high: int) -> int:
-    """The first place in low..high of ascending `cells` that holds `cell` or a later one, else
-    `high`.
+def _first_places(cells: Cells, size: int) -> Integers:
+    """(m,) where among ascending `cells` those from 0, 1, ... strides on begin; the grid has `size`
+    cells.
     """
-    # Bisection: all before `low` are lower, all from `high` on are not.
-    while low < high:
-        middle = (low + high) // 2
-        if cells[middle] < cell:
-            low = middle + 1
-        else:
-            high = middle
-    return low
+    # From the last one back, each cell is the first of its stride so far. A stride without cells
+    # begins where the next one does.
+    firsts = np.full((size >> _STRIDE_BITS) + 2, len(cells))
+    for n in range(len(cells) - 1, -1, -1):
+        firsts[cells[n] >> _STRIDE_BITS] = n
+    first = len(cells)
+    for k in range(len(firsts) - 1, -1, -1):
+        first = min(first, firsts[k])
+        firsts[k] = first
+    return firsts
 
 
 @compiled()
-def _ray(fan: Fan, row: int, column: int) -> Vector:
+def _place_of(cell: int, cells: Cells, firsts: Integers) -> int:
+    """Where a cell of the grid or the next later one is among those fired; behind the last one, if
+    there is none.
+    """
+    place: int = firsts[cell >> _STRIDE_BITS]
+    while place < len(cells) and cells[place] < cell:
+        place += 1
+    return place
+
+
+@compiled()
+def _pick(
+    window: tuple[int, int, int, int, int, float],
+    cells: Cells,
+    firsts: Integers,
+    across: Floats,
+    down: Floats,
+    ranges: Floats,
+    places: Integers,
+    picked: Floats,
+) -> int:
+    """Pick the rays of a window that have met nothing before `nearest`; how many they are. Their
+    `places` (n,) among the cells and their directions `picked` (3, n) are filled in.
+    """
+    first, last, upper, lower, turn, nearest = window
+    count = 0
+    for row in range(upper, lower + 1):
+        # A window that runs over a turn has two stretches of columns: up to its last one, and from
+        # its first one on. It may run on into columns that the grid does not have.
+        begin = row * len(across)
+        level, height = down[row, 0], down[row, 1]
+        for left, right in ((0, last - turn), (first, last)):
+            end = begin + min(right, len(across) - 1)
+            if begin + left > end:
+                continue
+            place = _place_of(begin + left, cells, firsts)
+            while place < len(cells) and cells[place] <= end:
+                # Written in any case, and counted if it is to be kept. An index without a sign is
+                # never counted from the end of an array, and need not be looked at.
+                own, column = np.uintp(count), np.uintp(cells[np.uintp(place)] - begin)
+                places[own] = place
+                picked[_X, own] = level * across[column, _X]
+                picked[_Y, own] = level * across[column, _Y]
+                picked[_Z, own] = height
+                count += ranges[np.uintp(place)] > nearest
+                place += 1
+    return count
+
+
+@compiled()
+def _meet(solid: Solid, picked: Floats, distances: Floats, count: int) -> None:
+    """Fill in how far the first `count` of the picked rays go to a solid."""
+    if solid.shape == BOX:
+        _enter_box(solid.axes, solid.half, solid.start, picked, distances, count)
+        return
+    for n in range(count):
+        distances[n] = _entry_of_round(solid, (picked[0, n], picked[1, n], picked[2, n]))
+
+
+@compiled()
+def _take(
+    ranges: Floats,
+    ids: Integers,
+    places: Integers,
+    distances: Floats,
+    count: int,
+    owner: int,
+    reach: float,
+) -> None:
+    """Let the first `count` of the picked rays end at the solid of a body where it is nearer."""
+    for n in range(count):
+        place, distance = places[n], distances[n]
+        is_nearer = distance < ranges[place] and distance <= reach
+        ranges[place] = distance if is_nearer else ranges[place]
+        ids[place] = owner if is_nearer else ids[place]
+
+
+@compiled()
+def _ray(across: Floats, down: Floats, row: int, column: int) -> Vector:
     """The direction of a cell, a unit vector in the frame of the sensor."""
-    across, down = fan.across, fan.down
     return down[row, 0] * across[column, 0], down[row, 0] * across[column, 1], down[row, 1]
 
 
@@ -209,21 +286,38 @@ def _triple(row: Floats) -> Vector:
 
 
 @compiled(error_model="numpy")
-def _entry(solid: Solid, ray: Vector) -> float:
-    """Distance along a unit ray of the sensor's frame to a solid, inf without an entry."""
+def _enter_box(
+    axes: Axes, half: Vector, start: Vector, picked: Floats, distances: Floats, count: int
+) -> None:
+    """Fill in the `distances` (n,) along unit rays (3, n) to a box, inf without an entry."""
+    # Without branches, so that the compiler computes several rays at once.
+    for n in range(count):
+        ray = picked[0, n], picked[1, n], picked[2, n]
+        sides = _common(
+            _slab(start[0], dot(axes[0], ray), half[0]), _slab(start[1], dot(axes[1], ray), half[1])
+        )
+        distances[n] = _if_entered(_common(sides, _slab(start[2], dot(axes[2], ray), half[2])))
+
+
+@compiled(error_model="numpy")
+def _entry_of_round(solid: Solid, ray: Vector) -> float:
+    """Distance along a unit ray of the sensor's frame to a cylinder or a sphere, inf without an
+    entry.
+    """
     # The ray in the frame of the part: from (u, v, w) along (x, y, z).
     u, v, w = solid.start
     x, y, z = dot(solid.axes[0], ray), dot(solid.axes[1], ray), dot(solid.axes[2], ray)
     half = solid.half
-    if solid.shape == BOX:
-        sides = _common(_slab(u, x, half[0]), _slab(v, y, half[1]))
-        near, far = _common(sides, _slab(w, z, half[2]))
-    elif solid.shape == CYLINDER:
-        near, far = _common(_tube(u, v, x, y, half[0]), _slab(w, z, half[2]))
-    else:
-        near, far = _ball(u, v, w, x, y, z, half[0])
+    if solid.shape == CYLINDER:
+        return _if_entered(_common(_tube(u, v, x, y, half[0]), _slab(w, z, half[2])))
+    return _if_entered(_ball(u, v, w, x, y, z, half[0]))
 
+
+@compiled()
+def _if_entered(stretch: Stretch) -> float:
+    """Where a ray enters, inf where it does not."""
     # Negative where the ray starts inside or beyond: neither is an entry.
+    near, far = stretch
     return near if 0.0 <= near <= far else math.inf
 
 
@@ -236,11 +330,13 @@ def _common(one: Stretch, other: Stretch) -> Stretch:
 @compiled(error_model="numpy")
 def _slab(start: float, along: float, half: float) -> Stretch:
     """The stretch of a ray between the planes at -half and half."""
+    one, other = (-half - start) / along, (half - start) / along
+    near, far = min(one, other), max(one, other)
     # A ray along the planes is between them everywhere or nowhere; 0 / 0 must not decide it.
     if along == 0.0:
-        return _all_or_nothing(abs(start) <= half)
-    one, other = (-half - start) / along, (half - start) / along
-    return min(one, other), max(one, other)
+        near = -math.inf if abs(start) <= half else math.inf
+        far = -near
+    return near, far
 
 
 @compiled(error_model="numpy")

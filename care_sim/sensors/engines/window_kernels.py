@@ -14,8 +14,10 @@ from care_sim.core.arrays import Floats, Integers
 from care_sim.core.grid_kernels import GridSpacing, row_at
 from care_sim.sensors.engines.geometry_kernels import Axes, Vector, body_axes, dot
 
-WINDOW_MARGIN = 1
+WINDOW_MARGIN = 0.001
 """Cells around a window, against rounding."""
+NEAREST_MARGIN_M = 0.001
+"""What the nearest point of a part may be nearer, against rounding."""
 NO_CELLS = (0, 0, 0, -1)
 """The window of a part that covers none."""
 
@@ -46,7 +48,8 @@ class Parts(NamedTuple):
 class PlacedParts(NamedTuple):
     """Parts in the frame of a sensor: `centres` (k, 3) in metres; `axes` (k, 3, 3), row i the
     part's axis i; `windows` (k, 4), the first and last column and the first and last row of the
-    angular rectangle of the box that holds each part.
+    angular rectangle of the box that holds each part; and `nearest` (k,), no more than how far any
+    of its points is.
 
     The first column lies within a turn, the last up to a turn beyond it. The first row lies below
     the last where a part covers none; of such a part nothing else need be told. `up` (3,) is the
@@ -56,6 +59,7 @@ class PlacedParts(NamedTuple):
     centres: Floats
     axes: Floats
     windows: Integers
+    nearest: Floats
     up: Floats
 
 
@@ -70,27 +74,47 @@ def place_parts(
     centres = np.empty((len(parts.owners), 3))
     axes = np.empty((len(parts.owners), 3, 3))
     windows = np.empty((len(parts.owners), 4), np.int64)
+    nearest = np.zeros(len(parts.owners))
     corners = np.empty((8, 3))
     sensor_axes = _sensor_axes(sensor.yaw, sensor.roll, sensor.pitch)
+    last = -1
     for part, owner in enumerate(parts.owners):
-        pose = poses[owner]
-        away = (pose[0] - sensor.x, pose[1] - sensor.y, pose[2] - sensor.z)
+        # The parts of a body lie side by side.
+        if owner != last or part == 0:
+            pose = poses[owner]
+            away = (pose[0] - sensor.x, pose[1] - sensor.y, pose[2] - sensor.z)
+            body = body_axes(pose[3], pose[4], pose[5], pose[6])
+            origin = _along(sensor_axes, away)
+            turn = (
+                _along(sensor_axes, body[0]),
+                _along(sensor_axes, body[1]),
+                _along(sensor_axes, body[2]),
+            )
+            last = owner
         if _is_beyond(away, parts.offsets[part], parts.halves[part], reach):
             windows[part] = NO_CELLS
             continue
-        body = body_axes(pose[3], pose[4], pose[5], pose[6])
         # Into the frame of the sensor: the origin of the body first, then the part's offset along
         # the axes of the body.
-        for j, axis in enumerate(sensor_axes):
-            centres[part, j] = dot(axis, away)
+        for j in range(3):
+            centres[part, j] = origin[j]
             for i in range(3):
-                axes[part, i, j] = dot(axis, body[i])
-                centres[part, j] += parts.offsets[part, i] * axes[part, i, j]
+                axes[part, i, j] = turn[i][j]
+                centres[part, j] += parts.offsets[part, i] * turn[i][j]
         _lay_corners(centres[part], axes[part], parts.halves[part], corners)
-        windows[part] = _window(centres[part], corners, grid)
+        # The sides of an upright box are seen along its edges below: those above lie over them.
+        is_upright = axes[part, 2, 0] == 0.0 and axes[part, 2, 1] == 0.0
+        outline = corners[:4] if is_upright else corners
+        windows[part], nearest[part] = _window(centres[part], corners, outline, grid)
 
     up = np.array((sensor_axes[0][2], sensor_axes[1][2], sensor_axes[2][2]))
-    return PlacedParts(centres, axes, windows, up)
+    return PlacedParts(centres, axes, windows, nearest, up)
+
+
+@compiled()
+def _along(axes: Axes, vector: Vector) -> Vector:
+    """A vector told along these axes."""
+    return dot(axes[0], vector), dot(axes[1], vector), dot(axes[2], vector)
 
 
 @compiled()
@@ -104,9 +128,13 @@ def _is_beyond(away: Vector, offset: Floats, half: Floats, reach: float) -> bool
 
 
 @compiled()
-def _window(centre: Floats, corners: Floats, grid: GridSpacing) -> tuple[int, int, int, int]:
-    """See `PlacedParts.windows`."""
-    heading, right, left = _spread(centre, corners)
+def _window(
+    centre: Floats, corners: Floats, outline: Floats, grid: GridSpacing
+) -> tuple[tuple[int, int, int, int], float]:
+    """See `PlacedParts.windows` and `PlacedParts.nearest`. `outline` are those of the `corners`
+    that bound the box in the x, y plane.
+    """
+    heading, right, left = _spread(centre, outline)
 
     # Corners that spread over half a turn leave the sensor no side to look from: the part is
     # around, above or below it, and may cover every column.
@@ -115,8 +143,9 @@ def _window(centre: Floats, corners: Floats, grid: GridSpacing) -> tuple[int, in
         heading = 0.0
         right, left = -math.pi, math.pi
     first, last = _columns(heading + right, heading + left, grid)
-    upper, lower = _rows(corners, surrounds, grid)
-    return first, last, upper, lower
+    near = 0.0 if surrounds else _nearest(outline)
+    upper, lower = _rows(corners, near, grid)
+    return (first, last, upper, lower), near - NEAREST_MARGIN_M
 
 
 @compiled()
@@ -151,7 +180,8 @@ def _spread(centre: Floats, corners: Floats) -> tuple[float, float, float]:
     rightmost = (1.0, 0.0)
     leftmost = (1.0, 0.0)
     least, most = 0.0, 0.0
-    for x, y, _ in corners:
+    for n in range(len(corners)):
+        x, y = corners[n, 0], corners[n, 1]
         # The corner in the plane turned so that the centre lies straight ahead. Angles are compared
         # by a measure that is cheap, and only the two extreme ones are computed.
         along, across = centre[0] * x + centre[1] * y, centre[0] * y - centre[1] * x
@@ -182,20 +212,20 @@ def _angle_order(along: float, across: float) -> float:
 @compiled()
 def _columns(right: float, left: float, grid: GridSpacing) -> tuple[int, int]:
     """First column, within a turn, and last, up to a turn beyond it, between two azimuths."""
-    # The columns that the two azimuths lie in. Some of their rays may pass by, none is left out.
-    first = math.floor((right - grid.right) / grid.column_width) - WINDOW_MARGIN
-    last = math.floor((left - grid.right) / grid.column_width) + WINDOW_MARGIN
+    # The ray of a column runs through its middle.
+    first = math.ceil((right - grid.right) / grid.column_width - 0.5 - WINDOW_MARGIN)
+    last = math.floor((left - grid.right) / grid.column_width - 0.5 + WINDOW_MARGIN)
     return first % grid.turn, first % grid.turn + min(last - first, grid.turn - 1)
 
 
 @compiled()
-def _rows(corners: Floats, surrounds: bool, grid: GridSpacing) -> tuple[int, int]:
-    """First and last row of the box with these corners."""
-    # How near, how far, how low and how high the box is; distances in the x, y plane.
-    near = 0.0 if surrounds else _nearest(corners)
+def _rows(corners: Floats, near: float, grid: GridSpacing) -> tuple[int, int]:
+    """First and last row of the box with these corners, which is as `near` in the x, y plane."""
+    # How far in that plane, how low and how high the box is.
     far = 0.0
     lowest, highest = math.inf, -math.inf
-    for x, y, z in corners:
+    for n in range(len(corners)):
+        x, y, z = corners[n, 0], corners[n, 1], corners[n, 2]
         far = max(far, x * x + y * y)
         lowest, highest = min(lowest, z), max(highest, z)
     far = math.sqrt(far)
@@ -205,8 +235,8 @@ def _rows(corners: Floats, surrounds: bool, grid: GridSpacing) -> tuple[int, int
     # between the two count.
     upper = row_at(math.atan2(highest, near if highest > 0.0 else far), grid)
     lower = row_at(math.atan2(lowest, near if lowest < 0.0 else far), grid)
-    first = max(0, math.ceil(upper) - WINDOW_MARGIN)
-    return first, min(grid.rows - 1, math.floor(lower) + WINDOW_MARGIN)
+    first = max(0, math.ceil(upper - WINDOW_MARGIN))
+    return first, min(grid.rows - 1, math.floor(lower + WINDOW_MARGIN))
 
 
 @compiled()
@@ -215,21 +245,25 @@ def _nearest(corners: Floats) -> float:
     nearest of its edges.
     """
     least = math.inf
-    for n in range(8):
+    for n in range(len(corners)):
         for i in range(3):
             # An edge joins two corners that differ in one bit.
-            if not n >> i & 1:
-                least = min(least, _to_edge(corners[n], corners[n | 1 << i]))
+            if not n >> i & 1 and n | 1 << i < len(corners):
+                other = n | 1 << i
+                edge = corners[n, 0], corners[n, 1], corners[other, 0], corners[other, 1]
+                least = min(least, _to_edge(edge))
     return math.sqrt(least)
 
 
 @compiled()
-def _to_edge(one: Floats, other: Floats) -> float:
-    """Squared distance in the x, y plane from the origin to the stretch between two corners."""
+def _to_edge(edge: tuple[float, float, float, float]) -> float:
+    """Squared distance in the x, y plane from the origin to the stretch between two corners, x and
+    y of each.
+    """
     # The nearest point of the line, at the share of the way where the connection to the origin is
     # at a right angle, and held between the ends.
-    x, y = one[0], one[1]
-    along, across = other[0] - x, other[1] - y
+    x, y = edge[0], edge[1]
+    along, across = edge[2] - x, edge[3] - y
     length = along * along + across * across
     share = min(1.0, max(0.0, -(x * along + y * across) / length)) if length > 0.0 else 0.0
     squared: float = (x + share * along) ** 2 + (y + share * across) ** 2

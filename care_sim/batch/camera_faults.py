@@ -1,0 +1,160 @@
+"""What goes wrong between the pictures of all worlds and the detections that arrive; see
+`care_sim.sensors.camera_faults`.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from care_sim.base.compiled import compiled
+from care_sim.batch.drawn_ahead import DrawnAhead
+from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.conditions import CameraFaults
+from care_sim.core.types import ImageDetections
+from care_sim.sensors.camera_faults import first_bursts, later_bursts, miss_rates
+
+# Numbers of a module are what compiled code can hold.
+_AGE, _YAW_CHANGE = ImageDetections.AGE, ImageDetections.YAW_CHANGE
+
+
+class Detected(NamedTuple):
+    """Camera detections: `counts` (W,), and `rows` (W, D, 9) in the order of
+    `ImageDetections.COLUMNS`.
+    """
+
+    counts: Integers
+    rows: Floats
+
+
+class BatchMisses:
+    """Which of the reported bodies the cameras miss; the numbers are those of
+    `care_sim.sensors.camera_faults.Misses`.
+    """
+
+    def __init__(self, faults: CameraFaults, worlds: int):
+        self._faults = faults
+        self._draws = DrawnAhead(worlds, lambda rng, k, n: rng.random((k, n)))
+        self._lasting = np.zeros((worlds, 0), np.int64)
+        self._started = np.zeros(worlds, np.bool_)
+        self.any = bool(faults.false_negative_rate or faults.false_negative_per_m)
+        """Whether any are ever missed."""
+
+    def begin(self, world: int, seed: np.random.SeedSequence, objects: int) -> None:
+        """Begin an episode with so many `objects` that can be missed."""
+        if self.any:
+            self._draws.begin(world, seed, objects)
+            self._started[world] = False
+
+    def draw(self, live: Mask, ranges: Floats) -> Mask:
+        """(W, R) who is missed at this keyframe of the worlds that are `live`; `ranges` (W, R) are
+        distances in metres.
+        """
+        width = ranges.shape[1]
+        lasting = self._lasting
+        if lasting.shape[1] < width:
+            lasting = np.pad(lasting, ((0, 0), (0, width - lasting.shape[1])))
+        rates = miss_rates(self._faults, ranges)
+        draws = self._draws.next(live, width)
+        burst = self._faults.false_negative_burst
+        first = first_bursts(rates, draws, burst)
+        later = later_bursts(lasting, rates, draws, burst)
+        drawn = np.where(self._started[:, None], later, first)
+        missed: Mask = (drawn > 0) & live[:, None]
+        self._lasting = np.where(live[:, None], drawn - missed, lasting)
+        self._started |= live
+        return missed
+
+
+class _Sent(NamedTuple):
+    """The pictures on their way, in a ring of L places each: `counts` (W, L) and `rows`
+    (W, L, D, 9) of their detections, the car's `headings` (W, L) when they were taken, and the
+    keyframes at which they are `due` (W, L). `taken` (W,) tells how many there have been.
+    """
+
+    counts: Integers
+    rows: Floats
+    headings: Floats
+    due: Integers
+    taken: Integers
+
+
+class BatchDelay:
+    """Hands out the newest picture that has arrived, as `care_sim.sensors.camera_faults.Delay`:
+    each is late by `latency` keyframes, and by 0 to `jitter` more that are drawn for it.
+    """
+
+    def __init__(self, latency: int, jitter: int, keyframe_s: float, worlds: int):
+        self._latency, self._jitter = latency, jitter
+        self._keyframe_s = keyframe_s
+        self._draws = DrawnAhead(worlds, lambda rng, k, n: rng.integers(jitter + 1, size=(k, n)))
+        # The last one that has not come by now has come in any case.
+        places = latency + jitter + 1
+        self._sent = _Sent(
+            np.zeros((worlds, places), np.int64),
+            np.empty((worlds, places, 0, len(ImageDetections.COLUMNS))),
+            np.zeros((worlds, places)),
+            np.zeros((worlds, places), np.int64),
+            np.zeros(worlds, np.int64),
+        )
+        self._arrived = Detected(self._sent.taken, self._sent.rows[:, 0])
+
+    def begin(self, world: int, seed: np.random.SeedSequence) -> None:
+        """Begin an episode; lateness is drawn from `seed`."""
+        self._sent.taken[world] = 0
+        if self._jitter:
+            self._draws.begin(world, seed, 1)
+
+    def newest(self, live: Mask, seen: Detected, headings: Floats) -> Detected:
+        """Take in what is `seen` at a keyframe of the worlds that are `live`, the cars with these
+        `headings` (W,), radians; the newest detections that are due, with age and yaw change.
+        """
+        late = np.full(len(live), self._latency)
+        if self._jitter:
+            late += self._draws.next(live, 1)[:, 0].astype(np.int64)
+        worlds, most, columns = seen.rows.shape
+        if self._sent.rows.shape[2] < most:
+            places = self._sent.rows.shape[1]
+            rows = np.empty((worlds, places, most, columns))
+            rows[:, :, : self._sent.rows.shape[2]] = self._sent.rows
+            self._sent = self._sent._replace(rows=rows)
+            self._arrived = Detected(np.zeros(worlds, np.int64), np.empty(seen.rows.shape))
+        _deliver(live, seen, headings, late, self._keyframe_s, self._sent, self._arrived)
+        return self._arrived
+
+
+@compiled()
+def _deliver(
+    live: Mask,
+    seen: Detected,
+    headings: Floats,
+    late: Integers,
+    keyframe_s: float,
+    sent: _Sent,
+    arrived: Detected,
+) -> None:
+    """See `BatchDelay.newest`."""
+    places = sent.due.shape[1]
+    for w in range(len(live)):
+        if not live[w]:
+            continue
+        keyframe = sent.taken[w]
+        place = keyframe % places
+        sent.taken[w] += 1
+        sent.due[w, place] = keyframe + late[w]
+        sent.headings[w, place] = headings[w]
+        sent.counts[w, place] = seen.counts[w]
+        for n in range(seen.counts[w]):
+            sent.rows[w, place, n] = seen.rows[w, n]
+
+        # The newest first. Jitter lets a picture overtake the ones before it, which are then never
+        # handed out: what has been due once is so later.
+        arrived.counts[w] = 0
+        for age in range(min(keyframe + 1, places)):
+            place = (keyframe - age) % places
+            if sent.due[w, place] <= keyframe:
+                arrived.counts[w] = sent.counts[w, place]
+                for n in range(sent.counts[w, place]):
+                    arrived.rows[w, n] = sent.rows[w, place, n]
+                    arrived.rows[w, n, _AGE] = age * keyframe_s
+                    arrived.rows[w, n, _YAW_CHANGE] = headings[w] - sent.headings[w, place]
+                break

@@ -1,0 +1,98 @@
+"""`GridObservation` of many worlds at once."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from care_sim.base.errors import InvalidInput, shown
+from care_sim.core.arrays import Floats, Mask
+from care_sim.core.belief import OBSERVED, Observation
+from care_sim.envs.wrappers.grid_observation import GridArrays, GridObservation, pictures_space
+from care_sim.envs.wrappers.vectors import AnyVector, WorldsWrapper, rig_of, shows_beliefs
+from care_sim.policies.learned.beliefs import Beliefs
+from care_sim.policies.learned.grid_features import GridFeatures
+
+
+class VectorGridObservation(WorldsWrapper):
+    """`GridObservation` over a vector environment: what it shows of a world is what
+    `GridObservation` shows of the single environment, to the last bit.
+
+    It takes every mode of `autoreset_mode`; in "SameStep" the last observations of episodes, in
+    `infos["final_obs"]`, are pictures, too.
+
+    ### Action
+    That of the wrapped vector environment.
+
+    ### Observation
+    The `Dict` of `GridObservation`, a row for every world: `grid` (W, 6 * rows * columns) and `ego`
+    (W, 4). The arrays are the caller's own, also where those of the wrapped environment are written
+    over by its next step (`copy=False`).
+
+    ### Arguments
+    As of `GridObservation`.
+
+    ### Example
+    ```python
+    envs = gymnasium.make_vec("CARE-Dense-v0", num_envs=4, budget=0.03)
+    env = VectorGridObservation(VectorSectorReserve(envs))
+    observation, info = env.reset(seed=0)
+    pictures = observation["grid"].reshape(4, *env.features.shape)  # (4, 6, 8, 64)
+    ```
+    """
+
+    single = GridObservation
+
+    def __init__(self, env: AnyVector, columns: int = 64, rows: int = 8):
+        self._rig = rig_of(env)
+        if not shows_beliefs(env):
+            raise InvalidInput(
+                "VectorGridObservation needs the observation of CARE-Sim's environments, with "
+                f"{', '.join(OBSERVED)}; {shown(env)} shows another"
+            )
+        super().__init__(env)
+        self.features = GridFeatures(self._rig, columns, rows)
+        self._given: Beliefs | None = None
+        self.single_observation_space = pictures_space(self.features)
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+
+    @property
+    def beliefs(self) -> Beliefs:
+        """What the pictures were last drawn of, for wrappers outside.
+
+        Raises gymnasium.error.ResetNeeded before the first reset.
+        """
+        if self._given is None:
+            raise gymnasium.error.ResetNeeded("call reset() before stepping")
+        return self._given
+
+    def reset(
+        self, *, seed: Any = None, options: dict[str, Any] | None = None
+    ) -> tuple[GridArrays, dict[str, Any]]:
+        """Begin episodes."""
+        observation, infos = self.env.reset(seed=seed, options=options)
+        return self._shown(observation), infos
+
+    def step(self, actions: Any) -> tuple[GridArrays, Floats, Mask, Mask, dict[str, Any]]:
+        """Go on to the next keyframe."""
+        observation, rewards, terminated, truncated, infos = self.env.step(actions)
+        if "final_obs" in infos:
+            infos = infos | {"final_obs": self._finals(infos["final_obs"])}
+        return self._shown(observation), rewards, terminated, truncated, infos
+
+    def _shown(self, observation: Observation) -> GridArrays:
+        self._given = Beliefs.read(observation, self._rig)
+        return self.features.of_all(self._given)
+
+    def _finals(self, given: Sequence[Any]) -> NDArray[np.object_]:
+        """(W,) pictures of the last observations of those worlds that have one, else None."""
+        over = [world for world, last in enumerate(given) if last is not None]
+        stacked = {name: np.stack([given[world][name] for world in over]) for name in OBSERVED}
+        drawn = self.features.of_all(Beliefs.read(stacked, self._rig))
+        finals = np.full(len(given), None, object)
+        for row, world in enumerate(over):
+            finals[world] = {name: rows[row] for name, rows in drawn.items()}
+        return finals

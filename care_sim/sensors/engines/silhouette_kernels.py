@@ -1,0 +1,364 @@
+"""What a camera sees of convex polyhedra, compiled: where each lies in the picture, row by row.
+
+A ray through pixel (u, v), one metre long along the optical axis, meets the plane n . x = h of the
+camera's frame at the inverse depth (n . ray) / h, which is linear in u and v. What is seen of a
+polyhedron lies at the least of these among its faces towards the camera; its outline is where a
+face towards the camera meets one that is turned away. PyBullet's renderer samples column i at u = i
+and row j at v = j + 1, outlines included, and so does this.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from care_sim.base.compiled import compiled
+from care_sim.core.arrays import Floats, Integers
+from care_sim.sensors.engines.geometry_kernels import Axes, Vector, body_axes, dot
+from care_sim.world.bullet import PixelWindow
+
+ROUNDING_PX = 0.1
+"""Room for rounding around the corners of a polyhedron in a picture: pixels."""
+
+
+class PlacedCamera(NamedTuple):
+    """A camera in the world: its `place` (3,) and its `axes` (3, 3), rows forward, left and up."""
+
+    place: Floats
+    axes: Floats
+
+
+class Lens(NamedTuple):
+    """Focal length and principal point, `across` from the left and `down` from the top, pixels."""
+
+    focal: float
+    across: float
+    down: float
+
+
+class Meshes(NamedTuple):
+    """The polyhedra of parts one after the other, in the frames of their bodies, as in
+    `care_sim.world.polyhedra.Polyhedra.tables`: `corners` (c, 3); `faces` (f, 4), outward normals
+    and distances from the body's origin; `edges` (e, 2), the two faces that meet in each, counted
+    within the part; `starts` (k + 1, 3), where the rows of a part begin in these three; `owners`
+    (k,) body ids; `reaches` (k,) how far each part reaches from the body's origin.
+    """
+
+    corners: Floats
+    faces: Floats
+    edges: Integers
+    starts: Integers
+    owners: Integers
+    reaches: Floats
+
+
+class BodyInCamera(NamedTuple):
+    """From the frame of a body to that of a camera: first `turn`, row by row, then `shift`."""
+
+    turn: Axes
+    shift: Vector
+
+
+Outline = tuple[Floats, Floats, Floats]
+"""Of rows: where each is in the picture, and the first and the last column inside, not rounded."""
+
+
+class Silhouettes(NamedTuple):
+    """Room for what a window of a picture shows of polyhedra.
+
+    Those that are in it have places, in the order of the meshes: `owners` (k,) their bodies,
+    `facing` (f, 3) the inverse depths of their faces that are turned towards the camera, per
+    column, per row, and at pixel (0, 0). Those of a place begin at `starts` (k + 1,): in threes,
+    the last one repeated.
+
+    Row by row of the window, `counts` (height,) of them are crossed: `crossed` (height, k) tells
+    which, `stretches` (height, k, 2) the first column of each and the one after its last.
+
+    For the work on one polyhedron: `planes` (f, 4) as `_lay_planes` and `lines` (e, 3) as
+    `_lay_lines` have them, and an `outline`.
+    `numbers` are 0.0, 1.0, 2.0, for every column.
+    """
+
+    owners: Integers
+    facing: Floats
+    starts: Integers
+    counts: Integers
+    crossed: Integers
+    stretches: Integers
+    planes: Floats
+    lines: Floats
+    outline: Outline
+    numbers: Floats
+
+
+@compiled()
+def room_for(counts: tuple[int, int, int], width: int, height: int) -> Silhouettes:
+    """Room for polyhedra in windows of this height that end before a column `width`; `counts` are
+    those of polyhedra, and of all their faces and edges.
+    """
+    parts, faces, edges = counts
+    return Silhouettes(
+        np.empty(parts, np.int64),
+        np.empty((faces + 2 * parts, 3)),
+        np.zeros(parts + 1, np.int64),
+        np.empty(height, np.int64),
+        np.empty((height, parts), np.int64),
+        np.empty((height, parts, 2), np.int64),
+        np.empty((faces, 4)),
+        np.empty((edges, 3)),
+        (np.empty(height), np.empty(height), np.empty(height)),
+        np.arange(width).astype(np.float64),
+    )
+
+
+@compiled(error_model="numpy")
+def lay_silhouettes(
+    eye: PlacedCamera,
+    optics: Lens,
+    window: PixelWindow,
+    depths: tuple[float, float],
+    table: Meshes,
+    poses: Floats,
+    seen: Silhouettes,
+) -> None:
+    """Fill `seen` with what a window of the picture shows of the meshes. `depths` are the least and
+    the greatest depth in metres, `poses` (m, 7) those of bodies by id.
+    """
+    # Whether the ball that holds a part meets the view comes first, then its rectangle in the
+    # picture: a part beside the window costs no more than its corners.
+    left, top, right, bottom = window
+    nearest, farthest = depths
+    view = nearest, farthest, left, right
+    starts = table.starts
+    seen.counts[: bottom - top] = 0
+    place = 0
+    for part in range(len(table.owners)):
+        owner = table.owners[part]
+        if _is_outside(eye, poses, owner, table.reaches[part], optics, view):
+            continue
+        body = _seen_from(eye, poses, owner)
+        corners = starts[part, 0], starts[part + 1, 0]
+        held = _rectangle(table.corners, *corners, body, optics, nearest)
+        upper, lower = max(held[1], top), min(held[3], bottom)
+        if upper >= lower or max(held[0], left) >= min(held[2], right):
+            continue
+
+        faces = starts[part + 1, 1] - starts[part, 1]
+        _lay_planes(table.faces, starts[part, 1], faces, body, optics, seen.planes)
+        seen.owners[place] = owner
+        seen.starts[place + 1] = _take_facing(seen.planes, faces, seen.starts[place], seen.facing)
+        _begin_outline(upper, lower - upper, left, right, seen.outline)
+        edges = starts[part, 2], starts[part + 1, 2]
+        lines = _lay_lines(table.edges, *edges, seen.planes, seen.lines)
+        _cut_outline(seen.lines, lines, lower - upper, seen.outline)
+        _add_stretches(place, upper - top, lower - upper, seen)
+        place += 1
+
+
+@compiled()
+def _is_outside(
+    camera: PlacedCamera,
+    poses: Floats,
+    body: int,
+    reach: float,
+    lens: Lens,
+    view: tuple[float, float, int, int],
+) -> bool:
+    """Whether a ball of radius `reach` about the position of a body lies wholly outside of a view:
+    nearer or farther than its first two numbers, or beside the columns of the other two.
+    """
+    nearest, farthest, first, last = view
+    place = camera.place
+    away = _away(poses, body, place)
+    depth = dot(camera.axes[0], away)
+    if depth + reach < nearest or depth - reach > farthest:
+        return True
+    # The plane of the eye and a column u is left * focal = (across - u) * depth. A column more on
+    # either side is room for rounding.
+    left = dot(camera.axes[1], away) * lens.focal
+    before, beyond = lens.across - first + 1.0, lens.across - last - 1.0
+    return left - before * depth > reach * math.hypot(
+        lens.focal, before
+    ) or beyond * depth - left > reach * math.hypot(lens.focal, beyond)
+
+
+@compiled()
+def _seen_from(camera: PlacedCamera, poses: Floats, number: int) -> BodyInCamera:
+    """A body as the camera sees it."""
+    body = body_axes(poses[number, 3], poses[number, 4], poses[number, 5], poses[number, 6])
+    away = _away(poses, number, camera.place)
+    # A point p of the body lies at position + body . p in the world. Told along the axes of the
+    # camera, from its place, that is turn . p + shift.
+    ahead, left, up = _row(camera.axes, 0), _row(camera.axes, 1), _row(camera.axes, 2)
+    turn = _along_each(ahead, body), _along_each(left, body), _along_each(up, body)
+    return BodyInCamera(turn, _along_each(away, (ahead, left, up)))
+
+
+@compiled()
+def _away(poses: Floats, body: int, place: Floats) -> Vector:
+    """From a place (3,) to the position of a body."""
+    return poses[body, 0] - place[0], poses[body, 1] - place[1], poses[body, 2] - place[2]
+
+
+@compiled()
+def _along_each(vector: Vector, axes: Axes) -> Vector:
+    """The parts of a vector along three axes."""
+    return dot(axes[0], vector), dot(axes[1], vector), dot(axes[2], vector)
+
+
+@compiled()
+def _row(table: Floats, n: int) -> Vector:
+    """The first three numbers of a row. Numbers at hand: a view on an array counts references."""
+    return table[n, 0], table[n, 1], table[n, 2]
+
+
+@compiled()
+def _rectangle(
+    corners: Floats, begin: int, end: int, body: BodyInCamera, lens: Lens, nearest: float
+) -> PixelWindow:
+    """The columns and rows of a polyhedron in the picture, as a window that ends before its right
+    and bottom; the whole picture when it reaches through the plane at the depth `nearest`.
+    """
+    # The picture of a convex body before the camera is bounded by those of its corners.
+    turn = body.turn
+    shift = body.shift
+    least_u, most_u, least_v, most_v = math.inf, -math.inf, math.inf, -math.inf
+    behind = 0
+    for n in range(begin, end):
+        corner = _row(corners, n)
+        depth = shift[0] + dot(turn[0], corner)
+        if depth < nearest:
+            behind += 1
+        else:
+            scale = lens.focal / depth
+            u = lens.across - scale * (shift[1] + dot(turn[1], corner))
+            v = lens.down - scale * (shift[2] + dot(turn[2], corner))
+            least_u, most_u = min(least_u, u), max(most_u, u)
+            least_v, most_v = min(least_v, v), max(most_v, v)
+
+    # The picture is as wide and as high as twice the principal point lies across and down. Column i
+    # is sampled at u = i and row j at v = j + 1: many a thin body far away lies between two of
+    # them.
+    width, height = 2 * lens.across, 2 * lens.down
+    if behind == end - begin:
+        return 0, 0, 0, 0
+    if behind > 0:
+        return 0, 0, math.ceil(width), math.ceil(height)
+    first = math.ceil(min(max(least_u, 0.0), width) - ROUNDING_PX)
+    upper = math.ceil(min(max(least_v, 0.0), height) - 1.0 - ROUNDING_PX)
+    last = math.floor(max(min(most_u, width), 0.0) + ROUNDING_PX) + 1
+    return first, upper, last, math.floor(max(min(most_v, height), 0.0) - 1.0 + ROUNDING_PX) + 1
+
+
+@compiled(error_model="numpy")
+def _lay_planes(
+    faces: Floats, begin: int, count: int, body: BodyInCamera, lens: Lens, planes: Floats
+) -> None:
+    """Fill `planes` (count, 4) with the inverse depths over the picture of the faces from `begin`
+    on, and where each face is.
+
+    Column 0 is by how much the inverse depth grows per column of the picture, column 1 per row,
+    column 2 what it is at pixel (0, 0). Column 3 is the distance of the plane from the camera along
+    its outward normal: negative for a face that is turned towards the camera.
+    """
+    turn = body.turn
+    shift = body.shift
+    for n in range(count):
+        # A point p of the body is q = turn . p + shift in the camera's frame. The plane n . p = d
+        # of the body becomes n' . q = h there, with the normal n' = turn . n, here its parts
+        # (ahead, left, up), and h = d + n' . shift, here `offset`.
+        normal = _row(faces, begin + n)
+        ahead, left, up = dot(turn[0], normal), dot(turn[1], normal), dot(turn[2], normal)
+        offset = faces[begin + n, 3] + ahead * shift[0] + left * shift[1] + up * shift[2]
+
+        # The ray of pixel (u, v) at the depth z is q = z * (1, (across - u) / focal,
+        # (down - v) / focal). Put into n' . q = h and solved for 1 / z:
+        #     1 / z = (ahead + left * (across - u) / focal + up * (down - v) / focal) / h.
+        # What stands with u, what stands with v, and the rest:
+        planes[n, 0] = -left / lens.focal / offset
+        planes[n, 1] = -up / lens.focal / offset
+        planes[n, 2] = (ahead + (left * lens.across + up * lens.down) / lens.focal) / offset
+        planes[n, 3] = offset
+
+
+@compiled()
+def _take_facing(planes: Floats, count: int, begin: int, facing: Floats) -> int:
+    """Fill `facing` from `begin` on with those of `count` faces that are turned towards the camera,
+    in threes, the last one repeated. Returns the number after the last.
+    """
+    end = begin
+    for n in range(count):
+        if planes[n, 3] < 0.0:
+            for k in range(3):
+                facing[end, k] = planes[n, k]
+            end += 1
+    while (end - begin) % 3:
+        for k in range(3):
+            facing[end, k] = facing[end - 1, k]
+        end += 1
+    return end
+
+
+@compiled()
+def _begin_outline(upper: int, rows: int, left: int, right: int, outline: Outline) -> None:
+    """Fill an outline with the whole of some rows of a window, from the row `upper` on."""
+    height, first, last = outline
+    for n in range(rows):
+        height[n], first[n], last[n] = upper + n + 1.0, left, right - 1.0
+
+
+@compiled()
+def _lay_lines(edges: Integers, begin: int, end: int, planes: Floats, lines: Floats) -> int:
+    """Fill `lines` (m, 3) with the outline of a polyhedron with the `planes` (f, 4), whose edges
+    are those from `begin` to the one before `end`; return how many lines it has.
+
+    They are told per column, per row, and at pixel (0, 0), by a number that is positive inside, 0
+    on the line and negative outside.
+    """
+    # An edge is on the outline where one of its two faces is turned towards the camera (distance
+    # below 0) and the other is not. Along the edge both have one inverse depth, so that their
+    # difference is 0 there; inside, the face towards the camera has the smaller one.
+    count = 0
+    for edge in range(begin, end):
+        one, other = edges[edge, 0], edges[edge, 1]
+        if (planes[one, 3] < 0.0) != (planes[other, 3] < 0.0):
+            near, away = (one, other) if planes[one, 3] < 0.0 else (other, one)
+            for k in range(3):
+                lines[count, k] = planes[near, k] - planes[away, k]
+            count += 1
+    return count
+
+
+@compiled(error_model="numpy")
+def _cut_outline(lines: Floats, count: int, rows: int, outline: Outline) -> None:
+    """Leave of so many rows of an outline what is inside of `count` lines."""
+    # In one row a line leaves a half of the columns, from -here / slope on or up to there, or all,
+    # or none. All rows in one loop: so the processor takes several at a time.
+    height, first, last = outline
+    for line in range(count):
+        slope, rise, start = _row(lines, line)
+        if slope > 0.0:
+            for n in range(rows):
+                first[n] = max(first[n], -(start + rise * height[n]) / slope)
+        elif slope < 0.0:
+            for n in range(rows):
+                last[n] = min(last[n], -(start + rise * height[n]) / slope)
+        else:
+            for n in range(rows):
+                if start + rise * height[n] < 0.0:
+                    last[n] = -math.inf
+
+
+@compiled()
+def _add_stretches(place: int, upper: int, rows: int, seen: Silhouettes) -> None:
+    """Add what is inside `seen.outline` to so many rows of the window, from the row `upper` on."""
+    _, first, last = seen.outline
+    counts = seen.counts
+    for n in range(rows):
+        if first[n] <= last[n]:
+            row = upper + n
+            count = counts[row]
+            seen.crossed[row, count] = place
+            seen.stretches[row, count, 0] = math.ceil(first[n])
+            seen.stretches[row, count, 1] = math.floor(last[n]) + 1
+            counts[row] = count + 1

@@ -1,0 +1,114 @@
+"""Lanes along x and the vehicles on them: those of highway-env, to the last bit, at less cost."""
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+from highway_env.road.lane import StraightLane
+from highway_env.utils import not_zero
+from highway_env.vehicle.behavior import IDMVehicle
+from highway_env.vehicle.kinematics import Vehicle
+
+from care_sim.core.arrays import Floats
+
+
+class LaneAlongX(StraightLane):  # type: ignore[misc]
+    """A lane from (-x, y) to (x, y) or back."""
+
+    def local_coordinates(self, position: Sequence[float]) -> tuple[float, float]:
+        """Metres along the lane and to its side: those of `StraightLane`, to the last bit, without
+        its dot products of axes that are 0 and 1 or -1.
+        """
+        # The 0.0 stands for the product with the other axis: without it the side could be -0.0.
+        x, y = position
+        start_x, start_y, sign = self._origin
+        return (float(x) - start_x) * sign, (float(y) - start_y) * sign + 0.0
+
+    @cached_property
+    def _origin(self) -> tuple[float, float, float]:
+        return float(self.start[0]), float(self.start[1]), float(self.direction[0])
+
+
+class StraightVehicle(Vehicle):  # type: ignore[misc]
+    """A vehicle of highway-env, to the last bit, that asks for no sine and no cosine while it goes
+    straight ahead.
+    """
+
+    _headed: tuple[float, Floats] | None = None
+
+    @property
+    def direction(self) -> Floats:
+        """(2,) unit vector along the heading."""
+        if self._headed is None or self._headed[0] != self.heading:
+            self._headed = self.heading, super().direction
+        return self._headed[1]
+
+    def step(self, dt: float) -> None:
+        """Move by `dt` seconds."""
+        if self.action["steering"] != 0.0 or self.impact is not None:
+            super().step(dt)
+            return
+        # With its wheels straight a vehicle does not slip sideways, and its heading stays.
+        self.clip_actions()
+        self.position += self.speed * self.direction * dt
+        self.speed += self.action["acceleration"] * dt
+        self.on_state_update()
+
+
+class LaneDriver(StraightVehicle, IDMVehicle):  # type: ignore[misc]
+    """An IDM driver who neither steers nor looks for the nearest lane in the middle of one. Its
+    numbers are plain floats, which NumPy would clip one by one. It moves as highway-env's, to the
+    last bit, as long as it neither changes lanes by itself nor is asked whether it crashed: then
+    nothing reads the timer and the flag that are left alone here.
+    """
+
+    def act(self, action: dict[str, float] | str | None = None) -> None:
+        """Decide on the next step."""
+        # Who changes lanes, or has come to the end of one, decides as highway-env does.
+        lane = self.lane
+        along = lane.local_coordinates(self.position)[0]
+        if (
+            self.lane_index != self.target_lane_index
+            or lane.after_end(self.position, along)
+            or not self._follows(lane)
+        ):
+            super().act(action)
+            return
+        ahead, _ = self.road.neighbour_vehicles(self, self.lane_index)
+        wanted = self.acceleration(self, ahead)
+        held = min(max(wanted, -self.ACC_MAX), self.ACC_MAX)
+        self.action = {"steering": 0.0, "acceleration": held}
+
+    def acceleration(
+        self,
+        ego_vehicle: Vehicle,
+        front_vehicle: Vehicle | None = None,
+        rear_vehicle: Vehicle | None = None,
+    ) -> float:
+        """m/s^2 that `ego_vehicle` wishes for behind `front_vehicle`, if any."""
+        # The powers are NumPy's: Python's round otherwise.
+        limit = ego_vehicle.lane.speed_limit
+        wanted_mps = min(max(ego_vehicle.target_speed, 0), limit)
+        share = max(ego_vehicle.speed, 0) / abs(not_zero(wanted_mps))
+        wish = self.COMFORT_ACC_MAX * (1 - np.power(share, self.DELTA))
+        if front_vehicle:
+            gap = self.desired_gap(ego_vehicle, front_vehicle)
+            apart = not_zero(ego_vehicle.lane_distance_to(front_vehicle))
+            wish -= self.COMFORT_ACC_MAX * np.power(gap / apart, 2)
+        return float(wish)
+
+    def steering_control(self, target_lane_index: tuple[str, str, int]) -> float:
+        """Angle of the front wheels, radians."""
+        # In the middle of a straight lane and along it, the steering that IDM computes is 0.
+        follows = self._follows(self.road.network.get_lane(target_lane_index))
+        return 0.0 if follows else float(super().steering_control(target_lane_index))
+
+    def on_state_update(self) -> None:
+        """Note the lane."""
+        if not self._follows(self.lane):
+            super().on_state_update()
+
+    def _follows(self, lane: LaneAlongX) -> bool:
+        return bool(
+            self.heading == lane.heading and lane.local_coordinates(self.position)[1] == 0.0
+        )
