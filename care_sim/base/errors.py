@@ -17,6 +17,10 @@ class BrokenPolicy(InvalidInput):
     """A policy of an installed package that cannot be loaded or made."""
 
 
+class BrokenScenario(InvalidInput):
+    """A scenario of an installed package that cannot be loaded, made or built."""
+
+
 class MissingExtra(ImportError):
     """An optional dependency that is not installed; the message names the extra to install."""
 

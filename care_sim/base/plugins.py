@@ -2,7 +2,8 @@
 
 A package adds one through an entry point: its name is what the user writes, its object is a class
 or another callable that makes the thing. Of two entries with one name the first on the path counts,
-as for modules. A built-in name cannot be taken.
+as for modules. A built-in name cannot be taken. A kind whose entries have longer names says what
+the user writes of them.
 
 What no package adds is asked for by its place, as MODULE:OBJECT, where the module is found as
 Python finds it, or in the folder in which the program was started.
@@ -29,13 +30,15 @@ class Plugins(Generic[Made]):
     that name them, and the entries of the entry-point `group`.
 
     `faults` says in which ways a loaded object makes nothing of the kind; each is the end of a
-    sentence that begins with the object's place.
+    sentence that begins with the object's place. `called` gives what the user writes for the name
+    of an entry.
     """
 
     kind: str
     group: str
     built_in: Mapping[str, Callable[..., Made] | EntryPoint]
     faults: Callable[[Any], Iterable[str]]
+    called: Callable[[str], str] = str
 
     def names(self) -> list[str]:
         """The built-in names in their order, then those of installed packages in alphabetical
@@ -65,23 +68,34 @@ class Plugins(Generic[Made]):
         return EntryPoint(name, name, self.group) if is_place(name) else self.entries()[name]
 
     def all_entries(self) -> list[EntryPoint]:
-        """Every entry of installed packages in order of name; of one name in order of the path."""
-        return sorted(entry_points(group=self.group), key=lambda entry: entry.name)
+        """Every entry of installed packages in order of what it is called; of one name in order of
+        the path.
+        """
+        return sorted(entry_points(group=self.group), key=lambda entry: self.called(entry.name))
 
     def entries(self) -> dict[str, EntryPoint]:
         """The entry that counts, by name."""
         # Of one name the last that is put in stays, and reversed that is the first on the path.
-        return {entry.name: entry for entry in reversed(self.all_entries())}
+        return {self.called(entry.name): entry for entry in reversed(self.all_entries())}
 
     def hidden_entries(self) -> Iterator[tuple[EntryPoint, EntryPoint | None]]:
         """The entries that do not count, each with the one that does; None for a built-in thing."""
         counting: dict[str, EntryPoint] = {}
         for entry in self.all_entries():
-            first = counting.setdefault(entry.name, entry)
-            if entry.name in self.built_in:
+            name = self.called(entry.name)
+            first = counting.setdefault(name, entry)
+            if name in self.built_in:
                 yield entry, None
             elif first is not entry:
                 yield entry, first
+
+    def refusals(self) -> Iterator[tuple[EntryPoint, str]]:
+        """The entries that do not count, each with the line that says so."""
+        for entry, winner in self.hidden_entries():
+            owner = f"that of {package_of(winner)}" if winner else "the built-in one"
+            name = self.called(entry.name)
+            line = f"{self.kind} {name} of {package_of(entry)} is refused: {owner} has its name"
+            yield entry, line
 
     def load(self, entry: EntryPoint) -> Callable[..., Made]:
         """What an entry names. Raises InvalidInput with the reason, in one line, when it is of no

@@ -53,16 +53,27 @@ class History:
         return [
             Keyframe(
                 index=index,
-                time_s=one.time_s,
-                fired=cells[: one.fired],
-                in_view=one.in_view,
-                detected=one.detected,
-                braking=one.braking,
-                speed_mps=one.speed_mps,
-                distance_m=one.distance_m,
-                nearest_m=one.nearest_m,
-                clearance_m=one.clearance_m,
-                impact_speed_mps=None if math.isnan(one.impact_speed_mps) else one.impact_speed_mps,
+                time_s=time,
+                fired=cells[:fired],
+                in_view=in_view,
+                detected=detected,
+                braking=braking,
+                speed_mps=speed,
+                distance_m=distance,
+                nearest_m=nearest,
+                clearance_m=clearance,
+                impact_speed_mps=None if math.isnan(impact) else impact,
             )
-            for index, one in enumerate(map(Records, *columns))
+            for index, (
+                time,
+                fired,
+                in_view,
+                detected,
+                braking,
+                speed,
+                distance,
+                nearest,
+                clearance,
+                impact,
+            ) in enumerate(zip(*columns, strict=True))
         ]

@@ -160,7 +160,8 @@ class BatchState:
             _counts(worlds), np.zeros((worlds, MAX_TRACKS, len(Tracks.COLUMNS))), _counts(worlds)
         )
         self.sensors = Sensors(np.zeros((worlds, 6)), np.zeros((worlds, 2)), np.zeros((worlds, 2)))
-        self.egos = Egos(*(np.zeros(worlds) for _ in range(3)), _counts(worlds), _counts(worlds))
+        motion = np.zeros(worlds), np.zeros(worlds), np.zeros(worlds)
+        self.egos = Egos(*motion, _counts(worlds), _counts(worlds))
 
 
 def filled(table: np.ndarray, world: int, rows: np.ndarray) -> np.ndarray:

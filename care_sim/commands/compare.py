@@ -41,7 +41,9 @@ class Compare:
     """Play the same seed under several policies and print their outcomes side by side."""
 
     scenario: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCENARIO")]
-    """dartout, dense, cutin, ncap, r157 or drive; `care-sim scenarios` lists their parameters."""
+    """dartout, dense, cutin, ncap, r157, drive, that of an installed package, or MODULE:CLASS;
+    `care-sim scenarios` lists their parameters.
+    """
     policies: tuple[str, ...] = ("history", "care")
     """Names of `care-sim policies`; `all` stands for all but the controls. `full` always runs with
     budget 1.0."""

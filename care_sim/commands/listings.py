@@ -5,9 +5,13 @@ from dataclasses import Field, dataclass, fields
 from typing import Any
 
 from care_sim.base.bounds import allowed
+from care_sim.base.errors import InvalidInput, printable
+from care_sim.base.plugins import package_of
+from care_sim.base.scenario_names import is_environment_id
 from care_sim.perception.detectors import detector_lines
 from care_sim.policies.listing import policy_paragraphs
-from care_sim.scenarios import SCENARIOS
+from care_sim.scenarios import PLUGINS, SCENARIOS, scenario_class, scenario_names
+from care_sim.scenarios.base import Scenario
 from care_sim.scenarios.crossing import OCCLUDERS
 from care_sim.scenarios.mirroring import MIRRORED
 from care_sim.scenarios.ncap.scenario import DRAWN
@@ -66,32 +70,55 @@ class Scenarios:
 
     def __call__(self) -> int:
         """Run it."""
-        for name, scenario in SCENARIOS.items():
-            print(f"{name:12} {_summary(scenario)}")
-            for field in fields(scenario):
-                print(f"    {field.name}={_rounded(field.default)}{_choices(field)}")
-            print()
+        for name in scenario_names():
+            print(*map(printable, _scenario_lines(name)), "", sep="\n")
+        for _, reason in PLUGINS.refusals():
+            print(printable(reason))
         return 0
 
 
-def _choices(field: Field[Any]) -> str:
+def _scenario_lines(name: str) -> list[str]:
+    """A scenario and its parameters, or why it cannot be loaded."""
+    # One that cannot be loaded must not hide the others.
+    try:
+        scenario = scenario_class(name)
+    except InvalidInput as error:
+        return [f"{name:12} (broken) {error} [{package_of(PLUGINS.entry(name))}]"]
+    return [
+        f"{name:12} {_summary(name, scenario)}",
+        *(
+            f"    {field.name}={_rounded(field.default)}{_choices(scenario, field)}"
+            for field in fields(scenario)
+        ),
+    ]
+
+
+def _choices(scenario: type[Scenario], field: Field[Any]) -> str:
     """The values that a parameter may have, and which the seed draws, in brackets; empty where
     there is nothing to tell.
     """
-    named = f"of {', '.join(_NAMED[field.name])}" if field.name in _NAMED else ""
+    # Those of another package may be called the same and mean something else.
+    ours = scenario in SCENARIOS.values()
+    named = f"of {', '.join(_NAMED[field.name])}" if ours and field.name in _NAMED else ""
     told = (
         named or allowed(field),
-        _ZERO.get(field.name, ""),
+        _ZERO.get(field.name, "") if ours else "",
         "None is drawn" if field.default is None else "",
     )
     text = "; ".join(filter(None, told))
     return f" ({text})" if text else ""
 
 
-def _summary(thing: object) -> str:
-    """The first line of the docstring of a scenario's module."""
-    module = inspect.getmodule(thing)
-    return (inspect.getdoc(module) or "").partition("\n")[0]
+def _summary(name: str, scenario: type[Scenario]) -> str:
+    """The first line of the docstring of a built-in scenario's module; of another class its own,
+    its package and the id of its environment.
+    """
+    if name in SCENARIOS:
+        return (inspect.getdoc(inspect.getmodule(scenario)) or "").partition("\n")[0]
+    entry = PLUGINS.entry(name)
+    own = (scenario.__doc__ or "").strip().partition("\n")[0]
+    known = f"{entry.name}, " if is_environment_id(entry.name) else ""
+    return f"{own} [{known}{package_of(entry)}]".strip()
 
 
 def _rounded(value: object) -> str:

@@ -23,7 +23,9 @@ class Run:
     """Play one episode and print its timeline and outcome."""
 
     scenario: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCENARIO")]
-    """dartout, dense, cutin, ncap, r157 or drive; `care-sim scenarios` lists their parameters."""
+    """dartout, dense, cutin, ncap, r157, drive, that of an installed package, or MODULE:CLASS;
+    `care-sim scenarios` lists their parameters.
+    """
     policy: str = "care"
     """`care-sim policies` lists them. `full` always runs with budget 1.0."""
     budget: float = 0.1

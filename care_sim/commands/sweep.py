@@ -9,8 +9,7 @@ import tyro
 from care_sim.base.errors import InvalidInput
 from care_sim.commands.shared.episode_studies import EpisodeStudy
 from care_sim.commands.shared.options import DEFAULT_OPTIONS, Options, seeds_of
-from care_sim.commands.shared.selection import check_values, expanded, in_turn, playable
-from care_sim.scenarios import SCENARIOS
+from care_sim.commands.shared.selection import buildable, check_values, in_turn, playable
 from care_sim.study.episode_config import grid
 
 
@@ -19,7 +18,7 @@ class Sweep(EpisodeStudy):
     """Play every combination of scenarios, policies, budgets, faults and seeds."""
 
     scenarios: tuple[str, ...] = ("dartout", "dense", "cutin")
-    """Names of `care-sim scenarios`; `all` stands for all of them."""
+    """Names of `care-sim scenarios`, or MODULE:CLASS; `all` stands for all that have a name."""
     policies: tuple[str, ...] = ("history", "all-camera", "care", "care-sightlines", "fan", "full")
     """Names of `care-sim policies`; `all` stands for all but the controls. `full` always runs with
     budget 1.0."""
@@ -37,9 +36,10 @@ class Sweep(EpisodeStudy):
     def __call__(self) -> int:
         """Run it."""
         check_values(self, "scenarios", "policies", "budgets", "seeds")
-        scenarios = expanded(self.scenarios, SCENARIOS)
         common = self.conditions.arguments(self.policies)
-        # A policy that cannot be made for one seed and budget is left out, and the others play.
+        # What is not ours may be broken: a scenario or a policy is left out, and the others play.
+        scenarios, unbuilt = buildable(self.scenarios, common["scenario_parameters"])
+        # A policy is tried on one seed and budget.
         policies, left_out = playable(
             self.policies, lambda name: grid(scenarios, [name], self.budgets[:1], [0], **common)
         )
@@ -50,4 +50,4 @@ class Sweep(EpisodeStudy):
         configs = grid(
             scenarios, policies, self.budgets, seeds_of(self.seeds), rates, latencies, **common
         )
-        return self.play_study("sweep", configs, self.out, left_out)
+        return self.play_study("sweep", configs, self.out, [*unbuilt, *left_out])

@@ -7,11 +7,9 @@ from typing import Annotated
 import tyro
 
 from care_sim.base.bounds import bounded
-from care_sim.base.checks import check_known
 from care_sim.commands.shared.episode_studies import EpisodeStudy
 from care_sim.commands.shared.options import DEFAULT_SENSING, SensingOptions, seeds_of
-from care_sim.commands.shared.selection import check_values
-from care_sim.scenarios import SCENARIOS
+from care_sim.commands.shared.selection import check_built, check_values
 from care_sim.study.designs.validate import levels_of, validation_study
 from care_sim.study.parameters import parameters
 
@@ -23,7 +21,9 @@ class Validate(EpisodeStudy):
     """
 
     world: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="WORLD")]
-    """dartout, dense or cutin; `care-sim scenarios` lists them."""
+    """dartout, dense, cutin, that of an installed package, or MODULE:CLASS; `care-sim scenarios`
+    lists them.
+    """
     seeds: tuple[int, ...] = (20,)
     """The test seeds. One number: that many, from 0. Several numbers: these, below 1,000; 7 7 is
     seed 7 alone.
@@ -44,11 +44,10 @@ class Validate(EpisodeStudy):
 
     def __call__(self) -> int:
         """Run it."""
-        check_known("scenario", self.world, SCENARIOS)
         check_values(self, "seeds", "budgets")
-        levels = levels_of(
-            parameters(self.scenario_parameters), [parameters([text]) for text in self.factors]
-        )
+        base = parameters(self.scenario_parameters)
+        check_built(self.world, base)
+        levels = levels_of(base, [parameters([text]) for text in self.factors])
         configs = validation_study(
             self.world,
             levels,

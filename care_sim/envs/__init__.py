@@ -1,6 +1,14 @@
-"""Gymnasium environments; importing `care_sim` registers them."""
+"""Gymnasium environments; importing `care_sim` registers them, and those of installed scenarios."""
+
+from importlib.metadata import entry_points
+from typing import Any
 
 import gymnasium
+from gymnasium.envs.registration import EnvSpec
+
+from care_sim.base.checks import check_known
+from care_sim.base.plugins import is_place
+from care_sim.base.scenario_names import SCENARIO_GROUP, is_environment_id, scenario_of
 
 CLOSED_LOOP = {
     "CARE-Dartout-v0": "care_sim.envs.scenarios:DartoutEnv",
@@ -15,14 +23,15 @@ OPEN_LOOP = {
     "CARE-Replay-v0": "care_sim.envs.scenes:ReplayEnv",
 }
 IDS = CLOSED_LOOP | OPEN_LOOP
-"""Entry points of all environments, by id."""
-_VECTORS = {
-    entry_point: entry_point.replace("envs.scenarios", "envs.vector.scenarios").replace(
-        "Env", "VectorEnv"
-    )
-    for entry_point in CLOSED_LOOP.values()
-}
-"""Entry points of many worlds of each at once."""
+"""Entry points of all environments of CARE-Sim, by id."""
+ENVIRONMENT_IDS = {scenario_of(name): name for name in CLOSED_LOOP}
+"""The id of every built-in scenario's environment."""
+_ANY_SCENARIO = "care_sim.envs.scenarios:ScenarioEnv"
+
+
+def installed_ids() -> list[str]:
+    """The ids of the environments of installed scenarios, in alphabetical order."""
+    return sorted({*filter(is_environment_id, _installed())} - {*IDS})
 
 
 def register_all() -> None:
@@ -31,5 +40,49 @@ def register_all() -> None:
     for name, entry_point in IDS.items():
         if name not in gymnasium.registry:
             gymnasium.register(
-                name, entry_point=entry_point, vector_entry_point=_VECTORS.get(entry_point)
+                name, entry_point=entry_point, vector_entry_point=_vector_of(entry_point)
             )
+    for name in installed_ids():
+        if name not in gymnasium.registry:
+            gymnasium.register(
+                name,
+                entry_point=_ANY_SCENARIO,
+                vector_entry_point=_vector_of(_ANY_SCENARIO),
+                kwargs={"scenario": name},
+            )
+
+
+def make_env(name: str, **arguments: Any) -> gymnasium.Env[Any, Any]:
+    """The environment of an id, of CARE-Sim or of an installed scenario, or else of a scenario by
+    name or place, without Gymnasium's checker. Raises InvalidInput for any other name.
+    """
+    scenarios = [*ENVIRONMENT_IDS, *map(scenario_of, _installed())]
+    if isinstance(name, str) and (is_place(name) or name in scenarios):
+        return make_scenario_env(name, **arguments)
+    check_known("environment", name, [*IDS, *installed_ids()])
+    return gymnasium.make(f"care_sim:{name}", disable_env_checker=True, **arguments)
+
+
+def make_scenario_env(scenario: str, **arguments: Any) -> gymnasium.Env[Any, Any]:
+    """The environment of a scenario by name or place, without Gymnasium's checker."""
+    known = ENVIRONMENT_IDS.get(scenario)
+    # Of another scenario nothing needs to be registered: workers make it by the name alone.
+    spec = f"care_sim:{known}" if known else _any_scenario(scenario)
+    return gymnasium.make(spec, disable_env_checker=True, **arguments)
+
+
+def _any_scenario(scenario: str) -> EnvSpec:
+    return EnvSpec("CARE-Scenario-v0", _ANY_SCENARIO, kwargs={"scenario": scenario})
+
+
+def _installed() -> list[str]:
+    """The names of the entries of installed scenarios."""
+    return [entry.name for entry in entry_points(group=SCENARIO_GROUP)]
+
+
+def _vector_of(entry_point: str) -> str | None:
+    """The entry point of many worlds at once of an environment; None of the open loop."""
+    place, _, kind = entry_point.partition(":")
+    if place != "care_sim.envs.scenarios":
+        return None
+    return f"care_sim.envs.vector.scenarios:{kind.removesuffix('Env')}VectorEnv"

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,8 @@ from care_sim.loops.false_box_pools import pool_of_another_drive
 from care_sim.loops.records import Keyframe, Outcome
 from care_sim.loops.seeds import SensorSeeds
 from care_sim.perception.detectors import PROXY
-from care_sim.scenarios import SCENARIOS, make_scenario
+from care_sim.scenarios import make_scenario, scenario_class
+from care_sim.scenarios.base import Scenario
 from care_sim.sensors.box_pool import EMPTY_POOL, BoxPool
 from care_sim.sensors.camera_profiles import invents_boxes
 from care_sim.sensors.engines import check_engine
@@ -178,7 +179,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012 (Gymnasium's)
-    scenario_name: ClassVar[str]
+    scenario_name: str | type[Scenario]
     conditions: ClosedLoopConditions
     conditions_kind = ClosedLoopConditions
 
@@ -199,7 +200,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         check_number("keyframe_s", keyframe_s, WORLD_STEP_S, LONGEST_KEYFRAME_S)
         whole_steps(keyframe_s)
         check_choice("render_mode", render_mode, self.metadata["render_modes"])
-        kind = SCENARIOS[self.scenario_name]
+        kind = scenario_class(self.scenario_name)
         check_arguments(
             type(self).__name__, parameters, [*arguments_of(type(self)), *kind.__dataclass_fields__]
         )
@@ -254,7 +255,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     def episode(self, entropy: int) -> Episode:
         """What an episode begins with. The caller closes its world."""
         scenario, camera, lidar, floor, odometry = self._streams(entropy, count=5)
-        world = self.scenario.build(np.random.default_rng(scenario))
+        world = self.scenario.make_world(np.random.default_rng(scenario))
         return Episode(world, SensorSeeds(camera, lidar, odometry), floor)
 
     def first_info(self, entropy: int, world: World) -> dict[str, Any]:
@@ -307,7 +308,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         # The first five are those of `reset`, however many are asked for.
         _, camera, lidar, _, odometry, another = self._streams(entropy, count=6)
         seeds = SensorSeeds(camera, lidar, odometry)
-        world = self.scenario.build(np.random.default_rng(another))
+        world = self.scenario.make_world(np.random.default_rng(another))
         return pool_of_another_drive(
             world, self.scenario.duration_s, self.rig, self.conditions, seeds, self._detector
         )

@@ -1,8 +1,16 @@
-"""The environments of the closed loop by id: one per scenario."""
+"""The environments of the closed loop by id: one per built-in scenario, and one for any other."""
 
+from typing import Any
+
+from care_sim.base.errors import BrokenScenario, InvalidInput
+from care_sim.base.scenario_names import is_environment_id, scenario_of
 from care_sim.envs.closed_loop import ClosedLoopEnv
+from care_sim.envs.sensing import arguments_of
 from care_sim.evaluation.drives import drive_outcome
-from care_sim.loops.records import DriveOutcome
+from care_sim.loops.records import DriveOutcome, Outcome
+from care_sim.scenarios import PLUGINS, scenario_class
+from care_sim.scenarios.base import Scenario
+from care_sim.scenarios.drive import DriveScenario
 
 
 class DartoutEnv(ClosedLoopEnv):
@@ -82,6 +90,46 @@ class DriveEnv(ClosedLoopEnv):
     scenario_name = "drive"
 
     def _outcome(self) -> DriveOutcome:
-        world = self.loop.world
-        kinds = {actor.body: actor.kind.name for actor in world.actors}
-        return drive_outcome(self.keyframes, world.meetings, kinds, world.along_m / world.goal_m)
+        return _of_drive(self)
+
+
+class ScenarioEnv(ClosedLoopEnv):
+    """Any `scenario` of the closed loop: of an installed package, by its name or the id of its
+    environment; by its place, MODULE:OBJECT; or a class.
+
+    An installed one whose entry is called `Mine-LeftBike-v0` has this environment under that id.
+    """
+
+    __doc__ = f"{__doc__}\n    {ClosedLoopEnv.__doc__}"
+
+    def __init__(self, *, scenario: str | type[Scenario], **parameters: Any):
+        if isinstance(scenario, str) and is_environment_id(scenario):
+            _check_counts(scenario)
+            scenario = scenario_of(scenario)
+        kind = scenario_class(scenario)
+        # Such a parameter would never reach the scenario.
+        for name in arguments_of(type(self)):
+            if name in kind.__dataclass_fields__:
+                raise BrokenScenario(
+                    f"scenario {kind.__module__}:{kind.__qualname__} has the parameter {name}, "
+                    "which is an argument of every environment"
+                )
+        self.scenario_name = scenario
+        super().__init__(**parameters)
+
+    def _outcome(self) -> Outcome:
+        # As the drive that it derives from is scored.
+        return _of_drive(self) if isinstance(self.scenario, DriveScenario) else super()._outcome()
+
+
+def _of_drive(env: ClosedLoopEnv) -> DriveOutcome:
+    world = env.loop.world
+    kinds = {actor.body: actor.kind.name for actor in world.actors}
+    return drive_outcome(env.keyframes, world.meetings, kinds, world.along_m / world.goal_m)
+
+
+def _check_counts(environment: str) -> None:
+    """Raise InvalidInput for the id of an installed scenario whose name another one has."""
+    for entry, reason in PLUGINS.refusals():
+        if entry.name == environment:
+            raise InvalidInput(f"environment {environment}: {reason}")

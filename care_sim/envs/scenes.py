@@ -8,7 +8,8 @@ from care_sim.envs.open_loop import FilmEnv, OpenLoopEnv, check_film_arguments
 from care_sim.envs.sensing import Observed
 from care_sim.sensors.setups import DEFAULT_SETUP, Sensor, sensor_setup
 from care_sim.sensors.surround import SURROUND_CAMERAS
-from care_sim.sources.recordings import film_of, recordings
+from care_sim.sources.named import replayed_source
+from care_sim.sources.scenes import Scene, film_of
 from care_sim.sources.street_films import check_filmed, street_film
 from care_sim.streets.draft import STREET_KEYFRAME_S
 
@@ -47,11 +48,12 @@ class StreetEnv(OpenLoopEnv):
 class ReplayEnv(FilmEnv):
     """`CARE-Replay-v0`: a recorded scene, at 2 Hz.
 
-    `source` names the recordings, `argoverse2:FOLDER` or `nuscenes:FOLDER`, and `scene` one of
-    their scenes by name; the first, unless given. `split`, `version`, `camera_detections` and
-    `sweeps` are those of `care_sim.sources.recordings.NuScenes`. A file that is missing or damaged,
-    or a token that points nowhere, raises `care_sim.InvalidInput` with its name. The seed of
-    `reset` draws faults, noise and floor.
+    `source` names the recordings, `argoverse2:FOLDER`, `nuscenes:FOLDER` or a source of your own
+    (`care_sim.sources.named`), and `scene` one of their scenes by name; the first, unless given.
+    `split`, `version`, `camera_detections` and `sweeps` are those of
+    `care_sim.sources.recordings.NuScenes`. A file that is missing or damaged, or a token that
+    points nowhere, raises `care_sim.InvalidInput` with its name. The seed of `reset` draws faults,
+    noise and floor.
     """
 
     __doc__ = f"{__doc__}\n    {OpenLoopEnv.__doc__}"
@@ -71,13 +73,15 @@ class ReplayEnv(FilmEnv):
         check_film_arguments(type(self), parameters)
         if not isinstance(scene, str | None):
             raise InvalidInput(f"scene must be a name, got {shown(scene)}")
-        options = {
-            "split": split,
-            "version": version,
-            "camera_detections": camera_detections,
-            "sweeps": sweeps,
-        }
-        recorded = recordings(source, options)
-        super().__init__(
-            film_of(recorded, recorded.scenes()[0] if scene is None else scene), **parameters
+        recorded = replayed_source(
+            source,
+            split=split,
+            version=version,
+            camera_detections=camera_detections,
+            sweeps=sweeps,
         )
+        scenes = recorded.scenes()
+        # The source refuses a name that it does not have.
+        named = (each for each in scenes if each.name == scene)
+        wanted = scenes[0] if scene is None else next(named, Scene(scene, 0))
+        super().__init__(film_of(recorded, wanted), **parameters)

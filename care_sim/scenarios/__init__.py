@@ -1,8 +1,16 @@
-"""Seeded scenarios by name. A scenario is a frozen dataclass of its physics with a `build(rng)`."""
+"""Seeded scenarios by name: the built-in ones, those that installed packages add, and any class by
+its place. A scenario is a frozen dataclass of its physics with a `build(rng)`.
+
+An entry of the group `care_sim.scenarios` names the class. It is called as the scenario is, or by
+the id of its environment, which is then registered (`care_sim.base.scenario_names`).
+"""
 
 from dataclasses import fields
 
 from care_sim.base.checks import check_known
+from care_sim.base.errors import BrokenScenario, InvalidInput, error_line, shown
+from care_sim.base.plugins import Plugins
+from care_sim.base.scenario_names import SCENARIO_GROUP, scenario_of
 from care_sim.scenarios.base import Scenario
 from care_sim.scenarios.cutin import CutIn
 from care_sim.scenarios.dartout import Dartout
@@ -10,6 +18,7 @@ from care_sim.scenarios.dense import Dense
 from care_sim.scenarios.drive import DriveScenario
 from care_sim.scenarios.ncap import Ncap
 from care_sim.scenarios.r157.scenario import R157
+from care_sim.scenarios.soundness import scenario_faults
 
 SCENARIOS: dict[str, type[Scenario]] = {
     "dartout": Dartout,
@@ -19,18 +28,53 @@ SCENARIOS: dict[str, type[Scenario]] = {
     "ncap": Ncap,
     "drive": DriveScenario,
 }
+"""The built-in ones."""
+PLUGINS: Plugins[Scenario] = Plugins(
+    "scenario", SCENARIO_GROUP, SCENARIOS, scenario_faults, scenario_of
+)
 PAPER_SCENARIOS = ("dartout", "dense", "cutin")
 """The three that stand for the paper's: one encounter on a straight road, by the clock."""
 
 
-def make_scenario(name: str, /, **parameters: object) -> Scenario:
-    """A scenario by name, its physics overridden by `parameters`.
+def scenario_names() -> list[str]:
+    """The built-in names, then those of installed packages."""
+    return PLUGINS.names()
 
-    Raises InvalidInput for an unknown scenario or parameter, or a value out of its domain.
+
+def scenario_class(scenario: str | type[Scenario], /) -> type[Scenario]:
+    """The class of a scenario by name or place; a class is itself.
+
+    Raises InvalidInput for an unknown name; BrokenScenario, with the reason, for what cannot be
+    loaded or is no scenario.
     """
-    check_known("scenario", name, SCENARIOS)
-    kind = SCENARIOS[name]
+    if not isinstance(scenario, str):
+        for fault in scenario_faults(scenario):
+            raise BrokenScenario(f"{shown(scenario)} {fault}")
+        return scenario
+    PLUGINS.check(scenario)
+    try:
+        kind = PLUGINS.maker(scenario)
+    except InvalidInput as error:
+        raise BrokenScenario(f"scenario {scenario} cannot be loaded: {error}") from error
+    return kind  # type: ignore[return-value]  # a class, as `scenario_faults` has it
+
+
+def make_scenario(scenario: str | type[Scenario], /, **parameters: object) -> Scenario:
+    """A scenario by name, place or class, its physics overridden by `parameters`.
+
+    Raises InvalidInput for an unknown scenario or parameter, or a value out of its domain;
+    BrokenScenario for one that cannot be loaded or made.
+    """
+    kind = scenario_class(scenario)
+    name = scenario if isinstance(scenario, str) else kind.__name__
     known = [field.name for field in fields(kind)]
     for parameter in parameters:
         check_known(f"parameter of {name}", parameter, known)
-    return kind(**parameters)  # type: ignore[arg-type]
+    try:
+        return kind(**parameters)  # type: ignore[arg-type]
+    except InvalidInput:
+        raise
+    # Foreign code may fail in any way; some leaves by `sys.exit`.
+    except (Exception, SystemExit) as error:
+        refused = shown(parameters) if parameters else "to start"
+        raise BrokenScenario(f"scenario {name} refuses {refused}: {error_line(error)}") from error

@@ -7,6 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from care_sim.base.bounds import bounded, check_fields
+from care_sim.base.errors import BrokenScenario, InvalidInput, error_line
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.streets.dimensions import LANE_WIDTH_M, PARKING_WIDTH_M, SPEED_LIMIT_MPS
@@ -46,6 +47,26 @@ class Scenario(ABC):
     @abstractmethod
     def build(self, rng: np.random.Generator) -> World:
         """A fresh world at time zero. The caller closes it."""
+
+    def make_world(self, rng: np.random.Generator) -> World:
+        """What `build` makes. Raises BrokenScenario, with the class's place, where that fails or is
+        no world to be played; InvalidInput as `build` does.
+        """
+        own = f"scenario {type(self).__module__}:{type(self).__qualname__}"
+        try:
+            world = self.build(rng)
+        except InvalidInput:
+            raise
+        # Foreign code may fail in any way; some leaves by `sys.exit`.
+        except (Exception, SystemExit) as error:
+            raise BrokenScenario(f"{own} cannot be built: {error_line(error)}") from error
+        if not isinstance(world, World):
+            raise BrokenScenario(f"{own}: build must return a World, got {type(world).__name__}")
+        # A drive has meetings in its place, or on its route nobody to meet.
+        if not (world.first_sighting or world.meetings or world.route):
+            world.close()
+            raise BrokenScenario(f"{own}: build sets no first_sighting, the actor that is scored")
+        return world
 
 
 def line_with_terraces(world: World, right_y: float, left_y: float) -> None:

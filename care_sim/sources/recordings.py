@@ -26,7 +26,8 @@ class Recordings(ABC):
     read.
     """
 
-    kind: ClassVar[str]
+    kind: ClassVar[str] = ""
+    """What a built-in one is called; one of another package is called by its entry or place."""
     folder: Path
 
     @abstractmethod
@@ -124,26 +125,29 @@ def recordings(text: str, options: Mapping[str, object] | None = None) -> Record
     if not (colon and folder) or kind not in RECORDING_KINDS:
         known = " or ".join(f"{name}:FOLDER" for name in RECORDING_KINDS)
         raise InvalidInput(f"source must be {known}, got {shown(text)}")
+    return recordings_in(RECORDING_KINDS[kind], kind, folder, options or {})
+
+
+def recordings_in(
+    kind: type[Recordings], name: str, folder: str, options: Mapping[str, object]
+) -> Recordings:
+    """The recordings of a kind, called by `name`, in a folder, with those of the `options` that are
+    not None. Raises InvalidInput for a folder that is none, an option that the kind does not have.
+    """
     check_path("source", folder)
     if not Path(folder).is_dir():
-        raise InvalidInput(f"source {text}: {folder} is no folder")
-    given = {name: value for name, value in (options or {}).items() if value is not None}
-    for name in given:
-        if name not in {field.name for field in fields(RECORDING_KINDS[kind])}:
-            raise InvalidInput(f"{name} has no meaning for {kind} recordings")
+        raise InvalidInput(f"source {name}:{folder}: {folder} is no folder")
+    given = {name: value for name, value in options.items() if value is not None}
+    for option in given:
+        if option not in {field.name for field in fields(kind)}:
+            raise InvalidInput(f"{option} has no meaning for {name} recordings")
     if "camera_detections" in given:
         check_path("camera_detections", given["camera_detections"])
         given["camera_detections"] = Path(str(given["camera_detections"]))
-    for name in {"split", "version"} & set(given):
-        if not isinstance(given[name], str):
-            raise InvalidInput(f"{name} must be a name, got {shown(given[name])}")
-    return RECORDING_KINDS[kind](Path(folder), **given)
-
-
-@lru_cache(maxsize=1)
-def film_of(source: Recordings, scene: str) -> Film:
-    """The film of a scene. The last one is kept, for policies that meet the same scene in turn."""
-    return source.film(scene)
+    for option in {"split", "version"} & set(given):
+        if not isinstance(given[option], str):
+            raise InvalidInput(f"{option} must be a name, got {shown(given[option])}")
+    return kind(Path(folder), **given)
 
 
 # Tables and detections are large and the same for all scenes: the last ones stay read.

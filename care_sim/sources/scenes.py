@@ -1,7 +1,10 @@
-"""The scenes of the protocol by a text: generated streets, or recordings in a folder."""
+"""The scenes of the open loop: generated streets, or recordings in a folder."""
 
-from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 from care_sim.base.checks import check_known
 from care_sim.base.digests import data_digest, file_digest
@@ -10,11 +13,12 @@ from care_sim.core.return_settings import RAYS, FilmedReturns, changed_settings
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.loops.film import Film
 from care_sim.sensors.setups import DEFAULT_SETUP, sensor_columns, sensor_setup
-from care_sim.sources.recordings import RECORDING_KINDS, NuScenes, Recordings, recordings
+from care_sim.sources.recordings import NuScenes, Recordings
 from care_sim.sources.street_films import check_filmed, record
 from care_sim.streets.street import (
     CALIBRATION_SEEDS,
     EVALUATION_SEEDS,
+    Street,
     make_street,
     street_name,
 )
@@ -28,7 +32,9 @@ class Scene(NamedTuple):
 
 
 class Source(Protocol):
-    """Where scenes come from. Hashable."""
+    """Where scenes come from."""
+
+    def __hash__(self) -> int: ...
 
     def scenes(self) -> list[Scene]:
         """All of them, in order. Raises InvalidInput where they cannot be listed."""
@@ -62,25 +68,39 @@ class Source(Protocol):
 
 
 @dataclass(frozen=True)
-class Streets:
-    """Generated streets: the 150 of the evaluation, or the 20 of the calibration. They are filmed
-    by the `sensor`, a set-up, its name or its file.
+class Generated(ABC):
+    """Generated streets, filmed by the `sensor`, a set-up, its name or its file. A subclass says
+    their seeds and makes them.
     """
 
-    kind = "streets"
-    split: str = "evaluation"
-    sensor: str | SensorSetup = DEFAULT_SETUP
+    kind: ClassVar[str] = ""
+    sensor: str | SensorSetup = field(default=DEFAULT_SETUP, kw_only=True)
 
     def __post_init__(self) -> None:
         sensor_setup(self.sensor)
 
+    @abstractmethod
+    def seeds(self) -> Sequence[int]:
+        """Those of all scenes, in order."""
+
+    @abstractmethod
+    def street(self, seed: int) -> Street:
+        """The street of a seed, whatever its name."""
+
+    def name(self, seed: int) -> str:
+        """What the scene of a seed is called."""
+        return f"{type(self).__name__.lower()}-{seed:04d}"
+
     def scenes(self) -> list[Scene]:
         """One per seed."""
-        return [Scene(street_name(seed), seed) for seed in SPLITS[self.split]]
+        return [Scene(self.name(seed), int(seed)) for seed in self.seeds()]
 
     def film(self, scene: Scene, returns: FilmedReturns = RAYS) -> Film:
-        """The street of the seed."""
-        return record(make_street(scene.seed), sensor_setup(self.sensor), returns)
+        """The street of the seed, under the name of the scene."""
+        street = self.street(scene.seed)
+        if not isinstance(street, Street):
+            raise InvalidInput(f"street must return a Street, got {type(street).__name__}")
+        return record(replace(street, name=scene.name), sensor_setup(self.sensor), returns)
 
     def check_returns(self, returns: FilmedReturns) -> None:
         """A street is filmed with all but one; see `care_sim.sources.street_films`."""
@@ -89,6 +109,26 @@ class Streets:
     def row(self, scene: Scene) -> dict[str, Any]:
         """The name of a street says all but the sensor."""
         return {"source": self.kind} | sensor_columns(self.sensor)
+
+
+@dataclass(frozen=True)
+class Streets(Generated):
+    """The streets of CARE-Sim: the 150 of the evaluation, or the 20 of the calibration."""
+
+    kind = "streets"
+    split: str = "evaluation"
+
+    def seeds(self) -> Sequence[int]:
+        """Those of the split."""
+        return SPLITS[self.split]
+
+    def street(self, seed: int) -> Street:
+        """See `care_sim.streets.street`."""
+        return make_street(seed)
+
+    def name(self, seed: int) -> str:
+        """With its layout."""
+        return street_name(seed)
 
 
 @dataclass(frozen=True)
@@ -144,26 +184,10 @@ LONGEST_NUMBER = 40
 SPLITS = {"evaluation": EVALUATION_SEEDS, "calibration": CALIBRATION_SEEDS}
 
 
-def source_of(text: str, **options: object) -> Source:
-    """The source that a text names: `streets`, `argoverse2:FOLDER` or `nuscenes:FOLDER`, with
-    `options` of its kind (`split`, and those of `care_sim.sources.recordings.NuScenes`); those that
-    are None are not given.
-
-    Raises InvalidInput for another text, a folder that is none, an option that the kind does not
-    have.
-    """
-    if text != "streets":
-        if text.partition(":")[0] not in RECORDING_KINDS:
-            known = ", ".join(["streets", *(f"{kind}:FOLDER" for kind in RECORDING_KINDS)])
-            raise InvalidInput(f"unknown source {text!r}; known: {known}")
-        return Recorded(recordings(text, options))
-    given = {name: value for name, value in options.items() if value is not None}
-    sensor = given.pop("sensor", DEFAULT_SETUP)
-    split = str(given.pop("split", "evaluation"))
-    if given:
-        raise InvalidInput(f"{', '.join(given)} has no meaning for streets")
-    check_known("split of the streets", split, SPLITS)
-    return Streets(split, sensor if isinstance(sensor, SensorSetup) else str(sensor))
+@lru_cache(maxsize=1)
+def film_of(source: Source, scene: Scene) -> Film:
+    """The film of a scene. The last one is kept, for policies that meet the same scene in turn."""
+    return source.film(scene)
 
 
 def chosen_scenes(scenes: list[Scene], names: tuple[str, ...]) -> list[Scene]:

@@ -10,18 +10,19 @@ from typing import Any, Self, cast
 
 import gymnasium
 
-from care_sim.base.checks import check_known, check_seed
+from care_sim.base.checks import check_seed
+from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import COLUMNS_WHERE_CHANGED, DEFAULTS, ClosedLoopConditions
 from care_sim.core.sensor_setup import SensorSetup
-from care_sim.envs import CLOSED_LOOP
+from care_sim.envs import ENVIRONMENT_IDS, make_scenario_env
 from care_sim.envs.closed_loop import KEYFRAME_S, ClosedLoopEnv
 from care_sim.envs.vector.coverage import why_separate
 from care_sim.perception.detectors import PROXY
 from care_sim.policies.base import PrivilegedPolicy
-from care_sim.scenarios import make_scenario
+from care_sim.scenarios import SCENARIOS, make_scenario
 from care_sim.sensors.setups import DEFAULT_SETUP, sensor_columns
 from care_sim.study.parameters import Parameters
-from care_sim.study.provenance import detector_digest
+from care_sim.study.provenance import detector_digest, scenario_digest
 from care_sim.study.run_config import (
     CONDITION_NAMES,
     Row,
@@ -34,10 +35,6 @@ from care_sim.study.run_config import (
     files_in,
     flat,
 )
-
-# CARE-CutIn-v0 is the environment of the scenario cutin.
-ENVIRONMENT_IDS = {name.split("-")[1].lower(): name for name in CLOSED_LOOP}
-"""Environment id of every scenario."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +63,7 @@ class EpisodeConfig(ClosedLoopConditions, RunConfig):
         check_seed(self.seed)
         self.check_parameters("detector_parameters", "scenario_parameters", "policy_parameters")
         make_scenario(self.scenario, **dict(self.scenario_parameters))
-        check_known("environment of the scenario", self.scenario, ENVIRONMENT_IDS)
+        _check_shared(self.scenario)
         # Making the environment and the policy is the check of all other fields: they alone know
         # what they accept.
         with self.make_env() as env:
@@ -87,9 +84,8 @@ class EpisodeConfig(ClosedLoopConditions, RunConfig):
 
     def make_env(self) -> gymnasium.Env[Any, Any]:
         """The environment of this episode, not yet reset."""
-        return gymnasium.make(
-            f"care_sim:{ENVIRONMENT_IDS[self.scenario]}",
-            disable_env_checker=True,
+        return make_scenario_env(
+            self.scenario,
             budget=self.budget,
             keyframe_s=self.keyframe_s,
             sensor=self.sensor,
@@ -120,13 +116,15 @@ class EpisodeConfig(ClosedLoopConditions, RunConfig):
         )
 
     def installed(self) -> list[str | None]:
-        """Those of the base, and of another detector than the default its hash and those of the
-        files that its parameters name.
+        """Those of the base; of another detector than the default, and of a scenario that is not
+        built in, its hash and those of the files that its parameters name.
         """
-        if self.detector == PROXY:
-            return super().installed()
-        own = [detector_digest(self.detector), *files_in(self.detector_parameters)]
-        return [*super().installed(), *own]
+        own = super().installed()
+        if self.detector != PROXY:
+            own += [detector_digest(self.detector), *files_in(self.detector_parameters)]
+        if self.scenario not in SCENARIOS:
+            own += [scenario_digest(self.scenario), *files_in(self.scenario_parameters)]
+        return own
 
     @property
     def label(self) -> str:
@@ -166,6 +164,17 @@ class EpisodeConfig(ClosedLoopConditions, RunConfig):
 def closed_loop(env: gymnasium.Env[Any, Any]) -> ClosedLoopEnv:
     """The environment of an episode without what Gymnasium puts around it."""
     return cast(ClosedLoopEnv, env.unwrapped)
+
+
+def _check_shared(scenario: str) -> None:
+    """Raise InvalidInput for a scenario that this process alone knows: workers would not find it,
+    and nothing would tell its code.
+    """
+    if scenario in SCENARIOS and scenario not in ENVIRONMENT_IDS:
+        raise InvalidInput(
+            f"scenario {scenario} is registered by hand, which other processes do not see: name "
+            "its class as MODULE:OBJECT, or install it"
+        )
 
 
 PLAIN_FIELDS = ["scenario", "policy", "budget", "seed", *CONDITION_NAMES]

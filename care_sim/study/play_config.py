@@ -16,7 +16,7 @@ from care_sim.loops.film import Film
 from care_sim.perception.detectors import PROXY
 from care_sim.sources.scenes import Scene, Source
 from care_sim.study.parameters import Parameters
-from care_sim.study.provenance import detector_digest
+from care_sim.study.provenance import detector_digest, source_digests
 from care_sim.study.run_config import (
     FULL,
     Row,
@@ -95,13 +95,14 @@ class PlayConfig(Conditions, RunConfig):
         return self.source.row(self.scene) | {"scene": self.scene.name} | plain | other | own
 
     def installed(self) -> list[str | None]:
-        """Those of the base, the hash of the detector, and those of the files that its parameters
-        name.
+        """Those of the base, the hash of the detector, those of the files that its parameters name,
+        and those of a source that is not built in.
         """
         return [
             *super().installed(),
             detector_digest(self.detector),
             *files_in(self.detector_parameters),
+            *source_digests(self.source),
         ]
 
     @property

@@ -10,10 +10,13 @@ from uuid import uuid4
 
 import care_sim
 from care_sim.base.digests import combined_digest, content_digest, file_digest
-from care_sim.base.named_files import files_named_by, files_named_in
+from care_sim.base.named_files import files_named_by, files_named_in, paths_in
 from care_sim.base.package_files import shipped_files
 from care_sim.perception.detectors import DETECTORS
 from care_sim.policies import POLICIES
+from care_sim.scenarios import PLUGINS as SCENARIO_PLUGINS
+from care_sim.sources.installed import SOURCES, Installed
+from care_sim.sources.scenes import Source
 
 _LIBRARIES = (
     "gymnasium",
@@ -57,6 +60,24 @@ def policy_digest(policy: str) -> str | None:
 def detector_digest(detector: str) -> str | None:
     """The same as `policy_digest`, of a detector."""
     return "" if detector in DETECTORS.built_in else _entry_digest(DETECTORS.entry(detector))
+
+
+def scenario_digest(scenario: str) -> str | None:
+    """The same as `policy_digest`, of a scenario."""
+    plugins = SCENARIO_PLUGINS
+    return "" if scenario in plugins.built_in else _entry_digest(plugins.entry(scenario))
+
+
+def source_digests(source: Source) -> list[str | None]:
+    """The same of a source, and what else decides its films: its options, and the files that they
+    name. Nothing for a built-in source, whose rows tell it all.
+    """
+    if not isinstance(source, Installed):
+        return []
+    named = [file_digest(path) for _, value in source.options for path in paths_in(value)]
+    # Where a file lies decides nothing.
+    plain = [pair for pair in source.options if not isinstance(pair[1], Path)]
+    return [_entry_digest(SOURCES.entry(source.name)), repr(plain), *named]
 
 
 def _entry_digest(entry: EntryPoint) -> str | None:

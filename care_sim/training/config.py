@@ -26,7 +26,7 @@ class AgentConfig:
     algorithm: ClassVar[str]
 
     env: str = "CARE-Dense-v0"
-    """Environment id."""
+    """Environment id, of an installed scenario too; or a scenario as `sweep` names it."""
     budget: tuple[float, ...] = (0.03,)
     """Share of the cells that may fire per keyframe. With several values, the environments take one
     each in turn, and the weights fit any budget; the first one is evaluated."""

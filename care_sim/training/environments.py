@@ -8,10 +8,8 @@ from typing import TYPE_CHECKING, Any
 import gymnasium
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
-import care_sim
-from care_sim.base.checks import check_known
 from care_sim.base.processes import following, starting
-from care_sim.envs import CLOSED_LOOP
+from care_sim.envs import CLOSED_LOOP, OPEN_LOOP, installed_ids, make_env
 from care_sim.envs.wrappers.grid_observation import GridObservation
 from care_sim.envs.wrappers.sector_actions import SectorReserve, SectorScores
 from care_sim.envs.wrappers.vector_grid_observation import VectorGridObservation
@@ -35,10 +33,9 @@ def plain(config: AgentConfig, budget: float | None = None) -> gymnasium.Env[Any
     Its budget is `budget`, or the first of the configuration. Raises InvalidInput for an unknown
     environment or a wrong argument.
     """
-    known = care_sim.envs.IDS
-    check_known("environment", config.env, known)
-    arguments = _arguments(config, config.budget[0] if budget is None else budget)
-    return gymnasium.make(f"care_sim:{config.env}", disable_env_checker=True, **arguments)
+    return make_env(
+        config.env, **_arguments(config, config.budget[0] if budget is None else budget)
+    )
 
 
 def wrapped(config: AgentConfig, budget: float | None = None) -> gymnasium.Env[Any, Any]:
@@ -87,7 +84,7 @@ def many(config: AgentConfig) -> list[AnyVector]:
 
 def _plain_vector(config: AgentConfig, budget: float, worlds: int) -> AnyVector:
     # The pictures that learners see are drawn at once, and need no copies of what they show.
-    if config.env in CLOSED_LOOP:
+    if config.env in (*CLOSED_LOOP, *installed_ids()):
         return gymnasium.make_vec(
             f"care_sim:{config.env}",
             worlds,
@@ -103,6 +100,6 @@ def _plain_vector(config: AgentConfig, budget: float, worlds: int) -> AnyVector:
 def _arguments(config: AgentConfig, budget: float) -> dict[str, Any]:
     # Only the closed loop has a reward of weighted terms.
     reward: dict[str, Any] = (
-        {"reward_weights": {"gain": config.gain}} if config.env in CLOSED_LOOP else {}
+        {} if config.env in OPEN_LOOP else {"reward_weights": {"gain": config.gain}}
     )
     return {"budget": budget} | reward | config.arguments

@@ -97,3 +97,17 @@ def test_a_folder_that_hides_the_module_is_named(install, tmp_path, monkeypatch)
     monkeypatch.syspath_prepend(str(folder.parent))
     with pytest.raises(InvalidInput, match=rf"no attribute 'ours' \(found in {folder}\)"):
         THINGS.maker("hidden")
+
+
+def test_a_kind_may_call_its_entries_otherwise(install):
+    called = Plugins("thing", "care_sim.called", {"usual": min}, faults, str.lower)
+    install("loud", MODULE, called.group, TWIN="ours", Usual="theirs")
+    install("louder", MODULE, called.group, Twin="theirs")
+    assert called.names() == ["usual", "twin"]
+    assert called.maker("twin")() == "theirs"
+    assert [line for _, line in called.refusals()] == [
+        "thing twin of loud 1.5 is refused: that of louder 1.5 has its name",
+        "thing usual of loud 1.5 is refused: the built-in one has its name",
+    ]
+    with pytest.raises(InvalidInput, match="unknown thing 'TWIN'"):
+        called.maker("TWIN")

@@ -12,7 +12,7 @@ from care_sim.commands.shared.run_study import run_study
 from care_sim.evaluation.sightings import PRESENCES
 from care_sim.reports.report import write_report
 from care_sim.reports.studies import STUDIES
-from care_sim.sources.scenes import source_of
+from care_sim.sources.named import source_of
 from care_sim.study.episode_config import PLAIN_FIELDS, grid
 from care_sim.study.journal import JOURNAL, Journal
 from care_sim.study.play_config import PLAY_FIELDS, play_grid

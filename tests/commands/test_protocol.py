@@ -18,7 +18,8 @@ from care_sim.evaluation.recall import Tally
 from care_sim.reports.protocol.rows import plays_by_setting
 from care_sim.reports.report import read_results
 from care_sim.reports.studies import STUDIES
-from care_sim.sources.scenes import Scene, Streets, chosen_scenes, source_of
+from care_sim.sources.named import source_of
+from care_sim.sources.scenes import Scene, Streets, chosen_scenes
 from care_sim.study import scene_play as plays
 from care_sim.study.journal import JOURNAL, Journal
 from care_sim.study.play_config import PLAY_FIELDS, PlayConfig, listed_plays, play_grid

@@ -17,7 +17,7 @@ from care_sim.perception.points_only import PointsOnly
 from care_sim.perception.proxy import ReturnsProxy
 from care_sim.sensors.annotated import NO_OBJECT, Annotations, Cloud, IdentifiedDetections
 from care_sim.sensors.surround import SURROUND_CAMERAS
-from care_sim.sources.scenes import source_of
+from care_sim.sources.named import source_of
 
 RIG = Rig(cameras=SURROUND_CAMERAS, keyframe_s=0.5)
 HEIGHT, OTHER = 1.84, 40

@@ -9,7 +9,7 @@ from care_sim.base.named_files import files_named_in, paths_in
 from care_sim.base.package_files import shipped_files
 from care_sim.commands.shared.run_study import run_study
 from care_sim.policies import POLICIES
-from care_sim.sources.scenes import source_of
+from care_sim.sources.named import source_of
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.journal import JOURNAL, Journal
 from care_sim.study.play_config import play_grid

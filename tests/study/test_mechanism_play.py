@@ -8,7 +8,8 @@ from care_sim.core.residual import wedges
 from care_sim.core.rig import Rig
 from care_sim.evaluation.sightings import Sightings
 from care_sim.policies.paper.care import Care
-from care_sim.sources.scenes import Scene, source_of
+from care_sim.sources.named import source_of
+from care_sim.sources.scenes import Scene
 from care_sim.study.accounted_play import account_play
 from care_sim.study.mechanism_config import MechanismConfig, mechanism_plays
 from care_sim.study.mechanism_play import BELIEF_MARKS, BELIEF_SUMS, play_mechanism

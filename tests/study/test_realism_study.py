@@ -4,7 +4,8 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.firing.listing import CELLS, HARDWARE, settled
-from care_sim.sources.scenes import Scene, Streets, source_of
+from care_sim.sources.named import source_of
+from care_sim.sources.scenes import Scene, Streets
 from care_sim.study.designs.realism import (
     CONDITIONS,
     FILM_CONDITIONS,

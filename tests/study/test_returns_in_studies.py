@@ -7,7 +7,8 @@ import pytest
 from care_sim.base.errors import InvalidInput
 from care_sim.reports.page.episodes import config_of
 from care_sim.sources import scenes
-from care_sim.sources.scenes import Streets, source_of
+from care_sim.sources.named import source_of
+from care_sim.sources.scenes import Streets
 from care_sim.streets.street import make_street
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.play_config import PlayConfig

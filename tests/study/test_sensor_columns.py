@@ -9,7 +9,8 @@ from care_sim.core.sensor_setup import SensorSetup
 from care_sim.reports.page.episodes import config_of
 from care_sim.reports.page.replay import replayed
 from care_sim.sensors.setups import sensor_setup
-from care_sim.sources.scenes import Streets, source_of
+from care_sim.sources.named import source_of
+from care_sim.sources.scenes import Streets
 from care_sim.study.episode_config import EpisodeConfig, listed_episodes
 from care_sim.study.episode_play import trace
 from care_sim.study.play_config import PlayConfig, listed_plays

@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.sources.scenes import source_of
+from care_sim.sources.named import source_of
 from care_sim.study import episode_config as config
 from care_sim.study.designs.ablations import ablation_study
 from care_sim.study.designs.crowding import crowding_study

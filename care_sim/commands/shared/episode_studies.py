@@ -7,7 +7,7 @@ from pathlib import Path
 from care_sim.commands.shared.options import seeds_of
 from care_sim.commands.shared.selection import playable
 from care_sim.commands.shared.study_command import StudyCommand
-from care_sim.scenarios import SCENARIOS
+from care_sim.envs import ENVIRONMENT_IDS
 from care_sim.study.episode_config import EpisodeConfig, grid, of_seeds
 
 CONTROLS = ("fan",)
@@ -45,4 +45,4 @@ class FixedStudy(EpisodeStudy):
         """Those that can be played, and a line for each that cannot."""
         # It is tried on one task in every scenario.
         named = CONTROLS if self.also is None else self.also
-        return playable(named, lambda name: grid(SCENARIOS, [name], [0.1], [0]))
+        return playable(named, lambda name: grid(ENVIRONMENT_IDS, [name], [0.1], [0]))

@@ -7,10 +7,13 @@ from typing import Annotated, Any
 
 import tyro
 
+from care_sim.base.errors import report_problems
 from care_sim.commands.shared.selection import policy_parameters
 from care_sim.core.conditions import Conditions
 from care_sim.perception.detectors import PROXY
-from care_sim.sources.scenes import Source, source_of
+from care_sim.sources.installed import SOURCES
+from care_sim.sources.named import source_of
+from care_sim.sources.scenes import Source
 from care_sim.study.parameters import parameters
 
 _DEFAULT_CONDITIONS = Conditions()
@@ -38,6 +41,9 @@ class SourceOptions:
 
     def source_named(self, text: str) -> Source:
         """The source that a text and the options name. Raises InvalidInput where there is none."""
+        # Of two with one name it is told which one plays.
+        kind = text.partition(":")[0]
+        report_problems([line for one, line in SOURCES.refusals() if one.name == kind])
         return source_of(
             text,
             split=self.split,
@@ -53,7 +59,9 @@ class PlayOptions(SourceOptions):
     """Options that all plays share."""
 
     source: str = "streets"
-    """streets, argoverse2:FOLDER or nuscenes:FOLDER."""
+    """streets, argoverse2:FOLDER, nuscenes:FOLDER, or a source of your own: the name of an
+    installed one or MODULE:CLASS, of recordings with :FOLDER behind it.
+    """
     detector: str = PROXY
     """returns (the paper's proxy), graded (the surer the more returns), cluster (a real
     one), torchscript, or that of an installed package.

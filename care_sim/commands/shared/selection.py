@@ -3,9 +3,19 @@
 from collections.abc import Callable, Collection, Iterable, Sequence
 from typing import Any
 
-from care_sim.base.errors import BrokenPolicy, InvalidInput, MissingExtra, report_problems
+import numpy as np
+
+from care_sim.base.errors import (
+    BrokenPolicy,
+    BrokenScenario,
+    InvalidInput,
+    MissingExtra,
+    report_problems,
+)
+from care_sim.base.scenario_names import scenario_of
 from care_sim.core.conditions import DEFAULTS
 from care_sim.policies import check_policy, contenders
+from care_sim.scenarios import PLUGINS, SCENARIOS, make_scenario, scenario_names
 from care_sim.study.parameters import Parameters, parameters
 
 _ALL = "all"
@@ -24,6 +34,36 @@ def check_values(command: object, *axes: str) -> None:
     for axis in axes:
         if not getattr(command, axis):
             raise InvalidInput(f"--{axis.replace('_', '-')} needs at least one value")
+
+
+def buildable(names: Sequence[str], given: Parameters) -> tuple[list[str], list[str]]:
+    """The scenarios, each once, whose worlds can be built with the `given` parameters, and a line
+    for each of the others, which is printed too; `all` stands for every known one.
+
+    Raises InvalidInput for an unknown scenario or parameter, and where none is left.
+    """
+    wanted = expanded(names, scenario_names())
+    report_problems([line for one, line in PLUGINS.refusals() if scenario_of(one.name) in wanted])
+    sound, left_out = [], []
+    for name in wanted:
+        try:
+            check_built(name, given)
+            sound.append(name)
+        except (BrokenScenario, MissingExtra) as error:
+            left_out.append(f"left out: {error}")
+    report_problems(left_out)
+    if not sound:
+        raise InvalidInput("none of the scenarios can be played")
+    return sound, left_out
+
+
+def check_built(scenario: str, given: Parameters) -> None:
+    """Build a world of a scenario that is not built in, which nobody has tried. Raises what that
+    raises.
+    """
+    made = make_scenario(scenario, **dict(given))
+    if scenario not in SCENARIOS:
+        made.make_world(np.random.default_rng(0)).close()
 
 
 def makeable(

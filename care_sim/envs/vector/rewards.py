@@ -28,7 +28,8 @@ class Rewards:
     @property
     def need_bound(self) -> Mask:
         """(W,) where the full-scan bound counts and is not known yet."""
-        return np.isnan(self._bound_m) & bool(self._weights["gain"])
+        wanted: Mask = np.isnan(self._bound_m) & bool(self._weights["gain"])
+        return wanted
 
     def of(
         self, records: Records, detectable: Mask, over: Mask, who: Mask

@@ -38,3 +38,9 @@ class DriveVectorEnv(ClosedLoopVectorEnv):
     """`CARE-Drive-v0` many times."""
 
     single = scenarios.DriveEnv
+
+
+class ScenarioVectorEnv(ClosedLoopVectorEnv):
+    """Any scenario of the closed loop many times."""
+
+    single = scenarios.ScenarioEnv

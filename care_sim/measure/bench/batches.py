@@ -5,9 +5,9 @@ from contextlib import closing
 
 import gymnasium
 
+from care_sim.envs import ENVIRONMENT_IDS
 from care_sim.measure.bench.config import BenchConfig
 from care_sim.policies import make_policy
-from care_sim.study.episode_config import ENVIRONMENT_IDS
 from care_sim.study.episode_play import peak_rss_mb
 
 WORLDS = 64
@@ -15,9 +15,10 @@ THREADS = (1, 2)
 
 
 def batches(config: BenchConfig) -> dict[str, list[float]]:
-    """Steps per second over all worlds, in every round, by the number of threads. The policy chooses
-    for all, observations are handed out at every step, and episodes that are over begin anew. The
-    numbers of threads are measured in turn. Not to be called on one core.
+    """Steps per second over all worlds, in every round, by the number of threads.
+
+    The policy chooses for all, observations are handed out at every step, and episodes that are
+    over begin anew. The numbers of threads are measured in turn. Not to be called on one core.
     """
     figures: dict[str, list[float]] = {str(threads): [] for threads in THREADS}
     for _ in range(config.repeats):

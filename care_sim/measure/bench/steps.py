@@ -13,10 +13,10 @@ from gymnasium.utils.performance import benchmark_init, benchmark_step
 from care_sim.base.errors import MissingExtra
 from care_sim.base.extras import STANDARD_OUTPUT, import_panda_gym, silenced
 from care_sim.core.conditions import DEFAULTS
+from care_sim.envs import ENVIRONMENT_IDS
 from care_sim.measure.bench.config import BenchConfig
 from care_sim.measure.driven import driven
 from care_sim.sensors.engines import ENGINES
-from care_sim.study.episode_config import ENVIRONMENT_IDS
 from care_sim.study.episode_play import GymEnv
 
 DRIVING = "highway-fast-v0"

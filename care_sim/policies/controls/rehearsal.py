@@ -37,7 +37,7 @@ def rehearsal(scenario: Scenario, seed: int, rig: Rig) -> ClosedLoop:
     The caller closes its world.
     """
     built, camera, lidar, _, odometry = streams((seed,), 5)
-    world = scenario.build(np.random.default_rng(built))
+    world = scenario.make_world(np.random.default_rng(built))
     # A rig that was made alone may have no camera; the scenario's environment has these.
     equipped = rig if rig.cameras else replace(rig, cameras=scenario.cameras)
     return ClosedLoop(world, equipped, ClosedLoopConditions(), SensorSeeds(camera, lidar, odometry))

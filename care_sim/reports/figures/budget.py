@@ -46,8 +46,8 @@ def sweep_figures(rows: Sequence[Row]) -> dict[str, Figure]:
         name: [cell for cell in cells if cell.setting.world == name] for name in scenarios
     }
     return {
-        f"{name}-budget": budget_figure(own)
-        for name, own in by_scenario.items()
+        f"{own[0].setting.slug}-budget": budget_figure(own)
+        for own in by_scenario.values()
         if len(_budgets(own)) > 1
     }
 

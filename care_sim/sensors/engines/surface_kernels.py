@@ -11,7 +11,7 @@ import numpy as np
 from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers
 from care_sim.sensors.engines.geometry_kernels import Vector, body_axes, dot
-from care_sim.sensors.engines.ray_kernels import BOX, CYLINDER
+from care_sim.sensors.engines.solid_kernels import BOX, CYLINDER
 from care_sim.sensors.engines.window_kernels import Parts
 
 SAME_SURFACE_M = 0.001

@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 
 from care_sim.core.grid import AngularGrid
 from care_sim.sensors.engines import ray_kernels as kernels
+from care_sim.sensors.engines.solid_kernels import BOX, CYLINDER, SPHERE, meet, solid_of
 from care_sim.sensors.engines.window_kernels import Parts, SensorPose, place_parts
 
 GROUND = 0
@@ -28,10 +29,10 @@ def test_no_ray_misses_what_it_would_meet_if_all_were_tried(seed, grid, tilted, 
         poses[:, 2:5] = 0.0
     poses[:, 3:] /= np.linalg.norm(poses[:, 3:], axis=1, keepdims=True)
     count = draw.integers(0, 20)
-    shapes = draw.choice([kernels.BOX, kernels.BOX, kernels.CYLINDER, kernels.SPHERE], count)
+    shapes = draw.choice([BOX, BOX, CYLINDER, SPHERE], count)
     halves = draw.choice([0.05, 0.3, 1.0, 3.0, 10.0], (count, 3)) * draw.uniform(0.5, 1.5)
-    halves[shapes != kernels.BOX, 1] = halves[shapes != kernels.BOX, 0]
-    halves[shapes == kernels.SPHERE, 2] = halves[shapes == kernels.SPHERE, 0]
+    halves[shapes != BOX, 1] = halves[shapes != BOX, 0]
+    halves[shapes == SPHERE, 2] = halves[shapes == SPHERE, 0]
     offsets = draw.normal(size=(count, 3))
     parts = shapes, halves, offsets, np.sort(draw.integers(0, len(poses), count))
     sensor = np.array([*draw.normal(size=2), 1.84, draw.uniform(-4, 4), 0, 0])
@@ -63,8 +64,8 @@ def asked_about_all(cells, grid, sensor, parts, poses):
     ranges[on_road], ids[on_road] = road[on_road], GROUND
     distances = np.empty(len(cells))
     for part, owner in enumerate(parts.owners):
-        solid = kernels._solid(part, parts, placed.centres, placed.axes)
-        kernels._meet(solid, rays, distances, len(cells))
+        solid = solid_of(part, parts, placed.centres, placed.axes)
+        meet(solid, rays, distances, len(cells))
         nearer = (distances < ranges) & (distances <= grid.range_m)
         ranges[nearer], ids[nearer] = distances[nearer], owner
     return ranges, ids

@@ -6,7 +6,7 @@ import pytest
 from care_sim.base.errors import InvalidInput
 from care_sim.core.grid import AngularGrid
 from care_sim.sensors.annotated import NO_OBJECT
-from care_sim.sources.scenes import source_of
+from care_sim.sources.named import source_of
 from care_sim.study.scene_play import film_hash
 from tests.helpers.nuscenes_database import START_US, as_recorded, change, pose
 from tests.helpers.nuscenes_scene import CAR, SCENE, WORLD, database, first

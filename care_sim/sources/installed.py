@@ -1,0 +1,138 @@
+"""Sources of other packages, by an entry of the group `care_sim.sources` or by place. Whatever is
+wrong with one is told with its name.
+"""
+
+import inspect
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import MISSING, dataclass, fields
+from functools import lru_cache
+from typing import Any
+
+from care_sim.base.checks import check_known
+from care_sim.base.errors import InvalidInput, MissingExtra, error_line, shown
+from care_sim.base.plugins import Plugins
+from care_sim.core.return_settings import RAYS, FilmedReturns
+from care_sim.core.sensor_setup import SensorSetup
+from care_sim.loops.film import Film
+from care_sim.sources.recordings import RECORDING_KINDS, Recordings, recordings_in
+from care_sim.sources.scenes import Generated, Recorded, Scene, Source, Streets
+
+
+def source_faults(made: Any) -> Iterator[str]:
+    """Why a loaded object is no source, one text per reason. `care_sim.base.plugins` asks it."""
+    if not (inspect.isclass(made) and issubclass(made, Recordings | Generated)):
+        yield "is neither Recordings nor Generated"
+        return
+    if inspect.isabstract(made):
+        yield f"is abstract: it lacks {', '.join(sorted(made.__abstractmethods__))}"
+    if "__dataclass_fields__" not in vars(made) and inspect.get_annotations(made):
+        yield "is no dataclass: @dataclass(frozen=True) stands above its class"
+    for field in fields(made):
+        if field.name != "folder" and field.default is MISSING:
+            yield f"has no default for {field.name}"
+
+
+SOURCES: Plugins[Recordings | Generated] = Plugins(
+    "source",
+    "care_sim.sources",
+    {Streets.kind: Streets, **RECORDING_KINDS},
+    source_faults,
+)
+
+
+@dataclass(frozen=True)
+class Installed:
+    """The source of another package that is called `name`, in a `folder` where it has one, with
+    `options` as pairs of name and value. It is known by its name, so that every process loads its
+    own.
+
+    Raises InvalidInput with the name for one that cannot be loaded or refuses folder or options;
+    so do its methods for whatever its code raises.
+    """
+
+    name: str
+    folder: str = ""
+    options: tuple[tuple[str, Any], ...] = ()
+
+    def __post_init__(self) -> None:
+        try:
+            SOURCES.maker(self.name)
+        except InvalidInput as error:
+            raise InvalidInput(f"source {self.name} cannot be loaded: {error}") from error
+        with self._blamed("refuses to start"):
+            self._made()
+
+    @property
+    def kind(self) -> str:
+        """What it was asked for by."""
+        return self.name
+
+    @property
+    def sensor(self) -> str | SensorSetup:
+        """The set-up whose grid its films hold."""
+        return self._made().sensor
+
+    def scenes(self) -> list[Scene]:
+        """Its own, in order."""
+        with self._blamed("lists no scenes"):
+            scenes = self._made().scenes()
+            names = [scene.name for scene in scenes]
+            wrong = [name for name in names if not (isinstance(name, str) and name)]
+            if wrong or not names or len(set(names)) < len(names):
+                raise InvalidInput(
+                    f"scenes must be names, at least one and each once, got {shown(names)}"
+                )
+        return scenes
+
+    def film(self, scene: Scene, returns: FilmedReturns = RAYS) -> Film:
+        """The film of a scene."""
+        scenes = self.scenes()
+        with self._blamed(f"makes no film of {scene.name}"):
+            check_known("scene", scene.name, [each.name for each in scenes])
+            film = self._made().film(scene, returns)
+            if not isinstance(film, Film):
+                raise InvalidInput(f"film must return a Film, got {type(film).__name__}")
+        return film
+
+    def check_returns(self, returns: FilmedReturns) -> None:
+        """Recordings hold what returned, generated streets are filmed."""
+        self._made().check_returns(returns)
+
+    def row(self, scene: Scene) -> dict[str, Any]:
+        """That of its kind, under its own name."""
+        with self._blamed(f"names no files of {scene.name}"):
+            return self._made().row(scene) | {"source": self.name}
+
+    def _made(self) -> Source:
+        return _source(self.name, self.folder, self.options)
+
+    @contextmanager
+    def _blamed(self, what: str) -> Iterator[None]:
+        """Errors become one line that names the source."""
+        try:
+            yield
+        except MissingExtra:
+            raise
+        except InvalidInput as error:
+            raise InvalidInput(f"source {self.name}: {error}") from error
+        # Foreign code may fail in any way; some leaves by `sys.exit`.
+        except (Exception, SystemExit) as error:
+            raise InvalidInput(f"source {self.name} {what}: {error_line(error)}") from error
+
+
+@lru_cache(maxsize=8)
+def _source(name: str, folder: str, options: tuple[tuple[str, Any], ...]) -> Source:
+    """Made once per process."""
+    made: Any = SOURCES.maker(name)
+    if issubclass(made, Recordings):
+        if not folder:
+            raise InvalidInput(f"its recordings lie in a folder: ask for {name}:FOLDER")
+        return Recorded(recordings_in(made, name, folder, dict(options)))
+    if folder:
+        raise InvalidInput(f"it is generated and has no folder, got {shown(folder)}")
+    for option, _ in options:
+        if option not in {field.name for field in fields(made)}:
+            raise InvalidInput(f"{option} has no meaning for {name}")
+    source: Source = made(**dict(options))
+    return source

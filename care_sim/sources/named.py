@@ -1,0 +1,79 @@
+"""Sources by a text: generated streets, recordings in a folder, and those of other packages.
+
+An entry of the group `care_sim.sources` names a class of `Recordings`, which is asked for as
+NAME:FOLDER, or one of `Generated`, asked for as NAME. Either is asked for by its place, too, as
+MODULE:CLASS:FOLDER or MODULE:CLASS.
+"""
+
+from importlib.util import find_spec
+
+from care_sim.base.checks import check_known
+from care_sim.base.errors import InvalidInput
+from care_sim.base.plugins import is_place
+from care_sim.core.sensor_setup import SensorSetup
+from care_sim.sensors.setups import DEFAULT_SETUP
+from care_sim.sources.installed import SOURCES, Installed
+from care_sim.sources.recordings import RECORDING_KINDS, recordings
+from care_sim.sources.scenes import SPLITS, Recorded, Source, Streets
+
+
+def source_of(text: str, **options: object) -> Source:
+    """The source that a text names: `streets`, `argoverse2:FOLDER`, `nuscenes:FOLDER`, or one of
+    another package, with `options` of its kind (`split`, and those of
+    `care_sim.sources.recordings.NuScenes`); those that are None are not given.
+
+    Raises InvalidInput for another text, a folder that is none, an option that the kind does not
+    have, a source that cannot be loaded.
+    """
+    given = {name: value for name, value in options.items() if value is not None}
+    if text == Streets.kind:
+        return _streets(given)
+    name, folder = _parted(text)
+    if name in RECORDING_KINDS:
+        return Recorded(recordings(text, given))
+    if not _is_foreign(name):
+        raise _unknown(text)
+    try:
+        return Installed(name, folder, tuple(given.items()))
+    except InvalidInput as error:
+        # A slip in the name of a kind, `nuscene:FOLDER`, looks like a place.
+        if is_place(name) and find_spec(name.partition(":")[0].partition(".")[0]) is None:
+            raise _unknown(text) from error
+        raise
+
+
+def replayed_source(text: str, **options: object) -> Source:
+    """The same, of what `CARE-Replay-v0` plays: all but `streets`, which have their own."""
+    name = _parted(text)[0] if isinstance(text, str) else ""
+    if _is_foreign(name):
+        return source_of(text, **options)
+    return Recorded(recordings(text, options))
+
+
+def _streets(given: dict[str, object]) -> Streets:
+    sensor = given.pop("sensor", DEFAULT_SETUP)
+    split = str(given.pop("split", "evaluation"))
+    if given:
+        raise InvalidInput(f"{', '.join(given)} has no meaning for streets")
+    check_known("split of the streets", split, SPLITS)
+    return Streets(split, sensor=sensor if isinstance(sensor, SensorSetup) else str(sensor))
+
+
+def _parted(text: str) -> tuple[str, str]:
+    """The name or place of a source, and the folder behind it."""
+    name, _, rest = text.partition(":")
+    second, _, folder = rest.partition(":")
+    place = f"{name}:{second}"
+    if name not in SOURCES.names() and is_place(place):
+        return place, folder
+    return name, rest
+
+
+def _is_foreign(name: str) -> bool:
+    return name not in SOURCES.built_in and (is_place(name) or name in SOURCES.entries())
+
+
+def _unknown(text: str) -> InvalidInput:
+    kinds = [f"{kind}:FOLDER" for kind in RECORDING_KINDS]
+    known = [Streets.kind, *kinds, *SOURCES.names()[len(SOURCES.built_in) :]]
+    return InvalidInput(f"unknown source {text!r:.200}; known: {', '.join(known)}")

@@ -1,0 +1,243 @@
+"""A source from outside: the documented example and recordings of one's own, through the same doors
+as ours.
+"""
+
+import sys
+import tomllib
+
+import gymnasium
+import pytest
+
+from care_sim.base.errors import InvalidInput
+from care_sim.cli import main
+from care_sim.reports.report import read_results
+from care_sim.sources.installed import SOURCES
+from care_sim.sources.named import source_of
+from care_sim.study.play_config import PlayConfig
+from tests.helpers.own_world import example
+from tests.helpers.pages import fenced
+from tests.helpers.places import ROOT
+
+CROSSINGS = example("source")
+(TOML,) = fenced(ROOT / "docs" / "write" / "source.md", "toml")
+LOGS = '''
+from dataclasses import dataclass
+from care_sim.sources.argoverse2.films import argoverse2_film, logs
+from care_sim.sources.recordings import Recordings
+
+
+@dataclass(frozen=True)
+class Logs(Recordings):
+    """Logs as Argoverse 2 has them, of which an option leaves some out."""
+
+    split: str = ""
+
+    def scenes(self):
+        return [log.name for log in logs(self.folder) if log.name.startswith(self.split)]
+
+    def film(self, scene):
+        return argoverse2_film(self.folder / scene)
+
+    def files(self, scene):
+        return sorted((self.folder / scene).iterdir())
+'''
+SHORT = ["--budgets", "0.05", "--floor-seeds", "1", "--policies", "random", "--workers", "1"]
+
+
+@pytest.fixture
+def installed(install):
+    install("crossings", CROSSINGS, SOURCES.group, crossings="Crossings")
+    install("own_logs", LOGS, SOURCES.group, ownlogs="Logs")
+
+
+def run(*arguments):
+    with pytest.raises(SystemExit) as end:
+        main([*map(str, arguments)])
+    return end.value.code
+
+
+def test_the_example_has_thirty_lines_or_so():
+    body = CROSSINGS[CROSSINGS.index("@dataclass") : CROSSINGS.index("if __name__")]
+    assert len([line for line in body.splitlines() if line.strip()]) <= 35
+    (entries,) = tomllib.loads(TOML)["project"]["entry-points"].items()
+    assert entries == (SOURCES.group, {"crossings": "crossings:Crossings"})
+
+
+def test_the_protocol_plays_it_and_names_it(installed, tmp_path, capsys):
+    command = ["protocol", "--source", "crossings", "--scenes", "2", *SHORT]
+    assert run(*command, "--out", tmp_path / "out") == 0
+    rows = read_results(tmp_path / "out")[0]
+    told = [(row["source"], row["scene"]) for row in rows]
+    assert told == [("crossings", "crossings-0000"), ("crossings", "crossings-0001")]
+    # Asked again, they are found: the worker's digests are those of this process.
+    assert run(*command, "--out", tmp_path / "out") == 0
+    assert "2 of 2 plays found" in capsys.readouterr().err
+
+
+def test_its_streets_hold_first_sightings_and_are_filmed_by_any_sensor(installed):
+    source = source_of("crossings", sensor="os1-64")
+    film = source.film(source.scenes()[3])
+    assert (film.name, film.grid.rows) == ("crossings-0003", 64)
+    annotated = [len(shot.annotations.objects) for shot in film.shots]
+    assert annotated[0] == 0
+    assert max(annotated) == 1
+
+
+def test_by_its_place_it_is_the_same(drive, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    (tmp_path / "placed_crossings.py").write_text(CROSSINGS)
+    (tmp_path / "placed_logs.py").write_text(LOGS)
+    streets = source_of("placed_crossings:Crossings")
+    assert streets.scenes()[4] == ("crossings-0004", 4)
+    assert streets.row(streets.scenes()[4])["source"] == "placed_crossings:Crossings"
+    logs = source_of(f"placed_logs:Logs:{drive.parent}")
+    assert [scene.name for scene in logs.scenes()] == ["drive"]
+
+
+def test_recordings_are_asked_for_with_their_folder_and_options(installed, drive):
+    source = source_of(f"ownlogs:{drive.parent}", split="dr")
+    (scene,) = source.scenes()
+    row = source.row(scene)
+    ours = source_of(f"argoverse2:{drive.parent}")
+    assert row["source"] == "ownlogs"
+    assert len(row["recording"]) == len(ours.row(scene)["recording"])
+    assert len(source.film(scene).shots) == len(ours.film(scene).shots)
+    with pytest.raises(InvalidInput, match="ownlogs: sweeps has no meaning for ownlogs recordings"):
+        source_of(f"ownlogs:{drive.parent}", sweeps=2)
+
+
+def test_gymnasium_replays_both(installed, drive):
+    for source, scene in (("crossings", "crossings-0002"), (f"ownlogs:{drive.parent}", "drive")):
+        env = gymnasium.make("CARE-Replay-v0", source=source, scene=scene)
+        env.reset(seed=0)
+        assert env.unwrapped.loop.film.name == scene
+        env.close()
+    with pytest.raises(InvalidInput, match="source crossings: unknown scene 'crossings-0099'"):
+        gymnasium.make("CARE-Replay-v0", source="crossings", scene="crossings-0099")
+
+
+def digest_of(source):
+    return PlayConfig(source, source.scenes()[0], "random").digest()
+
+
+def test_an_edit_of_its_code_and_an_option_make_its_plays_others(installed, drive, monkeypatch):
+    whole, some = (digest_of(source_of(f"ownlogs:{drive.parent}", split=s)) for s in ("", "d"))
+    assert whole != some
+    monkeypatch.setattr("care_sim.study.provenance._entry_digest", lambda _entry: "edited")
+    assert digest_of(source_of(f"ownlogs:{drive.parent}", split="d")) != some
+
+
+def test_the_digest_of_our_own_streets_asks_no_package(monkeypatch):
+    before = digest_of(source_of("streets"))
+    monkeypatch.setattr("care_sim.study.provenance._entry_digest", lambda _entry: "edited")
+    assert digest_of(source_of("streets")) == before
+
+
+BROKEN = """
+from dataclasses import dataclass
+from care_sim.sources.recordings import Recordings
+from care_sim.sources.scenes import Generated
+
+module = "a string"
+
+class Other: ...
+
+@dataclass(frozen=True)
+class Abstract(Generated):
+    def seeds(self): ...
+
+class Plain(Abstract):
+    rate: float = 3.0
+    def street(self, seed): ...
+
+@dataclass(frozen=True)
+class Sound(Generated):
+    def seeds(self):
+        return range(2)
+    def street(self, seed):
+        return "a street"
+
+@dataclass(frozen=True)
+class Exploding(Sound):
+    def street(self, seed):
+        raise KeyError("lane")
+
+@dataclass(frozen=True)
+class Twice(Sound):
+    def name(self, seed):
+        return "same"
+
+@dataclass(frozen=True)
+class Refusing(Sound):
+    def __post_init__(self):
+        raise RuntimeError("today")
+
+@dataclass(frozen=True)
+class Filmless(Recordings):
+    def scenes(self):
+        return ["one"]
+    def film(self, scene): ...
+    def files(self, scene):
+        return [self.folder / "one"]
+"""
+UNLOADED = {
+    "string": ("module", "broken_sources:module is neither Recordings nor Generated"),
+    "other": ("Other", "broken_sources:Other is neither Recordings nor Generated"),
+    "abstract": ("Abstract", "broken_sources:Abstract is abstract: it lacks street"),
+    "plain": ("Plain", "broken_sources:Plain is no dataclass"),
+    "torn": ("Nowhere", "AttributeError: .*Nowhere"),
+}
+UNPLAYED = {
+    "sound": ("Sound", "source sound: street must return a Street, got str"),
+    "exploding": (
+        "Exploding",
+        "source exploding makes no film of exploding-0000: KeyError: 'lane'",
+    ),
+    "twice": ("Twice", "source twice: scenes must be names, at least one and each once"),
+    "refusing": ("Refusing", "source refusing refuses to start: RuntimeError: today"),
+    "filmless:.": ("Filmless", "source filmless: film must return a Film, got NoneType"),
+    "filmless": ("Filmless", "source filmless: its recordings lie in a folder: .* filmless:FOLDER"),
+    "sound:folder": ("Sound", "source sound: it is generated and has no folder, got 'folder'"),
+}
+
+
+@pytest.fixture
+def broken(install):
+    names = {name.partition(":")[0]: thing for name, (thing, _) in (UNLOADED | UNPLAYED).items()}
+    install("broken_sources", BROKEN, SOURCES.group, **names)
+
+
+@pytest.mark.parametrize("name", UNLOADED)
+def test_one_that_cannot_be_loaded_is_named_with_the_reason(broken, name):
+    with pytest.raises(InvalidInput, match=f"source {name} cannot be loaded: {UNLOADED[name][1]}"):
+        source_of(name)
+
+
+@pytest.mark.parametrize("name", UNPLAYED)
+def test_one_that_makes_no_film_is_named_with_the_reason(broken, name):
+    with pytest.raises(InvalidInput, match=UNPLAYED[name][1]):
+        _ = (source := source_of(name)).film(source.scenes()[0])
+
+
+def test_commands_say_it_in_one_line(broken, installed, tmp_path, capsys):
+    played = ["protocol", *SHORT, "--out", tmp_path / "out", "--source"]
+    for source, told in (
+        ("torn", "source torn cannot be loaded: AttributeError"),
+        ("exploding", "failed: exploding-0001 random 0.05: source exploding makes no film"),
+        ("moon", "unknown source 'moon'; known: streets, argoverse2:FOLDER, nuscenes:FOLDER, "),
+        ("nuscene:data", "unknown source 'nuscene:data'; known: streets"),
+        ("crossings:Nowhere", "source crossings: it is generated and has no folder"),
+    ):
+        assert run(*played, source) in (1, 2)
+        error = capsys.readouterr().err
+        assert told in error
+        assert "Traceback" not in error
+
+
+def test_a_built_in_name_cannot_be_taken(install, capsys):
+    install("usurper_source", CROSSINGS, SOURCES.group, streets="Crossings")
+    assert run("protocol", "--policies", "nobody", "--scenes", "1") == 2
+    refusal = "source streets of usurper_source 1.5 is refused: the built-in one has its name"
+    assert refusal in capsys.readouterr().err
+    assert source_of("streets").scenes()[0].name.startswith("street-0000")
