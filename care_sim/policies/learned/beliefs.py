@@ -8,12 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.checks import as_array
-from care_sim.base.compiled import compiled
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.belief import HIGHEST, OBSERVED, Belief, Observation
 from care_sim.core.cell_sets import CellSets
-from care_sim.core.pinhole_kernels import CameraModels
 from care_sim.core.residual import _first_explaining, wedges
 from care_sim.core.rig import Rig
 from care_sim.core.types import ImageDetections, Tracks
@@ -105,17 +103,18 @@ class Beliefs:
         detections, tracks = self.detections, self.tracks
         if not len(detections):
             return np.zeros(0, np.bool_)
-        explained: Mask = _explained(
+        matched = _first_explaining(
             np.ascontiguousarray(detections.boxes),
             np.ascontiguousarray(detections.classes),
             np.ascontiguousarray(detections.cameras),
             np.ascontiguousarray(detections.yaw_changes),
-            self.detection_ends,
             np.ascontiguousarray(tracks.boxes[:, :3]),
             np.ascontiguousarray(tracks.classes),
-            self.track_ends,
+            np.diff(self.detection_ends, prepend=0),
+            np.diff(self.track_ends, prepend=0),
             self._rig.camera_models,
         )
+        explained: Mask = matched >= 0
         return explained
 
 
@@ -152,36 +151,3 @@ def _stacked(observation: Observation, rig: Rig) -> tuple[Any, Any, Any, dict[st
             f"ego of an observation must hold numbers up to {HIGHEST:g}, its budget lie in [0, 1]"
         )
     return egos, budgets, arrays.pop("ranges"), arrays
-
-
-@compiled()
-def _explained(
-    boxes: Floats,
-    classes: Integers,
-    cameras: Integers,
-    yaw_changes: Floats,
-    ends: Integers,
-    centres: Floats,
-    labels: Integers,
-    label_ends: Integers,
-    models: CameraModels,
-) -> Mask:
-    """See `care_sim.core.residual.explained`, world after world."""
-    known = np.zeros(len(boxes), np.bool_)
-    first = first_label = 0
-    for world in range(len(ends)):
-        last, last_label = ends[world], label_ends[world]
-        known[first:last] = (
-            _first_explaining(
-                boxes[first:last],
-                classes[first:last],
-                cameras[first:last],
-                yaw_changes[first:last],
-                centres[first_label:last_label],
-                labels[first_label:last_label],
-                models,
-            )
-            >= 0
-        )
-        first, first_label = last, last_label
-    return known
