@@ -1,6 +1,6 @@
 """What the episodes of a batch leave behind for the scoring."""
 
-import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -8,10 +8,14 @@ import numpy as np
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.loops.records import Keyframe
 
+_KINDS: dict[str, type] = {"fired": int, "in_view": bool, "detected": bool, "braking": bool}
+"""Of the columns that hold no floats."""
+
 
 class Records(NamedTuple):
-    """A keyframe of W worlds; (W,) each, as in `care_sim.loops.records.Keyframe`. `fired` is how
-    many cells were fired, and `impact_speed_mps` NaN where nothing was hit.
+    """A keyframe of W worlds, (W,) each, or the keyframes of one world; as in
+    `care_sim.loops.records.Keyframe`. `fired` is how many cells were fired, and `impact_speed_mps`
+    NaN where nothing was hit.
     """
 
     time_s: Floats
@@ -25,17 +29,21 @@ class Records(NamedTuple):
     clearance_m: Floats
     impact_speed_mps: Floats
 
+    @classmethod
+    def of(cls, keyframes: Sequence[Keyframe]) -> "Records":
+        """Those of an episode."""
+        columns = {name: [getattr(one, name) for one in keyframes] for name in cls._fields}
+        columns["fired"] = [len(one.fired) for one in keyframes]
+        # None, where nothing was hit, becomes NaN.
+        return cls(*(np.array(columns[name], _KINDS.get(name, float)) for name in cls._fields))
+
 
 class History:
     """The records of the running episodes of `worlds` worlds, of up to `keyframes` each."""
 
     def __init__(self, worlds: int, keyframes: int):
-        kinds = {"fired": np.int64, "in_view": np.bool_, "detected": np.bool_, "braking": np.bool_}
         self._columns = Records(
-            *(
-                np.zeros((keyframes, worlds), kinds.get(name, np.float64))
-                for name in Records._fields
-            )
+            *(np.zeros((keyframes, worlds), _KINDS.get(name, float)) for name in Records._fields)
         )
 
     def note(self, who: Mask, keyframes: Integers, records: Records) -> None:
@@ -44,25 +52,6 @@ class History:
         for table, column in zip(self._columns, records, strict=True):
             table[keyframes[worlds], worlds] = column[worlds]
 
-    def episode(self, world: int, keyframes: int) -> list[Keyframe]:
-        """The first `keyframes` records of a world's episode. Instead of the fired cells they hold
-        as many numbers.
-        """
-        columns = [table[:keyframes, world].tolist() for table in self._columns]
-        cells = np.zeros(self._columns.fired[:keyframes, world].max(), np.int64)
-        return [
-            Keyframe(
-                index=index,
-                time_s=one.time_s,
-                fired=cells[: one.fired],
-                in_view=one.in_view,
-                detected=one.detected,
-                braking=one.braking,
-                speed_mps=one.speed_mps,
-                distance_m=one.distance_m,
-                nearest_m=one.nearest_m,
-                clearance_m=one.clearance_m,
-                impact_speed_mps=None if math.isnan(one.impact_speed_mps) else one.impact_speed_mps,
-            )
-            for index, one in enumerate(map(Records, *columns))
-        ]
+    def episode(self, world: int, keyframes: int) -> Records:
+        """The first `keyframes` records of a world's episode, (keyframes,) each."""
+        return Records(*(table[:keyframes, world] for table in self._columns))

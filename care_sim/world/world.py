@@ -146,7 +146,8 @@ class World:
         self.actors.append(actor)
         if not isinstance(pose, tuple):
             self._moving.append(actor)
-            self._moving_bodies = np.append(self._moving_bodies, body)
+            bodies = [self.ego_body, *(one.body for one in self._moving)]
+            self._moving_bodies = np.array(bodies)
         return actor
 
     def at(self, time: float, event: Callable[[], None]) -> None:
