@@ -133,9 +133,12 @@ class Motion:
         """(n, steps + 1, 5) x, y, heading, and sine and cosine of half of it, of actors at every
         world step.
         """
-        poses = np.array([_poses(actor, self._times) for actor in actors])
-        half = poses[..., 2] / 2
-        return np.concatenate([poses, np.stack([np.sin(half), np.cos(half)], axis=-1)], axis=-1)
+        ways = np.empty((len(actors), len(self._times), 5))
+        for way, actor in zip(ways, actors, strict=True):
+            way[:, :3] = _poses(actor, self._times)
+            half = way[:, 2] / 2
+            way[:, 3], way[:, 4] = np.sin(half), np.cos(half)
+        return ways
 
     def _step(self, state: BatchState, accelerations: Floats) -> None:
         """Move all by a world step."""

@@ -1,15 +1,12 @@
 """What the episodes of a batch leave behind for the scoring."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.loops.records import Keyframe
-
-_KINDS: dict[str, type] = {"fired": int, "in_view": bool, "detected": bool, "braking": bool}
-"""Of the columns that hold no floats."""
 
 
 class Records(NamedTuple):
@@ -35,7 +32,7 @@ class Records(NamedTuple):
         columns = {name: [getattr(one, name) for one in keyframes] for name in cls._fields}
         columns["fired"] = [len(one.fired) for one in keyframes]
         # None, where nothing was hit, becomes NaN.
-        return cls(*(np.array(columns[name], _KINDS.get(name, float)) for name in cls._fields))
+        return cls(**{name: np.array(columns[name], _kind(name)) for name in cls._fields})
 
 
 class History:
@@ -43,7 +40,7 @@ class History:
 
     def __init__(self, worlds: int, keyframes: int):
         self._columns = Records(
-            *(np.zeros((keyframes, worlds), _KINDS.get(name, float)) for name in Records._fields)
+            *(np.zeros((keyframes, worlds), _kind(name)) for name in Records._fields)
         )
 
     def note(self, who: Mask, keyframes: Integers, records: Records) -> None:
@@ -55,3 +52,10 @@ class History:
     def episode(self, world: int, keyframes: int) -> Records:
         """The first `keyframes` records of a world's episode, (keyframes,) each."""
         return Records(*(table[:keyframes, world] for table in self._columns))
+
+
+def _kind(column: str) -> type:
+    kinds: dict[str, type] = {"fired": np.int64} | dict.fromkeys(
+        ("in_view", "detected", "braking"), np.bool_
+    )
+    return kinds.get(column, np.float64)

@@ -4,6 +4,7 @@ Who asks about many bodies at once, such as a compiled engine, reads these inste
 """
 
 import math
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -13,6 +14,8 @@ from care_sim.core.arrays import Floats, Integers
 from care_sim.core.frames import Pose
 from care_sim.world.bodies import Part, Shape, Triple
 
+OwnParts = tuple[int, tuple[Part, ...]]
+"""A body and its parts."""
 Solids = tuple[Integers, Floats, Floats, Integers]
 """Shapes, half extents, offsets and owners of parts; see `Primitives.tables`."""
 
@@ -105,25 +108,21 @@ def _rectangles_near(one: Floats, other: Floats, within: float) -> bool:
 class Primitives:
     """Every part of the opaque bodies of one world, and where the bodies are.
 
-    `materials` k names, in the order of the `tables`. `poses` (m, 7), one row per body id: x, y, z
-    in metres and the quaternion x, y, z, w, world frame.
+    `poses` (m, 7), one row per body id: x, y, z in metres and the quaternion x, y, z, w, world
+    frame.
     """
 
     def __init__(self) -> None:
-        self.materials: list[str] = []
         self._rows = np.zeros((_BODIES, 7))
         self.poses = self._rows[:0]
-        self._owners: list[int] = []
-        self._bodies: list[tuple[Part, ...]] = []
+        self._bodies: list[OwnParts] = []
         self._tables: Solids | None = None
 
     def add(self, body: int, parts: tuple[Part, ...]) -> None:
         """Take in a body, its parts in its own frame; a body that nothing can hit has none."""
         self._rows = _with_room(self._rows, body, 0.0)
         self.poses = self._rows[: body + 1]
-        self.materials += [part.material for part in parts]
-        self._owners += [body] * len(parts)
-        self._bodies.append(parts)
+        self._bodies.append((body, parts))
         self._tables = None
 
     @property
@@ -132,11 +131,29 @@ class Primitives:
         (k, 3) centres in the body frame, metres, and (k,) body ids.
         """
         if self._tables is None:
-            # That of no parts first: then there is always one to join.
-            columns = zip(*map(_columns, [(), *self._bodies]), strict=True)
-            shapes, halves, offsets = map(np.concatenate, columns)
-            self._tables = shapes, halves, offsets, np.array(self._owners, np.int64)
+            self._tables = _joined(tuple(self._bodies))
         return self._tables
+
+    @property
+    def materials(self) -> list[str]:
+        """The names of all k parts' materials."""
+        return [part.material for _, parts in self._bodies for part in parts]
+
+
+@lru_cache(maxsize=16)
+def _joined(bodies: tuple[OwnParts, ...]) -> Solids:
+    """See `Primitives.tables`. Many an episode has the bodies of the one before, elsewhere."""
+    # That of no parts first: then there is always one to join.
+    columns = zip(*map(_columns, [(), *(parts for _, parts in bodies)]), strict=True)
+    shapes, halves, offsets = map(np.concatenate, columns)
+    return shapes, halves, offsets, owners_of(bodies)
+
+
+def owners_of(bodies: Sequence[OwnParts]) -> Integers:
+    """(k,) the body ids of all parts, those of a body side by side."""
+    return np.repeat(
+        np.array([body for body, _ in bodies], np.int64), [len(parts) for _, parts in bodies]
+    )
 
 
 @lru_cache(maxsize=256)

@@ -8,6 +8,7 @@ from scipy.spatial import ConvexHull
 
 from care_sim.core.arrays import Floats, Integers
 from care_sim.world.bodies import Part
+from care_sim.world.body_tables import OwnParts, owners_of
 
 RING = 32
 """Points on each rim of a cylinder."""
@@ -26,14 +27,12 @@ class Polyhedra:
     """Every part that cameras see, as a polyhedron in the frame of its body."""
 
     def __init__(self) -> None:
-        self._owners: list[int] = []
-        self._bodies: list[tuple[Part, ...]] = []
+        self._bodies: list[OwnParts] = []
         self._tables: Tables | None = None
 
     def add(self, body: int, parts: tuple[Part, ...]) -> None:
         """Take in what is seen of a body, its parts in its own frame."""
-        self._owners += [body] * len(parts)
-        self._bodies.append(parts)
+        self._bodies.append((body, parts))
         self._tables = None
 
     @property
@@ -45,13 +44,19 @@ class Polyhedra:
         origin in metres.
         """
         if self._tables is None:
-            # A body without parts first: then there is always one to join.
-            columns = zip(*map(_body, [(), *self._bodies]), strict=True)
-            corners, faces, edges, sizes, reaches = map(np.concatenate, columns)
-            starts = np.zeros((len(sizes) + 1, 3), np.int64)
-            np.cumsum(sizes, axis=0, out=starts[1:])
-            self._tables = corners, faces, edges, starts, np.array(self._owners, int), reaches
+            self._tables = _joined(tuple(self._bodies))
         return self._tables
+
+
+@lru_cache(maxsize=16)
+def _joined(bodies: tuple[OwnParts, ...]) -> Tables:
+    """See `Polyhedra.tables`. Many an episode has the bodies of the one before, elsewhere."""
+    # A body without parts first: then there is always one to join.
+    columns = zip(*map(_body, [(), *(parts for _, parts in bodies)]), strict=True)
+    corners, faces, edges, sizes, reaches = map(np.concatenate, columns)
+    starts = np.zeros((len(sizes) + 1, 3), np.int64)
+    np.cumsum(sizes, axis=0, out=starts[1:])
+    return corners, faces, edges, starts, owners_of(bodies), reaches
 
 
 @lru_cache(maxsize=256)

@@ -103,7 +103,8 @@ class World:
         self.ego_body = self.bullet.add(self.ego_kind, self.ego.pose, transparent=True)
         self._footprints = Footprints()
         self._footprints.add(self.ego_body, self.ego_kind.size, self.ego.pose)
-        self._before = self._footprints.boxes.copy()
+        # Until the first step nothing has moved: there are no others.
+        self._before = self._footprints.boxes
         self.first_sighting = None
         self.speed_plan = None
         self.goal_m = np.inf
@@ -141,7 +142,7 @@ class World:
             kind = CATALOGUE[kind]
         body = self.bullet.add(kind, place, backdrop=backdrop)
         self._footprints.add(body, kind.size, place)
-        self._before = self._footprints.boxes.copy()
+        self._before = self._footprints.boxes
         actor = Actor(name, kind, body, pose_at, reported, pose)
         self.actors.append(actor)
         if not isinstance(pose, tuple):
