@@ -1,7 +1,7 @@
 """What the episodes of a batch leave behind for the scoring."""
 
-from collections.abc import Sequence
-from typing import Any, NamedTuple
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -51,7 +51,8 @@ class History:
 
     def episode(self, world: int, keyframes: int) -> Records:
         """The first `keyframes` records of a world's episode, (keyframes,) each."""
-        return Records(*(table[:keyframes, world] for table in self._columns))
+        columns: Iterable[np.ndarray] = self._columns
+        return Records(*(table[:keyframes, world] for table in columns))
 
 
 def _kind(column: str) -> type:
