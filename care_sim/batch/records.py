@@ -1,6 +1,6 @@
 """What the episodes of a batch leave behind for the scoring."""
 
-import math
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,8 +10,9 @@ from care_sim.loops.records import Keyframe
 
 
 class Records(NamedTuple):
-    """A keyframe of W worlds; (W,) each, as in `care_sim.loops.records.Keyframe`. `fired` is how
-    many cells were fired, and `impact_speed_mps` NaN where nothing was hit.
+    """A keyframe of W worlds, (W,) each, or the keyframes of one world; as in
+    `care_sim.loops.records.Keyframe`. `fired` is how many cells were fired, and `impact_speed_mps`
+    NaN where nothing was hit.
     """
 
     time_s: Floats
@@ -25,17 +26,21 @@ class Records(NamedTuple):
     clearance_m: Floats
     impact_speed_mps: Floats
 
+    @classmethod
+    def of(cls, keyframes: Sequence[Keyframe]) -> "Records":
+        """Those of an episode."""
+        columns = {name: [getattr(one, name) for one in keyframes] for name in cls._fields}
+        columns["fired"] = [len(one.fired) for one in keyframes]
+        # None, where nothing was hit, becomes NaN.
+        return cls(**{name: np.array(columns[name], _kind(name)) for name in cls._fields})
+
 
 class History:
     """The records of the running episodes of `worlds` worlds, of up to `keyframes` each."""
 
     def __init__(self, worlds: int, keyframes: int):
-        kinds = {"fired": np.int64, "in_view": np.bool_, "detected": np.bool_, "braking": np.bool_}
         self._columns = Records(
-            *(
-                np.zeros((keyframes, worlds), kinds.get(name, np.float64))
-                for name in Records._fields
-            )
+            *(np.zeros((keyframes, worlds), _kind(name)) for name in Records._fields)
         )
 
     def note(self, who: Mask, keyframes: Integers, records: Records) -> None:
@@ -44,36 +49,14 @@ class History:
         for table, column in zip(self._columns, records, strict=True):
             table[keyframes[worlds], worlds] = column[worlds]
 
-    def episode(self, world: int, keyframes: int) -> list[Keyframe]:
-        """The first `keyframes` records of a world's episode. Instead of the fired cells they hold
-        as many numbers.
-        """
-        columns = [table[:keyframes, world].tolist() for table in self._columns]
-        cells = np.zeros(self._columns.fired[:keyframes, world].max(), np.int64)
-        return [
-            Keyframe(
-                index=index,
-                time_s=time,
-                fired=cells[:fired],
-                in_view=in_view,
-                detected=detected,
-                braking=braking,
-                speed_mps=speed,
-                distance_m=distance,
-                nearest_m=nearest,
-                clearance_m=clearance,
-                impact_speed_mps=None if math.isnan(impact) else impact,
-            )
-            for index, (
-                time,
-                fired,
-                in_view,
-                detected,
-                braking,
-                speed,
-                distance,
-                nearest,
-                clearance,
-                impact,
-            ) in enumerate(zip(*columns, strict=True))
-        ]
+    def episode(self, world: int, keyframes: int) -> Records:
+        """The first `keyframes` records of a world's episode, (keyframes,) each."""
+        columns: Iterable[np.ndarray] = self._columns
+        return Records(*(table[:keyframes, world] for table in columns))
+
+
+def _kind(column: str) -> type:
+    kinds: dict[str, type] = {"fired": np.int64} | dict.fromkeys(
+        ("in_view", "detected", "braking"), np.bool_
+    )
+    return kinds.get(column, np.float64)
