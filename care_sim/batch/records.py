@@ -1,38 +1,11 @@
 """What the episodes of a batch leave behind for the scoring."""
 
-from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from collections.abc import Iterable
 
 import numpy as np
 
-from care_sim.core.arrays import Floats, Integers, Mask
-from care_sim.loops.records import Keyframe
-
-
-class Records(NamedTuple):
-    """A keyframe of W worlds, (W,) each, or the keyframes of one world; as in
-    `care_sim.loops.records.Keyframe`. `fired` is how many cells were fired, and `impact_speed_mps`
-    NaN where nothing was hit.
-    """
-
-    time_s: Floats
-    fired: Integers
-    in_view: Mask
-    detected: Mask
-    braking: Mask
-    speed_mps: Floats
-    distance_m: Floats
-    nearest_m: Floats
-    clearance_m: Floats
-    impact_speed_mps: Floats
-
-    @classmethod
-    def of(cls, keyframes: Sequence[Keyframe]) -> "Records":
-        """Those of an episode."""
-        columns = {name: [getattr(one, name) for one in keyframes] for name in cls._fields}
-        columns["fired"] = [len(one.fired) for one in keyframes]
-        # None, where nothing was hit, becomes NaN.
-        return cls(**{name: np.array(columns[name], _kind(name)) for name in cls._fields})
+from care_sim.core.arrays import Integers, Mask
+from care_sim.loops.record_columns import Records, kind_of
 
 
 class History:
@@ -40,7 +13,7 @@ class History:
 
     def __init__(self, worlds: int, keyframes: int):
         self._columns = Records(
-            *(np.zeros((keyframes, worlds), _kind(name)) for name in Records._fields)
+            *(np.zeros((keyframes, worlds), kind_of(name)) for name in Records._fields)
         )
 
     def note(self, who: Mask, keyframes: Integers, records: Records) -> None:
@@ -53,10 +26,3 @@ class History:
         """The first `keyframes` records of a world's episode, (keyframes,) each."""
         columns: Iterable[np.ndarray] = self._columns
         return Records(*(table[:keyframes, world] for table in columns))
-
-
-def _kind(column: str) -> type:
-    kinds: dict[str, type] = {"fired": np.int64} | dict.fromkeys(
-        ("in_view", "detected", "braking"), np.bool_
-    )
-    return kinds.get(column, np.float64)

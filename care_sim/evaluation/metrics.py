@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from care_sim.batch.records import Records
+from care_sim.loops.record_columns import Records
 from care_sim.loops.records import Keyframe, Outcome
 
 

@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from care_sim.base.times import LAST_BITS_S
 from care_sim.batch.loop import BatchLoop
-from care_sim.batch.records import History, Records
+from care_sim.batch.records import History
 from care_sim.core.arrays import Floats, Mask
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.envs.sensing import Observed
 from care_sim.envs.vector.rewards import Rewards
 from care_sim.envs.vector.worlds import Stepped
 from care_sim.evaluation.metrics import outcome_of
+from care_sim.loops.record_columns import Records
 from care_sim.loops.records import Outcome
 
 

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from care_sim.batch.records import Records
 from care_sim.core.arrays import Floats, Mask
 from care_sim.envs.reward import KEEP_CLEAR_M, weighted
+from care_sim.loops.record_columns import Records
 
 
 class Rewards:
