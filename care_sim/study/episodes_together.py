@@ -22,7 +22,9 @@ from care_sim.study.episode_play import EpisodeHash, Played, result_or_reason, r
 from care_sim.study.run_config import Row
 
 MOST_TOGETHER = 16
-"""Episodes that are played together."""
+"""Episodes that are played together: more save no time worth telling, and an interrupted study
+would leave fewer whole pairs of policies.
+"""
 
 
 def play_episodes(batch: Sequence[EpisodeConfig]) -> list[Row | str]:
