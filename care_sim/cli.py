@@ -3,16 +3,18 @@
 import contextlib
 import io
 import os
-import re
 import shutil
 import sys
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, NoReturn
 
+import care_sim
 from care_sim.base import interrupts
 from care_sim.base.errors import InvalidInput, MissingExtra, one_line, shortened, shown
-from care_sim.commands.entries import COMMANDS
-from care_sim.commands.shared.parsing import chosen_command, option_names
+from care_sim.commands.entries import COMMANDS, GROUPS
+from care_sim.commands.shared.hints import ways_on
+from care_sim.commands.shared.parsing import chosen_command, option_helps
 
 _BAD_INPUT = 2
 _UNEXPECTED = 70
@@ -24,8 +26,11 @@ _DEBUG = "--debug"
 _ABOUT = (
     "Benchmark for adaptive LiDAR sensing: the closed loop, and first sightings in the open loop."
 )
-_MOST_OPTIONS = ("sweep", "protocol")
-"""Of the closed and of the open loop, the commands that take every condition."""
+_USAGE = """usage: care-sim COMMAND [options]
+
+Benchmark for adaptive LiDAR sensing: a policy decides which cells fire."""
+_WAYS_ON = """care-sim COMMAND --help tells its options; care-sim --version the version.
+Begin with: care-sim run dartout"""
 _LONGEST = 2000
 """Characters of a complaint, at the most."""
 _NARROWEST = 20
@@ -171,33 +176,55 @@ def _check_texts(arguments: list[str]) -> None:
 
 def parsed_command(arguments: Sequence[str]) -> Callable[[], int]:
     """The command that the arguments name, with its options. Raises InvalidInput, in one line."""
-    named = arguments[0] if arguments else ""
+    named = arguments[0] if arguments else "--help"
+    if named in _ASKED:
+        return partial(_told, _ASKED[named]())
+    if named.startswith("-"):
+        raise InvalidInput(
+            f"{shown(named)} is no option of care-sim; `care-sim` tells the commands"
+        )
     # The learners are commands of their own; their help lists them alone.
     if named == "train":
-        train = COMMANDS[named]
-        return chosen_command(train.loaded(), "care-sim train", train.about, arguments[1:])
-    # For help, and for names that are mistyped, what the list says of each command is enough.
-    commands = {name: _described(command.about) for name, command in COMMANDS.items()}
-    if named in COMMANDS:
-        commands[named] = COMMANDS[named].loaded()
+        commands, prog = COMMANDS[named].loaded(), "care-sim train"
+        about, arguments = COMMANDS[named].about, arguments[1:]
+    else:
+        # For names that are mistyped, what the list says of each command is enough.
+        commands = {name: _described(command.about) for name, command in COMMANDS.items()}
+        prog, about = "care-sim", _ABOUT
+        if named in COMMANDS:
+            commands[named] = COMMANDS[named].loaded()
     try:
-        return chosen_command(commands, "care-sim", _ABOUT, arguments)
+        return chosen_command(commands, prog, about, arguments)
     except InvalidInput as error:
-        raise InvalidInput(f"{error}{_who_has_them(str(error))}") from None
+        asked = commands.get(arguments[0]) if arguments else None
+        options = option_helps(asked) if isinstance(asked, type) else {}
+        raise InvalidInput(f"{error}{ways_on(str(error), options)}") from None
 
 
-def _who_has_them(complaint: str) -> str:
-    """For a complaint of options that a command lacks, which other ones have them; else empty."""
-    if not complaint.startswith("Unrecognized options"):
-        return ""
-    lacking = re.findall(r"--[\w-]+", complaint.partition(";")[0])
-    held = {name: option_names(COMMANDS[name].loaded()) for name in _MOST_OPTIONS}
-    told = []
-    for option in dict.fromkeys(lacking):
-        owners = [f"care-sim {name}" for name in held if option.replace("_", "-") in held[name]]
-        if owners:
-            told.append(f"; {option} is an option of {' and '.join(owners)}")
-    return "".join(told)
+def _overview() -> str:
+    """Every command in its group, a line each."""
+    groups = [
+        "\n".join([title, *(f"  {name:13}{each.about}" for name, each in group.items())])
+        for title, group in GROUPS.items()
+    ]
+    return "\n\n".join([_USAGE, *groups, _WAYS_ON])
+
+
+def _version() -> str:
+    return f"care-sim {care_sim.__version__}"
+
+
+_ASKED: dict[str, Callable[[], str]] = {
+    "-h": _overview,
+    "--help": _overview,
+    "--version": _version,
+}
+"""What is printed where no command is named."""
+
+
+def _told(text: str) -> int:
+    print(text)
+    return 0
 
 
 def _described(about: str) -> Callable[..., Any]:

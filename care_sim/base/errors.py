@@ -4,9 +4,17 @@ allowed, and text made fit to be shown.
 
 import sys
 from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
 
 _QUOTED = 120
 """Characters of a value that a message quotes."""
+_LISTINGS = {
+    "command": "care-sim",
+    "policy": "care-sim policies",
+    "scenario": "care-sim scenarios",
+    "detector": "care-sim detectors",
+}
+"""The commands that list things of a kind."""
 
 
 class InvalidInput(ValueError):
@@ -26,9 +34,17 @@ class MissingExtra(ImportError):
 
 
 def unknown(kind: str, name: object, known: Iterable[str]) -> InvalidInput:
-    """The error for a name that is not among the known ones."""
-    told = shown(name if isinstance(name, str) else shown(name))
-    return InvalidInput(f"unknown {kind} {told}; known: {', '.join(sorted(known)) or 'none'}")
+    """The error for a name that is not among the known ones: it tells them all, the nearest, and
+    the command that says what each is.
+    """
+    names = sorted(known)
+    told = [f"unknown {kind} {shown(name if isinstance(name, str) else shown(name))}"]
+    told.append(f"known: {', '.join(names) or 'none'}")
+    if isinstance(name, str) and (nearest := get_close_matches(name, names, 1)):
+        told.append(f"the nearest is {nearest[0]}")
+    if kind in _LISTINGS:
+        told.append(f"`{_LISTINGS[kind]}` tells what each is")
+    return InvalidInput("; ".join(told))
 
 
 def report_problems(problems: Sequence[str]) -> None:

@@ -33,9 +33,9 @@ def load(state: BatchState, world: int, built: World) -> None:
         before=filled(bodies.before, world, boxes),
         poses=filled(bodies.poses, world, primitives.poses),
     )
-    state.solids.counts[world] = len(primitives.owners)
-    columns = primitives.shapes, primitives.halves, primitives.offsets, primitives.owners
-    state.solids = Solids(state.solids.counts, *_all_filled(state.solids[1:], world, columns))
+    parts = primitives.tables
+    state.solids.counts[world] = len(parts[-1])
+    state.solids = Solids(state.solids.counts, *_all_filled(state.solids[1:], world, parts))
     meshes = built.bullet.polyhedra.tables
     state.outlines.counts[world] = len(meshes[-1])
     outlines = _all_filled(state.outlines[1:], world, meshes)

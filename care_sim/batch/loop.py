@@ -13,7 +13,6 @@ from care_sim.batch.choice import Choice
 from care_sim.batch.loading import load
 from care_sim.batch.motion import Motion, steps_of
 from care_sim.batch.observing import Observations, Observing
-from care_sim.batch.records import Records
 from care_sim.batch.scanning import Found, Scanning
 from care_sim.batch.sight import Sight
 from care_sim.batch.state import BatchState, Fired
@@ -23,6 +22,7 @@ from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.frames import Frame
 from care_sim.core.rig import Rig
 from care_sim.loops.episode import Episode
+from care_sim.loops.record_columns import Records
 from care_sim.world.bullet import NO_BODY
 
 

@@ -30,6 +30,8 @@ KNOWN_BELOW_M = 2.0
 """Clearances below this are exact in any case: the reward reads them."""
 _BY_TIME_ALONE = (Walk, LaneChange)
 """Frozen: where they are depends on nothing but the time."""
+_REFLECTED = np.array([1.0, -1.0, -1.0])
+"""Turns poses into those on the other side of the x axis."""
 
 
 def steps_of(duration_s: float, keyframe_s: float) -> int:
@@ -131,10 +133,12 @@ class Motion:
         """(n, steps + 1, 5) x, y, heading, and sine and cosine of half of it, of actors at every
         world step.
         """
-        times = self._times.tolist()
-        poses = np.array([[actor.pose_at(time) for time in times] for actor in actors])
-        half = poses[..., 2] / 2
-        return np.concatenate([poses, np.stack([np.sin(half), np.cos(half)], axis=-1)], axis=-1)
+        ways = np.empty((len(actors), len(self._times), 5))
+        for way, actor in zip(ways, actors, strict=True):
+            way[:, :3] = _poses(actor, self._times)
+            half = way[:, 2] / 2
+            way[:, 3], way[:, 4] = np.sin(half), np.cos(half)
+        return ways
 
     def _step(self, state: BatchState, accelerations: Floats) -> None:
         """Move all by a world step."""
@@ -179,8 +183,21 @@ def _is_vehicle(source: object) -> TypeGuard[RoadVehicle]:
     return isinstance(source, RoadVehicle)
 
 
+def _timetable(actor: Actor) -> object:
+    """What tells where an actor is at a time, if the time alone tells it."""
+    return getattr(_source(actor), "__self__", None)
+
+
 def _goes_by_time(actor: Actor) -> bool:
-    return isinstance(getattr(_source(actor), "__self__", None), _BY_TIME_ALONE)
+    return isinstance(_timetable(actor), _BY_TIME_ALONE)
+
+
+def _poses(actor: Actor, times: Floats) -> Floats:
+    """(n, 3) where an actor that goes by time alone is at `times` (n,)."""
+    timetable = _timetable(actor)
+    assert isinstance(timetable, _BY_TIME_ALONE)
+    poses = timetable.poses(times)
+    return poses * _REFLECTED if isinstance(actor.moved_by, Reflection) else poses
 
 
 def _copy(built: World, world: int, state: BatchState) -> None:

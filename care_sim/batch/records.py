@@ -1,41 +1,19 @@
 """What the episodes of a batch leave behind for the scoring."""
 
-import math
-from typing import NamedTuple
+from collections.abc import Iterable
 
 import numpy as np
 
-from care_sim.core.arrays import Floats, Integers, Mask
-from care_sim.loops.records import Keyframe
-
-
-class Records(NamedTuple):
-    """A keyframe of W worlds; (W,) each, as in `care_sim.loops.records.Keyframe`. `fired` is how
-    many cells were fired, and `impact_speed_mps` NaN where nothing was hit.
-    """
-
-    time_s: Floats
-    fired: Integers
-    in_view: Mask
-    detected: Mask
-    braking: Mask
-    speed_mps: Floats
-    distance_m: Floats
-    nearest_m: Floats
-    clearance_m: Floats
-    impact_speed_mps: Floats
+from care_sim.core.arrays import Integers, Mask
+from care_sim.loops.record_columns import Records, kind_of
 
 
 class History:
     """The records of the running episodes of `worlds` worlds, of up to `keyframes` each."""
 
     def __init__(self, worlds: int, keyframes: int):
-        kinds = {"fired": np.int64, "in_view": np.bool_, "detected": np.bool_, "braking": np.bool_}
         self._columns = Records(
-            *(
-                np.zeros((keyframes, worlds), kinds.get(name, np.float64))
-                for name in Records._fields
-            )
+            *(np.zeros((keyframes, worlds), kind_of(name)) for name in Records._fields)
         )
 
     def note(self, who: Mask, keyframes: Integers, records: Records) -> None:
@@ -44,25 +22,7 @@ class History:
         for table, column in zip(self._columns, records, strict=True):
             table[keyframes[worlds], worlds] = column[worlds]
 
-    def episode(self, world: int, keyframes: int) -> list[Keyframe]:
-        """The first `keyframes` records of a world's episode. Instead of the fired cells they hold
-        as many numbers.
-        """
-        columns = [table[:keyframes, world].tolist() for table in self._columns]
-        cells = np.zeros(self._columns.fired[:keyframes, world].max(), np.int64)
-        return [
-            Keyframe(
-                index=index,
-                time_s=one.time_s,
-                fired=cells[: one.fired],
-                in_view=one.in_view,
-                detected=one.detected,
-                braking=one.braking,
-                speed_mps=one.speed_mps,
-                distance_m=one.distance_m,
-                nearest_m=one.nearest_m,
-                clearance_m=one.clearance_m,
-                impact_speed_mps=None if math.isnan(one.impact_speed_mps) else one.impact_speed_mps,
-            )
-            for index, one in enumerate(map(Records, *columns))
-        ]
+    def episode(self, world: int, keyframes: int) -> Records:
+        """The first `keyframes` records of a world's episode, (keyframes,) each."""
+        columns: Iterable[np.ndarray] = self._columns
+        return Records(*(table[:keyframes, world] for table in columns))

@@ -24,13 +24,11 @@ from care_sim.sensors.camera_kernels import reported_boxes, surest_first
 from care_sim.sensors.confidence import MIN_PIXELS
 from care_sim.sensors.engines.picture_kernels import Line, draw_silhouettes, empty_line
 from care_sim.sensors.engines.silhouette_kernels import (
-    Lens,
-    Meshes,
-    PlacedCamera,
     Silhouettes,
     lay_silhouettes,
     room_for,
 )
+from care_sim.sensors.engines.view_kernels import Lens, Meshes, PlacedCamera
 from care_sim.sensors.picture_timing import picture_timing
 from care_sim.world.bullet import FAR_M
 from care_sim.world.world import WORLD_STEP_S, World

@@ -41,9 +41,9 @@ class Solids(NamedTuple):
 
 
 class Outlines(NamedTuple):
-    """The parts that cameras see; columns as in `care_sim.sensors.engines.picture_kernels.Meshes`:
-    `corners` (W, C, 3), `faces` (W, F, 4), `edges` (W, D, 2), `starts` (W, K + 1, 3), `owners`
-    (W, K), `reaches` (W, K).
+    """The parts that cameras see; columns as in
+    `care_sim.sensors.engines.view_kernels.Meshes`: `corners` (W, C, 3), `faces` (W, F, 4), `edges`
+    (W, D, 2), `starts` (W, K + 1, 3), `owners` (W, K), `reaches` (W, K).
     """
 
     counts: Integers
@@ -159,10 +159,9 @@ class BatchState:
         self.tracks = TrackTables(
             _counts(worlds), np.zeros((worlds, MAX_TRACKS, len(Tracks.COLUMNS))), _counts(worlds)
         )
-        self.sensors = Sensors(
-            np.zeros((worlds, 6)), np.zeros((worlds, 2)), np.zeros((worlds, 2))
-        )
-        self.egos = Egos(*(np.zeros(worlds) for _ in range(3)), _counts(worlds), _counts(worlds))
+        self.sensors = Sensors(np.zeros((worlds, 6)), np.zeros((worlds, 2)), np.zeros((worlds, 2)))
+        motion = np.zeros(worlds), np.zeros(worlds), np.zeros(worlds)
+        self.egos = Egos(*motion, _counts(worlds), _counts(worlds))
 
 
 def filled(table: np.ndarray, world: int, rows: np.ndarray) -> np.ndarray:

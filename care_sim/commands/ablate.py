@@ -10,7 +10,9 @@ from care_sim.study.designs.ablations import ablation_plays, ablation_study, qua
 
 @dataclass(frozen=True, kw_only=True)
 class Ablate(EitherLoopStudy):
-    """Vary one thing at a time as the paper's ablations do, one table per thing varied; with
+    """Vary one thing at a time, as the paper's ablations do.
+
+    Vary one thing at a time as the paper's ablations do, one table per thing varied; with
     --source in the open loop, on a quarter of the scenes.
     """
 
@@ -21,7 +23,7 @@ class Ablate(EitherLoopStudy):
         """Run it."""
         self.check_loop(("seeds",), ("budgets",))
         if self.source is None:
-            return self.play("ablate", ablation_study, self.folder("ablate"))
+            return self.play("ablate", ablation_study, self.name_of("ablate"))
         return self._play_scenes(self.source)
 
     def _play_scenes(self, named: str) -> int:
@@ -34,4 +36,4 @@ class Ablate(EitherLoopStudy):
             lambda name: ablation_plays(source, scenes[:1], self.budgets[:1], [name]),
         )
         configs = ablation_plays(source, scenes, self.budgets, also)
-        return self.play_study("ablate-open-loop", configs, self.folder("ablate"), left_out)
+        return self.play_study("ablate-open-loop", configs, self.name_of("ablate"), left_out)

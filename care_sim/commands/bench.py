@@ -8,7 +8,9 @@ from care_sim.measure.bench.run import run_bench
 
 @dataclass(frozen=True, kw_only=True)
 class Bench(BenchConfig):
-    """Measure speed: keyframe, scans, steps and memory, beside other engines and environments.
+    """Measure speed, beside other engines and environments.
+
+    Measure speed: keyframe, scans, steps and memory, beside other engines and environments.
 
     The ray casters Embree and MuJoCo and the environments highway-env and panda-gym are measured in
     the same run. All but what takes several processes runs on one core.

@@ -1,6 +1,7 @@
 """`care-sim benchmark`: the official suite, one result file for every policy."""
 
 import re
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,7 +35,9 @@ _OUT = Path("runs/benchmark")
 
 @dataclass(frozen=True, kw_only=True)
 class Benchmark:
-    """Play the official suite and write a result file for every policy: one score and its parts.
+    """Play the official suite: one score, and a result file.
+
+    Play the official suite and write a result file for every policy: one score and its parts.
 
     The suite is drives, Euro NCAP tests and streets at 1% of the cells. `care-sim leaderboard`
     makes the table.
@@ -77,6 +80,7 @@ class Benchmark:
         entries, left_out = self._entries()
         for entry in entries:
             check_output(self._file(entry), JSON)
+        print(f"Results go to {self.out}", file=sys.stderr, flush=True)
         with player_in(self.out, self.workers, processes) as player:
             worlds = screened_worlds(player, salt) if salt else self._published()
             results = played(entries, worlds, player, self.quick, salt.digest if salt else None)

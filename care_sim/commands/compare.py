@@ -10,35 +10,37 @@ from pathlib import Path
 from typing import Annotated
 
 import tyro
-from rich.table import Table
-from rich.text import Text
 
-from care_sim.base.errors import InvalidInput, printable, report_problems
+from care_sim.base.errors import InvalidInput, report_problems
 from care_sim.commands.shared.options import DEFAULT_OPTIONS, Options
 from care_sim.commands.shared.selection import playable
 from care_sim.commands.shared.study_command import DONE, FAILED, console
 from care_sim.envs.wrappers.record_rerun import RecordRerun, recording
 from care_sim.reports.episodes.clips import Clip
 from care_sim.reports.episodes.timeline import text
+from care_sim.reports.table import Table
 from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.episode_play import GymEnv, result_or_reason, trace
 from care_sim.study.run_config import Row
 from care_sim.viewer.pictures.comparison import draw_panel
 
 _COLUMNS = {
-    "detection_distance_m": "detected at\n(sensor to actor) m",
+    "detection_distance_m": "detected at (to actor) m",
     "braked": "braked",
-    "min_distance_m": "nearest\n(centres) m",
-    "clearance_m": "clearance\n(hulls) m",
+    "min_distance_m": "nearest (centres) m",
+    "clearance_m": "clearance (hulls) m",
     "collision": "collision",
-    "impact_speed_mps": "impact\nm/s",
-    "rays_fired": "rays\nfired",
+    "impact_speed_mps": "impact m/s",
+    "rays_fired": "rays fired",
 }
 
 
 @dataclass(frozen=True, kw_only=True)
 class Compare:
-    """Play the same seed under several policies and print their outcomes side by side."""
+    """Play one seed under several policies, side by side.
+
+    Play the same seed under several policies and print their outcomes side by side.
+    """
 
     scenario: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCENARIO")]
     """dartout, dense, cutin, ncap, r157, drive, that of an installed package, or MODULE:CLASS;
@@ -110,7 +112,7 @@ def _report(configs: Sequence[EpisodeConfig], answers: Sequence[Row | str]) -> l
     told = [*zip(configs, answers, strict=False)]
     rows = [(config, row) for config, row in told if not isinstance(row, str)]
     if rows:
-        console().print(_outcome_table(rows))
+        console().print(_outcome_table(rows).rich())
     failures = [
         f"failed: {config.label}: {reason}" for config, reason in told if isinstance(reason, str)
     ]
@@ -135,13 +137,9 @@ def _recorded(
 def _outcome_table(played: Sequence[tuple[EpisodeConfig, Row]]) -> Table:
     """One line per episode."""
     config = played[0][0]
-    table = Table(title=f"{config.scenario} seed {config.seed}", title_justify="left", box=None)
-    for column in ("policy", "budget", *_COLUMNS.values()):
-        table.add_column(column, justify="left" if column == "policy" else "right", no_wrap=True)
-    for config, row in played:
-        table.add_row(
-            Text(printable(config.policy)),
-            f"{config.budget:.4g}",
-            *(text(row[name]) for name in _COLUMNS),
-        )
-    return table
+    lines = [
+        (config.policy, f"{config.budget:.4g}", *(text(row[name]) for name in _COLUMNS))
+        for config, row in played
+    ]
+    columns = ("policy", "budget", *_COLUMNS.values())
+    return Table(f"{config.scenario} seed {config.seed}", columns, tuple(lines), whole=columns)

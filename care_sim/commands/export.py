@@ -23,7 +23,9 @@ from care_sim.study.scene_play import play_through_film
 
 @dataclass(frozen=True, kw_only=True)
 class Export(PlayOptions):
-    """Play a policy over nuScenes scenes and write its detections in the results form of the
+    """Write a policy's detections for the official nuScenes devkit.
+
+    Play a policy over nuScenes scenes and write its detections in the results form of the
     official devkit.
     """
 

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Annotated
 
 import tyro
@@ -14,14 +13,15 @@ from care_sim.study.designs.faults import fault_study
 
 @dataclass(frozen=True, kw_only=True)
 class Faults(FixedStudy):
-    """Let every fault grow and find where the order of the policies changes."""
+    """Let every fault grow until the order of the policies changes.
 
-    out: Path = Path("runs/faults")
-    """Folder of the results; an interrupted study goes on there."""
+    Let every fault grow and find where the order of the policies changes.
+    """
+
     conditions: Annotated[SensingOptions, tyro.conf.arg(name="")] = DEFAULT_SENSING
     """Conditions that all episodes share, other than those that grow."""
 
     def __call__(self) -> int:
         """Run it."""
         study = partial(fault_study, **self.conditions.sensing())
-        return self.play("faults", study, self.out)
+        return self.play("faults", study, "faults")

@@ -12,7 +12,9 @@ from care_sim.study.designs.firing import FIRING_POLICIES, firing_plays, firing_
 
 @dataclass(frozen=True, kw_only=True)
 class Firing(ProtocolVariants):
-    """Play the dense street under every hardware, or with --source the first-sighting protocol, and
+    """Tell what a LiDAR that fires tiles, rows or a window decides.
+
+    Play the dense street under every hardware, or with --source the first-sighting protocol, and
     tell what a policy that knows its hardware has over one whose demand is projected.
 
     Units that do not divide the grid of a set-up are left out, as are the study's policies with
@@ -34,7 +36,7 @@ class Firing(ProtocolVariants):
             check_values(self, "sensors")
             report_problems([line for sensor in self.sensors for line in fitting(sensor).left_out])
             study = partial(firing_study, sensors=self.sensors)
-            return self.play("firing", study, self.folder("firing"))
+            return self.play("firing", study, self.name_of("firing"))
         # Others are checked when they are played, as in every study.
         own = [name for name in self.policies if name in FIRING_POLICIES]
         fits = fitting(self.sensor or DEFAULT_SETUP, own)

@@ -30,7 +30,9 @@ from care_sim.study.executors import CORES, MOST_WORKERS
 
 @dataclass(frozen=True, kw_only=True)
 class Leaderboard:
-    """Make one table of results of `benchmark`, or verify them by playing a random tenth of their
+    """Put result files in one table, or verify them.
+
+    Make one table of results of `benchmark`, or verify them by playing a random tenth of their
     episodes again.
 
     Page and figure of the table go to `out`.
@@ -84,7 +86,7 @@ class Leaderboard:
         save(leaderboard_figure(first), self.out / LEADERBOARD_FIGURE)
         write_text(page, _page([table.markdown() for table in tables]))
         for table in tables:
-            console().print(table.rich())
+            console().print(table.rich(page))
         print(f"Page: {page}")
 
     def _verified(self, results: dict[Path, BenchmarkResult]) -> list[str]:

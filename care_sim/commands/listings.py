@@ -1,6 +1,8 @@
 """`care-sim policies`, `detectors`, `sensors` and `scenarios`: what can be named."""
 
 import inspect
+import shutil
+import textwrap
 from dataclasses import Field, dataclass, fields
 from typing import Any
 
@@ -23,7 +25,7 @@ from care_sim.streets.encounters import COMERS
 
 @dataclass(frozen=True)
 class Policies:
-    """List the policies with their tags, parameters and sources."""
+    """List the policies: tags, parameters, sources."""
 
     def __call__(self) -> int:
         """Run it."""
@@ -37,7 +39,7 @@ class Detectors:
 
     def __call__(self) -> int:
         """Run it."""
-        print(*detector_lines(), sep="\n")
+        print(*map(_wrapped, detector_lines()), sep="\n")
         return 0
 
 
@@ -47,7 +49,7 @@ class Sensors:
 
     def __call__(self) -> int:
         """Run it."""
-        print(*setup_lines(), sep="\n")
+        print(*map(_wrapped, setup_lines()), sep="\n")
         return 0
 
 
@@ -71,10 +73,21 @@ class Scenarios:
     def __call__(self) -> int:
         """Run it."""
         for name in scenario_names():
-            print(*map(printable, _scenario_lines(name)), "", sep="\n")
+            print(*map(_wrapped, map(printable, _scenario_lines(name))), "", sep="\n")
         for _, reason in PLUGINS.refusals():
-            print(printable(reason))
+            print(_wrapped(printable(reason)))
         return 0
+
+
+def _wrapped(line: str) -> str:
+    """The line, broken at words where the terminal is narrower; what goes on is indented."""
+    return textwrap.fill(
+        line,
+        shutil.get_terminal_size().columns,
+        subsequent_indent=" " * 8,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
 
 
 def _scenario_lines(name: str) -> list[str]:

@@ -2,9 +2,8 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
-from care_sim.commands.shared.play_options import PlayOptions
+from care_sim.commands.shared.play_options import PlayOptions, named_after
 from care_sim.commands.shared.selection import playable
 from care_sim.commands.shared.study_command import StudyCommand
 from care_sim.sources.scenes import Scene, chosen_scenes
@@ -14,7 +13,10 @@ from care_sim.study.run_config import REFERENCE
 
 @dataclass(frozen=True, kw_only=True)
 class Mechanism(StudyCommand, PlayOptions):
-    """Find why policies differ: on one shared belief, and ray by ray, on streets or recordings."""
+    """Find why one policy finds what another misses, ray by ray.
+
+    Find why policies differ: on one shared belief, and ray by ray, on streets or recordings.
+    """
 
     scenes: tuple[str, ...] = ()
     """One number: that many scenes, from the first. Otherwise names of scenes. Without this
@@ -28,8 +30,6 @@ class Mechanism(StudyCommand, PlayOptions):
     """Share of the cells that may fire at a keyframe, above 0 and at most 1."""
     presence: str = "annotated"
     """As in `care-sim protocol`: who is present at scene start, and so no first sighting."""
-    out: Path = Path("runs/mechanism")
-    """Folder of the results; an interrupted run goes on there."""
 
     def __call__(self) -> int:
         """Run it."""
@@ -43,4 +43,7 @@ class Mechanism(StudyCommand, PlayOptions):
             )
 
         policies, left_out = playable(self.policies, lambda name: plays(scenes[:1], [name]))
-        return self.play_study("mechanism", plays(scenes, policies), self.out, left_out)
+        configs = plays(scenes, policies)
+        return self.play_study(
+            "mechanism", configs, named_after("mechanism", self.source), left_out
+        )

@@ -1,7 +1,6 @@
 """`care-sim ncap`: the Euro NCAP tests, scored."""
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated
 
 import tyro
@@ -25,7 +24,10 @@ from care_sim.study.episode_config import grid
 
 @dataclass(frozen=True, kw_only=True)
 class Ncap(EpisodeStudy):
-    """Play the Euro NCAP tests of emergency braking: avoided, mitigated or hit, and a score."""
+    """Play the Euro NCAP tests: avoided, mitigated or hit; a score.
+
+    Play the Euro NCAP tests of emergency braking: avoided, mitigated or hit, and a score.
+    """
 
     seeds: tuple[int, ...] = (10,)
     """One number: that many seeds, from 0. Several numbers: these seeds, of one split; 7 7 is seed
@@ -40,8 +42,6 @@ class Ncap(EpisodeStudy):
     """Shares of the cells that may fire at a keyframe, above 0 and at most 1."""
     step_kph: float = bounded(NCAP_STEP_KPH, 5, 50)
     """Plays the protocols' speeds that are multiples of this; 5 plays them all."""
-    out: Path = Path("runs/ncap")
-    """Folder of the results; an interrupted study goes on there."""
     conditions: Annotated[SensingOptions, tyro.conf.arg(name="")] = DEFAULT_SENSING
     """Conditions that all episodes share."""
 
@@ -61,4 +61,4 @@ class Ncap(EpisodeStudy):
             raise InvalidInput("none of the policies can be played")
         seeds = seeds_of(self.seeds)
         configs = ncap_study(seeds, policies, tests, self.budgets, self.step_kph, **common)
-        return self.play_study("ncap", configs, self.out, left_out)
+        return self.play_study("ncap", configs, "ncap", left_out)

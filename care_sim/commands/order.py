@@ -8,7 +8,9 @@ from care_sim.study.designs.order import order_plays, order_study
 
 @dataclass(frozen=True, kw_only=True)
 class Order(ProtocolVariants):
-    """Play the paper's closed-loop study under every order of the cells inside a set, 279
+    """Play the paper's study under every order of cells in a set.
+
+    Play the paper's closed-loop study under every order of the cells inside a set, 279
     configurations per seed and those of --also, or with --source the first-sighting protocol, and
     list what the paper says order by order.
     """
@@ -32,5 +34,5 @@ class Order(ProtocolVariants):
         """Run it."""
         self.check_options()
         if self.source is None:
-            return self.play("order", order_study, self.folder("order"))
+            return self.play("order", order_study, self.name_of("order"))
         return self.play_scenes("order-open-loop", "order", order_plays, self.source)

@@ -7,7 +7,9 @@ from care_sim.measure.parity.run import ParityConfig, run_parity
 
 @dataclass(frozen=True, kw_only=True)
 class Parity(ParityConfig):
-    """Compare the engine `fast` with Bullet: rays of random scenes and of every keyframe, pictures,
+    """Hold the engine `fast` against Bullet, ray by ray.
+
+    Compare the engine `fast` with Bullet: rays of random scenes and of every keyframe, pictures,
     whole episodes.
     """
 

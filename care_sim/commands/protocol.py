@@ -1,11 +1,10 @@
 """`care-sim protocol`: the paper's first-sighting protocol (Secs. 3 and 5)."""
 
 from dataclasses import dataclass
-from pathlib import Path
 
 from care_sim.base.bounds import bounded
 from care_sim.base.errors import InvalidInput
-from care_sim.commands.shared.play_options import PlayOptions
+from care_sim.commands.shared.play_options import PlayOptions, named_after
 from care_sim.commands.shared.selection import check_values, in_turn, playable
 from care_sim.commands.shared.study_command import StudyCommand
 from care_sim.sources.scenes import chosen_scenes
@@ -29,7 +28,9 @@ _CONTROLS = ("rows", "place")
 
 @dataclass(frozen=True, kw_only=True)
 class Protocol(StudyCommand, PlayOptions):
-    """Play the paper's first-sighting protocol: every policy over the same keyframes, on streets or
+    """Play the first-sighting protocol, on streets or recordings.
+
+    Play the paper's first-sighting protocol: every policy over the same keyframes, on streets or
     recordings.
     """
 
@@ -50,8 +51,6 @@ class Protocol(StudyCommand, PlayOptions):
     """Objects that are present at scene start are never first sightings. `annotated`: all that are
     annotated there are present (the paper's rule). `visible`: only those that are visible there
     are: an object hidden at the start counts when it first shows."""
-    out: Path = Path("runs/protocol")
-    """Folder of the results; an interrupted run goes on there."""
 
     def __call__(self) -> int:
         """Run it."""
@@ -70,4 +69,4 @@ class Protocol(StudyCommand, PlayOptions):
             raise InvalidInput("none of the policies can be played")
         floors = range(first, first + self.floor_seeds)
         configs = play_grid(source, scenes, policies, self.budgets, floors, latencies, **common)
-        return self.play_study("protocol", configs, self.out, left_out)
+        return self.play_study("protocol", configs, named_after("protocol", self.source), left_out)

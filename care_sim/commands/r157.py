@@ -1,7 +1,6 @@
 """`care-sim r157`: the preventable cut-ins of UN Regulation 157."""
 
 from dataclasses import dataclass
-from pathlib import Path
 
 from care_sim.base.bounds import bounded
 from care_sim.base.errors import InvalidInput
@@ -15,7 +14,9 @@ from care_sim.study.episode_config import grid
 
 @dataclass(frozen=True, kw_only=True)
 class R157(EpisodeStudy):
-    """Play the cut-ins that the careful human driver of UN Regulation 157 prevents, and tell which
+    """Play the preventable cut-ins of UN Regulation 157.
+
+    Play the cut-ins that the careful human driver of UN Regulation 157 prevents, and tell which
     of them every policy avoids.
     """
 
@@ -32,8 +33,6 @@ class R157(EpisodeStudy):
     """Plays one of N preventable cases of the grid, by a fixed lot: 3 plays 127 of the 379."""
     driver: str = FIXED
     """fixed, or careful-human: the regulation's driver at the wheel."""
-    out: Path = Path("runs/r157")
-    """Folder of the results; an interrupted study goes on there."""
 
     def __call__(self) -> int:
         """Run it."""
@@ -45,4 +44,4 @@ class R157(EpisodeStudy):
         if not policies:
             raise InvalidInput("none of the policies can be played")
         configs = r157_study(seeds_of(self.seeds), policies, self.budgets, self.every, self.driver)
-        return self.play_study("r157", configs, self.out, left_out)
+        return self.play_study("r157", configs, "r157", left_out)

@@ -11,13 +11,15 @@ from care_sim.base.checks import LARGEST_INTEGER
 from care_sim.base.errors import counted, report_problems
 from care_sim.base.extras import check_page
 from care_sim.commands.shared.study_command import console
-from care_sim.reports.report import print_report, read_results, write_report
+from care_sim.reports.report import print_report, read_results, where_it_lies, write_report
 from care_sim.study.executors import CORES, MOST_WORKERS
 
 
 @dataclass(frozen=True, kw_only=True)
 class PrintReport:
-    """Print the tables of a folder of results and draw its figures again, or make one web page of
+    """Print a folder's tables and figures again, or make one page.
+
+    Print the tables of a folder of results and draw its figures again, or make one web page of
     it all.
     """
 
@@ -41,8 +43,9 @@ class PrintReport:
 
     def _print(self) -> int:
         rows, study, left_out = read_results(self.folder)
-        print_report(rows, console(), study, left_out)
         write_report(rows, self.folder, study, left_out)
+        print_report(rows, console(), study, left_out, self.folder)
+        print(*where_it_lies(self.folder, study), sep="\n")
         return 0
 
     def _write(self, path: Path) -> int:

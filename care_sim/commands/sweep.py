@@ -1,7 +1,6 @@
 """`care-sim sweep`: every combination of scenarios, policies, budgets, faults and seeds."""
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated
 
 import tyro
@@ -15,7 +14,10 @@ from care_sim.study.episode_config import grid
 
 @dataclass(frozen=True, kw_only=True)
 class Sweep(EpisodeStudy):
-    """Play every combination of scenarios, policies, budgets, faults and seeds."""
+    """Play every combination of scenarios, policies, budgets, faults.
+
+    Play every combination of scenarios, policies, budgets, faults and seeds.
+    """
 
     scenarios: tuple[str, ...] = ("dartout", "dense", "cutin")
     """Names of `care-sim scenarios`, or MODULE:CLASS; `all` stands for all that have a name."""
@@ -28,8 +30,6 @@ class Sweep(EpisodeStudy):
     """Several values of --false-negative-rate, in turn."""
     camera_latencies: tuple[int, ...] = ()
     """Several values of --camera-latency, in turn."""
-    out: Path = Path("runs/sweep")
-    """Folder of the results; an interrupted sweep goes on there."""
     conditions: Annotated[Options, tyro.conf.arg(name="")] = DEFAULT_OPTIONS
     """Further conditions."""
 
@@ -50,4 +50,4 @@ class Sweep(EpisodeStudy):
         configs = grid(
             scenarios, policies, self.budgets, seeds_of(self.seeds), rates, latencies, **common
         )
-        return self.play_study("sweep", configs, self.out, [*unbuilt, *left_out])
+        return self.play_study("sweep", configs, "sweep", [*unbuilt, *left_out])

@@ -1,7 +1,6 @@
 """`care-sim validate`: whether a world tells a good allocator from a lucky pattern."""
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated
 
 import tyro
@@ -16,7 +15,9 @@ from care_sim.study.parameters import parameters
 
 @dataclass(frozen=True, kw_only=True)
 class Validate(EpisodeStudy):
-    """Say whether a world of the closed loop discriminates: whether a camera leads the best
+    """Say whether a world tells good policies from lucky ones.
+
+    Say whether a world of the closed loop discriminates: whether a camera leads the best
     control, a full scan leaves anything to win, and the reserves are told apart.
     """
 
@@ -37,8 +38,6 @@ class Validate(EpisodeStudy):
     factors: tuple[str, ...] = ()
     """Further worlds, each with one parameter changed, as NAME=VALUE: for example mirrored=drawn
     ego_speed_mps=12.2,12.8."""
-    out: Path = Path("runs/validate")
-    """Folder of the results; an interrupted validation goes on there."""
     conditions: Annotated[SensingOptions, tyro.conf.arg(name="")] = DEFAULT_SENSING
     """Conditions that all episodes share."""
 
@@ -56,4 +55,4 @@ class Validate(EpisodeStudy):
             self.training_seeds,
             **self.conditions.sensing(),
         )
-        return self.play_study("validate", configs, self.out)
+        return self.play_study("validate", configs, f"validate-{self.world}")

@@ -5,9 +5,8 @@ software takes.
 import json
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 
 from care_sim.base.bounds import bounded
 from care_sim.base.files import JSON, check_output, write_text
@@ -15,14 +14,16 @@ from care_sim.commands.shared.episode_studies import FixedStudy
 from care_sim.commands.shared.study_command import DONE, console
 from care_sim.measure.compute_path.report import compute_report, compute_tables
 from care_sim.study.designs.vehicle import vehicle_study
-from care_sim.study.episode_config import EpisodeConfig
+from care_sim.study.run_config import RunConfig
 
 _FILE = "compute-path.json"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Vehicle(FixedStudy):
-    """Play the paper's vehicle study: late evidence in turns, a camera that fails in mid-drive, a
+    """Play late evidence, a failing camera, a wrong pose; time it.
+
+    Play the paper's vehicle study: late evidence in turns, a camera that fails in mid-drive, a
     pose that is not exact; then time the car's software stage by stage.
     """
 
@@ -31,22 +32,22 @@ class Vehicle(FixedStudy):
     care-sbf, full or all-camera, of which it asks some questions itself."""
     frames: int = bounded(1000, 0, 100_000)
     """Keyframes over which the software is timed, on one core; 0 leaves it out."""
-    out: Path = Path("runs/vehicle")
-    """Folder of the results; an interrupted study goes on there."""
 
     def __call__(self) -> int:
         """Run it."""
-        code = self.play("vehicle", self._configurations, self.out)
+        return self.play("vehicle", vehicle_study, "vehicle")
+
+    def play_study(
+        self, study: str, configs: Sequence[RunConfig], name: str, left_out: Sequence[str] = ()
+    ) -> int:
+        """Play the episodes, once it is sure that the timings after them can be written."""
+        out = self.folder(study, configs, name)
+        if self.frames:
+            check_output(out / _FILE, JSON)
+        code = super(Vehicle, replace(self, out=out)).play_study(study, configs, name, left_out)
         if self.frames and code == DONE:
             report = compute_report(self.frames, partial(print, "measuring", file=sys.stderr))
             for table in compute_tables(report):
                 console().print(table.rich())
-            write_text(self.out / _FILE, json.dumps(report, indent=1) + "\n")
+            write_text(out / _FILE, json.dumps(report, indent=1) + "\n")
         return code
-
-    def _configurations(self, seeds: Sequence[int], also: Sequence[str]) -> list[EpisodeConfig]:
-        """The episodes of the study, once it is sure that the timings after it can be written."""
-        configs = vehicle_study(seeds, also)
-        if self.frames:
-            check_output(self.out / _FILE, JSON)
-        return configs

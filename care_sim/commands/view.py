@@ -39,7 +39,9 @@ _FAILED = 1
 
 @dataclass(frozen=True, kw_only=True)
 class View:
-    """Open a recording of `run --record` or `compare --record` in the Rerun viewer (extra
+    """Open a recording in the Rerun viewer.
+
+    Open a recording of `run --record` or `compare --record` in the Rerun viewer (extra
     'viewer').
 
     The viewer needs no network. Where there is one, it looks for updates and counts its use, which

@@ -89,7 +89,7 @@ class Beliefs:
         """(W, N) the last scans in metres. Raises InvalidInput for what no sensor says. They are
         looked through when somebody asks for them, which few do: it takes longer than all the rest.
         """
-        ranges = self.scans.reshape(len(self), -1)
+        ranges = np.ascontiguousarray(self.scans).reshape(len(self), -1)
         if not lie_between(ranges if self.live.all() else ranges[self.live], 0.0, HIGHEST):
             raise InvalidInput("ranges of an observation must be numbers of 0 or more")
         return ranges

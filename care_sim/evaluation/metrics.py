@@ -4,32 +4,36 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from care_sim.loops.record_columns import Records
 from care_sim.loops.records import Keyframe, Outcome
 
 
 def outcome(keyframes: Sequence[Keyframe]) -> Outcome:
     """The result of an episode; the fields of `Outcome` say what each number is."""
+    return outcome_of(Records.of(keyframes))
+
+
+def outcome_of(records: Records) -> Outcome:
+    """The result of an episode with these `records`, (n,) each."""
     # The first detection counts from the first keyframe on, in view or not: LiDAR may find what the
     # camera does not show.
-    first = next((record.distance_m for record in keyframes if record.detected), None)
-    appeared = next((n for n, record in enumerate(keyframes) if record.in_view), len(keyframes))
+    found = np.flatnonzero(records.detected)
+    first = float(records.distance_m[found[0]]) if len(found) else None
 
     # What a policy lets come near is counted from when it could have been seen, not while it was
     # hidden behind something.
-    seen = keyframes[appeared:]
-    nearest = min(record.distance_m for record in seen or keyframes)
-    impact = next(
-        (record.impact_speed_mps for record in keyframes if record.impact_speed_mps is not None),
-        None,
-    )
+    is_seen = bool(records.in_view.any())
+    since = int(records.in_view.argmax())
+    nearest = float(records.distance_m[since:].min())
+    hits = np.flatnonzero(~np.isnan(records.impact_speed_mps))
     return Outcome(
         detection_distance_m=first,
         # Without an actor every distance is inf, and there was nobody to detect.
         undetected_to_m=nearest if first is None and np.isfinite(nearest) else None,
-        braked=any(record.braking for record in keyframes),
-        min_distance_m=min((record.nearest_m for record in seen), default=None),
-        clearance_m=min((record.clearance_m for record in seen), default=None),
-        collision=impact is not None,
-        impact_speed_mps=impact,
-        rays_fired=int(np.sum([len(record.fired) for record in keyframes])),
+        braked=bool(records.braking.any()),
+        min_distance_m=float(records.nearest_m[since:].min()) if is_seen else None,
+        clearance_m=float(records.clearance_m[since:].min()) if is_seen else None,
+        collision=len(hits) > 0,
+        impact_speed_mps=float(records.impact_speed_mps[hits[0]]) if len(hits) else None,
+        rays_fired=int(records.fired.sum()),
     )

@@ -138,6 +138,12 @@ class _OneEach(VectorPolicy):
     def _actions(self, observation: Observation, live: Mask) -> Actions:
         for world in np.flatnonzero(live).tolist():
             action: Action = self._policies[world](_world(observation, world))
+            # One of another shape would be spread over all cells.
+            if np.shape(action) != self.rig.grid.shape:
+                raise InvalidInput(
+                    f"action must have shape {self.rig.grid.shape} (rows, columns), "
+                    f"got {np.shape(action)}"
+                )
             self._table[world] = action
         return self._table.view()
 

@@ -43,11 +43,18 @@ def tables_by_firing(
     columns = (*_NAMES, *firings)
     title = f"{shown.title} by hardware"
     tables = [
-        Table(f"{title}, {shown.level_unit}", columns, lines(level, keys), notes, whole=_NAMES)
+        Table(
+            f"{title}, {shown.level_unit}",
+            columns,
+            lines(level, keys),
+            notes,
+            whole=_NAMES,
+            names=len(_NAMES),
+        )
     ]
     played = {key[1] for key in keys}
     if AWARE in played and (others := [key for key in keys if key[1] not in (AWARE, FULL)]):
         leads = lines(lead, others)
         title = f"{title}, {AWARE} minus each, {shown.difference_unit}"
-        tables.append(Table(title, columns, leads, notes, whole=_NAMES))
+        tables.append(Table(title, columns, leads, notes, whole=_NAMES, names=len(_NAMES)))
     return tables

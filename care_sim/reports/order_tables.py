@@ -47,6 +47,7 @@ def tables_by_order(
             tuple(levels),
             tuple(notes),
             whole=_NAMES,
+            names=len(_NAMES),
         ),
         Table(
             f"{title}, minus {BASE_ORDER}, {shown.difference_unit}",
@@ -54,6 +55,7 @@ def tables_by_order(
             tuple(changes),
             (*on_changes, *notes),
             whole=_NAMES,
+            names=len(_NAMES),
             terminal=terminal,
         ),
     ]

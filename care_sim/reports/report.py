@@ -1,5 +1,6 @@
 """A study from configurations to a folder of results, and a report of what lies in one."""
 
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,11 +14,16 @@ from care_sim.reports.captions import caption
 from care_sim.reports.figures.files import remove_others, save
 from care_sim.reports.latex import PREAMBLE, latex, paragraph
 from care_sim.reports.studies import STUDIES, SWEEP, Study, study_of
-from care_sim.reports.table import unmarked
-from care_sim.study.journal import JOURNAL
+from care_sim.reports.table import brief, unmarked
 from care_sim.study.results_formats import results_format_in
 from care_sim.study.rows.parquet import read_notes, read_rows
 from care_sim.study.run_config import Row
+from care_sim.study.unfinished import UNFINISHED, how_far
+
+TABLES = "tables.md"
+"""Name of the file in a folder of results that holds all tables and how to read them."""
+PAGE = "report.html"
+"""Name of a page where none is given."""
 
 
 def read_results(folder: Path) -> tuple[list[Row], Study, list[str]]:
@@ -27,10 +33,8 @@ def read_results(folder: Path) -> tuple[list[Row], Study, list[str]]:
     """
     kind = results_format_in(folder)
     # Rows are written when a study ends. A journal without them is of a study that was stopped.
-    if (folder / JOURNAL).is_file() and not (folder / kind.file).is_file():
-        raise InvalidInput(
-            f"{folder} holds an unfinished study; run again the command that began it"
-        )
+    if not (folder / kind.file).is_file() and (told := how_far(folder)):
+        raise InvalidInput(told)
     path = folder / kind.file
     study = study_of(path)
     # A study of plays among episodes, or the other way round, is a file with a wrong name.
@@ -61,9 +65,7 @@ class StudyReport:
             sentences = "".join(f"- {unmarked(sentence)}\n" for sentence in closing)
             pages.append(f"## Statements\n\n{sentences}")
         texts = [PREAMBLE, paragraph(reading), *map(latex, tables), *map(paragraph, closing)]
-        return cls(
-            {"tables.md": "\n".join(pages), "tables.tex": "\n".join(texts)}, study.figures(rows)
-        )
+        return cls({TABLES: "\n".join(pages), "tables.tex": "\n".join(texts)}, study.figures(rows))
 
     def write(self, folder: Path) -> None:
         """Write tables and figures into a folder; then figures of an earlier study are removed."""
@@ -88,15 +90,37 @@ def write_report(
 
 
 def print_report(
-    rows: Sequence[Row], console: Console, study: Study = SWEEP, left_out: Sequence[str] = ()
+    rows: Sequence[Row],
+    console: Console,
+    study: Study = SWEEP,
+    left_out: Sequence[str] = (),
+    folder: Path | None = None,
 ) -> None:
-    """Print the tables, how to read them, and the closing sentences."""
+    """Print the tables, how to read them, and the closing sentences. Where `folder` holds the
+    report, what explains them is three lines, and where the rest of it stands.
+    """
+    rest = folder / TABLES if folder else None
     shown = [table for table in study.tables(rows) if table.terminal]
     for table in shown:
-        console.print(table.rich())
+        console.print(table.rich(rest))
         console.print()
-    for sentence in (caption(study.caption, shown), *_closing(rows, study, left_out)):
+    console.print(brief([caption(study.caption, shown)], console.width, rest), markup=False)
+    for sentence in _closing(rows, study, left_out):
         console.print(sentence, markup=False)
+
+
+def where_it_lies(folder: Path, study: Study) -> list[str]:
+    """The lines that end a study: its folder, tables, figures, and how to make its page."""
+    figures = sorted(
+        path.name for name in study.figure_names for path in folder.glob(f"{name}.png")
+    )
+    return [
+        f"Results are in {folder}",
+        f"Tables: {folder / TABLES}",
+        *([f"Figures: {', '.join(figures)}"] if figures else []),
+        *([f"Not all of it: {how_far(folder)}"] if (folder / UNFINISHED).is_file() else []),
+        f"Page: {shlex.join(['care-sim', 'report', str(folder), '-o', str(folder / PAGE)])}",
+    ]
 
 
 def _closing(rows: Sequence[Row], study: Study, left_out: Sequence[str]) -> list[str]:

@@ -8,6 +8,7 @@ middle).
 import tomllib
 from collections.abc import Mapping
 from functools import lru_cache
+from itertools import pairwise
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from care_sim.base.checks import check_arguments, check_number, check_path
 from care_sim.base.digests import content_digest
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.grid import AngularGrid, Place
+from care_sim.core.grid_rays import LEAST_VIEW, MOST_TILT
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.sensor_setup import LIDAR_POSITION, SensorSetup, between
 
@@ -27,6 +29,10 @@ Sensor = str | PathLike[str] | SensorSetup
 """A set-up, its name, or a TOML file of one."""
 
 _SHIPPED = Path(__file__).parent / "shipped"
+_LEAST_VIEW_DEG = round(float(np.rad2deg(LEAST_VIEW)), 6)
+_MOST_TILT_DEG = round(float(np.rad2deg(MOST_TILT)), 6)
+_FOV_DEG = (0.06, 179.9)
+"""What `care_sim.core.pinhole.PinholeCamera` allows, in whole hundredths of a degree."""
 _TABLES = ("name", "lidar", "lidars", "cameras")
 _EQUAL_ROWS = ("rows", "top_deg", "bottom_deg")
 _LIDAR = (
@@ -153,7 +159,9 @@ def _setup_of(plain: Mapping[str, Any]) -> SensorSetup:
         _camera(_table("cameras", camera, _CAMERA), position)
         for camera in _tables(plain, "cameras")
     ]
-    return SensorSetup.of_lidars(plain.get("name", ""), lidars, cameras)
+    if "name" not in plain:
+        raise InvalidInput("name is missing, a text by which rows and tables tell the set-up")
+    return SensorSetup.of_lidars(plain["name"], lidars, cameras)
 
 
 def _lidars(plain: Mapping[str, Any]) -> list[tuple[AngularGrid, Place]]:
@@ -181,33 +189,48 @@ def _grid(lidar: Mapping[str, Any]) -> AngularGrid:
     given = {
         "columns": lidar.get("columns", usual.columns),
         "range_m": lidar.get("range_m", usual.range_m),
-        "field_of_view": _radians(lidar, "field_of_view_deg", 360.0),
-        "heading": _radians(lidar, "yaw_deg", 0.0),
-        "pitch": _radians(lidar, "pitch_deg", 0.0),
-        "roll": _radians(lidar, "roll_deg", 0.0),
+        "field_of_view": _radians(lidar, "field_of_view_deg", 360.0, _LEAST_VIEW_DEG, 360),
+        "heading": _radians(lidar, "yaw_deg", 0.0, -180, 180),
+        "pitch": _radians(lidar, "pitch_deg", 0.0, -_MOST_TILT_DEG, _MOST_TILT_DEG),
+        "roll": _radians(lidar, "roll_deg", 0.0, -_MOST_TILT_DEG, _MOST_TILT_DEG),
     }
     if "elevations_deg" in lidar:
         if twice := [name for name in _EQUAL_ROWS if name in lidar]:
             raise InvalidInput(f"elevations_deg says all of the rows, so leave out {twice[0]}")
-        elevations = lidar["elevations_deg"]
-        if not isinstance(elevations, list):
-            raise InvalidInput(f"elevations_deg must be a list, got {shown(elevations)}")
-        for elevation in elevations:
-            check_number("elevations_deg", elevation, -90, 90)
+        elevations = _descending(lidar["elevations_deg"])
         return AngularGrid.of_elevations([float(np.deg2rad(one)) for one in elevations], **given)
     if missing := [name for name in _EQUAL_ROWS if name not in lidar]:
-        raise InvalidInput(f"lidar lacks {missing[0]}, or elevations_deg for rows of unequal steps")
-    top, bottom = (_radians(lidar, name, 0.0) for name in ("top_deg", "bottom_deg"))
+        raise InvalidInput(
+            f"{missing[0]} of lidar is missing, or elevations_deg for rows of unequal steps"
+        )
+    top, bottom = (_radians(lidar, name, 0.0, -90, 90) for name in ("top_deg", "bottom_deg"))
+    if bottom >= top:
+        raise InvalidInput(
+            f"bottom_deg must lie below top_deg, {lidar['top_deg']:g}, got {lidar['bottom_deg']:g}"
+        )
     return AngularGrid(rows=lidar["rows"], top=top, bottom=bottom, **given)
+
+
+def _descending(elevations: Any) -> list[float]:
+    """The elevations of rows, degrees. Raises InvalidInput unless they go down from the top."""
+    if not isinstance(elevations, list):
+        raise InvalidInput(f"elevations_deg must be a list, got {shown(elevations)}")
+    for elevation in elevations:
+        check_number("elevations_deg", elevation, -90, 90)
+    for above, below in pairwise(elevations):
+        if above <= below:
+            raise InvalidInput(f"elevations_deg must descend, got {below:g} after {above:g}")
+    return elevations
 
 
 def _camera(camera: Mapping[str, Any], lidar: Place) -> PinholeCamera:
     usual = PinholeCamera()
-    angles = {name: _radians(camera, f"{name}_deg", 0.0) for name in ("yaw", "pitch", "roll")}
+    turns = ("yaw", "pitch", "roll")
+    angles = {name: _radians(camera, f"{name}_deg", 0.0, -360, 360) for name in turns}
     return PinholeCamera(
         camera.get("width", usual.width),
         camera.get("height", usual.height),
-        _radians(camera, "horizontal_fov_deg", 90.0),
+        _radians(camera, "horizontal_fov_deg", 90.0, *_FOV_DEG),
         between(lidar, _position("cameras", camera)),
         **angles,
     )
@@ -223,7 +246,9 @@ def _table(name: str, table: object, known: tuple[str, ...]) -> Mapping[str, Any
 def _position(name: str, table: Mapping[str, Any]) -> Place:
     if "position_m" not in table and name == "lidar":
         return LIDAR_POSITION
-    position = table.get("position_m")
+    if "position_m" not in table:
+        raise InvalidInput(f"position_m of {name} is missing: [x, y, z] in metres, from the car")
+    position = table["position_m"]
     if not (isinstance(position, list) and len(position) == 3):
         raise InvalidInput(f"position_m of {name} must be [x, y, z], got {shown(position)}")
     for metres in position:
@@ -232,7 +257,8 @@ def _position(name: str, table: Mapping[str, Any]) -> Place:
     return x, y, z
 
 
-def _radians(table: Mapping[str, Any], name: str, usual: float) -> float:
+def _radians(table: Mapping[str, Any], name: str, usual: float, least: float, most: float) -> float:
+    """An angle of a table, which is checked in degrees: in these the file has it."""
     degrees = table.get(name, usual)
-    check_number(name, degrees, -360, 360)
+    check_number(name, degrees, least, most)
     return float(np.deg2rad(degrees))

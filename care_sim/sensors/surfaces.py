@@ -19,16 +19,15 @@ def brightness(
     now; 0 where they met nothing.
     """
     # What was met and has no parts is the road: level, so that the slope of a ray is its angle.
-    solid = np.isin(bodies, parts.owners)
+    solid = np.isin(bodies, parts.tables[-1])
     met = np.flatnonzero(solid)
     road = np.flatnonzero(~solid & (bodies != NO_BODY))
     bright = np.zeros(len(bodies))
     bright[road] = REFLECTANCES[ASPHALT] * np.maximum(-rays[road, 2], 0.0)
 
     places = np.broadcast_to(origins, rays.shape)[met] + rays[met] * ranges[met, None]
-    tables = parts.shapes, parts.halves, parts.offsets, parts.owners
     hit = bodies[met]
-    found, cosines = met_surfaces(places, rays[met], hit, parts.poses[hit], tables)
+    found, cosines = met_surfaces(places, rays[met], hit, parts.poses[hit], parts.tables)
     reflectances = np.array([REFLECTANCES[name] for name in parts.materials])
     bright[met] = reflectances[found] * cosines
     return bright

@@ -139,7 +139,7 @@ class EpisodeConfig(ClosedLoopConditions, RunConfig):
 
     @property
     def order(self) -> int:
-        """The seed: an interrupted study leaves whole pairs of policies."""
+        """The seed: an interrupted study leaves whole pairs of policies, up to a batch of each."""
         return self.seed
 
     @property

@@ -5,24 +5,26 @@ alone.
 import time
 from collections.abc import Sequence
 from contextlib import closing
+from functools import partial
 from typing import cast
 
 import numpy as np
 from gymnasium.vector.utils import create_empty_array
 from numpy.typing import NDArray
 
-from care_sim.core.arrays import Mask
 from care_sim.envs.sensing import Observed
 from care_sim.envs.spaces import checked_scores
 from care_sim.envs.vector.compiled_worlds import CompiledWorlds
 from care_sim.envs.vector.worlds import Stepped
-from care_sim.policies.base import Policy
+from care_sim.policies.vector import vector_policy
 from care_sim.study.episode_config import EpisodeConfig, closed_loop
 from care_sim.study.episode_play import EpisodeHash, Played, result_or_reason, run_episode
 from care_sim.study.run_config import Row
 
 MOST_TOGETHER = 16
-"""Episodes that are played together."""
+"""Episodes that are played together: more save no time worth telling, and an interrupted study
+would leave fewer whole pairs of policies.
+"""
 
 
 def play_episodes(batch: Sequence[EpisodeConfig]) -> list[Row | str]:
@@ -51,15 +53,17 @@ def play_together(configs: Sequence[EpisodeConfig]) -> list[Row]:
     with configs[0].make_env() as env:
         model = closed_loop(env)
         observed = cast(Observed, create_empty_array(model.observation_space, count))
-        policies = [config.make_policy(env) for config in configs]
+        policy = vector_policy(partial(configs[0].make_policy, env), count)
         with closing(CompiledWorlds(model, observed, exact=False)) as worlds:
             infos = worlds.begin({world: config.seed for world, config in enumerate(configs)})
-            for policy in policies:
-                policy.reset()
+            policy.reset()
             live = np.ones(count, np.bool_)
             # Worlds that are over rest until the last one is.
             while live.any():
-                stepped = worlds.step(_actions(policies, observed, live), live)
+                # In copies, since a policy may keep what it is shown, and write into it.
+                shown = {name: tables.copy() for name, tables in observed.items()}
+                actions = checked_scores(policy(shown, live), observed["ranges"].shape)
+                stepped = worlds.step(actions, live)
                 for world in np.flatnonzero(live).tolist():
                     fired = _fired(stepped, world)
                     hashes[world].add(fired, observed["ranges"][world], worlds.boxes(world))
@@ -79,17 +83,6 @@ def play_together(configs: Sequence[EpisodeConfig]) -> list[Row]:
         ).row(config)
         for world, config in enumerate(configs)
     ]
-
-
-def _actions(policies: Sequence[Policy], observed: Observed, live: Mask) -> NDArray[np.float32]:
-    """(W, E, A) what the policy of every world that is `live` makes of its observation."""
-    tables = observed["ranges"]
-    actions = np.zeros_like(tables)
-    for world in np.flatnonzero(live).tolist():
-        # In copies, since a policy may keep what it is shown, and write into it.
-        own = {name: rows[world].copy() for name, rows in observed.items()}
-        actions[world] = checked_scores(policies[world](own), tables.shape[1:])
-    return actions
 
 
 def _fired(stepped: Stepped, world: int) -> NDArray[np.int64] | list[int]:

@@ -9,7 +9,7 @@ import json
 import re
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import NamedTuple, Self
 
 from care_sim.base.errors import InvalidInput
 from care_sim.base.json_text import check_file_size, parsed_json
@@ -23,6 +23,16 @@ _CHECK = "check"
 LARGEST_JOURNAL = 2**32
 """Bytes of a journal: the plays of the largest study (100,000 of 10 kB), four times over."""
 _LINE = re.compile(rf'(\{{.*), "{_CHECK}": "([0-9a-f]{{16}})"\}}')
+
+
+class Finished(NamedTuple):
+    """The rows of a journal, each once, the studies that they are of, and how many of its lines are
+    damaged.
+    """
+
+    rows: list[Row]
+    studies: set[str]
+    damaged: int
 
 
 class Journal:
@@ -46,12 +56,10 @@ class Journal:
         self._lock(path.parent)
         self._file.seek(0)
         text = self._file.read()
-        # Not splitlines: a text in a row may hold other line separators.
-        lines = [line for line in text.split("\n") if line]
-        sound = [row for line in lines if (row := _read(line)) is not None]
-        self.damaged = len(lines) - len(sound)
-        self.studies = {row.pop(_STUDY) for row in sound}
-        self._rows = {row["digest"]: row for row in sound}
+        there = _finished(text)
+        self.damaged = there.damaged
+        self.studies = there.studies
+        self._rows = {row["digest"]: row for row in there.rows}
         # A torn last line is closed, so that the next row does not continue it.
         if text and not text.endswith("\n"):
             self._write("\n")
@@ -107,6 +115,35 @@ class Journal:
         except OSError as error:
             # With the name of the file, which errors of write lack.
             raise OSError(error.errno, error.strerror, self._file.name) from error
+
+
+def read_journal(path: Path) -> Finished:
+    """What a journal holds, none where there is no file; another process may be adding lines."""
+    if not path.is_file():
+        return Finished([], set(), 0)
+    _check_journal(path)
+    return _finished(path.read_text(encoding="utf-8", errors="replace"))
+
+
+def is_written(path: Path) -> bool:
+    """Whether a process that runs now adds lines to the journal."""
+    try:
+        with path.open(encoding="utf-8") as file:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        pass  # no journal, or a file system without locks
+    return False
+
+
+def _finished(text: str) -> Finished:
+    # Not splitlines: a text in a row may hold other line separators.
+    lines = [line for line in text.split("\n") if line]
+    sound = [row for line in lines if (row := _read(line)) is not None]
+    studies = {row.pop(_STUDY) for row in sound}
+    rows = {row["digest"]: row for row in sound}
+    return Finished([*rows.values()], studies, len(lines) - len(sound))
 
 
 def _check_journal(path: Path) -> None:

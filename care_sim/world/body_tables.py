@@ -5,6 +5,7 @@ Who asks about many bodies at once, such as a compiled engine, reads these inste
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -13,8 +14,15 @@ from care_sim.core.arrays import Floats, Integers
 from care_sim.core.frames import Pose
 from care_sim.world.bodies import Part, Shape, Triple
 
+OwnParts = tuple[int, tuple[Part, ...]]
+"""A body and its parts."""
+Solids = tuple[Integers, Floats, Floats, Integers]
+"""Shapes, half extents, offsets and owners of parts; see `Primitives.tables`."""
+
 SHAPES: tuple[Shape, ...] = ("box", "cylinder", "sphere")
 """Round parts stand along their own z; a shape's number is its place here."""
+_BODIES = 32
+"""Rows that tables have room for at first: enough for most streets."""
 
 
 class Footprints:
@@ -23,15 +31,16 @@ class Footprints:
     """
 
     def __init__(self) -> None:
-        self.boxes = np.empty((0, 7))
+        self._rows = np.full((_BODIES, 7), np.nan)
+        self.boxes = self._rows[:0]
 
     def add(self, body: int, size: Triple, pose: Pose) -> None:
         """Take in a body of a size on the ground plane."""
-        # PyBullet numbers bodies upwards, the ground among them: rows between stay NaN.
-        missing = body + 1 - len(self.boxes)
-        self.boxes = np.vstack([self.boxes, np.full((missing, 7), np.nan)])
-        self.boxes[body, 2:6] = size[2] / 2, *size
-        self.move_all(np.array([body]), np.array([pose], float))
+        # Ids count upwards, the ground's among them: rows between stay NaN.
+        self._rows = _with_room(self._rows, body, np.nan)
+        self.boxes = self._rows[: body + 1]
+        x, y, heading = pose
+        self.boxes[body] = x, y, size[2] / 2, *size, heading
 
     def move_all(self, bodies: Integers, poses: Floats) -> None:
         """Put bodies (n,) at poses (n, 3): x, y, heading."""
@@ -99,26 +108,68 @@ def _rectangles_near(one: Floats, other: Floats, within: float) -> bool:
 class Primitives:
     """Every part of the opaque bodies of one world, and where the bodies are.
 
-    `shapes` (k,) places in SHAPES, `halves` (k, 3) half extents and `offsets` (k, 3) centres of the
-    parts in the body frame, metres; `owners` (k,) body ids, the parts of a body side by side;
-    `materials` k names. `poses` (m, 7), one row per body id: x,
-    y, z in metres and the quaternion x, y, z, w, world frame.
+    `poses` (m, 7), one row per body id: x, y, z in metres and the quaternion x, y, z, w, world
+    frame.
     """
 
     def __init__(self) -> None:
-        self.shapes = np.empty(0, np.int64)
-        self.owners = np.empty(0, np.int64)
-        self.halves = np.empty((0, 3))
-        self.offsets = np.empty((0, 3))
-        self.materials: list[str] = []
-        self.poses = np.empty((0, 7))
+        self._rows = np.zeros((_BODIES, 7))
+        self.poses = self._rows[:0]
+        self._bodies: list[OwnParts] = []
+        self._tables: Solids | None = None
 
-    def add(self, body: int, parts: Sequence[Part]) -> None:
+    def add(self, body: int, parts: tuple[Part, ...]) -> None:
         """Take in a body, its parts in its own frame; a body that nothing can hit has none."""
-        self.poses = np.vstack([self.poses, np.zeros((body + 1 - len(self.poses), 7))])
-        self.materials += [part.material for part in parts]
-        if parts:
-            self.shapes = np.append(self.shapes, [SHAPES.index(part.shape) for part in parts])
-            self.owners = np.append(self.owners, [body] * len(parts))
-            self.halves = np.vstack([self.halves, np.array([part.size for part in parts]) / 2])
-            self.offsets = np.vstack([self.offsets, [part.centre for part in parts]])
+        self._rows = _with_room(self._rows, body, 0.0)
+        self.poses = self._rows[: body + 1]
+        self._bodies.append((body, parts))
+        self._tables = None
+
+    @property
+    def tables(self) -> Solids:
+        """All k parts, those of a body side by side: (k,) places in SHAPES, (k, 3) half extents and
+        (k, 3) centres in the body frame, metres, and (k,) body ids.
+        """
+        if self._tables is None:
+            self._tables = _joined(tuple(self._bodies))
+        return self._tables
+
+    @property
+    def materials(self) -> list[str]:
+        """The names of all k parts' materials."""
+        return [part.material for _, parts in self._bodies for part in parts]
+
+
+@lru_cache(maxsize=16)
+def _joined(bodies: tuple[OwnParts, ...]) -> Solids:
+    """See `Primitives.tables`. Many an episode has the bodies of the one before, elsewhere."""
+    # That of no parts first: then there is always one to join.
+    columns = zip(*map(_columns, [(), *(parts for _, parts in bodies)]), strict=True)
+    shapes, halves, offsets = map(np.concatenate, columns)
+    return shapes, halves, offsets, owners_of(bodies)
+
+
+def owners_of(bodies: Sequence[OwnParts]) -> Integers:
+    """(k,) the body ids of all parts, those of a body side by side."""
+    return np.repeat(
+        np.array([body for body, _ in bodies], np.int64), [len(parts) for _, parts in bodies]
+    )
+
+
+@lru_cache(maxsize=256)
+def _columns(parts: tuple[Part, ...]) -> tuple[Integers, Floats, Floats]:
+    """Shapes, half extents and offsets of a body's parts, as in `Primitives.tables`."""
+    shapes = np.array([SHAPES.index(part.shape) for part in parts], np.int64)
+    halves = np.array([part.size for part in parts], float).reshape(-1, 3) / 2
+    return shapes, halves, np.array([part.centre for part in parts], float).reshape(-1, 3)
+
+
+def _with_room(rows: Floats, body: int, empty: float) -> Floats:
+    """A table (n, 7) that has a row for a body: `rows`, or a longer copy, whose new rows hold
+    `empty`.
+    """
+    if body < len(rows):
+        return rows
+    longer = np.full((2 * body, 7), empty)
+    longer[: len(rows)] = rows
+    return longer

@@ -99,18 +99,6 @@ class BulletWorld:
             self.primitives.poses = own
             self._bodies.moved(changed)
 
-    @contextmanager
-    def put_back(self, bodies: Sequence[int], poses: Floats) -> Iterator[None]:
-        """While it lasts, some bodies (n,) at `poses` (n, 7), where they were before."""
-        rows = [*bodies]
-        if (self.primitives.poses[rows] == poses).all():
-            yield
-            return
-        table = self.primitives.poses.copy()
-        table[rows] = poses
-        with self.placed(table):
-            yield
-
     def cast(self, origin: Floats, directions: Floats, reach: float) -> tuple[Floats, Integers]:
         """Cast rays (n, 3 unit vectors, world frame) from `origin`.
 

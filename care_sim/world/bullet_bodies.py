@@ -45,6 +45,11 @@ class BulletBodies:
         self._numbers: dict[int, int] = {}
         self._count = int(ground)
 
+    @property
+    def made(self) -> int:
+        """How many of them PyBullet knows."""
+        return len(self._numbers)
+
     def add(self, parts: Sequence[Part], seen: Sequence[Part], group: int) -> int:
         """Take in a body of `parts`, of which cameras are to see `seen`; its id."""
         body = self._count

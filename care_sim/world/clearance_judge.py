@@ -1,10 +1,14 @@
 """How far bodies of any world are apart, asked of one client of PyBullet for them all."""
 
+import threading
 from collections.abc import Sequence
 
 from care_sim.world.bodies import BodyKind
 from care_sim.world.bullet_bodies import OPAQUE, BulletBodies
-from care_sim.world.bullet_clients import LentClient
+from care_sim.world.bullet_clients import LentClient, pybullet
+
+MOST_KINDS = 256
+"""A judge that worlds share knows no more kinds of bodies: streets may have kinds of their own."""
 
 
 class ClearanceJudge:
@@ -31,6 +35,18 @@ class ClearanceJudge:
         ego, other = map(self._bodies.put, bodies, poses)
         return self._bodies.clearance(ego, other, within)
 
+    @property
+    def serves_on(self) -> bool:
+        """Whether it can be asked further: it knows few kinds, and nobody else has closed or
+        emptied its client.
+        """
+        made = self._bodies.made
+        if not made:
+            return True
+        client = self._client.number
+        is_whole = pybullet.isConnected(client) and made == pybullet.getNumBodies(client)
+        return is_whole and len(self._egos) + len(self._others) < MOST_KINDS
+
     def close(self) -> None:
         """Free the simulator."""
         self._client.close()
@@ -39,3 +55,19 @@ class ClearanceJudge:
         if kind not in bodies:
             bodies[kind] = self._bodies.add(kind.parts, (), OPAQUE)
         return bodies[kind]
+
+
+class _Shared(threading.local):
+    judge: ClearanceJudge | None = None
+
+
+_SHARED = _Shared()
+
+
+def judge_here() -> ClearanceJudge:
+    """The judge that the worlds of this thread share. It serves until the next call, and in this
+    thread alone.
+    """
+    if _SHARED.judge is None or not _SHARED.judge.serves_on:
+        _SHARED.judge = ClearanceJudge()
+    return _SHARED.judge

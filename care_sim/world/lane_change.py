@@ -2,6 +2,9 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from care_sim.core.arrays import Floats
 from care_sim.core.frames import Pose
 
 
@@ -26,3 +29,12 @@ class LaneChange:
         way = self.to_y - y
         moved = min(self.lateral_mps * max(time - self.begins_s, 0.0), abs(way))
         return x + self.speed_mps * time, y + (moved if way > 0 else -moved), 0.0
+
+    def poses(self, times: Floats) -> Floats:
+        """(n, 3) the poses at `times` (n,): those of `pose`, to the last bit."""
+        x, y = self.start
+        way = self.to_y - y
+        moved = np.minimum(self.lateral_mps * np.maximum(times - self.begins_s, 0.0), abs(way))
+        poses = np.zeros((len(times), 3))
+        poses[:, 0], poses[:, 1] = x + self.speed_mps * times, y + (moved if way > 0 else -moved)
+        return poses

@@ -8,24 +8,28 @@ import math
 
 from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats
-from care_sim.world.bullet import BulletWorld
+from care_sim.world.bodies import BodyKind
+from care_sim.world.clearance_judge import ClearanceJudge
 
 PADDING_M = 0.05
 """PyBullet's distances may be this much less than those of the exact hulls; 2 mm were seen."""
 
 
 class LeastClearance:
-    """Between the hulls of `body` and `other`, at the moments that were noted."""
+    """Between the hulls of an `ego` and an `other` body of these kinds, at the moments that were
+    noted.
+    """
 
-    def __init__(self, bullet: BulletWorld, body: int, other: int):
-        self._bullet = bullet
-        self._bodies = body, other
+    def __init__(self, judge: ClearanceJudge, ego: BodyKind, other: BodyKind):
+        self._judge = judge
+        self._kinds = ego, other
         self._moments: list[tuple[float, Floats]] = []
 
-    def note(self, box: Floats, other_box: Floats) -> None:
-        """Note where the bodies are now. Their boxes (7,) hold them, in the world frame."""
-        poses = self._bullet.primitives.poses[[*self._bodies]]
-        self._moments.append((least_gap(box, other_box) - PADDING_M, poses))
+    def note(self, boxes: Floats, poses: Floats) -> None:
+        """Note where the two are now: the boxes (2, 7) that hold them, and their poses (2, 7) as in
+        `care_sim.world.body_tables.Primitives.poses`.
+        """
+        self._moments.append((least_gap(*boxes) - PADDING_M, poses))
 
     def metres(self) -> float:
         """The least clearance of all moments; negative when the hulls overlapped."""
@@ -35,8 +39,8 @@ class LeastClearance:
         for at_least, poses in sorted(self._moments, key=lambda moment: moment[0]):
             if at_least > least:
                 break
-            with self._bullet.put_back(self._bodies, poses):
-                least = min(least, self._bullet.clearance(*self._bodies))
+            stand_ins = self._judge.stand_ins(*self._kinds)
+            least = min(least, self._judge.clearance(stand_ins, poses.tolist()))
         return least
 
 

@@ -1,7 +1,6 @@
 """Bodies as PyBullet's renderer draws them: convex polyhedra, which come close to round parts."""
 
 import math
-from collections.abc import Sequence
 from functools import cache, lru_cache
 
 import numpy as np
@@ -9,6 +8,7 @@ from scipy.spatial import ConvexHull
 
 from care_sim.core.arrays import Floats, Integers
 from care_sim.world.bodies import Part
+from care_sim.world.body_tables import OwnParts, owners_of
 
 RING = 32
 """Points on each rim of a cylinder."""
@@ -27,14 +27,12 @@ class Polyhedra:
     """Every part that cameras see, as a polyhedron in the frame of its body."""
 
     def __init__(self) -> None:
-        self._owners: list[int] = []
-        self._parts: list[Part] = []
+        self._bodies: list[OwnParts] = []
         self._tables: Tables | None = None
 
-    def add(self, body: int, parts: Sequence[Part]) -> None:
+    def add(self, body: int, parts: tuple[Part, ...]) -> None:
         """Take in what is seen of a body, its parts in its own frame."""
-        self._owners += [body] * len(parts)
-        self._parts += parts
+        self._bodies.append((body, parts))
         self._tables = None
 
     @property
@@ -46,14 +44,31 @@ class Polyhedra:
         origin in metres.
         """
         if self._tables is None:
-            # An empty mesh first: then there is always one to join, and sums begin at 0.
-            meshes = [_NOTHING, *map(_mesh, self._parts)]
-            starts = np.cumsum([[len(column) for column in mesh] for mesh in meshes], axis=0)
-            corners, faces, edges = (np.concatenate(column) for column in zip(*meshes, strict=True))
-            owners = np.array(self._owners, np.int64)
-            reaches = [np.linalg.norm(mesh[0], axis=1).max() for mesh in meshes[1:]]
-            self._tables = corners, faces, edges, starts, owners, np.array(reaches, np.float64)
+            self._tables = _joined(tuple(self._bodies))
         return self._tables
+
+
+@lru_cache(maxsize=16)
+def _joined(bodies: tuple[OwnParts, ...]) -> Tables:
+    """See `Polyhedra.tables`. Many an episode has the bodies of the one before, elsewhere."""
+    # A body without parts first: then there is always one to join.
+    columns = zip(*map(_body, [(), *(parts for _, parts in bodies)]), strict=True)
+    corners, faces, edges, sizes, reaches = map(np.concatenate, columns)
+    starts = np.zeros((len(sizes) + 1, 3), np.int64)
+    np.cumsum(sizes, axis=0, out=starts[1:])
+    return corners, faces, edges, starts, owners_of(bodies), reaches
+
+
+@lru_cache(maxsize=256)
+def _body(parts: tuple[Part, ...]) -> tuple[Floats, Floats, Integers, Integers, Floats]:
+    """Corners, faces and edges of a body's k parts, one after the other; (k, 3) how many there are
+    of each in every part, and (k,) their reaches, as in `Polyhedra.tables`.
+    """
+    meshes = [_mesh(part) for part in parts]
+    corners, faces, edges = map(np.concatenate, zip(_NOTHING, *meshes, strict=True))
+    sizes = np.array([[len(column) for column in mesh] for mesh in meshes], np.int64)
+    reaches = np.array([np.linalg.norm(mesh[0], axis=1).max() for mesh in meshes])
+    return corners, faces, edges, sizes.reshape(-1, 3), reaches
 
 
 def _mesh(part: Part) -> Mesh:

@@ -26,6 +26,10 @@ sideways.
 """
 _NEAR_LANE_M = 1.0
 """What highway-env adds to either side of a lane to find who drives ahead in it."""
+_DRAWS = np.random.RandomState(0)
+"""highway-env's roads want a generator, and each makes one from the system's entropy where it is
+given none. Nothing here draws from it: neither vehicles nor behaviours are random.
+"""
 STANDING_GAP_M = float(IDMVehicle.DISTANCE_WANTED)
 """From centre to centre, what an IDM driver leaves before what stands ahead."""
 
@@ -71,8 +75,7 @@ class Traffic:
             self._lanes.append((*nodes, counts[direction]))
             counts[direction] += 1
         self._ego_lane = ego_lane
-        # A fixed generator: without one, highway-env takes the system's entropy.
-        self._road = Road(network, np_random=np.random.RandomState(0))
+        self._road = Road(network, np_random=_DRAWS)
 
     def add_ego(self, x: float, speed: float, kind: BodyKind) -> "RoadVehicle":
         """The car with the sensors, in lane 0 at `x`; `RoadVehicle.accelerate` drives it."""

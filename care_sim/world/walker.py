@@ -5,6 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
+from care_sim.core.arrays import Floats
 from care_sim.core.frames import Pose
 
 
@@ -47,6 +48,20 @@ class Walk:
         way = self.covered(time)
         cos, sin = self._direction
         return self.start[0] + way * cos, self.start[1] + way * sin, self.heading
+
+    def poses(self, times: Floats) -> Floats:
+        """(n, 3) the poses at `times` (n,): those of `pose`, to the last bit."""
+        moving = np.maximum(times - self.starts_s, 0.0)
+        gaining = np.minimum(moving, self.speed / self.acceleration)
+        # The squares are Python's: NumPy's round otherwise.
+        squares = np.array([time**2 for time in gaining.tolist()])
+        distance = self.acceleration * squares / 2 + self.speed * (moving - gaining)
+        way = np.minimum(distance, self.length_m)
+        cos, sin = self._direction
+        poses = np.empty((len(times), 3))
+        poses[:, 0], poses[:, 1] = self.start[0] + way * cos, self.start[1] + way * sin
+        poses[:, 2] = self.heading
+        return poses
 
     @cached_property
     def _direction(self) -> tuple[float, float]:

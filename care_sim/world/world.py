@@ -15,6 +15,7 @@ from care_sim.world.approach import ClosestApproach, Impact, lies_ahead
 from care_sim.world.bodies import CATALOGUE, BodyKind
 from care_sim.world.body_tables import Footprints
 from care_sim.world.bullet import BulletWorld
+from care_sim.world.clearance_judge import ClearanceJudge, judge_here
 from care_sim.world.crosser import Meeting
 from care_sim.world.least_clearance import LeastClearance
 from care_sim.world.linear_motion import LinearMotion, rates_between
@@ -103,7 +104,8 @@ class World:
         self.ego_body = self.bullet.add(self.ego_kind, self.ego.pose, transparent=True)
         self._footprints = Footprints()
         self._footprints.add(self.ego_body, self.ego_kind.size, self.ego.pose)
-        self._before = self._footprints.boxes.copy()
+        # Until the first step nothing has moved: there are no others.
+        self._before = self._footprints.boxes
         self.first_sighting = None
         self.speed_plan = None
         self.goal_m = np.inf
@@ -111,6 +113,7 @@ class World:
         self.has_oncoming = False
         self.meetings = []
         self.drawn = {}
+        self._kinds: dict[int, BodyKind] = {}
         self._moving: list[Actor] = []
         self._moving_bodies = np.array([self.ego_body])
         self._events: list[tuple[float, Callable[[], None]]] = []
@@ -141,12 +144,14 @@ class World:
             kind = CATALOGUE[kind]
         body = self.bullet.add(kind, place, backdrop=backdrop)
         self._footprints.add(body, kind.size, place)
-        self._before = self._footprints.boxes.copy()
+        self._before = self._footprints.boxes
+        self._kinds[body] = kind
         actor = Actor(name, kind, body, pose_at, reported, pose)
         self.actors.append(actor)
         if not isinstance(pose, tuple):
             self._moving.append(actor)
-            self._moving_bodies = np.append(self._moving_bodies, body)
+            bodies = [self.ego_body, *(one.body for one in self._moving)]
+            self._moving_bodies = np.array(bodies)
         return actor
 
     def at(self, time: float, event: Callable[[], None]) -> None:
@@ -218,15 +223,17 @@ class World:
         impacts = []
         nearest = clearance = np.inf
         target = self.first_sighting
-        least = LeastClearance(self.bullet, self.ego_body, target.body) if target else None
+        judge = judge_here()
+        least = LeastClearance(judge, self.ego_kind, target.kind) if target else None
         for _ in range(whole_steps(duration)):
             self.step(acceleration)
-            impacts.append(self._impact())
+            impacts.append(self._impact(judge))
             if target is not None and least is not None:
-                own, other = self.boxes_of(np.array([self.ego_body, target.body]))
+                two = np.array([self.ego_body, target.body])
+                boxes = own, other = self.boxes_of(two)
                 away = np.hypot(other[0] - own[0], other[1] - own[1])
                 nearest = min(nearest, float(away))
-                least.note(own, other)
+                least.note(boxes, self.bullet.primitives.poses[two])
         if least is not None:
             clearance = least.metres()
         first = next((impact for impact in impacts if impact is not None), None)
@@ -267,11 +274,13 @@ class World:
         """Free the simulator."""
         self.bullet.close()
 
-    def _impact(self) -> Impact | None:
+    def _impact(self, judge: ClearanceJudge) -> Impact | None:
         """The ego's contact with a body now."""
         # The exact distance is PyBullet's; asking it about every body would take most of a step.
         for body in self._footprints.near(self.ego_body, CONTACT_REACH_M).tolist():
-            if self.bullet.clearance(self.ego_body, body, CONTACT_REACH_M) <= 0.0:
+            stand_ins = judge.stand_ins(self.ego_kind, self._kinds[body])
+            poses = self.bullet.primitives.poses[[self.ego_body, body]].tolist()
+            if judge.clearance(stand_ins, poses, CONTACT_REACH_M) <= 0.0:
                 (box,) = self.boxes_of(np.array([body]))
                 ahead = lies_ahead(box, self.ego.pose, self.ego_kind.size[0])
                 return Impact(body, self.ego.speed, ahead)

@@ -11,7 +11,6 @@ from care_sim.batch.state import BatchState
 from care_sim.core.types import Ego
 from care_sim.scenarios import make_scenario
 from care_sim.world.bodies import CATALOGUE
-from care_sim.world.clearance_judge import ClearanceJudge
 from care_sim.world.traffic import Traffic
 from care_sim.world.world import World
 
@@ -136,13 +135,11 @@ def test_only_a_contact_is_an_impact(gap_m, hit):
 
 @pytest.mark.parametrize("name", ["dartout", "cutin"])
 def test_clearances_that_are_put_off_are_settled_in_the_end(name, monkeypatch):
-    asked = []
-    exact_clearance = ClearanceJudge.clearance
-    monkeypatch.setattr(
-        ClearanceJudge, "clearance", lambda *its: asked.append(1) or exact_clearance(*its)
-    )
+    asked, clearances, bounds = [], [], []
     with closing(Batch(*(of(name, seed) for seed in range(4)))) as batch:
-        clearances, bounds = [], []
+        judge = batch.motion._judge
+        exactly = judge.clearance
+        monkeypatch.setattr(judge, "clearance", lambda *its: asked.append(1) or exactly(*its))
         for _ in range(KEYFRAMES):
             passages = batch.motion.advance(batch.state, np.zeros(4), KEYFRAME_S, exact=False)
             bounds.append(passages.clearance_m)

@@ -51,6 +51,9 @@ def written(folder):
         ("realism --budgets 0.1", "--budgets has no meaning without --source"),
         ("realism --source streets --seeds 3", "--seeds has no meaning with --source"),
         ("realism --seeds 990 991", "got 990 of test and 1090 of calibration"),
+        ("realism --tables dense-3 --source streets", "--tables has no meaning with --source"),
+        ("realism --tables dense", "unknown table 'dense'; known: cutin-10, dartout-10, dense-3"),
+        ("realism --tables", "--tables needs at least one value"),
         ("ablate --split val", "--split has no meaning without --source"),
         ("ablate --source streets --seeds 3", "--seeds has no meaning with --source"),
         ("ablate --source streets --budgets", "--budgets needs at least one value"),
@@ -65,9 +68,10 @@ def test_an_option_of_the_other_loop_is_refused(given, told, capsys):
 @pytest.mark.parametrize("command", [Order, Ablate])
 def test_every_loop_has_a_folder_of_its_own(command):
     name = command.__name__.lower()
-    assert command().folder(name) == Path("runs", name)
-    assert command(source="nuscenes:data").folder(name) == Path("runs", f"{name}-nuscenes")
-    assert command(source="streets", out=Path("mine")).folder(name) == Path("mine")
+    assert command().name_of(name) == name
+    assert command(source="nuscenes:data").name_of(name) == f"{name}-nuscenes"
+    mine = command(source="streets", out=Path("mine"))
+    assert mine.folder(name, [], name) == Path("mine")
 
 
 def test_the_orders_of_a_log_are_played_and_reported_again(logs, tmp_path, capsys):

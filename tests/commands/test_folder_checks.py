@@ -25,9 +25,12 @@ from care_sim.study.results_formats import (
     VEHICLE,
 )
 from care_sim.study.rows.parquet import read_notes, read_rows, write_rows
+from care_sim.study.unfinished import UNFINISHED
 from tests.helpers.made_rows import STUDY, rows
 
 SHORT = (("duration_s", 0.1),)
+NOTES = (JOURNAL, UNFINISHED)
+"""What a study leaves of how far it is."""
 PAPER, SWEEP = STUDIES["paper"], STUDIES["sweep"]
 
 
@@ -140,7 +143,7 @@ def test_a_study_that_cannot_be_shown_replaces_nothing(folder, monkeypatch):
 
     with pytest.raises(InvalidInput, match="two films"):
         run_study(short(), folder, 1, study=replace(SWEEP, figures=broken), force=True)
-    assert {name: content for name, content in held(folder).items() if name != JOURNAL} == before
+    assert {name: content for name, content in held(folder).items() if name not in NOTES} == before
     with pytest.raises(InvalidInput, match="holds the study paper"):
         run_study(short(), folder, 1)
 
@@ -179,7 +182,7 @@ def test_where_tasks_fail_fewer_rows_replace_no_more(install, tmp_path, capsys):
         "failed, or "
         "--force to replace them"
     ]
-    assert {name: content for name, content in held(out).items() if name != JOURNAL} == before
+    assert {name: content for name, content in held(out).items() if name not in NOTES} == before
     run_study(short(("history", "moody")), out, workers=1, force=True)
     assert [row["policy"] for row in read_rows(out / EPISODES.file)] == ["history"]
 

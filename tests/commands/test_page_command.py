@@ -57,7 +57,7 @@ def test_the_same_results_make_the_same_page(results, tmp_path, capsys):
         ({}, "no results at"),
         (
             {"journal.jsonl": b"{}\n"},
-            "holds an unfinished study; run again the command that began it",
+            "holds an unfinished study, 0 rows; run again the command that began it",
         ),
         ({"episodes.parquet": b"PAR1 torn"}, "is not a readable Parquet file"),
     ],

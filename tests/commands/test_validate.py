@@ -27,9 +27,9 @@ def test_it_plays_every_world_and_its_report_is_made_again_of_the_rows(capsys, t
     assert {row["scenario.occluder_reported"] for row in rows} == {None, True}
     assert {row["seed"] for row in rows} == {0, 10_000}
     world = "dartout, duration s 0.1, occluder truck, occluder reported True"
-    assert f"{world}: no verdict on 1 test seed, it takes 5" in out
+    assert f"{world}: no verdict on 1 test seed, it takes 5" in " ".join(out.split())
     assert (tmp_path / "validation.png").is_file()
-    assert run(capsys, "report", [tmp_path])[1] == out.replace(f"Results are in {tmp_path}\n", "")
+    assert run(capsys, "report", [tmp_path])[1] == out
 
 
 def test_a_world_with_another_camera_is_one_world_with_its_full_scan(capsys, tmp_path):

@@ -32,6 +32,38 @@ class RaisesOddly(History):
 class Exits(History):
     def demand(self, belief):
         raise SystemExit(4)
+
+class RaisesInTheBrake(History):
+    def demand(self, belief):
+        if belief.ego.acceleration < 0:
+            raise RuntimeError("not in the brake")
+        return super().demand(belief)
+
+class DiesInTheBrake(History):
+    def demand(self, belief):
+        if belief.ego.acceleration < 0:
+            os._exit(3)
+        return super().demand(belief)
+
+class Narrow(History):
+    def __call__(self, observation):
+        return super().__call__(observation)[:1]
+
+class Keeps(History):
+    # Fires again what it fired before, by the observation that it kept, and writes into that.
+    kept = None
+
+    def reset(self):
+        self.kept = None
+
+    def __call__(self, observation):
+        kept, self.kept = self.kept, observation
+        if kept is None:
+            return super().__call__(observation)
+        action = (kept["ranges"] > 0) * kept["ranges"] / 100
+        kept["ranges"][:] = 1.0
+        observation["tracks"][:] = 0.0
+        return action
 """
 ENTRY_POINTS = """
 [care_sim.policies]
@@ -40,4 +72,8 @@ killed-once = misbehaving:KilledOnce
 raises = misbehaving:Raises
 raises-oddly = misbehaving:RaisesOddly
 exits = misbehaving:Exits
+raises-in-the-brake = misbehaving:RaisesInTheBrake
+dies-in-the-brake = misbehaving:DiesInTheBrake
+narrow = misbehaving:Narrow
+keeps = misbehaving:Keeps
 """

@@ -67,12 +67,11 @@ def fill(state, world, loop):
         boxes=filled(state.bodies.boxes, world, loop.world.boxes_of(np.arange(count))),
         poses=filled(state.bodies.poses, world, primitives.poses),
     )
-    state.solids.counts[world] = len(primitives.owners)
-    state.solids = state.solids._replace(
-        **{
-            name: filled(getattr(state.solids, name), world, getattr(primitives, name))
-            for name in ("shapes", "halves", "offsets", "owners")
-        }
+    parts = primitives.tables
+    state.solids.counts[world] = len(parts[-1])
+    state.solids = type(state.solids)(
+        state.solids.counts,
+        *(filled(table, world, rows) for table, rows in zip(state.solids[1:], parts, strict=True)),
     )
     labels = loop.world.labels()
     state.reported.counts[world] = len(labels)

@@ -91,7 +91,9 @@ def test_within_the_budget_and_the_same_after_reset(
 )
 def test_weights_of_another_grid_are_refused_in_one_line(environments, name, setup, needed):
     env = environments("CARE-Dense-v0", setup, 0.05)
-    with pytest.raises(InvalidInput, match=rf"grid is columns 512 .*needed is {needed}"):
+    way_on = "belongs to the cells of that grid: play the sensor set-up that has it, or a policy"
+    told = rf"grid is columns 512 .*needed is {needed}.*{way_on}"
+    with pytest.raises(InvalidInput, match=told):
         care_sim.make_policy(name, env)
 
 

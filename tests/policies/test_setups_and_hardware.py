@@ -37,10 +37,13 @@ FORWARD = SensorSetup(
 SETUPS = {"hdl-32e": "hdl-32e", "tilted": TILTED, "forward": FORWARD, "corners": CORNERS}
 FIRINGS = (*HARDWARE, "tiles:2x5")
 UNFIT = {
-    ("tilted", "tiles:2x5"): "columns of firing tiles must divide the 128 of the grid, got 5",
+    (
+        "tilted",
+        "tiles:2x5",
+    ): "tiles must divide the 128 of the grid, got 5; .* is 4",
     ("hdl-32e", "tiles:2x5"): "columns of firing tiles must divide the 512 of the grid, got 5",
-    ("forward", "tiles"): "rows of firing tiles must divide the 10 of the grid, got 4",
-    ("forward", "segments"): "columns of firing segments must divide the 90 of the grid, got 16",
+    ("forward", "tiles"): "must divide the 10 of the grid, got 4; the nearest that does is 5",
+    ("forward", "segments"): "must divide the 90 of the grid, got 16; the nearest that does is 15",
     ("forward", "azimuth-window"): "firing azimuth-window turns all round, and the grid has no",
     ("corners", "tiles:2x5"): "columns of firing tiles must divide the 64 of the grid, got 5",
     ("corners", "columns"): "firing columns needs LiDARs of as many rows each, got 4 and 8",

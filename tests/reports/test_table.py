@@ -3,6 +3,7 @@
 import html
 import io
 import re
+from pathlib import Path
 
 import markdown_it
 import pytest
@@ -27,6 +28,76 @@ def terminal(table, width=80):
     out = io.StringIO()
     Console(width=width, file=out, force_terminal=True, color_system="standard").print(table.rich())
     return out.getvalue()
+
+
+NOTES = tuple(f"Sentence {n} has some words that a reader may want to know." for n in range(9))
+
+
+def lines_of(table, width=80, rest=None):
+    console = Console(width=width, file=io.StringIO())
+    console.print(table.rich(rest))
+    return [line.rstrip() for line in console.file.getvalue().splitlines()]
+
+
+def test_notes_are_three_lines_that_end_with_the_place_of_the_rest():
+    table = Table("t", ("a", "b"), (("x", "y"),), NOTES)
+    *_, first, _, third = lines_of(table, rest=Path("runs/mine/tables.md"))
+    assert first.startswith("Sentence 0")
+    assert third.endswith("know. More: runs/mine/tables.md")
+    assert len(lines_of(table, rest=Path("runs/mine/tables.md"))) == 3 + 3
+    # One sentence longer than that is cut; short notes, and those that stand nowhere else, are not.
+    long = Table("t", ("a", "b"), (("x", "y"),), ("word " * 90,))
+    assert lines_of(long, rest=Path("tables.md"))[-1].endswith("word ... More: tables.md")
+    assert (
+        len(lines_of(Table("t", ("a", "b"), (("x", "y"),), NOTES[:2]), rest=Path("tables.md")))
+        == 3 + 2
+    )
+    assert " ".join(NOTES) in " ".join(lines_of(table))
+
+
+@pytest.mark.parametrize("length", range(60, 100, 3))
+def test_a_folder_of_any_name_leaves_the_notes_three_lines(length):
+    for notes in (NOTES, ("word " * 90,)):
+        table = Table("t", ("a", "b"), (("x", "y"),), notes)
+        lines = lines_of(table, rest=Path("f" * length, "tables.md"))
+        assert len(lines) == 3 + 3
+        assert max(map(len, lines)) <= 80
+        assert "tables.md" in lines[-1]
+
+
+def test_a_table_that_is_too_wide_goes_on_below_with_its_names_again():
+    columns = ("policy", "budget", *(f"column {n}" for n in range(9)))
+    rows = (
+        ("One group of the rows",),
+        ("care", "3%", *(f"+{n}.0 [{n}.0,{n}.5]" for n in range(9))),
+    )
+    shown = lines_of(Table("t", columns, rows, names=2))
+    assert max(map(len, shown)) <= 80
+    assert sum(line.startswith("policy budget") for line in shown) == 3
+    assert sum(line.startswith("care   3%") for line in shown) == 3
+    assert shown.count("One group of the rows") == 3
+    text = "\n".join(shown)
+    assert all(f"+{n}.0 [{n}.0,{n}.5]" in text for n in range(9))
+    # A terminal that is wide enough has one part, as every table that fits.
+    assert lines_of(Table("t", columns, rows, names=2), 200)[3].count("[") == 9
+
+
+def test_a_part_leaves_out_rows_that_it_tells_nothing_of_and_keeps_pairs_together():
+    columns = ("level", *(name for n in range(5) for name in (f"value {n}", "difference")))
+    filled = tuple("0123456789" * 2 for _ in range(6))
+    rows = (
+        ("First",),
+        ("a", *filled, "", "", "", ""),
+        ("Last",),
+        ("b", *([""] * 8), "some", "end"),
+    )
+    parts = "\n".join(lines_of(Table("t", columns, rows))).split("\n\n")
+    assert [part.count("difference") for part in parts] == [1, 1, 2]
+    assert [("First" in part, "Last" in part) for part in parts] == [
+        (True, False),
+        (True, False),
+        (True, True),
+    ]
 
 
 def test_bold_is_bold_everywhere():

@@ -263,25 +263,45 @@ def test_what_is_in_the_way_of_the_car_counts_wherever_the_lidar_stands_across_i
     assert not any(braking)
 
 
+ROWS = "elevations_deg = [5.0, 1.0, -1.0, -9.0]"
+FLAT = "rows = 4\ntop_deg = 2.0\nbottom_deg = 5.0"
+STEEP = "rows = 4\ntop_deg = 95.0\nbottom_deg = 5.0"
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
         ("columns", "colums", "unknown argument of lidar 'colums', the nearest is columns"),
-        ('name = "mine"', "", "name of a sensor set-up must be 1 to 60 printable"),
+        ('name = "mine"', "", "name is missing, a text"),
         ("[lidar]", "[radar]", "unknown argument of a set-up 'radar'"),
         ("elevations_deg", "rows = 4\nelevations_deg", "so leave out rows"),
         ("[5.0, 1.0, -1.0, -9.0]", "[5.0, 1.0, 2.0, -9.0]", "must descend"),
         ("[5.0, 1.0, -1.0, -9.0]", "5.0", "elevations_deg must be a list"),
-        ("elevations_deg = [5.0, 1.0, -1.0, -9.0]", "rows = 4", "lidar lacks top_deg"),
+        (
+            ROWS,
+            "rows = 4",
+            "top_deg of lidar is missing, or elevations_deg",
+        ),
         ("field_of_view_deg = 90.0", "field_of_view_deg = 91.0", "divides a whole turn"),
         ("[1.0, 0.5, 0.75]", "[1.0, 0.5]", r"position_m of lidar must be \[x, y, z\]"),
         ("[1.0, 0.5, 0.75]", "[1.0, 0.5, 0.0]", "z of the position of the sensor set-up mine"),
         ("[1.5, 0.0, 1.25]", "1.5", "position_m of cameras must be"),
-        ("position_m = [1.5, 0.0, 1.25]", "", "position_m of cameras must be"),
+        ("position_m = [1.5, 0.0, 1.25]", "", "position_m of cameras is missing: "),
+        ('"mine"', '""', "name of a sensor set-up must be 1 to 60 printable"),
+        ("5.0, 1.0, -1.0", "5.0, -1.0, 1.0", "elevations_deg must descend, got 1 after -1"),
+        (ROWS, FLAT, "below top_deg, 2, got 5"),
+        (
+            ROWS,
+            STEEP,
+            r"top_deg must lie in \[-90, 90\], got 95",
+        ),
+        ("= 90.0", "= 0.1", r"field_of_view_deg must lie in \[0.5, 360\], got 0.1"),
+        ("= 60.0", "= 180.0", r"horizontal_fov_deg must lie in \[0.06, 179.9\], got 180.0"),
+        ("yaw_deg = 30.0", "yaw_deg = 190.0", r"yaw_deg must lie in \[-180, 180\], got 190.0"),
         ("width = 400", "width = 0", "width of the camera must be"),
         ("yaw_deg = 20.0", "yaw_deg = 200.0", "camera 0 .* sees nothing of the grid"),
         ("[[cameras]]", "[cameras]", "cameras must be tables"),
-        ("pitch_deg = -2.0", "pitch_deg = -50.0", "pitch of the grid must"),
+        ("pitch_deg = -2.0", "pitch_deg = -50.0", r"pitch_deg must lie in \[-45, 45\], got -50.0"),
         ("= 80.0", "= nan", "range_m of the grid must"),
         ("= 80.0", "= eighty", "no TOML"),
     ],

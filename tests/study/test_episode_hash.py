@@ -17,7 +17,8 @@ def test_the_hash_holds_cells_ranges_and_the_pose_of_everybody_at_every_keyframe
     for _ in range(3):
         observation, *_, info = env.step(np.zeros((32, 512), np.float32))
         world = env.unwrapped.loop.world
-        found.add(info["fired"], observation, world)
+        bodies = [world.ego_body, *(actor.body for actor in world.actors)]
+        found.add(info["fired"], observation["ranges"], world.boxes_of(np.array(bodies)))
         poses = [world.ego.pose, *(actor.pose_at(world.time) for actor in world.actors)]
         content.update(portable_bytes(info["fired"], observation["ranges"], poses))
     env.close()

@@ -4,6 +4,7 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.firing.listing import CELLS, HARDWARE, settled
+from care_sim.reports.realism.episodes import realism_tables
 from care_sim.sources.named import source_of
 from care_sim.sources.scenes import Scene, Streets
 from care_sim.study.designs.realism import (
@@ -20,6 +21,7 @@ from care_sim.study.designs.realism import (
 from care_sim.study.designs.variants import Variant
 from care_sim.study.rows.reading import key_of
 from care_sim.study.run_config import FULL
+from tests.helpers.made_rows import row
 
 BY_NAME = {headline.name: headline for headline in HEADLINES}
 STREETS = Streets("evaluation")
@@ -33,6 +35,29 @@ def configs():
 
 def labels(levels):
     return [level.label for level in levels]
+
+
+def test_a_headline_table_is_played_and_shown_alone():
+    """The full scan at its budget is of every table of the street: alone it makes none."""
+    alone = realism_study([0], headlines=[BY_NAME["dense, 3%"]])
+    assert {config.budget for config in alone} == {0.03, 1.0}
+    assert len(alone) < 0.05 * len(realism_study([0]))
+    (told,) = {
+        line[0]
+        for table in realism_tables([row(config, 9.0) for config in alone])
+        for line in table.rows
+        if len(line) == 1
+    }
+    assert told == "dense, 3%"
+    assert [headline.option for headline in HEADLINES] == [
+        "dartout-10",
+        "dense-3",
+        "dense-5",
+        "cutin-10",
+        "ncap-1",
+        "ncap-3",
+        "drive-1",
+    ]
 
 
 @pytest.mark.parametrize("conditions", [CONDITIONS, FILM_CONDITIONS])

@@ -19,6 +19,7 @@ from care_sim.study.episode_play import result_or_reason, run_episode, trace
 from care_sim.study.journal import JOURNAL, Journal
 from care_sim.study.results_formats import EPISODES
 from care_sim.study.rows.parquet import read_rows
+from care_sim.study.run_config import in_batches
 from care_sim.study.runner import RunListener, run_all
 
 SHORT = (("duration_s", 0.3),)
@@ -133,13 +134,43 @@ def test_any_executor_will_do(tmp_path):
 
 
 def test_episodes_are_played_seed_by_seed_and_written_in_the_order_asked(tmp_path):
-    configs = short(["history", "random"], seeds=(0, 1, 2))
+    configs = short(["history", "history-oracle"], seeds=(0, 1, 2))
     run_study(configs, tmp_path, workers=1)
     played = [json.loads(line)["seed"] for line in (tmp_path / JOURNAL).read_text().splitlines()]
-    assert played == [0, 0, 1, 1, 2, 2]
+    # Those of history are one batch; those of a privileged policy are played one by one.
+    assert played == [0, 1, 2, 0, 1, 2]
     assert [row["digest"] for row in read_rows(tmp_path / EPISODES.file)] == [
         config.digest() for config in configs
     ]
+
+
+def test_pairs_of_policies_stand_together_as_far_as_batches_go():
+    configs = short(["history", "random"], seeds=(0, 1, 2))
+    batches = in_batches(configs, 2)
+    assert [[(one.policy, one.seed) for one in batch] for batch in batches] == [
+        [("history", 0), ("history", 1)],
+        [("random", 0), ("random", 1)],
+        [("history", 2)],
+        [("random", 2)],
+    ]
+
+
+@pytest.mark.parametrize(
+    ("most", "sizes"),
+    [(16, [10, 5, 2, 1, 1, 1]), (8, [8, 6, 2, 2, 1, 1]), (1, [1] * 20), (None, [20])],
+)
+def test_the_last_tasks_are_shared_out_among_the_workers(tmp_path, most, sizes):
+    played = []
+
+    def refuse(batch):
+        played.append(len(batch))
+        return ["no"] * len(batch)
+
+    configs = short(["history"], seeds=range(20))
+    with Journal(tmp_path / JOURNAL) as journal:
+        failures = run_all(configs, journal, 2, ThreadPoolExecutor, play_batch=refuse, most=most)
+    assert sorted(played, reverse=True) == sizes
+    assert {failure.config for failure in failures} == {*configs}
 
 
 def test_a_bad_policy_costs_only_its_own_episode(third_party, tmp_path):

@@ -25,6 +25,8 @@ BY_SIGNAL = (-signal.SIGINT, -signal.SIGTERM, -signal.SIGHUP, -signal.SIGQUIT)
 """Ends by a signal, which a shell shows as 130 and the like: as good as 130 where a line has said
 why, or where all was said and done and Python was about to leave."""
 NOTICES = (
+    r"Results go to .*",
+    r"another folder is taken, because .*",
     r"(episodes|plays) \d+/\d+.*",
     r"\d+ lines? of .* passed over, damaged or .*",
     r"\d+ (episodes|plays)? ?of \d+ .* found in .*",

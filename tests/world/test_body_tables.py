@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.world.bodies import CATALOGUE
-from care_sim.world.body_tables import Footprints
+from care_sim.world.body_tables import SHAPES, Footprints, Primitives
 from care_sim.world.bullet import BulletWorld
 
 BUS, EGO = CATALOGUE["bus"], CATALOGUE["ego"]
@@ -73,3 +73,33 @@ def test_footprints_are_near_by_their_rectangles_not_by_the_circles_around_them(
     assert footprints((BUS, (0.0, 0.0, 0.0)), (BUS, (0.0, beside, 0.0))).near(1, 3.1).tolist() == [
         2
     ]
+
+
+def test_tables_grow_with_the_street():
+    """What was there before stays, more bodies than there was room for, and an id left out."""
+    boxes, parts = Footprints(), Primitives()
+    kinds = [CATALOGUE[name] for name in sorted(CATALOGUE)] * 5
+    for body, kind in enumerate(kinds, start=1):
+        boxes.add(body, kind.size, (float(body), 0.0, 0.0))
+        parts.add(body, kind.parts)
+        parts.poses[body, 0] = body
+    ids = np.arange(1.0, len(kinds) + 1)
+    assert len(kinds) > 64
+    assert np.isnan(boxes.boxes[0]).all()
+    assert boxes.boxes[1:, 0].tolist() == parts.poses[1:, 0].tolist() == ids.tolist()
+    assert boxes.boxes[1:, 3].tolist() == [kind.size[0] for kind in kinds]
+    every = [(body, part) for body, kind in enumerate(kinds, start=1) for part in kind.parts]
+    shapes, halves, offsets, owners = parts.tables
+    assert owners.tolist() == [body for body, _ in every]
+    assert [SHAPES[shape] for shape in shapes] == [part.shape for _, part in every]
+    assert (2 * halves == [part.size for _, part in every]).all()
+    assert (offsets == [part.centre for _, part in every]).all()
+    assert parts.materials == [part.material for _, part in every]
+
+
+def test_a_body_that_comes_later_is_in_the_tables():
+    parts = Primitives()
+    parts.add(0, ())
+    assert len(parts.tables[0]) == 0
+    parts.add(1, BUS.parts)
+    assert set(parts.tables[-1].tolist()) == {1}

@@ -1,5 +1,6 @@
 """One client tells of bodies what the client of their own world tells, to the last bit."""
 
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 
 import numpy as np
@@ -7,9 +8,11 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
+from care_sim.world import clearance_judge
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.bullet import BulletWorld
-from care_sim.world.clearance_judge import ClearanceJudge
+from care_sim.world.bullet_clients import pybullet
+from care_sim.world.clearance_judge import ClearanceJudge, judge_here
 
 KINDS = ("pedestrian", "bicycle", "car", "bus", "trailer", "hoarding")
 BODIES = st.lists(
@@ -49,3 +52,39 @@ def test_two_of_one_kind_are_not_one(judge):
     apart = 10.0 - CATALOGUE["ego"].size[0]
     assert judge.clearance(pair, poses) == pytest.approx(apart, abs=0.01)
     assert np.isinf(judge.clearance(pair, poses, within=1.0))
+
+
+def ahead_by_ten(judge, kind):
+    pair = judge.stand_ins(CATALOGUE["ego"], kind)
+    return judge.clearance(pair, [[x, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0] for x in (0.0, 10.0)])
+
+
+def test_worlds_of_a_thread_share_a_judge_and_threads_do_not():
+    with ThreadPoolExecutor(1) as thread:
+        other = thread.submit(judge_here).result()
+        assert thread.submit(judge_here).result() is other
+    assert judge_here() is judge_here() is not other
+
+
+@pytest.mark.parametrize("end", [pybullet.disconnect, pybullet.resetSimulation])
+def test_a_judge_whose_client_somebody_else_ends_is_replaced(end):
+    told = ahead_by_ten(judge_here(), CATALOGUE["car"])
+    lost = judge_here()
+    end(physicsClientId=lost._client.number)
+    assert judge_here() is not lost
+    assert ahead_by_ten(judge_here(), CATALOGUE["car"]) == told
+
+
+def test_a_judge_of_many_kinds_is_replaced(monkeypatch):
+    monkeypatch.setattr(clearance_judge, "MOST_KINDS", 3)
+
+    def ask(name):
+        judge = judge_here()
+        ahead_by_ten(judge, CATALOGUE[name])
+        return judge
+
+    # In a thread where none has been asked: the ego and two others are three.
+    with ThreadPoolExecutor(1) as thread:
+        first, second, *others = thread.map(ask, KINDS)
+    assert first is second
+    assert len({first, *others}) == len(KINDS) // 2

@@ -1,4 +1,7 @@
+import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from care_sim.world.lane_change import LaneChange
 
@@ -10,3 +13,16 @@ def test_a_change_by_hand(side):
     places = {0.0: (5.0, 3.5), 2.0: (25.0, 3.5), 3.0: (35.0, 2.0), 4.0: (45.0, 0.5), 5.0: (55.0, 0)}
     for time, (x, y) in places.items():
         assert change.pose(time) == pytest.approx((x, side * y, 0.0))
+
+
+@given(
+    st.builds(
+        LaneChange,
+        st.tuples(st.floats(-90, 90), st.floats(-9, 9)),
+        *(st.floats(0, 30), st.floats(-2, 9), st.floats(0.1, 3), st.floats(-9, 9)),
+    ),
+    st.lists(st.floats(-1, 60), max_size=50),
+)
+def test_all_poses_at_once_are_those_one_by_one(change, times):
+    each = np.array([change.pose(time) for time in times]).reshape(-1, 3)
+    assert change.poses(np.array(times)).tobytes() == each.tobytes()

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -59,3 +61,18 @@ def test_setting_off_changes_only_the_time():
     later = RUN.setting_off(3.0)
     assert later.starts_s == 3.0
     assert later.covered(4.5) == pytest.approx(RUN.covered(2.5))
+
+
+@given(walks, st.lists(st.floats(-5, 50), max_size=50), st.floats(0.1, 60))
+def test_all_poses_at_once_are_those_one_by_one(walk, times, length):
+    walk = replace(walk, length_m=length)
+    each = np.array([walk.pose(time) for time in times]).reshape(-1, 3)
+    assert walk.poses(np.array(times)).tobytes() == each.tobytes()
+
+
+def test_the_squares_of_a_long_run_up_are_pythons():
+    """One in a thousand would be rounded otherwise by NumPy."""
+    run_up = replace(RUN, acceleration=0.25, length_m=100.0)
+    times = np.linspace(1.0, 11.0, 10001)
+    each = np.array([run_up.pose(time) for time in times.tolist()])
+    assert run_up.poses(times).tobytes() == each.tobytes()

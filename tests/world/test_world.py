@@ -159,3 +159,14 @@ def test_what_is_called_at_every_step_is_handed_the_world_of_that_time(world):
     world.at_every_step(lambda now: seen.append((now is world, now.time, now.along_m)))
     world.advance(0.0, 0.1)
     assert seen == [(True, 0.05, pytest.approx(0.5)), (True, 0.1, pytest.approx(1.0))]
+
+
+def test_clearances_are_those_of_the_bodies_in_its_own_client(world):
+    world.add("trailer", "trailer", (20.0, -3.2, 0.1))
+    walk = Walk((25.0, -3.0), np.pi / 2, speed=2.7, acceleration=5.0, length_m=8.0)
+    person = world.first_sighting = world.add("person", "pedestrian", walk.pose)
+    clearances = []
+    for _ in range(60):
+        clearances.append(world.advance(0.0, WORLD_STEP_S).clearance_m)
+        assert clearances[-1] == world.bullet.clearance(world.ego_body, person.body)
+    assert min(clearances) < 5.0 < max(clearances)

@@ -4,11 +4,10 @@ where a source of scenes is named.
 
 from collections.abc import Collection
 from dataclasses import dataclass, fields
-from pathlib import Path
 
 from care_sim.base.errors import InvalidInput
 from care_sim.commands.shared.episode_studies import FixedStudy
-from care_sim.commands.shared.play_options import SourceOptions
+from care_sim.commands.shared.play_options import SourceOptions, named_after
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,14 +21,12 @@ class EitherLoopStudy(FixedStudy, SourceOptions):
     scenes: tuple[str, ...] = ()
     """With --source. One number: that many scenes, from the first. Otherwise names of scenes.
     Without this option, all scenes of the study."""
-    out: Path | None = None
-    """Folder of the results; an interrupted study goes on there. Without this option runs/ and the
-    name of the command, with --source the kind of source behind it, as in runs/ablate-streets."""
 
-    def folder(self, command: str) -> Path:
-        """Where the results go."""
-        kind = [self.source.partition(":")[0]] if self.source else []
-        return self.out or Path("runs", "-".join([command, *kind]))
+    def name_of(self, command: str) -> str:
+        """What the folder is called where none is given: the kind of source behind the command, as
+        in ablate-streets.
+        """
+        return named_after(command, self.source) if self.source else command
 
     def check_loop(self, closed: Collection[str], opened: Collection[str]) -> None:
         """Raise InvalidInput for an option of the other loop: those named `closed` have no meaning

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 from care_sim.commands.shared.options import seeds_of
 from care_sim.commands.shared.selection import playable
@@ -34,12 +33,12 @@ class FixedStudy(EpisodeStudy):
     """Further policies, installed ones too, that are played and shown beside those of the study.
     Without this option, in the closed loop, the control `fan`; with no name after it, none."""
 
-    def play(self, study: str, configurations: _Configurations, out: Path) -> int:
+    def play(self, study: str, configurations: _Configurations, name: str) -> int:
         """Play the configurations of the seeds, with the further policies."""
         seeds = seeds_of(self.seeds)
         also, left_out = self.further_policies()
         configs = of_seeds(configurations(seeds[:1], also), seeds)
-        return self.play_study(study, configs, out, left_out)
+        return self.play_study(study, configs, name, left_out)
 
     def further_policies(self) -> tuple[list[str], list[str]]:
         """Those that can be played, and a line for each that cannot."""

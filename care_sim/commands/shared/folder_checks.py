@@ -9,12 +9,12 @@ from care_sim.base.errors import InvalidInput, counted
 from care_sim.core.conditions import DEFAULTS
 from care_sim.evaluation.sightings import ANNOTATED
 from care_sim.reports.studies import SWEEP, Study
-from care_sim.study.journal import Journal
+from care_sim.study.journal import Finished, Journal
 from care_sim.study.results_formats import RESULTS_FORMATS, is_parameter
 from care_sim.study.rows.parquet import read_notes, read_rows
 from care_sim.study.run_config import Row, RunConfig
 
-_WAYS_OUT = "give another --out, or --force to replace it"
+WAYS_OUT = "give another --out, or --force to replace it"
 _USUAL = DEFAULTS | {"presence": ANNOTATED}
 """Parameters of a row that does not name them: rows of older versions lack what was added since."""
 _LABEL_NAMES = ("scene", "scenario", "policy", "budget")
@@ -52,13 +52,13 @@ def check_results(folder: Path, configs: Sequence[RunConfig], study: Study) -> N
     if there != study.name:
         raise InvalidInput(
             f"{folder} holds the study {there}, {here}, which the study {study.name}, {wanted}, "
-            f"would replace: {_WAYS_OUT}"
+            f"would replace: {WAYS_OUT}"
         )
     if gone:
         raise InvalidInput(
             f"{folder} holds {here} of the study {there}; {len(gone)} of them, the first "
             f"{_label(gone[0])}{_differing(gone[0], configs)}, would be gone from the study "
-            f"{study.name} that is asked for, {wanted}: {_WAYS_OUT}"
+            f"{study.name} that is asked for, {wanted}: {WAYS_OUT}"
         )
 
 
@@ -80,7 +80,7 @@ def lost(folder: Path, played: Sequence[RunConfig], study: Study) -> str:
 
 
 def check_journal(
-    folder: Path, configs: Sequence[RunConfig], journal: Journal, study: Study
+    folder: Path, configs: Sequence[RunConfig], journal: Journal | Finished, study: Study
 ) -> None:
     """Raise InvalidInput where the folder holds an interrupted study that has another name, or rows
     that are not asked for now.
@@ -89,13 +89,13 @@ def check_journal(
     counts by its parameters, whatever code played it, so that a command goes on after a change of
     the code.
     """
-    if not len(journal) or (folder / study.results.file).is_file():
+    if not journal.rows or (folder / study.results.file).is_file():
         return
-    rows = counted(len(journal), "row")
+    rows = counted(len(journal.rows), "row")
     if study.name not in journal.studies:
         raise InvalidInput(
             f"{folder} holds the unfinished study {_joined(journal.studies)}, {rows}, beside "
-            f"which the study {study.name} would be played: {_WAYS_OUT}"
+            f"which the study {study.name} would be played: {WAYS_OUT}"
         )
     if gone := _gone(journal.rows, configs):
         raise InvalidInput(

@@ -22,6 +22,9 @@ from tyro.constructors import (
 
 from care_sim.base.errors import InvalidInput, shown, unknown
 
+UNRECOGNIZED = "Unrecognized options"
+"""How a complaint begins that is of options which a command lacks."""
+
 
 class _Reading(NamedTuple):
     """How the words after an option become a value: the words as help shows them, how many there
@@ -170,18 +173,19 @@ def chosen_command(
     raise InvalidInput(_one_line(complaint.getvalue()))
 
 
-def option_names(command: type) -> set[str]:
-    """The options of a command as they are written, those that several commands share included."""
-    names = set()
+def option_helps(command: type) -> dict[str, str]:
+    """The options of a command as they are written, those that several commands share included,
+    each with its help.
+    """
+    helps: dict[str, str] = {}
     for field in fields(command):
         written = field.name.replace("_", "-")
         if is_dataclass(field.default):
-            names |= option_names(type(field.default))
-        elif isinstance(field.default, bool):
-            names |= {f"--{written}", f"--no-{written}"}
-        else:
-            names.add(f"--{written}")
-    return names
+            helps |= option_helps(type(field.default))
+            continue
+        names = [written, f"no-{written}"] if isinstance(field.default, bool) else [written]
+        helps |= dict.fromkeys([f"--{name}" for name in names], _help_of(command, field.name))
+    return helps
 
 
 def _refusal(end: BaseException | None) -> InvalidInput | None:
@@ -204,8 +208,10 @@ def _one_line(box: str) -> str:
     sections = re.sub("─+|-{5,}", "\n", " ".join(lines)).splitlines()
     # An unknown option may be known to another command, which "in care-sim NAME" would tell.
     texts = [" ".join(section.split()).partition(" in care-sim ")[0] for section in sections]
-    return "; ".join(
+    told = [
         text.removeprefix("Error parsing ").rstrip(".")
         for text in texts
         if text and not text.startswith(("For full helptext", "Argument helptext:"))
-    )
+    ]
+    # What tyro takes for near, `care_sim.commands.shared.hints` tells better.
+    return told[0] if told[0].startswith(UNRECOGNIZED) else "; ".join(told)

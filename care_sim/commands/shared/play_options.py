@@ -20,6 +20,11 @@ _DEFAULT_CONDITIONS = Conditions()
 """The defaults."""
 
 
+def named_after(command: str, source: str) -> str:
+    """A command and the kind of its source, as folders are called."""
+    return f"{command}-{source.partition(':')[0]}"
+
+
 @dataclass(frozen=True, kw_only=True)
 class SourceOptions:
     """Which of a source's scenes there are, and what their camera saw."""

@@ -13,7 +13,7 @@ from care_sim.commands.shared.selection import check_values, playable
 from care_sim.sources.scenes import chosen_scenes
 from care_sim.study.play_config import PlayConfig
 
-_CLOSED = ("seeds", "also", "sensors")
+_CLOSED = ("seeds", "also", "sensors", "tables")
 _OPEN = ("policies", "budgets", "floor_seeds")
 
 
@@ -52,4 +52,4 @@ class ProtocolVariants(EitherLoopStudy):
         if not policies:
             raise InvalidInput("none of the policies can be played")
         configs = played(scenes, policies, self.budgets)
-        return self.play_study(study, configs, self.folder(command), left_out)
+        return self.play_study(study, configs, self.name_of(command), left_out)

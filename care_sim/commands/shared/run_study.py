@@ -18,6 +18,7 @@ from care_sim.study.provenance import machine, versions
 from care_sim.study.rows.parquet import check_columns, write_columns, write_rows
 from care_sim.study.run_config import Row, RunConfig
 from care_sim.study.runner import Failure
+from care_sim.study.unfinished import Unfinished, forget
 
 
 def run_study(
@@ -27,13 +28,16 @@ def run_study(
     make_executor: ExecutorFactory = processes,
     study: Study = SWEEP,
     force: bool = False,
+    command: str = "",
 ) -> list[Failure]:
     """Run a study into `folder`, going on where an earlier run stopped; returns the tasks that
     failed.
 
-    Writes `journal.jsonl` as tasks finish. When all have ended and some did not fail, writes
-    `config.json` with the configurations and what failed, the Parquet files of the study's kind
-    with the rows of `configs` in their order, `tables.md`, `tables.tex` and the figures of `study`.
+    Names the folder, and leaves in it how large the study is and the `command` that plays it, until
+    it has ended (`care_sim.study.unfinished`). Writes `journal.jsonl` as tasks finish. When all
+    have ended and some did not fail, writes `config.json` with the configurations and what failed,
+    the Parquet files of the study's kind with the rows of `configs` in their order, `tables.md`,
+    `tables.tex` and the figures of `study`.
     No other study can take the folder until all of that is written. Where the folder holds rows
     that were not obtained again because tasks failed, its files stay, unless `force`.
 
@@ -53,7 +57,9 @@ def run_study(
     _check(folder, configs, study, force)
     with _journal(folder, study) as journal:
         _check(folder, configs, study, force, journal)
-        _say_what_is_found(configs, journal, folder, kind.unit)
+        print(f"Results go to {folder}: {len(configs)} {kind.unit}", file=sys.stderr, flush=True)
+        others = _say_what_is_found(configs, journal, folder, kind.unit)
+        Unfinished(study.name, kind.unit, len(configs), others, command).write(folder)
 
         # The journal keeps what finishes, even if this process ends before results are written.
         failures = run_with_progress(configs, journal, workers, make_executor, kind)
@@ -65,6 +71,7 @@ def run_study(
             print(left, file=sys.stderr)
         elif played:
             _write([journal[config.key] for config in played], configs, folder, study, failures)
+            forget(folder)
     return failures
 
 
@@ -117,9 +124,9 @@ def _journal(folder: Path, study: Study) -> Journal:
 
 def _say_what_is_found(
     configs: Sequence[RunConfig], journal: Journal, folder: Path, unit: str
-) -> None:
+) -> int:
     """Print one line when the journal holds tasks of this study or of others, and one for lines of
-    it that are damaged.
+    it that are damaged; returns how many of others it holds.
     """
     if journal.damaged:
         lines = counted(journal.damaged, "line")
@@ -133,6 +140,7 @@ def _say_what_is_found(
     if found or others:
         rest = f"; {others} of other options or code stay in its journal" if others else ""
         print(f"{found} of {len(configs)} {unit} found in {folder}{rest}", file=sys.stderr)
+    return others
 
 
 def _write(

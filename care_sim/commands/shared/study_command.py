@@ -1,16 +1,17 @@
 """How a command plays a study: over workers, into a folder, and naming what is left out."""
 
-import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rich.console import Console
 
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.errors import report_problems
+from care_sim.commands.shared.command_line import command_line
+from care_sim.commands.shared.default_folder import free_folder
 from care_sim.commands.shared.run_study import run_study, summary
-from care_sim.reports.report import print_report, read_results
+from care_sim.reports.report import print_report, read_results, where_it_lies
 from care_sim.reports.studies import STUDIES
 from care_sim.study import executors
 from care_sim.study.executors import CORES, MOST_WORKERS
@@ -18,8 +19,6 @@ from care_sim.study.run_config import RunConfig
 
 DONE = 0
 FAILED = 1
-_PIPE_WIDTH = 180
-"""Columns of a table that is not printed on a terminal."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,6 +33,11 @@ class StudyCommand:
     """Address of a dask scheduler whose workers play instead, for example tcp://HOST:8786 (extra
     'cluster').
     """
+    out: Path | None = None
+    """Folder of the results; an interrupted study goes on there. Without this option it is in runs/
+    and has the name of the command: the first of them, such as runs/sweep and runs/sweep-2, that
+    holds no results of other options.
+    """
     force: bool = False
     """Play into a folder that holds another study, finished or not, or rows that are not asked for
     now: its tables, figures and Parquet files are replaced at the end; its journal stays. Episodes
@@ -42,19 +46,29 @@ class StudyCommand:
     def __post_init__(self) -> None:
         check_fields(self)
 
+    def folder(self, study: str, configs: Sequence[RunConfig], name: str) -> Path:
+        """Where the results of the tasks go, in runs/ under `name` unless it is told."""
+        if self.out is not None:
+            return self.out
+        return Path("runs", name) if self.force else free_folder(name, configs, STUDIES[study])
+
     def play_study(
-        self, study: str, configs: Sequence[RunConfig], out: Path, left_out: Sequence[str] = ()
+        self, study: str, configs: Sequence[RunConfig], name: str, left_out: Sequence[str] = ()
     ) -> int:
         """Play the tasks and print their tables, the tasks that failed and the policies that were
         left out.
         """
         make_executor = executors.cluster(self.cluster) if self.cluster else executors.processes
-        failures = run_study(configs, out, self.workers, make_executor, STUDIES[study], self.force)
+        out = self.folder(study, configs, name)
+        again = command_line(replace(self, out=out))
+        failures = run_study(
+            configs, out, self.workers, make_executor, STUDIES[study], self.force, again
+        )
         # What is printed is read back from the folder, as `care-sim report` would print it.
         if len(failures) < len(configs):
             rows, _, missing = read_results(out)
-            print_report(rows, console(), STUDIES[study], missing)
-            print(f"Results are in {out}")
+            print_report(rows, console(), STUDIES[study], missing, out)
+            print(*where_it_lies(out, STUDIES[study]), sep="\n")
         report_problems(
             [
                 *(f"failed: {line}" for line in summary(failures, STUDIES[study].results.unit)),
@@ -65,6 +79,5 @@ class StudyCommand:
 
 
 def console() -> Console:
-    """Where tables are printed: a terminal, or a pipe of a width at which tables need no breaks."""
-    width = None if sys.stdout.isatty() else _PIPE_WIDTH
-    return Console(highlight=False, width=width)
+    """Where tables are printed: as wide as the terminal, and 80 columns where there is none."""
+    return Console(highlight=False)

@@ -1,5 +1,6 @@
 """Blocks of the grid: rectangles of cells, each of which fires as a whole."""
 
+import math
 from functools import cached_property
 from typing import Any
 
@@ -24,13 +25,17 @@ class Blocks(Hardware):
 
     def __init__(self, grid: Grid, rows: int, columns: int):
         # A block lies in one LiDAR: the rows of each are whole blocks.
+        common = {
+            "rows": math.gcd(*(head.grid.rows for head in grid.heads)),
+            "columns": grid.columns,
+        }
         for head in grid.heads:
             sides = (rows, head.grid.rows, "rows"), (columns, grid.columns, "columns")
             for size, whole, what in sides:
                 if size < 1 or whole % size:
                     raise InvalidInput(
                         f"{what} of firing {self.name} must divide the {whole} of the grid, got "
-                        f"{size}"
+                        f"{size}; the nearest that does is {_nearest_divisor(size, common[what])}"
                     )
         super().__init__(grid, rows * columns)
         self.rows = rows
@@ -57,6 +62,12 @@ class Blocks(Hardware):
     def best(self, worth: Floats, budget: int, last: Cells) -> Integers:
         """Any blocks can fire together."""
         return ranked(worth)[: budget // self.unit_cells]
+
+
+def _nearest_divisor(size: int, whole: int) -> int:
+    """The divisor of `whole` that is nearest to `size`, of two the smaller."""
+    divisors = [n for n in range(1, whole + 1) if whole % n == 0]
+    return min(divisors, key=lambda n: abs(n - size))
 
 
 @compiled()

@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from care_sim.base.times import LAST_BITS_S
 from care_sim.batch.loop import BatchLoop
-from care_sim.batch.records import History, Records
+from care_sim.batch.records import History
 from care_sim.core.arrays import Floats, Mask
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.envs.sensing import Observed
 from care_sim.envs.vector.rewards import Rewards
 from care_sim.envs.vector.worlds import Stepped
-from care_sim.evaluation.metrics import outcome
+from care_sim.evaluation.metrics import outcome_of
+from care_sim.loops.record_columns import Records
 from care_sim.loops.records import Outcome
 
 
@@ -92,10 +93,10 @@ class CompiledWorlds:
     def _outcome(self, world: int, keyframes: int) -> Outcome:
         """The result of a world's episode of so many keyframes."""
         episode = self._history.episode(world, keyframes)
-        result = outcome(episode)
+        result = outcome_of(episode)
         if self._exact or result.clearance_m is None:
             return result
-        appeared = next(record.time_s for record in episode if record.in_view)
+        appeared = float(episode.time_s[episode.in_view.argmax()])
         return replace(result, clearance_m=self._loop.least_clearance_m(world, appeared))
 
     def _columns(self, records: Records, terms: dict[str, Any]) -> dict[str, Any]:

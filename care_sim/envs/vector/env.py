@@ -23,6 +23,7 @@ from care_sim.envs.spaces import checked_scores
 from care_sim.envs.vector.compiled_worlds import CompiledWorlds
 from care_sim.envs.vector.coverage import why_separate
 from care_sim.envs.vector.infos import kept
+from care_sim.envs.vector.same_step import last_rows, same_step
 from care_sim.envs.vector.separate_worlds import SeparateWorlds
 from care_sim.envs.vector.threads import Threads
 from care_sim.envs.vector.worlds import Stepped, Worlds
@@ -74,7 +75,8 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         self.action_space = batch_space(self.single_action_space, num_envs)
 
         # Every thread has worlds of its own, and works on nothing else.
-        self._observed: Observed = create_empty_array(self.single_observation_space, num_envs)
+        rows: Any = create_empty_array(self.single_observation_space, num_envs)
+        self._observed: Observed = rows
         count = min(num_envs, threads)
         ends = [num_envs * k // count for k in range(count + 1)]
         self._shares = [slice(*ends[k : k + 2]) for k in range(count)]
@@ -127,27 +129,24 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         """
         if not self._begun.all():
             raise gymnasium.error.ResetNeeded("call reset() before stepping")
-        disabled = self.autoreset_mode == AutoresetMode.DISABLED
-        if disabled and self._over.any():
-            over = np.flatnonzero(self._over).tolist()
+        begins = self._over.copy()
+        if self.autoreset_mode == AutoresetMode.DISABLED and begins.any():
             raise gymnasium.error.ResetNeeded(
-                f"worlds {shown(over)} are over: call reset() with a reset_mask"
+                f"worlds {shown(_places(begins))} are over: call reset() with a reset_mask"
             )
         scores = checked_scores(as_array("actions", actions), self.action_space.shape or ())
-        begins = self._over.copy()
         stepped = self._played(scores, ~begins)
         infos = self._infos(stepped, ~begins)
         over = stepped.terminated | stepped.truncated
 
         # What is over begins anew, now or at the next step. In the mode "SameStep" its last
         # observation and info are told apart from the first ones of the new episode.
+        anybody = [None] * self.num_envs
         if self.autoreset_mode == AutoresetMode.SAME_STEP and over.any():
-            infos = self._infos(stepped, ~over)
-            infos = self._with_finals(infos, stepped, over)
-            infos = self._begin(over, [None] * self.num_envs, infos)
-            self._over[:] = False
+            last = last_rows(self._observed, over)
+            infos = same_step(infos, self._begin(over, anybody, {}), last, over)
         else:
-            infos = self._begin(begins, [None] * self.num_envs, infos)
+            infos = self._begin(begins, anybody, infos)
             self._over = over
         return (
             self._handed_out(),
@@ -216,18 +215,6 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
             if who[world]:
                 infos = self._add_info(infos, info, world)
         return infos
-
-    def _with_finals(self, infos: dict[str, Any], stepped: Stepped, over: Mask) -> dict[str, Any]:
-        finals = np.full(self.num_envs, None, object)
-        for world in _places(over):
-            finals[world] = {name: rows[world].copy() for name, rows in self._observed.items()}
-        told = {
-            "final_obs": finals,
-            "_final_obs": over.copy(),
-            "final_info": self._infos(stepped, over),
-            "_final_info": over.copy(),
-        }
-        return infos | told
 
     def _handed_out(self) -> Observed:
         if not self.copy:

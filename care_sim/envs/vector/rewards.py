@@ -4,9 +4,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from care_sim.batch.records import Records
 from care_sim.core.arrays import Floats, Mask
 from care_sim.envs.reward import KEEP_CLEAR_M, weighted
+from care_sim.loops.record_columns import Records
 
 
 class Rewards:
@@ -28,7 +28,8 @@ class Rewards:
     @property
     def need_bound(self) -> Mask:
         """(W,) where the full-scan bound counts and is not known yet."""
-        return np.isnan(self._bound_m) & bool(self._weights["gain"])
+        wanted: Mask = np.isnan(self._bound_m) & bool(self._weights["gain"])
+        return wanted
 
     def of(
         self, records: Records, detectable: Mask, over: Mask, who: Mask

@@ -47,7 +47,7 @@ class Exact(Bullet):
             self._exact = Millimetres(_kinds(known), self._grid)
 
         # Bodies that no ray can meet, as the car itself, are kept away.
-        hit = set(known.owners.tolist())
+        hit = set(known.tables[-1].tolist())
         self._exact.place(
             [_frame(known.poses[body]) if body in hit else AWAY for body in range(1, self._bodies)]
         )
@@ -78,19 +78,14 @@ def exactly() -> Iterator[str]:
 
 def _kinds(known: Primitives) -> list[BodyKind]:
     """The bodies from id 1 on, with the primitives that rays can meet."""
-    return [
-        _kind(known, np.flatnonzero(known.owners == body)) for body in range(1, len(known.poses))
-    ]
+    owners = known.tables[-1]
+    return [_kind(known, np.flatnonzero(owners == body)) for body in range(1, len(known.poses))]
 
 
 def _kind(known: Primitives, rows: Integers) -> BodyKind:
+    shapes, halves, offsets, _ = known.tables
     parts = tuple(
-        Part(
-            SHAPES[known.shapes[row]],
-            tuple(2 * known.halves[row]),
-            tuple(known.offsets[row]),
-            (0.5, 0.5, 0.5),
-        )
+        Part(SHAPES[shapes[row]], tuple(2 * halves[row]), tuple(offsets[row]), (0.5, 0.5, 0.5))
         for row in rows.tolist()
     )
     return BodyKind("body", None, (1.0, 1.0, 1.0), parts) if parts else _UNSEEN

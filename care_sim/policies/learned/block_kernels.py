@@ -8,25 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.compiled import compiled
-from care_sim.core.arrays import Integers, Mask
+from care_sim.core.arrays import Integers
 from care_sim.core.grid import Cells
 
 BlockPictures = NDArray[np.float32]
 """(k, B) one number per block, for k pictures."""
-
-
-class Objects(NamedTuple):
-    """The objects of W worlds, world after world: the cells of their `hulls` and `wedges`, with the
-    sizes of these sets and (W,) how many of them each world has; and which wedges are explained.
-    """
-
-    hulls: Cells
-    hull_sizes: Integers
-    hull_counts: Integers
-    wedges: Cells
-    wedge_sizes: Integers
-    wedge_counts: Integers
-    explained: Mask
 
 
 class AboveRoad(NamedTuple):
@@ -43,31 +29,33 @@ class AboveRoad(NamedTuple):
 
 @compiled()
 def draw_pictures(
-    objects: Objects,
+    cells: Cells,
+    sizes: Integers,
+    counts: Integers,
     scans: NDArray[np.float32],
     above: AboveRoad,
     blocks: Cells,
     marks: NDArray[np.uint8],
     out: NDArray[np.float32],
 ) -> None:
-    """Fill `out` (W, 6, B), zeros before, with the six pictures of W worlds: of `objects`, and of
+    """Fill `out` (W, 6, B), zeros before, with the six pictures of W worlds: of objects, and of
     their last `scans` (W, N) in metres.
 
-    `blocks` (N,) is the block of every cell, `marks` (N,) memory to work in.
+    The objects are sets of so many `sizes`, one after the other in `cells`, in three groups: those
+    of the first group, of which `counts[0, w]` are of world w, world after world, then the other
+    two. `blocks` (N,) is the block of every cell, `marks` (N,) memory to work in.
     """
-    hull = wedge = hull_place = wedge_place = 0
+    ends = np.cumsum(sizes)
+    firsts = counts.sum(axis=1)
+    firsts = np.cumsum(firsts) - firsts
     for world in range(len(out)):
-        # The hulls first: where they are is asked again when the returns are drawn.
         marks[:] = 0
-        for _ in range(objects.hull_counts[world]):
-            end = hull_place + objects.hull_sizes[hull]
-            _add_object(objects.hulls[hull_place:end], 0, blocks, marks, out[world])
-            hull, hull_place = hull + 1, end
-        for _ in range(objects.wedge_counts[world]):
-            end = wedge_place + objects.wedge_sizes[wedge]
-            group = 2 if objects.explained[wedge] else 1
-            _add_object(objects.wedges[wedge_place:end], group, blocks, marks, out[world])
-            wedge, wedge_place = wedge + 1, end
+        for group in range(len(counts)):
+            last = firsts[group] + counts[group, world]
+            for n in range(firsts[group], last):
+                own = cells[ends[n] - sizes[n] : ends[n]]
+                _add_object(own, group, blocks, marks, out[world])
+            firsts[group] = last
         _add_returns(scans[world], above, blocks, marks, out[world, 3:])
 
 

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from care_sim.base.checks import check_whole
 from care_sim.core.belief import Belief, Observation
 from care_sim.core.beliefs import Beliefs
+from care_sim.core.cell_sets import CellSets
 from care_sim.core.grid import Cells
-from care_sim.core.residual import explained_of, wedges_of
+from care_sim.core.residual import camera_layers_of
 from care_sim.core.rig import Rig
 from care_sim.perception.cluster.road import KERB_CLEARANCE_M
-from care_sim.policies.learned.block_kernels import AboveRoad, Objects, draw_pictures
+from care_sim.policies.learned.block_kernels import AboveRoad, draw_pictures
 from care_sim.policies.learned.tiling import Tiling
 
 CHANNELS = ("forecast", "residual", "explained", "nearness", "fired", "undetected")
@@ -66,13 +67,13 @@ class GridFeatures:
     def of_all(self, beliefs: Beliefs) -> dict[str, NDArray[np.float32]]:
         """The same of W worlds: `grid` (W, channels * rows * columns) and `ego` (W, 4)."""
         out = np.zeros((len(beliefs), len(CHANNELS), self.rows * self.columns), np.float32)
-        hulls, wedges = beliefs.hulls, wedges_of(beliefs)
-        objects = Objects(
-            *(hulls.sets.cells, hulls.sets.sizes, hulls.counts),
-            *(wedges.sets.cells, wedges.sets.sizes, wedges.counts),
-            explained_of(beliefs),
-        )
-        draw_pictures(objects, beliefs.ranges, self._above, self._blocks, self._marks, out)
+        # In the order of the first three channels; where the first, the hulls, lie is asked again
+        # when the returns are drawn.
+        groups = [beliefs.hulls, *camera_layers_of(beliefs)]
+        sets = CellSets.joined([group.sets for group in groups])
+        counts = np.array([group.counts for group in groups])
+        told = sets.cells, sets.sizes, counts, beliefs.ranges
+        draw_pictures(*told, self._above, self._blocks, self._marks, out)
         # Shares are sums of float32 parts, and a full block may end a little above 1.
         grid = np.minimum(out, 1, out=out).reshape(len(beliefs), -1)
         return {"grid": grid, "ego": self._egos(beliefs)}

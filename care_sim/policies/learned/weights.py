@@ -87,6 +87,14 @@ class Card:
         return card
 
 
+_HINTS = {
+    "budget": "; those trained with several budgets fit any",
+    "grid": (
+        "; what was learned belongs to the cells of that grid: play the sensor set-up that has it, "
+        "or a policy that is not tagged `learned` in `care-sim policies`"
+    ),
+}
+"""Why weights do not fit, and what does."""
 _TYPES: dict[str, Any] = {column.name: str for column in fields(Card)}
 _TYPES |= {
     "grid": dict,
@@ -116,7 +124,7 @@ class Weights:
         for name, value in needed.items():
             if getattr(card, name) != value:
                 has, wanted = (_told(name, it, rig) for it in (getattr(card, name), value))
-                hint = "; those trained with several budgets fit any" if name == "budget" else ""
+                hint = _HINTS.get(name, "")
                 raise InvalidInput(
                     f"weights {self.path}: {name} is {has}, needed is {wanted}{hint}"
                 )

@@ -19,7 +19,7 @@ from care_sim.reports.table import Table
 from care_sim.study.designs.realism import CONDITIONS, HEADLINES, IDEAL, LATE_CAMERA, Headline
 from care_sim.study.designs.variants import Variant
 from care_sim.study.rows.reading import detections
-from care_sim.study.run_config import REFERENCE, Row
+from care_sim.study.run_config import FULL, REFERENCE, Row
 
 
 def realism_tables(rows: Sequence[Row]) -> list[Table]:
@@ -50,7 +50,10 @@ class RealismEpisodes(GroupRows):
             ]
             for headline in HEADLINES
         }
-        self._headlines = {each.name: each for each in HEADLINES if self._policies[each.name]}
+        # A full scan is of every table of its scenario: alone it is of one that was not played.
+        self._headlines = {
+            each.name: each for each in HEADLINES if {*self._policies[each.name]} - {FULL}
+        }
         self.conditions = [level for level in CONDITIONS if self._is_played(level)]
 
     def orders(self) -> dict[str, list[Order]]:

@@ -148,6 +148,7 @@ def _changes(study: RealismStudy) -> Table:
         f"{study.title}: orders that change, {study.unit}",
         ("order", "condition", IDEAL.label, "under the condition", "verdict"),
         tuple(lines),
+        names=2,
     )
 
 

@@ -11,8 +11,7 @@ from care_sim.study.designs.variants import USUAL_VARIANT, Place, Variant
 from care_sim.study.run_config import Row
 
 _LEVEL_COLUMNS = ("level", "first detection m", "quartiles m", "braked")
-_MOST_SHOWN = 2
-"""References that 80 characters of a terminal leave room for."""
+_FILES_ONLY = _LEVEL_COLUMNS[2:]
 
 
 def ablation_tables(rows: Sequence[Row]) -> list[Table]:
@@ -29,9 +28,6 @@ def _table(ablation: Ablation, study: StudyCells) -> Table:
         *(f"minus {study.marked(policy)}" for policy in beside),
     )
     lines = [line for place in ABLATION_PLACES for line in _block(ablation, place, beside, study)]
-    # The files show every column. A terminal lacks the room for quartiles, braking and further
-    # policies.
-    hidden = (*_LEVEL_COLUMNS[2:], *columns[len(_LEVEL_COLUMNS) + 1 + _MOST_SHOWN :])
     notes = (*ablation.notes, *study.notes(beside))
     return Table(
         f"{ablation.policy}: {ablation.title}",
@@ -39,7 +35,7 @@ def _table(ablation: Ablation, study: StudyCells) -> Table:
         tuple(lines),
         notes,
         (),
-        hidden,
+        _FILES_ONLY,
         _LEVEL_COLUMNS,
     )
 

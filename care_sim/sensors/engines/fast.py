@@ -64,7 +64,6 @@ class Fast:
 
     def _cast_ascending(self, sensor: Frame, cells: Cells) -> tuple[Floats, Integers]:
         world = self._world
-        parts = world.primitives
         # The fan is about the grid's own axes: the rays are cast from a frame that has them.
         if self._tilt is not None:
             sensor = sensor.holding(np.zeros(3), self._tilt)
@@ -75,7 +74,7 @@ class Fast:
             self._fan,
             self._spacing,
             np.array(pose, float),
-            (parts.shapes, parts.halves, parts.offsets, parts.owners),
-            parts.poses,
+            world.primitives.tables,
+            world.primitives.poses,
             world.ground,
         )

@@ -14,13 +14,11 @@ from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers
 from care_sim.sensors.engines.box_kernels import moved_up, note_pixels
 from care_sim.sensors.engines.silhouette_kernels import (
-    Lens,
-    Meshes,
-    PlacedCamera,
     Silhouettes,
     lay_silhouettes,
     room_for,
 )
+from care_sim.sensors.engines.view_kernels import Lens, Meshes, PlacedCamera
 from care_sim.world.bullet import NO_BODY, PixelWindow
 from care_sim.world.polyhedra import Tables
 
@@ -120,10 +118,11 @@ def draw_silhouettes(
         if len(picture):
             for column in range(left, right):
                 picture[row, column - left] = ids[column]
+        low, high = right, left
         for n in range(counts[row]):
-            first, end = stretches[row, n, 0], stretches[row, n, 1]
-            for column in range(np.uint64(first), np.uint64(end)):
-                ids[column], inverse_depths[column] = NO_BODY, least
+            low, high = min(low, stretches[row, n, 0]), max(high, stretches[row, n, 1])
+        for column in range(np.uint64(low), np.uint64(high)):
+            ids[column], inverse_depths[column] = NO_BODY, least
     return moved_up(found)
 
 
@@ -143,15 +142,14 @@ def _lay_surface(
     """
     # A ray is inside a convex body once it has passed all planes that face the camera. The farthest
     # of them has the least inverse depth. Three faces at once, and several pixels.
-    for column in range(np.uint64(first), np.uint64(end)):
-        surface[column] = math.inf
     for n in range(faces[0], faces[1], 3):
         a, b, c = facing[n, 0], facing[n + 1, 0], facing[n + 2, 0]
         a_down, b_down, c_down = facing[n, 1] * v, facing[n + 1, 1] * v, facing[n + 2, 1] * v
         a_start, b_start, c_start = facing[n, 2], facing[n + 1, 2], facing[n + 2, 2]
         for column in range(np.uint64(first), np.uint64(end)):
             u = numbers[column]
-            least = min(surface[column], a_start + a * u + a_down)
+            least = math.inf if n == faces[0] else surface[column]
+            least = min(least, a_start + a * u + a_down)
             least = min(least, b_start + b * u + b_down)
             surface[column] = min(least, c_start + c * u + c_down)
 

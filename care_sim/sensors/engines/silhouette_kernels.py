@@ -14,50 +14,18 @@ import numpy as np
 
 from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers
-from care_sim.sensors.engines.geometry_kernels import Axes, Vector, body_axes, dot
+from care_sim.sensors.engines.geometry_kernels import dot
+from care_sim.sensors.engines.view_kernels import (
+    BodyInCamera,
+    Lens,
+    Meshes,
+    PlacedCamera,
+    body_in_camera,
+    is_outside,
+    rectangle_of,
+    row_of,
+)
 from care_sim.world.bullet import PixelWindow
-
-ROUNDING_PX = 0.1
-"""Room for rounding around the corners of a polyhedron in a picture: pixels."""
-
-
-class PlacedCamera(NamedTuple):
-    """A camera in the world: its `place` (3,) and its `axes` (3, 3), rows forward, left and up."""
-
-    place: Floats
-    axes: Floats
-
-
-class Lens(NamedTuple):
-    """Focal length and principal point, `across` from the left and `down` from the top, pixels."""
-
-    focal: float
-    across: float
-    down: float
-
-
-class Meshes(NamedTuple):
-    """The polyhedra of parts one after the other, in the frames of their bodies, as in
-    `care_sim.world.polyhedra.Polyhedra.tables`: `corners` (c, 3); `faces` (f, 4), outward normals
-    and distances from the body's origin; `edges` (e, 2), the two faces that meet in each, counted
-    within the part; `starts` (k + 1, 3), where the rows of a part begin in these three; `owners`
-    (k,) body ids; `reaches` (k,) how far each part reaches from the body's origin.
-    """
-
-    corners: Floats
-    faces: Floats
-    edges: Integers
-    starts: Integers
-    owners: Integers
-    reaches: Floats
-
-
-class BodyInCamera(NamedTuple):
-    """From the frame of a body to that of a camera: first `turn`, row by row, then `shift`."""
-
-    turn: Axes
-    shift: Vector
-
 
 Outline = tuple[Floats, Floats, Floats]
 """Of rows: where each is in the picture, and the first and the last column inside, not rounded."""
@@ -134,120 +102,29 @@ def lay_silhouettes(
     place = 0
     for part in range(len(table.owners)):
         owner = table.owners[part]
-        if _is_outside(eye, poses, owner, table.reaches[part], optics, view):
+        if is_outside(eye, poses, owner, table.reaches[part], optics, view):
             continue
-        body = _seen_from(eye, poses, owner)
+        body = body_in_camera(eye, poses, owner)
         corners = starts[part, 0], starts[part + 1, 0]
-        held = _rectangle(table.corners, *corners, body, optics, nearest)
+        held = rectangle_of(table.corners, *corners, body, optics, nearest)
         upper, lower = max(held[1], top), min(held[3], bottom)
         if upper >= lower or max(held[0], left) >= min(held[2], right):
             continue
 
         faces = starts[part + 1, 1] - starts[part, 1]
         _lay_planes(table.faces, starts[part, 1], faces, body, optics, seen.planes)
-        seen.owners[place] = owner
-        seen.starts[place + 1] = _take_facing(seen.planes, faces, seen.starts[place], seen.facing)
+        begin = seen.starts[place]
+        end = _take_facing(seen.planes, faces, begin, seen.facing)
+        # A camera inside of a body looks through it.
+        if begin == end:
+            continue
+        seen.owners[place], seen.starts[place + 1] = owner, end
         _begin_outline(upper, lower - upper, left, right, seen.outline)
         edges = starts[part, 2], starts[part + 1, 2]
         lines = _lay_lines(table.edges, *edges, seen.planes, seen.lines)
         _cut_outline(seen.lines, lines, lower - upper, seen.outline)
         _add_stretches(place, upper - top, lower - upper, seen)
         place += 1
-
-
-@compiled()
-def _is_outside(
-    camera: PlacedCamera,
-    poses: Floats,
-    body: int,
-    reach: float,
-    lens: Lens,
-    view: tuple[float, float, int, int],
-) -> bool:
-    """Whether a ball of radius `reach` about the position of a body lies wholly outside of a view:
-    nearer or farther than its first two numbers, or beside the columns of the other two.
-    """
-    nearest, farthest, first, last = view
-    place = camera.place
-    away = _away(poses, body, place)
-    depth = dot(camera.axes[0], away)
-    if depth + reach < nearest or depth - reach > farthest:
-        return True
-    # The plane of the eye and a column u is left * focal = (across - u) * depth. A column more on
-    # either side is room for rounding.
-    left = dot(camera.axes[1], away) * lens.focal
-    before, beyond = lens.across - first + 1.0, lens.across - last - 1.0
-    return left - before * depth > reach * math.hypot(
-        lens.focal, before
-    ) or beyond * depth - left > reach * math.hypot(lens.focal, beyond)
-
-
-@compiled()
-def _seen_from(camera: PlacedCamera, poses: Floats, number: int) -> BodyInCamera:
-    """A body as the camera sees it."""
-    body = body_axes(poses[number, 3], poses[number, 4], poses[number, 5], poses[number, 6])
-    away = _away(poses, number, camera.place)
-    # A point p of the body lies at position + body . p in the world. Told along the axes of the
-    # camera, from its place, that is turn . p + shift.
-    ahead, left, up = _row(camera.axes, 0), _row(camera.axes, 1), _row(camera.axes, 2)
-    turn = _along_each(ahead, body), _along_each(left, body), _along_each(up, body)
-    return BodyInCamera(turn, _along_each(away, (ahead, left, up)))
-
-
-@compiled()
-def _away(poses: Floats, body: int, place: Floats) -> Vector:
-    """From a place (3,) to the position of a body."""
-    return poses[body, 0] - place[0], poses[body, 1] - place[1], poses[body, 2] - place[2]
-
-
-@compiled()
-def _along_each(vector: Vector, axes: Axes) -> Vector:
-    """The parts of a vector along three axes."""
-    return dot(axes[0], vector), dot(axes[1], vector), dot(axes[2], vector)
-
-
-@compiled()
-def _row(table: Floats, n: int) -> Vector:
-    """The first three numbers of a row. Numbers at hand: a view on an array counts references."""
-    return table[n, 0], table[n, 1], table[n, 2]
-
-
-@compiled()
-def _rectangle(
-    corners: Floats, begin: int, end: int, body: BodyInCamera, lens: Lens, nearest: float
-) -> PixelWindow:
-    """The columns and rows of a polyhedron in the picture, as a window that ends before its right
-    and bottom; the whole picture when it reaches through the plane at the depth `nearest`.
-    """
-    # The picture of a convex body before the camera is bounded by those of its corners.
-    turn = body.turn
-    shift = body.shift
-    least_u, most_u, least_v, most_v = math.inf, -math.inf, math.inf, -math.inf
-    behind = 0
-    for n in range(begin, end):
-        corner = _row(corners, n)
-        depth = shift[0] + dot(turn[0], corner)
-        if depth < nearest:
-            behind += 1
-        else:
-            scale = lens.focal / depth
-            u = lens.across - scale * (shift[1] + dot(turn[1], corner))
-            v = lens.down - scale * (shift[2] + dot(turn[2], corner))
-            least_u, most_u = min(least_u, u), max(most_u, u)
-            least_v, most_v = min(least_v, v), max(most_v, v)
-
-    # The picture is as wide and as high as twice the principal point lies across and down. Column i
-    # is sampled at u = i and row j at v = j + 1: many a thin body far away lies between two of
-    # them.
-    width, height = 2 * lens.across, 2 * lens.down
-    if behind == end - begin:
-        return 0, 0, 0, 0
-    if behind > 0:
-        return 0, 0, math.ceil(width), math.ceil(height)
-    first = math.ceil(min(max(least_u, 0.0), width) - ROUNDING_PX)
-    upper = math.ceil(min(max(least_v, 0.0), height) - 1.0 - ROUNDING_PX)
-    last = math.floor(max(min(most_u, width), 0.0) + ROUNDING_PX) + 1
-    return first, upper, last, math.floor(max(min(most_v, height), 0.0) - 1.0 + ROUNDING_PX) + 1
 
 
 @compiled(error_model="numpy")
@@ -267,7 +144,7 @@ def _lay_planes(
         # A point p of the body is q = turn . p + shift in the camera's frame. The plane n . p = d
         # of the body becomes n' . q = h there, with the normal n' = turn . n, here its parts
         # (ahead, left, up), and h = d + n' . shift, here `offset`.
-        normal = _row(faces, begin + n)
+        normal = row_of(faces, begin + n)
         ahead, left, up = dot(turn[0], normal), dot(turn[1], normal), dot(turn[2], normal)
         offset = faces[begin + n, 3] + ahead * shift[0] + left * shift[1] + up * shift[2]
 
@@ -336,7 +213,7 @@ def _cut_outline(lines: Floats, count: int, rows: int, outline: Outline) -> None
     # or none. All rows in one loop: so the processor takes several at a time.
     height, first, last = outline
     for line in range(count):
-        slope, rise, start = _row(lines, line)
+        slope, rise, start = row_of(lines, line)
         if slope > 0.0:
             for n in range(rows):
                 first[n] = max(first[n], -(start + rise * height[n]) / slope)

@@ -95,6 +95,11 @@ class Headline(Group):
     first_seed: int = 0
     most_seeds: int | None = None
 
+    @property
+    def option(self) -> str:
+        """Its name on a command line: `dense-3`."""
+        return self.name.removesuffix("%").replace(", ", "-")
+
     def seeds(self, asked: Sequence[int]) -> list[int]:
         """Those that it plays. Raises InvalidInput where they are of another split."""
         played = [seed + self.first_seed for seed in asked[: self.most_seeds]]
@@ -206,13 +211,15 @@ def film_conditions(source: Source, scenes: Sequence[Scene], budget: float) -> F
     )
 
 
-def realism_study(seeds: Sequence[int], also: Sequence[str] = ()) -> list[EpisodeConfig]:
-    """Every headline table of the closed loop under every condition; `also` are further policies
-    of all.
+def realism_study(
+    seeds: Sequence[int], also: Sequence[str] = (), headlines: Sequence[Headline] = HEADLINES
+) -> list[EpisodeConfig]:
+    """Headline tables of the closed loop under every condition; `also` are further policies of
+    all.
     """
     made: list[EpisodeConfig] = []
     # All seeds are looked at before the first configuration is made.
-    for headline, worlds in [(each, each.seeds(seeds)) for each in HEADLINES]:
+    for headline, worlds in [(each, each.seeds(seeds)) for each in headlines]:
         policies = dict.fromkeys([*headline.policies, *also])
         place = headline.places[0]._replace(parameters=())
         for level in headline_conditions(headline).levels:

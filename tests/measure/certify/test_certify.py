@@ -169,7 +169,7 @@ MADE = replace(
 
 
 def moved_by_a_millimetre(monkeypatch):
-    step = World._step
+    step = World.step
 
     def moved(self, acceleration):
         passage = step(self, acceleration)
@@ -177,7 +177,7 @@ def moved_by_a_millimetre(monkeypatch):
             self.ego._vehicle.position[0] += 0.001
         return passage
 
-    monkeypatch.setattr(World, "_step", moved)
+    monkeypatch.setattr(World, "step", moved)
 
 
 def one_box_a_pixel_wider(monkeypatch):

@@ -93,6 +93,7 @@ RIGS = {
     "3%": Rig(cameras=(FRONT_CAMERA,), budget=492),
     "no reserve": Rig(cameras=(FRONT_CAMERA,), budget=200, reserve_fraction=0.0),
     "ordered": Rig(cameras=(FRONT_CAMERA,), budget=492, cell_order="core-spread"),
+    "tilted": Rig(AngularGrid(pitch=0.05, roll=-0.02), (FRONT_CAMERA,), budget=492),
     "full": Rig(AngularGrid(columns=64, rows=8), (FRONT_CAMERA,), budget=512),
 }
 

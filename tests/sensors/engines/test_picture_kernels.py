@@ -128,6 +128,23 @@ def test_a_window_is_cut_out_of_the_picture(bullet):
     assert drawn(bullet, window=(0, 0, 0, 0))[1].size == 0
 
 
+@pytest.mark.parametrize("window", [WHOLE, (60, 40, 201, 120), (0, 0, 0, 0)])
+def test_the_boxes_are_those_of_the_picture(window):
+    """Read off row by row, half-hidden bodies of many parts among them."""
+    boxes = 0
+    for seed in range(20):
+        world, sensor = crowd(seed)
+        engine = Fast(world, AngularGrid())
+        left, top, _, _ = window
+        expected = visible_boxes(engine.body_ids(FRONT_CAMERA, sensor, window))
+        expected += [0, left, top, left, top, 0]
+        seen = engine.visible_boxes(FRONT_CAMERA, sensor, window)
+        world.close()
+        assert seen.tolist() == expected.tolist()
+        boxes += len(seen)
+    assert boxes > 40 or window == (0, 0, 0, 0)
+
+
 def test_polyhedra_are_closed():
     """Euler: corners - edges + faces = 2."""
     for shape, size in (

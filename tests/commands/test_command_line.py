@@ -1,0 +1,38 @@
+"""A command tells the line that runs it: parsed again it is the same command."""
+
+import shlex
+from pathlib import Path
+
+import pytest
+
+from care_sim.cli import parsed_command
+from care_sim.commands.shared.command_line import command_line
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "sweep",
+        "sweep --seeds 7 7 --scenarios dense --no-floor --out 'my runs/x y' --workers 1",
+        "sweep --false-negative-rates 0.1 0.2 --scenario-parameters vehicles=7 gap_m=0.8,1.2",
+        "sweep --camera-latency-s 0.12 --firing tiles:4x8 --lidar-dead-rows 3 4 --force",
+        "validate dense --budgets 0.1 --factors mirrored=drawn ego_speed_mps=12.2,12.8",
+        "ablate --source streets --scenes 3 --budgets 0.03",
+        "reproduce --also",
+        "ncap --tests CPNCO-50 --step-kph 5 --lidar-stated-range-m 40 --visibility-m 50",
+        "protocol --source nuscenes:data --split val --sweeps 2 --camera-detections boxes.json",
+        "realism --tables dense-3 --seeds 2",
+    ],
+)
+def test_the_line_of_a_command_is_the_command(line):
+    command = parsed_command(shlex.split(line))
+    told = shlex.split(command_line(command))
+    assert told[0] == "care-sim"
+    assert parsed_command(told[1:]) == command
+    assert len(told) == 1 + len(shlex.split(line))
+
+
+def test_paths_are_told_as_a_shell_takes_them():
+    command = parsed_command(["crowding", "--out", "a b"])
+    assert command.out == Path("a b")
+    assert command_line(command) == "care-sim crowding --out 'a b'"
