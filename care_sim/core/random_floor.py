@@ -11,8 +11,7 @@ from care_sim.base.compiled import compiled
 from care_sim.core.pcg64 import WordStreams, refill, seed_stream, word_streams
 
 FloorCells = NDArray[np.int32]
-"""(N,) all cells in a random order. Half as wide as `Cells`, they are shuffled in a sixth less time.
-"""
+"""(N,) all cells in a random order: half as wide as `Cells`, and shuffled in a sixth less time."""
 _LOOKED_AT = 128
 """Words that are looked at together."""
 
