@@ -2,7 +2,7 @@
 then done once for all of them.
 """
 
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +15,7 @@ from care_sim.core.rig import Rig
 from care_sim.core.types import ImageDetections, Tracks
 
 
-@dataclass(frozen=True)
-class Beliefs:
+class Beliefs(NamedTuple):
     """The `detections` and `tracks` of W worlds, those of one world after those of another; how
     many are of each, `detected` and `tracked` (W,); and the `budgets` (W,) in cells.
     """
@@ -58,7 +57,7 @@ class Beliefs:
 
     def unturned(self) -> "Beliefs":
         """The same as if no car had turned since its pictures."""
-        return replace(self, detections=self.detections.unturned())
+        return self._replace(detections=self.detections.unturned())
 
 
 def check_observed(observation: Observation, rig: Rig, worlds: int) -> None:

@@ -118,7 +118,7 @@ class RowPolicy(Policy):
 
     def demand(self, belief: Belief) -> Demand:
         """The stages of one world."""
-        exploitation, *layers = (stage.sets for stage in self.stages(Beliefs.of(belief)))
+        exploitation, *layers = [stage.sets for stage in self.stages(Beliefs.of(belief))]
         return Demand(exploitation, layers)
 
     def hulls(self, beliefs: Beliefs) -> WorldSets:
