@@ -61,7 +61,7 @@ def _fire(
     drawn in each world.
     """
     chosen = np.empty(scores.shape[1], np.bool_)
-    floor = np.empty(scores.shape[1], np.int64)
+    floor = np.empty(scores.shape[1], np.int32)
     for world in range(len(scores)):
         count = 0
         if live[world]:

@@ -15,6 +15,12 @@ from care_sim.core.rig import Rig
 from care_sim.core.types import ImageDetections, Tracks
 from care_sim.core.world_sets import WorldSets, kept_of_each
 
+# Numbers of a module are what compiled code can hold.
+_CLASS, _CAMERA = ImageDetections.CLASS, ImageDetections.CAMERA
+_YAW_CHANGE, _LABEL = ImageDetections.YAW_CHANGE, Tracks.CLASS
+_LEFT, _TOP, _RIGHT, _BOTTOM = range(ImageDetections.BOX.start, ImageDetections.BOX.stop)
+_X, _Y, _Z = range(Tracks.CENTRE.start, Tracks.CENTRE.stop)
+
 
 def camera_layers(belief: Belief, rig: Rig) -> tuple[CellSets, CellSets]:
     """(U, M) of Algorithm 2: the wedges of unexplained and of explained detections.
@@ -80,18 +86,8 @@ def _explaining(
     (detections, detected), (tracks, tracked) = seen, known
     if not len(detections):
         return np.zeros(0, np.int64)
-    # One layout of all arrays, so that compiled code is compiled once.
-    return _first_explaining(
-        np.ascontiguousarray(detections.boxes),
-        np.ascontiguousarray(detections.classes),
-        np.ascontiguousarray(detections.cameras),
-        np.ascontiguousarray(detections.yaw_changes),
-        np.ascontiguousarray(tracks.boxes[:, :3]),
-        np.ascontiguousarray(tracks.classes),
-        detected,
-        tracked,
-        rig.camera_models,
-    )
+    tables = detections.rows(), tracks.rows()
+    return _first_explaining(*tables, detected, tracked, rig.camera_models)
 
 
 def wedges(detections: ImageDetections, rig: Rig) -> CellSets:
@@ -135,41 +131,32 @@ def _turned_since(vectors: Floats, detections: ImageDetections) -> Floats:
 
 @compiled()
 def _first_explaining(
-    boxes: Floats,
-    classes: Integers,
-    cameras: Integers,
-    yaw_changes: Floats,
-    centres: Floats,
-    labels: Integers,
-    detected: Integers,
-    tracked: Integers,
-    models: CameraModels,
+    detections: Floats, tracks: Floats, detected: Integers, tracked: Integers, models: CameraModels
 ) -> Integers:
     """Eq. 2: (n,) the row of the first forecast of the class of each detection whose centre lies in
     its image box, -1 without one.
 
-    Detections are image `boxes` (n, 4) with their `classes`, `cameras` and `yaw_changes` since
-    their pictures. Forecasts are `centres` (m, 3) with their classes, `labels`. World after world
-    has so many `detected` (W,) and `tracked` (W,), and is matched by itself.
+    Of `detections` (n, 9) and forecasts, `tracks` (m, 13), world after world has so many `detected`
+    (W,) and `tracked` (W,), and is matched by itself.
     """
     # Forecasts come nearest first, so the first match is the nearest one.
-    found = np.full(len(boxes), -1)
+    found = np.full(len(detections), -1)
     n = first = 0
     for world in range(len(detected)):
         last = n + detected[world]
         end = first + tracked[world]
         while n < last:
-            left, top, right, bottom = boxes[n]
-            camera = model_of(models, cameras[n])
-            cos, sin = math.cos(yaw_changes[n]), math.sin(yaw_changes[n])
+            one = detections[n]
+            camera = model_of(models, int(one[_CAMERA]))
+            cos, sin = math.cos(one[_YAW_CHANGE]), math.sin(one[_YAW_CHANGE])
             for m in range(first, end):
-                if labels[m] == classes[n]:
+                if tracks[m, _LABEL] == one[_CLASS]:
                     # The forecast is of now and the picture older: the centre is turned back to
                     # where the car's axes were then.
-                    x, y, z = centres[m]
+                    x, y, z = tracks[m, _X], tracks[m, _Y], tracks[m, _Z]
                     u, v, _ = pixel(cos * x - sin * y, sin * x + cos * y, z, camera)
                     # Behind the camera a pixel is NaN, which lies in no box.
-                    if left <= u <= right and top <= v <= bottom:
+                    if one[_LEFT] <= u <= one[_RIGHT] and one[_TOP] <= v <= one[_BOTTOM]:
                         found[n] = m
                         break
             n += 1

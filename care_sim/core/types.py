@@ -5,9 +5,10 @@ z, length, width, height, yaw. Velocities are over ground, in sensor axes. Nothi
 body id of the simulator: truth stays in the world and in the scoring.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,8 +56,57 @@ class Detections:
         return len(self.classes)
 
 
+class _Table:
+    """Columns of one table. Made of its rows it reads each column off them when that is first asked
+    for, since few ask for all. `len()` is the number of rows n.
+    """
+
+    COLUMNS: ClassVar[tuple[str, ...]]
+    _PLACES: ClassVar[Mapping[str, int | slice]]
+    """Where in COLUMNS the attributes are."""
+    _WHOLE: ClassVar[tuple[str, ...]]
+    """Those that are whole numbers."""
+
+    @classmethod
+    def from_checked_rows(cls, table: Floats) -> Self:
+        """The columns of rows (n, k) without padding, whose numbers are known to be in order. The
+        table is theirs from now on.
+        """
+        made = cls.__new__(cls)
+        vars(made).update(_table=table, _rows=_shared(table.view()))
+        return made
+
+    if not TYPE_CHECKING:  # for which any name would then be an attribute
+
+        def __getattr__(self, name: str) -> Floats | Integers:
+            if name not in self._PLACES:
+                raise AttributeError(f"{type(self).__name__} has no attribute {name!r}")
+            column = self._table[:, self._PLACES[name]]
+            vars(self)[name] = column.astype(np.int64) if name in self._WHOLE else column
+            return vars(self)[name]
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def take(self, rows: NDArray[np.int64] | Mask) -> Self:
+        """Some of the rows, by index or mask."""
+        return self.from_checked_rows(self._rows[rows])
+
+    def rows(self) -> Floats:
+        """(n, k) table in the order of `COLUMNS`, read-only."""
+        return self._rows
+
+    @cached_property
+    def _rows(self) -> Floats:
+        columns = [getattr(self, name) for name in self._PLACES]
+        table = np.empty((len(columns[0]), len(self.COLUMNS)))
+        for place, column in zip(self._PLACES.values(), columns, strict=True):
+            table[:, place] = column
+        return _shared(table)
+
+
 @dataclass(frozen=True)
-class ImageDetections:
+class ImageDetections(_Table):
     """2D camera detections as columns of one table; `len()` is their number n."""
 
     classes: Integers
@@ -78,9 +128,11 @@ class ImageDetections:
     CLASS, CONFIDENCE, LEFT, CAMERA, AGE, YAW_CHANGE = 0, 1, 2, 6, 7, 8
     BOX = slice(2, 6)
     """Places in COLUMNS."""
-
-    def __len__(self) -> int:
-        return len(self.classes)
+    _PLACES = {  # noqa: RUF012 (a constant)
+        "classes": CLASS, "confidences": CONFIDENCE, "boxes": BOX, "cameras": CAMERA, "ages": AGE,
+        "yaw_changes": YAW_CHANGE,
+    }  # fmt: skip
+    _WHOLE = ("classes", "cameras")
 
     @classmethod
     def from_rows(cls, rows: NDArray[np.floating]) -> "ImageDetections":
@@ -92,26 +144,6 @@ class ImageDetections:
         table: Floats = rows[rows[:, cls.CLASS] >= 0].astype(np.float64)
         _check_whole_columns("classes and cameras", table[:, [cls.CLASS, cls.CAMERA]])
         return cls.from_checked_rows(table)
-
-    @classmethod
-    def from_checked_rows(cls, table: Floats) -> "ImageDetections":
-        """The columns of rows (n, 9) without padding, whose numbers are known to be in order. The
-        table is theirs from now on.
-        """
-        made = cls(
-            classes=table[:, cls.CLASS].astype(np.int64),
-            confidences=table[:, cls.CONFIDENCE],
-            boxes=table[:, cls.BOX],
-            cameras=table[:, cls.CAMERA].astype(np.int64),
-            ages=table[:, cls.AGE],
-            yaw_changes=table[:, cls.YAW_CHANGE],
-        )
-        vars(made)["_rows"] = _shared(table)
-        return made
-
-    def take(self, rows: NDArray[np.int64] | Mask) -> "ImageDetections":
-        """Some of the detections, by index or mask."""
-        return ImageDetections.from_checked_rows(self.rows()[rows])
 
     def aged(self, age_s: float, yaw_change: float) -> "ImageDetections":
         """The same detections of a picture that was taken `age_s` seconds ago, since when the car
@@ -126,24 +158,9 @@ class ImageDetections:
         """The same detections as if the car had not turned since their pictures."""
         return replace(self, yaw_changes=np.zeros(len(self)))
 
-    def rows(self) -> Floats:
-        """(n, 9) table in the order of `COLUMNS`, read-only."""
-        return self._rows
-
-    @cached_property
-    def _rows(self) -> Floats:
-        table = np.empty((len(self), len(self.COLUMNS)))
-        table[:, self.CLASS] = self.classes
-        table[:, self.CONFIDENCE] = self.confidences
-        table[:, self.BOX] = self.boxes
-        table[:, self.CAMERA] = self.cameras
-        table[:, self.AGE] = self.ages
-        table[:, self.YAW_CHANGE] = self.yaw_changes
-        return _shared(table)
-
 
 @dataclass(frozen=True)
-class Tracks:
+class Tracks(_Table):
     """Tracked objects as columns of one table, the nearest first; `len()` is their number n."""
 
     ids: Integers
@@ -166,9 +183,11 @@ class Tracks:
     ID, CLASS, YAW, MISSES, HITS = 0, 1, 8, 11, 12
     CENTRE, BOX, VELOCITY = slice(2, 5), slice(2, 9), slice(9, 11)
     """Places in COLUMNS."""
-
-    def __len__(self) -> int:
-        return len(self.ids)
+    _PLACES = {  # noqa: RUF012 (a constant)
+        "ids": ID, "classes": CLASS, "boxes": BOX, "velocities": VELOCITY, "misses": MISSES,
+        "hits": HITS,
+    }  # fmt: skip
+    _WHOLE = ("ids", "classes", "misses", "hits")
 
     @property
     def ranges(self) -> Floats:
@@ -187,52 +206,9 @@ class Tracks:
         _check_whole_columns("ids, classes, misses and hits", table[:, whole])
         return cls.from_checked_rows(table)
 
-    @classmethod
-    def from_checked_rows(cls, table: Floats) -> "Tracks":
-        """The columns of rows (n, 13) without padding, whose numbers are known to be in order. The
-        table is theirs from now on.
-        """
-        made = cls(
-            ids=table[:, cls.ID].astype(np.int64),
-            classes=table[:, cls.CLASS].astype(np.int64),
-            boxes=table[:, cls.BOX],
-            velocities=table[:, cls.VELOCITY],
-            misses=table[:, cls.MISSES].astype(np.int64),
-            hits=table[:, cls.HITS].astype(np.int64),
-        )
-        vars(made)["_rows"] = _shared(table)
-        return made
-
-    def take(self, rows: NDArray[np.int64] | Mask) -> "Tracks":
-        """Some of the tracks, by index or mask."""
-        # Each column by its name: a loop over `fields` would take a third longer.
-        return Tracks(
-            self.ids[rows],
-            self.classes[rows],
-            self.boxes[rows],
-            self.velocities[rows],
-            self.misses[rows],
-            self.hits[rows],
-        )
-
     def moved(self, boxes: Floats, velocities: Floats) -> "Tracks":
         """The same tracks at other boxes (n, 7), with other velocities (n, 2)."""
         return Tracks(self.ids, self.classes, boxes, velocities, self.misses, self.hits)
-
-    def rows(self) -> Floats:
-        """(n, 13) table in the order of `COLUMNS`, read-only."""
-        return self._rows
-
-    @cached_property
-    def _rows(self) -> Floats:
-        table = np.empty((len(self), len(self.COLUMNS)))
-        table[:, self.ID] = self.ids
-        table[:, self.CLASS] = self.classes
-        table[:, self.BOX] = self.boxes
-        table[:, self.VELOCITY] = self.velocities
-        table[:, self.MISSES] = self.misses
-        table[:, self.HITS] = self.hits
-        return _shared(table)
 
 
 def _check_whole_columns(what: str, numbers: Floats) -> None:

@@ -263,13 +263,12 @@ class ClosedLoop:
             self._photograph(camera, sensor, boxes) for camera in self.rig.cameras
         )
         # The scoring sees the world through the cameras as designed, the detector through those
-        # that are mounted; without an error of the mount one picture serves both.
-        taken = [
-            picture if mounted == nominal else self._photograph(mounted, sensor, boxes)
-            for picture, nominal, mounted in zip(
-                self.pictures, self.rig.cameras, self._camera.mounted, strict=True
+        # that are mounted; without an error of the mount the same pictures serve both.
+        taken = self.pictures
+        if self._camera.mounted != self.rig.cameras:
+            taken = tuple(
+                self._photograph(camera, sensor, boxes) for camera in self._camera.mounted
             )
-        ]
         self.seen = faultless_detections(taken, self._classes)
 
         # The boxes that arrive, late and with errors, and the forecasts: all that is known when the

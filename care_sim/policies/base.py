@@ -118,7 +118,8 @@ class RowPolicy(Policy):
 
     def demand(self, belief: Belief) -> Demand:
         """The stages of one world."""
-        exploitation, *layers = (stage.sets for stage in self.stages(Beliefs.of(belief, self.rig)))
+        beliefs = Beliefs.of(belief, self.rig)
+        exploitation, *layers = [stage.sets for stage in self.stages(beliefs)]
         return Demand(exploitation, layers)
 
 

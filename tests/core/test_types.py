@@ -1,3 +1,6 @@
+import pickle
+from dataclasses import fields, replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -102,6 +105,25 @@ def test_tables_hold_what_they_can_and_refuse_more_in_one_line():
         belief(tracks).to_observation()
     with pytest.raises(InvalidInput, match="an observation holds 128 detections at most, got 129"):
         belief(detections=detections).to_observation()
+
+
+@pytest.mark.parametrize("kind", [ImageDetections, Tracks])
+def test_columns_read_off_rows_are_those_that_made_them(kind):
+    rows = np.arange(3.0 * len(kind.COLUMNS)).reshape(3, -1)
+    told = kind.from_checked_rows(rows.copy())
+    again = replace(pickle.loads(pickle.dumps(told)))
+    assert "boxes" not in vars(told)
+    assert len(told) == len(again) == 3
+    for field in fields(kind):
+        one, other = getattr(told, field.name), getattr(again, field.name)
+        assert one.dtype == other.dtype
+        assert one.tolist() == other.tolist()
+    assert told.boxes is told.boxes
+    assert told.classes.dtype == np.int64
+    assert again.rows().tolist() == rows.tolist()
+    assert not hasattr(told, "colours")
+    with pytest.raises(ValueError, match="read-only"):
+        told.rows()[0] = 0.0
 
 
 def test_take_by_index_and_by_mask():

@@ -13,7 +13,7 @@ from care_sim.core.arrays import Floats, Integers
 from care_sim.core.grid import Cells
 from care_sim.core.grid_stack import Grid
 
-Floor: TypeAlias = Callable[[], Cells] | None
+Floor: TypeAlias = Callable[[], NDArray[np.integer]] | None
 """Draws the random floor of a keyframe, a permutation of all cells; None of an environment without
 one."""
 

@@ -71,7 +71,7 @@ def _nearest_divisor(size: int, whole: int) -> int:
 
 
 @compiled()
-def _take(order: Cells, unit_of: Integers, taken: Mask, count: int, most: int) -> int:
+def _take(order: NDArray[np.integer], unit_of: Integers, taken: Mask, count: int, most: int) -> int:
     """Mark the units of the cells `order` as taken, in its order, until `most` of them are;
     `count` are before. Returns how many are afterwards.
     """

@@ -85,7 +85,7 @@ def choose_demanded(scores: NDArray[np.float32], budget: int, chosen: Mask) -> i
 
 
 @compiled()
-def top_up(chosen: Mask, count: int, floor: Cells, budget: int) -> int:
+def top_up(chosen: Mask, count: int, floor: NDArray[np.integer], budget: int) -> int:
     """Choose the first of the `floor` besides, up to the budget; `count` are chosen before. Returns
     how many are afterwards.
     """
