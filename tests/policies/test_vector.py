@@ -138,8 +138,8 @@ def dense():
         yield sensing(env).rig, recorded(env)
 
 
-@pytest.mark.parametrize("name", ["care", "care-sbf", "sweep", "place"])
-def test_worlds_that_rest_remember_nothing(name, dense):
+@pytest.mark.parametrize("name", ["care", "care-sbf", "sweep", "place", "ppo"])
+def test_worlds_that_rest_are_not_read_and_remember_nothing(name, dense):
     rig, observations = dense
     make = BUILT_IN[name]
     together, alone = vector_policy(lambda: make(rig), WORLDS), [make(rig) for _ in range(WORLDS)]
@@ -150,7 +150,10 @@ def test_worlds_that_rest_remember_nothing(name, dense):
             together.reset(mask)
             for number in np.flatnonzero(mask):
                 alone[number].reset()
-        actions = together(observation, live)
+        shown = {name: table.copy() for name, table in observation.items()}
+        for table in shown.values():
+            table[~live] = np.nan
+        actions = together(shown, live)
         for number in np.flatnonzero(live):
             assert np.array_equal(actions[number], alone[number](world(observation, number)))
 
