@@ -9,11 +9,12 @@ What no package adds is asked for by its place, as MODULE:OBJECT, where the modu
 Python finds it, or in the folder in which the program was started.
 """
 
+import inspect
 import os
 import re
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
+from dataclasses import MISSING, dataclass, fields
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Generic, TypeVar
 
@@ -113,6 +114,25 @@ class Plugins(Generic[Made]):
             raise InvalidInput(f"{entry.value} {fault}")
         maker: Callable[..., Made] = made
         return maker
+
+
+def class_faults(made: Any) -> Iterator[str]:
+    """Why a class makes nothing: abstract methods."""
+    if inspect.isabstract(made):
+        yield f"is abstract: it lacks {', '.join(sorted(made.__abstractmethods__))}"
+
+
+def dataclass_faults(made: Any, told: Container[str] = ()) -> Iterator[str]:
+    """Why a class makes nothing of the numbers that it is given, of which those `told` alone may be
+    without a default.
+    """
+    yield from class_faults(made)
+    # Without the decorator the numbers are attributes of the class, and nobody can set them.
+    if "__dataclass_fields__" not in vars(made) and inspect.get_annotations(made):
+        yield "is no dataclass: @dataclass(frozen=True) stands above its class"
+    for field in fields(made):
+        if field.name not in told and field.default is MISSING:
+            yield f"has no default for {field.name}"
 
 
 def is_place(name: str) -> bool:

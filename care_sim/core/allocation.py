@@ -6,20 +6,16 @@ those of the hardware (`care_sim.core.firing`), which every action passes, whate
 """
 
 from collections.abc import Sequence
-from itertools import accumulate
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from care_sim.base.checks import check_number, check_whole, is_number
-from care_sim.base.compiled import compiled
 from care_sim.base.errors import InvalidInput, shown
-from care_sim.core.arrays import Integers, Mask
+from care_sim.core.allocation_kernels import bounds, fill_stages
 from care_sim.core.cell_sets import CellSets, cell_indices
 from care_sim.core.grid import Cells
 from care_sim.core.types import Demand
-from care_sim.core.world_sets import WorldSets
 
 RESERVE_FRACTION = 0.3
 """rho, the share of the budget kept for the reserve (paper, Remark 2)."""
@@ -68,34 +64,6 @@ def allocate(
     return np.concatenate([chosen, _free(floor, chosen, budget - len(chosen))])
 
 
-class Allocator:
-    """Algorithm 1 for `worlds` worlds over a grid of so many `cells`, and the scores of what it
-    takes (`care_sim.core.actions.scores_of`), in one table that is used again.
-    """
-
-    def __init__(self, worlds: int, cells: int, reserve_fraction: float):
-        self._reserve_fraction = reserve_fraction
-        self._scores = np.zeros((worlds, cells), np.float32)
-        # Memory is taken for what is written alone.
-        self._chosen = np.empty((worlds, cells), np.int64)
-        self._counts = np.zeros(worlds, np.int64)
-
-    def scores(self, stages: Sequence[WorldSets], budgets: Integers) -> NDArray[np.float32]:
-        """(W, N) the scores of the cells that `allocate` chooses of each world's sets, those of
-        exploitation and of each layer in order, with the `budgets` (W,); read-only, and
-        overwritten by the next call.
-        """
-        sets = CellSets.joined([stage.sets for stage in stages])
-        counts = np.array([stage.counts for stage in stages])
-        limits = np.tile(budgets, (len(stages), 1))
-        limits[:1] = np.rint((1 - self._reserve_fraction) * budgets)
-        told = sets.cells, sets.sizes, counts, limits
-        _fill_worlds(*told, self._chosen, self._counts, self._scores)
-        shown = self._scores.view()
-        shown.flags.writeable = False
-        return shown
-
-
 def stages_of(demand: Demand) -> list[Sequence[Cells]]:
     """The sets of exploitation, then those of each reserve layer in order. Raises InvalidInput for
     another form of demand.
@@ -134,17 +102,19 @@ def _sequence(name: str, form: str, given: Any) -> Sequence[Any]:
 def _filled(stages: Sequence[Sequence[Cells]], limits: Sequence[int]) -> Cells:
     """Stage after stage, round-robin over its sets, up to its limit in all."""
     # The sets of all stages lie in one array. A stage of the sets [3, 5] and [5, 9] and a stage of
-    # the set [7] are cells [3, 5, 5, 9, 7], sizes [2, 2, 1] and stage_ends [2, 3].
+    # the set [7] are cells [3, 5, 5, 9, 7], sizes [2, 2, 1] and counts [2, 1].
     sets = CellSets.joined([CellSets.of(stage) for stage in stages])
-    stage_ends = np.array([*accumulate(map(len, stages))], np.int64)
+    counts = np.array([*map(len, stages)], np.int64)
 
-    # A table of flags runs from the lowest to the highest cell, so its size must be bounded.
-    lowest, highest = _bounds(sets.cells)
+    # A table of flags runs from the lowest to the highest cell, so its size must be bounded. The
+    # grid is not known here: `care_sim.policies.base.Policy` refuses cells below 0 or beyond the
+    # grid afterwards, and the table must hold them until then.
+    lowest, highest = bounds(sets.cells)
     if highest - lowest > HIGHEST_CELL:
         wrong = lowest if lowest < 0 else highest
         raise InvalidInput(f"cells must lie in 0..{HIGHEST_CELL}, got {wrong}")
     most = np.array(limits, np.int64)
-    return _fill_stages(sets.cells, sets.sizes, stage_ends, most, lowest, highest)
+    return fill_stages(sets.cells, sets.sizes, counts, most, lowest, highest)
 
 
 def _free(floor: Sequence[int] | Cells, chosen: Cells, count: int) -> Cells:
@@ -159,137 +129,3 @@ def _free(floor: Sequence[int] | Cells, chosen: Cells, count: int) -> Cells:
             taken.add(cell)
             free.append(cell)
     return np.array(free, np.int64)
-
-
-class _Sets(NamedTuple):
-    """Sets of cells: set s still offers `cells[next_places[s]:ends[s]]`."""
-
-    cells: Cells
-    next_places: Integers
-    ends: Integers
-
-
-class _Selection(NamedTuple):
-    """The cells chosen so far, in order, at the start of `chosen`; `taken[cell - lowest]` says of
-    every cell whether it is among them.
-    """
-
-    chosen: Cells
-    taken: Mask
-    lowest: int
-
-
-@compiled()
-def _bounds(cells: Cells) -> tuple[int, int]:
-    """The lowest of the cells, at most 0, and the highest, at least 0."""
-    lowest = highest = 0
-    for cell in cells:
-        lowest, highest = min(lowest, cell), max(highest, cell)
-    return lowest, highest
-
-
-@compiled()
-def _fill_stages(
-    cells: Cells,
-    sizes: Integers,
-    stage_ends: Integers,
-    limits: Integers,
-    lowest: int,
-    highest: int,
-) -> Cells:
-    """The cells taken, in order of selection.
-
-    Sets of so many `sizes` lie one after the other in `cells`. Stages of sets follow each other
-    likewise: stage k ends at set `stage_ends[k]` and fills up to `limits[k]` cells in all. No cell
-    is lower than `lowest` (at most 0) or higher than `highest`.
-    """
-    # A set offers its cells from its own start, which is where the set before it ends.
-    ends = np.cumsum(sizes)
-    sets = _Sets(cells, ends - sizes, ends)
-
-    # The grid is not known here: `care_sim.policies.base.Policy` refuses cells below 0 or beyond
-    # the grid afterwards. The table of what is taken must hold them until then, hence the offset.
-    taken = np.zeros(highest - lowest + 1, np.bool_)
-    chosen = np.empty(max(0, min(limits.max(), len(cells))), np.int64)
-    selection = _Selection(chosen, taken, lowest)
-
-    # A stage goes on where the one before it stopped, with the same cells taken.
-    count = first_set = 0
-    for stage, end in enumerate(stage_ends):
-        open_sets = np.arange(first_set, end)
-        count = _round_robin(sets, open_sets, selection, count, limits[stage])
-        first_set = end
-    return chosen[:count]
-
-
-@compiled()
-def _fill_worlds(
-    cells: Cells,
-    sizes: Integers,
-    counts: Integers,
-    limits: Integers,
-    chosen: Cells,
-    chosen_counts: Integers,
-    scores: NDArray[np.float32],
-) -> None:
-    """Replace what is scored in `scores` (W, N) by what each world takes; see `Allocator`. Stage k
-    of world w has `counts[k, w]` sets and fills up to `limits[k, w]` cells in all.
-    """
-    ends = np.cumsum(sizes)
-    sets = _Sets(cells, ends - sizes, ends)
-    taken = np.zeros(scores.shape[1], np.bool_)
-    # The first set of every stage that is yet to be served; worlds follow each other in each.
-    firsts = counts.sum(axis=1)
-    firsts = np.cumsum(firsts) - firsts
-    for world in range(len(scores)):
-        own = chosen[world]
-        for cell in own[: chosen_counts[world]]:
-            scores[world, cell] = 0
-        count = 0
-        selection = _Selection(own, taken, 0)
-        for stage in range(len(counts)):
-            end = firsts[stage] + counts[stage, world]
-            open_sets = np.arange(firsts[stage], end)
-            count = _round_robin(sets, open_sets, selection, count, limits[stage, world])
-            firsts[stage] = end
-        chosen_counts[world] = count
-
-        # The arithmetic of `care_sim.core.actions.scores_of`, in float32 as there.
-        whole = np.float32(2 * max(count, 1))
-        for place in range(count):
-            scores[world, own[place]] = (whole - np.float32(place)) / whole
-            taken[own[place]] = False
-
-
-@compiled()
-def _round_robin(
-    sets: _Sets, open_sets: Integers, selection: _Selection, count: int, limit: int
-) -> int:
-    """Take one cell per set and round, until `limit` cells are chosen or all sets have run dry.
-
-    `open_sets` are the numbers of the sets, and are overwritten; `count` cells are chosen before.
-    Returns how many are chosen afterwards.
-    """
-    # The first `open_count` of `open_sets` still have cells. Each pass of the loop is one round:
-    # one cell of every such set, in their order.
-    open_count = len(open_sets)
-    while open_count and count < limit:
-        served = 0
-        for number in open_sets[:open_count]:
-            # Cells that are already taken are passed over, and cost the set no turn.
-            place = sets.next_places[number]
-            end = sets.ends[number]
-            while place < end and selection.taken[sets.cells[place] - selection.lowest]:
-                place += 1
-            sets.next_places[number] = place + 1
-
-            # A set that gave a cell is open in the next round, in the same order. Writing it back
-            # into `open_sets` is safe: `served` never overtakes the place that is being read.
-            if place < end and count < limit:
-                selection.taken[sets.cells[place] - selection.lowest] = True
-                selection.chosen[count] = sets.cells[place]
-                count += 1
-                open_sets[served] = number
-                served += 1
-        open_count = served
-    return count

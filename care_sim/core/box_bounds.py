@@ -29,7 +29,9 @@ def tilted_bounds(boxes: Floats, axes: Floats) -> Bounds:
     """The bounds of boxes (n, 7) on a grid whose forward, left and up are the rows of `axes` (3, 3)
     in the sensor frame.
     """
-    return corner_bounds(boxes[:, :3] @ axes.T, box_corners(boxes) @ axes.T)
+    # One product a box: that of all at once might round otherwise, by how many there are.
+    centres = (boxes[:, None, :3] @ axes.T)[:, 0]
+    return corner_bounds(centres, box_corners(boxes) @ axes.T)
 
 
 def corner_bounds(centres: Floats, corners: Floats) -> Bounds:

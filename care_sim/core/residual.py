@@ -27,27 +27,38 @@ def camera_layers(belief: Belief, rig: Rig) -> tuple[CellSets, CellSets]:
 
     Both are in the order of the detections.
     """
-    unexplained, known = camera_layers_of(Beliefs.of(belief), rig)
+    unexplained, known = camera_layers_of(Beliefs.of(belief, rig))
     return unexplained.sets, known.sets
 
 
 def unexplained_layer(belief: Belief, rig: Rig) -> CellSets:
     """U of Algorithm 2 alone, the reserve layer of CARE; nothing is laid for what is explained."""
-    return unexplained_layer_of(Beliefs.of(belief), rig).sets
+    return unexplained_layer_of(Beliefs.of(belief, rig)).sets
 
 
-def camera_layers_of(beliefs: Beliefs, rig: Rig) -> tuple[WorldSets, WorldSets]:
+def camera_layers_of(beliefs: Beliefs) -> tuple[WorldSets, WorldSets]:
     """`camera_layers` of several worlds."""
-    every = WorldSets(wedges(beliefs.detections, rig), beliefs.detected)
-    known = _explaining(beliefs, rig) >= 0
+    every, known = wedges_of(beliefs), explained_of(beliefs)
     return every.take(~known), every.take(known)
 
 
-def unexplained_layer_of(beliefs: Beliefs, rig: Rig) -> WorldSets:
+def unexplained_layer_of(beliefs: Beliefs) -> WorldSets:
     """`unexplained_layer` of several worlds."""
-    new = _explaining(beliefs, rig) < 0
+    new = ~explained_of(beliefs)
     counts = kept_of_each(new, beliefs.detected)
-    return WorldSets(wedges(beliefs.detections.take(new), rig), counts)
+    return WorldSets(wedges(beliefs.detections.take(new), beliefs.rig), counts)
+
+
+def wedges_of(beliefs: Beliefs) -> WorldSets:
+    """`wedges` of several worlds."""
+    return WorldSets(wedges(beliefs.detections, beliefs.rig), beliefs.detected)
+
+
+def explained_of(beliefs: Beliefs) -> Mask:
+    """`explained` of several worlds, by the forecasts of the own world."""
+    seen, known = (beliefs.detections, beliefs.detected), (beliefs.tracks, beliefs.tracked)
+    rows: Mask = _explaining(seen, known, beliefs.rig) >= 0
+    return rows
 
 
 def explained(detections: ImageDetections, tracks: Tracks, rig: Rig) -> Mask:
@@ -63,16 +74,20 @@ def explaining_tracks(detections: ImageDetections, tracks: Tracks, rig: Rig) -> 
     a detection of a camera that the rig does not have.
     """
     counts = np.array([len(detections), len(tracks)])
-    return _explaining(Beliefs(detections, tracks, counts[:1], counts[1:], counts[:0]), rig)
+    return _explaining((detections, counts[:1]), (tracks, counts[1:]), rig)
 
 
-def _explaining(beliefs: Beliefs, rig: Rig) -> Integers:
-    """`explaining_tracks` of several worlds: a row is that among the forecasts of all."""
-    detections, tracks = beliefs.detections, beliefs.tracks
+def _explaining(
+    seen: tuple[ImageDetections, Integers], known: tuple[Tracks, Integers], rig: Rig
+) -> Integers:
+    """`explaining_tracks` of several worlds: a row is that among the forecasts of all. Detections
+    and tracks come world after world, with how many (W,) are of each.
+    """
+    (detections, detected), (tracks, tracked) = seen, known
     if not len(detections):
         return np.zeros(0, np.int64)
     tables = detections.rows(), tracks.rows()
-    return _first_explaining(*tables, beliefs.detected, beliefs.tracked, rig.camera_models)
+    return _first_explaining(*tables, detected, tracked, rig.camera_models)
 
 
 def wedges(detections: ImageDetections, rig: Rig) -> CellSets:

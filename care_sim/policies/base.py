@@ -118,14 +118,9 @@ class RowPolicy(Policy):
 
     def demand(self, belief: Belief) -> Demand:
         """The stages of one world."""
-        exploitation, *layers = [stage.sets for stage in self.stages(Beliefs.of(belief))]
+        beliefs = Beliefs.of(belief, self.rig)
+        exploitation, *layers = [stage.sets for stage in self.stages(beliefs)]
         return Demand(exploitation, layers)
-
-    def hulls(self, beliefs: Beliefs) -> WorldSets:
-        """The hulls of all forecasts. The tracks of a belief come nearest first, and their hulls
-        keep that order.
-        """
-        return WorldSets(self.rig.hulls(beliefs.tracks.boxes), beliefs.tracked)
 
 
 class FixedPolicy(Policy):

@@ -10,6 +10,7 @@ from typing import Any, TypeAlias
 
 from care_sim.base.checks import check_known
 from care_sim.base.errors import InvalidInput
+from care_sim.base.plugins import class_faults
 from care_sim.policies.base import TAGS, Policy, PrivilegedPolicy
 
 PolicyMaker: TypeAlias = Callable[..., Policy]
@@ -53,8 +54,7 @@ def policy_faults(made: Any) -> Iterator[str]:
     """Why a loaded object makes no policy, one text per reason. `care_sim.base.plugins` asks it."""
     if not callable(made) or (inspect.isclass(made) and not issubclass(made, Policy)):
         yield "is no Policy"
-    if inspect.isabstract(made):
-        yield f"is abstract: it lacks {', '.join(sorted(made.__abstractmethods__))}"
+    yield from class_faults(made)
     try:
         inspect.signature(made)
     except (TypeError, ValueError):

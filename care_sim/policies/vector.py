@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.errors import InvalidInput, shown
-from care_sim.core.allocation import Allocator
+from care_sim.core.allocator import Allocator
 from care_sim.core.arrays import Mask
 from care_sim.core.belief import Observation
 from care_sim.core.beliefs import Beliefs, check_observed
@@ -49,13 +49,13 @@ class VectorPolicy(ABC):
         """
         wanted = self._mask("live", live)
         check_observed(observation, self.rig, self.worlds)
-        actions = self._actions(observation, wanted).reshape(self.worlds, *self.rig.grid.shape)
+        actions = self._actions(observation, wanted)
         actions.flags.writeable = False
         return actions
 
     @abstractmethod
     def _actions(self, observation: Observation, live: Mask) -> Actions:
-        """The actions, with as many axes as there may be; the worlds come first."""
+        """The actions; what is made of the array is read-only."""
 
     @abstractmethod
     def _forget(self, mask: Mask) -> None:
@@ -73,10 +73,7 @@ class VectorPolicy(ABC):
 def vector_policy(make: Callable[[], Policy], worlds: int) -> VectorPolicy:
     """What plays so many worlds, each as a policy that `make` makes would play it alone."""
     first = make()
-    # Along the axes of a tilted grid boxes are told by a product of matrices, whose last bits hang
-    # on how many rows there are.
-    is_tilted = any(head.grid.is_tilted for head in first.rig.grid.heads)
-    if isinstance(first, RowPolicy) and _asks_as(first, RowPolicy) and not is_tilted:
+    if isinstance(first, RowPolicy) and _asks_as(first, RowPolicy):
         return _ByRows(first, worlds)
     if isinstance(first, FixedPolicy) and _asks_as(first, FixedPolicy):
         return _Fixed(first, worlds)
@@ -97,7 +94,7 @@ class _ByRows(VectorPolicy):
     def __init__(self, policy: RowPolicy, worlds: int):
         super().__init__(policy.rig, worlds)
         self._policy = policy
-        self._allocator = Allocator(worlds, policy.rig.grid.size, policy.rig.reserve_fraction)
+        self._allocator = Allocator(policy.rig, worlds)
 
     def _actions(self, observation: Observation, live: Mask) -> Actions:
         beliefs = Beliefs.from_observation(observation, self.rig, live)

@@ -2,9 +2,9 @@
 
 import inspect
 from collections.abc import Iterator
-from dataclasses import MISSING, fields
 from typing import Any
 
+from care_sim.base.plugins import dataclass_faults
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.scenarios.base import Scenario
 
@@ -14,14 +14,7 @@ def scenario_faults(made: Any) -> Iterator[str]:
     if not (inspect.isclass(made) and issubclass(made, Scenario)):
         yield "is no Scenario"
         return
-    if inspect.isabstract(made):
-        yield f"is abstract: it lacks {', '.join(sorted(made.__abstractmethods__))}"
-    # Without the decorator the numbers are attributes of the class, and nobody can set them.
-    if "__dataclass_fields__" not in vars(made) and inspect.get_annotations(made):
-        yield "is no dataclass: @dataclass(frozen=True) stands above its class"
-    for field in fields(made):
-        if field.default is MISSING:
-            yield f"has no default for {field.name}"
+    yield from dataclass_faults(made)
     cameras = made.cameras
     if not (isinstance(cameras, tuple) and all(isinstance(one, PinholeCamera) for one in cameras)):
         yield f"has the cameras {cameras!r:.80}; allowed is a tuple of PinholeCamera"

@@ -5,13 +5,13 @@ wrong with one is told with its name.
 import inspect
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import dataclass, fields
 from functools import lru_cache
 from typing import Any
 
 from care_sim.base.checks import check_known
 from care_sim.base.errors import InvalidInput, MissingExtra, error_line, shown
-from care_sim.base.plugins import Plugins
+from care_sim.base.plugins import Plugins, dataclass_faults
 from care_sim.core.return_settings import RAYS, FilmedReturns
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.loops.film import Film
@@ -24,13 +24,7 @@ def source_faults(made: Any) -> Iterator[str]:
     if not (inspect.isclass(made) and issubclass(made, Recordings | Generated)):
         yield "is neither Recordings nor Generated"
         return
-    if inspect.isabstract(made):
-        yield f"is abstract: it lacks {', '.join(sorted(made.__abstractmethods__))}"
-    if "__dataclass_fields__" not in vars(made) and inspect.get_annotations(made):
-        yield "is no dataclass: @dataclass(frozen=True) stands above its class"
-    for field in fields(made):
-        if field.name != "folder" and field.default is MISSING:
-            yield f"has no default for {field.name}"
+    yield from dataclass_faults(made, told=("folder",))
 
 
 SOURCES: Plugins[Recordings | Generated] = Plugins(

@@ -9,14 +9,17 @@ from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
 from care_sim.base.errors import InvalidInput, shown
-from care_sim.core.belief import OBSERVED, Belief, Observation
+from care_sim.core.belief import OBSERVED, Observation
 from care_sim.envs.sensing import sensing, shows_belief
+from care_sim.envs.wrappers.reading import Reading, ReadsBeliefs, read_one, reading_of
 from care_sim.policies.learned.grid_features import EGO_INPUTS, GridFeatures
 
 GridArrays = dict[str, NDArray[np.float32]]
 
 
-class GridObservation(gymnasium.ObservationWrapper[GridArrays, Any, Any], RecordConstructorArgs):
+class GridObservation(
+    gymnasium.ObservationWrapper[GridArrays, Any, Any], RecordConstructorArgs, ReadsBeliefs
+):
     """Shows the belief as coarse pictures of the angular grid, and the car's own motion.
 
     The pictures are six channels over `columns` x `rows` blocks of the grid.
@@ -67,32 +70,23 @@ class GridObservation(gymnasium.ObservationWrapper[GridArrays, Any, Any], Record
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], columns: int = 64, rows: int = 8):
-        self._rig = sensing(env).rig
+        rig = sensing(env).rig
         if not shows_belief(env):
             raise InvalidInput(
                 "GridObservation needs the observation of CARE-Sim's environments, with "
                 f"{', '.join(OBSERVED)}; {shown(env)} shows another"
             )
-        self.features = GridFeatures(self._rig, columns, rows)
-        self._given: Belief | None = None
+        self.features = GridFeatures(rig, columns, rows)
+        # Nothing stands between it and a wrapper that it is put around at once.
+        self.reading = Reading(rig, read_one, reading_of(env))
         RecordConstructorArgs.__init__(self, columns=columns, rows=rows)
         gymnasium.ObservationWrapper.__init__(self, env)
         self.observation_space = pictures_space(self.features)
 
-    @property
-    def belief(self) -> Belief:
-        """What the pictures were last drawn of, for wrappers outside.
-
-        Raises gymnasium.error.ResetNeeded before the first reset.
-        """
-        if self._given is None:
-            raise gymnasium.error.ResetNeeded("call reset() before stepping")
-        return self._given
-
     def observation(self, observation: Observation) -> GridArrays:
         """The pictures of the observation that was given. Raises InvalidInput for another form."""
-        self._given = self._rig.read(observation)
-        return dict(self.features(self._given))
+        self.reading.take(observation)
+        return {name: rows[0] for name, rows in self.features.of_all(self.reading.beliefs).items()}
 
 
 def pictures_space(features: GridFeatures) -> spaces.Space[Any]:

@@ -8,13 +8,11 @@ from gymnasium import spaces
 from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
-from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.types import Action
 from care_sim.envs.sensing import sensing, shows_belief
 from care_sim.envs.spaces import checked_scores
-from care_sim.envs.wrappers.grid_observation import GridObservation
-from care_sim.policies.learned.sector_choice import SectorChoice
-from care_sim.policies.learned.seen import Seen
+from care_sim.envs.wrappers.reading import Reading, ReadsBeliefs, read_one, reading_inside
+from care_sim.policies.learned.sector_choice import SectorActions
 from care_sim.policies.learned.tiling import Tiling
 
 
@@ -24,13 +22,13 @@ class _Sectors(gymnasium.ActionWrapper[Any, NDArray[np.float32], Action], Record
     def __init__(self, env: gymnasium.Env[Any, Any], azimuths: int = 32, elevations: int = 4):
         self._rig = sensing(env).rig
         self.sectors = Tiling(self._rig.grid, azimuths, elevations)
-        self._choice = SectorChoice(self._rig, self.sectors)
+        self._fired = SectorActions(self._rig, self.sectors, 1)
         RecordConstructorArgs.__init__(self, azimuths=azimuths, elevations=elevations)
         gymnasium.ActionWrapper.__init__(self, env)
         self.action_space = sectors_space(self.sectors)
 
 
-class SectorReserve(_Sectors):
+class SectorReserve(_Sectors, ReadsBeliefs):
     """The action ranks sectors for the reserve.
 
     Exploitation and floor stay those of the shared allocator, so a learner competes with the rules
@@ -74,15 +72,15 @@ class SectorReserve(_Sectors):
 
     def __init__(self, env: gymnasium.Env[Any, Any], azimuths: int = 32, elevations: int = 4):
         super().__init__(env, azimuths, elevations)
-        self._pictures = None if shows_belief(env) else _pictures_inside(env)
-        self._seen: Seen | None = None
+        inside = None if shows_belief(env) else reading_inside(env, "SectorReserve")
+        self.reading = Reading(self._rig, read_one, inside)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         """Begin an episode."""
         observation, info = super().reset(seed=seed, options=options)
-        self._read(observation)
+        self.reading.take(observation)
         return observation, info
 
     def step(
@@ -90,23 +88,15 @@ class SectorReserve(_Sectors):
     ) -> tuple[Any, SupportsFloat, bool, bool, dict[str, Any]]:
         """Fire what `action` makes of the scores and go on to the next keyframe."""
         answer = super().step(action)
-        self._read(answer[0])
+        self.reading.take(answer[0])
         return answer
 
     def action(self, action: NDArray[np.float32]) -> Action:
         """Scores (E, A) of the cells that the shared allocator takes."""
         scores = checked_scores(action, self.sectors.shape)
-        if self._seen is None:
-            raise gymnasium.error.ResetNeeded("call reset() before stepping")
-        cells: Action = self._choice.reserve(self._seen, scores[None])[0].copy()
+        # A copy: whoever is given it may keep it.
+        cells: Action = self._fired.reserve(self.reading.beliefs, scores[None])[0].copy()
         return cells
-
-    def _read(self, observation: Any) -> None:
-        # At once, not when the next action comes: until then the observation is the caller's, who
-        # may write into it.
-        pictures = self._pictures
-        belief = self._rig.read(observation) if pictures is None else pictures.belief
-        self._seen = Seen.of(belief, self._rig)
 
 
 class SectorScores(_Sectors):
@@ -140,23 +130,10 @@ class SectorScores(_Sectors):
     def action(self, action: NDArray[np.float32]) -> Action:
         """Scores (E, A) of the cells that the shared allocator takes."""
         scores = checked_scores(action, self.sectors.shape)
-        cells: Action = self._choice.alone(scores[None])[0].copy()
+        cells: Action = self._fired.alone(scores[None])[0].copy()
         return cells
 
 
 def sectors_space(sectors: Tiling) -> spaces.Space[Any]:
     """The space of one score per sector."""
     return spaces.Box(-1.0, 1.0, sectors.shape, np.float32)
-
-
-def _pictures_inside(env: gymnasium.Env[Any, Any]) -> GridObservation:
-    """The outermost `GridObservation` of an environment. Raises InvalidInput if there is none."""
-    layer = env
-    while isinstance(layer, gymnasium.Wrapper):
-        if isinstance(layer, GridObservation):
-            return layer
-        layer = layer.env
-    raise InvalidInput(
-        f"SectorReserve needs the forecasts, and the observation of {shown(env)} does not tell "
-        "them: put it inside the wrapper that changes the observation"
-    )

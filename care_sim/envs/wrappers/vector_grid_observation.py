@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from typing import Any
 
-import gymnasium
 import numpy as np
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
@@ -11,13 +10,14 @@ from numpy.typing import NDArray
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.arrays import Floats, Mask
 from care_sim.core.belief import OBSERVED, Observation
+from care_sim.core.beliefs import Beliefs
 from care_sim.envs.wrappers.grid_observation import GridArrays, GridObservation, pictures_space
+from care_sim.envs.wrappers.reading import Reading, ReadsBeliefs, reading_of
 from care_sim.envs.wrappers.vectors import AnyVector, WorldsWrapper, rig_of, shows_beliefs
 from care_sim.policies.learned.grid_features import GridFeatures
-from care_sim.policies.learned.seen import Seen
 
 
-class VectorGridObservation(WorldsWrapper):
+class VectorGridObservation(WorldsWrapper, ReadsBeliefs):
     """`GridObservation` over a vector environment: what it shows of a world is what
     `GridObservation` shows of the single environment, to the last bit.
 
@@ -55,19 +55,10 @@ class VectorGridObservation(WorldsWrapper):
             )
         super().__init__(env)
         self.features = GridFeatures(self._rig, columns, rows)
-        self._given: Seen | None = None
+        # Nothing stands between it and a wrapper that it is put around at once.
+        self.reading = Reading(self._rig, Beliefs.from_observation, reading_of(env))
         self.single_observation_space = pictures_space(self.features)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
-
-    @property
-    def seen(self) -> Seen:
-        """What the pictures were last drawn of, for wrappers outside.
-
-        Raises gymnasium.error.ResetNeeded before the first reset.
-        """
-        if self._given is None:
-            raise gymnasium.error.ResetNeeded("call reset() before stepping")
-        return self._given
 
     def reset(
         self, *, seed: Any = None, options: dict[str, Any] | None = None
@@ -84,16 +75,14 @@ class VectorGridObservation(WorldsWrapper):
         return self._shown(observation), rewards, terminated, truncated, infos
 
     def _shown(self, observation: Observation) -> GridArrays:
-        # What stands directly inside may have read the same.
-        read = self.env.read if isinstance(self.env, WorldsWrapper) else None
-        self._given = Seen.read(observation, self._rig) if read is None else read
-        return self.features.of_all(self._given)
+        self.reading.take(observation)
+        return self.features.of_all(self.reading.beliefs)
 
     def _finals(self, given: Sequence[Any]) -> NDArray[np.object_]:
         """(W,) pictures of the last observations of those worlds that have one, else None."""
         over = [world for world, last in enumerate(given) if last is not None]
         stacked = {name: np.stack([given[world][name] for world in over]) for name in OBSERVED}
-        drawn = self.features.of_all(Seen.read(stacked, self._rig))
+        drawn = self.features.of_all(Beliefs.from_observation(stacked, self._rig))
         finals = np.full(len(given), None, object)
         for row, world in enumerate(over):
             finals[world] = {name: rows[row] for name, rows in drawn.items()}

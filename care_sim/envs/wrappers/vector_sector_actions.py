@@ -2,21 +2,18 @@
 
 from typing import Any
 
-import gymnasium
 import numpy as np
-from gymnasium.vector import VectorWrapper
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.arrays import Floats, Mask
+from care_sim.core.beliefs import Beliefs
 from care_sim.core.types import Action
 from care_sim.envs.spaces import checked_scores
+from care_sim.envs.wrappers.reading import Reading, ReadsBeliefs, reading_inside
 from care_sim.envs.wrappers.sector_actions import SectorReserve, SectorScores, sectors_space
-from care_sim.envs.wrappers.vector_grid_observation import VectorGridObservation
 from care_sim.envs.wrappers.vectors import AnyVector, WorldsWrapper, rig_of, shows_beliefs
-from care_sim.policies.learned.sector_choice import SectorChoice
-from care_sim.policies.learned.seen import Seen
+from care_sim.policies.learned.sector_choice import SectorActions
 from care_sim.policies.learned.tiling import Tiling
 
 
@@ -27,7 +24,7 @@ class _VectorSectors(WorldsWrapper):
         self._rig = rig_of(env)
         super().__init__(env)
         self.sectors = Tiling(self._rig.grid, azimuths, elevations)
-        self._choice = SectorChoice(self._rig, self.sectors, self.num_envs)
+        self._fired = SectorActions(self._rig, self.sectors, self.num_envs)
         self.single_action_space = sectors_space(self.sectors)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
 
@@ -39,11 +36,11 @@ class _VectorSectors(WorldsWrapper):
         return self.env.step(self._cells(scores))
 
     def _cells(self, scores: NDArray[np.float32]) -> Action:
-        """Scores (W, E, A) of the cells that the shared allocator takes."""
+        """Scores (W, E, A) of the cells that the shared allocator takes, until the next call."""
         raise NotImplementedError
 
 
-class VectorSectorReserve(_VectorSectors):
+class VectorSectorReserve(_VectorSectors, ReadsBeliefs):
     """`SectorReserve` over a vector environment: a world is the single environment behind
     `SectorReserve`, to the last bit.
 
@@ -72,31 +69,25 @@ class VectorSectorReserve(_VectorSectors):
 
     def __init__(self, env: AnyVector, azimuths: int = 32, elevations: int = 4):
         super().__init__(env, azimuths, elevations)
-        self._pictures = None if shows_beliefs(env) else _pictures_inside(env)
+        inside = None if shows_beliefs(env) else reading_inside(env, "VectorSectorReserve")
+        self.reading = Reading(self._rig, Beliefs.from_observation, inside)
 
     def reset(
         self, *, seed: Any = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         """Begin episodes."""
         observation, infos = self.env.reset(seed=seed, options=options)
-        self._look(observation)
+        self.reading.take(observation)
         return observation, infos
 
     def step(self, actions: NDArray[np.float32]) -> tuple[Any, Floats, Mask, Mask, dict[str, Any]]:
         """As `VectorSectorReserve` says."""
         answer = super().step(actions)
-        self._look(answer[0])
+        self.reading.take(answer[0])
         return answer
 
     def _cells(self, scores: NDArray[np.float32]) -> Action:
-        if self.read is None:
-            raise gymnasium.error.ResetNeeded("call reset() before stepping")
-        return self._choice.reserve(self.read, scores)
-
-    def _look(self, observation: Any) -> None:
-        # At once, for the reason that `SectorReserve` has.
-        pictures = self._pictures
-        self.read = Seen.read(observation, self._rig) if pictures is None else pictures.seen
+        return self._fired.reserve(self.reading.beliefs, scores)
 
 
 class VectorSectorScores(_VectorSectors):
@@ -125,17 +116,4 @@ class VectorSectorScores(_VectorSectors):
     single = SectorScores
 
     def _cells(self, scores: NDArray[np.float32]) -> Action:
-        return self._choice.alone(scores)
-
-
-def _pictures_inside(env: AnyVector) -> VectorGridObservation:
-    """The outermost `VectorGridObservation`. Raises InvalidInput if there is none."""
-    layer = env
-    while isinstance(layer, VectorWrapper):
-        if isinstance(layer, VectorGridObservation):
-            return layer
-        layer = layer.env
-    raise InvalidInput(
-        f"VectorSectorReserve needs the forecasts, and the observation of {shown(env)} does not "
-        "tell them: put it inside the wrapper that changes the observation"
-    )
+        return self._fired.alone(scores)

@@ -8,18 +8,12 @@ from gymnasium.vector import AutoresetMode, VectorEnv, VectorWrapper
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.belief import OBSERVED
 from care_sim.core.rig import Rig
-from care_sim.policies.learned.seen import Seen
 
 AnyVector = VectorEnv[Any, Any, Any]
 
 
 class WorldsWrapper(VectorWrapper[Any, Any, Any, Any, Any]):
-    """A wrapper of a vector environment.
-
-    `read` is what it last read of the observation, if it hands that on as it is.
-    """
-
-    read: Seen | None = None
+    """A wrapper of a vector environment."""
 
     @property
     def autoreset_mode(self) -> AutoresetMode:

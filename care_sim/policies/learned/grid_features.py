@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 
 from care_sim.base.checks import check_whole
 from care_sim.core.belief import Belief, Observation
+from care_sim.core.beliefs import Beliefs
 from care_sim.core.cell_sets import CellSets
 from care_sim.core.grid import Cells
+from care_sim.core.residual import camera_layers_of
 from care_sim.core.rig import Rig
 from care_sim.perception.cluster.road import KERB_CLEARANCE_M
 from care_sim.policies.learned.block_kernels import AboveRoad, draw_pictures
-from care_sim.policies.learned.seen import Seen
 from care_sim.policies.learned.tiling import Tiling
 
 CHANNELS = ("forecast", "residual", "explained", "nearness", "fired", "undetected")
@@ -61,26 +62,26 @@ class GridFeatures:
 
     def __call__(self, belief: Belief) -> Observation:
         """`grid` (channels * rows * columns,) and `ego` (4,), both float32."""
-        return {name: rows[0] for name, rows in self.of_all(Seen.of(belief, self.rig)).items()}
+        return {name: rows[0] for name, rows in self.of_all(Beliefs.of(belief, self.rig)).items()}
 
-    def of_all(self, seen: Seen) -> dict[str, NDArray[np.float32]]:
+    def of_all(self, beliefs: Beliefs) -> dict[str, NDArray[np.float32]]:
         """The same of W worlds: `grid` (W, channels * rows * columns) and `ego` (W, 4)."""
-        out = np.zeros((len(seen), len(CHANNELS), self.rows * self.columns), np.float32)
+        out = np.zeros((len(beliefs), len(CHANNELS), self.rows * self.columns), np.float32)
         # In the order of the first three channels; where the first, the hulls, lie is asked again
         # when the returns are drawn.
-        groups = [seen.hulls, *seen.camera_layers]
+        groups = [beliefs.hulls, *camera_layers_of(beliefs)]
         sets = CellSets.joined([group.sets for group in groups])
         counts = np.array([group.counts for group in groups])
-        told = sets.cells, sets.sizes, counts, seen.ranges
+        told = sets.cells, sets.sizes, counts, beliefs.ranges
         draw_pictures(*told, self._above, self._blocks, self._marks, out)
         # Shares are sums of float32 parts, and a full block may end a little above 1.
-        grid = np.minimum(out, 1, out=out).reshape(len(seen), -1)
-        return {"grid": grid, "ego": self._egos(seen)}
+        grid = np.minimum(out, 1, out=out).reshape(len(beliefs), -1)
+        return {"grid": grid, "ego": self._egos(beliefs)}
 
-    def _egos(self, seen: Seen) -> NDArray[np.float32]:
+    def _egos(self, beliefs: Beliefs) -> NDArray[np.float32]:
         """(W, 4) the `EGO_INPUTS`, scaled and clipped to -1 to 1."""
-        shares = seen.beliefs.budgets[:, None] / self.rig.grid.size
-        values = np.concatenate([seen.egos, shares], axis=1).astype(np.float32)
+        shares = beliefs.budgets[:, None] / self.rig.grid.size
+        values = np.concatenate([beliefs.egos, shares], axis=1).astype(np.float32)
         return np.asarray(np.clip(values / EGO_SCALES, -1, 1))
 
     @cached_property

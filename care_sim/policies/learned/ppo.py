@@ -8,17 +8,18 @@ from os import PathLike
 from typing import ClassVar
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.belief import Belief
+from care_sim.core.beliefs import Beliefs
 from care_sim.core.rig import Rig
-from care_sim.core.types import Demand
-from care_sim.policies.base import Policy
+from care_sim.core.world_sets import WorldSets
+from care_sim.policies.base import RowPolicy
 from care_sim.policies.learned.grid_features import GridFeatures
 from care_sim.policies.learned.score_map import ScoreMap
-from care_sim.policies.learned.tiling import Tiling, reserve_demand, sector_demand
+from care_sim.policies.learned.sector_choice import SectorChoice
+from care_sim.policies.learned.tiling import Tiling
 from care_sim.policies.learned.weights import load_weights, shipped_weights
 
 
-class PpoPolicy(Policy):
+class PpoPolicy(RowPolicy):
     """Acts as the learner does behind its wrappers, without exploration. Scores and allocator are
     the same.
 
@@ -33,6 +34,7 @@ class PpoPolicy(Policy):
         "Schulman et al. 2017 (proximal policy optimisation), with Stable-Baselines3; learned on "
         "the dense street"
     )
+    keeps_order = True
     weights: ClassVar[str] = "ppo-dense"
 
     def __init__(self, rig: Rig, path: str | PathLike[str] | None = None):
@@ -45,17 +47,18 @@ class PpoPolicy(Policy):
             raise InvalidInput(f"weights {file.path}: the card names no wrapper")
         self._reserve_alone = wrapping.action == "SectorReserve"
         self._features = GridFeatures(rig, wrapping.columns, wrapping.rows)
-        self._sectors = Tiling(rig.grid, wrapping.azimuths, wrapping.elevations)
+        sectors = Tiling(rig.grid, wrapping.azimuths, wrapping.elevations)
+        self._choice = SectorChoice(rig, sectors)
         self._score_map = ScoreMap(file, wrapping, rig.grid.goes_round)
 
-    def demand(self, belief: Belief) -> Demand:
+    def stages(self, beliefs: Beliefs) -> list[WorldSets]:
         """Hulls and the sectors scored above 0, best first; or, learned with `SectorScores`, the
         sectors alone.
         """
-        scores = self._score_map(self._features(belief))
+        scores = self._score_map.of_all(self._features.of_all(beliefs))
         if self._reserve_alone:
-            return reserve_demand(belief, self.rig, self._sectors, scores)
-        return sector_demand(self.rig, self._sectors, scores)
+            return self._choice.reserve(beliefs, scores)
+        return self._choice.alone(scores)
 
 
 class PpoDartoutPolicy(PpoPolicy):

@@ -48,29 +48,38 @@ class ScoreMap:
 
     def __call__(self, observation: Observation) -> NDArray[np.float32]:
         """(elevations, azimuths) from -1 to 1."""
-        seen = self._windows(observation["grid"]) @ self._kernel + (
-            self._ego @ observation["ego"] + self._bias
-        )
+        scores: NDArray[np.float32] = self.of_all(
+            {name: values[None] for name, values in observation.items()}
+        )[0]
+        return scores
+
+    def of_all(self, observation: Observation) -> NDArray[np.float32]:
+        """(W, elevations, azimuths) of the observations of W worlds, stacked."""
+        # Products of stacks of matrices, which NumPy makes one by one: of every world the very
+        # numbers that it has alone. One product of all would round otherwise.
+        ego = (self._ego @ observation["ego"][..., None]).swapaxes(1, 2)
+        seen = self._windows(observation["grid"]) @ self._kernel + (ego + self._bias)
         weight, bias = self._hidden
         hidden = np.maximum(np.maximum(seen, 0) @ weight.T + bias, 0)
-        return np.asarray(np.tanh((hidden @ self._score).reshape(self._place.shape) + self._place))
+        scores = (hidden @ self._score).reshape(-1, *self._place.shape)
+        return np.asarray(np.tanh(scores + self._place))
 
-    def _windows(self, grid: NDArray[np.float32]) -> NDArray[np.float32]:
-        """(sectors, channels * blocks) what each sector sees; nothing beyond the grid."""
+    def _windows(self, grids: NDArray[np.float32]) -> NDArray[np.float32]:
+        """(W, sectors, channels * blocks) what each sector sees; nothing beyond the grid."""
         channels, rows, columns = self._shape
+        margin = BLOCK_MARGIN
         padded = np.zeros(
-            (channels, rows + 2 * BLOCK_MARGIN, columns + 2 * BLOCK_MARGIN), np.float32
+            (len(grids), channels, rows + 2 * margin, columns + 2 * margin), np.float32
         )
-        padded[:, BLOCK_MARGIN:-BLOCK_MARGIN, BLOCK_MARGIN:-BLOCK_MARGIN] = grid.reshape(
-            self._shape
-        )
+        padded[..., margin:-margin, margin:-margin] = grids.reshape(-1, *self._shape)
         # Where columns go round the car, each end continues with the other one's blocks.
         if self._goes_round:
-            padded[:, :, :BLOCK_MARGIN] = padded[:, :, -2 * BLOCK_MARGIN : -BLOCK_MARGIN]
-            padded[:, :, -BLOCK_MARGIN:] = padded[:, :, BLOCK_MARGIN : 2 * BLOCK_MARGIN]
+            padded[..., :margin] = padded[..., -2 * margin : -margin]
+            padded[..., -margin:] = padded[..., margin : 2 * margin]
         # Windows of neighbouring sectors overlap by the margins.
         tall, wide = self._stride
-        windows = np.lib.stride_tricks.sliding_window_view(padded, self._window, axis=(1, 2))[
-            :, ::tall, ::wide
+        windows = np.lib.stride_tricks.sliding_window_view(padded, self._window, axis=(2, 3))[
+            ..., ::tall, ::wide, :, :
         ]
-        return windows.transpose(1, 2, 0, 3, 4).reshape(-1, self._kernel.shape[0])
+        seen = windows.transpose(0, 2, 3, 1, 4, 5)
+        return seen.reshape(len(grids), -1, self._kernel.shape[0])

@@ -1,64 +1,78 @@
-"""What scores of sectors fire, in several worlds at once.
-
-It is what the shared allocator makes of `care_sim.policies.learned.tiling.reserve_demand` and
-`sector_demand`.
+"""What scores of sectors ask of the shared allocator, and what it then fires, in any number of
+worlds.
 """
 
 from functools import cached_property
+from itertools import accumulate, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.core.allocation import Allocator
+from care_sim.core.allocator import Allocator
+from care_sim.core.beliefs import Beliefs
 from care_sim.core.cell_sets import CellSets
 from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
+from care_sim.core.types import Action
 from care_sim.core.world_sets import WorldSets
-from care_sim.policies.learned.seen import Seen
-from care_sim.policies.learned.tiling import Tiling, enough_beside_hulls
+from care_sim.policies.learned.tiling import Tiling
 
 
 class SectorChoice:
-    """Actions of `worlds` worlds of a rig from scores of `sectors`: (W, E, A), read-only, and
-    overwritten by the next call.
+    """The stages of Algorithm 1 for scores (W, ...) of the `sectors` of W worlds. All sets are
+    listed in the rig's `cell_order` already.
     """
 
-    def __init__(self, rig: Rig, sectors: Tiling, worlds: int = 1):
+    def __init__(self, rig: Rig, sectors: Tiling):
         self._rig = rig
         self._sectors = sectors
-        self._budgets = np.full(worlds, rig.budget)
-        self._allocator = Allocator(worlds, rig.grid.size, rig.reserve_fraction)
 
-    def reserve(self, seen: Seen, scores: NDArray[np.floating]) -> NDArray[np.float32]:
-        """Scores of the cells of `reserve_demand`, from those of the sectors (W, elevations,
-        azimuths).
+    def reserve(self, beliefs: Beliefs, scores: NDArray[np.floating]) -> list[WorldSets]:
+        """The forecasts' hulls, then the sectors with a positive score as layers of the reserve,
+        best first.
         """
-        hulls = WorldSets(self._rig.listed(seen.hulls.sets), seen.hulls.counts)
-        return self._actions(hulls, scores, enough_beside_hulls(self._rig))
+        hulls = beliefs.hulls
+        # At most one budget of the cells of sectors is taken by hulls.
+        layers = self._layers(scores, 2 * self._rig.budget)
+        return [WorldSets(self._rig.listed(hulls.sets), hulls.counts), *layers]
 
-    def alone(self, scores: NDArray[np.floating]) -> NDArray[np.float32]:
-        """The same of `sector_demand`."""
-        return self._actions(WorldSets.nothing(len(scores)), scores, self._rig.budget)
+    def alone(self, scores: NDArray[np.floating]) -> list[WorldSets]:
+        """The sectors with a positive score alone, best first."""
+        return [WorldSets.nothing(len(scores)), *self._layers(scores, self._rig.budget)]
 
-    def _actions(
-        self, hulls: WorldSets, scores: NDArray[np.floating], enough: int
-    ) -> NDArray[np.float32]:
-        ranked, counts = self._sectors.best(scores, enough)
-        # The layer at every place of the ranking is one sector of each world that has as many. They
-        # are gathered at once, and then parted.
-        served = np.arange(counts.max())[:, None] < counts
-        cells = self._listed[ranked.T[: len(served)][served]]
-        sizes = np.full(len(cells), cells.shape[1])
-        ends = np.cumsum(np.count_nonzero(served, axis=1)).tolist()
-        layers = [
-            WorldSets(CellSets(cells[start:end].ravel(), sizes[start:end]), own)
-            for start, end, own in zip([0, *ends], ends, served.astype(np.int64), strict=False)
+    def _layers(self, scores: NDArray[np.floating], enough: int) -> list[WorldSets]:
+        """The best sector of every world that has one, then the next of each, and so on."""
+        ranked, counts = self._sectors.ranked(scores, enough)
+        has = np.arange(counts.max(initial=0))[:, None] < counts
+        cells = self._listed[ranked.T[: len(has)][has]]
+        sizes = np.full(*cells.shape)
+        ends = accumulate(np.count_nonzero(has, axis=1).tolist(), initial=0)
+        return [
+            WorldSets(CellSets(cells[first:last].ravel(), sizes[first:last]), told)
+            for (first, last), told in zip(pairwise(ends), has.astype(np.int64), strict=True)
         ]
-        actions = self._allocator.scores([hulls, *layers], self._budgets)
-        return actions.reshape(-1, *self._rig.grid.shape)
 
     @cached_property
     def _listed(self) -> Cells:
         """(sectors, n) the cells of every sector in the order in which they are taken."""
         cells = self._sectors.cells
         return self._rig.listed(list(cells)).cells.reshape(cells.shape)
+
+
+class SectorActions:
+    """The actions (W, E, A) for scores (W, ...) of the `sectors` of W worlds, each with the budget
+    of the rig. They are read-only, and the next call overwrites them.
+    """
+
+    def __init__(self, rig: Rig, sectors: Tiling, worlds: int):
+        self._choice = SectorChoice(rig, sectors)
+        self._allocator = Allocator(rig, worlds)
+        self._budgets = np.full(worlds, rig.budget)
+
+    def reserve(self, beliefs: Beliefs, scores: NDArray[np.floating]) -> Action:
+        """See `SectorChoice.reserve`."""
+        return self._allocator.scores(self._choice.reserve(beliefs, scores), self._budgets)
+
+    def alone(self, scores: NDArray[np.floating]) -> Action:
+        """See `SectorChoice.alone`."""
+        return self._allocator.scores(self._choice.alone(scores), self._budgets)

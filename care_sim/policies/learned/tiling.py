@@ -1,5 +1,5 @@
 """Equal tiles of the angular grid: the sectors that an agent scores, and the coarse blocks in which
-it sees. What scores of sectors ask of the allocator.
+it sees.
 """
 
 from dataclasses import dataclass
@@ -11,11 +11,8 @@ from numpy.typing import NDArray
 from care_sim.base.checks import check_whole
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Integers
-from care_sim.core.belief import Belief
 from care_sim.core.grid import Cells
 from care_sim.core.grid_stack import Grid
-from care_sim.core.rig import Rig
-from care_sim.core.types import Demand
 
 
 @dataclass(frozen=True)
@@ -68,40 +65,13 @@ class Tiling:
         pictured = np.arange(self.grid.size).reshape(self.elevations, rows, self.azimuths, columns)
         return pictured.swapaxes(1, 2).reshape(self.elevations * self.azimuths, rows * columns)
 
-    def ranked(self, scores: NDArray[np.floating], enough: int) -> list[Cells]:
-        """The cells of the tiles with a strictly positive score (`shape`), best first, ties by
-        ascending index; no more tiles than hold `enough` cells.
-        """
-        (best,), (count,) = self.best(np.reshape(scores, (1, -1)), enough)
-        return list(self.cells[best[:count]])
-
-    def best(self, scores: NDArray[np.floating], enough: int) -> tuple[Integers, Integers]:
+    def ranked(self, scores: NDArray[np.floating], enough: int) -> tuple[Integers, Integers]:
         """Of the tiles of W pictures of `scores` (W, ...) the best (W, m), ties by ascending index,
-        and how many (W,) of these are as in `ranked`.
+        and how many (W,) of these have a strictly positive score; no more tiles than hold `enough`
+        cells.
         """
         flat = scores.reshape(len(scores), -1)
         most = min(-(-enough // self.cells.shape[1]), len(self.cells))
         # A stable sort of the negated scores: among equals the lower index comes first.
         best = np.argsort(-flat, axis=1, kind="stable")[:, :most]
         return best, np.minimum(np.count_nonzero(flat > 0, axis=1), most)
-
-
-def reserve_demand(
-    belief: Belief, rig: Rig, sectors: Tiling, scores: NDArray[np.floating]
-) -> Demand:
-    """The forecasts' hulls, then the sectors with a positive score as layers of the reserve, best
-    first.
-    """
-    layers = [[cells] for cells in sectors.ranked(scores, enough_beside_hulls(rig))]
-    return Demand(rig.hulls(belief.tracks.boxes), layers)
-
-
-def enough_beside_hulls(rig: Rig) -> int:
-    """Cells of sectors that fill the budget, whatever the hulls take."""
-    # At most one budget of the cells of sectors is taken by hulls.
-    return 2 * rig.budget
-
-
-def sector_demand(rig: Rig, sectors: Tiling, scores: NDArray[np.floating]) -> Demand:
-    """The sectors with a positive score alone, best first."""
-    return Demand(layers=[[cells] for cells in sectors.ranked(scores, rig.budget)])

@@ -46,11 +46,11 @@ class CareSpread(RowPolicy):
 
     def stages(self, beliefs: Beliefs) -> list[WorldSets]:
         """Layers: a round of wedges, a round of hulls, and both again."""
-        unexplained = unexplained_layer_of(beliefs, self.rig)
+        unexplained = unexplained_layer_of(beliefs)
         wedges = self._listed(unexplained, 2 * self._wedge_round)
-        hulls = self._listed(self.hulls(beliefs), 2 * self._hull_round)
+        hulls = self._listed(beliefs.hulls, 2 * self._hull_round)
         return [
-            WorldSets.nothing(len(beliefs.tracked)),
+            WorldSets.nothing(len(beliefs)),
             wedges.part(0, self._wedge_round),
             hulls.part(0, self._hull_round),
             wedges.part(self._wedge_round, 2 * self._wedge_round),

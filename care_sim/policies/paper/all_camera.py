@@ -1,7 +1,7 @@
 """A reserve for everything the camera sees, tracked or not."""
 
 from care_sim.core.beliefs import Beliefs
-from care_sim.core.residual import wedges
+from care_sim.core.residual import wedges_of
 from care_sim.core.world_sets import WorldSets
 from care_sim.policies.base import RowPolicy
 
@@ -18,5 +18,4 @@ class AllCamera(RowPolicy):
 
     def stages(self, beliefs: Beliefs) -> list[WorldSets]:
         """Hulls, then the wedges of all detections."""
-        every = WorldSets(wedges(beliefs.detections, self.rig), beliefs.detected)
-        return [self.hulls(beliefs), every]
+        return [beliefs.hulls, wedges_of(beliefs)]

@@ -30,4 +30,4 @@ class Care(RowPolicy):
         """Hulls, then the wedges of the residual."""
         if not self._yaw_compensation:
             beliefs = beliefs.unturned()
-        return [self.hulls(beliefs), unexplained_layer_of(beliefs, self.rig)]
+        return [beliefs.hulls, unexplained_layer_of(beliefs)]

@@ -18,4 +18,4 @@ class CarePriority(RowPolicy):
 
     def stages(self, beliefs: Beliefs) -> list[WorldSets]:
         """Hulls, then the layers (U, M)."""
-        return [self.hulls(beliefs), *camera_layers_of(beliefs, self.rig)]
+        return [beliefs.hulls, *camera_layers_of(beliefs)]

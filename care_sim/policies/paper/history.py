@@ -17,4 +17,4 @@ class History(RowPolicy):
 
     def stages(self, beliefs: Beliefs) -> list[WorldSets]:
         """Hulls of all forecasts."""
-        return [self.hulls(beliefs)]
+        return [beliefs.hulls]

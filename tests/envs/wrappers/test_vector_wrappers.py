@@ -139,6 +139,19 @@ def test_what_they_take_and_give_is_in_their_spaces(pair):
     single.close()
 
 
+def test_what_stands_side_by_side_is_read_once():
+    inside = VectorSectorReserve(vector("dense", "NextStep"))
+    envs = VectorGridObservation(inside)
+    envs.reset(seed=0)
+    envs.step(np.zeros(envs.action_space.shape, np.float32))
+    assert envs.reading.beliefs is inside.reading.beliefs
+    envs.close()
+    with gymnasium.make("CARE-Dense-v0", budget=0.03) as env:
+        single = SectorReserve(GridObservation(env))
+        single.reset(seed=0)
+        assert single.reading.beliefs is single.env.reading.beliefs
+
+
 def as_it_is(env):
     return env
 
@@ -220,9 +233,9 @@ def test_wrong_actions_are_refused(wrapper):
     ("spoil", "message"),
     [
         (lambda seen: seen | {"ranges": seen["ranges"][:, :-1]}, "ranges of an observation"),
-        (lambda seen: seen | {"ego": seen["ego"] * np.nan}, "ego must hold numbers"),
+        (lambda seen: seen | {"ego": seen["ego"] * np.nan}, "ego of an observation must hold"),
         (lambda seen: seen | {"budget": seen["budget"] + 1}, "budget lie in"),
-        (lambda seen: seen | {"ranges": -1 - seen["ranges"]}, "ranges must be numbers"),
+        (lambda seen: seen | {"ranges": -1 - seen["ranges"]}, "must be numbers of 0 or more"),
         (lambda seen: seen | {"detections": np.full((WORLDS, 1, 9), 3.0)}, "of cameras 0 to"),
         (lambda seen: seen | {"tracks": np.full((WORLDS, 1, 13), 9.0)}, "tracks of an observ"),
         (lambda seen: {"ego": seen["ego"]}, "an observation of CARE-Sim"),
@@ -235,7 +248,9 @@ def test_an_observation_that_no_sensor_gives_is_refused(spoil, message):
         def observations(self, observations):
             return spoil(observations)
 
-    for wrapper in (VectorSectorReserve, VectorGridObservation):
+    # Pictures read all of it, and sectors all but how far the last scan saw.
+    wrappers = [VectorGridObservation, VectorSectorReserve]
+    for wrapper in wrappers[:1] if "0 or more" in message else wrappers:
         with pytest.raises(InvalidInput, match=message):
             wrapper(Spoiled(envs)).reset(seed=0)
     envs.close()

@@ -8,14 +8,14 @@ from hypothesis import strategies as st
 from care_sim.core.actions import scores_of
 from care_sim.core.allocation import allocate
 from care_sim.core.belief import Belief
+from care_sim.core.beliefs import Beliefs
 from care_sim.core.grid import AngularGrid
-from care_sim.core.residual import camera_layers
+from care_sim.core.residual import explained, explained_of
 from care_sim.core.rig import Rig
-from care_sim.core.types import CLASSES, Ego, ImageDetections, Tracks
+from care_sim.core.types import CLASSES, Demand, Ego, ImageDetections, Tracks
 from care_sim.policies.learned.grid_features import GridFeatures
-from care_sim.policies.learned.sector_choice import SectorChoice
-from care_sim.policies.learned.seen import Seen
-from care_sim.policies.learned.tiling import Tiling, reserve_demand, sector_demand
+from care_sim.policies.learned.sector_choice import SectorActions, SectorChoice
+from care_sim.policies.learned.tiling import Tiling
 from care_sim.sensors.camera import FRONT_CAMERA
 
 
@@ -48,6 +48,47 @@ def stacked(beliefs):
     return {name: np.stack([row[name] for row in rows]) for name in rows[0]}
 
 
+GRID = AngularGrid(columns=4, rows=4)
+QUARTERS = Tiling(GRID, 2, 2)
+NOTHING = Belief(
+    Ego(),
+    4,
+    ImageDetections.from_rows(np.empty((0, 9))),
+    Tracks.from_rows(np.empty((0, 13))),
+    np.zeros((4, 4), np.float32),
+)
+
+
+def listed(stages):
+    return [[cells.tolist() for cells in stage.sets] for stage in stages]
+
+
+def test_sectors_become_layers_behind_the_hulls_best_first():
+    rig = Rig(GRID, budget=4)
+    scores = np.array([[[0.1, 0.2], [0.3, 0.4]]])
+    choice = SectorChoice(rig, QUARTERS)
+    first, second = [10, 11, 14, 15], [8, 9, 12, 13]
+    assert listed(choice.reserve(Beliefs.of(NOTHING, rig), scores)) == [[], [first], [second]]
+    assert listed(choice.alone(scores)) == [[], [first]]
+    assert listed(choice.alone(-scores)) == [[]]
+
+
+def test_worlds_without_another_sector_are_left_out_of_a_layer():
+    choice = SectorChoice(Rig(GRID, budget=8), QUARTERS)
+    scores = np.array([[[0.5, -1], [-1, -1]], [[0.2, 0.3], [-1, -1]], [[-1, -1], [-1, 0]]])
+    stages = choice.alone(scores)
+    left, right = [0, 1, 4, 5], [2, 3, 6, 7]
+    assert listed(stages) == [[], [left, right], [left]]
+    assert [stage.counts.tolist() for stage in stages] == [[0, 0, 0], [1, 1, 0], [0, 1, 0]]
+
+
+def test_equal_scores_go_by_ascending_sector():
+    """Also where a network is so sure that its scores are equal in float32."""
+    scores = np.tanh(np.array([[[12, 14], [13, 15]]], np.float32))
+    assert len(np.unique(scores)) == 1
+    assert listed(SectorChoice(Rig(GRID, budget=4), QUARTERS).alone(scores)) == [[], [[0, 1, 4, 5]]]
+
+
 RIGS = {
     "3%": Rig(cameras=(FRONT_CAMERA,), budget=492),
     "no reserve": Rig(cameras=(FRONT_CAMERA,), budget=200, reserve_fraction=0.0),
@@ -63,22 +104,24 @@ def test_every_world_acts_and_sees_as_if_it_were_alone(name, seed, worlds):
     rng = np.random.default_rng(seed)
     rig = RIGS[name]
     sectors, features = Tiling(rig.grid, 32, 4), GridFeatures(rig, 32, 4)
-    choice = SectorChoice(rig, sectors, worlds)
+    acting, choice = SectorActions(rig, sectors, worlds), SectorChoice(rig, sectors)
     alone = [a_belief(rng, rig) for _ in range(worlds)]
     scores = np.round(rng.uniform(-1, 1, (worlds, 4, 32)), 1).astype(np.float32)
     scores[0] *= rng.integers(-1, 2)
 
-    together = Seen.read(stacked(alone), rig)
+    together = Beliefs.from_observation(stacked(alone), rig)
     pictures = features.of_all(together)
-    reserved, only = choice.reserve(together, scores).copy(), choice.alone(scores)
+    reserved, only = acting.reserve(together, scores).copy(), acting.alone(scores)
     for world, belief in enumerate(alone):
         for drawn, rows in pictures.items():
             assert features(belief)[drawn].tobytes() == rows[world].tobytes()
-        for demand, actions in (
-            (reserve_demand(belief, rig, sectors, scores[world]), reserved),
-            (sector_demand(rig, sectors, scores[world]), only),
+        own = scores[world : world + 1]
+        for stages, actions in (
+            (choice.reserve(Beliefs.of(belief, rig), own), reserved),
+            (choice.alone(own), only),
         ):
-            cells = allocate(rig.in_cell_order(demand), rig.budget, rig.reserve_fraction)
+            exploitation, *layers = (stage.sets for stage in stages)
+            cells = allocate(Demand(exploitation, layers), rig.budget, rig.reserve_fraction)
             assert scores_of(cells, rig.grid.shape).tobytes() == actions[world].tobytes()
 
 
@@ -86,7 +129,9 @@ def test_a_forecast_of_another_world_explains_nothing():
     rig = RIGS["3%"]
     rng = np.random.default_rng(0)
     beliefs = [a_belief(rng, rig) for _ in range(200)]
-    _, explained = Seen.read(stacked(beliefs), rig).camera_layers
-    alone = [len(camera_layers(belief, rig)[1]) for belief in beliefs]
-    assert explained.counts.tolist() == alone
-    assert explained.counts.any()
+    together = Beliefs.from_observation(stacked(beliefs), rig)
+    found = [explained(belief.detections, belief.tracks, rig) for belief in beliefs]
+    known = explained_of(together)
+    assert np.concatenate(found).tolist() == known.tolist()
+    assert known.any()
+    assert together.detected.sum() == len(known)

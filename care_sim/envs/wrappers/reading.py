@@ -1,0 +1,74 @@
+"""What wrappers believe: the observation that they were given, read once for all who need it."""
+
+from collections.abc import Callable
+from typing import Any
+
+import gymnasium
+from gymnasium.vector import VectorWrapper
+
+from care_sim.base.errors import InvalidInput, shown
+from care_sim.core.belief import Observation
+from care_sim.core.beliefs import Beliefs
+from care_sim.core.rig import Rig
+
+
+class Reading:
+    """The beliefs of the observation that a wrapper was last given: `read` with its rig, or, where
+    a wrapper `inside` was given the very same, those that are read already.
+    """
+
+    def __init__(
+        self,
+        rig: Rig,
+        read: Callable[[Observation, Rig], Beliefs],
+        inside: "Reading | None" = None,
+    ):
+        self._rig = rig
+        self._read = read
+        self._inside = inside
+        self._beliefs: Beliefs | None = None
+
+    def take(self, observation: Any) -> None:
+        """Read an observation, at once and not when somebody asks: until then it is the caller's,
+        who may write into it. Raises InvalidInput for what is none of the rig.
+        """
+        inside = self._inside
+        self._beliefs = self._read(observation, self._rig) if inside is None else inside.beliefs
+
+    @property
+    def beliefs(self) -> Beliefs:
+        """What was read last. Raises gymnasium.error.ResetNeeded before the first reset."""
+        if self._beliefs is None:
+            raise gymnasium.error.ResetNeeded("call reset() before stepping")
+        return self._beliefs
+
+
+class ReadsBeliefs:
+    """A wrapper that reads what it is given."""
+
+    reading: Reading
+
+
+def read_one(observation: Observation, rig: Rig) -> Beliefs:
+    """The beliefs of the one world of a single environment."""
+    return Beliefs.of(rig.read(observation), rig)
+
+
+def reading_of(env: Any) -> Reading | None:
+    """That of a wrapper, None of anything else."""
+    return env.reading if isinstance(env, ReadsBeliefs) else None
+
+
+def reading_inside(env: Any, what: str) -> Reading:
+    """That of the outermost wrapper of an environment, or of a vector, that reads. Raises
+    InvalidInput, which says `what` needs it, if there is none.
+    """
+    layer = env
+    while isinstance(layer, gymnasium.Wrapper | VectorWrapper):
+        if (found := reading_of(layer)) is not None:
+            return found
+        layer = layer.env
+    raise InvalidInput(
+        f"{what} needs the forecasts, and the observation of {shown(env)} does not tell them: put "
+        "it inside the wrapper that changes the observation"
+    )
