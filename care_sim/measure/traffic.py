@@ -70,9 +70,8 @@ def loads(episodes: int, scenario: str = "dense") -> tuple[dict[str, Load], dict
         name: Load(*np.mean([load[name] for load, _ in told], axis=0).tolist())
         for name in told[0][0]
     }
-    return stages, {
-        name: float(np.mean([counts[name] for _, counts in told])) for name in told[0][1]
-    }
+    means = {name: float(np.mean([counts[name] for _, counts in told])) for name in told[0][1]}
+    return stages, {"keyframes of an episode": len(told) / episodes, **means}
 
 
 def reset_ms(episodes: int, scenario: str = "dense") -> float:
