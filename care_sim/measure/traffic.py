@@ -22,13 +22,8 @@ from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.policies.base import RowPolicy
 from care_sim.scenarios.mirroring import Reflection
 from care_sim.sensors.camera import window_on
-from care_sim.sensors.engines.silhouette_kernels import (
-    Lens,
-    Meshes,
-    PlacedCamera,
-    lay_silhouettes,
-    room_for,
-)
+from care_sim.sensors.engines.silhouette_kernels import lay_silhouettes, room_for
+from care_sim.sensors.engines.view_kernels import Lens, Meshes, PlacedCamera
 from care_sim.sensors.engines.window_kernels import Parts, SensorPose, place_parts
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.world.bullet import FAR_M
@@ -133,8 +128,7 @@ def _of_scan(
     """The parts that rays may meet, and how often a fired ray lies in the window of a part: of that
     many tests those of rays that have met something nearer are left out when they are cast.
     """
-    solids = loop.world.bullet.primitives
-    parts = Parts(solids.shapes, solids.halves, solids.offsets, solids.owners)
+    parts = Parts(*loop.world.bullet.primitives.tables)
     placed = place_parts(SensorPose(*sensor), parts, poses, grid.spacing, float(grid.range_m))
     fired = np.zeros(grid.shape, np.int64)
     fired.flat[cells] = 1
@@ -206,7 +200,7 @@ def _loads(counts: dict[str, float], cells: int, tables: int, steps: int) -> dic
         "choice of cells": Load(_SINGLE * cells + _NUMBER * fired, 3 * cells, 3 * cells),
         "floor": Load(
             0.0,
-            2 * _NUMBER * cells * has_floor,
+            2 * _SINGLE * cells * has_floor,
             # A word of the generator takes some 20 operations, and a quarter of them is refused.
             (20 * 4 / 3 + 3) * cells * has_floor,
             cells * has_floor,
