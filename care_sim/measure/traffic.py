@@ -89,7 +89,7 @@ def _keyframes(config: EpisodeConfig) -> Iterator[tuple[dict[str, Load], dict[st
         ended = False
         while not ended:
             loop = played.loop
-            stages = policy.stages(Beliefs.of(loop.belief))
+            stages = policy.stages(Beliefs.of(loop.belief, loop.rig))
             listed = sum(len(stage.sets.cells) for stage in stages)
             action = policy(observation)
             asked = int(np.count_nonzero(action))
