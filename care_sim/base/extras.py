@@ -49,6 +49,14 @@ def import_panda_gym() -> ModuleType:
     return _import("panda_gym", "panda-gym", "bench")
 
 
+def import_envpool() -> ModuleType:
+    """EnvPool, which no extra brings. Raises MissingExtra with what to install."""
+    try:
+        return import_module("envpool")
+    except ImportError as error:
+        raise MissingExtra(f"EnvPool is not installed: pip install envpool ({error})") from error
+
+
 def import_imageio_ffmpeg() -> ModuleType:
     """FFmpeg, as imageio-ffmpeg brings it. Raises MissingExtra with the extra to install."""
     return _import("imageio_ffmpeg", "A film as MP4", "video")

@@ -13,7 +13,8 @@ class Bench(BenchConfig):
     Measure speed: keyframe, scans, steps and memory, beside other engines and environments.
 
     The ray casters Embree and MuJoCo and the environments highway-env and panda-gym are measured in
-    the same run. All but what takes several processes runs on one core.
+    the same run, EnvPool's highway-env where it is installed, and PPO where the extra `rl` is. All
+    but what takes several threads or processes runs on one core.
     """
 
     def __call__(self) -> int:

@@ -12,8 +12,8 @@ from care_sim.study.episode_config import EpisodeConfig
 
 @dataclass(frozen=True, kw_only=True)
 class BenchConfig:
-    """Measure speed on one core: a keyframe by stage, scans, steps and memory, beside known ones in
-    the same run.
+    """Measure speed: a keyframe by stage, scans, steps, many worlds at once and memory, beside
+    known ones in the same run.
     """
 
     scenario: str = "dense"
@@ -25,14 +25,18 @@ class BenchConfig:
     seed: int = 0
     """Seed of the first episode, and of the scenes of scans and choices."""
     seconds: float = bounded(3.0, 0.001, 3600)
-    """Duration of every single measurement of steps."""
+    """Duration of every single measurement of steps; worlds at once and PPO take longer where whole
+    episodes, and whole rollouts, do.
+    """
     repeats: int = bounded(5, 1, 10_000)
     """Rounds; in each round everything is measured once."""
     samples: int = bounded(200, 1, 1_000_000)
     """Scans per engine, and choices of cells, in a round; a tenth of them per point of the growth
     curves."""
     resets: int = bounded(2000, 1, LARGEST_INTEGER)
-    """Episodes that are begun in the worker whose memory is measured."""
+    """Episodes that are begun in the worker whose memory is measured, and in the worlds at once
+    whose memory is, rounded up to whole batches.
+    """
     seeds: int = bounded(5, 0, 10_000)
     """Seeds of the paper's closed-loop study, 49 episodes each, that two workers play; 0 leaves it
     out.

@@ -13,10 +13,12 @@ from typing import Any
 from rich.console import Console
 
 from care_sim.base.files import JSON, replacing
+from care_sim.measure.bench.batches import batch_memory, batches
 from care_sim.measure.bench.choices import choices
 from care_sim.measure.bench.config import BenchConfig
 from care_sim.measure.bench.growth import growth, growth_figure
 from care_sim.measure.bench.keyframe import stages
+from care_sim.measure.bench.learning import learning
 from care_sim.measure.bench.ratios import BenchReport, ratios
 from care_sim.measure.bench.scanning.scans import scans
 from care_sim.measure.bench.steps import makers, speed
@@ -68,8 +70,19 @@ def bench_report(
         "versions": versions(),
         "main": next(iter(made)),
     }
-    # What runs in several processes needs the other cores.
-    for name, part in (("memory", worker_memory), ("study", _study), ("vectorised", vectorised)):
+    # What runs in several threads or processes needs the other cores.
+    report["batches"] = {}
+    for name, rows in (("batches", batches), ("learning", learning)):
+        tell(name)
+        measured, missing = rows(config)
+        report["batches"] |= measured
+        skipped += missing
+    for name, part in (
+        ("memory", worker_memory),
+        ("batch_memory", batch_memory),
+        ("study", _study),
+        ("vectorised", vectorised),
+    ):
         tell(name)
         report[name] = part(config)
     # All else runs on one, so that libraries with threads of their own gain nothing by them.

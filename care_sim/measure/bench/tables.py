@@ -5,8 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from care_sim.measure.bench.batches import ENVPOOL, ENVPOOL_CONTAINS, WORLDS
 from care_sim.measure.bench.choices import TRACKS
 from care_sim.measure.bench.keyframe import REST
+from care_sim.measure.bench.learning import PPO
 from care_sim.measure.bench.ratios import BenchReport
 from care_sim.reports.table import Table
 
@@ -14,9 +16,12 @@ _SPREAD = "median (least to most)"
 
 
 def bench_tables(report: BenchReport) -> list[Table]:
-    """Speed with the machine, vectors, the keyframe, choices, scans, memory, ratios, targets."""
+    """Speed with the machine, many worlds, vectors, the keyframe, choices, scans, memory, ratios,
+    targets.
+    """
     return [
         _speed(report),
+        _batches(report),
         _spreads(
             "Steps/s of Gymnasium's AsyncVectorEnv, policies inside",
             "processes",
@@ -58,6 +63,29 @@ def _speed(report: BenchReport) -> Table:
     )
 
 
+def _batches(report: BenchReport) -> Table:
+    rows = tuple(
+        (name, *(_spread(figures[key]) for key in ("steps_per_s", "steps_per_cpu_s")))
+        for name, figures in report["batches"].items()
+    )
+    config = report["config"]
+    notes = [
+        f"worlds of {report['main']} at {config['budget']:.0%}, with {config['policy']} inside for "
+        "all of them, copy=False; observations are handed out at every step; resets included",
+        "scoring_info=False: infos without what is for scoring alone, and rewards the same",
+    ]
+    if PPO in report["batches"]:
+        notes.append("PPO: by the recipe of the shipped weights, the updates included")
+    if ENVPOOL in report["batches"]:
+        notes.append(ENVPOOL_CONTAINS)
+    return Table(
+        f"Many worlds at once: {_SPREAD} of {config['repeats']}",
+        ("worlds", "steps/s of all together", "per CPU second of any thread"),
+        rows,
+        tuple(notes),
+    )
+
+
 def _stages(stages: Mapping[str, Sequence[float]]) -> Table:
     note = (
         f"{REST}, an estimate: what lies between these stages: drawing the floor, "
@@ -94,14 +122,21 @@ def _scans(report: BenchReport) -> Table:
 
 
 def _memory(report: BenchReport) -> Table:
-    memory = report["memory"]
     moments = {
-        "its first reset and step": "begun_mb",
+        "the first resets and a step": "begun_mb",
         "a tenth of the resets": "early_mb",
-        f"{memory['resets']:.0f} resets": "peak_mb",
+        "all resets": "peak_mb",
     }
-    rows = tuple((f"after {moment}", f"{memory[key]:.0f}") for moment, key in moments.items())
-    return Table("Peak memory of a worker, MB", ("", "MB"), rows)
+    holders = {
+        f"a worker, {report['memory']['resets']:.0f} resets": report["memory"],
+        f"{WORLDS} worlds, {report['batch_memory']['resets']:.0f} resets": report["batch_memory"],
+    }
+    rows = tuple(
+        (f"after {moment}", *(f"{memory[key]:.0f}" for memory in holders.values()))
+        for moment, key in moments.items()
+    )
+    note = "libraries and compiled code included"
+    return Table("Peak memory of a process, MB", ("", *holders), rows, (note,))
 
 
 def _targets(report: BenchReport) -> Table:
