@@ -15,7 +15,7 @@ from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
 from care_sim.core.types import Action
 from care_sim.core.world_sets import WorldSets
-from care_sim.policies.learned.tiling import Tiling
+from care_sim.policies.learned.tiling import Tiling, enough_beside_hulls
 
 
 class SectorChoice:
@@ -32,8 +32,7 @@ class SectorChoice:
         best first.
         """
         hulls = beliefs.hulls
-        # At most one budget of the cells of sectors is taken by hulls.
-        layers = self._layers(scores, 2 * self._rig.budget)
+        layers = self._layers(scores, enough_beside_hulls(self._rig))
         return [WorldSets(self._rig.listed(hulls.sets), hulls.counts), *layers]
 
     def alone(self, scores: NDArray[np.floating]) -> list[WorldSets]:

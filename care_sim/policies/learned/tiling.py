@@ -11,8 +11,11 @@ from numpy.typing import NDArray
 from care_sim.base.checks import check_whole
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Integers
+from care_sim.core.belief import Belief
 from care_sim.core.grid import Cells
 from care_sim.core.grid_stack import Grid
+from care_sim.core.rig import Rig
+from care_sim.core.types import Demand
 
 
 @dataclass(frozen=True)
@@ -75,3 +78,22 @@ class Tiling:
         # A stable sort of the negated scores: among equals the lower index comes first.
         best = np.argsort(-flat, axis=1, kind="stable")[:, :most]
         return best, np.minimum(np.count_nonzero(flat > 0, axis=1), most)
+
+
+def reserve_demand(
+    belief: Belief, rig: Rig, sectors: Tiling, scores: NDArray[np.floating]
+) -> Demand:
+    """The forecasts' hulls, then the sectors with a positive score as layers of the reserve, best
+    first: what `care_sim.policies.learned.sector_choice.SectorChoice` asks for, in one world and
+    not yet in the rig's `cell_order`, for a policy of your own.
+    """
+    (ranked,), (count,) = sectors.ranked(np.reshape(scores, (1, -1)), enough_beside_hulls(rig))
+    return Demand(
+        rig.hulls(belief.tracks.boxes), [[cells] for cells in sectors.cells[ranked[:count]]]
+    )
+
+
+def enough_beside_hulls(rig: Rig) -> int:
+    """Cells of sectors that fill the budget, whatever the hulls take."""
+    # At most one budget of the cells of sectors is taken by hulls.
+    return 2 * rig.budget

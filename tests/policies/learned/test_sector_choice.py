@@ -15,7 +15,7 @@ from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES, Demand, Ego, ImageDetections, Tracks
 from care_sim.policies.learned.grid_features import GridFeatures
 from care_sim.policies.learned.sector_choice import SectorActions, SectorChoice
-from care_sim.policies.learned.tiling import Tiling
+from care_sim.policies.learned.tiling import Tiling, reserve_demand
 from care_sim.sensors.camera import FRONT_CAMERA
 
 
@@ -116,12 +116,12 @@ def test_every_world_acts_and_sees_as_if_it_were_alone(name, seed, worlds):
         for drawn, rows in pictures.items():
             assert features(belief)[drawn].tobytes() == rows[world].tobytes()
         own = scores[world : world + 1]
-        for stages, actions in (
-            (choice.reserve(Beliefs.of(belief, rig), own), reserved),
-            (choice.alone(own), only),
+        exploitation, *layers = (stage.sets for stage in choice.alone(own))
+        for demand, actions in (
+            (rig.in_cell_order(reserve_demand(belief, rig, sectors, scores[world])), reserved),
+            (Demand(exploitation, layers), only),
         ):
-            exploitation, *layers = (stage.sets for stage in stages)
-            cells = allocate(Demand(exploitation, layers), rig.budget, rig.reserve_fraction)
+            cells = allocate(demand, rig.budget, rig.reserve_fraction)
             assert scores_of(cells, rig.grid.shape).tobytes() == actions[world].tobytes()
 
 
