@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from care_sim import InvalidInput
-from tests.helpers.vectors import native
+from tests.helpers.vectors import difference, native, singles
 
 NAME = "CARE-Dartout-v0"
 
@@ -145,3 +145,21 @@ def wait_for(holds, seconds=5.0):
     while not holds() and time.monotonic() < end:
         time.sleep(0.01)
     assert holds()
+
+
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
+def test_a_thread_of_which_no_world_plays(mode):
+    # World 1 is over while world 0, whose episode began later, goes on in the other thread.
+    arguments = {"budget": 0.03, "duration_s": 0.3}
+    env = native(NAME, 2, threads=2, autoreset_mode=mode, **arguments)
+    reference = singles(NAME, 2, mode, **arguments)
+    for one in (env, reference):
+        one.reset(seed=0)
+        one.step(zeros(one))
+        one.reset(seed=[5, None], options={"reset_mask": np.array([True, False])})
+    for step in range(12):
+        given, expected = env.step(zeros(env)), reference.step(zeros(env))
+        alike = dict(enumerate(given)), dict(enumerate(expected))
+        assert difference(*alike, f"step {step}") is None
+    env.close()
+    reference.close()
