@@ -54,8 +54,6 @@ class CompiledWorlds:
 
     def step(self, actions: NDArray[np.float32], who: Mask) -> Stepped:
         """See `care_sim.envs.vector.worlds.Worlds`."""
-        if not who.any():
-            return Stepped.nothing(len(who))
         # Asked before the keyframe, which moves the worlds on, and only while it is needed: it
         # costs rays.
         state = self._loop.state
@@ -75,6 +73,7 @@ class CompiledWorlds:
         }
         if not self._model.conditions.floor:
             self._list_fired(single, who)
+        # There are columns even where nobody plays: they are joined with those of other threads.
         columns = self._columns(records, terms)
         return Stepped(np.where(who, rewards, 0.0), terminated, truncated, columns, single)
 

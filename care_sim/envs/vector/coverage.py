@@ -2,6 +2,7 @@
 
 from care_sim.core.grid import AngularGrid
 from care_sim.envs.closed_loop import ClosedLoopEnv
+from care_sim.envs.scenarios import CutInEnv, DartoutEnv, DenseEnv, R157Env, ScenarioEnv
 from care_sim.scenarios.cutin import CutIn
 from care_sim.scenarios.dartout import Dartout
 from care_sim.scenarios.dense import Dense
@@ -9,6 +10,8 @@ from care_sim.scenarios.r157.scenario import R157
 
 STRAIGHT = (Dartout, Dense, CutIn, R157)
 """Scenarios on a straight road, without a route, a plan of speeds or an end before their time."""
+PLAIN = (DartoutEnv, DenseEnv, CutInEnv, R157Env, ScenarioEnv)
+"""Environments that do nothing of their own in a step. A class that derives from them may."""
 
 
 def why_separate(env: ClosedLoopEnv) -> str | None:
@@ -16,6 +19,8 @@ def why_separate(env: ClosedLoopEnv) -> str | None:
     conditions, rig = env.conditions, env.rig
     if type(env.scenario) not in STRAIGHT:
         return f"the scenario {env.scenario_name}"
+    if type(env) not in PLAIN:
+        return f"the class {type(env).__name__}"
     reasons = {
         "the engine": conditions.engine != "fast",
         "the detector": not env.detects_by_returns,

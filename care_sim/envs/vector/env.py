@@ -1,7 +1,7 @@
 """The vector environments of the closed loop: thin Gymnasium adapters around `Worlds`."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import partial
 from typing import Any, ClassVar
 
@@ -113,8 +113,10 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
     ) -> tuple[Observed, dict[str, Any]]:
         """Begin an episode in every world, or in those of `options["reset_mask"]` (W,).
 
-        With a whole number for a `seed` world i takes `seed + i`; a list has one for each.
+        With a whole number for a `seed` world i takes `seed + i`; a list has one for each. Raises
+        gymnasium.error.ClosedEnvironmentError once the environment is closed, as `step` does.
         """
+        self._check_open()
         seeds = self._seeds(seed)
         who = self._to_reset(options)
         infos = self._begin(who, seeds, {})
@@ -124,9 +126,10 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         """Fire the cells that each world's row of `actions` (W, E, A) scores highest.
 
         Raises InvalidInput for actions of the wrong shape or with values that are not finite, and
-        gymnasium.error.ResetNeeded before `reset`, and for a world that is over in the mode
-        "Disabled".
+        gymnasium.error.ResetNeeded before `reset`, after an error or interrupt in the middle of a
+        step, and for a world that is over in the mode "Disabled".
         """
+        self._check_open()
         if not self._begun.all():
             raise gymnasium.error.ResetNeeded("call reset() before stepping")
         begins = self._over.copy()
@@ -158,9 +161,13 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
 
     def close_extras(self, **_: Any) -> None:
         """Free the worlds and end the threads."""
+        self._threads.close()
         for worlds in self._worlds:
             worlds.close()
-        self._threads.close()
+
+    def _check_open(self) -> None:
+        if self.closed:
+            raise gymnasium.error.ClosedEnvironmentError("the environment is closed: make another")
 
     def _made(self, share: slice, arguments: dict[str, Any]) -> Worlds:
         rows = {name: values[share] for name, values in self._observed.items()}
@@ -170,12 +177,15 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         return SeparateWorlds(partial(self.single, **arguments), rows)
 
     def _played(self, scores: NDArray[np.float32], who: Mask) -> Stepped:
+        # An error leaves worlds at different keyframes: then all have to begin anew.
+        self._begun[:] = False
         parts = self._threads.all(
             [
                 partial(worlds.step, scores[share], who[share])
                 for worlds, share in zip(self._worlds, self._shares, strict=True)
             ]
         )
+        self._begun[:] = True
         if len(parts) == 1:
             return parts[0]
         single = {
@@ -193,6 +203,7 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         self, who: Mask, seeds: Sequence[int | None], infos: dict[str, Any]
     ) -> dict[str, Any]:
         """Begin episodes in the worlds `who`, and add their infos."""
+        self._begun[who] = False
         tasks = [
             partial(
                 worlds.begin, {world: seeds[share.start + world] for world in _places(who[share])}
@@ -224,10 +235,11 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
     def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
         if seed is None:
             return [None] * self.num_envs
-        if isinstance(seed, int | np.integer):
+        if isinstance(seed, Iterable):
+            seeds = [*seed]
+        else:
             check_seed(seed)
-            return [int(seed) + world for world in range(self.num_envs)]
-        seeds = [*seed]
+            seeds = [int(seed) + world for world in range(self.num_envs)]
         if len(seeds) != self.num_envs:
             raise InvalidInput(f"seed must be one for each of {self.num_envs}, got {len(seeds)}")
         for one in seeds:

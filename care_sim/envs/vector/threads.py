@@ -2,8 +2,8 @@
 
 import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from typing import TypeVar
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from typing import Any, TypeVar
 from weakref import finalize
 
 _T = TypeVar("_T")
@@ -16,6 +16,7 @@ class Threads:
         self._count = count
         self._pool: ThreadPoolExecutor | None = None
         self._process = -1
+        self._others: list[Future[Any]] = []
 
     def all(self, tasks: Sequence[Callable[[], _T]]) -> list[_T]:
         """What every task gives. The first of them is done by the thread that asks."""
@@ -25,14 +26,16 @@ class Threads:
         if self._pool is None or self._process != os.getpid():
             self._pool = ThreadPoolExecutor(self._count - 1, "care-sim worlds")
             self._process = os.getpid()
+            self._others = []
             finalize(self, self._pool.shutdown, wait=False)
-        others = [self._pool.submit(task) for task in tasks[1:]]
+        # Whoever was interrupted while waiting has left some at work.
+        wait(self._others)
+        self._others = others = [self._pool.submit(task) for task in tasks[1:]]
         # All are waited for, whatever one of them raises: nothing goes on behind the caller's back.
         try:
             first = tasks[0]()
         finally:
-            for other in others:
-                other.exception()
+            wait(others)
         return [first, *(other.result() for other in others)]
 
     def close(self) -> None:

@@ -2,8 +2,10 @@
 
 import pytest
 
+from care_sim import SensorSetup
+from care_sim.core.pinhole import PinholeCamera
 from care_sim.envs import CLOSED_LOOP
-from tests.helpers.vectors import MODES, played_alike
+from tests.helpers.vectors import MODES, native, played_alike
 
 LATE = {"camera_latency": 2, "camera_jitter": 1}
 BLIND = {"blackout_start_s": 1.0, "blackout_s": 1.5}
@@ -43,3 +45,12 @@ def test_conditions(conditions):
 @pytest.mark.parametrize(("worlds", "threads"), [(1, 1), (5, 1), (5, 2), (5, 8)])
 def test_numbers_of_worlds_and_threads(worlds, threads):
     assert played_alike("CARE-CutIn-v0", worlds=worlds, steps=30, threads=threads) is None
+
+
+def test_more_detections_than_an_observation_holds():
+    cameras = [PinholeCamera(position=(0.6, 0.01 * n, 0.0)) for n in range(24)]
+    arguments = {"sensor": SensorSetup("many", cameras=tuple(cameras)), "vehicles": 12}
+    env = native("CARE-Dense-v0", 1, **arguments)
+    assert (env.reset(seed=3)[0]["detections"][..., 0] >= 0).all()
+    env.close()
+    assert played_alike("CARE-Dense-v0", worlds=2, steps=12, **LATE, **arguments) is None

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from care_sim import InvalidInput
-from tests.helpers.vectors import native
+from tests.helpers.vectors import difference, native, singles
 
 NAME = "CARE-Dartout-v0"
 
@@ -145,3 +145,58 @@ def wait_for(holds, seconds=5.0):
     while not holds() and time.monotonic() < end:
         time.sleep(0.01)
     assert holds()
+
+
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
+def test_a_thread_of_which_no_world_plays(mode):
+    # World 1 is over while world 0, whose episode began later, goes on in the other thread.
+    arguments = {"budget": 0.03, "duration_s": 0.3}
+    env = native(NAME, 2, threads=2, autoreset_mode=mode, **arguments)
+    reference = singles(NAME, 2, mode, **arguments)
+    for one in (env, reference):
+        one.reset(seed=0)
+        one.step(zeros(one))
+        one.reset(seed=[5, None], options={"reset_mask": np.array([True, False])})
+    for step in range(12):
+        given, expected = env.step(zeros(env)), reference.step(zeros(env))
+        alike = dict(enumerate(given)), dict(enumerate(expected))
+        assert difference(*alike, f"step {step}") is None
+    env.close()
+    reference.close()
+
+
+def test_after_an_error_in_one_thread_all_worlds_begin_anew(vector, monkeypatch):
+    vector.reset(seed=0)
+    expected = vector.step(zeros(vector))[0]["tracks"].tobytes()
+    vector.reset(seed=3)
+
+    def fails(*_):
+        raise MemoryError
+
+    with monkeypatch.context() as broken:
+        broken.setattr(vector._worlds[1], "step", fails)
+        with pytest.raises(MemoryError):
+            vector.step(zeros(vector))
+    # The worlds of the other thread have gone on.
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        vector.step(zeros(vector))
+    vector.reset(seed=0)
+    assert vector.step(zeros(vector))[0]["tracks"].tobytes() == expected
+
+
+def test_what_is_closed_says_so(vector):
+    vector.reset(seed=0)
+    vector.close()
+    vector.close()
+    with pytest.raises(gymnasium.error.ClosedEnvironmentError):
+        vector.reset(seed=0)
+    with pytest.raises(gymnasium.error.ClosedEnvironmentError):
+        vector.step(zeros(vector))
+
+
+@pytest.mark.parametrize("seed", [1.5, "one", [0, 1.0, 2], 2**63 - 1, {"seed": 1}])
+def test_a_seed_that_no_world_can_have_begins_none(vector, seed):
+    with pytest.raises(InvalidInput, match="seed must be"):
+        vector.reset(seed=seed)
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        vector.step(zeros(vector))

@@ -1,0 +1,51 @@
+"""Threads that work at the same time."""
+
+import signal
+import threading
+import time
+
+import pytest
+
+from care_sim.envs.vector.threads import Threads
+
+
+@pytest.fixture
+def threads():
+    made = Threads(3)
+    yield made
+    made.close()
+
+
+def test_all_are_waited_for_when_one_fails(threads):
+    done = []
+
+    def works():
+        time.sleep(0.1)
+        done.append(True)
+
+    def fails():
+        raise MemoryError
+
+    for tasks in ([fails, works, works], [works, fails, works]):
+        done.clear()
+        with pytest.raises(MemoryError):
+            threads.all(tasks)
+        assert len(done) == 2
+
+
+def test_what_an_interrupt_left_at_work_is_waited_for_before_more_is_begun(threads):
+    done = []
+
+    def works():
+        time.sleep(0.1)
+        signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
+        time.sleep(0.3)
+        done.append(True)
+
+    def nothing():
+        pass
+
+    with pytest.raises(KeyboardInterrupt):
+        threads.all([nothing, works, nothing])
+    assert not done
+    assert threads.all([nothing, nothing, lambda: bool(done)])[2]
