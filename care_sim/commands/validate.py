@@ -8,6 +8,7 @@ import tyro
 from care_sim.base.bounds import bounded
 from care_sim.commands.shared.episode_studies import EpisodeStudy
 from care_sim.commands.shared.options import DEFAULT_SENSING, SensingOptions, seeds_of
+from care_sim.commands.shared.play_options import named_after
 from care_sim.commands.shared.selection import check_built, check_values
 from care_sim.study.designs.validate import levels_of, validation_study
 from care_sim.study.parameters import parameters
@@ -55,4 +56,4 @@ class Validate(EpisodeStudy):
             self.training_seeds,
             **self.conditions.sensing(),
         )
-        return self.play_study("validate", configs, f"validate-{self.world}")
+        return self.play_study("validate", configs, named_after("validate", self.world))

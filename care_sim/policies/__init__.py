@@ -12,6 +12,7 @@ import gymnasium.vector
 
 from care_sim.base.errors import BrokenPolicy, InvalidInput, MissingExtra, shown
 from care_sim.base.plugins import Plugins
+from care_sim.base.vectors import shared_attribute
 from care_sim.policies.base import Policy
 from care_sim.policies.controls.fan import Fan
 from care_sim.policies.controls.history_place import HistoryPlace
@@ -183,7 +184,7 @@ def make_policy(name: str, env: _AnyEnv, /, **parameters: object) -> Policy | Ve
             )
         given.append(_of_environment(name, env, "truth"))
     for parameter, attribute in getattr(make, "told", Policy.told).items():
-        parameters.setdefault(parameter, getattr(env.unwrapped, attribute, None))
+        parameters.setdefault(parameter, _told(env, attribute))
     made = partial(_made, name, make, given, parameters)
     if isinstance(env, gymnasium.vector.VectorEnv):
         return vector_policy(made, env.num_envs)
@@ -225,12 +226,21 @@ def _check_unwrapped(name: str, env: _AnyEnv) -> None:
 
 
 def _of_environment(name: str, env: _AnyEnv, attribute: str) -> object:
-    # A vector environment has no door for what lies under wrappers but this one.
-    asked = env.unwrapped if isinstance(env, gymnasium.vector.VectorEnv) else env
-    get = getattr(asked, "get_wrapper_attr", partial(getattr, asked))
     try:
-        return get(attribute)
+        if isinstance(env, gymnasium.vector.VectorEnv):
+            return shared_attribute(env, attribute)
+        return env.get_wrapper_attr(attribute)
     except AttributeError as error:
         raise InvalidInput(
             f"policy {name} needs an environment of CARE-Sim with a {attribute}, got {shown(env)}"
         ) from error
+
+
+def _told(env: _AnyEnv, attribute: str) -> object:
+    """What the environment itself says, None where it says nothing."""
+    if not isinstance(env, gymnasium.vector.VectorEnv):
+        return getattr(env.unwrapped, attribute, None)
+    try:
+        return shared_attribute(env, attribute)
+    except AttributeError:
+        return None

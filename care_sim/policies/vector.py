@@ -85,7 +85,10 @@ def _asks_as(policy: Policy, kind: Any) -> bool:
     may have changed it elsewhere.
     """
     asked = ("__call__", "_cells", "demand", "remember", "reset")
-    return all(getattr(type(policy), name) is getattr(kind, name) for name in asked)
+    return all(
+        getattr(type(policy), name) is getattr(kind, name) and name not in vars(policy)
+        for name in asked
+    )
 
 
 class _ByRows(VectorPolicy):
@@ -99,9 +102,24 @@ class _ByRows(VectorPolicy):
     def _actions(self, observation: Observation, live: Mask) -> Actions:
         beliefs = Beliefs.from_observation(observation, self.rig, live)
         stages = self._policy.stages(beliefs)
+        for stage in stages:
+            self._check(stage)
         if not self._policy.keeps_order:
             stages = [WorldSets(self.rig.listed(sets), counts) for sets, counts in stages]
         return self._allocator.scores(stages, beliefs.budgets)
+
+    def _check(self, stage: WorldSets) -> None:
+        """Raise InvalidInput for sets that compiled code would follow out of its tables."""
+        sets, counts = stage
+        name, cells = self._policy.name or type(self._policy).__name__, self.rig.grid.size
+        # One look at all: as numbers without a sign, those below 0 are the largest.
+        if sets.cells.view(np.uint64).max(initial=0) >= cells:
+            raise InvalidInput(f"policy {name}: cells must lie in 0..{cells - 1}")
+        if counts.shape != (self.worlds,) or counts.sum() != len(sets):
+            raise InvalidInput(
+                f"policy {name}: counts must tell of {self.worlds} worlds how many of the "
+                f"{len(sets)} sets are of each, got {shown(counts.tolist())}"
+            )
 
     def _forget(self, mask: Mask) -> None:
         pass

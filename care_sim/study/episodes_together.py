@@ -2,19 +2,23 @@
 alone.
 """
 
+import random
+import sys
 import time
 from collections.abc import Sequence
 from contextlib import closing
 from functools import partial
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 from gymnasium.vector.utils import create_empty_array
 from numpy.typing import NDArray
 
+from care_sim.base.errors import InvalidInput
 from care_sim.envs.sensing import Observed
 from care_sim.envs.spaces import checked_scores
 from care_sim.envs.vector.compiled_worlds import CompiledWorlds
+from care_sim.envs.vector.coverage import why_separate
 from care_sim.envs.vector.worlds import Stepped
 from care_sim.policies.vector import vector_policy
 from care_sim.study.episode_config import EpisodeConfig, closed_loop
@@ -41,7 +45,7 @@ def play_episodes(batch: Sequence[EpisodeConfig]) -> list[Row | str]:
 
 def play_together(configs: Sequence[EpisodeConfig]) -> list[Row]:
     """The rows of episodes of one `EpisodeConfig.batch`, of whose time each has an even share.
-    Raises what any of them raises.
+    Raises what any of them raises, and InvalidInput where they would not be what each is alone.
     """
     started = time.perf_counter()
     # The file of a set-up may be written anew while the episodes run.
@@ -52,11 +56,14 @@ def play_together(configs: Sequence[EpisodeConfig]) -> list[Row]:
     outcomes = dict[int, Row]()
     with configs[0].make_env() as env:
         model = closed_loop(env)
+        if reason := why_separate(model):
+            raise InvalidInput(f"{reason} is not played as arrays")
         observed = cast(Observed, create_empty_array(model.observation_space, count))
         policy = vector_policy(partial(configs[0].make_policy, env), count)
         with closing(CompiledWorlds(model, observed, exact=False)) as worlds:
             infos = worlds.begin({world: config.seed for world, config in enumerate(configs)})
             policy.reset()
+            drawn = _common_draws()
             live = np.ones(count, np.bool_)
             # Worlds that are over rest until the last one is.
             while live.any():
@@ -71,6 +78,10 @@ def play_together(configs: Sequence[EpisodeConfig]) -> list[Row]:
                 outcomes |= {w: stepped.single[w]["outcome"] for w in np.flatnonzero(over).tolist()}
                 keyframes += live
                 live &= ~over
+    # Who seeds a generator of the whole process in `reset`, and draws from it at keyframes, gets
+    # other numbers where others draw from it, too.
+    if _common_draws() != drawn:
+        raise InvalidInput(f"policy {configs[0].policy} draws from a generator of the process")
     wall_s = (time.perf_counter() - started) / count
     return [
         Played(
@@ -83,6 +94,16 @@ def play_together(configs: Sequence[EpisodeConfig]) -> list[Row]:
         ).row(config)
         for world, config in enumerate(configs)
     ]
+
+
+def _common_draws() -> list[Any]:
+    """Where the generators are that everything in a process shares."""
+    _, words, *rest = cast(tuple[Any, ...], np.random.get_state())  # noqa: NPY002 (whose it may be)
+    states: list[Any] = [random.getstate(), words.tobytes(), *rest]
+    # Whoever draws from it has imported it; nobody else waits for it.
+    if torch := sys.modules.get("torch"):
+        states.append(torch.get_rng_state().numpy().tobytes())
+    return states
 
 
 def _fired(stepped: Stepped, world: int) -> NDArray[np.int64] | list[int]:

@@ -63,6 +63,8 @@ class VectorTrainingSeeds(WorldsWrapper):
             if isinstance(seed, int | np.integer)
             else [*seed]
         )
+        if len(given) != self.num_envs:
+            raise InvalidInput(f"seed must be one for each of {self.num_envs}, got {len(given)}")
         drawn = [own.next(one) for own, one in zip(self._seeds, given, strict=True)]
         return self.env.reset(seed=drawn)  # type: ignore[arg-type]
 

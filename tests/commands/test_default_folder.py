@@ -78,6 +78,10 @@ def test_a_world_and_a_source_have_folders_of_their_own(monkeypatch, capsys):
 
     for line, name in (
         ("validate dense --seeds 1 --training-seeds 1 --budgets 0.1", "validate-dense"),
+        (
+            "validate care_sim.scenarios.dense:Dense --seeds 1 --training-seeds 1 --budgets 0.1",
+            "validate-care_sim.scenarios.dense",
+        ),
         ("protocol --scenes 1 --policies history --budgets 0.1", "protocol-streets"),
         ("mechanism --scenes 1", "mechanism-streets"),
         ("ablate --source streets --scenes 1", "ablate-streets"),

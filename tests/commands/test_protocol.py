@@ -382,7 +382,7 @@ def test_a_bad_policy_costs_only_its_own_plays(third_party, source, tmp_path):
     assert sorted(kept) == ["care"] * 4 + ["history"] * 4
     reasons = sorted((failure.config.policy, failure.reason) for failure in failures)
     assert (
-        reasons[4:] == [("raises", "RuntimeError: no idea, at all (misbehaving.py, line 20)")] * 4
+        reasons[4:] == [("raises", "RuntimeError: no idea, at all (misbehaving.py, line 22)")] * 4
     )
     assert reasons[0] == ("dies", "the worker process died")
     assert reasons[3] == ("dies", "the worker process died 3 times before")

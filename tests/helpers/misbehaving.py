@@ -3,6 +3,8 @@
 THIRD_PARTY = """
 import os, signal
 from pathlib import Path
+import numpy as np
+from care_sim.core.types import Demand
 from care_sim.policies.paper.history import History
 
 class Dies(History):
@@ -64,6 +66,17 @@ class Keeps(History):
         kept["ranges"][:] = 1.0
         observation["tracks"][:] = 0.0
         return action
+
+class DrawsInCommon(History):
+    # Seeds the one generator that the whole process has.
+    def reset(self):
+        np.random.seed(5)
+
+    def remember(self, belief):
+        self.drawn = np.random.permutation(self.rig.grid.size)
+
+    def demand(self, belief):
+        return Demand(layers=[[self.drawn]])
 """
 ENTRY_POINTS = """
 [care_sim.policies]
@@ -76,4 +89,5 @@ raises-in-the-brake = misbehaving:RaisesInTheBrake
 dies-in-the-brake = misbehaving:DiesInTheBrake
 narrow = misbehaving:Narrow
 keeps = misbehaving:Keeps
+draws-in-common = misbehaving:DrawsInCommon
 """

@@ -1,17 +1,22 @@
 """A policy of many worlds asks for what as many of its kind ask for alone, to the last bit."""
 
+from contextlib import closing
 from dataclasses import replace
+from functools import partial
 
 import gymnasium
 import numpy as np
 import pytest
+from gymnasium.vector import SyncVectorEnv
 
 import care_sim
 from care_sim.base.errors import InvalidInput
 from care_sim.core.cell_order import CELL_ORDERS
+from care_sim.core.cell_sets import CellSets
 from care_sim.core.grid import AngularGrid
 from care_sim.core.grid_stack import GridStack
 from care_sim.core.types import Demand
+from care_sim.core.world_sets import WorldSets
 from care_sim.envs.sensing import sensing
 from care_sim.measure.certify.design import AS_LISTED
 from care_sim.policies import BUILT_IN
@@ -207,6 +212,74 @@ def test_what_somebody_changed_is_asked_for_in_every_world(make, dense):
         actions = together(observation)
         for number, policy in enumerate(alone):
             assert np.array_equal(actions[number], policy(world(observation, number)))
+
+
+class Patched(Care):
+    """Somebody's policy that changes what it asks for when it is made."""
+
+    def __init__(self, rig):
+        super().__init__(rig)
+        self.demand = lambda belief: Demand(layers=[[np.arange(len(belief.detections))]])
+
+
+def test_what_somebody_changed_in_the_object_is_asked_for_too(dense):
+    rig, observations = dense
+    together, alone = vector_policy(lambda: Patched(rig), WORLDS), Patched(rig)
+    for observation in observations[:2]:
+        actions = together(observation)
+        for number in range(WORLDS):
+            assert np.array_equal(actions[number], alone(world(observation, number)))
+
+
+@pytest.mark.parametrize("cell", [-1, 16_384, 2**40])
+def test_a_cell_that_the_grid_lacks_is_refused_before_compiled_code_meets_it(cell, dense):
+    class Astray(Care):
+        name = "astray"
+
+        def stages(self, beliefs):
+            cells = np.full(len(beliefs), cell)
+            return [WorldSets(CellSets(cells, np.ones_like(cells)), np.ones_like(cells))]
+
+    rig, observations = dense
+    with pytest.raises(InvalidInput, match=r"^policy astray: cells must lie in 0\.\.16383$"):
+        vector_policy(lambda: Astray(rig), WORLDS)(observations[0])
+
+
+@pytest.mark.parametrize("counts", [[1, 1], [1, 1, 1, 0], [1, 1, 2]])
+def test_sets_of_other_worlds_are_refused(counts, dense):
+    class Miscounted(Care):
+        def stages(self, beliefs):
+            cells = np.arange(len(beliefs))
+            return [WorldSets(CellSets(cells, np.ones_like(cells)), np.array(counts))]
+
+    rig, observations = dense
+    with pytest.raises(InvalidInput, match="counts must tell of 3 worlds how many of the 3 sets"):
+        vector_policy(lambda: Miscounted(rig), WORLDS)(observations[0])
+
+
+@pytest.mark.parametrize("name", ["care", "care-sightlines", "care-spread", "history-place"])
+def test_vectors_of_gymnasium_are_played_too(name):
+    arguments = {"budget": 0.03, "min_returns": 9, "disable_env_checker": True}
+    makers = [partial(gymnasium.make, "CARE-Dense-v0", **arguments)] * 2
+    with (
+        closing(SyncVectorEnv(makers)) as one_by_one,
+        closing(gymnasium.make_vec("CARE-Dense-v0", 2, budget=0.03, min_returns=9)) as arrays,
+    ):
+        observation, _ = one_by_one.reset(seed=4)
+        policy, same = (care_sim.make_policy(name, envs) for envs in (one_by_one, arrays))
+        for _ in range(8):
+            actions = policy(observation)
+            assert np.array_equal(actions, same(observation))
+            observation, *_ = one_by_one.step(actions.copy())
+
+
+def test_worlds_that_differ_and_worlds_of_others_are_refused():
+    makers = [partial(gymnasium.make, "CARE-Dense-v0", budget=budget) for budget in (0.1, 0.03)]
+    with closing(SyncVectorEnv(makers)) as envs, pytest.raises(InvalidInput, match="must have one"):
+        care_sim.make_policy("care", envs)
+    cartpoles = gymnasium.make_vec("CartPole-v1", 2, "sync")
+    with pytest.raises(InvalidInput, match="needs an environment of CARE-Sim with a rig"):
+        care_sim.make_policy("care", cartpoles)
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 import pytest
 
+from care_sim.base.errors import InvalidInput
 from care_sim.study.episode_config import EpisodeConfig, grid, of_seeds
 from care_sim.study.episode_play import run_episode
 from care_sim.study.episodes_together import play_episodes, play_together
@@ -87,7 +88,7 @@ def test_one_that_fails_costs_only_itself(third_party):
 def test_the_reasons_are_those_of_episodes_alone(third_party):
     short = {"scenario_parameters": (("duration_s", 0.3),)}
     for policy, reason in {
-        "exits": "SystemExit: 4 (misbehaving.py, line 32)",
+        "exits": "SystemExit: 4 (misbehaving.py, line 34)",
         "narrow": "action must have shape (32, 512) (rows, columns), got (1, 512)",
     }.items():
         assert play_episodes(of(policy, 2, **short)) == [reason] * 2
@@ -97,6 +98,21 @@ def test_a_policy_may_keep_what_it_is_shown_and_write_into_it(third_party):
     configs = of("keeps", scenario_parameters=(("duration_s", 1.0),))
     together = play_together(configs)
     assert [*map(steady, together)] == [steady(run_episode(config)) for config in configs]
+
+
+def test_draws_that_a_process_shares_are_those_of_episodes_alone(third_party):
+    configs = of("draws-in-common", 2, scenario_parameters=(("duration_s", 0.5),))
+    for _ in range(2):
+        with pytest.raises(InvalidInput, match="draws from a generator of the process"):
+            play_together(configs)
+    rows = play_episodes(configs)
+    assert [*map(steady, rows)] == [steady(run_episode(config)) for config in configs]
+
+
+def test_what_was_changed_later_is_not_taken_for_arrays():
+    configs = [config.changed(engine="bullet") for config in of("history", 2)]
+    with pytest.raises(InvalidInput, match="the engine is not played as arrays"):
+        play_together(configs)
 
 
 # Every death costs the start of a worker.

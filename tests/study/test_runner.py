@@ -181,9 +181,9 @@ def test_a_bad_policy_costs_only_its_own_episode(third_party, tmp_path):
         kept = {config for config in configs if config.digest() in journal}
     assert {failure.config.policy: failure.reason for failure in failures} == {
         "dies": "the worker process died",
-        "raises": "RuntimeError: no idea, at all (misbehaving.py, line 20)",
-        "raises-oddly": "Odd: hard to unpickle (misbehaving.py, line 28)",
-        "exits": "SystemExit: 4 (misbehaving.py, line 32)",
+        "raises": "RuntimeError: no idea, at all (misbehaving.py, line 22)",
+        "raises-oddly": "Odd: hard to unpickle (misbehaving.py, line 30)",
+        "exits": "SystemExit: 4 (misbehaving.py, line 34)",
     }
     assert str(failures[0]).startswith(
         f"dartout {failures[0].config.policy} 0.1 seed 0 scenario.duration_s=0.3: "

@@ -202,4 +202,6 @@ def test_training_seeds_begin_episodes_themselves():
     envs = vector(2, DISABLED)
     with pytest.raises(InvalidInput, match="reset takes no options"):
         VectorTrainingSeeds(envs).reset(options={"reset_mask": np.array([True, False])})
+    with pytest.raises(InvalidInput, match="seed must be one for each of 2, got 3"):
+        VectorTrainingSeeds(envs).reset(seed=[1, 2, 3])
     envs.close()

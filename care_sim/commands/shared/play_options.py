@@ -20,9 +20,11 @@ _DEFAULT_CONDITIONS = Conditions()
 """The defaults."""
 
 
-def named_after(command: str, source: str) -> str:
-    """A command and the kind of its source, as folders are called."""
-    return f"{command}-{source.partition(':')[0]}"
+def named_after(command: str, played: str) -> str:
+    """A command and the world or kind of source that it plays, of a place its module, as folders
+    are called.
+    """
+    return f"{command}-{played.partition(':')[0]}"
 
 
 @dataclass(frozen=True, kw_only=True)

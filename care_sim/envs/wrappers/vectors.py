@@ -6,6 +6,7 @@ from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv, VectorWrapper
 
 from care_sim.base.errors import InvalidInput, shown
+from care_sim.base.vectors import shared_attribute
 from care_sim.core.belief import OBSERVED
 from care_sim.core.rig import Rig
 
@@ -26,26 +27,18 @@ def rig_of(env: AnyVector) -> Rig:
     """The rig of all worlds of a vector environment, one of CARE-Sim or one of Gymnasium over
     environments of CARE-Sim. Raises InvalidInput for another, and for worlds of several rigs.
     """
-    inner = env.unwrapped if isinstance(env, VectorEnv) else None
-    rigs = [inner.rig] if hasattr(inner, "rig") else _rigs_of_each(inner)
-    if not rigs or not all(isinstance(rig, Rig) for rig in rigs):
+    try:
+        rig = shared_attribute(env, "rig") if isinstance(env, VectorEnv) else None
+    except AttributeError:
+        rig = None
+    if not isinstance(rig, Rig):
         raise InvalidInput(
             "vector wrappers of CARE-Sim need a vector of its environments, got " + shown(env)
         )
-    if any(rig != rigs[0] for rig in rigs):
-        raise InvalidInput(f"the worlds of one vector must have one rig, those of {env} differ")
-    first: Rig = rigs[0]
-    return first
+    return rig
 
 
 def shows_beliefs(env: AnyVector) -> bool:
     """Whether observations have the form of CARE-Sim's environments, whatever wrappers did."""
     space = env.single_observation_space
     return isinstance(space, spaces.Dict) and set(OBSERVED) <= set(space.keys())
-
-
-def _rigs_of_each(inner: Any) -> list[Any]:
-    try:
-        return list(inner.get_attr("rig"))
-    except AttributeError:
-        return []
