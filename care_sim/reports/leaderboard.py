@@ -29,8 +29,8 @@ _MINUS = (
 _IDEAL = "Ideal camera: the score with a camera that reports whatever shows enough pixels."
 _UNRANKED = "No number: no policy that a car can have."
 _CODES = (
-    "Played by {} versions of the code of CARE-Sim: care-sim leaderboard --verify says whether "
-    "rows come out the same with the one that is here."
+    "Played by {} versions of the code: care-sim leaderboard --verify says whether rows come out "
+    "the same here."
 )
 _TRIAL = "Only the tenth of the worlds that --quick plays: a trial, and no leaderboard."
 
@@ -49,7 +49,7 @@ def leaderboard_table(results: Sequence[BenchmarkResult]) -> Table:
     )
     parts = results[0].parts
     columns = ("", "policy", "score", f"minus {CONTROL.name}", *parts, "ideal camera")
-    return Table(title(results), columns, rows, notes_on(results), whole=("", "score"))
+    return Table(title(results), columns, rows, notes_on(results), whole=("", "score"), names=2)
 
 
 def names_in(results: Sequence[BenchmarkResult]) -> list[str]:
@@ -84,7 +84,8 @@ def notes_on(results: Sequence[BenchmarkResult]) -> tuple[str, ...]:
     codes = {*map(code_of, results)}
     several = (_CODES.format(len(codes)),) if len(codes) > 1 else ()
     tags = tag_notes(each.tags for each in results)
-    return (*trial, _SCORE, _MINUS, _IDEAL, *beyond, *tags, *several)
+    # What limits the numbers comes first: a terminal has room for three lines.
+    return (*trial, *several, _SCORE, _MINUS, _IDEAL, *beyond, *tags)
 
 
 def is_beyond(result: BenchmarkResult) -> bool:

@@ -462,7 +462,7 @@ def test_a_scenario_without_an_environment_is_named(monkeypatch):
 
     monkeypatch.setitem(SCENARIOS, "mine", Mine)
     assert make_scenario("mine") == Mine()
-    refused("unknown environment of the scenario 'mine'", EpisodeConfig, "mine", "care")
+    refused("scenario mine is registered by hand", EpisodeConfig, "mine", "care")
 
 
 @pytest.mark.parametrize(

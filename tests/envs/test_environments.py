@@ -461,8 +461,8 @@ def test_bad_actions_get_one_clear_line_and_leave_the_episode_alone(action, mess
 
 def test_reward_weights_can_be_changed():
     env = make("CARE-Dartout-v0", reward_weights={"delay": 7.0}).unwrapped
-    assert env._weights["delay"] == 7.0
-    assert env._weights["collision"] == REWARD_WEIGHTS["collision"]
+    assert env.reward_weights["delay"] == 7.0
+    assert env.reward_weights["collision"] == REWARD_WEIGHTS["collision"]
 
 
 @pytest.mark.parametrize("name", ["CARE-NCAP-v0", "CARE-Street-v0"])

@@ -13,6 +13,7 @@ import gymnasium
 import numpy as np
 import pytest
 
+from care_sim.base.errors import BrokenScenario
 from care_sim.envs import CLOSED_LOOP
 from care_sim.scenarios.dartout import Dartout
 from care_sim.world.bullet_clients import MOST_FREE, pybullet
@@ -61,7 +62,7 @@ def failed(seed):
     env = made().unwrapped
     env.reset(seed=seed)
     env.scenario = Broken()
-    with pytest.raises(RuntimeError, match="no furniture"):
+    with pytest.raises(BrokenScenario, match="no furniture"):
         env.reset(seed=seed)
 
 
@@ -137,6 +138,10 @@ def test_many_at_a_time_leave_few_clients_behind():
     before = clients()
     for env in envs:
         env.reset(seed=0)
+    # A world asks for a client of its own when it is drawn, or looked at with Bullet's rays.
+    assert clients() <= before + 1
+    for env in envs:
+        env.unwrapped.loop.world.bullet.cast(np.zeros(3), np.array([[1.0, 0.0, 0.0]]), 10.0)
     assert clients() > before
     for env in envs:
         env.close()

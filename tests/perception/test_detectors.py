@@ -149,7 +149,12 @@ def test_a_broken_one_gets_one_line(installed, name, line):
 @pytest.mark.parametrize(
     ("name", "parameters", "line"),
     [
-        ("yolo", {}, "unknown detector 'yolo'; known: cluster, graded, returns, torchscript"),
+        (
+            "yolo",
+            {},
+            "unknown detector 'yolo'; known: cluster, graded, returns, torchscript; "
+            "`care-sim detectors` tells what each is",
+        ),
         (
             "returns",
             {"least": 3},

@@ -117,11 +117,15 @@ def test_roof_and_corners_is_as_its_sources_say():
     ("old", "new", "words"),
     [
         ('name = "two"', 'name = "two"\nlidar = {}', "either [lidar] or [[lidars]], got both"),
-        ("position_m = [1.9, 0.65, 0.5]", "", "position_m of lidars must be"),
+        (
+            "position_m = [1.9, 0.65, 0.5]",
+            "",
+            "position_m of lidars is missing: [x, y, z] in metres",
+        ),
         ("0.65, 0.5]", "0.65, -0.5]", "z of a position of the sensor set-up two must"),
         ("columns = 64\nelev", "columns = 32\nelev", "as many columns each, got 32 and 64"),
         ("range_m = 80.0", "range = 80.0", "range"),
-        ("yaw_deg", "roll_deg = 50.0\nyaw_deg", "roll of the grid must"),
+        ("yaw_deg", "roll_deg = 50.0\nyaw_deg", "roll_deg must lie in [-45, 45]"),
     ],
 )
 def test_what_does_not_fit_is_refused_in_one_line(read, old, new, words):

@@ -146,7 +146,9 @@ def steady(row):
 
 @pytest.mark.slow
 def test_a_killed_worker_costs_a_retry_and_every_row_is_the_one_played_here(dask_cluster, tmp_path):
-    configs = grid(["dartout"], ["history", "care"], [0.1], range(6), scenario_parameters=LONG)
+    # Of a policy that is played one by one, so that there are as many batches as episodes.
+    policies = ["history-oracle"]
+    configs = grid(["dartout"], policies, [0.1], range(12), scenario_parameters=LONG)
     doomed, _ = dask_cluster.worker(), dask_cluster.worker()
     listener, path = Watching(), tmp_path / "journal.jsonl"
     with watched(dask_cluster.address) as client, Journal(path) as journal:
@@ -189,7 +191,9 @@ def test_a_lost_scheduler_is_one_line_and_keeps_what_was_played(dask_cluster, tm
         "what is finished is kept, "
     )
     assert complaint.splitlines()[-1] == f"{gone}the same command goes on from there"
-    assert all(line.startswith("episodes ") for line in complaint.splitlines()[:-1])
+    assert all(
+        line.startswith(("episodes ", "Results go to ")) for line in complaint.splitlines()[:-1]
+    )
     assert sweep.returncode == 2
     with Journal(journal) as kept:
         assert 2 <= len(kept) < 200

@@ -69,6 +69,6 @@ def test_every_set_up_is_played_under_what_fits_it():
 
 
 def test_plays_of_a_source_are_under_what_fits_its_set_up():
-    streets = Streets("evaluation", "m1-forward")
+    streets = Streets("evaluation", sensor="m1-forward")
     plays = firing_plays(streets, SCENES[:1], ["care"], [0.1])
     assert [play.firing for play in plays] == fitting("m1-forward").firings

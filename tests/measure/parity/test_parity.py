@@ -246,6 +246,7 @@ class Nearsighted:
 
     def __init__(self, engine):
         self.engine, self.body_ids = engine, engine.body_ids
+        self.visible_boxes = engine.visible_boxes
 
     def cast(self, sensor, cells):
         ranges, ids = self.engine.cast(sensor, cells)
