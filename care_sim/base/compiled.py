@@ -75,7 +75,7 @@ class _CompileNotice(event.Listener):  # type: ignore[misc]
             _stop_listening()
             if sys.stderr.isatty():
                 print(
-                    "care_sim: compiling; this takes half a minute, once on a machine",
+                    "care_sim: compiling; this takes up to a minute, once on a machine",
                     file=sys.stderr,
                 )
 

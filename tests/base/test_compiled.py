@@ -166,4 +166,4 @@ def test_who_waits_at_a_terminal_for_the_first_use_is_told(tmp_path):
         heard.append(
             os.read(terminal, 1000).decode() if select.select([terminal], [], [], 0)[0] else ""
         )
-    assert heard == ["care_sim: compiling; this takes half a minute, once on a machine\r\n", ""]
+    assert heard == ["care_sim: compiling; this takes up to a minute, once on a machine\r\n", ""]
