@@ -145,7 +145,8 @@ def test_many_at_a_time_leave_few_clients_behind():
     assert clients() > before
     for env in envs:
         env.close()
-    assert clients() <= max(before, MOST_FREE)
+    # One more is that of the judge of clearances, which stays as long as the thread.
+    assert clients() <= max(before, MOST_FREE) + 1
 
 
 def test_what_was_dropped_in_the_middle_of_another_is_not_its_client():

@@ -10,6 +10,14 @@ from care_sim.envs.vector.threads import Threads
 
 
 @pytest.fixture
+def interruptible():
+    """Interrupts raise, also where whoever started the tests made them deaf."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.fixture
 def threads():
     made = Threads(3)
     yield made
@@ -33,6 +41,7 @@ def test_all_are_waited_for_when_one_fails(threads):
         assert len(done) == 2
 
 
+@pytest.mark.usefixtures("interruptible")
 def test_what_an_interrupt_left_at_work_is_waited_for_before_more_is_begun(threads):
     done = []
 
