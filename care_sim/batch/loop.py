@@ -51,6 +51,8 @@ class BatchLoop:
         self._observed = observed
         self._choice = Choice(rig, conditions, worlds)
         self._scanning = Scanning(rig, conditions)
+        # Its tables are of other sizes than those of what is fired, so that it has its own.
+        self._asking = Scanning(rig, conditions)
         self._tracking = Tracking(rig.keyframe_s)
         self._braking = Braking(rig, conditions, worlds)
         self._exact = exact
@@ -119,7 +121,9 @@ class BatchLoop:
         """
         # No cell outside its hull can hit it, so these stand for all.
         state = self.state
-        asked = np.flatnonzero(who & self._has_target)
+        rows = np.arange(state.worlds)
+        reported = state.reported.by_body[rows, state.egos.targets] >= 0
+        asked = np.flatnonzero(who & self._has_target & reported)
         targets = state.egos.targets[asked]
         hulls = self._rig.hulls(self._boxes_from_sensors(asked, targets))
         most = int(hulls.sizes.max(initial=0))
@@ -130,10 +134,10 @@ class BatchLoop:
             counts[world] = len(hull)
         state.live[:] = False
         state.live[asked] = True
-        returns = self._scanning.scan(state, Fired(counts, cells))
+        returns = self._asking.scan(state, Fired(counts, cells))
         in_use = np.arange(most) < counts[:, None]
         hits = ((returns.ids == state.egos.targets[:, None]) & in_use).sum(axis=1)
-        result: Mask = self._has_target & (hits >= self._min_returns)
+        result: Mask = state.live & (hits >= self._min_returns)
         return result
 
     def least_clearance_m(self, world: int, since_s: float) -> float:

@@ -421,7 +421,7 @@ for command in {["", "run", "sweep", "reproduce", "ablate", "faults", "crowding"
         assert "--help" in text
     assert len(names) == 8
     assert seconds[0] < 4
-    assert max(later - earlier for earlier, later in pairwise(seconds)) < 3
+    assert max(later - earlier for earlier, later in pairwise(seconds)) < 2.5
     assert "pyarrow" not in done.stderr
 
 
