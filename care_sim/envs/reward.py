@@ -3,10 +3,12 @@
 Each is at most 0, so that 0 is the best return there is.
 """
 
+import math
 from collections.abc import Mapping
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from care_sim.base.checks import check_known, check_number
+from care_sim.base.compiled import compiled
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.arrays import Floats
 from care_sim.loops.records import Keyframe
@@ -44,11 +46,61 @@ def weights(changes: Mapping[str, float] | None) -> dict[str, float]:
     return {**REWARD_WEIGHTS, **{name: float(value) for name, value in changes.items()}}
 
 
-def terms(record: Keyframe, in_view: bool, detected: bool, lost: float = 0.0) -> dict[str, float]:
-    """The terms of one keyframe.
+class Course(NamedTuple):
+    """What the reward remembers of an episode.
 
-    `in_view` and `detected` say whether the first-sighting actor has been so by now, at least once;
-    `lost` is what `Potential.advance` gives.
+    `in_view` and `detected` say whether the first-sighting actor has been so at any keyframe.
+    `bound_m` is the full-scan bound: the distance at the first keyframe at which a scan of every
+    cell would have detected it, NaN while there was none. `lost` is the share of it that is lost.
+    """
+
+    in_view: bool
+    detected: bool
+    bound_m: float
+    lost: float
+
+
+class Told(NamedTuple):
+    """What the reward is told of a keyframe: columns of `care_sim.loops.record_columns.Records`;
+    whether a scan of every cell would detect the actor, `detectable`; and whether the episode ends
+    with this keyframe, `over`.
+    """
+
+    in_view: bool
+    detected: bool
+    braking: bool
+    distance_m: float
+    clearance_m: float
+    impact_speed_mps: float
+    detectable: bool
+    over: bool
+
+
+BEGINNING = (False, False, math.nan, 0.0)
+"""The fields of `Course` before the first keyframe."""
+
+
+# Plain tuples: from Python, named ones would take compiled code longer than the terms do.
+@compiled()
+def earned_at(
+    before: tuple[bool, bool, float, float],
+    told: tuple[bool, bool, bool, float, float, float, bool, bool],
+    measured: bool,
+) -> tuple[tuple[bool, bool, float, float], tuple[float, float, float, float, float]]:
+    """The course after a keyframe and its `terms`, of the fields of the `Course` before it and of
+    `Told`; `measured` says whether the bound is, on which `gain` stands.
+    """
+    now = Told(*told)
+    course = _after(Course(*before), now)
+    lost = course.lost - before[3] if measured else 0.0
+    return (course.in_view, course.detected, course.bound_m, course.lost), terms(course, now, lost)
+
+
+@compiled()
+def terms(course: Course, now: Told, lost: float) -> tuple[float, float, float, float, float]:
+    """The terms of one keyframe, in the order of `REWARD_WEIGHTS`.
+
+    `course` is that after the keyframe, `lost` the share of the bound that was lost at it.
 
     | term | of a keyframe | of an episode |
     |---|---|---|
@@ -62,47 +114,35 @@ def terms(record: Keyframe, in_view: bool, detected: bool, lost: float = 0.0) ->
     late, as the first rays that return lag behind the first pixels in view, `delay` stays below 0;
     `gain` reaches 0 there, but for faults of the LiDAR, which the bound does not know.
     """
-    closeness = 1.0 - min(max(record.clearance_m, 0.0), KEEP_CLEAR_M) / KEEP_CLEAR_M
-    return {
-        "delay": -1.0 if in_view and not detected else 0.0,
-        "clearance": -closeness if in_view and closeness > 0 else 0.0,
-        "collision": -1.0 if record.impact_speed_mps is not None else 0.0,
-        "braking": -1.0 if record.braking and not in_view else 0.0,
-        "gain": -lost,
-    }
+    closeness = 1.0 - min(max(now.clearance_m, 0.0), KEEP_CLEAR_M) / KEEP_CLEAR_M
+    return (
+        -1.0 if course.in_view and not course.detected else 0.0,
+        -closeness if course.in_view and closeness > 0 else 0.0,
+        0.0 if math.isnan(now.impact_speed_mps) else -1.0,
+        -1.0 if now.braking and not course.in_view else 0.0,
+        -lost,
+    )
 
 
-class Potential:
-    """The share of the full-scan bound that is lost so far in an episode, as a potential.
+@compiled()
+def _after(course: Course, now: Told) -> Course:
+    """The course after a keyframe.
 
-    The bound is the distance at the first keyframe at which a scan of every cell would have
-    detected the first-sighting actor. From then on, while it is undetected, 1 - distance / bound is
-    lost, and at the end of an episode without a detection everything. The potential never falls,
-    and `gain` is its difference from keyframe to keyframe (Ng, Harada and Russell 1999, with a
-    discount of 1): the differences sum to the metric itself, however they are spread over the
-    episode. A learner that discounts more weighs early losses more.
+    From the bound on, while the actor is undetected, 1 - distance / bound is lost, and at the end
+    of an episode without a detection everything. This potential never falls, and `gain` is its
+    difference from keyframe to keyframe (Ng, Harada and Russell 1999, with a discount of 1): the
+    differences sum to the metric itself, however they are spread over the episode. A learner that
+    discounts more weighs early losses more.
     """
-
-    def __init__(self) -> None:
-        self.bound_m: float | None = None
-        self._lost = 0.0
-        self._found = False
-
-    def advance(self, record: Keyframe, detectable: bool, over: bool) -> float:
-        """Go on by a keyframe, and say by how much the potential grows.
-
-        `detectable` says whether a scan of every cell would detect the actor, `over` whether the
-        episode ends with this keyframe.
-        """
-        before = self._lost
-        if self.bound_m is None and (detectable or record.detected):
-            self.bound_m = record.distance_m
-        if self.bound_m is not None and not self._found:
-            # A car that comes nearer loses more; one that moves away again wins nothing back.
-            all_of_it = over and not record.detected
-            self._lost = 1.0 if all_of_it else max(before, 1.0 - record.distance_m / self.bound_m)
-        self._found |= record.detected
-        return self._lost - before
+    bound_m, lost = course.bound_m, course.lost
+    if math.isnan(bound_m) and (now.detectable or now.detected):
+        bound_m = now.distance_m
+    if not (math.isnan(bound_m) or course.detected):
+        # A car that comes nearer loses more; one that moves away again wins nothing back.
+        all_of_it = now.over and not now.detected
+        lost = 1.0 if all_of_it else max(lost, 1.0 - now.distance_m / bound_m)
+    in_view, detected = course.in_view or now.in_view, course.detected or now.detected
+    return Course(in_view, detected, bound_m, lost)
 
 
 class EpisodeReward:
@@ -110,15 +150,13 @@ class EpisodeReward:
 
     def __init__(self, weights: Mapping[str, float]):
         self._weights = weights
-        # Whether the first-sighting actor was in view or detected at any keyframe so far.
-        self._in_view = False
-        self._detected = False
-        self._potential = Potential()
+        self._measured = bool(weights["gain"])
+        self._course = BEGINNING
 
     @property
     def needs_bound(self) -> bool:
         """Whether the full-scan bound counts and is not known yet."""
-        return bool(self._weights["gain"]) and self._potential.bound_m is None
+        return self._measured and math.isnan(Course(*self._course).bound_m)
 
     def of(self, record: Keyframe, detectable: bool, over: bool) -> tuple[float, dict[str, float]]:
         """The reward of the next keyframe, and its `terms`.
@@ -126,11 +164,19 @@ class EpisodeReward:
         `detectable` says whether a scan of every cell would detect the actor, where `needs_bound`
         asks for it; `over` whether the episode ends with this keyframe.
         """
-        self._in_view |= record.in_view
-        self._detected |= record.detected
-        measured = bool(self._weights["gain"])
-        lost = self._potential.advance(record, detectable, over) if measured else 0.0
-        earned = terms(record, self._in_view, self._detected, lost)
+        impact_speed_mps = record.impact_speed_mps
+        told = (
+            record.in_view,
+            record.detected,
+            record.braking,
+            record.distance_m,
+            record.clearance_m,
+            math.nan if impact_speed_mps is None else impact_speed_mps,
+            detectable,
+            over,
+        )
+        self._course, values = earned_at(self._course, told, self._measured)
+        earned = dict(zip(REWARD_WEIGHTS, values, strict=True))
         return weighted(self._weights, earned), earned
 
 

@@ -1,10 +1,14 @@
+from itertools import zip_longest
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
-from care_sim.envs.reward import KEEP_CLEAR_M, REWARD_WEIGHTS, Potential, terms, weights
+from care_sim.envs.reward import KEEP_CLEAR_M, REWARD_WEIGHTS, EpisodeReward, weights
+from care_sim.envs.vector.rewards import Rewards
+from care_sim.loops.record_columns import Records
 from care_sim.loops.records import Keyframe
 
 
@@ -59,8 +63,11 @@ def nothing(**changes):
     ],
 )
 def test_terms(frame, before, expected):
-    now = keyframe(**frame)
-    assert terms(now, before[0] or now.in_view, before[1] or now.detected) == nothing(**expected)
+    reward = EpisodeReward(weights(None))
+    reward.of(keyframe(in_view=before[0], detected=before[1]), False, False)
+    earned, terms = reward.of(keyframe(**frame), False, False)
+    assert terms == nothing(**expected)
+    assert earned == pytest.approx(sum(REWARD_WEIGHTS[name] * terms[name] for name in terms))
 
 
 def test_a_weight_is_changed_by_name_and_the_rest_stays():
@@ -74,22 +81,17 @@ def test_an_unknown_term_is_refused_with_the_known_ones():
         weights({"speed": 1.0})
 
 
-def test_every_term_has_a_weight():
-    assert set(terms(keyframe(), False, False)) == set(REWARD_WEIGHTS)
-
-
 def losses(*frames):
-    """What a potential loses at keyframes of (distance, whether a full scan detects, whether it was
+    """What is lost at keyframes of (distance, whether a full scan detects, whether it was
     detected).
     """
-    potential = Potential()
+    reward = EpisodeReward(weights({"gain": 1.0}))
     last = len(frames) - 1
-    return [
-        potential.advance(
-            keyframe(distance_m=distance, detected=detected), detectable, number == last
-        )
+    terms = [
+        reward.of(keyframe(distance_m=distance, detected=detected), detectable, number == last)[1]
         for number, (distance, detectable, detected) in enumerate(frames)
     ]
+    return [-term["gain"] for term in terms]
 
 
 def test_nothing_is_lost_before_a_full_scan_would_detect_nor_when_it_is_found_at_once():
@@ -125,5 +127,53 @@ def test_the_losses_are_positive_and_sum_to_one_at_most(frames):
     assert sum(lost) <= 1 + 1e-9
 
 
-def test_the_term_is_what_is_lost():
-    assert terms(keyframe(), False, False, lost=0.25) == nothing(gain=-0.25)
+def test_without_a_weight_nothing_is_asked_nor_lost():
+    reward = EpisodeReward(weights(None))
+    assert not reward.needs_bound
+    assert reward.of(keyframe(detected=True), False, False)[1]["gain"] == 0
+    asks = EpisodeReward(weights({"gain": 0.5}))
+    assert asks.needs_bound
+    assert asks.of(keyframe(), True, True) == (-0.5, nothing(gain=-1.0))
+    assert not asks.needs_bound
+
+
+KEYFRAMES = st.builds(
+    keyframe,
+    in_view=st.booleans(),
+    detected=st.booleans(),
+    braking=st.booleans(),
+    distance_m=st.floats(0.5, 50.0),
+    clearance_m=st.floats(-1.0, 5.0),
+    impact_speed_mps=st.none() | st.floats(0.0, 15.0),
+)
+MOMENTS = st.lists(st.tuples(KEYFRAMES, st.booleans(), st.booleans(), st.booleans()), max_size=20)
+
+
+@given(st.lists(MOMENTS, min_size=1, max_size=3), st.sampled_from([{}, {"gain": 2.0}]))
+def test_many_episodes_are_rewarded_as_each_of_them(episodes, changes):
+    together = Rewards(weights(changes), len(episodes))
+    apart = [EpisodeReward(weights(changes)) for _ in episodes]
+    pause = (keyframe(), False, False, False)
+    for now in zip_longest(*episodes, fillvalue=pause):
+        records = Records.of([frame for frame, *_ in now])
+        detectable, over, who = np.array([flags for _, *flags in now]).T
+        wanted = together.need_bound.copy()
+        earned, terms = together.of(records, detectable, over, who)
+        for world, one in enumerate(apart):
+            expected = (0.0, nothing())
+            if who[world]:
+                assert wanted[world] == one.needs_bound
+                expected = one.of(now[world][0], detectable[world], over[world])
+            told = {name: column[world] for name, column in terms.items()}
+            assert (earned[world], told) == expected
+
+
+def test_a_new_episode_begins_with_nothing_behind_it():
+    rewards = Rewards(weights({"gain": 1.0}), 1)
+    frame = Records.of([keyframe(in_view=True, detected=True)])
+    yes = np.ones(1, bool)
+    rewards.of(frame, yes, ~yes, yes)
+    assert not rewards.need_bound
+    rewards.begin(0)
+    assert rewards.need_bound
+    assert rewards.of(Records.of([keyframe(in_view=True)]), ~yes, ~yes, yes)[1]["delay"] == -1

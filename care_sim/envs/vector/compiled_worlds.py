@@ -75,7 +75,7 @@ class CompiledWorlds:
             self._list_fired(single, who)
         # There are columns even where nobody plays: they are joined with those of other threads.
         columns = self._columns(records, terms)
-        return Stepped(np.where(who, rewards, 0.0), terminated, truncated, columns, single)
+        return Stepped(rewards, terminated, truncated, columns, single)
 
     def boxes(self, world: int) -> Floats:
         """(n, 7) of the ego and then every actor of a world, in the world frame. Truth."""
