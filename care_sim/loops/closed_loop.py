@@ -13,7 +13,6 @@ from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.frames import Frame
 from care_sim.core.grid import Cells
 from care_sim.core.observation_limits import Limits
-from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.rig import Rig
 from care_sim.core.types import Command, Scan, Tracks
 from care_sim.driving.corridor import along_route
@@ -21,6 +20,7 @@ from care_sim.driving.cruising import Cruising, CruisingRules
 from care_sim.driving.drivers import make_driver
 from care_sim.driving.localisation import Localisation
 from care_sim.driving.odometry import Odometry
+from care_sim.loops.cameras import Cameras
 from care_sim.loops.needless import NeedlessBraking
 from care_sim.loops.records import Keyframe, Sight
 from care_sim.loops.scan_detection import ScanDetection
@@ -29,20 +29,12 @@ from care_sim.loops.told import Told, told_by
 from care_sim.loops.truth import TrackObjects
 from care_sim.perception.base import Detector
 from care_sim.perception.tracker import TrackMemory
-from care_sim.sensors.annotated import IdentifiedDetections
 from care_sim.sensors.beams import Beams
 from care_sim.sensors.box_pool import EMPTY_POOL, BoxPool
-from care_sim.sensors.camera import (
-    CameraDetector,
-    Picture,
-    class_table,
-    faultless_detections,
-    window_on,
-)
 from care_sim.sensors.engines import make_engine
 from care_sim.sensors.lidar import Lidar
 from care_sim.world.approach import ClosestApproach
-from care_sim.world.world import WORLD_STEP_S, World
+from care_sim.world.world import World
 
 
 class ClosedLoop:
@@ -58,12 +50,8 @@ class ClosedLoop:
     """Where the LiDAR is."""
     belief: Belief
     """All that a policy may know when it chooses the cells."""
-    pictures: tuple[Picture, ...]
-    """What each camera as it was designed shows. Truth: for scoring and people."""
-    seen: IdentifiedDetections
-    """What the cameras as they are mounted show, before misses, false boxes and delay. Truth: for
-    scoring and people.
-    """
+    cameras: Cameras
+    """The cameras, and what they show. Truth: for scoring and people."""
     detected_bodies: Integers
     """(n,) the body behind each camera detection of the belief, NO_OBJECT behind a false one.
     Truth: for scoring and people.
@@ -84,28 +72,17 @@ class ClosedLoop:
     ):
         self.world = world
         self.rig = rig
-        labels = world.labels()
-        self._classes = class_table(labels)
-        self._reported = np.array(list(labels), np.int64)
-        self._engine = make_engine(conditions.engine, world.bullet, rig.grid)
+        engine = make_engine(conditions.engine, world.bullet, rig.grid)
         beams = (
             Beams(world.bullet, rig.grid, conditions, conditions.engine, world.linear_motion)
             if conditions.shapes_beams
             else None
         )
-        self._lidar = Lidar(rig.grid, self._engine, conditions, seeds.lidar, beams)
-        self._camera = CameraDetector(
-            list(labels),
-            conditions,
-            rig.keyframe_s,
-            seeds.camera,
-            rig.cameras,
-            pool,
-            step_s=WORLD_STEP_S,
-        )
+        self._lidar = Lidar(rig.grid, engine, conditions, seeds.lidar, beams)
+        self.cameras = Cameras(world, rig, engine, conditions, seeds.camera, pool)
         self._odometry = Odometry(conditions.ego_speed_sigma, seeds.odometry)
         self._localisation = Localisation(conditions, rig.keyframe_s, seeds.odometry)
-        self._detection = ScanDetection(rig.grid, labels, conditions.min_returns, detector)
+        self._detection = ScanDetection(rig.grid, world.labels(), conditions.min_returns, detector)
         self._min_returns = conditions.min_returns
         self._limits = Limits(rig)
         self._memory = TrackMemory(rig.keyframe_s)
@@ -213,7 +190,7 @@ class ClosedLoop:
 
     def shows(self, body: int) -> bool:
         """Whether a camera shows enough of a body for a box. Truth: for scoring and people."""
-        return any(picture.shows(body) for picture in self.pictures)
+        return self.cameras.shows(body)
 
     def _middle(self) -> Frame:
         """Where the driver reckons from: the LiDAR's frame, moved to the middle line of the car."""
@@ -241,51 +218,33 @@ class ClosedLoop:
         """Let the world move on to the next keyframe, and the cameras take their pictures on the
         way if their latency asks for it.
         """
-        after_s = self._camera.timing.after_s
+        after_s = self.cameras.after_s
         if not after_s:
             return self.world.advance(acceleration, self.rig.keyframe_s)
         before = self.world.advance(acceleration, after_s)
-        sensor = Frame.mounted(self.world.ego.pose, self.rig.sensor_position)
-        boxes = sensor.boxes_to_local(self.world.boxes_of(self._reported))
-        taken = [self._photograph(camera, sensor, boxes) for camera in self._camera.mounted]
-        seen = faultless_detections(taken, self._classes)
-        yaw = self._localisation.taken_for(sensor).yaw
-        self._camera.take(seen, yaw, boxes, self.world.time)
+        sensor = self._mounted()
+        self.cameras.look_between(sensor, self._localisation.taken_for(sensor).yaw)
         rest = self.world.advance(acceleration, self.rig.keyframe_s - after_s)
         return ClosestApproach.over([before, rest])
 
     def _look(self, ranges: NDArray[np.float32]) -> None:
-        """Take the cameras' pictures and form the belief on which the next cells are chosen."""
+        """Let the cameras look, and form the belief on which the next cells are chosen."""
         self._localisation.advance()
-        self.sensor = sensor = Frame.mounted(self.world.ego.pose, self.rig.sensor_position)
-        boxes = self._local_boxes(self._reported)
-        self.pictures = tuple(
-            self._photograph(camera, sensor, boxes) for camera in self.rig.cameras
-        )
-        # The scoring sees the world through the cameras as designed, the detector through those
-        # that are mounted; without an error of the mount the same pictures serve both.
-        taken = self.pictures
-        if self._camera.mounted != self.rig.cameras:
-            taken = tuple(
-                self._photograph(camera, sensor, boxes) for camera in self._camera.mounted
-            )
-        self.seen = faultless_detections(taken, self._classes)
+        self.sensor = self._mounted()
 
         # The boxes that arrive, late and with errors, and the forecasts: all that is known when the
         # next cells are chosen.
-        taken_for = self._localisation.taken_for(sensor)
-        if not self._camera.timing.after_s:
-            self._camera.take(self.seen, taken_for.yaw, boxes, self.world.time)
-        arrived = self._camera.newest(taken_for.yaw)
+        taken_for = self._localisation.taken_for(self.sensor)
+        arrived = self.cameras.look(self.sensor, taken_for.yaw)
         ego = self._odometry.reading(self.world.ego_motion)
         tracks = self._memory.tracks(taken_for)
         self.belief = self._limits.belief(ego, arrived.detections, tracks, ranges)
         # A rendered box lies in the picture, so the limits leave out none but the last, too many.
         self.detected_bodies = arrived.objects[: len(self.belief.detections)]
 
-    def _photograph(self, camera: PinholeCamera, sensor: Frame, boxes: Floats) -> Picture:
-        window = window_on(camera, boxes)
-        return Picture.listed(self._engine.visible_boxes(camera, sensor, window))
+    def _mounted(self) -> Frame:
+        """Where the LiDAR is on the car now."""
+        return Frame.mounted(self.world.ego.pose, self.rig.sensor_position)
 
     def _range_image(self, scan: Scan) -> NDArray[np.float32]:
         grid = self.rig.grid

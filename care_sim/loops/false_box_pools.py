@@ -62,7 +62,7 @@ def pool_of_another_drive(
 
         # What the camera shows is taken before each keyframe, as the episode takes it.
         while not over:
-            seen.append(loop.seen)
+            seen.append(loop.cameras.seen)
             times_s.append(world.time)
             hit = loop.keyframe(cells).impact_speed_mps is not None
             over = hit or world.time >= duration_s - LAST_BITS_S

@@ -19,7 +19,6 @@ from care_sim.core.types import Action, Demand, ImageDetections
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.records import Keyframe
 from care_sim.sensors.annotated import NO_OBJECT
-from care_sim.sensors.camera import class_table, faultless_detections
 from care_sim.world.world import Actor, World
 
 WAY_M = 40.0
@@ -123,7 +122,6 @@ class EpisodeWatcher:
     def __init__(self, loop: ClosedLoop, confidence: float):
         self._loop = loop
         self._confidence = confidence
-        self._classes = class_table(loop.world.labels())
 
     def situation(self) -> TrueSituation:
         """How things stand before the next keyframe."""
@@ -157,7 +155,7 @@ class EpisodeWatcher:
     def _missed(self, given: Integers) -> ImageDetections:
         """What a camera without faults would report now, less the bodies that were `given`."""
         # Through the camera as designed: what an error of its mount hides is missed, too.
-        clear = faultless_detections(self._loop.pictures, self._classes)
+        clear = self._loop.cameras.faultless()
         rows = clear.detections.rows()
         sure = clear.detections.confidences >= self._confidence
         return ImageDetections.from_rows(rows[sure & ~np.isin(clear.objects, given)])

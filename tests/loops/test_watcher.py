@@ -21,7 +21,7 @@ class Notes(Watching):
 
     def look(self, loop):
         labelled = [actor.body for actor in loop.world.actors if actor.label is not None]
-        (picture,) = loop.pictures
+        (picture,) = loop.cameras.pictures
         seen = np.isin(picture.bodies, labelled) & (picture.pixels >= MIN_PIXELS)
         self.shown.append(int(np.count_nonzero(seen)))
 

@@ -217,7 +217,7 @@ def played(env, seed):
     loop, everything, over = env.unwrapped.loop, np.ones(env.action_space.shape, np.float32), False
     keyframes = []
     while not over:
-        identified = loop.seen if hasattr(loop, "seen") else loop.shot.seen
+        identified = (loop.cameras if hasattr(loop, "cameras") else loop.shot).seen
         truth = {
             tuple(row) for row in identified.detections.rows().astype(np.float32)[:, SHOWN].tolist()
         }
