@@ -7,12 +7,11 @@ import numpy as np
 from care_sim.base.compiled import compiled
 from care_sim.batch.state import BatchState
 from care_sim.core.arrays import Floats, Integers, Mask
-from care_sim.core.frames import Pose
-from care_sim.world.approach import Impact, lies_ahead
+from care_sim.world.approach import Impact
 from care_sim.world.bodies import BodyKind
 from care_sim.world.body_tables import bodies_near
-from care_sim.world.clearance_judge import ClearanceJudge
-from care_sim.world.world import CONTACT_REACH_M, World
+from care_sim.world.clearance_judge import CONTACT_REACH_M, ClearanceJudge
+from care_sim.world.world import World
 
 
 class Impacts:
@@ -37,23 +36,15 @@ class Impacts:
         for world in np.flatnonzero(counts).tolist():
             for body in near[world, : counts[world]].tolist():
                 if self._touches(state, world, body):
-                    yield world, self._impact(state, world, body)
+                    speed_mps = float(egos.speeds[world])
+                    yield world, Impact.on(body, bodies.boxes[world], egos.bodies[world], speed_mps)
                     break
 
     def _touches(self, state: BatchState, world: int, body: int) -> bool:
         ego = self._egos[world]
         assert ego is not None
-        pair = self._judge.stand_ins(ego, self._kinds[world][body])
         poses = state.bodies.poses[world, [int(state.egos.bodies[world]), body]]
-        return self._judge.clearance(pair, poses.tolist(), CONTACT_REACH_M) <= 0.0
-
-    def _impact(self, state: BatchState, world: int, body: int) -> Impact:
-        boxes = state.bodies.boxes[world]
-        own = boxes[state.egos.bodies[world]]
-        x, y, heading = own[[0, 1, 6]].tolist()
-        pose: Pose = x, y, heading
-        ahead = lies_ahead(boxes[body], pose, float(own[3]))
-        return Impact(body, float(state.egos.speeds[world]), ahead)
+        return self._judge.touch((ego, self._kinds[world][body]), poses)
 
 
 @compiled()

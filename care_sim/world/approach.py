@@ -27,6 +27,13 @@ class Impact:
     speed_mps: float
     at_front: bool
 
+    @classmethod
+    def on(cls, body: int, boxes: Floats, ego: int, speed_mps: float) -> "Impact":
+        """That of the body `ego` on another one; `boxes` (m, 7) are those of all bodies by id."""
+        own = boxes[ego]
+        x, y, heading = own[[0, 1, 6]].tolist()
+        return cls(body, speed_mps, lies_ahead(boxes[body], (x, y, heading), float(own[3])))
+
 
 @dataclass(frozen=True)
 class ClosestApproach:

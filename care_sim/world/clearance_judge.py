@@ -3,10 +3,15 @@
 import threading
 from collections.abc import Sequence
 
+from care_sim.core.arrays import Floats
 from care_sim.world.bodies import BodyKind
 from care_sim.world.bullet_bodies import OPAQUE, BulletBodies
 from care_sim.world.bullet_clients import LentClient, pybullet
 
+CONTACT_REACH_M = 0.5
+"""Contact is looked for among bodies this close: far more than the centimetres by which hulls are
+padded.
+"""
 MOST_KINDS = 256
 """A judge that worlds share knows no more kinds of bodies: streets may have kinds of their own."""
 
@@ -34,6 +39,12 @@ class ClearanceJudge:
         """
         ego, other = map(self._bodies.put, bodies, poses)
         return self._bodies.clearance(ego, other, within)
+
+    def touch(self, kinds: tuple[BodyKind, BodyKind], poses: Floats) -> bool:
+        """Whether the hulls of an ego and another body of these kinds touch at `poses` (2, 7), as
+        in `Primitives.poses`.
+        """
+        return self.clearance(self.stand_ins(*kinds), poses.tolist(), CONTACT_REACH_M) <= 0.0
 
     @property
     def serves_on(self) -> bool:

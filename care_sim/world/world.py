@@ -11,14 +11,13 @@ from care_sim.base.times import LAST_BITS_S
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.frames import Pose
 from care_sim.core.types import CLASSES, Ego
-from care_sim.world.approach import ClosestApproach, Impact, lies_ahead
+from care_sim.world.approach import ClosestApproach
 from care_sim.world.bodies import CATALOGUE, BodyKind
 from care_sim.world.body_tables import Footprints
 from care_sim.world.bullet import BulletWorld
-from care_sim.world.clearance_judge import ClearanceJudge, judge_here
 from care_sim.world.crosser import Meeting
-from care_sim.world.least_clearance import LeastClearance
 from care_sim.world.linear_motion import LinearMotion, rates_between
+from care_sim.world.passage import Passage
 from care_sim.world.route import Route
 from care_sim.world.route_car import RouteCar
 from care_sim.world.speed_plan import SpeedPlan
@@ -26,10 +25,6 @@ from care_sim.world.traffic import RoadVehicle, Traffic
 
 WORLD_STEP_S = 0.05
 """Half a keyframe of the closed loop: nobody here moves further than 0.5 m in it."""
-CONTACT_REACH_M = 0.5
-"""Contact is looked for among bodies this close: far more than the centimetres by which hulls are
-padded.
-"""
 
 Motion = Callable[[float], Pose]
 """The pose of a body at a time in seconds."""
@@ -113,7 +108,7 @@ class World:
         self.has_oncoming = False
         self.meetings = []
         self.drawn = {}
-        self._kinds: dict[int, BodyKind] = {}
+        self._kinds = {self.ego_body: self.ego_kind}
         self._moving: list[Actor] = []
         self._moving_bodies = np.array([self.ego_body])
         self._events: list[tuple[float, Callable[[], None]]] = []
@@ -218,26 +213,12 @@ class World:
         `acceleration` (m/s^2) meanwhile. Clearance and distance are those of the first-sighting
         actor at its beginning.
         """
-        # Looked at after every step: between two keyframes the car may hit something and be past
-        # it, or come closest to it.
-        impacts = []
-        nearest = clearance = np.inf
-        target = self.first_sighting
-        judge = judge_here()
-        least = LeastClearance(judge, self.ego_kind, target.kind) if target else None
+        target = None if self.first_sighting is None else self.first_sighting.body
+        passage = Passage(self._footprints, self.bullet, self._kinds, self.ego_body, target)
         for _ in range(whole_steps(duration)):
             self.step(acceleration)
-            impacts.append(self._impact(judge))
-            if target is not None and least is not None:
-                two = np.array([self.ego_body, target.body])
-                boxes = own, other = self.boxes_of(two)
-                away = np.hypot(other[0] - own[0], other[1] - own[1])
-                nearest = min(nearest, float(away))
-                least.note(boxes, self.bullet.primitives.poses[two])
-        if least is not None:
-            clearance = least.metres()
-        first = next((impact for impact in impacts if impact is not None), None)
-        return ClosestApproach(nearest, clearance, first)
+            passage.look(self.ego.speed)
+        return passage.closest()
 
     def step(self, acceleration: float) -> None:
         """Move everything by a world step, as `advance` does, and look at nothing."""
@@ -273,18 +254,6 @@ class World:
     def close(self) -> None:
         """Free the simulator."""
         self.bullet.close()
-
-    def _impact(self, judge: ClearanceJudge) -> Impact | None:
-        """The ego's contact with a body now."""
-        # The exact distance is PyBullet's; asking it about every body would take most of a step.
-        for body in self._footprints.near(self.ego_body, CONTACT_REACH_M).tolist():
-            stand_ins = judge.stand_ins(self.ego_kind, self._kinds[body])
-            poses = self.bullet.primitives.poses[[self.ego_body, body]].tolist()
-            if judge.clearance(stand_ins, poses, CONTACT_REACH_M) <= 0.0:
-                (box,) = self.boxes_of(np.array([body]))
-                ahead = lies_ahead(box, self.ego.pose, self.ego_kind.size[0])
-                return Impact(body, self.ego.speed, ahead)
-        return None
 
 
 def _motion(pose: Pose | Motion | RoadVehicle) -> Motion:

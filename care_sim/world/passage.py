@@ -1,0 +1,66 @@
+"""What happens to the ego while its world moves on from one keyframe to the next."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from care_sim.world.approach import ClosestApproach, Impact
+from care_sim.world.bodies import BodyKind
+from care_sim.world.body_tables import Footprints
+from care_sim.world.bullet import BulletWorld
+from care_sim.world.clearance_judge import CONTACT_REACH_M, judge_here
+from care_sim.world.least_clearance import LeastClearance
+
+
+class Passage:
+    """How close the body `ego` comes to the body `target`, if there is one, and how it first hits
+    any other. It looks after every world step: between two keyframes the car may hit something and
+    be past it, or come closest to it.
+
+    `footprints` and `bullet` say where all bodies are, `kinds` what they are.
+    """
+
+    def __init__(
+        self,
+        footprints: Footprints,
+        bullet: BulletWorld,
+        kinds: Mapping[int, BodyKind],
+        ego: int,
+        target: int | None,
+    ):
+        self._footprints = footprints
+        self._bullet = bullet
+        self._kinds = kinds
+        self._ego = ego
+        self._judge = judge_here()
+        self._impact: Impact | None = None
+        self._nearest_m = np.inf
+        self._least: LeastClearance | None = None
+        if target is not None:
+            self._two = np.array([ego, target])
+            self._least = LeastClearance(self._judge, kinds[ego], kinds[target])
+
+    def look(self, speed_mps: float) -> None:
+        """Look at the world after a step, which left the ego with a speed."""
+        if self._impact is None:
+            self._impact = self._contact(speed_mps)
+        if self._least is not None:
+            boxes = own, other = self._footprints.boxes[self._two]
+            away = np.hypot(other[0] - own[0], other[1] - own[1])
+            self._nearest_m = min(self._nearest_m, float(away))
+            self._least.note(boxes, self._bullet.primitives.poses[self._two])
+
+    def closest(self) -> ClosestApproach:
+        """What came of it."""
+        clearance_m = np.inf if self._least is None else self._least.metres()
+        return ClosestApproach(self._nearest_m, clearance_m, self._impact)
+
+    def _contact(self, speed_mps: float) -> Impact | None:
+        """The ego's contact with a body now."""
+        # The exact distance is PyBullet's; asking it about every body would take most of a step.
+        own = self._kinds[self._ego]
+        for body in self._footprints.near(self._ego, CONTACT_REACH_M).tolist():
+            poses = self._bullet.primitives.poses[[self._ego, body]]
+            if self._judge.touch((own, self._kinds[body]), poses):
+                return Impact.on(body, self._footprints.boxes, self._ego, speed_mps)
+        return None
