@@ -19,8 +19,9 @@ from care_sim.evaluation.metrics import outcome
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.episode import Episode
 from care_sim.loops.false_box_pools import pool_of_another_drive
+from care_sim.loops.record_columns import Records
 from care_sim.loops.records import Keyframe, Outcome
-from care_sim.loops.seeds import SensorSeeds
+from care_sim.loops.seeds import EpisodeSeeds
 from care_sim.perception.detectors import PROXY
 from care_sim.scenarios import make_scenario, scenario_class
 from care_sim.scenarios.base import Scenario
@@ -254,14 +255,30 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
 
     def episode(self, entropy: int) -> Episode:
         """What an episode begins with. The caller closes its world."""
-        scenario, camera, lidar, floor, odometry = self._streams(entropy, count=5)
-        world = self.scenario.make_world(np.random.default_rng(scenario))
-        return Episode(world, SensorSeeds(camera, lidar, odometry), floor)
+        seeds = EpisodeSeeds.of(entropy, self._secret)
+        world = self.scenario.make_world(np.random.default_rng(seeds.scenario))
+        return Episode(world, seeds.sensors, seeds.floor)
 
     def first_info(self, entropy: int, world: World) -> dict[str, Any]:
         """The info of `reset`."""
         drawn = {"drawn": dict(world.drawn)} if world.drawn else {}
         return self._info_of({}, {"seed": entropy, **drawn})
+
+    def keyframe_info(
+        self, scan: dict[str, Any], record: Keyframe | Records, terms: Mapping[str, Any]
+    ) -> dict[str, Any]:
+        """The info of a keyframe, or columns of many worlds: with `scan`, what the fired cells
+        told, and the terms of the reward.
+        """
+        own = {**scan, "braking": record.braking, "time_s": record.time_s}
+        scoring = {
+            "detected": record.detected,
+            "in_view": record.in_view,
+            "clearance_m": record.clearance_m,
+            "speed_mps": record.speed_mps,
+            "reward_terms": terms,
+        }
+        return self._info_of(own, scoring)
 
     def step(self, action: Action) -> tuple[Observed, float, bool, bool, dict[str, Any]]:
         """Fire the cells that `action` scores highest and go on to the next keyframe.
@@ -280,7 +297,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         truncated = loop.world.time >= self.scenario.duration_s - LAST_BITS_S
         self._over = terminated or truncated
         reward, terms = self._reward.of(record, detectable, self._over)
-        info = self._info(record, terms)
+        info = self.keyframe_info(self._scan_info(fired), record, terms)
         if self._over:
             info["outcome"] = asdict(self._outcome())
         return self.observed(), reward, terminated, truncated, info
@@ -298,36 +315,17 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
             self._running = None
 
     def _pool(self, entropy: int) -> BoxPool:
-        """The boxes that false ones are drawn from, if there are any.
-
-        They are those of another drive through this scenario. Its stream is its own, so that
-        nothing in it tells of this episode.
+        """The boxes that false ones are drawn from, if there are any: those of another drive
+        through this scenario.
         """
         if not invents_boxes(self.conditions):
             return EMPTY_POOL
-        # The first five are those of `reset`, however many are asked for.
-        _, camera, lidar, _, odometry, another = self._streams(entropy, count=6)
-        seeds = SensorSeeds(camera, lidar, odometry)
-        world = self.scenario.make_world(np.random.default_rng(another))
-        return pool_of_another_drive(
-            world, self.scenario.duration_s, self.rig, self.conditions, seeds, self._detector
-        )
+        scenario, rig, conditions = self.scenario, self.rig, self.conditions
+        seeds = EpisodeSeeds.of(entropy, self._secret)
+        world = scenario.make_world(np.random.default_rng(seeds.another))
+        drive = world, scenario.duration_s, rig, conditions, seeds.sensors
+        return pool_of_another_drive(*drive, self._detector)
 
     def _outcome(self) -> Outcome:
         """The result of the episode."""
         return outcome(self.keyframes)
-
-    def _info(self, record: Keyframe, terms: dict[str, float]) -> dict[str, Any]:
-        own = {
-            **self._scan_info(record.fired),
-            "braking": record.braking,
-            "time_s": record.time_s,
-        }
-        scoring = {
-            "detected": record.detected,
-            "in_view": record.in_view,
-            "clearance_m": record.clearance_m,
-            "speed_mps": record.speed_mps,
-            "reward_terms": terms,
-        }
-        return self._info_of(own, scoring)
