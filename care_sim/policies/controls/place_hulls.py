@@ -4,14 +4,13 @@ from collections.abc import Mapping
 from os import PathLike
 from typing import ClassVar
 
-from care_sim.base.checks import check_whole
 from care_sim.core.belief import Belief
 from care_sim.core.conditions import MIN_RETURNS
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
 from care_sim.policies.controls.place import likeliest_cells
-from care_sim.policies.own.care_spread import CORE_FIRST, HULL_CELLS_PER_RETURN
+from care_sim.policies.own.rounds import CORE_FIRST, Round
 
 MAP_SHARE = 0.35
 """Share of the budget that the map has before any track is served. First tried on the streets 0 to
@@ -39,9 +38,8 @@ class PlaceHulls(Policy):
         min_returns: int = MIN_RETURNS,
     ):
         super().__init__(rig)
-        check_whole("min_returns", min_returns, 1)
+        self._round = Round.of(min_returns).hull
         self._map = likeliest_cells(rig, path)
-        self._round = HULL_CELLS_PER_RETURN * min_returns
 
     def demand(self, belief: Belief) -> Demand:
         """Layers: the top of the map, a round of hulls, another one, and the map again."""

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from typing import ClassVar
 
-from care_sim.base.checks import check_whole
 from care_sim.core.belief import Belief
 from care_sim.core.conditions import MIN_RETURNS
 from care_sim.core.residual import camera_layers
@@ -12,11 +11,7 @@ from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
 from care_sim.policies.controls.rows import cells_by_row, entry_cells
 from care_sim.policies.own.care_sightlines import WEDGE_ROUNDS
-from care_sim.policies.own.care_spread import (
-    CORE_FIRST,
-    HULL_CELLS_PER_RETURN,
-    WEDGE_CELLS_PER_RETURN,
-)
+from care_sim.policies.own.rounds import CORE_FIRST, Round
 from care_sim.policies.own.sector import columns_ahead
 
 
@@ -37,9 +32,7 @@ class CareSector(Policy):
 
     def __init__(self, rig: Rig, min_returns: int = MIN_RETURNS):
         super().__init__(rig)
-        check_whole("min_returns", min_returns, 1)
-        self._hull_round = HULL_CELLS_PER_RETURN * min_returns
-        self._wedge_round = WEDGE_CELLS_PER_RETURN * min_returns
+        self._round = Round.of(min_returns)
         self._rows = cells_by_row(rig)
         entries = entry_cells(rig)
         self._entries = len(entries)
@@ -48,7 +41,7 @@ class CareSector(Policy):
     def demand(self, belief: Belief) -> Demand:
         """Layers in order of priority; see the class."""
         unexplained, known = camera_layers(belief, self.rig)
-        few, more = self._hull_round, self._wedge_round
+        few, more = self._round
         wedges = self.rig.listed(unexplained, CORE_FIRST, WEDGE_ROUNDS * more)
         hulls = self.rig.listed(self.rig.hulls(belief.tracks.boxes), CORE_FIRST, few + more)
         return Demand(

@@ -12,11 +12,7 @@ from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
 from care_sim.policies.controls.rows import cells_by_row, entry_cells
-from care_sim.policies.own.care_spread import (
-    CORE_FIRST,
-    HULL_CELLS_PER_RETURN,
-    WEDGE_CELLS_PER_RETURN,
-)
+from care_sim.policies.own.rounds import CORE_FIRST, Round
 from care_sim.policies.own.sight_lines import SightLines
 
 WEDGE_ROUNDS = 4
@@ -55,7 +51,7 @@ class CareSightlines(Policy):
         rows: bool = True,
     ):
         super().__init__(rig)
-        check_whole("min_returns", min_returns, 1)
+        self._round = Round.of(min_returns)
         check_whole("wedge_rounds", wedge_rounds, 1)
         switches = {
             "camera": camera,
@@ -66,9 +62,7 @@ class CareSightlines(Policy):
         }
         for name, value in switches.items():
             check_flag(name, value)
-        self._hull_round = HULL_CELLS_PER_RETURN * min_returns
-        self._wedge_round = WEDGE_CELLS_PER_RETURN * min_returns
-        self._wedge_most = wedge_rounds * self._wedge_round
+        self._wedge_most = wedge_rounds * self._round.wedge
         self._uses_camera = camera
         self._looks_ahead = ahead
         self._rechecks = explained
@@ -88,7 +82,7 @@ class CareSightlines(Policy):
     def demand(self, belief: Belief) -> Demand:
         """Layers in order of priority; see the class."""
         unexplained, known = camera_layers(belief, self.rig) if self._uses_camera else ([], [])
-        few, more = self._hull_round, self._wedge_round
+        few, more = self._round
         wedges = self.rig.listed(unexplained, CORE_FIRST, self._wedge_most)
         rechecked = self.rig.listed(known if self._rechecks else [], CORE_FIRST, few)
         hulls = self.rig.listed(self.rig.hulls(belief.tracks.boxes), CORE_FIRST, few + more)

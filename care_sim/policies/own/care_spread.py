@@ -3,23 +3,13 @@
 from collections.abc import Mapping
 from typing import ClassVar
 
-from care_sim.base.checks import check_whole
 from care_sim.core.beliefs import Beliefs
 from care_sim.core.conditions import MIN_RETURNS
 from care_sim.core.residual import unexplained_layer_of
 from care_sim.core.rig import Rig
 from care_sim.core.world_sets import WorldSets
 from care_sim.policies.base import RowPolicy
-
-CORE_FIRST = "core-spread"
-"""The order of the cells in hulls and wedges (`care_sim.core.cell_order`), unless the rig has one:
-the rim is there for errors of the forecast, without which the object lies in the core alone."""
-HULL_CELLS_PER_RETURN = 2
-"""Cells that a hull gets in a round for every return that a detection needs."""
-WEDGE_CELLS_PER_RETURN = 3
-"""Cells that a wedge gets in a round for every return that a detection needs. Both numbers were
-chosen on the calibration's streets 1000 to 1007 and on streets 2000 to 2007, none of which is
-scored."""
+from care_sim.policies.own.rounds import CORE_FIRST, Round
 
 
 class CareSpread(RowPolicy):
@@ -40,21 +30,20 @@ class CareSpread(RowPolicy):
 
     def __init__(self, rig: Rig, min_returns: int = MIN_RETURNS):
         super().__init__(rig)
-        check_whole("min_returns", min_returns, 1)
-        self._wedge_round = WEDGE_CELLS_PER_RETURN * min_returns
-        self._hull_round = HULL_CELLS_PER_RETURN * min_returns
+        self._round = Round.of(min_returns)
 
     def stages(self, beliefs: Beliefs) -> list[WorldSets]:
         """Layers: a round of wedges, a round of hulls, and both again."""
         unexplained = unexplained_layer_of(beliefs)
-        wedges = self._listed(unexplained, 2 * self._wedge_round)
-        hulls = self._listed(beliefs.hulls, 2 * self._hull_round)
+        few, more = self._round
+        wedges = self._listed(unexplained, 2 * more)
+        hulls = self._listed(beliefs.hulls, 2 * few)
         return [
             WorldSets.nothing(len(beliefs)),
-            wedges.part(0, self._wedge_round),
-            hulls.part(0, self._hull_round),
-            wedges.part(self._wedge_round, 2 * self._wedge_round),
-            hulls.part(self._hull_round, 2 * self._hull_round),
+            wedges.part(0, more),
+            hulls.part(0, few),
+            wedges.part(more, 2 * more),
+            hulls.part(few, 2 * few),
         ]
 
     def _listed(self, given: WorldSets, most: int) -> WorldSets:

@@ -9,7 +9,7 @@ from care_sim.core.residual import camera_layers
 from care_sim.core.rig import Rig
 from care_sim.policies.controls.rows import cells_by_row
 from care_sim.policies.own.care_sector import CareSector
-from care_sim.policies.own.care_spread import CORE_FIRST
+from care_sim.policies.own.rounds import CORE_FIRST
 from care_sim.policies.own.sector import columns_ahead
 
 
