@@ -134,6 +134,18 @@ class PinholeCamera:
         return CameraModel(np.array(self.position, dtype=float), self.axes, self.focal, centre)
 
 
+def checked_cameras(cameras: object, of: str = "") -> tuple[PinholeCamera, ...]:
+    """Cameras as a tuple. Raises InvalidInput, which names what they are `of`, for anything but a
+    tuple or list of them.
+    """
+    if not (
+        isinstance(cameras, tuple | list)
+        and all(isinstance(camera, PinholeCamera) for camera in cameras)
+    ):
+        raise InvalidInput(f"cameras{of} must be PinholeCameras, got {shown(cameras)}")
+    return tuple(cameras)
+
+
 def camera_models(cameras: Sequence[PinholeCamera]) -> CameraModels:
     """The models of k cameras, of which there may be none, as one table."""
     models = [camera._model for camera in cameras]

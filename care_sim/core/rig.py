@@ -26,7 +26,7 @@ from care_sim.core.grid import (
 )
 from care_sim.core.grid_rays import MOST_COLUMNS, MOST_ROWS
 from care_sim.core.grid_stack import Grid, GridStack
-from care_sim.core.pinhole import PinholeCamera, camera_models
+from care_sim.core.pinhole import PinholeCamera, camera_models, checked_cameras
 from care_sim.core.pinhole_kernels import CameraModels
 from care_sim.core.return_settings import RAYS, FilmedReturns
 from care_sim.core.types import Demand, ImageDetections
@@ -80,14 +80,8 @@ class Rig:
         object.__setattr__(self, "firing", settled(self.firing))
         if not isinstance(self.returns, FilmedReturns):
             raise InvalidInput(f"returns must be FilmedReturns, got {shown(self.returns)}")
-        cameras = self.cameras
-        if not (
-            isinstance(cameras, tuple | list)
-            and all(isinstance(camera, PinholeCamera) for camera in cameras)
-        ):
-            raise InvalidInput(f"cameras must be a tuple of PinholeCamera, got {shown(cameras)}")
         # A list could change later, unlike what has been computed from it and kept.
-        object.__setattr__(self, "cameras", tuple(cameras))
+        object.__setattr__(self, "cameras", checked_cameras(self.cameras))
 
     @property
     def sensor_position(self) -> tuple[float, float, float]:

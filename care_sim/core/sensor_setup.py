@@ -14,7 +14,7 @@ from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.json_text import parsed_json
 from care_sim.core.grid import AngularGrid, Place
 from care_sim.core.grid_stack import Grid, GridStack
-from care_sim.core.pinhole import PinholeCamera
+from care_sim.core.pinhole import PinholeCamera, checked_cameras
 from care_sim.core.rig import LIDAR_HEIGHT_M, LIDAR_X_M, MOST_SHIFT_M
 
 LIDAR_POSITION: Place = (LIDAR_X_M, 0.0, LIDAR_HEIGHT_M)
@@ -137,12 +137,7 @@ class SensorSetup:
         )
 
     def _check_cameras(self, of: str) -> None:
-        cameras = self.cameras
-        if not (
-            isinstance(cameras, tuple | list)
-            and all(isinstance(camera, PinholeCamera) for camera in cameras)
-        ):
-            raise InvalidInput(f"cameras{of} must be PinholeCameras, got {shown(cameras)}")
+        cameras = checked_cameras(self.cameras, of)
         for number, camera in enumerate(cameras):
             picture = camera.box_rays([[0.0, 0.0, camera.width, camera.height]])
             (seen,) = self.grid.wedges(picture, 0, 0, np.array([camera.position], float))
