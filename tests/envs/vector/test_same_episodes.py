@@ -30,14 +30,14 @@ CONDITIONS = {
 
 OWN_BUDGETS = {"budget": [0.01, 0.2, 0.03]}
 OWN_FAULTS = {
-    "false_negative_rate": [0.0, 0.3, 1.0],
-    "false_negative_per_m": [0.01, 0.0, 0.0],
+    "false_negative_rate": [1.0, 0.3, 0.0],
+    "false_negative_per_m": [0.0, 0.0, 0.01],
     "false_negative_burst": [4, 1, 2],
     "camera_latency": [2, 0, 1],
     "camera_jitter": [0, 0, 2],
     "blackout_start_s": [0.0, 1.0, 0.5],
     "blackout_s": [0.0, 1.5, 0.2],
-    "camera_confidence": [0.25, 0.7, 0.4],
+    "camera_confidence": [0.25, 0.4, 0.8],
 }
 OWN = {
     "budgets": OWN_BUDGETS,
