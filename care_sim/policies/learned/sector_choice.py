@@ -59,8 +59,8 @@ class SectorChoice:
 
 
 class SectorActions:
-    """The actions (W, E, A) for scores (W, ...) of the `sectors` of W worlds, each with the budget
-    of the rig. They are read-only, and the next call overwrites them.
+    """The actions (W, E, A) for scores (W, ...) of the `sectors` of W worlds, none with a larger
+    budget than the rig. They are read-only, and the next call overwrites them.
     """
 
     def __init__(self, rig: Rig, sectors: Tiling, worlds: int):
@@ -69,9 +69,9 @@ class SectorActions:
         self._budgets = np.full(worlds, rig.budget)
 
     def reserve(self, beliefs: Beliefs, scores: NDArray[np.floating]) -> Action:
-        """See `SectorChoice.reserve`."""
-        return self._allocator.scores(self._choice.reserve(beliefs, scores), self._budgets)
+        """See `SectorChoice.reserve`; each world with the budget that it is told."""
+        return self._allocator.scores(self._choice.reserve(beliefs, scores), beliefs.budgets)
 
     def alone(self, scores: NDArray[np.floating]) -> Action:
-        """See `SectorChoice.alone`."""
+        """See `SectorChoice.alone`. Of the cells, best first, a world fires what it can pay."""
         return self._allocator.scores(self._choice.alone(scores), self._budgets)
