@@ -13,8 +13,8 @@ from care_sim.base.compiled import compiled
 from care_sim.batch.state import BatchState, Bodies
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.world.bullet import NO_BODY
-from care_sim.world.clearance_judge import ClearanceJudge
-from care_sim.world.least_clearance import PADDING_M, least_gap
+from care_sim.world.clearance_judge import ClearanceJudge, StandIns
+from care_sim.world.gaps import PADDING_M, least_gap
 from care_sim.world.world import World
 
 
@@ -23,7 +23,7 @@ class Clearances:
 
     def __init__(self, worlds: int, steps: int, judge: ClearanceJudge):
         self._judge = judge
-        self._pairs: list[tuple[int, int] | None] = [None] * worlds
+        self._pairs: list[StandIns | None] = [None] * worlds
         # By world and step, of which the first is 1: the poses of the two, what they are apart at
         # least, and exactly where it is known, else NaN.
         self._poses = np.zeros((worlds, steps + 1, 2, 7))
@@ -87,7 +87,7 @@ class Clearances:
         known = float(self._known[world, step])
         pair = self._pairs[world]
         if math.isnan(known) and pair is not None:
-            known = self._judge.clearance(pair, self._poses[world, step].tolist())
+            known = self._judge.clearance(pair, self._poses[world, step])
             self._known[world, step] = known
         return known
 

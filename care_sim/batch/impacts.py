@@ -45,7 +45,7 @@ class Impacts:
         assert ego is not None
         pair = self._judge.stand_ins(ego, self._kinds[world][body])
         poses = state.bodies.poses[world, [int(state.egos.bodies[world]), body]]
-        return self._judge.clearance(pair, poses.tolist(), CONTACT_REACH_M) <= 0.0
+        return self._judge.clearance(pair, poses, CONTACT_REACH_M) <= 0.0
 
     def _impact(self, state: BatchState, world: int, body: int) -> Impact:
         boxes = state.bodies.boxes[world]
