@@ -39,10 +39,13 @@ class Clearances:
         self._bounds[world] = np.inf
         self._known[world] = np.nan
 
-    def note(self, state: BatchState, steps: Integers) -> None:
-        """Note where the bodies are at the `steps` (W,) to which the worlds have come."""
+    def note(self, state: BatchState, steps: Integers, nearest_m: Floats) -> None:
+        """Note where the bodies are at the `steps` (W,) to which the worlds have come. What is
+        `nearest_m` (W,) from centre to centre falls to what it is now.
+        """
         egos = state.egos
-        _note(state.live, steps, state.bodies, egos.bodies, egos.targets, self._poses, self._bounds)
+        tables = self._poses, self._bounds, nearest_m
+        _note(state.live, steps, state.bodies, egos.bodies, egos.targets, *tables)
 
     def least_since(self, steps: Integers, count: int, live: Mask, exact_below: float) -> Floats:
         """(W,) the least clearance of the last `count` of all `steps` (W,) so far, metres. What is
@@ -101,13 +104,16 @@ def _note(
     targets: Integers,
     poses: Floats,
     bounds: Floats,
+    nearest_m: Floats,
 ) -> None:
     """See `Clearances.note`."""
     for world in range(len(live)):
         if not live[world] or targets[world] == NO_BODY:
             continue
         ego, target, step = egos[world], targets[world], steps[world]
-        boxes = bodies.boxes[world]
-        bounds[world, step] = least_gap(boxes[ego], boxes[target]) - PADDING_M
+        box, other = bodies.boxes[world, ego], bodies.boxes[world, target]
+        away = math.hypot(other[0] - box[0], other[1] - box[1])
+        nearest_m[world] = min(nearest_m[world], away)
+        bounds[world, step] = least_gap(box, other) - PADDING_M
         poses[world, step, 0] = bodies.poses[world, ego]
         poses[world, step, 1] = bodies.poses[world, target]
