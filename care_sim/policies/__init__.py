@@ -10,7 +10,7 @@ from typing import Any, TypeAlias, overload
 import gymnasium
 import gymnasium.vector
 
-from care_sim.base.errors import BrokenPolicy, InvalidInput, MissingExtra, shown
+from care_sim.base.errors import BrokenPolicy, InvalidInput, MissingExtra, error_line, shown
 from care_sim.base.plugins import Plugins
 from care_sim.base.vectors import attribute_of_each, shared_attribute
 from care_sim.policies.base import Policy
@@ -205,7 +205,7 @@ def _made(
     except Exception as error:
         raise BrokenPolicy(
             f"policy {name} refuses {shown(parameters) if parameters else 'to start'}: "
-            f"{type(error).__name__}: {error}"
+            f"{error_line(error)}"
         ) from error
     if not isinstance(policy, Policy):
         raise BrokenPolicy(f"policy {name} is no Policy but of type {type(policy).__name__}")

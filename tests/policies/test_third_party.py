@@ -216,7 +216,9 @@ def test_broken_policies_do_not_stop_the_others(broken, installed, env):
         reasons["torn"].partition(" (found in ")[0] == "policy torn cannot be loaded: "
         "AttributeError: module 'broken' has no attribute 'Nowhere'"
     )
-    assert reasons["leaving"] == "policy leaving cannot be loaded: SystemExit: 3"
+    assert (
+        reasons["leaving"] == "policy leaving cannot be loaded: SystemExit: 3 (leaving.py, line 1)"
+    )
     assert reasons["exploding"] == "policy exploding refuses to start: KeyError: 'weights'"
     assert list(reasons) == ["torn", "exploding", "leaving", "deaf"]
     assert care_sim.make_policy("horizon", env).name == "horizon"

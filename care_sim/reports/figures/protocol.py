@@ -167,7 +167,7 @@ def levels_figure(plays: SettingPlays) -> Figure:
     panels = figure.subplots(1, 2)
     for axes, ratio in zip(panels, (FIRST_SIGHTING, OVERALL), strict=True):
         _draw_levels(axes, plays, ratio)
-        if not plays.setting.conditions:
+        if plays.setting.as_in_paper:
             # The paper gives levels for its plain setting alone.
             _draw_published(axes, plays, ratio)
         axes.set_xscale("log")
