@@ -14,12 +14,12 @@ from care_sim.batch.loading import load
 from care_sim.batch.motion import Motion, steps_of
 from care_sim.batch.observing import Observations, Observing
 from care_sim.batch.scanning import Found, Scanning
+from care_sim.batch.sensor_frames import place_sensors, seen_by_each
 from care_sim.batch.sight import Sight
 from care_sim.batch.state import BatchState, Fired
 from care_sim.batch.tracking import Tracking
-from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.arrays import Floats, Mask
 from care_sim.core.conditions import ClosedLoopConditions
-from care_sim.core.frames import Frame
 from care_sim.core.rig import Rig
 from care_sim.loops.episode import Episode
 from care_sim.loops.record_columns import Records
@@ -128,7 +128,9 @@ class BatchLoop:
         reported = state.reported.by_body[rows, state.egos.targets] >= 0
         asked = np.flatnonzero(who & self._has_target & reported)
         targets = state.egos.targets[asked]
-        hulls = self._rig.hulls(self._boxes_from_sensors(asked, targets))
+        hulls = self._rig.hulls(
+            seen_by_each(state.sensors, asked, state.bodies.boxes[asked, targets])
+        )
         most = int(hulls.sizes.max(initial=0))
         cells = np.zeros((state.worlds, most), np.int64)
         counts = np.zeros(state.worlds, np.int64)
@@ -155,33 +157,11 @@ class BatchLoop:
         """Take the cameras' pictures and write what the policies of the worlds `who` are told."""
         state = self.state
         state.live[:] = who
-        self._place_sensors()
+        place_sensors(state, self._rig.sensor_position)
         arrived, shown = self._sight.look(state)
         targets = state.egos.targets
         self._in_view[who] = (self._has_target & shown[np.arange(state.worlds), targets])[who]
         self._observing.write(state, arrived, self._tracking.seen(state), self._observed)
-
-    def _place_sensors(self) -> None:
-        """Where the LiDARs are; see `care_sim.core.frames.Frame.mounted`."""
-        state = self.state
-        ahead, left, up = self._rig.sensor_position
-        x, y, yaw = state.bodies.boxes[np.arange(state.worlds), state.egos.bodies][:, [0, 1, 6]].T
-        cos, sin = np.cos(yaw), np.sin(yaw)
-        sensors = state.sensors
-        sensors.poses[:, 0] = x + (cos * ahead - sin * left)
-        sensors.poses[:, 1] = y + (sin * ahead + cos * left)
-        sensors.poses[:, 2] = up
-        sensors.poses[:, 3] = yaw
-        sensors.turns[:, 0], sensors.turns[:, 1] = cos, sin
-        sensors.turns_back[:, 0], sensors.turns_back[:, 1] = np.cos(-yaw), np.sin(-yaw)
-
-    def _boxes_from_sensors(self, worlds: Integers, bodies: Integers) -> Floats:
-        """(n, 7) a body of each of some worlds, in the frame of its sensor."""
-        sensors = self.state.sensors
-        boxes = self.state.bodies.boxes[worlds, bodies].copy()
-        for box, world in zip(boxes, worlds.tolist(), strict=True):
-            box[:] = Frame(*sensors.poses[world].tolist()).boxes_to_local(box[None])
-        return boxes
 
     @property
     def _has_target(self) -> Mask:

@@ -4,19 +4,18 @@ Common is a world whose ego and drivers keep their lanes and whose other bodies 
 the time alone tells. Any other moves by its own Python.
 """
 
-import math
 from collections.abc import Sequence
 from typing import NamedTuple, TypeGuard
 
 import numpy as np
 
 from care_sim.base.compiled import compiled
-from care_sim.base.times import LAST_BITS_S
 from care_sim.batch.clearances import Clearances
 from care_sim.batch.impacts import Impacts
 from care_sim.batch.lane_columns import SPEED, LaneColumns
 from care_sim.batch.state import BatchState, Bodies, Egos, Passages, filled
 from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.loops.episode import most_keyframes
 from care_sim.scenarios.mirroring import Reflection
 from care_sim.world.bullet import NO_BODY
 from care_sim.world.clearance_judge import ClearanceJudge
@@ -36,7 +35,7 @@ _REFLECTED = np.array([1.0, -1.0, -1.0])
 
 def steps_of(duration_s: float, keyframe_s: float) -> int:
     """World steps of an episode of `duration_s` seconds, which ends with a whole keyframe."""
-    return math.ceil((duration_s - LAST_BITS_S) / keyframe_s) * whole_steps(keyframe_s)
+    return most_keyframes(duration_s, keyframe_s) * whole_steps(keyframe_s)
 
 
 class Clock(NamedTuple):

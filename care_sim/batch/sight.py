@@ -12,11 +12,12 @@ import numpy as np
 
 from care_sim.base.compiled import compiled
 from care_sim.batch.camera_faults import BatchDelay, BatchMisses, Detected
+from care_sim.batch.sensor_frames import seen_by
 from care_sim.batch.state import BatchState, Bodies, Outlines, Reported, Sensors
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.boxes import planar_ranges
 from care_sim.core.conditions import Sensing
-from care_sim.core.frames import seen_from, turned_alike
+from care_sim.core.frames import turned_alike
 from care_sim.core.pinhole import NEAR_M
 from care_sim.core.pinhole_kernels import CameraModels, model_of, window_on
 from care_sim.core.rig import Rig
@@ -142,9 +143,7 @@ def _see_boxes(
             count = reported.counts[w]
             for n in range(count):
                 boxes[w, n] = bodies.boxes[w, reported.bodies[w, n]]
-            x, y, z, yaw, _, _ = sensors.poses[w]
-            cos, sin = sensors.turns_back[w]
-            boxes[w, :count] = seen_from(boxes[w, :count], (cos, sin), (x, y, z, yaw))
+            boxes[w, :count] = seen_by(sensors, w, boxes[w, :count])
 
 
 @compiled()

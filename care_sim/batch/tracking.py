@@ -6,9 +6,9 @@ import numpy as np
 
 from care_sim.base.compiled import compiled
 from care_sim.batch.scanning import Found
+from care_sim.batch.sensor_frames import placed_by, seen_by
 from care_sim.batch.state import BatchState, Bodies, Reported, Sensors, TrackTables
 from care_sim.core.arrays import Floats, Integers, Mask
-from care_sim.core.frames import placed_at, seen_from
 from care_sim.core.types import Tracks
 from care_sim.perception.track_kernels import (
     forecast_in_place,
@@ -116,10 +116,7 @@ def _detected(
         boxes[n] = bodies.boxes[w, reported.bodies[w, rows[n]]]
 
     # A detector tells boxes in the frame of the sensor: on the way there and back they are rounded.
-    x, y, z, yaw, _, _ = sensors.poses[w]
-    back, turn = sensors.turns_back[w], sensors.turns[w]
-    local = seen_from(boxes, (back[0], back[1]), (x, y, z, yaw))
-    return classes, placed_at(local, (turn[0], turn[1]), (x, y, z, yaw))
+    return classes, placed_by(sensors, w, seen_by(sensors, w, boxes))
 
 
 @compiled()
@@ -154,7 +151,6 @@ def _see(live: Mask, tracks: TrackTables, sensors: Sensors, seen: Floats) -> Non
     for w in range(len(live)):
         if live[w]:
             table = tracks.rows[w, : tracks.counts[w]]
-            x, y, z, yaw, _, _ = sensors.poses[w]
             turn = sensors.turns_back[w, 0], sensors.turns_back[w, 1]
-            boxes = seen_from(table[:, _BOX:_BOX_END], turn, (x, y, z, yaw))
+            boxes = seen_by(sensors, w, table[:, _BOX:_BOX_END])
             seen[w, : len(table)] = seen_nearest_first(table, boxes, turn)

@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -15,6 +16,17 @@ Pose = tuple[float, float, float]
 """x, y (metres, world frame) and heading (radians, from x towards y) of a body on the ground."""
 
 _Place = tuple[float, float, float, float]
+_Number = TypeVar("_Number", float, Floats)
+
+
+def mounted_at(
+    place: tuple[_Number, _Number], turn: tuple[_Number, _Number], at: tuple[float, float, float]
+) -> tuple[_Number, _Number]:
+    """World x and y of what is mounted `at` (x, y, z) in the frame of a body at a `place` on the
+    ground; `turn` is the cosine and the sine of its yaw. Of one body, or of many as columns.
+    """
+    (x, y), (cos, sin), (ahead, left, _) = place, turn, at
+    return x + (cos * ahead - sin * left), y + (sin * ahead + cos * left)
 
 
 def turned(vectors: Floats, yaw: float | Floats) -> Floats:
@@ -69,10 +81,9 @@ class Frame:
     @classmethod
     def mounted(cls, pose: Pose, at: tuple[float, float, float]) -> "Frame":
         """The frame of a sensor mounted `at` (x, y, z) in the frame of a body at `pose`."""
-        ahead, left, up = at
         x, y, yaw = pose
-        cos, sin = float(np.cos(yaw)), float(np.sin(yaw))
-        return cls(x + (cos * ahead - sin * left), y + (sin * ahead + cos * left), up, yaw)
+        turn = float(np.cos(yaw)), float(np.sin(yaw))
+        return cls(*mounted_at((x, y), turn, at), at[2], yaw)
 
     @classmethod
     def turned_by(cls, rotation: Rotation, origin: Floats) -> "Frame":

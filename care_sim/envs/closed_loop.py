@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict
+from textwrap import indent
 from typing import Any
 
 import numpy as np
@@ -13,14 +14,16 @@ from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.types import Action
 from care_sim.driving.drivers import check_driver
 from care_sim.envs import reward as rewards
+from care_sim.envs.conditions_page import CONDITIONS
 from care_sim.envs.detection import detector_of
 from care_sim.envs.sensing import Observed, SensingEnv, arguments_of, split_conditions
 from care_sim.evaluation.metrics import outcome
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.episode import Episode
 from care_sim.loops.false_box_pools import pool_of_another_drive
+from care_sim.loops.record_columns import Records
 from care_sim.loops.records import Keyframe, Outcome
-from care_sim.loops.seeds import SensorSeeds
+from care_sim.loops.seeds import EpisodeSeeds
 from care_sim.perception.detectors import PROXY
 from care_sim.scenarios import make_scenario, scenario_class
 from care_sim.scenarios.base import Scenario
@@ -121,63 +124,9 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     (`care_sim.base.random_streams`). An agent that holds this package can then not look its
     episodes up. Take at least 16 random bytes, since a word can be tried like a seed. False, the
     default, means none.
-
-    The conditions are the fields of `care_sim.core.conditions.ClosedLoopConditions`, which says
-    more of each. Faults are off by default and drawn by the seed.
-
-    | condition | of | meaning |
-    |---|---|---|
-    | `reserve_fraction` | allocator | rho, the share of the budget kept for the reserve |
-    | `floor` | allocator | whether the random floor spends what the policy leaves |
-    | `floor_seed` | allocator | which of the random floors that the seed holds |
-    | `azimuth_margin`, `elevation_margin` | allocator | cells by which hulls are dilated |
-    | `cell_order` | allocator | in which order the cells of a set are taken |
-    | `firing` | LiDAR | what fires as a whole, "cells", "tiles:4x8", ... (3) |
-    | `engine` | sensors | what casts the rays, "fast" or "bullet" |
-    | `min_returns` | LiDAR detector | fired rays that must hit an object |
-    | `camera_confidence` | camera detector | least confidence of a detection |
-    | `camera_profile` | camera | the detector that it is like, "ideal" or "yolox" |
-    | `false_negative_rate` | camera | share of the objects that it misses |
-    | `false_negative_per_m` | camera | growth of that share with distance, 1/m |
-    | `false_negative_burst` | camera | keyframes that a miss lasts |
-    | `false_positive_rate` | camera | mean number of false boxes per picture |
-    | `camera_latency` | camera | age of its detections, keyframes |
-    | `camera_latency_s` | camera | age of its detections, s; not with `camera_latency` |
-    | `camera_jitter` | camera | most keyframes by which a picture comes later still |
-    | `blackout_start_s`, `blackout_s` | camera | begin and length of a blackout, s |
-    | `camera_rotation_sigma_deg` | camera | spread of the mount's error in yaw and pitch, degrees |
-    | `camera_position_sigma_m` | camera | spread of the mount's error in x, y and z, m |
-    | `lidar_range_sigma` | LiDAR | noise on every range, m |
-    | `lidar_dropout` | LiDAR | share of the returns that are lost |
-    | `lidar_dead_rows` | LiDAR | elevation rows that return nothing; row 0 is the highest |
-    | `lidar_stated_range_m` | returns | range that its data sheet states, m (5) |
-    | `lidar_stated_reflectance` | returns | reflectance at which it is stated |
-    | `visibility_m` | returns | meteorological visibility in fog, m |
-    | `rain_mm_h` | returns | rain, mm/h |
-    | `lidar_divergence_mrad` | returns | angle between opposite edges of a beam, mrad |
-    | `lidar_returns` | returns | which echo of a beam, "strongest", "last" or "both" |
-    | `lidar_sweep_s` | returns | how long a sweep takes, whose columns fire one by one, s |
-    | `lidar_compensated` | returns | whether its points are freed of the ego's motion |
-    | `lidar_crosstalk` | returns | share of the cells with the pulse of another LiDAR |
-    | `ego_speed_sigma` | odometry | noise on the car's own speed, m/s |
-    | `ego_position_sigma_m`, `ego_yaw_sigma_deg` | localisation | errors of its pose, m, degrees |
-    | `ego_pose_correlation_s` | localisation | how long these errors last, s |
-    | `driver` | driver | who brakes, "fixed" or "careful-human" (4) |
-    | `brake_mps2` | fixed driver | its deceleration, m/s^2 |
-    | `brake_reaction_s` | fixed driver | from decision to full braking, s |
-    | `brake_standstill_m` | fixed driver | gap at which it means to stand, m |
-    | `brake_horizon_s` | fixed driver | how far ahead it foresees an entry, s |
-    | `brake_side_margin_m` | fixed driver | room that it keeps on either side, m |
-    | `brake_release_s` | fixed driver | time of free way before it lets go, s |
-    | `brake_for_oncoming` | fixed driver | whether it foresees how near a track comes by itself |
-    | `comfort_mps2` | driver | acceleration back to cruising speed, m/s^2 |
-
-    (3) `care_sim.core.firing`; B is then the cells of the units that the budget buys. (4)
-    `care_sim.driving.braking` and `care_sim.driving.careful_human`. Only `fixed` has the settings
-    that begin with `brake_`. (5) `care_sim.core.return_settings`; at 0 all that is in reach
-    returns.
     """
 
+    __doc__ = f"{__doc__}{indent(CONDITIONS, '    ')}"
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012 (Gymnasium's)
     scenario_name: str | type[Scenario]
     conditions: ClosedLoopConditions
@@ -254,14 +203,30 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
 
     def episode(self, entropy: int) -> Episode:
         """What an episode begins with. The caller closes its world."""
-        scenario, camera, lidar, floor, odometry = self._streams(entropy, count=5)
-        world = self.scenario.make_world(np.random.default_rng(scenario))
-        return Episode(world, SensorSeeds(camera, lidar, odometry), floor)
+        seeds = EpisodeSeeds.of(entropy, self._secret)
+        world = self.scenario.make_world(np.random.default_rng(seeds.scenario))
+        return Episode(world, seeds.sensors, seeds.floor)
 
     def first_info(self, entropy: int, world: World) -> dict[str, Any]:
         """The info of `reset`."""
         drawn = {"drawn": dict(world.drawn)} if world.drawn else {}
         return self._info_of({}, {"seed": entropy, **drawn})
+
+    def keyframe_info(
+        self, scan: dict[str, Any], record: Keyframe | Records, terms: Mapping[str, Any]
+    ) -> dict[str, Any]:
+        """The info of a keyframe, or columns of many worlds: with `scan`, what the fired cells
+        told, and the terms of the reward.
+        """
+        own = {**scan, "braking": record.braking, "time_s": record.time_s}
+        scoring = {
+            "detected": record.detected,
+            "in_view": record.in_view,
+            "clearance_m": record.clearance_m,
+            "speed_mps": record.speed_mps,
+            "reward_terms": terms,
+        }
+        return self._info_of(own, scoring)
 
     def step(self, action: Action) -> tuple[Observed, float, bool, bool, dict[str, Any]]:
         """Fire the cells that `action` scores highest and go on to the next keyframe.
@@ -280,7 +245,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         truncated = loop.world.time >= self.scenario.duration_s - LAST_BITS_S
         self._over = terminated or truncated
         reward, terms = self._reward.of(record, detectable, self._over)
-        info = self._info(record, terms)
+        info = self.keyframe_info(self._scan_info(fired), record, terms)
         if self._over:
             info["outcome"] = asdict(self._outcome())
         return self.observed(), reward, terminated, truncated, info
@@ -298,36 +263,17 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
             self._running = None
 
     def _pool(self, entropy: int) -> BoxPool:
-        """The boxes that false ones are drawn from, if there are any.
-
-        They are those of another drive through this scenario. Its stream is its own, so that
-        nothing in it tells of this episode.
+        """The boxes that false ones are drawn from, if there are any: those of another drive
+        through this scenario.
         """
         if not invents_boxes(self.conditions):
             return EMPTY_POOL
-        # The first five are those of `reset`, however many are asked for.
-        _, camera, lidar, _, odometry, another = self._streams(entropy, count=6)
-        seeds = SensorSeeds(camera, lidar, odometry)
-        world = self.scenario.make_world(np.random.default_rng(another))
-        return pool_of_another_drive(
-            world, self.scenario.duration_s, self.rig, self.conditions, seeds, self._detector
-        )
+        scenario, rig, conditions = self.scenario, self.rig, self.conditions
+        seeds = EpisodeSeeds.of(entropy, self._secret)
+        world = scenario.make_world(np.random.default_rng(seeds.another))
+        drive = world, scenario.duration_s, rig, conditions, seeds.sensors
+        return pool_of_another_drive(*drive, self._detector)
 
     def _outcome(self) -> Outcome:
         """The result of the episode."""
         return outcome(self.keyframes)
-
-    def _info(self, record: Keyframe, terms: dict[str, float]) -> dict[str, Any]:
-        own = {
-            **self._scan_info(record.fired),
-            "braking": record.braking,
-            "time_s": record.time_s,
-        }
-        scoring = {
-            "detected": record.detected,
-            "in_view": record.in_view,
-            "clearance_m": record.clearance_m,
-            "speed_mps": record.speed_mps,
-            "reward_terms": terms,
-        }
-        return self._info_of(own, scoring)

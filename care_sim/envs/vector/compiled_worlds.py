@@ -17,6 +17,7 @@ from care_sim.envs.sensing import Observed
 from care_sim.envs.vector.rewards import Rewards
 from care_sim.envs.vector.worlds import Stepped
 from care_sim.evaluation.metrics import outcome_of
+from care_sim.loops.episode import most_keyframes
 from care_sim.loops.record_columns import Records
 from care_sim.loops.records import Outcome
 
@@ -48,8 +49,7 @@ class CompiledWorlds:
         duration_s = model.scenario.duration_s
         self._loop = BatchLoop(rigs, conditions, duration_s, observed, self._exact)
         self._rewards = Rewards(model.reward_weights, worlds)
-        longest = int(np.ceil(model.scenario.duration_s / model.rig.keyframe_s)) + 1
-        self._history = History(worlds, longest)
+        self._history = History(worlds, most_keyframes(duration_s, model.rig.keyframe_s))
         # Each world draws the seeds of its later episodes as a single environment does.
         self._generators: list[np.random.Generator | None] = [None] * worlds
 
@@ -113,17 +113,10 @@ class CompiledWorlds:
 
     def _columns(self, records: Records, terms: dict[str, Any]) -> dict[str, Any]:
         """What `info` says of all worlds, in the order of the single environment."""
-        own = {"braking": records.braking, "time_s": records.time_s}
+        scan = {}
         if self._model.conditions.floor:
-            own = {"fired": self._all_fired(), **own}
-        scoring = {
-            "detected": records.detected,
-            "in_view": records.in_view,
-            "clearance_m": records.clearance_m,
-            "speed_mps": records.speed_mps,
-            "reward_terms": terms,
-        }
-        return own | scoring if self._model.scoring_info else own
+            scan["fired"] = self._all_fired()
+        return self._model.keyframe_info(scan, records, terms)
 
     def _all_fired(self) -> NDArray[Any]:
         """(W, B) the cells of all worlds, or (W,) arrays of each world's own."""

@@ -7,11 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from care_sim.base.checks import check_known
-from care_sim.base.random_streams import streams
 from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.rig import Rig
 from care_sim.loops.closed_loop import ClosedLoop
-from care_sim.loops.seeds import SensorSeeds
+from care_sim.loops.seeds import EpisodeSeeds
 from care_sim.scenarios import SCENARIOS, make_scenario
 from care_sim.scenarios.base import Scenario
 
@@ -36,8 +35,8 @@ def rehearsal(scenario: Scenario, seed: int, rig: Rig) -> ClosedLoop:
 
     The caller closes its world.
     """
-    built, camera, lidar, _, odometry = streams((seed,), 5)
-    world = scenario.make_world(np.random.default_rng(built))
+    seeds = EpisodeSeeds.of(seed)
+    world = scenario.make_world(np.random.default_rng(seeds.scenario))
     # A rig that was made alone may have no camera; the scenario's environment has these.
     equipped = rig if rig.cameras else replace(rig, cameras=scenario.cameras)
-    return ClosedLoop(world, equipped, ClosedLoopConditions(), SensorSeeds(camera, lidar, odometry))
+    return ClosedLoop(world, equipped, ClosedLoopConditions(), seeds.sensors)
