@@ -116,4 +116,6 @@ def _arguments(config: AgentConfig, budget: float | list[float]) -> dict[str, An
     reward: dict[str, Any] = (
         {} if config.env in OPEN_LOOP else {"reward_weights": {"gain": config.gain}}
     )
-    return {"budget": budget} | reward | config.arguments
+    # No learner reads it, and evaluations read outcomes, which stay.
+    scoring = {"scoring_info": False}
+    return {"budget": budget} | reward | scoring | config.arguments

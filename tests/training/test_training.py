@@ -20,6 +20,7 @@ from care_sim.training.seeds import validation_seeds
 from care_sim.training.validation import evaluate, rule
 
 SHORT = ["--environments", "2", "--episodes", "2", "--env-parameters", "duration_s=1.0"]
+TOLD = ("scoring_info=True",)
 TINY = [*SHORT, "--rollout", "32", "--batch", "32", "--epochs", "1", "--hidden", "4"]
 
 
@@ -38,7 +39,7 @@ def libraries():
 
 def test_training_never_meets_a_seed_that_is_held_out(monkeypatch):
     monkeypatch.setattr("care_sim.training.seeds.LAST", TRAINING + 100_000)
-    env = training(PpoConfig(), 0.03)
+    env = training(PpoConfig(env_parameters=TOLD), 0.03)
     seeds = [env.reset(seed=0 if n == 0 else None)[1]["seed"] for n in range(30)]
     again = [env.reset(seed=0 if n == 0 else None)[1]["seed"] for n in range(30)]
     other = [env.reset(seed=1 if n == 0 else None)[1]["seed"] for n in range(30)]
@@ -53,7 +54,7 @@ def test_learners_of_neighbouring_seeds_share_no_episode():
     """Though Stable-Baselines3 seeds environment n of a learner with its seed + n."""
     met = []
     for learner, environment in ((0, 1), (1, 0)):
-        env = training(PpoConfig(seed=learner), 0.03)
+        env = training(PpoConfig(seed=learner, env_parameters=TOLD), 0.03)
         met.append(
             [env.reset(seed=learner + environment if n == 0 else None)[1]["seed"] for n in range(5)]
         )
