@@ -256,7 +256,8 @@ def _follow(
         step = clock.steps[world]
         clock.now[world] = clock.times[step]
         for body in range(bodies.counts[world]):
-            bodies.before[world, body] = bodies.boxes[world, body]
+            for k in range(bodies.boxes.shape[2]):
+                bodies.before[world, body, k] = bodies.boxes[world, body, k]
         if not together[world]:
             continue
 
