@@ -48,4 +48,5 @@ def points_within(points: Floats, boxes: Floats) -> Integers:
 def _holds(box: Floats, x: float, y: float) -> bool:
     dx, dy = x - box[0], y - box[1]
     cos, sin = np.cos(box[6]), np.sin(box[6])
-    return abs(cos * dx + sin * dy) <= box[3] / 2 and abs(cos * dy - sin * dx) <= box[4] / 2
+    along, across = abs(cos * dx + sin * dy), abs(cos * dy - sin * dx)
+    return bool(along <= box[3] / 2 and across <= box[4] / 2)

@@ -30,7 +30,7 @@ class Peaks(NamedTuple):
 
     def take(self, rows: Integers | Mask) -> "Peaks":
         """Some of them."""
-        return Peaks(*(column[rows] for column in self))
+        return Peaks(self.classes[rows], self.logits[rows], self.scores[rows], self.boxes[rows])
 
 
 def peaks_of(

@@ -27,10 +27,10 @@ class PillarsDetector:
     """The learned detector. `file` holds weights that `care-sim train detector` wrote; without it
     the shipped ones act.
 
-    What it reports has a score of `least_score` or more. A score is the share of such boxes that lie
-    within 2 m of an object of their class, in scenes apart from those of the training. Runs on one
-    core with PyTorch, the extra `rl`. Raises MissingExtra without it, InvalidInput for a file that
-    is not of such weights.
+    What it reports has a score of `least_score` or more. A score is the share of such boxes that
+    lie within 2 m of an object of their class, in scenes apart from those of the training. Runs on
+    one core with PyTorch, the extra `rl`. Raises MissingExtra without it, InvalidInput for a file
+    that is not of such weights.
     """
 
     def __init__(self, file: str | PathLike[str] | None = None, least_score: float = LEAST_SCORE):
