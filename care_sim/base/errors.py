@@ -14,6 +14,7 @@ _LISTINGS = {
     "command": "care-sim",
     "policy": "care-sim policies",
     "scenario": "care-sim scenarios",
+    "source": "care-sim sources",
     "detector": "care-sim detectors",
 }
 """The commands that list things of a kind."""

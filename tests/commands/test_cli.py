@@ -17,6 +17,7 @@ from care_sim.commands.reproduce import Reproduce
 from care_sim.commands.shared.options import Options
 from care_sim.policies import contenders
 from care_sim.scenarios import SCENARIOS
+from care_sim.sources.installed import SOURCES
 from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.episode_play import run_episode
 from care_sim.study.parameters import parameters
@@ -243,7 +244,26 @@ def test_the_detectors_are_listed_with_a_line_each(capsys):
     assert all(len(line.split()) > 5 for line in first)
 
 
-@pytest.mark.parametrize("command", ["policies", "scenarios", "sensors", "detectors", "compare"])
+def test_the_sources_are_listed_as_they_are_asked_for_and_a_broken_one_with_its_reason(
+    capsys, install
+):
+    install("ours", "import nowhere", SOURCES.group, torn="Torn")
+    code, out, err = run(capsys, "sources")
+    assert (code, err) == (0, "")
+    assert re.findall(r"^\S+", out, re.MULTILINE) == [
+        "streets",
+        "argoverse2:FOLDER",
+        "nuscenes:FOLDER",
+        "torn",
+    ]
+    assert "    split='val'\n" in out
+    (torn,) = (line for line in out.splitlines() if line.startswith("torn"))
+    assert "(broken) ModuleNotFoundError: No module named 'nowhere'" in torn
+
+
+@pytest.mark.parametrize(
+    "command", ["policies", "scenarios", "sources", "sensors", "detectors", "compare"]
+)
 def test_lists_and_tables_fit_eighty_columns_and_lose_nothing(command, capsys):
     short = ["dartout", "--scenario-parameters", "duration_s=0.1"]
     _, out, _ = run(capsys, command, *(short if command == "compare" else []))

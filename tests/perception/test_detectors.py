@@ -126,7 +126,7 @@ def test_a_package_that_ends_the_program_gets_one_line(install):
     install("rude_detectors", "raise SystemExit('no device')", DETECTORS.group, rude="Any")
     with pytest.raises(
         BrokenDetector,
-        match=r"^detector rude cannot be loaded: SystemExit: no device \(rude_detectors.py, line 1\)$",
+        match=r"rude cannot be loaded: SystemExit: no device \(rude_detectors.py, line 1\)$",
     ):
         make_detector("rude", HEIGHT)
 

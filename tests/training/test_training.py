@@ -13,9 +13,12 @@ from care_sim.base.seed_ranges import TRAINING, VALIDATION
 from care_sim.cli import main
 from care_sim.policies.learned.weights import load_weights
 from care_sim.policies.learned.wrapping import Wrapping
+from care_sim.scenarios import PLUGINS
+from care_sim.study import provenance
 from care_sim.training.algorithms import algorithm
 from care_sim.training.config import PpoConfig, SacConfig
 from care_sim.training.environments import plain, training
+from care_sim.training.folder import Folder
 from care_sim.training.seeds import validation_seeds
 from care_sim.training.validation import evaluate, rule
 
@@ -202,6 +205,37 @@ def test_bad_input_is_one_line(capsys, tmp_path, options, message):
     assert (code, complaint.count("\n")) == (2, 1)
     assert message in complaint
     assert not (tmp_path / "out").exists()
+
+
+class Learner:
+    """Writes something where a learner writes its checkpoint."""
+
+    def save(self, path):
+        """Write it."""
+        path.write_bytes(b"weights")
+
+
+def test_a_run_on_other_code_of_ones_own_scenario_is_not_gone_on_with(install, tmp_path):
+    source = (
+        "from dataclasses import dataclass\nfrom care_sim.scenarios.dartout import Dartout\n\n"
+        "@dataclass(frozen=True)\nclass Own(Dartout):\n    pass\n"
+    )
+    install("own_scenario", source, PLUGINS.group, own="Own")
+    for env in ("own", "own_scenario:Own", "CARE-Dense-v0"):
+        out = tmp_path / env
+        begun = PpoConfig(env=env, out=out)
+        Folder(begun).begin(Learner())
+        again = PpoConfig(env=env, out=out, resume=True)
+        Folder(again)
+        with (tmp_path / "own_scenario" / "own_scenario.py").open("a") as file:
+            file.write("# edited\n")
+        provenance._loaded.cache_clear()
+        if env == "CARE-Dense-v0":
+            Folder(again)
+            continue
+        with pytest.raises(InvalidInput, match=f"the code of {env} is another than when"):
+            Folder(again)
+    provenance._loaded.cache_clear()
 
 
 def test_a_missing_library_is_named(monkeypatch):

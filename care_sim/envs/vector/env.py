@@ -174,6 +174,13 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
             infos,
         )
 
+    def render(self) -> None:
+        """Raise InvalidInput: many worlds draw no pictures."""
+        raise InvalidInput(
+            "many worlds draw no pictures: play the world's seed in the single environment, made "
+            'with render_mode="rgb_array"'
+        )
+
     def close_extras(self, **_: Any) -> None:
         """Free the worlds and end the threads."""
         self._threads.close()

@@ -78,6 +78,13 @@ def test_wrong_arguments_are_named(wrong, message):
         native(NAME, arguments.pop("num_envs"), **arguments)
 
 
+def test_a_picture_of_many_is_refused_in_one_line_that_tells_the_way(vector):
+    with pytest.raises(
+        InvalidInput, match=r'^[^\n]*single environment, made with render_mode="rgb'
+    ):
+        vector.render()
+
+
 def test_wrong_seeds_and_masks_are_named(vector):
     with pytest.raises(InvalidInput, match="one for each of 3"):
         vector.reset(seed=[1, 2])
