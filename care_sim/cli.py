@@ -11,11 +11,13 @@ from typing import Any, NoReturn
 
 import care_sim
 from care_sim.base import interrupts
-from care_sim.base.errors import InvalidInput, MissingExtra, one_line, shortened, shown
+from care_sim.base.errors import InvalidInput, MissingExtra, error_line, one_line, shortened, shown
+from care_sim.base.foreign_code import foreign_place
 from care_sim.commands.entries import COMMANDS, GROUPS
 from care_sim.commands.shared.hints import ways_on
 from care_sim.commands.shared.parsing import chosen_command, option_helps
 
+_FAILED = 1
 _BAD_INPUT = 2
 _UNEXPECTED = 70
 """The exit code of a fault in the software: `EX_SOFTWARE` of BSD."""
@@ -66,9 +68,9 @@ _KEPT = {
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run the command line and exit.
 
-    Exit codes: 0 done, 1 something failed or a policy was left out, 2 bad input, 70 a fault of the
-    software itself, whose trace `--debug` shows, 130 interrupted, 141 nobody reads the output any
-    more.
+    Exit codes: 0 done, 1 something failed, such as code of the user's own, or a policy was left
+    out, 2 bad input, 70 a fault of the software itself, 130 interrupted, 141 nobody reads the
+    output any more. `--debug` shows the trace of a fault.
     """
     # A host that calls this with arguments keeps its handlers of signals and its process.
     alone = arguments is None
@@ -114,6 +116,9 @@ def _end_with(error: BaseException, trace: bool) -> NoReturn:
     if isinstance(error, BrokenPipeError):
         _leave_output()
         sys.exit(_UNREAD)
+    # A fault in code that somebody brought is theirs to mend.
+    if foreign_place(error) and not trace:
+        _complain(error_line(error), _FAILED)
     if isinstance(error, OSError):
         _leave_output()
         _complain(f"{error.filename}: {error.strerror}" if error.filename else str(error))

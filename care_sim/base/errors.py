@@ -6,12 +6,15 @@ import sys
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 
+from care_sim.base.foreign_code import foreign_place
+
 _QUOTED = 120
 """Characters of a value that a message quotes."""
 _LISTINGS = {
     "command": "care-sim",
     "policy": "care-sim policies",
     "scenario": "care-sim scenarios",
+    "source": "care-sim sources",
     "detector": "care-sim detectors",
 }
 """The commands that list things of a kind."""
@@ -54,8 +57,11 @@ def report_problems(problems: Sequence[str]) -> None:
 
 
 def error_line(error: BaseException) -> str:
-    """The type of an error and what it says, on one line."""
-    return f"{type(error).__name__}: {' '.join(str(error).split())}"
+    """The type of an error and what it says, on one line; of an error in foreign code with its file
+    and line.
+    """
+    told = one_line(f"{type(error).__name__}: {error}").removesuffix(":")
+    return told + foreign_place(error)
 
 
 def shown(value: object) -> str:

@@ -48,7 +48,14 @@ class Plugins(Generic[Made]):
         return [*self.built_in, *sorted(set(self.entries()) - set(self.built_in))]
 
     def check(self, name: object) -> None:
-        """Raise InvalidInput for what is no name of this kind."""
+        """Raise InvalidInput for what is no name of this kind; of a class with its place."""
+        if inspect.isclass(name):
+            place = f"{name.__module__}:{name.__qualname__}"
+            asked = f"as {place!r}" if is_place(place) else "as MODULE:CLASS, from a module's top"
+            raise InvalidInput(
+                f"{self.kind} must be a name, got the class {name.__name__}: ask for it by its "
+                f"place, {asked}"
+            )
         # Installed packages are searched only for a name that is not built in.
         if not (isinstance(name, str) and (name in self.built_in or is_place(name))):
             check_known(self.kind, name, self.names())

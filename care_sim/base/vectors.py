@@ -1,4 +1,4 @@
-"""What the worlds of a vector environment have alike."""
+"""What is fixed about the worlds of a vector environment."""
 
 from typing import Any
 
@@ -7,18 +7,23 @@ from gymnasium.vector import VectorEnv
 from care_sim.base.errors import InvalidInput, shown
 
 
+def attribute_of_each(env: VectorEnv[Any, Any, Any], name: str) -> list[Any]:
+    """An attribute of each world of a vector environment, whatever wrappers are around it. Raises
+    AttributeError where there is none.
+    """
+    inner = env.unwrapped
+    # The class of all vectors lacks the method that those of CARE-Sim and of Gymnasium have.
+    if hasattr(inner, "get_attr"):
+        return [*inner.get_attr(name)]
+    return [getattr(inner, name)] * env.num_envs
+
+
 def shared_attribute(env: VectorEnv[Any, Any, Any], name: str) -> Any:
-    """An attribute that a vector environment, whatever wrappers are around it, has for all its
-    worlds, or that each of them has.
+    """An attribute that all worlds of a vector environment have alike.
 
     Raises AttributeError where there is none, InvalidInput where worlds differ in it.
     """
-    inner = env.unwrapped
-    # Those of CARE-Sim have one for all; those of Gymnasium ask each world, and say so by a method
-    # that the class of all vectors lacks.
-    if hasattr(inner, name) or not hasattr(inner, "get_attr"):
-        return getattr(inner, name)
-    first, *others = inner.get_attr(name)
+    first, *others = attribute_of_each(env, name)
     if any(other != first for other in others):
         raise InvalidInput(
             f"the worlds of one vector must have one {name}, those of {shown(env)} differ"

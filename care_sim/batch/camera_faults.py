@@ -1,7 +1,8 @@
-"""What goes wrong between the pictures of all worlds and the detections that arrive; see
-`care_sim.sensors.camera_faults`.
+"""What goes wrong between the pictures of all worlds and the detections that arrive, in each world
+by its own faults; see `care_sim.sensors.camera_faults`.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -31,18 +32,22 @@ class BatchMisses:
     `care_sim.sensors.camera_faults.Misses`.
     """
 
-    def __init__(self, faults: CameraFaults, worlds: int):
-        self._faults = faults
-        self._draws = DrawnAhead(worlds, lambda rng, k, n: rng.random((k, n)))
+    def __init__(self, faults: Sequence[CameraFaults]):
+        worlds = len(faults)
+        told = [(one.false_negative_rate, one.false_negative_per_m) for one in faults]
+        self._shares = np.array(told)[:, :, None]
+        self._bursts = np.array([[one.false_negative_burst] for one in faults])
+        self._draws = DrawnAhead(worlds)
         self._lasting = np.zeros((worlds, 0), np.int64)
         self._started = np.zeros(worlds, np.bool_)
-        self.any = bool(faults.false_negative_rate or faults.false_negative_per_m)
+        self.any = bool(self._shares.any())
         """Whether any are ever missed."""
 
     def begin(self, world: int, seed: np.random.SeedSequence, objects: int) -> None:
         """Begin an episode with so many `objects` that can be missed."""
         if self.any:
-            self._draws.begin(world, seed, objects)
+            rng = np.random.default_rng(seed)
+            self._draws.begin(world, lambda keyframes: rng.random((keyframes, objects)))
             self._started[world] = False
 
     def draw(self, live: Mask, ranges: Floats) -> Mask:
@@ -53,11 +58,10 @@ class BatchMisses:
         lasting = self._lasting
         if lasting.shape[1] < width:
             lasting = np.pad(lasting, ((0, 0), (0, width - lasting.shape[1])))
-        rates = miss_rates(self._faults, ranges)
+        rates = miss_rates(self._shares[:, 0], self._shares[:, 1], ranges)
         draws = self._draws.next(live, width)
-        burst = self._faults.false_negative_burst
-        first = first_bursts(rates, draws, burst)
-        later = later_bursts(lasting, rates, draws, burst)
+        first = first_bursts(rates, draws, self._bursts)
+        later = later_bursts(lasting, rates, draws, self._bursts)
         drawn = np.where(self._started[:, None], later, first)
         missed: Mask = (drawn > 0) & live[:, None]
         self._lasting = np.where(live[:, None], drawn - missed, lasting)
@@ -80,15 +84,17 @@ class _Sent(NamedTuple):
 
 class BatchDelay:
     """Hands out the newest picture that has arrived, as `care_sim.sensors.camera_faults.Delay`:
-    each is late by `latency` keyframes, and by 0 to `jitter` more that are drawn for it.
+    each is late by its world's one of the `latencies` (W,), keyframes, and by 0 to that of the
+    `jitters` (W,) more that are drawn for it.
     """
 
-    def __init__(self, latency: int, jitter: int, keyframe_s: float, worlds: int):
-        self._latency, self._jitter = latency, jitter
+    def __init__(self, latencies: Integers, jitters: Integers, keyframe_s: float):
+        worlds = len(latencies)
+        self._latencies, self._jitters = latencies, jitters
         self._keyframe_s = keyframe_s
-        self._draws = DrawnAhead(worlds, lambda rng, k, n: rng.integers(jitter + 1, size=(k, n)))
+        self._draws = DrawnAhead(worlds)
         # The last one that has not come by now has come in any case.
-        places = latency + jitter + 1
+        places = int((latencies + jitters).max()) + 1
         self._sent = _Sent(
             np.zeros((worlds, places), np.int64),
             np.empty((worlds, places, 0, len(ImageDetections.COLUMNS))),
@@ -101,16 +107,17 @@ class BatchDelay:
     def begin(self, world: int, seed: np.random.SeedSequence) -> None:
         """Begin an episode; lateness is drawn from `seed`."""
         self._sent.taken[world] = 0
-        if self._jitter:
-            self._draws.begin(world, seed, 1)
+        if self._jitters.any():
+            rng, most = np.random.default_rng(seed), self._jitters[world] + 1
+            self._draws.begin(world, lambda keyframes: rng.integers(most, size=(keyframes, 1)))
 
     def newest(self, live: Mask, seen: Detected, headings: Floats) -> Detected:
         """Take in what is `seen` at a keyframe of the worlds that are `live`, the cars with these
         `headings` (W,), radians; the newest detections that are due, with age and yaw change.
         """
-        late = np.full(len(live), self._latency)
-        if self._jitter:
-            late += self._draws.next(live, 1)[:, 0].astype(np.int64)
+        late = self._latencies
+        if self._jitters.any():
+            late = late + self._draws.next(live, 1)[:, 0].astype(np.int64)
         worlds, most, columns = seen.rows.shape
         if self._sent.rows.shape[2] < most:
             places = self._sent.rows.shape[1]

@@ -16,18 +16,19 @@ from care_sim.core.rig import Rig
 
 
 class Choice:
-    """The free cells of `worlds` worlds and their floors, with the budget of a `rig` and the
-    `conditions` of the floor.
+    """The free cells of W worlds and their floors, each with its own of the `budgets` (W,), with
+    the grid of a `rig` and the `conditions` of the floor.
     """
 
-    def __init__(self, rig: Rig, conditions: Conditions, worlds: int):
-        self._budget = rig.budget
+    def __init__(self, rig: Rig, conditions: Conditions, budgets: Integers):
+        worlds, most = len(budgets), int(budgets.max())
+        self._budgets = budgets
         self._conditions = conditions
         self._size = rig.grid.size
         self._streams = word_streams(worlds)
         self._drawn = np.full(worlds, -1)
         # A row has room for one cell more, which `list_chosen` may write over and over.
-        self._fired = Fired(np.zeros(worlds, np.int64), np.zeros((worlds, rig.budget + 1), int))
+        self._fired = Fired(np.zeros(worlds, np.int64), np.zeros((worlds, most + 1), int))
 
     def begin(self, world: int, floor: np.random.SeedSequence) -> None:
         """Begin the episode of a world with the seed of its floors."""
@@ -41,7 +42,7 @@ class Choice:
         The tables are the same at every call, and hold its cells till the next.
         """
         flat = scores.reshape(len(scores), self._size)
-        told = flat, live, keyframes, self._budget
+        told = flat, live, keyframes, self._budgets
         _fire(*told, self._conditions.floor, self._streams, self._drawn, self._fired)
         return self._fired
 
@@ -51,7 +52,7 @@ def _fire(
     scores: NDArray[np.float32],
     live: Mask,
     keyframes: Integers,
-    budget: int,
+    budgets: Integers,
     has_floor: bool,
     streams: WordStreams,
     drawn: Integers,
@@ -63,7 +64,7 @@ def _fire(
     chosen = np.empty(scores.shape[1], np.bool_)
     floor = np.empty(scores.shape[1], np.int32)
     for world in range(len(scores)):
-        count = 0
+        count, budget = 0, budgets[world]
         if live[world]:
             count = choose_demanded(scores[world], budget, chosen)
             if has_floor and count < budget:

@@ -13,8 +13,8 @@ from care_sim.base.compiled import compiled
 from care_sim.batch.state import BatchState, Bodies
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.world.bullet import NO_BODY
-from care_sim.world.clearance_judge import ClearanceJudge
-from care_sim.world.least_clearance import PADDING_M, least_gap
+from care_sim.world.clearance_judge import ClearanceJudge, StandIns
+from care_sim.world.gaps import PADDING_M, least_gap
 from care_sim.world.world import World
 
 
@@ -23,7 +23,7 @@ class Clearances:
 
     def __init__(self, worlds: int, steps: int, judge: ClearanceJudge):
         self._judge = judge
-        self._pairs: list[tuple[int, int] | None] = [None] * worlds
+        self._pairs: list[StandIns | None] = [None] * worlds
         # By world and step, of which the first is 1: the poses of the two, what they are apart at
         # least, and exactly where it is known, else NaN.
         self._poses = np.zeros((worlds, steps + 1, 2, 7))
@@ -39,10 +39,13 @@ class Clearances:
         self._bounds[world] = np.inf
         self._known[world] = np.nan
 
-    def note(self, state: BatchState, steps: Integers) -> None:
-        """Note where the bodies are at the `steps` (W,) to which the worlds have come."""
+    def note(self, state: BatchState, steps: Integers, nearest_m: Floats) -> None:
+        """Note where the bodies are at the `steps` (W,) to which the worlds have come. What is
+        `nearest_m` (W,) from centre to centre falls to what it is now.
+        """
         egos = state.egos
-        _note(state.live, steps, state.bodies, egos.bodies, egos.targets, self._poses, self._bounds)
+        tables = self._poses, self._bounds, nearest_m
+        _note(state.live, steps, state.bodies, egos.bodies, egos.targets, *tables)
 
     def least_since(self, steps: Integers, count: int, live: Mask, exact_below: float) -> Floats:
         """(W,) the least clearance of the last `count` of all `steps` (W,) so far, metres. What is
@@ -87,7 +90,7 @@ class Clearances:
         known = float(self._known[world, step])
         pair = self._pairs[world]
         if math.isnan(known) and pair is not None:
-            known = self._judge.clearance(pair, self._poses[world, step].tolist())
+            known = self._judge.clearance(pair, self._poses[world, step])
             self._known[world, step] = known
         return known
 
@@ -101,13 +104,16 @@ def _note(
     targets: Integers,
     poses: Floats,
     bounds: Floats,
+    nearest_m: Floats,
 ) -> None:
     """See `Clearances.note`."""
     for world in range(len(live)):
         if not live[world] or targets[world] == NO_BODY:
             continue
         ego, target, step = egos[world], targets[world], steps[world]
-        boxes = bodies.boxes[world]
-        bounds[world, step] = least_gap(boxes[ego], boxes[target]) - PADDING_M
+        box, other = bodies.boxes[world, ego], bodies.boxes[world, target]
+        away = math.hypot(other[0] - box[0], other[1] - box[1])
+        nearest_m[world] = min(nearest_m[world], away)
+        bounds[world, step] = least_gap(box, other) - PADDING_M
         poses[world, step, 0] = bodies.poses[world, ego]
         poses[world, step, 1] = bodies.poses[world, target]

@@ -10,22 +10,23 @@ _KEYFRAMES = 64
 """For how many keyframes numbers are drawn at once."""
 
 
+Draw = Callable[[int], np.ndarray]
+"""Gives the rows (k, n) of the next k keyframes of a world, n always the same; for a generator of
+NumPy they are those of k calls for one.
+"""
+
+
 class DrawnAhead:
-    """A row of numbers per world and keyframe, as long as the most that a world needs.
+    """A row of numbers per world and keyframe, as long as the most that a world needs."""
 
-    `draw` gives the rows (k, n) of the next k keyframes of a world; for a generator of NumPy they
-    are those of k calls for one.
-    """
-
-    def __init__(self, worlds: int, draw: Callable[[np.random.Generator, int, int], np.ndarray]):
-        self._draw = draw
-        self._streams: list[tuple[np.random.Generator, int] | None] = [None] * worlds
+    def __init__(self, worlds: int):
+        self._draws: list[Draw | None] = [None] * worlds
         self._numbers = np.zeros((worlds, _KEYFRAMES, 0))
         self._used = np.zeros(worlds, np.int64)
 
-    def begin(self, world: int, seed: np.random.SeedSequence, numbers: int) -> None:
-        """Begin an episode that needs so many numbers a keyframe."""
-        self._streams[world] = np.random.default_rng(seed), numbers
+    def begin(self, world: int, draw: Draw) -> None:
+        """Begin an episode whose numbers `draw` gives."""
+        self._draws[world] = draw
         self._used[world] = 0
 
     def next(self, live: Mask, width: int) -> Floats:
@@ -43,8 +44,8 @@ class DrawnAhead:
         return self._numbers[np.arange(len(live)), place, :width]
 
     def _fill(self, world: int) -> None:
-        stream = self._streams[world]
-        if stream is not None:
-            generator, numbers = stream
+        draw = self._draws[world]
+        if draw is not None:
+            rows = draw(_KEYFRAMES)
             self._numbers[world] = 1.0
-            self._numbers[world, :, :numbers] = self._draw(generator, _KEYFRAMES, numbers)
+            self._numbers[world, :, : rows.shape[1]] = rows

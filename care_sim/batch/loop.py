@@ -3,7 +3,7 @@
 The stages are those of `care_sim.loops.closed_loop.ClosedLoop`, each over all worlds at once.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +28,8 @@ from care_sim.world.bullet import NO_BODY
 
 class BatchLoop:
     """W worlds, their sensors and the software of their cars, over episodes of up to `duration_s`
-    seconds. Observations are written into `observed`, arrays with a row per world.
+    seconds. Observations are written into `observed`, arrays with a row per world. The `rigs` (W,)
+    differ at most in their budgets, the `conditions` (W,) in those of their cameras.
 
     Unless `exact`, records tell the clearance as `Motion.advance` does, and `least_clearance_m`
     has to be asked for that of an episode.
@@ -39,27 +40,29 @@ class BatchLoop:
 
     def __init__(
         self,
-        rig: Rig,
-        conditions: ClosedLoopConditions,
+        rigs: Sequence[Rig],
+        conditions: Sequence[ClosedLoopConditions],
         duration_s: float,
         observed: Observations,
         exact: bool = True,
     ):
         worlds = len(observed["budget"])
+        budgets = np.array([each.budget for each in rigs])
+        rig, common = rigs[0], conditions[0]
         self.state = BatchState(worlds)
         self._rig = rig
         self._observed = observed
-        self._choice = Choice(rig, conditions, worlds)
-        self._scanning = Scanning(rig, conditions)
+        self._choice = Choice(rig, common, budgets)
+        self._scanning = Scanning(rig, common)
         # Its tables are of other sizes than those of what is fired, so that it has its own.
-        self._asking = Scanning(rig, conditions)
+        self._asking = Scanning(rig, common)
         self._tracking = Tracking(rig.keyframe_s)
-        self._braking = Braking(rig, conditions, worlds)
+        self._braking = Braking(rig, common, worlds)
         self._exact = exact
         self._motion = Motion(worlds, steps_of(duration_s, rig.keyframe_s))
-        self._sight = Sight(rig, conditions, worlds)
-        self._observing = Observing(rig)
-        self._min_returns = conditions.min_returns
+        self._sight = Sight(rig, conditions)
+        self._observing = Observing(rig, budgets)
+        self._min_returns = common.min_returns
         self._in_view = np.zeros(worlds, np.bool_)
 
     def begin(self, episodes: Mapping[int, Episode]) -> None:

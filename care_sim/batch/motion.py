@@ -5,7 +5,7 @@ the time alone tells. Any other moves by its own Python.
 """
 
 from collections.abc import Sequence
-from typing import TypeGuard
+from typing import NamedTuple, TypeGuard
 
 import numpy as np
 
@@ -38,6 +38,37 @@ def steps_of(duration_s: float, keyframe_s: float) -> int:
     return most_keyframes(duration_s, keyframe_s) * whole_steps(keyframe_s)
 
 
+class Clock(NamedTuple):
+    """The world `steps` (W,) that each world has done; the `times` of all steps; those of each
+    world `now` (W,).
+    """
+
+    steps: Integers
+    times: Floats
+    now: Floats
+
+
+class Drivers(NamedTuple):
+    """The vehicles in the lanes, `counts` and `rows` as in `LaneColumns`, the ego first: their
+    `bodies` (W, V), and the egos' speeds (W,) `before` the world step.
+    """
+
+    counts: Integers
+    rows: Floats
+    bodies: Integers
+    before: Floats
+
+
+class Timed(NamedTuple):
+    """What goes by time alone: `bodies` (W, P), and their `ways` (W, P, steps + 1, 5): x, y,
+    heading, and sine and cosine of half of it.
+    """
+
+    counts: Integers
+    bodies: Integers
+    ways: Floats
+
+
 class Motion:
     """The motion of `worlds` worlds, whose episodes last `steps` world steps at most."""
 
@@ -55,6 +86,7 @@ class Motion:
         self._timed = np.zeros((worlds, 1), np.int64)
         self._ways = np.zeros((worlds, 1, steps + 1, 5))
         self._by_itself: dict[int, World] = {}
+        self._goes_along = np.ones(worlds, np.bool_)
 
     def begin(self, world: int, built: World) -> None:
         """Move a fresh world from now on. Its tables lie in the state by the first `advance`.
@@ -65,12 +97,14 @@ class Motion:
         self._clearances.begin(world, built)
         self._impacts.begin(world, built)
         self._by_itself.pop(world, None)
+        self._goes_along[world] = True
         drivers = [actor for actor in built.actors if _is_driver(actor)]
         others = [actor for actor in built.actors if not _is_driver(actor)]
         keepers = self._keepers(built, drivers)
         timed = [actor for actor in others if not isinstance(actor.moved_by, tuple)]
         if keepers is None or not all(map(_goes_by_time, timed)):
             self._by_itself[world] = built
+            self._goes_along[world] = False
             return
         self._lanes.begin(world, keepers)
         bodies = np.array([built.ego_body, *(actor.body for actor in drivers)])
@@ -102,9 +136,7 @@ class Motion:
         count = whole_steps(duration_s)
         for _ in range(count):
             self._step(state, accelerations)
-            self._clearances.note(state, self._steps)
-            away = _away(targeted, state)
-            np.minimum(passages.nearest_m, away, out=passages.nearest_m)
+            self._clearances.note(state, self._steps, passages.nearest_m)
             self._note_impacts(state, passages)
         below = np.inf if exact else KNOWN_BELOW_M
         passages.clearance_m[:] = self._clearances.least_since(self._steps, count, targeted, below)
@@ -141,19 +173,13 @@ class Motion:
 
     def _step(self, state: BatchState, accelerations: Floats) -> None:
         """Move all by a world step."""
-        self._steps += state.live
-        itself = np.zeros(state.worlds, np.bool_)
-        itself[list(self._by_itself)] = True
-        together = state.live & ~itself
+        together = state.live & self._goes_along
         speeds = self._lanes.rows[:, 0, SPEED].copy()
         self._lanes.step(together, accelerations, WORLD_STEP_S)
-        state.times[state.live] = self._times[self._steps[state.live]]
-        state.bodies.before[state.live] = state.bodies.boxes[state.live]
-        _place_drivers(together, self._lanes.counts, self._lanes.rows, self._drivers, state.bodies)
-        _place_timed(
-            together, self._steps, self._timed_counts, self._timed, self._ways, state.bodies
-        )
-        _tell_egos(together, speeds, self._lanes.rows, WORLD_STEP_S, state.egos)
+        clock = Clock(self._steps, self._times, state.times)
+        drivers = Drivers(self._lanes.counts, self._lanes.rows, self._drivers, speeds)
+        timed = Timed(self._timed_counts, self._timed, self._ways)
+        _follow(state.live, together, clock, drivers, timed, state.bodies, state.egos)
         for world, built in self._by_itself.items():
             if state.live[world]:
                 built.step(float(accelerations[world]))
@@ -210,55 +236,44 @@ def _copy(built: World, world: int, state: BatchState) -> None:
     state.egos.accelerations[world] = motion.acceleration
 
 
-def _away(targeted: Mask, state: BatchState) -> Floats:
-    """(W,) from centre to centre of the egos and the first-sighting actors, inf without one."""
-    rows = np.arange(state.worlds)
-    boxes, egos = state.bodies.boxes, state.egos
-    apart = boxes[rows, egos.targets, :2] - boxes[rows, egos.bodies, :2]
-    return np.where(targeted, np.hypot(apart[:, 0], apart[:, 1]), np.inf)
-
-
 @compiled()
-def _place_drivers(
-    moved: Mask, counts: Integers, rows: Floats, drivers: Integers, bodies: Bodies
-) -> None:
-    """Put the bodies `drivers` (W, V) where their vehicles are: who keeps a lane along x changes
-    nothing but x.
-    """
-    for world in range(len(moved)):
-        if moved[world]:
-            for n in range(counts[world]):
-                body, x = drivers[world, n], rows[world, n, 0]
-                bodies.boxes[world, body, 0] = x
-                bodies.poses[world, body, 0] = x
-
-
-@compiled()
-def _place_timed(
-    moved: Mask,
-    steps: Integers,
-    counts: Integers,
-    timed: Integers,
-    ways: Floats,
+def _follow(
+    live: Mask,
+    together: Mask,
+    clock: Clock,
+    drivers: Drivers,
+    timed: Timed,
     bodies: Bodies,
+    egos: Egos,
 ) -> None:
-    """Put the bodies `timed` (W, P) where their `ways` (W, P, steps, 5) tell."""
-    for world in range(len(moved)):
-        if moved[world]:
-            for n in range(counts[world]):
-                row = ways[world, n, steps[world]]
-                box = bodies.boxes[world, timed[world, n]]
-                pose = bodies.poses[world, timed[world, n]]
-                box[0], box[1], box[6] = row[0], row[1], row[2]
-                pose[0], pose[1], pose[5], pose[6] = row[0], row[1], row[3], row[4]
+    """Let the clocks of the worlds that are `live` go on by a world step, and put the bodies of
+    those that move `together` where they are then.
+    """
+    for world in range(len(live)):
+        if not live[world]:
+            continue
+        clock.steps[world] += 1
+        step = clock.steps[world]
+        clock.now[world] = clock.times[step]
+        for body in range(bodies.counts[world]):
+            for k in range(bodies.boxes.shape[2]):
+                bodies.before[world, body, k] = bodies.boxes[world, body, k]
+        if not together[world]:
+            continue
 
+        # Who keeps a lane along x changes nothing but x.
+        for n in range(drivers.counts[world]):
+            body, x = drivers.bodies[world, n], drivers.rows[world, n, 0]
+            bodies.boxes[world, body, 0] = x
+            bodies.poses[world, body, 0] = x
+        for n in range(timed.counts[world]):
+            row = timed.ways[world, n, step]
+            box = bodies.boxes[world, timed.bodies[world, n]]
+            pose = bodies.poses[world, timed.bodies[world, n]]
+            box[0], box[1], box[6] = row[0], row[1], row[2]
+            pose[0], pose[1], pose[5], pose[6] = row[0], row[1], row[3], row[4]
 
-@compiled()
-def _tell_egos(moved: Mask, before: Floats, rows: Floats, dt: float, egos: Egos) -> None:
-    """Write the motion of the egos, whose speeds were `before` (W,) a world step ago."""
-    for world in range(len(moved)):
-        if moved[world]:
-            speed = rows[world, 0, SPEED]
-            egos.speeds[world] = speed
-            egos.yaw_rates[world] = 0.0
-            egos.accelerations[world] = (speed - before[world]) / dt
+        speed = drivers.rows[world, 0, SPEED]
+        egos.speeds[world] = speed
+        egos.yaw_rates[world] = 0.0
+        egos.accelerations[world] = (speed - drivers.before[world]) / WORLD_STEP_S

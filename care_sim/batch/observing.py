@@ -17,12 +17,14 @@ Observations = dict[str, NDArray[np.float32]]
 
 
 class Observing:
-    """Writes what the policies are told, within the limits of observations."""
+    """Writes what the policies are told, within the limits of observations. Of a budget of the
+    `budgets` (W,) each is told its share of the cells.
+    """
 
-    def __init__(self, rig: Rig):
+    def __init__(self, rig: Rig, budgets: Integers):
         self._rig = rig
         self._limits = Limits(rig)
-        self._share = np.float32(rig.budget / rig.grid.size)
+        self._shares = (budgets[:, None] / rig.grid.size).astype(np.float32)
         cameras = self._limits.most_by_camera
         self._detection_bounds = self._limits.detections[0], cameras
         self._track_bounds = self._limits.tracks[0], self._limits.tracks[1][None]
@@ -41,7 +43,7 @@ class Observing:
         egos = state.egos
         numbers = np.stack([egos.speeds, egos.yaw_rates, egos.accelerations], axis=1)
         observed["ego"][who] = np.clip(numbers, *self._limits.ego)[who]
-        observed["budget"][who] = self._share
+        observed["budget"][who] = self._shares[who]
         fits = _put(*detections, *self._detection_bounds, _CAMERA, observed["detections"], who)
         fits &= _put(*tracks, *self._track_bounds, _NO_CAMERA, observed["tracks"], who)
         for world in np.flatnonzero(who & ~fits).tolist():

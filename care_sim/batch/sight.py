@@ -5,6 +5,7 @@ detections those of an ideal camera (`care_sim.sensors.camera`): it may miss bod
 black, and takes its pictures at keyframes.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -39,13 +40,14 @@ _DEPTHS = (NEAR_M, FAR_M)
 
 class Cameras(NamedTuple):
     """The k cameras of a rig: their `models`; `mounts` (k, 4, 3), place and axes in the frame of
-    the sensor; `sizes` (k, 2), width and height in pixels; and the `least` confidence of a box.
+    the sensor; `sizes` (k, 2), width and height in pixels; and in each world the `least` (W,)
+    confidence of a box.
     """
 
     models: CameraModels
     mounts: Floats
     sizes: Integers
-    least: float
+    least: Floats
 
 
 class _Room(NamedTuple):
@@ -57,24 +59,27 @@ class _Room(NamedTuple):
 
 
 class Sight:
-    """The cameras of all worlds.
+    """The cameras of all worlds, which differ in their `conditions` alone.
 
     What it returns it fills anew at the next keyframe.
     """
 
-    def __init__(self, rig: Rig, conditions: Sensing, worlds: int):
+    def __init__(self, rig: Rig, conditions: Sequence[Sensing]):
         models = rig.camera_models
         self._conditions = conditions
         self._cameras = Cameras(
             models,
             np.concatenate([models.positions[:, None], models.axes], axis=1),
             np.array([(camera.width, camera.height) for camera in rig.cameras]).reshape(-1, 2),
-            float(conditions.camera_confidence),
+            np.array([float(each.camera_confidence) for each in conditions]),
         )
-        timing = picture_timing(conditions, rig.keyframe_s, WORLD_STEP_S)
-        self._misses = BatchMisses(conditions, worlds)
-        self._delay = BatchDelay(timing.keyframes, conditions.camera_jitter, rig.keyframe_s, worlds)
-        self._is_late = bool(timing.keyframes or conditions.camera_jitter)
+        timings = [picture_timing(each, rig.keyframe_s, WORLD_STEP_S) for each in conditions]
+        latencies = np.array([timing.keyframes for timing in timings])
+        jitters = np.array([each.camera_jitter for each in conditions])
+        self._misses = BatchMisses(conditions)
+        self._delay = BatchDelay(latencies, jitters, rig.keyframe_s)
+        self._is_late = bool(latencies.any() or jitters.any())
+        self._is_ever_dark = any(each.blackout_s for each in conditions)
 
     def begin(self, world: int, built: World, seed: np.random.SeedSequence) -> None:
         """Begin an episode; `seed` is that of the camera (`care_sim.loops.seeds.SensorSeeds`)."""
@@ -119,8 +124,11 @@ class Sight:
         if self._misses.any:
             ranges = planar_ranges(boxes.reshape(-1, 7)).reshape(silent.shape)
             silent = self._misses.draw(state.live, ranges)
-        if self._conditions.blackout_s:
-            dark = [self._conditions.black_at(time_s) for time_s in state.times.tolist()]
+        if self._is_ever_dark:
+            times = state.times.tolist()
+            dark = [
+                each.black_at(time_s) for each, time_s in zip(self._conditions, times, strict=True)
+            ]
             silent |= np.array(dark)[:, None]
         return silent
 
@@ -186,7 +194,7 @@ def _look(
             seen.rows[w, count : count + len(rows)] = rows
             count += len(rows)
         rows = seen.rows[w, :count]
-        surest, _ = surest_first(rows, np.empty(count, np.int64), cameras.least)
+        surest, _ = surest_first(rows, np.empty(count, np.int64), cameras.least[w])
         seen.rows[w, : len(surest)] = surest
         seen.counts[w] = len(surest)
 

@@ -106,6 +106,9 @@ GROUPS = {
         "scenarios": CommandEntry(
             "listings", "Scenarios", "List the scenarios and their parameters."
         ),
+        "sources": CommandEntry(
+            "listings", "Sources", "List the sources of scenes for the open loop."
+        ),
         "detectors": CommandEntry("listings", "Detectors", "List the detectors."),
         "sensors": CommandEntry("listings", "Sensors", "List the sensor set-ups."),
     },

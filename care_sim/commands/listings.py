@@ -1,4 +1,4 @@
-"""`care-sim policies`, `detectors`, `sensors` and `scenarios`: what can be named."""
+"""`care-sim policies`, `detectors`, `sensors`, `scenarios` and `sources`: what can be named."""
 
 import inspect
 import shutil
@@ -20,6 +20,8 @@ from care_sim.scenarios.ncap.scenario import DRAWN
 from care_sim.scenarios.ncap.table import TESTS
 from care_sim.scenarios.r157.grid import KINDS, SIDES
 from care_sim.sensors.setups import setup_lines
+from care_sim.sources.installed import SOURCES
+from care_sim.sources.recordings import Recordings
 from care_sim.streets.encounters import COMERS
 
 
@@ -77,6 +79,39 @@ class Scenarios:
         for _, reason in PLUGINS.refusals():
             print(_wrapped(printable(reason)))
         return 0
+
+
+@dataclass(frozen=True)
+class Sources:
+    """List the sources of scenes for the open loop."""
+
+    def __call__(self) -> int:
+        """Run it."""
+        for name in SOURCES.names():
+            print(*map(_wrapped, map(printable, _source_lines(name))), "", sep="\n")
+        for _, reason in SOURCES.refusals():
+            print(_wrapped(printable(reason)))
+        return 0
+
+
+def _source_lines(name: str) -> list[str]:
+    """A source as it is asked for and its parameters, or why it cannot be loaded."""
+    package = "" if name in SOURCES.built_in else f" [{package_of(SOURCES.entry(name))}]"
+    try:
+        source: Any = SOURCES.maker(name)
+    except InvalidInput as error:
+        return [f"{name:17} (broken) {error}{package}"]
+    asked = f"{name}:FOLDER" if issubclass(source, Recordings) else name
+    about, _, _ = (inspect.getdoc(source) or "").partition("\n\n")
+    return [
+        f"{asked:17} {' '.join(about.split())}{package}",
+        *(
+            f"    {field.name}={_rounded(field.default)}"
+            for field in fields(source)
+            # The folder is told behind the name.
+            if field.name != "folder"
+        ),
+    ]
 
 
 def _wrapped(line: str) -> str:

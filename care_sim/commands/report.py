@@ -45,7 +45,7 @@ class PrintReport:
         rows, study, left_out = read_results(self.folder)
         write_report(rows, self.folder, study, left_out)
         print_report(rows, console(), study, left_out, self.folder)
-        print(*where_it_lies(self.folder, study), sep="\n")
+        print(*where_it_lies(self.folder, study, rows), sep="\n")
         return 0
 
     def _write(self, path: Path) -> int:

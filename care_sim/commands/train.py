@@ -12,6 +12,7 @@ from care_sim.reports.figures.files import check_figure, save
 from care_sim.training.config import PpoConfig, RecurrentPpoConfig, SacConfig
 from care_sim.training.curves import grouped_runs, read_run
 from care_sim.training.curves_figure import curves_figure
+from care_sim.training.detector import TrainDetector
 from care_sim.training.place_map import TrainPlace
 from care_sim.training.run import train_agent
 from care_sim.training.scorer import TrainScorer
@@ -74,6 +75,7 @@ LEARNERS: dict[str, Callable[..., Any]] = {
     "recurrent-ppo": TrainRecurrentPpo,
     "learned-scorer": TrainScorer,
     "place": TrainPlace,
+    "detector": TrainDetector,
     "curves": DrawCurves,
 }
 """Commands of `care-sim train`, by name."""

@@ -15,6 +15,7 @@ from care_sim.base.plugins import Plugins
 from care_sim.perception.base import Detector
 from care_sim.perception.cluster.detector import ClusterDetector
 from care_sim.perception.graded import GradedProxy
+from care_sim.perception.pillars.detector import PillarsDetector
 from care_sim.perception.points_only import BrokenDetector, PointDetector, PointsOnly
 from care_sim.perception.proxy import ReturnsProxy
 from care_sim.perception.torchscript import TorchScriptDetector
@@ -25,6 +26,8 @@ GRADED = "graded"
 """The proxy that is surer with more returns."""
 CLUSTER = "cluster"
 """The classical one. It is told the grid, and so how far apart neighbouring points are."""
+PILLARS = "pillars"
+"""The learned one."""
 _PRIVILEGED = (PROXY, GRADED)
 """Those that read whose return each one is; all others are `PointDetector`s."""
 
@@ -41,6 +44,7 @@ DETECTORS: Plugins[Any] = Plugins(
         PROXY: ReturnsProxy,
         GRADED: GradedProxy,
         CLUSTER: ClusterDetector,
+        PILLARS: PillarsDetector,
         "torchscript": TorchScriptDetector,
     },
     faults=_faults,

@@ -5,14 +5,14 @@
 from collections.abc import Mapping, Sequence
 from functools import partial
 from importlib.metadata import EntryPoint
-from typing import TypeAlias, overload
+from typing import Any, TypeAlias, overload
 
 import gymnasium
 import gymnasium.vector
 
-from care_sim.base.errors import BrokenPolicy, InvalidInput, MissingExtra, shown
+from care_sim.base.errors import BrokenPolicy, InvalidInput, MissingExtra, error_line, shown
 from care_sim.base.plugins import Plugins
-from care_sim.base.vectors import shared_attribute
+from care_sim.base.vectors import attribute_of_each, shared_attribute
 from care_sim.policies.base import Policy
 from care_sim.policies.controls.fan import Fan
 from care_sim.policies.controls.history_place import HistoryPlace
@@ -47,7 +47,8 @@ from care_sim.policies.paper.history_uniform import HistoryUniform
 from care_sim.policies.paper.random import Random
 from care_sim.policies.paper.random_points import RandomPoints
 from care_sim.policies.paper.uncertainty import Uncertainty
-from care_sim.policies.vector import VectorPolicy, vector_policy
+from care_sim.policies.vector import VectorPolicy
+from care_sim.policies.vector_rigs import policy_of_rigs
 
 __all__ = [
     "BUILT_IN",
@@ -173,22 +174,23 @@ def make_policy(name: str, env: _AnyEnv, /, **parameters: object) -> Policy | Ve
     except InvalidInput as error:
         raise BrokenPolicy(f"policy {name} cannot be loaded: {error}") from error
     # What the environment gives comes first: rig, truth, and what the policy says it is told.
-    given = [_of_environment(name, env, "rig")]
+    rigs = _of_environment(name, env, "rig")
     _check_unwrapped(name, env)
     check_parameters(name, make, parameters)
+    truth: list[Any] = []
     if is_privileged(make):
         if isinstance(env, gymnasium.vector.VectorEnv):
             raise InvalidInput(
                 f"policy {name} is handed the truth of one world: it plays a single environment, "
                 "no vector of them"
             )
-        given.append(_of_environment(name, env, "truth"))
+        truth = _of_environment(name, env, "truth")
     for parameter, attribute in getattr(make, "told", Policy.told).items():
         parameters.setdefault(parameter, _told(env, attribute))
-    made = partial(_made, name, make, given, parameters)
+    makers = [partial(_made, name, make, [rig, *truth], parameters) for rig in rigs]
     if isinstance(env, gymnasium.vector.VectorEnv):
-        return vector_policy(made, env.num_envs)
-    return made()
+        return policy_of_rigs(makers, rigs)
+    return makers[0]()
 
 
 def _made(
@@ -203,7 +205,7 @@ def _made(
     except Exception as error:
         raise BrokenPolicy(
             f"policy {name} refuses {shown(parameters) if parameters else 'to start'}: "
-            f"{type(error).__name__}: {error}"
+            f"{error_line(error)}"
         ) from error
     if not isinstance(policy, Policy):
         raise BrokenPolicy(f"policy {name} is no Policy but of type {type(policy).__name__}")
@@ -225,11 +227,12 @@ def _check_unwrapped(name: str, env: _AnyEnv) -> None:
         )
 
 
-def _of_environment(name: str, env: _AnyEnv, attribute: str) -> object:
+def _of_environment(name: str, env: _AnyEnv, attribute: str) -> list[Any]:
+    """That of an environment, or those of the worlds of a vector."""
     try:
         if isinstance(env, gymnasium.vector.VectorEnv):
-            return shared_attribute(env, attribute)
-        return env.get_wrapper_attr(attribute)
+            return attribute_of_each(env, attribute)
+        return [env.get_wrapper_attr(attribute)]
     except AttributeError as error:
         raise InvalidInput(
             f"policy {name} needs an environment of CARE-Sim with a {attribute}, got {shown(env)}"

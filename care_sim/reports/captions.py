@@ -138,7 +138,8 @@ _VERDICTS = (
         "conditions: it holds (both intervals lie on one side of zero), is lost (the interval "
         "holds zero, or may where actors were missed) or flips (it lies on the other side). Of two "
         "that are not told apart under ideal conditions: tied (here neither), or a lead arises. No "
-        "verdict of fewer than five pairs."
+        "verdict of fewer than five pairs.",
+        (" orders ",),
     ),
 )
 REALISM_CAPTION = (

@@ -71,9 +71,9 @@ class Contrast:
         return self.difference.interval.mean
 
     @property
-    def interval(self) -> Interval:
-        """The interval of the mean."""
-        return self.difference.interval
+    def interval(self) -> Interval | None:
+        """The interval of the mean; None of a single pair, which tells of no spread."""
+        return self.difference.interval if self.difference.pairs > 1 else None
 
     @property
     def decimals(self) -> int:

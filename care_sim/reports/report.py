@@ -77,7 +77,7 @@ class StudyReport:
             save(figure, folder / name)
         remove_others(
             folder,
-            (name for known in STUDIES.values() for name in known.figure_names),
+            (name for known in STUDIES.values() for name in known.figures_of()),
             self.figures,
         )
 
@@ -109,11 +109,12 @@ def print_report(
         console.print(sentence, markup=False)
 
 
-def where_it_lies(folder: Path, study: Study) -> list[str]:
-    """The lines that end a study: its folder, tables, figures, and how to make its page."""
-    figures = sorted(
-        path.name for name in study.figure_names for path in folder.glob(f"{name}.png")
-    )
+def where_it_lies(folder: Path, study: Study, rows: Sequence[Row] = ()) -> list[str]:
+    """The lines that end a study: its folder, tables, figures of its rows, and how to make its
+    page.
+    """
+    names = study.figures_of(rows)
+    figures = sorted({path.name for name in names for path in folder.glob(f"{name}.png")})
     return [
         f"Results are in {folder}",
         f"Tables: {folder / TABLES}",

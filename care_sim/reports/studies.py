@@ -48,6 +48,7 @@ from care_sim.reports.tables.r157 import r157_tables
 from care_sim.reports.tables.sweep import sweep_tables
 from care_sim.reports.tables.validate import validation_tables
 from care_sim.reports.vehicle.tables import vehicle_tables
+from care_sim.scenarios import SCENARIOS
 from care_sim.study.designs.crowding import VEHICLES_COLUMN
 from care_sim.study.designs.ncap import (
     REPORTED_COLUMN,
@@ -58,7 +59,9 @@ from care_sim.study.designs.ncap import (
 from care_sim.study.designs.r157 import CASE_COLUMNS
 from care_sim.study.results_formats import EPISODES, MECHANISM, PLAYS, VEHICLE, ResultsFormat
 from care_sim.study.rows.parquet import read_notes
+from care_sim.study.rows.reading import setting_of
 from care_sim.study.rows.schema import COUNT, FLAG, SUM, TEXT, Column, Schema, as_optional
+from care_sim.study.rows.settings import SOURCES, Setting
 from care_sim.study.run_config import Row
 
 
@@ -67,7 +70,8 @@ class Study:
     """How the rows of a study are shown; all functions are pure functions of the rows.
 
     `title` names it to readers. `closing` are sentences after the tables. `figure_names` are all
-    figures that the study can draw, as patterns in which a * stands for any text. `caption` says
+    figures that the study can draw, as patterns in which {world} stands for a scenario or source,
+    and a * for any text. `caption` says
     how to read its tables. `results` is what it plays. `columns` are further columns that its
     tables read: those that a row may leave empty may be missing where all rows do.
     """
@@ -81,6 +85,19 @@ class Study:
     caption: tuple[captions.Remark, ...] = captions.EPISODES_CAPTION
     results: ResultsFormat = EPISODES
     columns: Mapping[str, Column] = field(default_factory=dict)
+
+    def figures_of(self, rows: Sequence[Row] = ()) -> list[str]:
+        """The figures that it can draw of the built-in worlds and those of the rows, as patterns in
+        which a * stands for any text.
+        """
+        # Names of figures are told apart by worlds: what a user draws beside them is not ours.
+        own = [Setting(setting_of(row).world).slug for row in rows]
+        worlds = dict.fromkeys([*SCENARIOS, *SOURCES, *own])
+        return [
+            *dict.fromkeys(
+                name.format(world=world) for name in self.figure_names for world in worlds
+            )
+        ]
 
     @property
     def schema(self) -> Schema:

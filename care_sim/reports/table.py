@@ -14,6 +14,7 @@ from rich.table import Table as RichTable
 from rich.text import Text
 
 from care_sim.base.errors import printable
+from care_sim.reports.marks import marks_in_short
 
 TableRow = tuple[str, ...]
 _MARKS = re.compile(r"[\\`*|~]|(?<!\w)_|_(?!\w)|<(?=[A-Za-z/!?])|&(?=#?\w+;)|(?<=\])\(")
@@ -111,8 +112,16 @@ class TerminalTable:
                 yield Text()
             rows = self._told_in(columns) if len(parts) > 1 else self.table.rows
             yield from self._part(columns, rows, options.max_width)
-        if self.table.notes:
-            yield Text(brief(self.table.notes, options.max_width, self.rest), style="dim")
+        told = brief(self.table.notes, options.max_width, self.rest)
+        for words in (told, self._marks(told)):
+            if words:
+                yield Text(words, style="dim")
+
+    def _marks(self, told: str) -> str:
+        """What the marks mean of the entries that are shown, where the text does not say it."""
+        columns = [n for n in range(len(self.table.columns)) if self._is_shown(n)]
+        entries = [entry for n in columns for entry in self.table.entries(n)]
+        return marks_in_short(entries, [e for e in entries if isinstance(e, Bold)], told)
 
     def _parts(self, width: int) -> list[list[int]]:
         """The columns that stand side by side, part by part."""

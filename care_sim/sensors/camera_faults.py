@@ -38,7 +38,7 @@ class Misses:
         faults = self._faults
         if not (faults.false_negative_rate or faults.false_negative_per_m):
             return np.zeros(len(ranges), bool)
-        rates = miss_rates(faults, ranges)
+        rates = miss_rates(faults.false_negative_rate, faults.false_negative_per_m, ranges)
         # One draw per object decides all: whether it is missed, and at the start for how long.
         draws = self._rng.random(len(rates))
         burst = faults.false_negative_burst
@@ -52,13 +52,14 @@ class Misses:
         return missed
 
 
-def miss_rates(faults: CameraFaults, ranges: Floats) -> Floats:
-    """The share of keyframes at which objects so many metres away are missed, in any shape."""
-    rates = faults.false_negative_rate + faults.false_negative_per_m * ranges
-    return np.minimum(rates, 1.0)
+def miss_rates(rate: float | Floats, per_m: float | Floats, ranges: Floats) -> Floats:
+    """The share of keyframes at which objects so many metres away are missed, in any shape, by
+    `false_negative_rate` and `false_negative_per_m`.
+    """
+    return np.minimum(rate + per_m * ranges, 1.0)
 
 
-def first_bursts(rates: Floats, draws: Floats, burst: int) -> Integers:
+def first_bursts(rates: Floats, draws: Floats, burst: int | Integers) -> Integers:
     """For how many keyframes, from the first on, objects are missed that have these rates and
     draws. Arrays of one shape.
 
@@ -72,7 +73,9 @@ def first_bursts(rates: Floats, draws: Floats, burst: int) -> Integers:
     return np.where(hit, burst - served, 0)
 
 
-def later_bursts(lasting: Integers, rates: Floats, draws: Floats, burst: int) -> Integers:
+def later_bursts(
+    lasting: Integers, rates: Floats, draws: Floats, burst: int | Integers
+) -> Integers:
     """The same at a later keyframe, before which they were missed for `lasting` more: bursts begin
     among the objects that are in none.
     """

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import care_sim
-from care_sim.base.errors import InvalidInput, one_line
+from care_sim.base.errors import InvalidInput, error_line, one_line
+from care_sim.base.foreign_code import foreign_place
 from care_sim.base.portable_hash import portable_bytes
 from care_sim.core.arrays import Floats
 from care_sim.envs.closed_loop import ClosedLoopEnv
@@ -40,7 +41,7 @@ def result_or_reason(play: Callable[..., _Result], *arguments: object) -> _Resul
         return one_line(str(error))
     # A policy that calls sys.exit ends its episode, not the worker.
     except (Exception, SystemExit) as error:
-        return one_line(f"{type(error).__name__}: {error}").removesuffix(":") + _place(error)
+        return error_line(error) + ("" if foreign_place(error) else _place(error))
 
 
 def run_episode(config: EpisodeConfig) -> Row:
@@ -145,7 +146,7 @@ def _boxes(loop: ClosedLoop) -> Floats:
 
 
 def _place(error: BaseException) -> str:
-    """File and line where it was raised, for whoever has to find it in a file of their own."""
+    """File and line where it was raised."""
     frames = extract_tb(error.__traceback__)
     return f" ({Path(frames[-1].filename).name}, line {frames[-1].lineno})" if frames else ""
 

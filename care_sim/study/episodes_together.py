@@ -60,7 +60,7 @@ def play_together(configs: Sequence[EpisodeConfig]) -> list[Row]:
             raise InvalidInput(f"{reason} is not played as arrays")
         observed = cast(Observed, create_empty_array(model.observation_space, count))
         policy = vector_policy(partial(configs[0].make_policy, env), count)
-        with closing(CompiledWorlds(model, observed, exact=False)) as worlds:
+        with closing(CompiledWorlds([model] * count, observed, exact=False)) as worlds:
             infos = worlds.begin({world: config.seed for world, config in enumerate(configs)})
             policy.reset()
             drawn = _common_draws()

@@ -57,9 +57,8 @@ def side_by_side(config: AgentConfig) -> "VecEnv":
 
     if not config.processes:
         return VecMonitor(GymnasiumVecEnv(*many(config)))
-    budgets = islice(cycle(config.budget), config.environments)
     makers: list[Callable[[], gymnasium.Env[Any, Any]]] = [
-        partial(training, config, budget) for budget in budgets
+        partial(training, config, budget) for budget in _budgets(config)
     ]
     # Spawned, not forked: PyTorch has threads by now, and a fork copies their locks.
     with starting():
@@ -69,37 +68,54 @@ def side_by_side(config: AgentConfig) -> "VecEnv":
 
 
 def many(config: AgentConfig) -> list[AnyVector]:
-    """The training environments as vector environments, one for each budget: together, one world of
-    each in turn, they are as many as `training` makes one by one.
+    """The training environments as vector environments: one of all, or, where they have no vector
+    of their own, one for each budget. Their worlds, one of each in turn, are those that `training`
+    makes one by one.
     """
     vectors = list[AnyVector]()
     wrapper = VECTOR_ACTIONS[config.action]
-    for place, budget in enumerate(config.budget):
-        worlds = len(range(config.environments)[place :: len(config.budget)])
-        seeded = VectorTrainingSeeds(_plain_vector(config, budget, worlds), config.seed)
+    for plain_vector in _plain_vectors(config):
+        seeded = VectorTrainingSeeds(plain_vector, config.seed)
         acting = wrapper(seeded, config.azimuths, config.elevations)
         vectors.append(VectorGridObservation(acting, config.columns, config.rows))
     return vectors
 
 
-def _plain_vector(config: AgentConfig, budget: float, worlds: int) -> AnyVector:
+def _plain_vectors(config: AgentConfig) -> list[AnyVector]:
     # The pictures that learners see are drawn at once, and need no copies of what they show.
+    budgets = _budgets(config)
     if config.env in (*CLOSED_LOOP, *installed_ids()):
-        return gymnasium.make_vec(
-            f"care_sim:{config.env}",
-            worlds,
-            "vector_entry_point",
-            autoreset_mode=AutoresetMode.DISABLED,
+        return [
+            gymnasium.make_vec(
+                f"care_sim:{config.env}",
+                config.environments,
+                "vector_entry_point",
+                autoreset_mode=AutoresetMode.DISABLED,
+                copy=False,
+                **_arguments(config, budgets),
+            )
+        ]
+    count = len(config.budget)
+    return [
+        SyncVectorEnv(
+            [partial(plain, config, budget) for budget in budgets[place::count]],
             copy=False,
-            **_arguments(config, budget),
+            autoreset_mode=AutoresetMode.DISABLED,
         )
-    makers = [partial(plain, config, budget)] * worlds
-    return SyncVectorEnv(makers, copy=False, autoreset_mode=AutoresetMode.DISABLED)
+        for place in range(count)
+    ]
 
 
-def _arguments(config: AgentConfig, budget: float) -> dict[str, Any]:
+def _budgets(config: AgentConfig) -> list[float]:
+    """Those of the training environments."""
+    return [*islice(cycle(config.budget), config.environments)]
+
+
+def _arguments(config: AgentConfig, budget: float | list[float]) -> dict[str, Any]:
     # Only the closed loop has a reward of weighted terms.
     reward: dict[str, Any] = (
         {} if config.env in OPEN_LOOP else {"reward_weights": {"gain": config.gain}}
     )
-    return {"budget": budget} | reward | config.arguments
+    # No learner reads it, and evaluations read outcomes, which stay.
+    scoring = {"scoring_info": False}
+    return {"budget": budget} | reward | scoring | config.arguments

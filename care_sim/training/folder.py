@@ -2,7 +2,7 @@
 
 | file | content |
 |---|---|
-| `config.json` | the effective configuration |
+| `config.json` | the effective configuration, and the hash of the code of a scenario of one's own |
 | `rules.json` | what rules score on the same validation seeds |
 | `curve.csv` | steps, seconds, return and detection distance of every evaluation |
 | `checkpoint.zip` | the learner, by Stable-Baselines3; loading it executes code: load your own |
@@ -25,10 +25,13 @@ from care_sim.base.checks import LARGEST_INTEGER, check_known, is_number
 from care_sim.base.errors import InvalidInput
 from care_sim.base.files import replacing, write_text
 from care_sim.base.json_text import check_file_size, json_content
+from care_sim.base.plugins import is_place
+from care_sim.base.scenario_names import scenario_of
 from care_sim.base.seed_ranges import TRAINING
 from care_sim.core.rig import Rig
 from care_sim.policies.learned.weights import Card, save_weights
-from care_sim.study.provenance import machine_line, package_versions
+from care_sim.scenarios import PLUGINS
+from care_sim.study.provenance import machine_line, package_versions, scenario_digest
 from care_sim.training.config import ALGORITHMS, AgentConfig
 from care_sim.training.seeds import validation_seeds
 from care_sim.training.validation import ValidationScore
@@ -38,6 +41,8 @@ if TYPE_CHECKING:
 
 CONFIG, RULES, CURVE = "config.json", "rules.json", "curve.csv"
 CURVE_COLUMNS = ("steps", "seconds", "return", "distance_m")
+_CODE = "scenario_code"
+"""Of the configuration of a run on a scenario of one's own: the hash of its code."""
 _LARGEST_DRAWN = 1e30
 """The largest return or distance that a figure can draw."""
 Evaluation = tuple[int, float, float, float | None]
@@ -73,7 +78,8 @@ class Folder:
         self.path.mkdir(parents=True, exist_ok=True)
         # The checkpoint first: a folder with a configuration alone could not be resumed.
         self.save(model)
-        write_text(self.path / CONFIG, self.config.to_json())
+        content = json.loads(self.config.to_json()) | _own_code(self.config.env)
+        write_text(self.path / CONFIG, json.dumps(content, indent=1) + "\n")
 
     def rules(self, score: Callable[[], dict[str, ValidationScore]]) -> dict[str, ValidationScore]:
         """What rules score: measured at the beginning of a run, read when it is resumed."""
@@ -153,7 +159,24 @@ class Folder:
         for file in (self.path / CONFIG, self.checkpoint):
             if not file.exists():
                 raise InvalidInput(f"{self.path} holds no run to be resumed: no {file.name}")
-        self.config.check_same(read_config(self.path / CONFIG))
+        before = read_config(self.path / CONFIG)
+        self.config.check_same(before)
+        # A folder of before tells nothing of the code.
+        if (_CODE in before) and before[_CODE] != _own_code(self.config.env).get(_CODE):
+            raise InvalidInput(
+                f"{self.path}: the code of {self.config.env} is another than when it was trained; "
+                "give another --out"
+            )
+
+
+def _own_code(env: str) -> dict[str, str | None]:
+    """The hash of the code of a scenario of one's own, None where it cannot be read; nothing of
+    another environment.
+    """
+    name = scenario_of(env)
+    if is_place(name) or name in PLUGINS.entries():
+        return {_CODE: scenario_digest(name)}
+    return {}
 
 
 def read_config(path: Path) -> dict[str, Any]:

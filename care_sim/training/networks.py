@@ -13,9 +13,9 @@ from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from torch import Tensor, nn
 from torch.nn.functional import pad
 
+from care_sim.base.array_files import Arrays
 from care_sim.policies.learned.grid_features import EGO_INPUTS
 from care_sim.policies.learned.score_map import BLOCK_MARGIN
-from care_sim.policies.learned.weights import Arrays
 
 
 class Window(nn.Module):

@@ -10,7 +10,6 @@ the same machine makes the same bytes.
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,12 +17,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from care_sim.base.array_files import Arrays
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.checks import LARGEST_INTEGER
 from care_sim.base.extras import import_torch
 from care_sim.base.files import ZIP, check_output
+from care_sim.base.torch_threads import one_thread
 from care_sim.core.grid import AngularGrid
-from care_sim.policies.learned.weights import Arrays, Card, save_weights
+from care_sim.policies.learned.weights import Card, save_weights
 from care_sim.sensors.setups import DEFAULT_SETUP, sensor_setup
 from care_sim.streets.street import CALIBRATION_SEEDS
 from care_sim.study.provenance import machine_line, package_versions
@@ -78,7 +79,7 @@ def train_scorer(
 ) -> tuple[Arrays, dict[str, float]]:
     """The weights, and the loss on both sets of examples (log 2 = 0.69 without any knowledge)."""
     torch = import_torch()
-    with _one_thread(torch):
+    with one_thread(torch):
         torch.manual_seed(seed)
         network = torch.nn.Sequential(
             torch.nn.Linear(learned.inputs.shape[1], HIDDEN_UNITS),
@@ -162,14 +163,3 @@ def _card(made: TrainScorer, learned: Examples, losses: dict[str, float]) -> Car
         versions=package_versions("care-sim", "numpy", "torch"),
         result={f"loss {name}": round(loss, 5) for name, loss in losses.items()},
     )
-
-
-@contextmanager
-def _one_thread(torch: Any) -> Iterator[None]:
-    """One thread of PyTorch: sums then have one order, however many cores the machine has."""
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(threads)

@@ -15,6 +15,9 @@ __all__ = ["LentClient", "borrow", "give_back", "leave", "pybullet"]
 MOST_FREE = 4
 """Clients kept for whoever borrows next. Each holds 28 MB, and another one takes 14 ms."""
 
+_CLOSED = -1
+"""What PyBullet calls no client."""
+
 _free: list[int] = []
 
 
@@ -38,12 +41,17 @@ class LentClient:
             self._abandoned.atexit = False
         return self._number
 
+    @property
+    def closed(self) -> bool:
+        """Whether `close` was called."""
+        return self._number == _CLOSED
+
     def close(self) -> None:
         """Give the client back; calling it again does nothing."""
         if self._abandoned is not None and self._abandoned.detach():
             give_back(self.number)
         # PyBullet refuses whoever asks it now.
-        self._number = -1
+        self._number = _CLOSED
 
 
 def borrow() -> int:

@@ -6,13 +6,10 @@ nearer it is needed of the last moment alone.
 
 import math
 
-from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats
 from care_sim.world.bodies import BodyKind
 from care_sim.world.clearance_judge import ClearanceJudge
-
-PADDING_M = 0.05
-"""PyBullet's distances may be this much less than those of the exact hulls; 2 mm were seen."""
+from care_sim.world.gaps import PADDING_M, least_gap
 
 
 class LeastClearance:
@@ -40,20 +37,5 @@ class LeastClearance:
             if at_least > least:
                 break
             stand_ins = self._judge.stand_ins(*self._kinds)
-            least = min(least, self._judge.clearance(stand_ins, poses.tolist()))
+            least = min(least, self._judge.clearance(stand_ins, poses))
         return least
-
-
-@compiled()
-def least_gap(box: Floats, other: Floats) -> float:
-    """What two boxes (7,) on the ground are apart at least, metres; -inf where they may overlap."""
-    # In the plane, and in the axes of the first: there an upright rectangle holds the other.
-    dx, dy, turned = other[0] - box[0], other[1] - box[1], other[6] - box[6]
-    cos, sin = math.cos(box[6]), math.sin(box[6])
-    ahead, aside = cos * dx + sin * dy, cos * dy - sin * dx
-    cos, sin = abs(math.cos(turned)), abs(math.sin(turned))
-    along = abs(ahead) - (box[3] + other[3] * cos + other[4] * sin) / 2
-    across = abs(aside) - (box[4] + other[3] * sin + other[4] * cos) / 2
-    if along <= 0 and across <= 0:
-        return -math.inf
-    return math.hypot(max(along, 0.0), max(across, 0.0))

@@ -35,15 +35,19 @@ keyframes = st.lists(
 )
 
 
+budgets = st.lists(st.integers(1, GRID.size), min_size=WORLDS, max_size=WORLDS)
+
+
 def rows(fired):
     counts, cells = fired
     return [row[:count].tolist() for count, row in zip(counts, cells, strict=True)]
 
 
-@given(keyframes, st.integers(1, GRID.size), st.booleans(), st.integers(0, 2))
-def test_every_world_fires_as_if_alone(played, budget, floor, floor_seed):
-    rig = Rig(GRID, budget=budget)
-    choice = Choice(rig, ClosedLoopConditions(floor=floor, floor_seed=floor_seed), WORLDS)
+@given(keyframes, budgets, st.booleans(), st.integers(0, 2))
+def test_every_world_fires_as_if_alone(played, budgets, floor, floor_seed):
+    rig = Rig(GRID)
+    conditions = ClosedLoopConditions(floor=floor, floor_seed=floor_seed)
+    choice = Choice(rig, conditions, np.array(budgets))
     floors = []
     for world in range(WORLDS):
         choice.begin(world, np.random.SeedSequence(world))
@@ -54,7 +58,7 @@ def test_every_world_fires_as_if_alone(played, budget, floor, floor_seed):
         alone = [
             rig.hardware.fire(
                 action[world],
-                budget,
+                budgets[world],
                 partial(floors[world].at, now[world]) if floor else None,
                 NOTHING,
             ).tolist()
@@ -73,7 +77,7 @@ def test_published_episodes_fire_the_same(budget):
         sensing(gymnasium.make("CARE-Dense-v0", budget=budget, disable_env_checker=True))
         for _ in range(2)
     ]
-    choice = Choice(envs[0].rig, envs[0].conditions, len(envs))
+    choice = Choice(envs[0].rig, envs[0].conditions, np.array([env.rig.budget for env in envs]))
     for world, env in enumerate(envs):
         env.reset(seed=world)
         choice.begin(world, streams((world,), 5)[3])
@@ -91,8 +95,7 @@ def test_published_episodes_fire_the_same(budget):
 
 
 def test_a_new_episode_begins_with_its_first_floor():
-    rig = Rig(GRID, budget=7)
-    choice = Choice(rig, ClosedLoopConditions(), 2)
+    choice = Choice(Rig(GRID), ClosedLoopConditions(), np.array([7, 7]))
     nothing = np.zeros((2, *GRID.shape), np.float32)
     every, first = np.ones(2, np.bool_), np.zeros(2, np.int64)
     for world in range(2):

@@ -36,7 +36,7 @@ class Watched:
         self.envs = [gymnasium.make(f"CARE-{name}-v0", **arguments).unwrapped for _ in seeds]
         self.rig = self.envs[0].rig
         self.state = BatchState(len(seeds))
-        self.sight = Sight(self.rig, self.envs[0].conditions, len(seeds))
+        self.sight = Sight(self.rig, [env.conditions for env in self.envs])
         self.begin(dict(enumerate(seeds)))
 
     def begin(self, seeds):
@@ -128,11 +128,10 @@ def test_several_cameras_see_in_their_order():
 @given(st.integers(0, 2**32), st.integers(0, 12), st.integers(0, 9))
 def test_numbers_drawn_ahead_are_those_of_single_draws(seed, objects, jitter):
     keyframes = 150
-    ahead = DrawnAhead(1, lambda rng, k, n: rng.random((k, n)))
-    late = DrawnAhead(1, lambda rng, k, n: rng.integers(jitter + 1, size=(k, n)))
-    ahead.begin(0, np.random.SeedSequence(seed), objects)
-    late.begin(0, np.random.SeedSequence(seed), 1)
-    one, other = (np.random.default_rng(np.random.SeedSequence(seed)) for _ in range(2))
+    ahead, late = DrawnAhead(1), DrawnAhead(1)
+    one, other, first, second = (np.random.default_rng(seed) for _ in range(4))
+    ahead.begin(0, lambda k: first.random((k, objects)))
+    late.begin(0, lambda k: second.integers(jitter + 1, size=(k, 1)))
     live = np.ones(1, np.bool_)
     for _ in range(keyframes):
         assert ahead.next(live, 13)[0].tolist() == [*one.random(objects)] + [1.0] * (13 - objects)
@@ -142,21 +141,25 @@ def test_numbers_drawn_ahead_are_those_of_single_draws(seed, objects, jitter):
 @settings(max_examples=30)
 @given(
     st.integers(0, 1000),
-    st.floats(0, 1),
-    st.floats(0, 0.1),
-    st.integers(1, 5),
+    st.lists(
+        st.builds(
+            CameraFaults,
+            false_negative_rate=st.just(0.0) | st.floats(0, 1),
+            false_negative_per_m=st.just(0.0) | st.floats(0, 0.1),
+            false_negative_burst=st.integers(1, 5),
+        ),
+        min_size=3,
+        max_size=3,
+    ),
 )
-def test_the_misses_are_those_of_one_world(seed, rate, per_m, burst):
-    faults = CameraFaults(
-        false_negative_rate=rate, false_negative_per_m=per_m, false_negative_burst=burst
-    )
+def test_the_misses_are_those_of_one_world(seed, faults):
     sizes = [3, 0, 7]
-    together = BatchMisses(faults, len(sizes))
+    together = BatchMisses(faults)
     apart = []
     for world, size in enumerate(sizes):
         together.begin(world, np.random.SeedSequence((seed, world)), size)
         rng = np.random.default_rng(np.random.SeedSequence((seed, world)))
-        apart.append(Misses(size, faults, rng))
+        apart.append(Misses(size, faults[world], rng))
     rng = np.random.default_rng(seed)
     for _ in range(20):
         ranges, live = rng.uniform(0, 60, (3, 7)), rng.random(3) < 0.7
@@ -170,15 +173,18 @@ def test_the_misses_are_those_of_one_world(seed, rate, per_m, burst):
 
 
 @settings(max_examples=40)
-@given(st.integers(0, 1000), st.integers(0, 3), st.integers(0, 4))
-def test_what_is_late_arrives_as_in_one_world(seed, latency, jitter):
+@given(
+    st.integers(0, 1000),
+    *[st.tuples(st.integers(0, most), st.integers(0, most)) for most in (3, 4)],
+)
+def test_what_is_late_arrives_as_in_one_world(seed, latencies, jitters):
     seeds = [np.random.SeedSequence((seed, world)) for world in range(2)]
-    together = BatchDelay(latency, jitter, 0.1, 2)
+    together = BatchDelay(np.array(latencies), np.array(jitters), 0.1)
     apart = []
     for world in range(2):
         together.begin(world, seeds[world])
         rng = np.random.default_rng(seeds[world])
-        apart.append(Delay(PictureTiming(latency, 0.0), jitter, 0.1, rng))
+        apart.append(Delay(PictureTiming(latencies[world], 0.0), jitters[world], 0.1, rng))
     rng = np.random.default_rng(seed)
     for _ in range(25):
         live = rng.random(2) < 0.8

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
+from unittest.mock import Mock
 
 import pytest
 
@@ -16,6 +17,7 @@ from care_sim.commands.reproduce import Reproduce
 from care_sim.commands.shared.options import Options
 from care_sim.policies import contenders
 from care_sim.scenarios import SCENARIOS
+from care_sim.sources.installed import SOURCES
 from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.episode_play import run_episode
 from care_sim.study.parameters import parameters
@@ -242,7 +244,26 @@ def test_the_detectors_are_listed_with_a_line_each(capsys):
     assert all(len(line.split()) > 5 for line in first)
 
 
-@pytest.mark.parametrize("command", ["policies", "scenarios", "sensors", "detectors", "compare"])
+def test_the_sources_are_listed_as_they_are_asked_for_and_a_broken_one_with_its_reason(
+    capsys, install
+):
+    install("ours", "import nowhere", SOURCES.group, torn="Torn")
+    code, out, err = run(capsys, "sources")
+    assert (code, err) == (0, "")
+    assert re.findall(r"^\S+", out, re.MULTILINE) == [
+        "streets",
+        "argoverse2:FOLDER",
+        "nuscenes:FOLDER",
+        "torn",
+    ]
+    assert "    split='val'\n" in out
+    (torn,) = (line for line in out.splitlines() if line.startswith("torn"))
+    assert "(broken) ModuleNotFoundError: No module named 'nowhere'" in torn
+
+
+@pytest.mark.parametrize(
+    "command", ["policies", "scenarios", "sources", "sensors", "detectors", "compare"]
+)
 def test_lists_and_tables_fit_eighty_columns_and_lose_nothing(command, capsys):
     short = ["dartout", "--scenario-parameters", "duration_s=0.1"]
     _, out, _ = run(capsys, command, *(short if command == "compare" else []))
@@ -488,9 +509,8 @@ def test_absurd_input_is_one_line_and_exit_code_2(arguments, named, capsys, tmp_
 
 @pytest.mark.parametrize("fault", [TypeError, RecursionError, MemoryError, OverflowError])
 def test_a_fault_of_the_software_is_one_line_and_its_trace_is_to_be_had(fault, capsys, monkeypatch):
-    def fails(self):
-        raise fault("deep\ninside")
-
+    # Raised by the library, since what this file raises is no fault of the software's own.
+    fails = Mock(side_effect=fault("deep\ninside"))
     monkeypatch.delenv("CARE_SIM_DEBUG", raising=False)
     monkeypatch.setattr("care_sim.commands.listings.Scenarios.__call__", fails)
     code, _, err = run(capsys, "scenarios")
@@ -502,6 +522,57 @@ def test_a_fault_of_the_software_is_one_line_and_its_trace_is_to_be_had(fault, c
     monkeypatch.setenv("CARE_SIM_DEBUG", "1")
     with pytest.raises(fault):
         main(["scenarios"])
+
+
+_FAULTY = """
+import numpy
+from dataclasses import dataclass
+from care_sim.policies.paper.history import History
+from care_sim.scenarios.dartout import Dartout
+
+class Slips(History):
+    def demand(self, belief):
+        return numpy.concatenate([numpy.zeros(3), belief.tracks.boxes])
+
+class Lacks(History):
+    def demand(self, belief):
+        open("no such file")
+
+class RefusesToStart(History):
+    def __init__(self, rig):
+        raise KeyError("weights")
+
+@dataclass(frozen=True)
+class Cracked(Dartout):
+    def build(self, rng):
+        world = super().build(rng)
+        return world.crack
+"""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "place"),
+    [
+        ("run dartout --policy faulty:Slips", 1, "faulty.py, line 9"),
+        ("compare dartout --policies faulty:Slips", 1, "faulty.py, line 9"),
+        ("sweep --scenarios dartout --policies faulty:Slips --seeds 1", 1, "faulty.py, line 9"),
+        ("run dartout --policy faulty:Lacks", 1, "faulty.py, line 13"),
+        ("run dartout --policy faulty:RefusesToStart", 2, "faulty.py, line 17"),
+        ("run faulty:Cracked", 2, "faulty.py, line 23"),
+    ],
+)
+def test_a_fault_in_code_of_ones_own_is_told_with_its_file_and_line(
+    arguments, code, place, capsys, tmp_path, monkeypatch
+):
+    (tmp_path / "faulty.py").write_text(_FAULTY)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    ended, _, err = run(capsys, *arguments.split())
+    sys.modules.pop("faulty", None)
+    assert ended == code, err
+    (told,) = [line for line in err.splitlines() if "faulty.py" in line]
+    assert f"({place})" in told
+    assert "report it" not in err
 
 
 @pytest.mark.parametrize(

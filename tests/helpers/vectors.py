@@ -1,10 +1,13 @@
 """A vector environment played beside the single environments that it stands for."""
 
+from functools import partial
+
 import gymnasium
 import numpy as np
-from gymnasium.vector import AutoresetMode
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 import care_sim
+from care_sim.envs.vector.arguments import OF_EACH_WORLD
 
 MODES = tuple(mode.value for mode in AutoresetMode)
 
@@ -19,15 +22,25 @@ def native(name, worlds, **arguments):
     )
 
 
+class _Own(SyncVectorEnv):
+    """Of single environments whose arrays in infos may differ in their lengths."""
+
+    def _add_info(self, vector_infos, env_info, env_num):
+        for name, value in env_info.items():
+            if isinstance(value, np.ndarray):
+                vector_infos.setdefault(name, np.full(self.num_envs, None, object))
+        return super()._add_info(vector_infos, env_info, env_num)
+
+
 def singles(name, worlds, mode, **arguments):
-    """Gymnasium's vector of single environments."""
-    return gymnasium.make_vec(
-        f"care_sim:{name}",
-        num_envs=worlds,
-        vectorization_mode="sync",
-        vector_kwargs={"autoreset_mode": AutoresetMode(mode)},
-        **arguments,
-    )
+    """Gymnasium's vector of single environments. Of arguments that are lists each takes its own."""
+    own = {name: arguments[name] for name in OF_EACH_WORLD if isinstance(arguments.get(name), list)}
+    each = [
+        arguments | {name: values[world] for name, values in own.items()} for world in range(worlds)
+    ]
+    makers = [partial(gymnasium.make, f"care_sim:{name}", **given) for given in each]
+    kind = _Own if len({*own.get("budget", [])}) > 1 else SyncVectorEnv
+    return kind(makers, autoreset_mode=AutoresetMode(mode))
 
 
 def difference(one, other, place=""):

@@ -125,7 +125,8 @@ def test_of_two_with_one_name_the_first_on_the_path_counts(install):
 def test_a_package_that_ends_the_program_gets_one_line(install):
     install("rude_detectors", "raise SystemExit('no device')", DETECTORS.group, rude="Any")
     with pytest.raises(
-        BrokenDetector, match=r"^detector rude cannot be loaded: SystemExit: no device$"
+        BrokenDetector,
+        match=r"rude cannot be loaded: SystemExit: no device \(rude_detectors.py, line 1\)$",
     ):
         make_detector("rude", HEIGHT)
 

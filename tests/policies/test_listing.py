@@ -72,5 +72,5 @@ def test_a_broken_policy_is_listed_with_the_reason(install):
     install("broken", "raise RuntimeError('no\\nweights')", torn="Torn")
     assert list(policy_paragraphs())[-1].splitlines() == [
         "torn (broken)",
-        "    RuntimeError: no weights [broken 1.5]",
+        "    RuntimeError: no weights (broken.py, line 1) [broken 1.5]",
     ]

@@ -195,7 +195,10 @@ def test_a_policy_that_cannot_be_loaded_is_named_with_the_reason(broken, env, na
 @pytest.mark.parametrize(
     ("name", "reason"),
     [
-        ("exploding", r"policy exploding refuses to start: KeyError: 'weights'"),
+        (
+            "exploding",
+            r"policy exploding refuses to start: KeyError: 'weights' \(broken.py, line 18\)",
+        ),
         ("deaf", r"policy deaf refuses to start: TypeError: .*positional argument"),
         ("nothing", r"policy nothing is no Policy but of type NoneType"),
     ],
@@ -203,6 +206,24 @@ def test_a_policy_that_cannot_be_loaded_is_named_with_the_reason(broken, env, na
 def test_a_policy_that_cannot_be_made_is_named_with_the_reason(broken, env, name, reason):
     with pytest.raises(InvalidInput, match=reason):
         care_sim.make_policy(name, env)
+
+
+class Own(care_sim.Policy):
+    """One that nobody has installed."""
+
+    def demand(self, belief):
+        """Nothing."""
+        raise NotImplementedError
+
+
+def test_a_class_is_told_the_place_by_which_it_is_asked_for(env):
+    place = f"{__name__}:Own"
+    with pytest.raises(InvalidInput, match=f"got the class Own: ask for it .* as '{place}'$"):
+        care_sim.make_policy(Own, env)
+    assert isinstance(care_sim.make_policy(place, env), Own)
+    inner = type("Inner", (Own,), {"__qualname__": "f.<locals>.Inner"})
+    with pytest.raises(InvalidInput, match=r"MODULE:CLASS, from a module's top$"):
+        care_sim.make_policy(inner, env)
 
 
 def test_broken_policies_do_not_stop_the_others(broken, installed, env):
@@ -216,8 +237,13 @@ def test_broken_policies_do_not_stop_the_others(broken, installed, env):
         reasons["torn"].partition(" (found in ")[0] == "policy torn cannot be loaded: "
         "AttributeError: module 'broken' has no attribute 'Nowhere'"
     )
-    assert reasons["leaving"] == "policy leaving cannot be loaded: SystemExit: 3"
-    assert reasons["exploding"] == "policy exploding refuses to start: KeyError: 'weights'"
+    assert (
+        reasons["leaving"] == "policy leaving cannot be loaded: SystemExit: 3 (leaving.py, line 1)"
+    )
+    assert (
+        reasons["exploding"]
+        == "policy exploding refuses to start: KeyError: 'weights' (broken.py, line 18)"
+    )
     assert list(reasons) == ["torn", "exploding", "leaving", "deaf"]
     assert care_sim.make_policy("horizon", env).name == "horizon"
 

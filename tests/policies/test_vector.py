@@ -1,6 +1,6 @@
 """A policy of many worlds asks for what as many of its kind ask for alone, to the last bit."""
 
-from contextlib import closing
+from contextlib import ExitStack, closing
 from dataclasses import replace
 from functools import partial
 
@@ -273,10 +273,49 @@ def test_vectors_of_gymnasium_are_played_too(name):
             observation, *_ = one_by_one.step(actions.copy())
 
 
-def test_worlds_that_differ_and_worlds_of_others_are_refused():
-    makers = [partial(gymnasium.make, "CARE-Dense-v0", budget=budget) for budget in (0.1, 0.03)]
-    with closing(SyncVectorEnv(makers)) as envs, pytest.raises(InvalidInput, match="must have one"):
-        care_sim.make_policy("care", envs)
+@pytest.mark.parametrize(
+    "name", ["care", "ppo", "beam-reduce", "history-uniform", "uncertainty", "random"]
+)
+def test_worlds_of_several_budgets_play_each_its_own(name):
+    budgets = [0.1, 0.03, 0.1, 0.01]
+    with (
+        closing(gymnasium.make_vec("CARE-Dense-v0", 4, budget=budgets)) as envs,
+        ExitStack() as singles,
+    ):
+        policy, alone = care_sim.make_policy(name, envs), []
+        for budget in budgets:
+            env = singles.enter_context(gymnasium.make("CARE-Dense-v0", budget=budget))
+            alone.append(care_sim.make_policy(name, env))
+        observation, _ = envs.reset(seed=4)
+        for step in range(12):
+            if step == 6:
+                again = np.array([True, False, False, True])
+                policy.reset(again)
+                for world in np.flatnonzero(again):
+                    alone[world].reset()
+            live = np.array([True, step % 3 > 0, True, step % 2 > 0])
+            actions = policy(observation, live)
+            for world in np.flatnonzero(live):
+                own = alone[world]({key: rows[world] for key, rows in observation.items()})
+                assert np.array_equal(actions[world], own)
+            observation, *_ = envs.step(actions)
+
+
+def test_a_policy_of_one_budget_refuses_worlds_of_another():
+    with (
+        closing(gymnasium.make_vec("CARE-Dense-v0", 2, budget=[0.1, 1.0])) as envs,
+        pytest.raises(InvalidInput, match=r"policy full needs budget=1\.0"),
+    ):
+        care_sim.make_policy("full", envs)
+
+
+def test_worlds_that_differ_in_what_a_policy_is_told_and_worlds_of_others_are_refused():
+    makers = [partial(gymnasium.make, "CARE-Dense-v0", min_returns=least) for least in (3, 5)]
+    with (
+        closing(SyncVectorEnv(makers)) as envs,
+        pytest.raises(InvalidInput, match="must have one min_returns"),
+    ):
+        care_sim.make_policy("care-spread", envs)
     cartpoles = gymnasium.make_vec("CartPole-v1", 2, "sync")
     with pytest.raises(InvalidInput, match="needs an environment of CARE-Sim with a rig"):
         care_sim.make_policy("care", cartpoles)

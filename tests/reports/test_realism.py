@@ -1,10 +1,12 @@
 """Orders under realistic conditions, on rows made by hand."""
 
 import pytest
+from rich.console import Console
 
 from care_sim.reports.page.build import Findings
 from care_sim.reports.realism import episodes, plays
 from care_sim.reports.realism.orders import Order, Standing, Verdict, changes, of_plays
+from care_sim.reports.report import StudyReport, print_report
 from care_sim.reports.studies import STUDIES
 from care_sim.reports.table import Bold
 from care_sim.study.designs.realism import (
@@ -135,6 +137,16 @@ def test_fewer_than_five_seeds_carry_no_verdict():
         "avoided",
         "Closed loop: every condition, median first detection, m, or collisions avoided",
     ]
+
+
+def test_one_seed_has_no_interval_and_no_note_on_a_table_that_is_not_shown(capsys):
+    one = [each for each in ROWS if each["seed"] % 100 == 0 and each["scenario"] == "dense"]
+    first, *others = episodes.realism_tables(one)
+    assert lines(first)["range 40 m"]["dense, 3%: care : history"] == "+6.0"
+    assert not any("[" in entry for table in others for line in table.rows for entry in line)
+    print_report(one, Console(width=80), STUDIES["realism"])
+    assert "Orders:" not in capsys.readouterr().out
+    assert "Orders:" in StudyReport.of(one, STUDIES["realism"]).texts["tables.md"]
 
 
 def test_policies_that_join_in_are_set_beside_care():

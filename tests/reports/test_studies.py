@@ -90,7 +90,7 @@ def test_a_column_that_no_row_fills_may_be_missing(tmp_path):
 def test_every_study_shows_its_rows_in_three_forms(name, rows, tmp_path, capsys):
     study = STUDIES[name]
     figures = study.figures(rows)
-    assert set(figures) <= set(study.figure_names)
+    assert set(figures) <= set(study.figures_of())
     # To write a figure at the resolution of print takes a second. All are drawn coarsely, which
     # takes the same code; one is written.
     for figure in figures.values():

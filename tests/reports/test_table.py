@@ -39,6 +39,32 @@ def lines_of(table, width=80, rest=None):
     return [line.rstrip() for line in console.file.getvalue().splitlines()]
 
 
+@pytest.mark.parametrize(
+    ("entry", "told"),
+    [
+        ("+3.0*", "*: reaches the gate stated in advance."),
+        (Bold("+3.0* [1.0,4.0]"), "bold: the interval excludes zero; *: reaches the gate"),
+        ("≤-1.0 [-2.0,0.0]", "≤, ≥, ~: a bound, since actors were missed."),
+        ("~+0.0", "≤, ≥, ~: a bound"),
+        ("[n.d., 3.0]", "n.d.: not detected."),
+        ("+1.0 [0.5,2.0]°", "°: interval of events, not of scenes."),
+        ("mine †", "†: knows the truth."),
+        (Bold("flips"), ""),
+        ("a*b", ""),
+        ("+3.0 [1.0,4.0]", ""),
+    ],
+)
+def test_the_marks_of_a_table_are_told_below_it_in_a_line(entry, told):
+    rows = (("x", entry),)
+    shown = lines_of(Table("t", ("a", "b"), rows))
+    assert len(shown) == (4 if told else 3)
+    assert told in shown[-1]
+    # A column that stands in files alone needs no words, nor does a mark that a note tells.
+    assert len(lines_of(Table("t", ("a", "b"), rows, files_only=("b",)))) == 3
+    if told.startswith("†"):
+        assert len(lines_of(Table("t", ("a", "b"), rows, ("† knows it.",)))) == 4
+
+
 def test_notes_are_three_lines_that_end_with_the_place_of_the_rest():
     table = Table("t", ("a", "b"), (("x", "y"),), NOTES)
     *_, first, _, third = lines_of(table, rest=Path("runs/mine/tables.md"))

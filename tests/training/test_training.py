@@ -13,13 +13,17 @@ from care_sim.base.seed_ranges import TRAINING, VALIDATION
 from care_sim.cli import main
 from care_sim.policies.learned.weights import load_weights
 from care_sim.policies.learned.wrapping import Wrapping
+from care_sim.scenarios import PLUGINS
+from care_sim.study import provenance
 from care_sim.training.algorithms import algorithm
 from care_sim.training.config import PpoConfig, SacConfig
 from care_sim.training.environments import plain, training
+from care_sim.training.folder import Folder
 from care_sim.training.seeds import validation_seeds
 from care_sim.training.validation import evaluate, rule
 
 SHORT = ["--environments", "2", "--episodes", "2", "--env-parameters", "duration_s=1.0"]
+TOLD = ("scoring_info=True",)
 TINY = [*SHORT, "--rollout", "32", "--batch", "32", "--epochs", "1", "--hidden", "4"]
 
 
@@ -38,7 +42,7 @@ def libraries():
 
 def test_training_never_meets_a_seed_that_is_held_out(monkeypatch):
     monkeypatch.setattr("care_sim.training.seeds.LAST", TRAINING + 100_000)
-    env = training(PpoConfig(), 0.03)
+    env = training(PpoConfig(env_parameters=TOLD), 0.03)
     seeds = [env.reset(seed=0 if n == 0 else None)[1]["seed"] for n in range(30)]
     again = [env.reset(seed=0 if n == 0 else None)[1]["seed"] for n in range(30)]
     other = [env.reset(seed=1 if n == 0 else None)[1]["seed"] for n in range(30)]
@@ -53,7 +57,7 @@ def test_learners_of_neighbouring_seeds_share_no_episode():
     """Though Stable-Baselines3 seeds environment n of a learner with its seed + n."""
     met = []
     for learner, environment in ((0, 1), (1, 0)):
-        env = training(PpoConfig(seed=learner), 0.03)
+        env = training(PpoConfig(seed=learner, env_parameters=TOLD), 0.03)
         met.append(
             [env.reset(seed=learner + environment if n == 0 else None)[1]["seed"] for n in range(5)]
         )
@@ -201,6 +205,37 @@ def test_bad_input_is_one_line(capsys, tmp_path, options, message):
     assert (code, complaint.count("\n")) == (2, 1)
     assert message in complaint
     assert not (tmp_path / "out").exists()
+
+
+class Learner:
+    """Writes something where a learner writes its checkpoint."""
+
+    def save(self, path):
+        """Write it."""
+        path.write_bytes(b"weights")
+
+
+def test_a_run_on_other_code_of_ones_own_scenario_is_not_gone_on_with(install, tmp_path):
+    source = (
+        "from dataclasses import dataclass\nfrom care_sim.scenarios.dartout import Dartout\n\n"
+        "@dataclass(frozen=True)\nclass Own(Dartout):\n    pass\n"
+    )
+    install("own_scenario", source, PLUGINS.group, own="Own")
+    for env in ("own", "own_scenario:Own", "CARE-Dense-v0"):
+        out = tmp_path / env
+        begun = PpoConfig(env=env, out=out)
+        Folder(begun).begin(Learner())
+        again = PpoConfig(env=env, out=out, resume=True)
+        Folder(again)
+        with (tmp_path / "own_scenario" / "own_scenario.py").open("a") as file:
+            file.write("# edited\n")
+        provenance._loaded.cache_clear()
+        if env == "CARE-Dense-v0":
+            Folder(again)
+            continue
+        with pytest.raises(InvalidInput, match=f"the code of {env} is another than when"):
+            Folder(again)
+    provenance._loaded.cache_clear()
 
 
 def test_a_missing_library_is_named(monkeypatch):

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
+from care_sim.core.frames import Frame
 from care_sim.world import clearance_judge
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.bullet import BulletWorld
@@ -45,6 +46,33 @@ def test_it_tells_what_the_world_of_the_bodies_tells(judge, others, place):
                 assert clearance == world.clearance(ego, body, within)
 
 
+@pytest.mark.parametrize("x", [3.0, 60.0, 104.0])
+def test_of_bodies_that_lie_on_their_side_all_parts_are_asked_about(judge, x):
+    lying = Frame(x, 1.0, 0.5, 0.3, 1.5, 0.2)
+    with closing(BulletWorld()) as world:
+        ego = world.add(CATALOGUE["ego"], (0.0, 0.0, 0.1), transparent=True)
+        body = world.add(CATALOGUE["pedestrian"], lying)
+        pair = judge.stand_ins(CATALOGUE["ego"], CATALOGUE["pedestrian"])
+        poses = world.primitives.poses[[ego, body]]
+        assert judge.clearance(pair, poses) == world.clearance(ego, body)
+
+
+def test_pybullet_is_asked_about_the_parts_that_could_be_the_nearest(judge, monkeypatch):
+    asked = []
+    exactly = judge._bodies.clearance
+    monkeypatch.setattr(judge._bodies, "clearance", lambda *its: asked.append(1) or exactly(*its))
+    pair = judge.stand_ins(CATALOGUE["ego"], CATALOGUE["pedestrian"])
+    upright = [0.0, 0.0, 0.0, 1.0]
+    near = [[0.0, 0.0, 0.0, *upright], [12.0, 0.0, 0.0, *upright]]
+    # The hind leg is nearer than the trunk, and the car's front than its cabin.
+    hind_m = 0.285 + 0.16 / 2
+    assert judge.clearance(pair, near) == pytest.approx(12.0 - 4.08 / 2 - hind_m, abs=1e-3)
+    assert len(asked) == 1
+    # Where all lies in each other, nothing tells what is nearest.
+    assert judge.clearance(pair, [near[0], near[0]]) < 0
+    assert len(asked) > 2
+
+
 def test_two_of_one_kind_are_not_one(judge):
     pair = judge.stand_ins(CATALOGUE["ego"], CATALOGUE["ego"])
     upright = [0.0, 0.0, 0.0, 1.0]
@@ -73,6 +101,16 @@ def test_a_judge_whose_client_somebody_else_ends_is_replaced(end):
     end(physicsClientId=lost._client.number)
     assert judge_here() is not lost
     assert ahead_by_ten(judge_here(), CATALOGUE["car"]) == told
+
+
+def test_a_judge_that_was_closed_before_it_was_asked_is_replaced():
+    def ask():
+        judge_here().close()
+        return ahead_by_ten(judge_here(), CATALOGUE["car"])
+
+    # In a thread where none has been asked.
+    with ThreadPoolExecutor(1) as thread:
+        assert thread.submit(ask).result() == ahead_by_ten(judge_here(), CATALOGUE["car"])
 
 
 def test_a_judge_of_many_kinds_is_replaced(monkeypatch):

@@ -68,7 +68,7 @@ class StudyCommand:
         if len(failures) < len(configs):
             rows, _, missing = read_results(out)
             print_report(rows, console(), STUDIES[study], missing, out)
-            print(*where_it_lies(out, STUDIES[study]), sep="\n")
+            print(*where_it_lies(out, STUDIES[study], rows), sep="\n")
         report_problems(
             [
                 *(f"failed: {line}" for line in summary(failures, STUDIES[study].results.unit)),

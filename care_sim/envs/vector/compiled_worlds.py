@@ -1,6 +1,6 @@
 """Worlds that are played as arrays, all at once."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -23,18 +23,31 @@ from care_sim.loops.records import Outcome
 
 
 class CompiledWorlds:
-    """A batch of worlds of the environment `model`, one for every row of `observed`.
+    """A batch of worlds, one for every row of `observed`. World i is one of the environment
+    `models[i]`; these differ at most in budget and camera (`BatchLoop`).
 
     Unless `exact`, clearances that no reward needs are bounds (`BatchLoop`); outcomes are exact.
+    Infos hold the cells that were fired as one array, or, unless there is `one_budget`, also beside
+    these, as an array for each world.
     """
 
-    def __init__(self, model: ClosedLoopEnv, observed: Observed, exact: bool):
-        worlds = len(observed["budget"])
+    def __init__(
+        self,
+        models: Sequence[ClosedLoopEnv],
+        observed: Observed,
+        exact: bool,
+        one_budget: bool = True,
+    ):
+        worlds = len(models)
+        # What is alike in all is asked of the first.
+        self._model = model = models[0]
         self.observed = observed
-        self._model = model
         self._exact = exact
+        rigs, conditions = [each.rig for each in models], [each.conditions for each in models]
+        self._budgets = [rig.budget for rig in rigs]
+        self._one_budget = one_budget
         duration_s = model.scenario.duration_s
-        self._loop = BatchLoop(model.rig, model.conditions, duration_s, observed, self._exact)
+        self._loop = BatchLoop(rigs, conditions, duration_s, observed, self._exact)
         self._rewards = Rewards(model.reward_weights, worlds)
         self._history = History(worlds, most_keyframes(duration_s, model.rig.keyframe_s))
         # Each world draws the seeds of its later episodes as a single environment does.
@@ -102,8 +115,17 @@ class CompiledWorlds:
         """What `info` says of all worlds, in the order of the single environment."""
         scan = {}
         if self._model.conditions.floor:
-            scan["fired"] = self._loop.fired.cells[:, : self._model.rig.budget].copy()
+            scan["fired"] = self._all_fired()
         return self._model.keyframe_info(scan, records, terms)
+
+    def _all_fired(self) -> NDArray[Any]:
+        """(W, B) the cells of all worlds, or (W,) arrays of each world's own."""
+        cells, budgets = self._loop.fired.cells, self._budgets
+        if self._one_budget:
+            return cells[:, : budgets[0]].copy()
+        fired = np.empty(len(budgets), object)
+        fired[:] = [row[:budget].copy() for row, budget in zip(cells, budgets, strict=True)]
+        return fired
 
     def _list_fired(self, single: dict[int, dict[str, Any]], who: Mask) -> None:
         """Cells of different numbers, as lists: they are no column."""

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from care_sim.base.checks import as_array, check_flag, check_seed, check_whole
 from care_sim.base.errors import InvalidInput, shown
+from care_sim.base.vectors import shared_attribute
 from care_sim.core.arrays import Floats, Mask
 from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.rig import Rig
@@ -20,6 +21,7 @@ from care_sim.core.types import Action
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.envs.sensing import Observed
 from care_sim.envs.spaces import checked_scores
+from care_sim.envs.vector.arguments import Maker, makers_of, models_of
 from care_sim.envs.vector.compiled_worlds import CompiledWorlds
 from care_sim.envs.vector.coverage import why_separate
 from care_sim.envs.vector.infos import kept
@@ -39,7 +41,8 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
 
     World i, begun with a seed, is the single environment begun with it, to the last bit, whatever
     the other worlds do and however many threads there are. All keyword arguments of the single
-    environment are taken but `render_mode`.
+    environment are taken but `render_mode`. The `budget` and whatever the camera gets wrong
+    (`care_sim.envs.vector.arguments.OF_EACH_WORLD`) may be lists of a value for each world.
 
     Observations, rewards and infos are those that `gymnasium.vector.SyncVectorEnv` gives, in all
     three of its modes of `autoreset_mode`: "NextStep", "SameStep" and "Disabled". With `copy=False`
@@ -68,7 +71,11 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         self.autoreset_mode = _autoreset(autoreset_mode)
         self.metadata = {**self.single.metadata, "autoreset_mode": self.autoreset_mode}
         self.copy = copy
-        self._model = self.single(**arguments)
+        makers = makers_of(self.single, arguments, num_envs)
+        self._models = models_of(makers)
+        # What is alike in all worlds is asked of the first.
+        self._model = self._models[0]
+        self._one_budget = len({model.rig.budget for model in self._models}) == 1
         self.single_observation_space = self._model.observation_space
         self.single_action_space = self._model.action_space
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -80,15 +87,16 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         count = min(num_envs, threads)
         ends = [num_envs * k // count for k in range(count + 1)]
         self._shares = [slice(*ends[k : k + 2]) for k in range(count)]
-        self._worlds = [self._made(share, arguments) for share in self._shares]
+        self._worlds = [self._made(share, makers) for share in self._shares]
         self._threads = Threads(count)
         self._over = np.zeros(num_envs, np.bool_)
         self._begun = np.zeros(num_envs, np.bool_)
 
     @property
     def rig(self) -> Rig:
-        """What is fixed about the sensing task; the same in all worlds."""
-        return self._model.rig
+        """What is fixed about the sensing task. Raises InvalidInput where budgets differ."""
+        rig: Rig = shared_attribute(self, "rig")
+        return rig
 
     @property
     def scenario(self) -> Scenario:
@@ -97,13 +105,20 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
 
     @property
     def conditions(self) -> ClosedLoopConditions:
-        """The conditions of all worlds."""
-        return self._model.conditions
+        """The conditions of all worlds. Raises InvalidInput where cameras differ."""
+        conditions: ClosedLoopConditions = shared_attribute(self, "conditions")
+        return conditions
 
     @property
     def min_returns(self) -> int:
         """See `care_sim.envs.sensing.SensingEnv.min_returns`."""
         return self._model.min_returns
+
+    def get_attr(self, name: str) -> tuple[Any, ...]:
+        """An attribute of each world (W,), as of Gymnasium's own vectors: `rig`, `conditions`, or
+        another one that a single environment has before its first episode.
+        """
+        return tuple(getattr(model, name) for model in self._models)
 
     def reset(
         self,
@@ -159,6 +174,13 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
             infos,
         )
 
+    def render(self) -> None:
+        """Raise InvalidInput: many worlds draw no pictures."""
+        raise InvalidInput(
+            "many worlds draw no pictures: play the world's seed in the single environment, made "
+            'with render_mode="rgb_array"'
+        )
+
     def close_extras(self, **_: Any) -> None:
         """Free the worlds and end the threads."""
         self._threads.close()
@@ -169,12 +191,13 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         if self.closed:
             raise gymnasium.error.ClosedEnvironmentError("the environment is closed: make another")
 
-    def _made(self, share: slice, arguments: dict[str, Any]) -> Worlds:
+    def _made(self, share: slice, makers: Sequence[Maker]) -> Worlds:
         rows = {name: values[share] for name, values in self._observed.items()}
-        if why_separate(self._model) is None:
+        if not any(map(why_separate, {*self._models})):
             # Where no info tells of clearances, few of them are needed.
-            return CompiledWorlds(self._model, rows, exact=self._model.scoring_info)
-        return SeparateWorlds(partial(self.single, **arguments), rows)
+            exact = self._model.scoring_info
+            return CompiledWorlds(self._models[share], rows, exact, self._one_budget)
+        return SeparateWorlds(makers[share], rows)
 
     def _played(self, scores: NDArray[np.float32], who: Mask) -> Stepped:
         # An error leaves worlds at different keyframes: then all have to begin anew.
@@ -226,6 +249,16 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
             if who[world]:
                 infos = self._add_info(infos, info, world)
         return infos
+
+    def _add_info(
+        self, vector_infos: dict[str, Any], env_info: dict[str, Any], env_num: int
+    ) -> dict[str, Any]:
+        # Gymnasium takes all arrays of a name for equally long, unless their column is of objects.
+        if not self._one_budget:
+            for name, value in env_info.items():
+                if isinstance(value, np.ndarray):
+                    vector_infos.setdefault(name, np.full(self.num_envs, None, object))
+        return super()._add_info(vector_infos, env_info, env_num)
 
     def _handed_out(self) -> Observed:
         if not self.copy:

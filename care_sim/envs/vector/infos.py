@@ -9,8 +9,8 @@ from care_sim.core.arrays import Mask
 
 def kept(columns: dict[str, Any], who: Mask) -> dict[str, Any]:
     """Infos in the form of Gymnasium: of `columns` (W, ...), or dictionaries of them, the rows of
-    the worlds `who` (W,), 0 of the others; and beside every name, with a line before it, of whom
-    it tells.
+    the worlds `who` (W,), 0 or None of the others; and beside every name, with a line before it, of
+    whom it tells.
     """
     infos = dict[str, Any]()
     for name, column in columns.items():
@@ -23,5 +23,5 @@ def _rows(column: np.ndarray, who: Mask) -> np.ndarray:
     if who.all():
         return column
     rows = column.copy()
-    rows[~who] = 0
+    rows[~who] = None if rows.dtype == object else 0
     return rows

@@ -2,24 +2,24 @@
 `care_sim.batch` do not know.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.core.arrays import Mask
-from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.envs.sensing import Observed
+from care_sim.envs.vector.arguments import Maker
 from care_sim.envs.vector.worlds import Stepped
 
 
 class SeparateWorlds:
-    """One environment, which `make` makes, for every row of `observed`."""
+    """One environment, which one of `makers` makes, for every row of `observed`."""
 
-    def __init__(self, make: Callable[[], ClosedLoopEnv], observed: Observed):
+    def __init__(self, makers: Sequence[Maker], observed: Observed):
         self.observed = observed
-        self._envs = [make() for _ in range(len(observed["budget"]))]
+        self._envs = [make() for make in makers]
 
     def begin(self, seeds: Mapping[int, int | None]) -> dict[int, dict[str, Any]]:
         """See `care_sim.envs.vector.worlds.Worlds`."""

@@ -1,12 +1,13 @@
 """What the wrappers of vector environments ask of what they wrap."""
 
+from dataclasses import replace
 from typing import Any
 
 from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv, VectorWrapper
 
 from care_sim.base.errors import InvalidInput, shown
-from care_sim.base.vectors import shared_attribute
+from care_sim.base.vectors import attribute_of_each
 from care_sim.core.belief import OBSERVED
 from care_sim.core.rig import Rig
 
@@ -25,17 +26,24 @@ class WorldsWrapper(VectorWrapper[Any, Any, Any, Any, Any]):
 
 def rig_of(env: AnyVector) -> Rig:
     """The rig of all worlds of a vector environment, one of CARE-Sim or one of Gymnasium over
-    environments of CARE-Sim. Raises InvalidInput for another, and for worlds of several rigs.
+    environments of CARE-Sim; where budgets differ, that of the largest. Raises InvalidInput for
+    another, and for worlds whose rigs differ in more.
     """
     try:
-        rig = shared_attribute(env, "rig") if isinstance(env, VectorEnv) else None
+        rigs = attribute_of_each(env, "rig") if isinstance(env, VectorEnv) else []
     except AttributeError:
-        rig = None
-    if not isinstance(rig, Rig):
+        rigs = []
+    if not rigs or not all(isinstance(rig, Rig) for rig in rigs):
         raise InvalidInput(
             "vector wrappers of CARE-Sim need a vector of its environments, got " + shown(env)
         )
-    return rig
+    largest: Rig = max(rigs, key=lambda rig: rig.budget)
+    if any(replace(rig, budget=largest.budget) != largest for rig in rigs):
+        raise InvalidInput(
+            f"the worlds of one vector may differ in the budget of their rigs alone, those of "
+            f"{shown(env)} differ in more"
+        )
+    return largest
 
 
 def shows_beliefs(env: AnyVector) -> bool:

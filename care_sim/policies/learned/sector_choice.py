@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.core.allocator import Allocator
+from care_sim.core.arrays import Integers
 from care_sim.core.beliefs import Beliefs
 from care_sim.core.cell_sets import CellSets
 from care_sim.core.grid import Cells
@@ -31,13 +32,27 @@ class SectorChoice:
         """The forecasts' hulls, then the sectors with a positive score as layers of the reserve,
         best first.
         """
-        hulls = beliefs.hulls
-        layers = self._layers(scores, enough_beside_hulls(self._rig))
-        return [WorldSets(self._rig.listed(hulls.sets), hulls.counts), *layers]
+        return [self.hulls(beliefs), *self._layers(scores, enough_beside_hulls(self._rig.budget))]
 
     def alone(self, scores: NDArray[np.floating]) -> list[WorldSets]:
         """The sectors with a positive score alone, best first."""
         return [WorldSets.nothing(len(scores)), *self._layers(scores, self._rig.budget)]
+
+    def hulls(self, beliefs: Beliefs) -> WorldSets:
+        """The hulls of the forecasts."""
+        hulls = beliefs.hulls
+        return WorldSets(self._rig.listed(hulls.sets), hulls.counts)
+
+    def best(self, scores: NDArray[np.floating], enough: Integers) -> WorldSets:
+        """Of each world one set, the cells of the sectors with a positive score, best first, up to
+        the one that makes them `enough` (W,). One set gives in turn what a layer for each sector
+        would.
+        """
+        tile = self._sectors.cells.shape[1]
+        ranked, counts = self._sectors.ranked(scores, int(enough.max()))
+        counts = np.minimum(counts, -(-enough // tile))
+        cells = self._listed[ranked[np.arange(ranked.shape[1]) < counts[:, None]]]
+        return WorldSets(CellSets(cells.ravel(), counts * tile), np.ones(len(counts), np.int64))
 
     def _layers(self, scores: NDArray[np.floating], enough: int) -> list[WorldSets]:
         """The best sector of every world that has one, then the next of each, and so on."""
@@ -59,8 +74,8 @@ class SectorChoice:
 
 
 class SectorActions:
-    """The actions (W, E, A) for scores (W, ...) of the `sectors` of W worlds, each with the budget
-    of the rig. They are read-only, and the next call overwrites them.
+    """The actions (W, E, A) for scores (W, ...) of the `sectors` of W worlds, none with a larger
+    budget than the rig. They are read-only, and the next call overwrites them.
     """
 
     def __init__(self, rig: Rig, sectors: Tiling, worlds: int):
@@ -69,9 +84,12 @@ class SectorActions:
         self._budgets = np.full(worlds, rig.budget)
 
     def reserve(self, beliefs: Beliefs, scores: NDArray[np.floating]) -> Action:
-        """See `SectorChoice.reserve`."""
-        return self._allocator.scores(self._choice.reserve(beliefs, scores), self._budgets)
+        """See `SectorChoice.reserve`; each world with the budget that it is told."""
+        budgets = beliefs.budgets
+        best = self._choice.best(scores, enough_beside_hulls(budgets))
+        return self._allocator.scores([self._choice.hulls(beliefs), best], budgets)
 
     def alone(self, scores: NDArray[np.floating]) -> Action:
-        """See `SectorChoice.alone`."""
-        return self._allocator.scores(self._choice.alone(scores), self._budgets)
+        """See `SectorChoice.alone`. Of the cells, best first, a world fires what it can pay."""
+        best = self._choice.best(scores, self._budgets)
+        return self._allocator.scores([WorldSets.nothing(len(scores)), best], self._budgets)

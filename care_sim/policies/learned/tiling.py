@@ -4,6 +4,7 @@ it sees.
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,8 @@ from care_sim.core.grid import Cells
 from care_sim.core.grid_stack import Grid
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
+
+_Cells = TypeVar("_Cells", int, Integers)
 
 
 @dataclass(frozen=True)
@@ -87,13 +90,14 @@ def reserve_demand(
     first: what `care_sim.policies.learned.sector_choice.SectorChoice` asks for, in one world and
     not yet in the rig's `cell_order`, for a policy of your own.
     """
-    (ranked,), (count,) = sectors.ranked(np.reshape(scores, (1, -1)), enough_beside_hulls(rig))
+    enough = enough_beside_hulls(rig.budget)
+    (ranked,), (count,) = sectors.ranked(np.reshape(scores, (1, -1)), enough)
     return Demand(
         rig.hulls(belief.tracks.boxes), [[cells] for cells in sectors.cells[ranked[:count]]]
     )
 
 
-def enough_beside_hulls(rig: Rig) -> int:
-    """Cells of sectors that fill the budget, whatever the hulls take."""
+def enough_beside_hulls(budget: _Cells) -> _Cells:
+    """Cells of sectors that fill a budget, or each of some, whatever the hulls take."""
     # At most one budget of the cells of sectors is taken by hulls.
-    return 2 * rig.budget
+    return 2 * budget

@@ -1,8 +1,5 @@
-"""Weights of learned policies in a file that executes no code: float32 arrays and a card that says
-whose they are.
-
-The file is an .npz of NumPy, read with `allow_pickle=False`; the card is JSON text in one of its
-entries.
+"""Weights of learned policies in a file of arrays (`care_sim.base.array_files`), whose card, JSON
+text, says what they fit.
 """
 
 import json
@@ -11,14 +8,13 @@ from dataclasses import asdict, dataclass, field, fields
 from os import PathLike
 from pathlib import Path
 from typing import Any
-from zipfile import ZipInfo
 
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.base.checks import check_path, is_number
+from care_sim.base.array_files import Arrays, read_arrays, write_arrays
+from care_sim.base.checks import is_number
 from care_sim.base.errors import InvalidInput
-from care_sim.base.files import ZIP, replacing
 from care_sim.base.json_text import parsed_json
 from care_sim.core.grid import AngularGrid
 from care_sim.core.grid_stack import Grid, GridStack
@@ -26,15 +22,6 @@ from care_sim.core.rig import Rig
 from care_sim.policies.learned.wrapping import Wrapping, wrapping_of_line
 
 FORMAT = "care-sim weights 1"
-MOST_UNPACKED_BYTES = 2**26
-"""Bytes that a file may hold when it is unpacked; the shipped ones hold some thousands."""
-LARGEST_WEIGHT = 1e6
-"""What a weight may be, of either sign. Inputs are at most 1 and a file holds 2^24 numbers, so that
-three layers of any shape stay below 1e29, while float32 ends at 3e38; the shipped ones stay below
-5."""
-_CARD = "card"
-
-Arrays = dict[str, NDArray[np.float32]]
 
 
 @dataclass(frozen=True)
@@ -158,46 +145,18 @@ def save_weights(
     path: str | PathLike[str], arrays: Mapping[str, NDArray[np.floating]], card: Card
 ) -> None:
     """Write weights, whole or not at all; the same arrays and card give the same bytes."""
-    entries: dict[str, Any] = {_CARD: np.frombuffer(card.to_json().encode(), np.uint8)}
-    entries |= {name: np.asarray(array, np.float32) for name, array in arrays.items()}
-    with replacing(Path(path), ZIP) as unfinished, unfinished.open("wb") as file:
-        np.savez(file, **entries)
+    write_arrays(path, arrays, card.to_json())
 
 
 def load_weights(path: str | PathLike[str]) -> Weights:
     """Read weights. Raises InvalidInput for a file that is missing, damaged or something else."""
-    check_path("a file of weights", path)
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            _check_contents(file.zip.infolist())
-            entries = {name: file[name] for name in file.files}
-        card = Card.from_json(bytes(entries.pop(_CARD)).decode())
-        return Weights(Path(path), _checked(entries), card)
-    except FileNotFoundError as error:
-        raise InvalidInput(f"weights {path}: no such file") from error
-    # Damaged archives raise errors of many kinds in zipfile, zlib and NumPy; all become one line,
-    # without NumPy's advice to allow pickled objects.
-    except Exception as error:
-        reason = " ".join((str(error) or type(error).__name__).split()).partition(" If you trust")[
-            0
-        ]
-        raise InvalidInput(
-            f"weights {path}: no .npz of weights of care-sim train, or damaged ({reason})"
-        ) from error
+    arrays, card = read_arrays(path, Card.from_json, "care-sim train")
+    return Weights(Path(path), arrays, card)
 
 
 def shipped_weights(name: str) -> Path:
     """Where the weights of that name lie that come with the package."""
     return Path(__file__).parent / "shipped" / f"{name}.npz"
-
-
-def _check_contents(entries: list[ZipInfo]) -> None:
-    # Of two entries of one name each reader would take its own.
-    if len({entry.filename for entry in entries}) < len(entries):
-        raise ValueError("an entry comes twice")
-    # Before anything is unpacked: a small archive can hold more than the memory does.
-    if sum(entry.file_size for entry in entries) > MOST_UNPACKED_BYTES:
-        raise ValueError(f"unpacked it is larger than {MOST_UNPACKED_BYTES} bytes")
 
 
 def _grid(plain: dict[str, Any]) -> Grid:
@@ -223,15 +182,6 @@ def _wrapping(stored: dict[str, Any] | str | None) -> Wrapping | None:
     if isinstance(stored, str):
         return wrapping_of_line(stored)
     return None if stored is None else Wrapping.from_plain(stored)
-
-
-def _checked(arrays: dict[str, NDArray[Any]]) -> Arrays:
-    for name, array in arrays.items():
-        if array.dtype != np.float32 or not np.isfinite(array).all():
-            raise ValueError(f"array {name!r} is not of finite float32 numbers")
-        if array.size and np.abs(array).max() > LARGEST_WEIGHT:
-            raise ValueError(f"array {name!r} holds numbers beyond {LARGEST_WEIGHT:g}")
-    return arrays
 
 
 def _told(name: str, value: Any, rig: Rig) -> str:

@@ -20,11 +20,10 @@ from care_sim.reports.figures.styles import (
     styles,
 )
 from care_sim.reports.formatting import marked, tag_notes
-from care_sim.scenarios import SCENARIOS
 from care_sim.study.run_config import Row
 
-BUDGET_FIGURES = tuple(f"{scenario}-budget" for scenario in SCENARIOS)
-"""Every figure that a sweep can draw."""
+BUDGET_FIGURES = ("{world}-budget",)
+"""Every figure that a sweep can draw of a scenario."""
 _FEW = 5
 """Up to so many policies their quartiles are drawn in full strength."""
 

@@ -25,16 +25,13 @@ from care_sim.reports.formatting import MARKS, marked, tag_notes
 from care_sim.reports.protocol.controls import over_controls
 from care_sim.reports.protocol.paper import published_level
 from care_sim.reports.protocol.rows import SettingPlays, plays_by_setting
-from care_sim.study.rows.settings import SOURCES
 from care_sim.study.run_config import FULL, REFERENCE, Row
 
 _PANELS_A_LINE = 4
 _KINDS = ("pareto", "levels", "controls")
-PROTOCOL_FIGURES = tuple(
-    f"{kind}-{source}{rest}" for kind in _KINDS for source in SOURCES for rest in ("", "-*")
-)
-"""Every figure that a folder may hold, as patterns: the source, then what is not usual in detector
-and conditions.
+PROTOCOL_FIGURES = tuple(f"{kind}-{{world}}{rest}" for kind in _KINDS for rest in ("", "-*"))
+"""Every figure that a folder may hold of a source, as patterns: behind the source stands what is
+not usual in detector and conditions.
 """
 
 
@@ -167,7 +164,7 @@ def levels_figure(plays: SettingPlays) -> Figure:
     panels = figure.subplots(1, 2)
     for axes, ratio in zip(panels, (FIRST_SIGHTING, OVERALL), strict=True):
         _draw_levels(axes, plays, ratio)
-        if not plays.setting.conditions:
+        if plays.setting.as_in_paper:
             # The paper gives levels for its plain setting alone.
             _draw_published(axes, plays, ratio)
         axes.set_xscale("log")

@@ -69,10 +69,10 @@ class MechanismRows:
 
     @property
     def as_in_paper(self) -> bool:
-        """Whether the paper's figures are of the same: the belief is CARE's, and nothing departs
-        from the default conditions.
+        """Whether the paper's figures are of the same: the belief is CARE's, the films are no
+        source's of one's own, and nothing departs from the default conditions.
         """
-        return self.driver == REFERENCE and not self.setting.conditions
+        return self.driver == REFERENCE and self.setting.as_in_paper
 
     @property
     def events(self) -> int:

@@ -215,7 +215,8 @@ def _curves(plays: SettingPlays, ratio: Ratio) -> _Values:
                     | {"place": budget * shift, "value": here, "by": "here", "of_full": of_full}
                 )
             # The paper's stand at their own budgets, and belong to its plain setting alone.
-            said = None if plays.setting.conditions else published_level(ratio, policy, budget)
+            plain = plays.setting.as_in_paper
+            said = published_level(ratio, policy, budget) if plain else None
             if said is not None:
                 values.append(about | {"place": budget, "value": said, "by": "paper"})
     ceiling = plays.level(ratio, FULL, 1.0).by_event if plays.full else None

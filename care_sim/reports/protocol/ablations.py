@@ -24,6 +24,7 @@ from care_sim.reports.protocol.paper_ablations import (
 from care_sim.reports.table import Table
 from care_sim.study.designs.ablations import GUARD, OPEN_ABLATIONS, OPEN_POLICIES, Ablation
 from care_sim.study.designs.variants import USUAL_VARIANT, FilmPlace, Variant
+from care_sim.study.rows.settings import Setting
 from care_sim.study.run_config import FULL, Row
 
 
@@ -82,7 +83,8 @@ class _AblationPlays:
             for base in (USUAL, *ablation.beside(self.joined))
         ]
         title = ablation.title
-        together = [PUBLISHED_ON_ALL_LEVELS[title]] if title in PUBLISHED_ON_ALL_LEVELS else []
+        known = PUBLISHED_ON_ALL_LEVELS if Setting(self.source).has_paper else {}
+        together = [known[title]] if title in known else []
         said = [claims.source for block in blocks for claims in block.said()]
         return Table(
             f"{ablation.policy}: {title}",
@@ -155,6 +157,8 @@ class _Block:
         return (name, *entries, rounded(released))
 
     def _claims(self, level: Variant, measure: _Measure) -> Claims | None:
+        if not Setting(self.place.source).has_paper:
+            return None
         _, ratio, within = measure
         return PUBLISHED_CHANGES.get(
             LevelChange(self.ablation.title, level.label, self.base, ratio, within)
@@ -166,6 +170,6 @@ class _Block:
 
     def _published_release(self, level: Variant) -> str:
         default = self.ablation.title == GUARD.title and not level.parameters
-        if self.base != USUAL or not default:
+        if self.base != USUAL or not default or not Setting(self.place.source).has_paper:
             return ""
         return rounded(PUBLISHED_RELEASE.get(self.place.budget))

@@ -19,14 +19,14 @@ from care_sim.study.run_config import REFERENCE, Row
 
 
 def protocol_closing(rows: Sequence[Row]) -> list[str]:
-    """Size of the study, and CARE over history against the gate of five points in every setting
-    without conditions.
+    """Size of the study, and CARE over history against the paper's gate of five points in every
+    setting without conditions that is no source of one's own.
     """
     gains = {
         plays.setting: _gains(plays)
         for plays in plays_by_setting(rows)
         # The gate was fixed for the plain setting, so that no fault is judged by it.
-        if not plays.setting.conditions
+        if plays.setting.as_in_paper
     }
     gates = [_gate(setting, differences) for setting, differences in gains.items() if differences]
     return [

@@ -214,7 +214,11 @@ def published_level(ratio: Ratio, policy: str, budget: float) -> float | None:
 
 
 def claims_about(setting: Setting) -> Mapping[Comparison, Claims]:
-    """What the paper says under these conditions, whatever the films and the detector are."""
+    """What the paper says under these conditions, whatever the detector is; nothing of films of a
+    source of one's own.
+    """
+    if not setting.has_paper:
+        return {}
     if setting.strict_causal:
         return _STRICT_CAUSAL
     return {} if setting.conditions else _PLAIN

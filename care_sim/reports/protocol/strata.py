@@ -207,7 +207,7 @@ def _published_shares(plays: SettingPlays) -> dict[str, dict[float, float]]:
     """The shares that the paper gives of policies and budgets that were played, by policy; it gives
     them for the default conditions alone.
     """
-    if plays.setting.conditions:
+    if not plays.setting.as_in_paper:
         return {}
     return {
         policy: shares

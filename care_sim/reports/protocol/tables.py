@@ -115,7 +115,7 @@ def _level_lines(plays: SettingPlays, policy: str, budget: float) -> list[tuple[
         _deviation(plays, OVERALL, policy, budget),
         str(len(plays.tallies(policy, budget))),
     )
-    said = None if plays.setting.conditions else PUBLISHED_LEVELS.get((policy, budget))
+    said = PUBLISHED_LEVELS.get((policy, budget)) if plays.setting.as_in_paper else None
     if said is None:
         return [line]
     return [line, ("", PAPER, *level_of_paper(said), *("" for _ in _DETAILS))]

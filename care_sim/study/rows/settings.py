@@ -40,6 +40,18 @@ class Setting:
         return bool(self.detector) and self.conditions == (("camera_latency", 1),)
 
     @property
+    def has_paper(self) -> bool:
+        """Whether the paper's figures stand beside those of these films: of generated streets and
+        recordings, not of a source of one's own, of which it says nothing.
+        """
+        return self.world in SOURCES
+
+    @property
+    def as_in_paper(self) -> bool:
+        """Whether these are films beside which its figures stand, under the default conditions."""
+        return self.has_paper and not self.conditions
+
+    @property
     def label(self) -> str:
         """A heading."""
         changed = [f"{name.replace('_', ' ')} {value}" for name, value in self.conditions]

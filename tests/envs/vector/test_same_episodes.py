@@ -28,6 +28,29 @@ CONDITIONS = {
     "by tiles": {"firing": "tiles:4x8"},
 }
 
+OWN_BUDGETS = {"budget": [0.01, 0.2, 0.03]}
+OWN_FAULTS = {
+    "false_negative_rate": [1.0, 0.3, 0.0],
+    "false_negative_per_m": [0.0, 0.0, 0.01],
+    "false_negative_burst": [4, 1, 2],
+    "camera_latency": [2, 0, 1],
+    "camera_jitter": [0, 0, 2],
+    "blackout_start_s": [0.0, 1.0, 0.5],
+    "blackout_s": [0.0, 1.5, 0.2],
+    "camera_confidence": [0.25, 0.4, 0.8],
+}
+OWN = {
+    "budgets": OWN_BUDGETS,
+    "equal budgets": {"budget": [0.03] * 3},
+    "faults": OWN_FAULTS,
+    "both": OWN_BUDGETS | OWN_FAULTS,
+    "budgets without a floor": OWN_BUDGETS | {"floor": False},
+    "budgets without scoring": OWN_BUDGETS | {"scoring_info": False},
+    # These are played one after the other.
+    "budgets of noisy worlds": OWN_BUDGETS | {"lidar_dropout": 0.2},
+    "one profile of a detector": {"camera_profile": ["ideal", "yolox", "ideal"]},
+}
+
 
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("name", CLOSED_LOOP)
@@ -40,6 +63,17 @@ def test_every_world_in_every_mode(name, mode):
 def test_conditions(conditions):
     arguments = {"budget": 0.03} | conditions
     assert played_alike("CARE-Dense-v0", worlds=2, steps=62, **arguments) is None
+
+
+@pytest.mark.parametrize("own", OWN.values(), ids=OWN)
+def test_arguments_of_each_world(own):
+    assert played_alike("CARE-Dense-v0", worlds=3, steps=62, threads=2, **own) is None
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_budgets_of_each_world_in_every_mode(mode):
+    arguments = OWN_BUDGETS | {"duration_s": 1.0}
+    assert played_alike("CARE-CutIn-v0", worlds=3, steps=24, mode=mode, **arguments) is None
 
 
 @pytest.mark.parametrize(("worlds", "threads"), [(1, 1), (5, 1), (5, 2), (5, 8)])

@@ -82,12 +82,24 @@ def test_seeds_count_up_or_are_told_one_by_one(vector):
         ({"render_mode": "rgb_array"}, "render_mode"),
         ({"budget": 2.0}, "budget"),
         ({"vehicels": 2}, "vehicels"),
+        ({"budget": [0.1, 0.2, 0.3]}, "budget must be one value, or .* each of 2 worlds, got"),
+        ({"camera_latency": (1,)}, "camera_latency must be one value, or"),
+        ({"budget": [0.1, 2.0]}, r"budget must lie in \(0, 1\]"),
+        ({"budget": [[0.1], [0.2]]}, "budget must"),
+        ({"reserve_fraction": [0.1, 0.2]}, "reserve_fraction must"),
     ],
 )
 def test_wrong_arguments_are_named(wrong, message):
     arguments = {"num_envs": 2} | wrong
     with pytest.raises(InvalidInput, match=message):
         native(NAME, arguments.pop("num_envs"), **arguments)
+
+
+def test_a_picture_of_many_is_refused_in_one_line_that_tells_the_way(vector):
+    with pytest.raises(
+        InvalidInput, match=r'^[^\n]*single environment, made with render_mode="rgb'
+    ):
+        vector.render()
 
 
 def test_wrong_seeds_and_masks_are_named(vector):
@@ -112,6 +124,21 @@ def test_wrong_actions_are_named_and_nothing_moves(vector):
     with pytest.raises(InvalidInput, match="NaN"):
         vector.step(broken)
     assert vector.step(zeros(vector))[4]["time_s"].tolist() == [0.0, 0.0, 0.0]
+
+
+def test_what_differs_is_told_of_each_world():
+    budgets = np.array([0.1, 0.03, 0.1])
+    env = native(NAME, 3, budget=budgets, camera_latency=(0, 0, 2))
+    rigs = env.get_attr("rig")
+    assert [rig.budget for rig in rigs] == [1638, 492, 1638]
+    assert [each.camera_latency for each in env.get_attr("conditions")] == [0, 0, 2]
+    for name in ("rig", "conditions"):
+        with pytest.raises(InvalidInput, match=f"must have one {name}"):
+            getattr(env, name)
+    env.reset(seed=0)
+    fired = env.step(zeros(env))[4]["fired"]
+    assert [len(cells) for cells in fired] == [1638, 492, 1638]
+    env.close()
 
 
 def test_what_is_over_waits_for_a_reset_where_that_is_asked_for():

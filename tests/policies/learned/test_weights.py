@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 
 import care_sim
+from care_sim.base.array_files import LARGEST_WEIGHT
 from care_sim.base.errors import InvalidInput
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.policies.learned.weights import (
-    LARGEST_WEIGHT,
     Card,
     load_weights,
     save_weights,

@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 from matplotlib.colors import to_rgb
 
 from care_sim.reports.figures.files import save
-from care_sim.reports.figures.protocol import PROTOCOL_FIGURES, frontier, protocol_figures
+from care_sim.reports.figures.protocol import frontier, protocol_figures
 from care_sim.reports.figures.styles import styles
+from care_sim.reports.studies import STUDIES
 from tests.helpers.made_plays import study
 
 FOUND = {
@@ -32,8 +33,11 @@ def test_every_setting_has_its_figures_and_their_names_are_known():
     ]
     figures = protocol_figures(rows)
     assert list(figures) == ["pareto-streets", "levels-streets", "pareto-streets-camera-latency-1"]
-    assert all(any(fnmatch(name, pattern) for pattern in PROTOCOL_FIGURES) for name in figures)
-    assert not any(fnmatch("pareto-mine", pattern) for pattern in PROTOCOL_FIGURES)
+    patterns = STUDIES["protocol"].figures_of()
+    assert all(any(fnmatch(name, pattern) for pattern in patterns) for name in figures)
+    assert not any(fnmatch("pareto-mine", pattern) for pattern in patterns)
+    own = STUDIES["protocol"].figures_of([row | {"source": "mine:Film"} for row in rows])
+    assert any(fnmatch("pareto-mine-Film", pattern) for pattern in own)
 
 
 @pytest.mark.parametrize("name", ["pareto-streets", "levels-streets"])

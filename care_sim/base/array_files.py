@@ -1,0 +1,86 @@
+"""Learned numbers in a file that executes no code: float32 arrays and a card that says whose they
+are.
+
+The file is an .npz of NumPy, read with `allow_pickle=False`; the card is text in one of its
+entries.
+"""
+
+from collections.abc import Callable, Mapping
+from os import PathLike
+from pathlib import Path
+from typing import Any, TypeVar
+from zipfile import ZipInfo
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_sim.base.checks import check_path
+from care_sim.base.errors import InvalidInput
+from care_sim.base.files import ZIP, replacing
+
+MOST_UNPACKED_BYTES = 2**26
+"""Bytes that a file may hold when it is unpacked; the shipped ones hold some millions at most."""
+LARGEST_WEIGHT = 1e6
+"""What a weight may be, of either sign. Inputs are at most 1 and a file holds 2^24 numbers, so that
+three layers of any shape stay below 1e29, while float32 ends at 3e38; the shipped ones stay below
+100."""
+_CARD = "card"
+
+Arrays = dict[str, NDArray[np.float32]]
+_C = TypeVar("_C")
+
+
+def write_arrays(
+    path: str | PathLike[str], arrays: Mapping[str, NDArray[np.floating]], card: str
+) -> None:
+    """Write arrays, whole or not at all; the same arrays and card give the same bytes."""
+    entries: dict[str, Any] = {_CARD: np.frombuffer(card.encode(), np.uint8)}
+    entries |= {name: np.asarray(array, np.float32) for name, array in arrays.items()}
+    with replacing(Path(path), ZIP) as unfinished, unfinished.open("wb") as file:
+        np.savez(file, **entries)
+
+
+def read_arrays(
+    path: str | PathLike[str], card_of: Callable[[str], _C], command: str
+) -> tuple[Arrays, _C]:
+    """The arrays, and what `card_of` makes of the card; it raises ValueError for one that is none.
+
+    Raises InvalidInput, which names the `command` that writes such files, for a file that is
+    missing, damaged or something else.
+    """
+    check_path("a file of weights", path)
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            _check_contents(file.zip.infolist())
+            entries = {name: file[name] for name in file.files}
+        card = card_of(bytes(entries.pop(_CARD)).decode())
+        return _checked(entries), card
+    except FileNotFoundError as error:
+        raise InvalidInput(f"weights {path}: no such file") from error
+    # Damaged archives raise errors of many kinds in zipfile, zlib and NumPy; all become one line,
+    # without NumPy's advice to allow pickled objects.
+    except Exception as error:
+        reason = " ".join((str(error) or type(error).__name__).split()).partition(" If you trust")[
+            0
+        ]
+        raise InvalidInput(
+            f"weights {path}: no .npz of weights of {command}, or damaged ({reason})"
+        ) from error
+
+
+def _check_contents(entries: list[ZipInfo]) -> None:
+    # Of two entries of one name each reader would take its own.
+    if len({entry.filename for entry in entries}) < len(entries):
+        raise ValueError("an entry comes twice")
+    # Before anything is unpacked: a small archive can hold more than the memory does.
+    if sum(entry.file_size for entry in entries) > MOST_UNPACKED_BYTES:
+        raise ValueError(f"unpacked it is larger than {MOST_UNPACKED_BYTES} bytes")
+
+
+def _checked(arrays: dict[str, NDArray[Any]]) -> Arrays:
+    for name, array in arrays.items():
+        if array.dtype != np.float32 or not np.isfinite(array).all():
+            raise ValueError(f"array {name!r} is not of finite float32 numbers")
+        if array.size and np.abs(array).max() > LARGEST_WEIGHT:
+            raise ValueError(f"array {name!r} holds numbers beyond {LARGEST_WEIGHT:g}")
+    return arrays

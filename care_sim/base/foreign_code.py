@@ -1,0 +1,47 @@
+"""Where an error was raised in code that is not ours: the place that its author looks for."""
+
+import sysconfig
+from importlib.metadata import entry_points
+from pathlib import Path
+from traceback import walk_tb
+from types import FrameType
+
+_OURS = Path(__file__).parent.parent
+_LIBRARIES = [Path(sysconfig.get_path(name)) for name in ("stdlib", "purelib", "platlib")]
+_GROUPS = "care_sim."
+"""How the names of our groups of entry points begin."""
+
+
+def foreign_place(error: BaseException) -> str:
+    """File and line, in brackets after a space, where an error left the code of a user or of a
+    package that adds something to the benchmark; empty where no such code was running.
+    """
+    places = [
+        f" ({Path(frame.f_code.co_filename).name}, line {line})"
+        for frame, line in walk_tb(error.__traceback__)
+        if _is_foreign(frame)
+    ]
+    # The innermost one: what it calls is ours or a library's, and was called wrongly.
+    return places[-1] if places else ""
+
+
+def _is_foreign(frame: FrameType) -> bool:
+    """Whether the code of a frame is neither ours nor that of a library which adds nothing."""
+    file = Path(frame.f_code.co_filename)
+    # What Python itself makes, such as the methods of dataclasses, has a name in brackets.
+    if not file.is_absolute() or file.is_relative_to(_OURS):
+        return False
+    if not any(map(file.is_relative_to, _LIBRARIES)):
+        return True
+    return _top(frame.f_globals.get("__name__", "")) in _plugged_in()
+
+
+def _plugged_in() -> set[str]:
+    """The top-level modules of packages that add something."""
+    installed = entry_points()
+    ours = [group for group in installed.groups if group.startswith(_GROUPS)]
+    return {_top(entry.module) for group in ours for entry in installed.select(group=group)}
+
+
+def _top(module: str) -> str:
+    return module.partition(".")[0]

@@ -1,0 +1,54 @@
+"""Arguments of which every world of a vector environment may have its own."""
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from care_sim.base.errors import InvalidInput, shown
+from care_sim.core.conditions import CAMERA_FAULTS
+from care_sim.envs.closed_loop import ClosedLoopEnv
+
+OF_EACH_WORLD = ("budget", *CAMERA_FAULTS, "camera_confidence")
+"""Arguments that may be a list, of a value for each world: what an allocator has to cope with."""
+
+Maker = partial[ClosedLoopEnv]
+
+
+def makers_of(kind: type[ClosedLoopEnv], arguments: Mapping[str, Any], worlds: int) -> list[Maker]:
+    """What makes the single environment of each of so many worlds, from the `arguments` of their
+    vector environment. Raises InvalidInput for a list of another length.
+    """
+    given = {name: arguments[name] for name in OF_EACH_WORLD if name in arguments}
+    lists = {name: [*value] for name, value in given.items() if _is_list(value)}
+    for name, values in lists.items():
+        if len(values) != worlds:
+            raise InvalidInput(
+                f"{name} must be one value, or a list of one for each of {worlds} worlds, got "
+                f"{shown(given[name])}"
+            )
+    return [
+        partial(kind, **{**arguments, **{name: values[world] for name, values in lists.items()}})
+        for world in range(worlds)
+    ]
+
+
+def models_of(makers: Sequence[Maker]) -> list[ClosedLoopEnv]:
+    """The environments, which nobody resets, that show what is fixed about each world: one for all
+    whose arguments are equal.
+    """
+    made: list[tuple[list[Any], ClosedLoopEnv]] = []
+    models = []
+    for make in makers:
+        own = [make.keywords.get(name) for name in OF_EACH_WORLD]
+        model = next((model for before, model in made if before == own), None)
+        if model is None:
+            model = make()
+            made.append((own, model))
+        models.append(model)
+    return models
+
+
+def _is_list(value: object) -> bool:
+    return isinstance(value, list | tuple) or (isinstance(value, np.ndarray) and value.ndim == 1)

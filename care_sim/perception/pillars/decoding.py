@@ -1,0 +1,78 @@
+"""From what the network answers to boxes: peaks, the box that each tells of, one body a place."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter
+
+from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.types import CLASSES
+from care_sim.perception.pillars.box_kernels import one_a_place
+from care_sim.perception.pillars.plan import cell_centres
+
+MOST_PEAKS = 300
+"""The surest that are looked at; a street has 30 objects in range."""
+SMALLEST_M, LARGEST_M = 0.2, 25.0
+"""What a length, a width or a height may be, whatever was learned."""
+
+
+class Peaks(NamedTuple):
+    """Where a class is likelier than in the eight cells around, the surest first: `classes` (n,),
+    `logits` (n,) as the network has them, `scores` (n,) from 0 to 1, `boxes` (n, 7) in the sensor
+    frame.
+    """
+
+    classes: Integers
+    logits: Floats
+    scores: Floats
+    boxes: Floats
+
+    def take(self, rows: Integers | Mask) -> "Peaks":
+        """Some of them."""
+        return Peaks(self.classes[rows], self.logits[rows], self.scores[rows], self.boxes[rows])
+
+
+def peaks_of(
+    answer: NDArray[np.float32], sensor_height_m: float, calibration: Floats, least_score: float
+) -> Peaks:
+    """The peaks of an answer (OUTPUTS, CELLS, CELLS) of a network
+    (`care_sim.perception.pillars.network`) whose scores are `least_score` or more, one a place.
+
+    `calibration` (classes, 2) holds slopes and offsets from logits to those of scores.
+    """
+    sure = answer[: len(CLASSES)]
+    peak = sure == maximum_filter(sure, (1, 3, 3), mode="constant", cval=-np.inf)
+    classes, rows, columns = np.nonzero(peak)
+    logits = sure[classes, rows, columns].astype(np.float64)
+    scores = score(calibration, classes, logits)
+
+    # Stable, so that of equally sure ones the first class and the first cell come first.
+    order = np.argsort(-scores, kind="stable")[:MOST_PEAKS]
+    order = order[scores[order] >= least_score]
+    rows, columns = rows[order], columns[order]
+    boxes = _boxes(answer[len(CLASSES) :, rows, columns], rows, columns)
+    boxes[:, 2] -= sensor_height_m
+    return Peaks(classes[order], logits[order], scores[order], boxes).take(one_a_place(boxes))
+
+
+def score(calibration: Floats, classes: Integers, logits: Floats) -> Floats:
+    """(n,) the scores of `classes` (n,) with these `logits` (n,)."""
+    slopes, offsets = calibration[classes].T
+    # Beyond, the exponential would overflow, and the score is 0 or 1 to the last bit.
+    return np.asarray(1 / (1 + np.exp(-np.clip(slopes * logits + offsets, -700, 700))))
+
+
+def _boxes(told: NDArray[np.float32], rows: Integers, columns: Integers) -> Floats:
+    """(n, 7) with heights above the road, from BOX_OUTPUTS (10, n)."""
+    x, y, height, *log_sizes, cos, sin, cos2, sin2 = told.astype(np.float64)
+    middles_x, middles_y = cell_centres()
+    sizes = np.exp(np.clip(log_sizes, np.log(SMALLEST_M), np.log(LARGEST_M)))
+
+    # The axis, and of its two ways the one that the direction leans to.
+    yaw = np.arctan2(sin2, cos2) / 2
+    backwards = np.cos(yaw) * cos + np.sin(yaw) * sin < 0
+    yaw = np.where(backwards, yaw + np.where(yaw > 0, -np.pi, np.pi), yaw)
+    return np.stack(
+        [middles_x[rows, 0] + x, middles_y[0, columns] + y, height, *sizes, yaw], axis=1
+    )

@@ -1,0 +1,182 @@
+"""Train the learned detector: `care-sim train detector` makes the shipped weights from nothing.
+
+One process plays and another learns from what it plays, so nothing is kept on disk. Plays come in
+the order of their numbers, PyTorch computes in one thread, and seeds are fixed: the same machine
+makes the same bytes.
+"""
+
+import sys
+import time
+from collections import deque
+from collections.abc import Iterator
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from care_sim.base.bounds import bounded, check_fields
+from care_sim.base.checks import LARGEST_INTEGER
+from care_sim.base.extras import import_torch
+from care_sim.base.files import ZIP, check_output
+from care_sim.base.seed_ranges import TRAINING, VALIDATION
+from care_sim.base.torch_threads import one_thread
+from care_sim.perception.pillars.weights import CALIBRATION, save_detector
+from care_sim.study.executors import processes
+from care_sim.study.provenance import machine_line, package_versions
+from care_sim.training.detector_data import Example, play
+from care_sim.training.detector_score import calibration_of, judged, scores_by_scan
+from care_sim.training.detector_targets import Targets, loss, targets_of
+
+if TYPE_CHECKING:
+    from care_sim.training.detector_network import Learning
+
+BATCH = 4
+"""Scans per gradient."""
+LEARNING_RATE = 2e-3
+"""Of AdamW, at its highest, after a twentieth of the steps."""
+WEIGHT_DECAY = 0.01
+STEEPEST = 10.0
+"""The longest gradient; longer ones are shortened to it."""
+SHUFFLED = 512
+"""Examples from which a batch is drawn: those of some twenty plays, so that a batch holds several
+streets."""
+AHEAD = 4
+"""Plays that are under way before they are needed."""
+MOST_TURN = 0.4
+"""Radians by which a scan is turned for the learning, either way; every second one is mirrored,
+too. Generated streets are mostly straight."""
+CURVE_STEPS = 250
+"""Steps between two points of the curve that the card tells."""
+CALIBRATING = range(VALIDATION, VALIDATION + 24)
+HELD_OUT = range(VALIDATION + 24, VALIDATION + 48)
+"""Seeds of plays that nothing is learned from: those that scores are fitted to, and those by which
+the card tells what was reached."""
+
+
+@dataclass(frozen=True)
+class TrainDetector:
+    """Train the detector `pillars` on generated streets and drives and write its weights; needs the
+    extra `rl`.
+    """
+
+    out: Path
+    """File to write."""
+    seed: int = bounded(0, 0, LARGEST_INTEGER)
+    """Of the first weights and the order of the examples."""
+    steps: int = bounded(10_000, 1, 1_000_000)
+    """Batches of four scans that are learned from."""
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    def __call__(self) -> int:
+        """Run it."""
+        torch = import_torch()
+        from care_sim.training.detector_network import Learning
+
+        check_output(self.out, ZIP)
+        started = time.perf_counter()
+        with one_thread(torch), processes(1) as executor:
+            torch.manual_seed(self.seed)
+            network = Learning()
+            batches = _batches(played(executor, TRAINING), np.random.default_rng(self.seed))
+            curve = train_detector(torch, network, batches, self.steps)
+            network.eval()
+            fitted, apart = (
+                [example for examples in executor.map(play, seeds) for example in examples]
+                for seeds in (CALIBRATING, HELD_OUT)
+            )
+            calibration = calibration_of(scores_by_scan(torch, network, fitted))
+            result = judged(scores_by_scan(torch, network, apart, calibration))
+            executor.shutdown(cancel_futures=True)
+        arrays = network.arrays() | {CALIBRATION: calibration.astype(np.float32)}
+        save_detector(self.out, arrays, _card(self, network, curve, result))
+        told = ", ".join(f"{name} {value:.3f}" for name, value in result.items())
+        print(f"{self.out}: {told}; {time.perf_counter() - started:.0f} s")
+        return 0
+
+
+def train_detector(
+    torch: Any, network: "Learning", batches: Iterator[list[Example]], steps: int
+) -> list[float]:
+    """Let the network learn from so many batches. Returns the mean loss of every CURVE_STEPS."""
+    network.train()
+    optimizer = torch.optim.AdamW(network.parameters(), lr=LEARNING_RATE, weight_decay=WEIGHT_DECAY)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(
+        optimizer, LEARNING_RATE, total_steps=max(steps, 2), pct_start=0.05, cycle_momentum=False
+    )
+    losses: list[float] = []
+    for step, batch in zip(range(steps), batches, strict=False):
+        wanted = Targets(*map(torch.from_numpy, targets_of(batch)))
+        off = loss(torch, network(batch), wanted)
+        optimizer.zero_grad()
+        off.backward()
+        torch.nn.utils.clip_grad_norm_(network.parameters(), STEEPEST)
+        optimizer.step()
+        schedule.step()
+        losses.append(off.item())
+        lately = np.mean(losses[-CURVE_STEPS:])
+        told = f"step {step + 1} of {steps}, loss {lately:.3f}"
+        print(told, end="\r", file=sys.stderr, flush=True)
+    parts = [losses[n : n + CURVE_STEPS] for n in range(0, len(losses), CURVE_STEPS)]
+    return [round(float(np.mean(part)), 3) for part in parts]
+
+
+def played(executor: Executor, first: int) -> Iterator[Example]:
+    """The examples of the plays of seeds from `first` on, in order, without end."""
+    under_way = deque(executor.submit(play, first + number) for number in range(AHEAD))
+    while True:
+        first += 1
+        examples = under_way.popleft().result()
+        under_way.append(executor.submit(play, first + AHEAD - 1))
+        yield from examples
+
+
+def _batches(examples: Iterator[Example], rng: np.random.Generator) -> Iterator[list[Example]]:
+    """Batches of examples, turned, each drawn from SHUFFLED that wait."""
+    waiting = [next(examples) for _ in range(SHUFFLED)]
+    while True:
+        batch = []
+        for place in rng.choice(SHUFFLED, BATCH, replace=False).tolist():
+            batch.append(turned_example(waiting[place], rng))
+            waiting[place] = next(examples)
+        yield batch
+
+
+def turned_example(example: Example, rng: np.random.Generator) -> Example:
+    """The example as another way of the sensor would have it: mirrored or not, and turned."""
+    side = float(rng.choice([-1.0, 1.0]))
+    turn = float(rng.uniform(-MOST_TURN, MOST_TURN))
+    cos, sin = np.cos(turn), np.sin(turn)
+    matrix = np.array([[cos, -sin * side], [sin, cos * side]])
+    points, boxes = example.points.copy(), example.boxes.copy()
+    points[:, :2] = points[:, :2] @ matrix.T.astype(np.float32)
+    boxes[:, :2] = boxes[:, :2] @ matrix.T
+    boxes[:, 6] = side * boxes[:, 6] + turn
+    return Example(points, example.sensor_height_m, example.classes, boxes, example.full)
+
+
+def _card(
+    made: TrainDetector, network: "Learning", curve: list[float], result: dict[str, float]
+) -> dict[str, Any]:
+    numbers = sum(array.size for array in network.arrays().values())
+    return {
+        "kind": "pillars",
+        "network": f"{numbers} numbers",
+        "data": f"{made.steps * BATCH} scans of generated streets and drives, of "
+        "every budget, by the policies that know any grid; see care_sim.training.detector_data",
+        "seeds": {
+            "training from": TRAINING,
+            "calibration of scores": [CALIBRATING[0], CALIBRATING[-1]],
+            "held out": [HELD_OUT[0], HELD_OUT[-1]],
+            "training": made.seed,
+        },
+        "steps": made.steps,
+        "batch": BATCH,
+        "curve": curve,
+        "result": {name: round(value, 4) for name, value in result.items()},
+        "machine": machine_line(),
+        "versions": package_versions("care-sim", "numpy", "torch"),
+    }

@@ -1,0 +1,167 @@
+"""What the learned detector learns from: scans of generated streets and drives, and what stood in
+them.
+
+Truth is used here, at training, and nowhere else.
+
+- A play is one street or one drive under one seed. Policies play it at budgets, all drawn; an
+  example is a keyframe of it. What a detector would be handed is what the observation holds: the
+  ranges of the cells that fired.
+- A quarter of the plays fire every cell. The budgets of the others are drawn evenly by their
+  logarithm: a scan of a hundredth differs from one of a tenth as that does from the whole.
+- Noise of ranges and lost returns are drawn for every play. Streets have the default set-up, since
+  a film casts every cell of every keyframe; of drives half have another one.
+- Policies track what they find by the paper's proxy. So what they aim at does not hang on a
+  detector that is still to be trained.
+- An object counts from one return on. What has none cannot be told from nothing.
+"""
+
+from collections.abc import Iterator
+from contextlib import closing
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_sim.core.arrays import Floats, Integers
+from care_sim.core.belief import Belief
+from care_sim.core.grid_stack import Grid
+from care_sim.envs.closed_loop import ClosedLoopEnv
+from care_sim.envs.open_loop import FilmEnv
+from care_sim.perception.pillars.box_kernels import points_within
+from care_sim.perception.pillars.plan import REACH_M
+from care_sim.policies import make_policy
+from care_sim.sensors.annotated import Annotations
+from care_sim.sensors.setups import DEFAULT_SETUP
+from care_sim.sources.street_films import record
+from care_sim.streets.street import make_street
+
+POLICIES = (
+    "random", "history", "history-uniform", "uncertainty", "beam-reduce", "all-camera", "care",
+    "care-priority", "care-sbf", "care-spread", "care-sightlines", "care-sector", "care-units",
+    "rows", "fan", "stride", "sweep", "history-rows",
+)  # fmt: skip
+"""Those that come with the package and know any grid."""
+LEAST_BUDGET, MOST_BUDGET = 0.01, 0.6
+FULL_SHARE = 0.25
+"""Of plays in which every cell fires."""
+RANGE_SIGMAS_M = (0.0, 0.02, 0.05)
+DROPOUTS = (0.0, 0.05, 0.2)
+OTHER_SETUPS = ("m1-forward", "os1-64", "paper-vehicle", "roof-and-corners")
+PLAYS_OF_FILM = 3
+"""A film costs thirty times what a play of it does."""
+KEPT = 12
+"""Keyframes of a play that become examples, drawn: neighbours resemble each other."""
+DRIVE_KEYFRAME_S = 0.5
+"""As far apart as those of a street."""
+_ROUND_BOX_M = 0.2
+"""A box is taken so much larger on either side for its returns: noise of ranges."""
+_NO_RETURN_M = 1e-3
+"""A range this near to the reach is none."""
+
+
+@dataclass(frozen=True)
+class Example:
+    """A scan and what stands in it: `points` (P, 3) in the sensor frame, `classes` (n,), `boxes`
+    (n, 7); all objects within the plan that have a return. `full` says that every cell fired.
+    """
+
+    points: NDArray[np.float32]
+    sensor_height_m: float
+    classes: Integers
+    boxes: Floats
+    full: bool = False
+
+
+def play(seed: int) -> list[Example]:
+    """The examples of the street or the drive of a seed."""
+    rng = np.random.default_rng([seed, 21])
+    # Drawn, since the layouts of streets come in turn.
+    return [*(_street if rng.random() < 0.5 else _drive)(seed, rng)]
+
+
+def _street(seed: int, rng: np.random.Generator) -> Iterator[Example]:
+    film = record(make_street(seed))
+    for _ in range(PLAYS_OF_FILM):
+        with closing(FilmEnv(film, **_conditions(rng))) as env:
+            yield from _examples(env, seed, rng, len(film.shots))
+
+
+def _drive(seed: int, rng: np.random.Generator) -> Iterator[Example]:
+    other = rng.random() < 0.5
+    sensor = str(rng.choice(OTHER_SETUPS)) if other else DEFAULT_SETUP
+    told: dict[str, Any] = {"sensor": sensor, "keyframe_s": DRIVE_KEYFRAME_S}
+    with closing(_Drive(**told, **_conditions(rng))) as env:
+        keyframes = round(env.scenario.duration_s / DRIVE_KEYFRAME_S)
+        yield from _examples(env, seed, rng, keyframes)
+
+
+class _Drive(ClosedLoopEnv):
+    """The drive by itself, without the wrappers of `gymnasium.make`."""
+
+    scenario_name = "drive"
+
+
+def _conditions(rng: np.random.Generator) -> dict[str, Any]:
+    full = rng.random() < FULL_SHARE
+    low, high = np.log([LEAST_BUDGET, MOST_BUDGET])
+    drawn = float(np.exp(rng.uniform(low, high)))
+    return {
+        "budget": 1.0 if full else drawn,
+        "lidar_range_sigma": float(rng.choice(RANGE_SIGMAS_M)),
+        "lidar_dropout": float(rng.choice(DROPOUTS)),
+    }
+
+
+def _examples(
+    env: FilmEnv | ClosedLoopEnv, seed: int, rng: np.random.Generator, keyframes: int
+) -> Iterator[Example]:
+    full = env.rig.budget == env.rig.grid.size
+    policy = make_policy("full" if full else str(rng.choice(POLICIES)), env)
+    kept = set(rng.choice(keyframes, min(KEPT, keyframes), replace=False).tolist())
+    observation, _ = env.reset(seed=seed)
+    policy.reset()
+    for keyframe in range(max(kept) + 1):
+        # The truth of the scan is that of the time before the step, which moves the world on.
+        present = _present(env)
+        observation, _, terminated, truncated, _ = env.step(policy(observation))
+        if keyframe in kept:
+            ranges = Belief.from_observation(observation).ranges
+            points = scanned(env.rig.grid, ranges)
+            yield _example(points, env.rig.sensor_height_m, present, full)
+        if terminated or truncated:
+            break
+
+
+def _present(env: FilmEnv | ClosedLoopEnv) -> Annotations:
+    """Everything that perception reports, at the coming keyframe."""
+    if isinstance(env, FilmEnv):
+        return env.loop.shot.annotations
+    world, sensor = env.loop.world, env.loop.sensor
+    labels = world.labels()
+    bodies = np.array([*labels], np.int64)
+    boxes = sensor.boxes_to_local(world.boxes_of(bodies))
+    return Annotations(bodies, np.array([*labels.values()], np.int64), boxes)
+
+
+def scanned(grid: Grid, ranges: NDArray[np.float32]) -> Floats:
+    """(P, 3) the points of a range image (E, A): 0 where nothing fired, the reach where nothing
+    returned.
+    """
+    told = ranges.ravel().astype(np.float64)
+    cells = np.flatnonzero(told)
+    reach = np.broadcast_to(grid.reach_of(cells), cells.shape)
+    cells = cells[told[cells] < np.minimum(reach, grid.range_m) - _NO_RETURN_M]
+    return grid.points(cells, told[cells])
+
+
+def _example(points: Floats, sensor_height_m: float, present: Annotations, full: bool) -> Example:
+    boxes = present.boxes
+    larger = boxes + 2 * _ROUND_BOX_M * np.isin(np.arange(7), (3, 4, 5))
+    # The road beneath a body is no return of it.
+    standing = points[points[:, 2] > _ROUND_BOX_M - sensor_height_m]
+    returns = points_within(np.ascontiguousarray(standing), larger)
+    seen = (returns > 0) & (np.abs(boxes[:, :2]).max(axis=1, initial=0) < REACH_M)
+    return Example(
+        points.astype(np.float32), sensor_height_m, present.classes[seen], boxes[seen], full
+    )
