@@ -10,6 +10,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 from care_sim.base.processes import following, starting
 from care_sim.envs import CLOSED_LOOP, OPEN_LOOP, installed_ids, make_env
+from care_sim.envs.vector.env import CORES
 from care_sim.envs.wrappers.grid_observation import GridObservation
 from care_sim.envs.wrappers.sector_actions import SectorReserve, SectorScores
 from care_sim.envs.wrappers.vector_grid_observation import VectorGridObservation
@@ -21,6 +22,8 @@ from care_sim.training.seeds import TrainingSeeds, VectorTrainingSeeds
 if TYPE_CHECKING:
     from stable_baselines3.common.vec_env import VecEnv
 
+WORLDS_A_THREAD = 32
+"""With fewer, what a thread does once for all its worlds takes longer than what it saves."""
 ACTIONS = {wrapper.__name__: wrapper for wrapper in (SectorReserve, SectorScores)}
 VECTOR_ACTIONS = {
     wrapper.single.__name__: wrapper for wrapper in (VectorSectorReserve, VectorSectorScores)
@@ -92,6 +95,7 @@ def _plain_vectors(config: AgentConfig) -> list[AnyVector]:
                 "vector_entry_point",
                 autoreset_mode=AutoresetMode.DISABLED,
                 copy=False,
+                threads=_threads(config.environments),
                 **_arguments(config, budgets),
             )
         ]
@@ -104,6 +108,11 @@ def _plain_vectors(config: AgentConfig) -> list[AnyVector]:
         )
         for place in range(count)
     ]
+
+
+def _threads(worlds: int) -> int:
+    """Threads that pay for so many worlds, at most one for every core."""
+    return min(CORES, max(1, worlds // WORLDS_A_THREAD))
 
 
 def _budgets(config: AgentConfig) -> list[float]:

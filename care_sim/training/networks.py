@@ -11,7 +11,6 @@ from gymnasium import spaces
 from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from torch import Tensor, nn
-from torch.nn.functional import pad
 
 from care_sim.base.array_files import Arrays
 from care_sim.policies.learned.grid_features import EGO_INPUTS
@@ -35,7 +34,7 @@ class Window(nn.Module):
     ):
         super().__init__()
         self.shape = shape
-        self.beside = "circular" if goes_round else "constant"
+        self.goes_round = goes_round
         stride = shape[1] // sectors[0], shape[2] // sectors[1]
         self.window = nn.Conv2d(
             shape[0], hidden, (stride[0] + 2 * BLOCK_MARGIN, stride[1] + 2 * BLOCK_MARGIN), stride
@@ -43,16 +42,24 @@ class Window(nn.Module):
         self.ego = nn.Linear(len(EGO_INPUTS), hidden, bias=False)
         self.hidden = nn.Conv2d(hidden, hidden, 1)
 
-    def forward(self, ego: Tensor, grid: Tensor) -> Tensor:
-        """From ego (n, 4) and grid (n, channels * rows * columns)."""
+    def bordered(self, grid: Tensor) -> Tensor:
+        """(n, channels, rows + 2, columns + 2) the blocks of grid (n, channels * rows * columns),
+        with one more on each side.
+        """
+        channels, rows, columns = self.shape
+        blocks = grid.view(-1, *self.shape)
+        side = BLOCK_MARGIN
+        result = blocks.new_zeros((len(blocks), channels, rows + 2 * side, columns + 2 * side))
+        within = result[:, :, side:-side]
+        within[..., side:-side] = blocks
         # All round the car the columns go on over the seam; beyond the grid there is nothing.
-        wrapped = pad(
-            grid.view(-1, *self.shape), (BLOCK_MARGIN, BLOCK_MARGIN, 0, 0), mode=self.beside
-        )
-        seen = (
-            self.window(pad(wrapped, (0, 0, BLOCK_MARGIN, BLOCK_MARGIN)))
-            + self.ego(ego)[:, :, None, None]
-        )
+        if self.goes_round:
+            within[..., :side], within[..., -side:] = blocks[..., -side:], blocks[..., :side]
+        return result
+
+    def forward(self, ego: Tensor, blocks: Tensor) -> Tensor:
+        """From ego (n, 4) and `bordered` blocks."""
+        seen = self.window(blocks) + self.ego(ego)[:, :, None, None]
         return torch.relu(self.hidden(torch.relu(seen))).flatten(2)
 
 
@@ -78,17 +85,26 @@ class Windows(nn.Module):
 
     def forward(self, features: Tensor) -> tuple[Tensor, Tensor]:
         """The features of the actor and those of the critic."""
-        return self.forward_actor(features), self.forward_critic(features)
+        # Both look at the same blocks, with the same border.
+        ego, blocks = self._seen(features)
+        return self.actor(ego, blocks), self._valued(ego, blocks)
 
     def forward_actor(self, features: Tensor) -> Tensor:
         """(n, hidden, sectors)."""
-        result: Tensor = self.actor(*_parts(features))
+        result: Tensor = self.actor(*self._seen(features))
         return result
 
     def forward_critic(self, features: Tensor) -> Tensor:
         """(n, 2 * hidden)."""
-        ego, grid = _parts(features)
-        seen = self.critic(ego, grid)
+        return self._valued(*self._seen(features))
+
+    def _seen(self, features: Tensor) -> tuple[Tensor, Tensor]:
+        """The car's motion (n, 4) and the `bordered` blocks."""
+        inputs = len(EGO_INPUTS)
+        return features[:, :inputs], self.actor.bordered(features[:, inputs:])
+
+    def _valued(self, ego: Tensor, blocks: Tensor) -> Tensor:
+        seen = self.critic(ego, blocks)
         result: Tensor = self.valued(torch.cat([seen.mean(2), seen.amax(2), ego], 1))
         return result
 
@@ -117,7 +133,7 @@ class Joined(BaseFeaturesExtractor):
         )
 
     def forward(self, observation: dict[str, Tensor]) -> Tensor:
-        """The car's motion first, as `_parts` expects."""
+        """The car's motion first, as `Windows` expects."""
         return torch.cat([observation["ego"], observation["grid"]], 1)
 
 
@@ -140,7 +156,7 @@ class Sectored(BaseFeaturesExtractor):
     def forward(self, observation: dict[str, Tensor]) -> Tensor:
         """The car's motion, then four features per sector."""
         ego, grid = observation["ego"], observation["grid"]
-        return torch.cat([ego, self.window(ego, grid).flatten(1)], 1)
+        return torch.cat([ego, self.window(ego, self.window.bordered(grid)).flatten(1)], 1)
 
 
 class SectorPolicy(ActorCriticPolicy):
@@ -188,7 +204,3 @@ class SectorPolicy(ActorCriticPolicy):
         arrays["hidden.weight"] = arrays["hidden.weight"][:, :, 0, 0]
         arrays["place"] = arrays["place"].reshape(self._sectors)
         return arrays
-
-
-def _parts(features: Tensor) -> tuple[Tensor, Tensor]:
-    return features[:, : len(EGO_INPUTS)], features[:, len(EGO_INPUTS) :]

@@ -19,6 +19,7 @@ from stable_baselines3.common.vec_env.base_vec_env import (
 )
 
 from care_sim.base.errors import InvalidInput, shown
+from care_sim.base.vectors import attribute_of_each
 from care_sim.envs.wrappers.vectors import AnyVector
 
 Infos = list[dict[str, Any]]
@@ -31,8 +32,8 @@ class GymnasiumVecEnv(VecEnv):
     The worlds of several vector environments of the same spaces come in turn: with two vectors of
     three worlds each, 0, 2 and 4 are those of the first. Learners need the mode "SameStep" of
     `autoreset_mode`. In infos None may read NaN, as in all of Gymnasium's vectors. Attributes of a
-    world are those of its vector environment, which has no methods for one world alone. Raises
-    InvalidInput for other modes, sizes and spaces.
+    world are its own, or else those of its vector environment, which has no methods for one world
+    alone. Raises InvalidInput for other modes, sizes and spaces.
     """
 
     def __init__(self, *envs: AnyVector):
@@ -88,10 +89,12 @@ class GymnasiumVecEnv(VecEnv):
             env.close()
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """An attribute of the vector environment of every world, or of its wrappers: that of the
-        outermost which has it. Raises AttributeError for another.
+        """An attribute of every world: that of the outermost wrapper of its vector environment
+        which has it, or else its own. Raises AttributeError for another.
         """
-        return [_attribute(env, attr_name) for env in self._of(indices)]
+        each = [_attributes(env, attr_name) for env in self.envs]
+        count = len(self.envs)
+        return [each[world % count][world // count] for world in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
         """Set an attribute of the vector environments. Raises InvalidInput for some of the worlds
@@ -209,11 +212,17 @@ def _check(envs: Sequence[AnyVector]) -> None:
             )
 
 
-def _attribute(env: AnyVector, name: str) -> Any:
+def _attributes(env: AnyVector, name: str) -> list[Any]:
+    """An attribute of each world of a vector environment."""
     layer = env
-    while not hasattr(layer, name) and isinstance(layer, VectorWrapper):
+    while isinstance(layer, VectorWrapper):
+        if hasattr(layer, name):
+            return [getattr(layer, name)] * env.num_envs
         layer = layer.env
-    return getattr(layer, name)
+    try:
+        return attribute_of_each(layer, name)
+    except AttributeError:
+        return [getattr(layer, name)] * env.num_envs
 
 
 def _wrappers(env: AnyVector) -> list[type]:

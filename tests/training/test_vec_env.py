@@ -132,6 +132,10 @@ def test_attributes_and_wrappers_are_those_of_the_vectors():
     envs = GymnasiumVecEnv(first, second)
     assert [rig.budget for rig in envs.get_attr("rig")] == [492, 1638, 492]
     assert [rig.budget for rig in envs.get_attr("rig", [1])] == [1638]
+    (own := GymnasiumVecEnv(vector(budget=[0.1, 0.03]))).set_attr("mark", 5)
+    assert [rig.budget for rig in own.get_attr("rig")] == [1638, 492]
+    assert own.get_attr("mark") == [5, 5]
+    own.close()
     assert envs.get_attr("features", 0)[0] is first.features
     assert not envs.has_attr("wheels")
     envs.set_attr("mark", 3, [0, 2])

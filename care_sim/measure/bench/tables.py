@@ -75,7 +75,10 @@ def _batches(report: BenchReport) -> Table:
         "scoring_info=False: infos without what is for scoring alone, and rewards the same",
     ]
     if PPO in report["batches"]:
-        notes.append("PPO: by the recipe of the shipped weights, the updates included")
+        notes.append(
+            "PPO: by the recipe of the shipped weights, the updates included; answered at once, it "
+            "waits for no environment"
+        )
     if ENVPOOL in report["batches"]:
         notes.append(ENVPOOL_CONTAINS)
     return Table(

@@ -16,6 +16,8 @@ from care_sim.measure.bench.batches import ENVPOOL, WORLDS, batch_memory, row
 from care_sim.measure.bench.config import BenchConfig
 from care_sim.measure.bench.learning import PPO, RECIPE, learning
 from care_sim.policies.learned.weights import load_weights, shipped_weights
+from care_sim.training.config import PpoConfig
+from care_sim.training.environments import side_by_side
 
 TINY = BenchConfig(seconds=0.001, repeats=1, resets=1)
 
@@ -63,6 +65,21 @@ def test_what_is_not_installed_is_left_out_in_one_line(monkeypatch):
     figures, (line,) = learning(TINY)
     assert figures == {}
     assert line.startswith(f"{PPO}: ppo needs the extra 'rl': pip install 'care-sim[rl]'")
+
+
+def test_a_learner_that_is_answered_at_once_waits_for_one_step():
+    pytest.importorskip("stable_baselines3")
+    from care_sim.measure.bench.answered_at_once import AnsweredAtOnce
+
+    config = PpoConfig(environments=2, env_parameters=("duration_s=0.2",))
+    envs = AnsweredAtOnce(side_by_side(config))
+    envs.reset()
+    first, *others = (envs.step(np.zeros((2, 4, 32), np.float32)) for _ in range(5))
+    assert all(answer is first for answer in others)
+    # Of the real ones the second step ends the episodes.
+    assert not first[2].any()
+    assert envs.venv.step(np.zeros((2, 4, 32), np.float32))[2].all()
+    envs.close()
 
 
 @pytest.mark.slow
