@@ -11,7 +11,7 @@ from care_sim.core.arrays import Integers, Mask
 from care_sim.core.conditions import Conditions
 from care_sim.core.firing.free_cells import choose_demanded, list_chosen, top_up
 from care_sim.core.pcg64 import WordStreams, seed_stream, word_streams
-from care_sim.core.random_floor import draw_floor, floor_seed
+from care_sim.core.random_floor import FloorCells, draw_floor, floor_cells, floor_seed
 from care_sim.core.rig import Rig
 
 
@@ -27,6 +27,7 @@ class Choice:
         self._size = rig.grid.size
         self._streams = word_streams(worlds)
         self._drawn = np.full(worlds, -1)
+        self._floor = floor_cells(rig.grid.size)
         # A row has room for one cell more, which `list_chosen` may write over and over.
         self._fired = Fired(np.zeros(worlds, np.int64), np.zeros((worlds, most + 1), int))
 
@@ -42,8 +43,8 @@ class Choice:
         The tables are the same at every call, and hold its cells till the next.
         """
         flat = scores.reshape(len(scores), self._size)
-        told = flat, live, keyframes, self._budgets
-        _fire(*told, self._conditions.floor, self._streams, self._drawn, self._fired)
+        floor = self._conditions.floor, self._streams, self._drawn, self._floor
+        _fire(flat, live, keyframes, self._budgets, *floor, self._fired)
         return self._fired
 
 
@@ -56,13 +57,13 @@ def _fire(
     has_floor: bool,
     streams: WordStreams,
     drawn: Integers,
+    floor: FloorCells,
     fired: Fired,
 ) -> None:
     """Fill `fired`; see `Choice.fired`. `drawn` (W,) is the keyframe of the last floor that was
-    drawn in each world.
+    drawn in each world, `floor` (N,) room for one.
     """
     chosen = np.empty(scores.shape[1], np.bool_)
-    floor = np.empty(scores.shape[1], np.int32)
     for world in range(len(scores)):
         count, budget = 0, budgets[world]
         if live[world]:

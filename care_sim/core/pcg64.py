@@ -19,10 +19,8 @@ Wide: TypeAlias = tuple[np.uint64, np.uint64]
 
 _MULTIPLIER = 0x2360ED051FC65DA44385DF649FCCF645
 _LANES = 16
-"""States that go on side by side, each as many steps at a time. Compiled code computes several at
-once, and none of them waits for the product before."""
-_DRAWN = 1024
-"""Numbers of 64 bits that are drawn at a time, a multiple of `_LANES`."""
+"""States that go on side by side. Compiled code computes several at once, and none of them waits
+for the product before."""
 _32 = np.uint64(32)
 _58 = np.uint64(58)
 _63 = np.uint64(63)
@@ -32,12 +30,14 @@ _HALF = 2**64 - 1
 
 
 class WordStreams(NamedTuple):
-    """A stream of random words for each of W worlds: `states` (W, 4), the two halves of its state
-    and of its increment; the `numbers` (W, n) of 64 bits that were drawn last; their halves `words`
-    (W, 2 n) in the same memory, the lower one first; how many words are `used` (W,).
+    """A stream of random words for each of W worlds: `lanes` (W, 2, n), the upper and the lower
+    halves of n neighbouring states; `increments` (W, 2), the halves of what is added when all of
+    them leap over each other; the `numbers` (W, n) of 64 bits that were drawn last; their halves
+    `words` (W, 2 n) in the same memory, the lower one first; how many words are `used` (W,).
     """
 
-    states: NDArray[np.uint64]
+    lanes: NDArray[np.uint64]
+    increments: NDArray[np.uint64]
     numbers: NDArray[np.uint64]
     words: NDArray[np.uint32]
     used: Integers
@@ -45,18 +45,24 @@ class WordStreams(NamedTuple):
 
 def word_streams(worlds: int) -> WordStreams:
     """Streams that are yet to be seeded."""
-    numbers = np.zeros((worlds, _DRAWN), np.uint64)
+    numbers = np.zeros((worlds, _LANES), np.uint64)
     # Numba compiles for machines alone that keep the lower half first.
     words = numbers.view(np.uint32)
-    return WordStreams(np.zeros((worlds, 4), np.uint64), numbers, words, np.zeros(worlds, np.int64))
+    lanes = np.zeros((worlds, 2, _LANES), np.uint64)
+    increments = np.zeros((worlds, 2), np.uint64)
+    return WordStreams(lanes, increments, numbers, words, np.zeros(worlds, np.int64))
 
 
 def seed_stream(streams: WordStreams, world: int, seed: np.random.SeedSequence) -> None:
     """Begin the stream of a world as `numpy.random.PCG64(seed)` begins."""
     begun = np.random.PCG64(seed).state["state"]
-    # NumPy goes a step on before it takes a number; here the state is that of the number to come.
-    first = begun["state"] * _MULTIPLIER + begun["inc"]
-    streams.states[world] = [*_halves(first), *_halves(begun["inc"])]
+    state, increment = begun["state"], begun["inc"]
+    for lane in range(_LANES):
+        # NumPy goes a step on before it takes a number; here the states are those of the numbers
+        # to come.
+        state = state * _MULTIPLIER + increment
+        streams.lanes[world, :, lane] = _halves(state)
+    streams.increments[world] = _halves(increment * _INCREMENTS)
     streams.used[world] = streams.words.shape[1]
 
 
@@ -78,47 +84,38 @@ def _leap(steps: int) -> tuple[int, int]:
     return factor, increments
 
 
-_STEP = _limbs(_MULTIPLIER)
-_LEAP, _LEAP_INCREMENTS = map(_limbs, _leap(_LANES))
+_FACTOR, _INCREMENTS = _leap(_LANES)
+_LEAP = _limbs(_FACTOR)
 
 
 @compiled()
 def refill(streams: WordStreams, world: int) -> None:
     """Draw the next words of a world, as many as the table holds."""
-    state = streams.states[world]
+    upper, lower = streams.lanes[world, 0], streams.lanes[world, 1]
     numbers = streams.numbers[world]
-    increment = state[2], state[3]
-    nothing = increment[0] - increment[0]
-    plus = _product_and(increment, _LEAP_INCREMENTS, (nothing, nothing))
-
-    # The lanes begin with neighbouring numbers. After that each leaps over those of the others.
-    upper, lower = np.empty(_LANES, np.uint64), np.empty(_LANES, np.uint64)
-    now = state[0], state[1]
-    for lane in range(_LANES):
-        upper[lane], lower[lane] = now
-        now = _product_and(now, _STEP, increment)
-    for first in range(0, len(numbers), _LANES):
-        for lane in range(_LANES):
-            now = upper[lane], lower[lane]
-            # What a state gives is its halves in one, turned by as many bits as its first six say.
-            mixed, turn = now[0] ^ now[1], now[0] >> _58
-            numbers[first + lane] = mixed >> turn | mixed << (_64 - turn & _63)
-            upper[lane], lower[lane] = _product_and(now, _LEAP, plus)
-    state[0], state[1] = upper[0], lower[0]
+    increment = streams.increments[world, 0], streams.increments[world, 1]
+    # As many as there are lanes, which the compiler is not told: it would write out a loop of known
+    # length step by step, and then compute none of them together.
+    for lane in range(len(numbers)):
+        now = upper[lane], lower[lane]
+        # What a state gives is its halves in one, turned by as many bits as its first six say.
+        mixed, turn = now[0] ^ now[1], now[0] >> _58
+        numbers[lane] = mixed >> turn | mixed << (_64 - turn & _63)
+        upper[lane], lower[lane] = _product_and(now, _LEAP, increment)
     streams.used[world] = 0
 
 
 @compiled()
 def _product_and(number: Wide, factor: tuple[np.uint64, ...], addend: Wide) -> Wide:
     """The lowest 128 bits of a number, times a factor (`_limbs`), plus an addend."""
-    # Long multiplication of the lower halves, in digits of 32 bits: no product overflows.
+    # Long multiplication of the lower halves, in digits of 32 bits: no product overflows, nor does
+    # one with two more digits added to it.
     high, low = number[1] >> _32, number[1] & _LOWER
-    least, across = low * factor[3], low * factor[2]
+    least = low * factor[3] + (addend[1] & _LOWER)
     middle = high * factor[3] + (least >> _32)
-    carried = across + (middle & _LOWER)
+    carried = low * factor[2] + (middle & _LOWER) + (addend[1] >> _32)
     upper = high * factor[2] + (middle >> _32) + (carried >> _32)
 
     # Of what the upper halves add, only the lower half counts.
-    upper += number[1] * factor[0] + number[0] * factor[1]
-    lower = (carried << _32 | least & _LOWER) + addend[1]
-    return upper + addend[0] + np.uint64(lower < addend[1]), lower
+    upper += number[1] * factor[0] + number[0] * factor[1] + addend[0]
+    return upper, carried << _32 | least & _LOWER

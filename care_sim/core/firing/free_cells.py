@@ -67,12 +67,14 @@ def choose_demanded(scores: NDArray[np.float32], budget: int, chosen: Mask) -> i
     """Set in `chosen` (N,) whether a cell is one of the `budget` with the highest strictly positive
     `scores` (N,), of equals the lower one. Returns how many are.
     """
-    count = 0
+    # Counted as narrow as the scores are: as many of both are computed at once.
+    count = np.int32(0)
     for cell in range(len(scores)):
-        chosen[cell] = scores[cell] > 0
-        count += chosen[cell]
+        is_positive = scores[cell] > np.float32(0)
+        chosen[cell] = is_positive
+        count = np.int32(count + is_positive)
     if count <= budget:
-        return count
+        return int(count)
 
     # Bits of positive floats ascend as their values do.
     ranks = scores.view(np.int32)
