@@ -28,11 +28,7 @@ class Learning(nn.Module):
 
     def __init__(self) -> None:
         super().__init__()
-        made = {name: _module(layer) for name, layer in LAYERS.items()}
-        (answer,) = made["answer"]
-        with torch.no_grad():
-            answer.bias[: len(CLASSES)] = RARE
-        self.layers = nn.ModuleDict(made)
+        self.layers = nn.ModuleDict({name: _module(layer) for name, layer in LAYERS.items()})
         self._places = place_planes(torch)
 
     def forward(self, examples: list[Example]) -> Tensor:
@@ -67,7 +63,11 @@ def _module(layer: Layer) -> nn.Sequential:
         return nn.Sequential(nn.Linear(layer.inputs, layer.outputs), nn.ReLU())
     planes = layer.inputs, layer.outputs, layer.size, layer.stride, layer.size // 2
     if not layer.rectified:
-        return nn.Sequential(nn.Conv2d(*planes))
+        answer = nn.Conv2d(*planes)
+        bias = torch.zeros(layer.outputs)
+        bias[: len(CLASSES)] = RARE
+        answer.bias = nn.Parameter(bias)
+        return nn.Sequential(answer)
     return nn.Sequential(
         nn.Conv2d(*planes, bias=False), nn.BatchNorm2d(layer.outputs), nn.ReLU(inplace=True)
     )

@@ -1,4 +1,4 @@
-"""How sure the learned detector may be, and what it finds, on plays that nothing is learned from."""
+"""How sure the learned detector may be and what it finds, on plays that nothing is learned from."""
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 

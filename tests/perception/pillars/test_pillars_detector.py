@@ -1,0 +1,176 @@
+"""The detector around a network: what it takes, what it gives, what it refuses."""
+
+import pickle
+import zipfile
+
+import numpy as np
+import pytest
+
+from care_sim.base.array_files import write_arrays
+from care_sim.base.errors import InvalidInput, MissingExtra
+from care_sim.perception.detectors import make_detector
+from care_sim.perception.pillars import weights
+from care_sim.perception.pillars.detector import PillarsDetector
+from care_sim.perception.pillars.network import LAYERS, Fixed, answers, place_planes
+from care_sim.perception.pillars.plan import PILLARS, on_plan
+from care_sim.perception.points_only import PointsOnly, checked
+from tests.helpers.detector_weights import drawn_arrays, drawn_weights
+from tests.helpers.made_points import HEIGHT, road, shell
+
+torch = pytest.importorskip("torch")
+POINTS = np.concatenate([shell(8, 6, 0.4, 4.61, 1.95, 1.72), road()])
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    return drawn_weights(tmp_path_factory.mktemp("weights") / "drawn.npz")
+
+
+def test_it_is_made_by_name_and_reports_what_the_contract_allows(file):
+    made = make_detector("pillars", HEIGHT, file=file, least_score=0.0)
+    assert isinstance(made, PointsOnly)
+    found = PillarsDetector(file, least_score=0.0).detect(POINTS, HEIGHT)
+    assert 0 < len(checked("pillars", found, len(POINTS))) <= 300
+    assert (np.diff(found.scores) <= 0).all()
+    assert len(PillarsDetector(file, least_score=1.0).detect(POINTS, HEIGHT)) == 0
+
+
+def test_a_scan_without_returns_is_no_error(file):
+    found = PillarsDetector(file, least_score=0.0).detect(np.empty((0, 3)), HEIGHT)
+    assert not found.returns.any()
+
+
+def test_the_order_of_the_points_does_not_matter_but_for_last_bits(file):
+    detector = PillarsDetector(file)
+    shuffled = np.random.default_rng(0).permutation(POINTS)
+    one, other = (detector.answer(points, HEIGHT) for points in (POINTS, shuffled))
+    assert np.allclose(one, other, atol=1e-4)
+
+
+def test_only_the_height_above_the_road_and_the_sensor_enter_not_the_points_off_the_plan(file):
+    detector = PillarsDetector(file)
+    far = np.concatenate([POINTS, [[70.0, 0, 0], [10, 10, 9], [0.5, 0.5, -0.2]]])
+    assert np.array_equal(detector.answer(POINTS, HEIGHT), detector.answer(far, HEIGHT))
+    assert not np.array_equal(detector.answer(POINTS, HEIGHT), detector.answer(POINTS, HEIGHT + 1))
+
+
+def test_scans_of_a_batch_do_not_see_each_other():
+    network, places = Fixed(torch, drawn_arrays()), place_planes(torch)
+    seen = [on_plan(points, HEIGHT) for points in (POINTS, POINTS[::3] * 1.01)]
+    together = answers(
+        torch,
+        network,
+        torch.from_numpy(np.concatenate([one.inputs for one in seen])),
+        torch.from_numpy(np.concatenate([seen[0].pillars, seen[1].pillars + PILLARS**2])),
+        places,
+        scans=2,
+    )
+    for number, one in enumerate(seen):
+        alone = answers(
+            torch, network, torch.from_numpy(one.inputs), torch.from_numpy(one.pillars), places
+        )
+        assert torch.allclose(alone[0], together[number], atol=1e-4)
+
+
+def test_the_threads_of_pytorch_are_given_back_and_do_not_matter(file):
+    detector, before = PillarsDetector(file), torch.get_num_threads()
+    made = []
+    for threads in (1, 2):
+        torch.set_num_threads(threads)
+        made.append(detector.answer(POINTS, HEIGHT))
+        assert torch.get_num_threads() == threads
+    torch.set_num_threads(before)
+    assert np.array_equal(*made)
+
+
+@pytest.mark.parametrize("points", [np.zeros((3, 2)), np.array([[1.0, np.nan, 0.0]])])
+def test_points_that_are_none_are_refused(file, points):
+    with pytest.raises(InvalidInput, match="points must be"):
+        PillarsDetector(file).detect(points, HEIGHT)
+
+
+@pytest.mark.parametrize("score", [-0.1, 1.5, "sure"])
+def test_a_score_beyond_its_bounds_is_refused(file, score):
+    with pytest.raises(InvalidInput, match="least_score"):
+        PillarsDetector(file, least_score=score)
+
+
+def test_without_pytorch_the_extra_is_named(file, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "torch", None)
+    with pytest.raises(MissingExtra, match=r"care-sim\[rl\]"):
+        make_detector("pillars", HEIGHT, file=file)
+
+
+def test_without_shipped_weights_the_command_that_makes_them_is_named(monkeypatch, tmp_path):
+    monkeypatch.setattr(weights, "SHIPPED", tmp_path / "none.npz")
+    with pytest.raises(InvalidInput, match=r"`care-sim train detector --out FILE`") as refused:
+        make_detector("pillars", HEIGHT)
+    assert "\n" not in str(refused.value)
+
+
+def missing(path):
+    path.unlink()
+
+
+def torn(path):
+    path.write_bytes(path.read_bytes()[:-2000])
+
+
+def text(path):
+    path.write_text("not weights")
+
+
+def pickled(path):
+    path.write_bytes(pickle.dumps(drawn_arrays()))
+
+
+def objects(path):
+    np.savez(path, card=np.array([{"format": weights.FORMAT}], object))
+
+
+def lacking(path):
+    arrays = drawn_arrays()
+    del arrays["body0.bias"]
+    weights.save_detector(path, arrays, {})
+
+
+def of_another_shape(path):
+    weights.save_detector(path, drawn_arrays() | {"body0.bias": np.zeros(3)}, {})
+
+
+def not_finite(path):
+    weights.save_detector(path, drawn_arrays() | {"body0.bias": np.full(64, np.inf)}, {})
+
+
+def turned_round(path):
+    weights.save_detector(path, drawn_arrays() | {weights.CALIBRATION: -np.ones((5, 2))}, {})
+
+
+def of_another_format(path):
+    write_arrays(path, drawn_arrays(), '{"format": "care-sim weights 1"}')
+
+
+def too_large(path):
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("card.npy", bytes(2**27))
+
+
+SPOILT = [
+    missing, torn, text, pickled, objects, lacking, of_another_shape, not_finite, turned_round,
+    of_another_format, too_large,
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("spoil", SPOILT)
+def test_a_wrong_file_is_refused_in_one_line_that_names_it(tmp_path, spoil):
+    path = drawn_weights(tmp_path / "spoilt.npz")
+    spoil(path)
+    with pytest.raises(InvalidInput, match=r"spoilt\.npz") as refused:
+        make_detector("pillars", HEIGHT, file=path)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_file_holds_the_numbers_of_every_layer():
+    shapes = weights.array_shapes()
+    assert len(shapes) == 2 * len(LAYERS) + 1
+    assert 5e5 < sum(np.prod(shape) for shape in shapes.values()) < 1.5e6

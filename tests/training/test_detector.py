@@ -1,0 +1,141 @@
+"""The training of the learned detector: it learns, and makes the same bytes again."""
+
+from concurrent.futures import ThreadPoolExecutor
+from itertools import repeat
+
+import numpy as np
+import pytest
+
+from care_sim.cli import main
+from care_sim.perception.pillars.detector import PillarsDetector
+from care_sim.perception.pillars.network import Fixed, answers, place_planes
+from care_sim.perception.pillars.plan import on_plan
+from care_sim.perception.pillars.weights import load_detector
+from care_sim.training import detector
+from care_sim.training.detector_data import Example
+from care_sim.training.detector_score import PLAIN, Judged, Peaks, calibration_of, right
+from tests.helpers.made_points import HEIGHT, road, shell
+
+torch = pytest.importorskip("torch")
+from care_sim.training.detector_network import Learning  # noqa: E402 (it needs PyTorch)
+
+
+def street(seed):
+    """Two cars on a road."""
+    rng = np.random.default_rng(seed)
+    places = [
+        (side * rng.uniform(6, 20), rng.uniform(-9, 9), rng.uniform(-3, 3)) for side in (1, -1)
+    ]
+    bodies = [shell(x, y, yaw, 4.6, 1.9, 1.7) for x, y, yaw in places]
+    points = np.concatenate([road(reach=24), *bodies]).astype(np.float32)
+    boxes = np.array([[x, y, 0.85 - HEIGHT, 4.6, 1.9, 1.7, yaw] for x, y, yaw in places])
+    return [Example(points, HEIGHT, np.array([0, 0]), boxes, full=seed % 2 == 0)]
+
+
+def test_it_learns_where_a_car_stands():
+    with detector.one_thread(torch):
+        torch.manual_seed(0)
+        network = Learning()
+        curve = detector.train_detector(torch, network, repeat(street(0)), 25)
+    assert len(curve) == 1
+    network.eval()
+    (judged,) = detector.scores_by_scan(torch, network, street(0))
+    surest = judged.peaks.take(np.arange(2))
+    assert surest.classes.tolist() == [0, 0]
+    assert judged.right[:2].all()
+
+
+def test_what_was_learned_acts_alike_once_it_is_fixed():
+    network = Learning()
+    network.train()
+    for seed in range(2):
+        network(street(seed))
+    network.eval()
+    seen = on_plan(street(5)[0].points.astype(float), HEIGHT)
+    fixed = answers(
+        torch,
+        Fixed(torch, network.arrays()),
+        torch.from_numpy(seen.inputs),
+        torch.from_numpy(seen.pillars),
+        place_planes(torch),
+    )
+    with torch.no_grad():
+        assert torch.allclose(network(street(5)), fixed, atol=1e-3)
+
+
+def trained(path, monkeypatch, *options):
+    monkeypatch.setattr(detector, "processes", ThreadPoolExecutor)
+    monkeypatch.setattr(detector, "play", street)
+    monkeypatch.setattr(detector, "SHUFFLED", 6)
+    monkeypatch.setattr(detector, "CALIBRATING", range(2))
+    monkeypatch.setattr(detector, "HELD_OUT", range(2, 4))
+    with pytest.raises(SystemExit) as end:
+        main(["train", "detector", "--out", str(path), *options])
+    return end.value.code
+
+
+def test_the_command_writes_the_same_file_again_with_its_card(tmp_path, monkeypatch, capsys):
+    one, two, other = (tmp_path / "new" / name for name in ("one.npz", "two.npz", "three.npz"))
+    for path, seed in ((one, "3"), (two, "3"), (other, "4")):
+        assert trained(path, monkeypatch, "--steps", "2", "--seed", seed) == 0
+    assert one.read_bytes() == two.read_bytes() != other.read_bytes()
+    _, card = load_detector(one)
+    assert (card["kind"], card["steps"], card["seeds"]["training"]) == ("pillars", 2, 3)
+    assert len(card["curve"]) == 1
+    assert f"{one}: recall, all scans" in capsys.readouterr().out
+    PillarsDetector(one).detect(road(), HEIGHT)
+
+
+def test_plays_come_in_order_whatever_they_take(monkeypatch):
+    monkeypatch.setattr(detector, "play", street)
+    with ThreadPoolExecutor(3) as executor:
+        examples = detector.played(executor, 7)
+        taken = [next(examples) for _ in range(9)]
+    for one, seed in zip(taken, range(7, 16), strict=True):
+        assert np.array_equal(one.boxes, street(seed)[0].boxes)
+
+
+def test_a_scan_turns_with_what_stands_in_it():
+    rng = np.random.default_rng(0)
+    for _ in range(6):
+        (before,) = street(3)
+        after = detector.turned_example(before, rng)
+        for old, new in zip(before.boxes, after.boxes, strict=True):
+            corner = 2.3 * np.array([np.cos(new[6]), np.sin(new[6])])
+            near = np.hypot(*(after.points[:, :2] - new[:2] - corner).T).min()
+            was = 2.3 * np.array([np.cos(old[6]), np.sin(old[6])])
+            assert near == pytest.approx(
+                np.hypot(*(before.points[:, :2] - old[:2] - was).T).min(), abs=1e-4
+            )
+
+
+def peaks(logits, places):
+    boxes = np.array([[x, 0, -1, 4.6, 1.9, 1.7, 0] for x in places], float)
+    logits = np.array(logits, float)
+    return Peaks(np.zeros(len(logits), np.int64), logits, 1 / (1 + np.exp(-logits)), boxes)
+
+
+def test_an_object_is_served_once_by_the_surest_near_it():
+    boxes = np.array([[10.0, 0, -1, 4.6, 1.9, 1.7, 0], [20.0, 0, -1, 4.6, 1.9, 1.7, 0]])
+    example = Example(np.empty((0, 3)), HEIGHT, np.array([0, 4]), boxes)
+    assert right(peaks([3, 2, 1], [11.5, 10, 20]), example).tolist() == [True, False, False]
+
+
+def test_scores_become_the_share_that_is_right():
+    rng = np.random.default_rng(0)
+    logits = rng.normal(0, 2, 4000)
+    hits = rng.random(4000) < 1 / (1 + np.exp(-(0.5 * logits - 1)))
+    fitted = calibration_of([Judged(peaks(logits, np.zeros(4000)), hits, 4000, True)])
+    assert fitted[0] == pytest.approx([0.5, -1], abs=0.15)
+    assert np.array_equal(fitted[1:], PLAIN[1:])
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [(("--steps", "0"), "steps must be a whole number"), (("--sead", "0"), "--sead")],
+)
+def test_bad_options_are_refused_in_one_line(tmp_path, monkeypatch, capsys, options, message):
+    assert trained(tmp_path / "w.npz", monkeypatch, *options) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
