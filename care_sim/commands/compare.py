@@ -148,7 +148,8 @@ def _recorded(configs: Sequence[AnyConfig], record: Path | None) -> Iterator[Cal
     if record is None:
         yield lambda _name, env, _policy: env
         return
-    with recording(record, [config.policy for config in configs]) as shared:
+    open_loop = isinstance(configs[0], PlayConfig)
+    with recording(record, [config.policy for config in configs], open_loop) as shared:
         yield lambda name, env, policy: RecordRerun(env, shared, policy, name)
 
 
