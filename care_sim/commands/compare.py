@@ -7,23 +7,30 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, cast
 
 import tyro
 
 from care_sim.base.errors import InvalidInput, report_problems
+from care_sim.commands.shared.one_scene import SceneOptions, is_source, scene_plays
 from care_sim.commands.shared.options import DEFAULT_OPTIONS, Options
 from care_sim.commands.shared.selection import playable
 from care_sim.commands.shared.study_command import DONE, FAILED, console
 from care_sim.envs.wrappers.record_rerun import RecordRerun, recording
+from care_sim.loops.film import Film
 from care_sim.reports.episodes.clips import Clip
+from care_sim.reports.episodes.scene_timeline import LABELS, outcome_text
 from care_sim.reports.episodes.timeline import text
 from care_sim.reports.table import Table
 from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.episode_play import GymEnv, result_or_reason, trace
+from care_sim.study.play_config import PlayConfig
 from care_sim.study.run_config import Row
+from care_sim.study.scene_trace import trace_scene
 from care_sim.viewer.pictures.comparison import draw_panel
+from care_sim.viewer.pictures.scene_comparison import draw_scene_panel
 
+AnyConfig = EpisodeConfig | PlayConfig
 _COLUMNS = {
     "detection_distance_m": "detected at (to actor) m",
     "braked": "braked",
@@ -36,7 +43,7 @@ _COLUMNS = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Compare:
+class Compare(SceneOptions):
     """Play one seed under several policies, side by side.
 
     Play the same seed under several policies and print their outcomes side by side.
@@ -44,7 +51,8 @@ class Compare:
 
     scenario: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCENARIO")]
     """dartout, dense, cutin, ncap, r157, drive, that of an installed package, or MODULE:CLASS;
-    `care-sim scenarios` lists their parameters.
+    `care-sim scenarios` lists their parameters. For the open loop street, argoverse2:FOLDER,
+    nuscenes:FOLDER, or another of `care-sim sources`.
     """
     policies: tuple[str, ...] = ("history", "care")
     """Names of `care-sim policies`; `all` stands for all but the controls. `full` always runs with
@@ -68,31 +76,43 @@ class Compare:
         """Run it."""
         common = self.conditions.arguments(self.policies)
 
-        def made(names: Sequence[str]) -> list[EpisodeConfig]:
-            return grid([self.scenario], names, [self.budget], [self.seed], **common)
-
+        made = self._plays(common) if is_source(self.scenario) else self._episodes(common)
         policies, left_out = playable(self.policies, lambda name: made([name]))
         if not policies:
             raise InvalidInput("none of the policies can be played")
         failures = play_side_by_side(made(policies), self.record, self.video)
         return FAILED if left_out or failures else DONE
 
+    def _episodes(self, common: dict[str, Any]) -> Callable[[Sequence[str]], list[EpisodeConfig]]:
+        """What makes the episodes of policies, in the closed loop."""
+        self.check_unused()
+        return lambda names: grid([self.scenario], names, [self.budget], [self.seed], **common)
+
+    def _plays(self, common: dict[str, Any]) -> Callable[[Sequence[str]], list[PlayConfig]]:
+        """What makes the plays of policies, in a scene of the open loop."""
+        source = self.source(self.scenario, self.conditions.sensor)
+        scene = self.scene_of(source, self.seed)
+        return lambda names: scene_plays(source, scene, names, self.budget, common)
+
 
 def play_side_by_side(
-    configs: Sequence[EpisodeConfig], record: Path | None = None, video: Path | None = None
+    configs: Sequence[AnyConfig], record: Path | None = None, video: Path | None = None
 ) -> list[str]:
     """Play episodes one after the other, into one recording and one film where files are given, and
     print their outcomes. A line for each that failed is printed too, and returned.
     """
-    film = Clip(video, draw_panel)
+    film = Clip(video, draw_scene_panel if isinstance(configs[0], PlayConfig) else draw_panel)
+    # All plays of a scene meet its one film.
+    shown = configs[0].film() if isinstance(configs[0], PlayConfig) else None
     answers: list[Row | str] = []
     try:
         with _recorded(configs, record) as wrapped:
 
-            def played(config: EpisodeConfig) -> Row:
-                return trace(
-                    config, film.episode(config.policy), wrap=partial(wrapped, config.policy)
-                )[0]
+            def played(config: AnyConfig) -> Row:
+                watch, wrap = film.episode(config.policy), partial(wrapped, config.policy)
+                if isinstance(config, PlayConfig):
+                    return trace_scene(config, cast(Film, shown), watch, wrap=wrap).row
+                return trace(config, watch, wrap=wrap)[0]
 
             for config in configs:
                 # One by one, so that an interrupt leaves those that were played.
@@ -107,7 +127,7 @@ def play_side_by_side(
     return failures
 
 
-def _report(configs: Sequence[EpisodeConfig], answers: Sequence[Row | str]) -> list[str]:
+def _report(configs: Sequence[AnyConfig], answers: Sequence[Row | str]) -> list[str]:
     # Answers are fewer than configurations where an interrupt came between.
     told = [*zip(configs, answers, strict=False)]
     rows = [(config, row) for config, row in told if not isinstance(row, str)]
@@ -121,25 +141,33 @@ def _report(configs: Sequence[EpisodeConfig], answers: Sequence[Row | str]) -> l
 
 
 @contextmanager
-def _recorded(
-    configs: Sequence[EpisodeConfig], record: Path | None
-) -> Iterator[Callable[..., GymEnv]]:
+def _recorded(configs: Sequence[AnyConfig], record: Path | None) -> Iterator[Callable[..., GymEnv]]:
     """A function of the policy's name, an environment and its policy, which returns the environment
     under the recording; the environment as it is where there is no recording.
     """
     if record is None:
         yield lambda _name, env, _policy: env
         return
-    with recording(record, [config.policy for config in configs]) as shared:
+    open_loop = isinstance(configs[0], PlayConfig)
+    with recording(record, [config.policy for config in configs], open_loop) as shared:
         yield lambda name, env, policy: RecordRerun(env, shared, policy, name)
 
 
-def _outcome_table(played: Sequence[tuple[EpisodeConfig, Row]]) -> Table:
+def _outcome_table(played: Sequence[tuple[AnyConfig, Row]]) -> Table:
     """One line per episode."""
     config = played[0][0]
+    if isinstance(config, PlayConfig):
+        title, told, written = config.scene.name, LABELS, outcome_text
+    else:
+        title, told = f"{config.scenario} seed {config.seed}", _COLUMNS
+        written = _text_of
     lines = [
-        (config.policy, f"{config.budget:.4g}", *(text(row[name]) for name in _COLUMNS))
+        (config.policy, f"{config.budget:.4g}", *(written(row, name) for name in told))
         for config, row in played
     ]
-    columns = ("policy", "budget", *_COLUMNS.values())
-    return Table(f"{config.scenario} seed {config.seed}", columns, tuple(lines), whole=columns)
+    columns = ("policy", "budget", *told.values())
+    return Table(title, columns, tuple(lines), whole=columns)
+
+
+def _text_of(row: Row, name: str) -> str:
+    return text(row[name])

@@ -7,24 +7,29 @@ from typing import Annotated
 
 import tyro
 
+from care_sim.base.errors import InvalidInput
+from care_sim.commands.shared.one_scene import SceneOptions, is_source, scene_plays
 from care_sim.commands.shared.options import DEFAULT_OPTIONS, Options
 from care_sim.commands.shared.study_command import console
 from care_sim.envs.wrappers.export_scans import ExportScans
 from care_sim.envs.wrappers.record_rerun import RecordRerun
 from care_sim.policies.base import Policy
-from care_sim.reports.episodes.clips import BrakePhoto, Clip
+from care_sim.reports.episodes.clips import BrakePhoto, Clip, draw_scene
+from care_sim.reports.episodes.scene_timeline import print_scene_timeline
 from care_sim.reports.episodes.timeline import print_timeline
 from care_sim.study.episode_config import grid
 from care_sim.study.episode_play import GymEnv, trace
+from care_sim.study.scene_trace import trace_scene
 
 
 @dataclass(frozen=True, kw_only=True)
-class Run:
+class Run(SceneOptions):
     """Play one episode and print its timeline and outcome."""
 
     scenario: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCENARIO")]
     """dartout, dense, cutin, ncap, r157, drive, that of an installed package, or MODULE:CLASS;
-    `care-sim scenarios` lists their parameters.
+    `care-sim scenarios` lists their parameters. For the open loop street, argoverse2:FOLDER,
+    nuscenes:FOLDER, or another of `care-sim sources`.
     """
     policy: str = "care"
     """`care-sim policies` lists them. `full` always runs with budget 1.0."""
@@ -48,6 +53,9 @@ class Run:
 
     def __call__(self) -> int:
         """Run it."""
+        if is_source(self.scenario):
+            return self._play_scene()
+        self.check_unused()
         # Made as a grid of one, the configuration gets what `full` needs, as in a study.
         axes = ([self.scenario], [self.policy], [self.budget], [self.seed])
         (config,) = grid(*axes, **self.conditions.arguments([self.policy]))
@@ -61,6 +69,25 @@ class Run:
             console(),
         )
         photographer.report()
+        film.write()
+        return 0
+
+    def _play_scene(self) -> int:
+        """The same of a scene of the open loop."""
+        for name in ("picture", "export"):
+            if getattr(self, name) is not None:
+                raise InvalidInput(
+                    f"--{name} has no meaning in the open loop, in which no car acts"
+                )
+        given = self.conditions.arguments([self.policy])
+        source = self.source(self.scenario, self.conditions.sensor)
+        scene = self.scene_of(source, self.seed)
+        (config,) = scene_plays(source, scene, [self.policy], self.budget, given)
+        if config.budget != self.budget:
+            print("full fires every cell, whatever the budget", file=sys.stderr)
+        film = Clip(self.video, draw_scene)
+        played = trace_scene(config, config.film(), film.episode(self.policy), wrap=self._watched)
+        print_scene_timeline(config, played, console())
         film.write()
         return 0
 

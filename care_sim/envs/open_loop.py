@@ -24,6 +24,7 @@ from care_sim.evaluation.recall import SceneScore
 from care_sim.evaluation.sightings import ANNOTATED, Sightings, check_presence
 from care_sim.loops.film import Film
 from care_sim.loops.open_loop import OpenLoop, OpenLoopKeyframe
+from care_sim.loops.scene_records import SceneKeyframe
 from care_sim.loops.seeds import SensorSeeds
 from care_sim.perception import matching
 from care_sim.perception.detectors import PROXY
@@ -66,7 +67,7 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
     | `objects` | how many annotated objects are within 50 m | scoring alone |
     | `found` | how many of them were found at this keyframe | scoring alone |
     | `seed`, `scene` | from `reset`: they repeat the episode, so they tell all | scoring alone |
-    | `outcome` | at the end: a dict of `care_sim.evaluation.recall.Tally` | scoring alone |
+    | `outcome` | at the end: a dict of `care_sim.evaluation.recall.SceneOutcome` | scoring alone |
 
     ### Arguments
     `budget` beta in (0, 1]; `render_mode` None or "rgb_array"; `secret` and `scoring_info` as in
@@ -124,6 +125,14 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         """What was found of the scene; complete once the episode is over."""
         return SceneScore.of(self._sightings, self._masks)
 
+    @property
+    def last(self) -> SceneKeyframe:
+        """The last keyframe, with what it found. Truth: for scoring and people."""
+        record, seen = self.keyframes[-1], self._sightings
+        shot = self.loop.film.shots[record.index]
+        scored, appearing = seen.scored(record.index), seen.appearing(record.index)
+        return SceneKeyframe(shot.time_s, record, self._masks[-1], scored, appearing)
+
     def _start(self, film: Film, seed: int) -> tuple[Observed, dict[str, Any]]:
         """Begin an episode over a film.
 
@@ -162,7 +171,7 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         own = {**self._scan_info(fired), "time_s": shot.time_s}
         info = self._info_of(own, {"objects": len(scored), "found": int(scored.sum())})
         if self._over:
-            info["outcome"] = asdict(self.score.tally())
+            info["outcome"] = asdict(self.score.outcome())
         # A keyframe without annotated objects misses none of them.
         reward = float(scored.mean()) - 1.0 if len(scored) else 0.0
         return self.observed(), reward, False, self._over, info
@@ -174,11 +183,14 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         """
         if self.render_mode is None:
             return None
-        record = self.keyframes[-1] if self.keyframes else None
-        index = record.index if record else self.loop.index
-        found = self._masks[-1] if self._masks else np.zeros(len(self.loop.shot.annotations), bool)
-        seen = self._sightings
-        return draw_plan(self.loop, index, record, found, seen.scored(index), seen.appearing(index))
+        if self.keyframes:
+            return draw_plan(self.loop, self.last)
+        index, seen = self.loop.index, self._sightings
+        nothing = np.zeros(len(self.loop.shot.annotations), bool)
+        before = SceneKeyframe(
+            self.loop.shot.time_s, None, nothing, seen.scored(index), seen.appearing(index)
+        )
+        return draw_plan(self.loop, before)
 
 
 class FilmEnv(OpenLoopEnv):

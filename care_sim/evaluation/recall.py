@@ -50,6 +50,20 @@ class Tally:
 
 
 @dataclass(frozen=True)
+class SceneOutcome:
+    """How a play of a scene ended: `first_sightings` events and `object_frames` in range, the
+    shares of them that were found, at the first sighting and at all, 0 to 1, and `ttfd_keyframes`,
+    the mean time to first detection of the events. None where there is nothing to find.
+    """
+
+    first_sightings: int
+    first_sighting_recall: float | None
+    ttfd_keyframes: float | None
+    object_frames: int
+    overall_recall: float | None
+
+
+@dataclass(frozen=True)
 class SceneScore:
     """What a policy found of a scene.
 
@@ -99,6 +113,17 @@ class SceneScore:
         sums = counted.sum(), self.found[events][counted].sum(), self.delays[counted].sum()
         return Tally(*map(float, (*sums, rows.sum(), self.found[rows].sum())))
 
+    def outcome(self) -> SceneOutcome:
+        """Recalls and the mean TTFD, of all events and object frames alike."""
+        sums = self.tally()
+        return SceneOutcome(
+            int(sums.events),
+            _share(sums.sighted, sums.events),
+            _share(sums.delay, sums.events),
+            int(sums.frames),
+            _share(sums.found, sums.frames),
+        )
+
     def event_rows(self) -> list[dict[str, Any]]:
         """One row per event: where and what it was, whether it was found at once, its TTFD and its
         chances.
@@ -119,6 +144,10 @@ class SceneScore:
             {"scene": self.sightings.scene, **dict(zip(columns, row, strict=True))}
             for row in values
         ]
+
+
+def _share(part: float, whole: float) -> float | None:
+    return part / whole if whole else None
 
 
 def score_scene(

@@ -58,6 +58,9 @@ class OpenLoop:
     """All that a policy may know when it chooses the cells."""
     told: Told
     """What the returns of the last keyframe told besides their ranges."""
+    last_ranges: NDArray[np.float32]
+    """(E, A) the scan of the last keyframe in metres: 0 not fired, maximum range without a return.
+    """
 
     def __init__(
         self,
@@ -88,7 +91,8 @@ class OpenLoop:
         self._held: Cells = np.empty(0, np.int64)
         self.index = 0
         self.told = {}
-        self._look(np.zeros(rig.grid.shape, np.float32))
+        self.last_ranges = np.zeros(rig.grid.shape, np.float32)
+        self._look(self.last_ranges)
 
     @property
     def over(self) -> bool:
@@ -119,8 +123,9 @@ class OpenLoop:
         # After the last keyframe there is nothing to look at, and no cells are to be chosen.
         self.index += 1
         self._memory.predict()
+        self.last_ranges = self._range_image(fired, cloud)
         if not self.over:
-            self._look(self._range_image(fired, cloud))
+            self._look(self.last_ranges)
         return OpenLoopKeyframe(index, fired, detections, velocities)
 
     def true_boxes(self, tracks: Tracks) -> Floats:

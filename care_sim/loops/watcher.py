@@ -65,7 +65,7 @@ class TrueSituation:
     """(7,) the box of the car."""
     way: Floats
     """(n, 3) world poses on the car's way, the middles of n equal pieces of `WAY_M` metres from the
-    sensor on; one piece where no route bends it.
+    sensor on; one piece where no route bends it, none in the open loop.
     """
     names: tuple[str, ...]
     """(n,) of all actors."""
@@ -86,8 +86,8 @@ class TrueSituation:
 
 
 @dataclass(frozen=True)
-class WatchedKeyframe:
-    """A keyframe with all that is true about it."""
+class Watched:
+    """A keyframe of either loop with all that is true about it."""
 
     situation: TrueSituation
     """How things stood before it."""
@@ -95,8 +95,6 @@ class WatchedKeyframe:
     """(E, A) the share of the budget of each cell, a place in `care_sim.core.actions.SHARES`."""
     ranges: NDArray[np.float32]
     """(E, A) the scan in metres: 0 not fired, maximum range without a return."""
-    record: Keyframe
-    """For the scoring."""
 
     def returned(self, grid: Grid) -> tuple[Cells, Floats]:
         """The cells (n,) that returned, ascending, and the points (n, 3), sensor frame."""
@@ -104,6 +102,14 @@ class WatchedKeyframe:
         # Neither not fired (0) nor without return (the reach).
         cells = np.flatnonzero((ranges > 0) & (ranges < grid.range_m))
         return cells, grid.points(cells, ranges[cells].astype(np.float64))
+
+
+@dataclass(frozen=True)
+class WatchedKeyframe(Watched):
+    """One of the closed loop."""
+
+    record: Keyframe
+    """For the scoring."""
 
 
 def _way(world: World, sensor_x: float) -> Floats:

@@ -42,6 +42,11 @@ def source_of(text: str, **options: object) -> Source:
         raise
 
 
+def source_name(text: str) -> str:
+    """The name or place of a source, without the folder behind it, whether there is one or not."""
+    return _parted(text)[0]
+
+
 def replayed_source(text: str, **options: object) -> Source:
     """The same, of what `CARE-Replay-v0` plays: all but `streets`, which have their own."""
     name = _parted(text)[0] if isinstance(text, str) else ""

@@ -91,7 +91,7 @@ class ScenePlayer:
             "version": care_sim.__version__,
             "digest": config.digest(),
             "film_hash": self._film_hash,
-            "episode_hash": _episode_hash(record.keyframes),
+            "episode_hash": play_hash(record.keyframes),
             "keyframes": len(record.keyframes),
             **asdict(score.tally()),
             **_strata(score),
@@ -213,7 +213,8 @@ def _strata(score: SceneScore) -> Row:
     }
 
 
-def _episode_hash(keyframes: Sequence[OpenLoopKeyframe]) -> str:
+def play_hash(keyframes: Sequence[OpenLoopKeyframe]) -> str:
+    """A hash over what was fired and detected."""
     content = hashlib.sha256()
     for record in keyframes:
         content.update(

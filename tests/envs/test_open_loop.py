@@ -99,19 +99,22 @@ def test_it_documents_itself_and_travels(make):
     assert again.unwrapped.rig.budget == env.unwrapped.rig.budget == 3277
 
 
-def test_an_episode_shows_every_keyframe_once_and_ends_with_the_tally(make):
+def test_an_episode_shows_every_keyframe_once_and_ends_with_the_recalls(make):
     env = make(budget=0.1)
     infos, rewards = played(env, "care")
     film = env.unwrapped.loop.film
     assert [info["time_s"] for info in infos] == [shot.time_s for shot in film.shots]
     assert all(len(set(info["fired"].tolist())) == 1638 for info in infos)
     outcome = infos[-1]["outcome"]
-    assert outcome["frames"] == sum(info["objects"] for info in infos)
-    assert outcome["found"] == sum(info["found"] for info in infos)
+    objects, found = (sum(info[name] for info in infos) for name in ("objects", "found"))
+    assert (outcome["object_frames"], outcome["overall_recall"]) == (objects, found / objects)
     assert rewards == [
         info["found"] / info["objects"] - 1 if info["objects"] else 0.0 for info in infos
     ]
-    assert 0 < outcome["sighted"] <= outcome["events"]
+    tally = env.unwrapped.score.tally()
+    assert outcome["first_sightings"] == tally.events > 0
+    assert 0 < outcome["first_sighting_recall"] == tally.sighted / tally.events <= 1
+    assert outcome["ttfd_keyframes"] == tally.delay / tally.events
     with pytest.raises(gymnasium.error.ResetNeeded, match="over"):
         env.step(NOTHING)
 
@@ -134,13 +137,15 @@ def test_the_person_at_the_house_is_the_one_event_and_the_camera_finds_it(replay
     for policy, budget in (("history", 0.05), ("care", 0.05), ("full", 1.0)):
         infos, _ = played(replay(budget=budget), policy)
         outcomes[policy] = infos[-1]["outcome"]
-    assert {outcome["events"] for outcome in outcomes.values()} == {1.0}
-    assert [outcomes[policy]["sighted"] for policy in ("history", "care", "full")] == [
+    assert {outcome["first_sightings"] for outcome in outcomes.values()} == {1}
+    assert [
+        outcomes[policy]["first_sighting_recall"] for policy in ("history", "care", "full")
+    ] == [
         0.0,
         1.0,
         1.0,
     ]
-    assert outcomes["history"]["delay"] > outcomes["care"]["delay"] == 0
+    assert outcomes["history"]["ttfd_keyframes"] > outcomes["care"]["ttfd_keyframes"] == 0
 
 
 def test_who_waits_hidden_from_the_start_is_an_event_by_presence_visible_alone(tmp_path):
@@ -159,9 +164,9 @@ def test_who_waits_hidden_from_the_start_is_an_event_by_presence_visible_alone(t
         infos, rewards = played(env, "full")
         outcomes[presence] = infos[-1]["outcome"]
         assert rewards == [0.0] * 3, "what is scored is the same"
-    assert outcomes["annotated"]["events"] == 0.0
-    assert (outcomes["visible"]["events"], outcomes["visible"]["sighted"]) == (1.0, 1.0)
-    assert {outcome["frames"] for outcome in outcomes.values()} == {5.0}
+    # Without an event there is no recall of events.
+    assert list(outcomes["annotated"].values()) == [0, None, None, 5, 1.0]
+    assert list(outcomes["visible"].values()) == [1, 1.0, 0.0, 5, 1.0]
     with pytest.raises(InvalidInput, match="presence must be 'annotated' or 'visible', got 'seen'"):
         gymnasium.make("CARE-Replay-v0", source=f"argoverse2:{log}", presence="seen")
 

@@ -96,7 +96,7 @@ class ExportScans(Watching):
     def keep(self, watched: WatchedKeyframe) -> None:
         """Write the two files of a keyframe."""
         stem = f"{watched.record.index:03d}"
-        cells, points = watched.returned(self._closed_loop.rig.grid)
+        cells, points = watched.returned(self._inner.rig.grid)
         self._write_cloud(
             self._folder / f"{stem}.pcd", points, cells, watched.shares.ravel()[cells]
         )
@@ -109,7 +109,7 @@ class ExportScans(Watching):
     def _describe(self, outcome: Mapping[str, Any] | None) -> None:
         content = {
             "units": _UNITS_NOTE,
-            "grid": asdict(self._closed_loop.rig.grid),
+            "grid": asdict(self._inner.rig.grid),
             "classes": CLASSES,
             "shares": SHARES,
             "outcome": outcome,

@@ -12,13 +12,17 @@ from care_sim.base.checks import check_path
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.extras import import_rerun
 from care_sim.core.types import Action
+from care_sim.envs.closed_loop import ClosedLoopEnv
+from care_sim.envs.open_loop import OpenLoopEnv
 from care_sim.envs.wrappers.watching import Watching, numbered
 from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.loops.film_watcher import WatchedScene
+from care_sim.loops.open_loop import OpenLoop
 from care_sim.loops.watcher import WatchedKeyframe
 from care_sim.policies.base import Policy
 
 if TYPE_CHECKING:
-    from care_sim.viewer.recording.recording import RecordedEpisode, Recording
+    from care_sim.viewer.recording.recording import RecordedEpisode, RecordedScene, Recording
 
 
 def _recording_class() -> "type[Recording]":
@@ -33,16 +37,17 @@ def _recording_class() -> "type[Recording]":
     return Recording
 
 
-def recording(path: Path, lanes: Sequence[str]) -> "Recording":
+def recording(path: Path, lanes: Sequence[str], open_loop: bool = False) -> "Recording":
     """A file for several episodes, which `RecordRerun` takes in the place of a path; to be closed.
 
-    `lanes` are the names of the episodes. Raises as `RecordRerun` does.
+    `lanes` are the names of the episodes, all of the closed or of the open loop.
+    Raises as `RecordRerun` does.
     """
-    return _recording_class()(path, lanes)
+    return _recording_class()(path, lanes, open_loop)
 
 
 class RecordRerun(Watching):
-    """Records every episode for the Rerun viewer: `care-sim view FILE`.
+    """Records every episode, of either loop, for the Rerun viewer: `care-sim view FILE`.
 
     The first episode becomes `path`, later ones `NAME-1.rrd`, `NAME-2.rrd` beside it. An episode
     that is left before its end is kept as far as it was played. A file appears whole or not at all,
@@ -61,7 +66,7 @@ class RecordRerun(Watching):
     does the page "About" of the recording. Timelines are `keyframe` and `seconds`.
 
     Raises `care_sim.MissingExtra` without the extra `viewer`, `care_sim.InvalidInput` for an
-    environment that is no closed loop of CARE-Sim and for a file that is a folder or is being
+    environment that is no loop of CARE-Sim and for a file that is a folder or is being
     written already, OSError where it cannot be written.
 
     ### Example
@@ -73,6 +78,9 @@ class RecordRerun(Watching):
         env.step(policy(observation))  # and so on, until terminated or truncated
     ```
     """
+
+    watches = "a loop"
+    kinds = (ClosedLoopEnv, OpenLoopEnv)
 
     def __init__(
         self,
@@ -89,21 +97,23 @@ class RecordRerun(Watching):
         self._path = Path(fspath(path)) if isinstance(path, str | PathLike) else None
         self._recording = None if isinstance(path, str | PathLike) else path
         self._name = name or (policy.name if policy is not None else "") or "agent"
-        self._episode: RecordedEpisode | None = None
+        self._episode: RecordedEpisode | RecordedScene | None = None
 
-    def begin(self, loop: ClosedLoop, episode: int) -> None:
+    def begin(self, loop: ClosedLoop | OpenLoop, episode: int) -> None:
         """Open the file of this episode, or its lane in a file that was given."""
         if self._path is not None:
-            self._recording = recording(numbered(self._path, episode), [self._name])
+            self._recording = recording(
+                numbered(self._path, episode), [self._name], isinstance(loop, OpenLoop)
+            )
         assert self._recording is not None
         self._episode = self._recording.episode(self._name, loop)
 
-    def look(self, loop: ClosedLoop) -> None:
+    def look(self, loop: ClosedLoop | OpenLoop) -> None:
         """Take the camera's picture."""
         if self._episode is not None:
             self._episode.look(loop)
 
-    def keep(self, watched: WatchedKeyframe) -> None:
+    def keep(self, watched: WatchedKeyframe | WatchedScene) -> None:
         """Log the keyframe."""
         if self._episode is not None:
             self._episode.keep(watched)

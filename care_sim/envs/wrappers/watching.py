@@ -3,60 +3,66 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import gymnasium
 
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.types import Action
 from care_sim.envs.closed_loop import ClosedLoopEnv
-from care_sim.loops.closed_loop import ClosedLoop
-from care_sim.loops.watcher import EpisodeWatcher, WatchedKeyframe
+from care_sim.envs.open_loop import OpenLoopEnv
+from care_sim.loops.film_watcher import FilmWatcher
+from care_sim.loops.watcher import EpisodeWatcher
 from care_sim.policies.base import Policy
 
 
 class Watching(gymnasium.Wrapper[Any, Action, Any, Action], ABC):
-    """Records the keyframes of the closed loop under it.
+    """Records the keyframes of the loop under it.
 
     It may stand around or inside wrappers that change the action. With the `policy` that acts, the
     shares of exploitation and reserve are known. Of raw actions it is only known what was chosen
     and what the floor filled up.
 
-    Raises InvalidInput for an environment that is no closed loop of CARE-Sim.
+    Raises InvalidInput for an environment that is none of those that it `watches`.
     """
+
+    watches: ClassVar[str] = "the closed loop"
+    """Which loops of CARE-Sim."""
+    kinds: ClassVar[tuple[type[gymnasium.Env[Any, Any]], ...]] = (ClosedLoopEnv,)
+    """Their environments."""
 
     def __init__(self, env: gymnasium.Env[Any, Action], policy: Policy | None = None):
         inner = getattr(env, "unwrapped", None)
         name = type(self).__name__
-        if not (isinstance(env, gymnasium.Env) and isinstance(inner, ClosedLoopEnv)):
-            raise InvalidInput(f"{name} watches the closed loop of CARE-Sim, got {shown(env)}")
+        if not (isinstance(env, gymnasium.Env) and isinstance(inner, self.kinds)):
+            raise InvalidInput(f"{name} watches {self.watches} of CARE-Sim, got {shown(env)}")
         if not isinstance(policy, Policy | None):
             raise InvalidInput(
                 f"policy of {name} must be a care_sim.Policy or None, got {shown(policy)}"
             )
         super().__init__(env)
-        self._closed_loop = inner
+        self._inner: Any = inner
         self._policy = policy
-        self._watcher: EpisodeWatcher | None = None
+        self._watcher: Any = None
         self._begun = False
         self._episodes = 0
 
     @abstractmethod
-    def begin(self, loop: ClosedLoop, episode: int) -> None:
+    def begin(self, loop: Any, episode: int) -> None:
         """An episode begins, number `episode` from 0: its first keyframe is about to be played."""
 
-    def look(self, loop: ClosedLoop) -> None:
+    def look(self, loop: Any) -> None:
         """A keyframe is about to be played."""
 
     @abstractmethod
-    def keep(self, watched: WatchedKeyframe) -> None:
+    def keep(self, watched: Any) -> None:
         """A keyframe was played."""
 
     @abstractmethod
     def end(self, outcome: Mapping[str, Any] | None) -> None:
         """The episode is over.
 
-        `outcome` has the fields of `care_sim.loops.records.Outcome`; None for one that was left.
+        `outcome` is that of `info`; None for one that was left.
         """
 
     def reset(
@@ -65,16 +71,15 @@ class Watching(gymnasium.Wrapper[Any, Action, Any, Action], ABC):
         """Begin an episode. One that was left before its end is closed as it is."""
         self._leave(None)
         answer = super().reset(seed=seed, options=options)
-        self._watcher = EpisodeWatcher(
-            self._closed_loop.loop, self._closed_loop.conditions.camera_confidence
-        )
+        watcher = FilmWatcher if isinstance(self._inner, OpenLoopEnv) else EpisodeWatcher
+        self._watcher = watcher(self._inner.loop, self._inner.conditions.camera_confidence)
         return answer
 
     def step(self, action: Action) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """Play a keyframe and keep its record."""
         if self._watcher is None:
             return super().step(action)
-        loop = self._closed_loop.loop
+        loop = self._inner.loop
         # Not at the reset: one that is followed by another reset leaves no empty file.
         if not self._begun:
             self.begin(loop, self._episodes)
@@ -85,11 +90,9 @@ class Watching(gymnasium.Wrapper[Any, Action, Any, Action], ABC):
         self.look(loop)
         observation, reward, terminated, truncated, info = super().step(action)
         demand = self._policy.demanded if self._policy is not None else None
-        self.keep(
-            self._watcher.watched(
-                situation, self._closed_loop.acted, demand, self._closed_loop.keyframes[-1]
-            )
-        )
+        inner = self._inner
+        record = inner.last if isinstance(inner, OpenLoopEnv) else inner.keyframes[-1]
+        self.keep(self._watcher.watched(situation, inner.acted, demand, record))
         if terminated or truncated:
             self._leave(info.get("outcome"))
         return observation, reward, terminated, truncated, info

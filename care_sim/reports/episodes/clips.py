@@ -6,28 +6,38 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from itertools import zip_longest
 from pathlib import Path
+from typing import Any
 
 from PIL import Image
 
 from care_sim.base.files import PNG, check_output, replacing
 from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.loops.open_loop import OpenLoop
 from care_sim.loops.records import Keyframe
-from care_sim.study.episode_play import Watcher
+from care_sim.loops.scene_records import SceneKeyframe
 from care_sim.viewer.pictures.clip_files import check_clip, write_clip
 from care_sim.viewer.pictures.drawing import BACKGROUND
 from care_sim.viewer.pictures.keyframe import draw_keyframe
+from care_sim.viewer.pictures.scene_from_above import draw_plan
 
 _LAST_PICTURE_S = 2.5
 """Seconds for which the last picture stays."""
 _GAP = 8
 
-Draw = Callable[[str, ClosedLoop, Sequence[Keyframe]], Image.Image]
-"""Draws where a loop stands after its keyframes so far, under the name of its policy."""
+Draw = Callable[[str, Any, Sequence[Any]], Image.Image]
+"""Draws where a loop, closed or open, stands after its keyframes so far, under the name of its
+policy.
+"""
 
 
 def draw_whole(_name: str, loop: ClosedLoop, frames: Sequence[Keyframe]) -> Image.Image:
     """The picture of an episode on its own."""
     return Image.fromarray(draw_keyframe(loop, frames[-1]))
+
+
+def draw_scene(_name: str, loop: OpenLoop, frames: Sequence[SceneKeyframe]) -> Image.Image:
+    """The picture of a play of the open loop on its own."""
+    return Image.fromarray(draw_plan(loop, frames[-1]))
 
 
 class Clip:
@@ -44,13 +54,13 @@ class Clip:
         if path is not None:
             check_clip(path)
 
-    def episode(self, name: str) -> Watcher:
+    def episode(self, name: str) -> Callable[[Any, Any], None]:
         """What watches the next episode, of the policy `name`."""
-        frames: list[Keyframe] = []
+        frames: list[Keyframe | SceneKeyframe] = []
         film: list[Image.Image] = []
         self._films.append(film)
 
-        def watch(loop: ClosedLoop, frame: Keyframe) -> None:
+        def watch(loop: ClosedLoop | OpenLoop, frame: Keyframe | SceneKeyframe) -> None:
             if self._path is not None:
                 # Episodes of one clip have the same keyframe, because they meet the same world.
                 self._keyframe_s = loop.rig.keyframe_s

@@ -6,8 +6,10 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
+from care_sim.core.grid_stack import Grid
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.evaluation.metrics import outcome
 from care_sim.loops.closed_loop import ClosedLoop
@@ -21,7 +23,7 @@ from care_sim.viewer.pictures.sought import DETECTED, HIT, IN_VIEW, contact_text
 _VIEW_SIZE = (512, 320)
 _CAMERA = PinholeCamera(*_VIEW_SIZE, np.deg2rad(52.0), (-11.0, 0.0, 3.8), 0.0, np.deg2rad(-11.0))
 _TOP = 36
-_CELLS_SIZE = (512, 96)
+CELLS_SIZE = (512, 96)
 """Of the picture of any grid: three pixels a row for the paper's."""
 _APART = 4
 """Pixels between the pictures of two LiDARs."""
@@ -48,7 +50,7 @@ def draw_panel(name: str, loop: ClosedLoop, frames: Sequence[Keyframe]) -> Image
         FAINT_INK,
         drawing.font(14),
     )
-    canvas.paste(_cells_ahead(loop), (0, _GRID_TOP))
+    canvas.paste(cells_ahead(loop.rig.grid, loop.belief.ranges), (0, _GRID_TOP))
     contact = contact_text(loop, frames[-1])
     text, colour = (contact, HIT.colour) if contact else verdict_text(frames, loop.rig.keyframe_s)
     draw.text((8, _COMPARISON_HEIGHT - 26), text, colour, drawing.font(16))
@@ -74,13 +76,12 @@ def _chase_view(loop: ClosedLoop, frame: Keyframe) -> Image.Image:
     return view
 
 
-def _cells_ahead(loop: ClosedLoop) -> Image.Image:
-    """The columns of the front half, from its left to its right; several LiDARs one below the
-    other.
+def cells_ahead(grid: Grid, ranges: NDArray[np.floating]) -> Image.Image:
+    """The columns of the front half of a scan (E, A), from its left to its right; several LiDARs
+    one below the other.
     """
-    grid = loop.rig.grid
-    width, height = _CELLS_SIZE
-    cells = Image.new("RGB", _CELLS_SIZE, BACKGROUND)
+    width, height = CELLS_SIZE
+    cells = Image.new("RGB", CELLS_SIZE, BACKGROUND)
     tops = np.linspace(0, height + _APART, len(grid.heads) + 1).astype(int).tolist()
     for head, (upper, below) in zip(grid.heads, pairwise(tops), strict=True):
         azimuths = head.grid.azimuths
@@ -88,7 +89,7 @@ def _cells_ahead(loop: ClosedLoop) -> Image.Image:
         ahead = ahead[np.abs(azimuths[ahead]) < np.pi / 2]
         if len(ahead):
             first, last = head.rows
-            picture = drawing.grid_picture(grid, loop.belief.ranges[first : last + 1, ahead])
+            picture = drawing.grid_picture(grid, ranges[first : last + 1, ahead])
             cells.paste(drawing.fitted(picture, (width, below - _APART - upper)), (0, upper))
     return cells
 

@@ -10,7 +10,8 @@ from care_sim.core.arrays import Floats, Mask
 from care_sim.core.boxes import box_corners
 from care_sim.core.firing.shots import shots_by_cell
 from care_sim.evaluation.sightings import RANGE_M
-from care_sim.loops.open_loop import OpenLoop, OpenLoopKeyframe
+from care_sim.loops.open_loop import OpenLoop
+from care_sim.loops.scene_records import SceneKeyframe
 from care_sim.sensors.annotated import Cloud
 from care_sim.viewer.pictures import drawing
 from care_sim.viewer.pictures.drawing import BACKGROUND, FAINT_INK, INK
@@ -24,9 +25,9 @@ from care_sim.viewer.pictures.keyframe import (
 from care_sim.world.bodies import CATALOGUE
 
 _TOP = 40
-_MAP_SIZE = (PICTURE_WIDTH, 460)
-_BOTTOM = _TOP + _MAP_SIZE[1]
-_PIXELS_PER_M = _MAP_SIZE[1] / (2 * RANGE_M + 4)
+MAP_SIZE = (PICTURE_WIDTH, 460)
+_BOTTOM = _TOP + MAP_SIZE[1]
+_PIXELS_PER_M = MAP_SIZE[1] / (2 * RANGE_M + 4)
 _RINGS = (10.0, 20.0, 30.0, 40.0, RANGE_M)
 """Radii of the range rings, metres."""
 _CAR = np.array([0.0, 0.0, 0.0, *CATALOGUE["ego"].size, 0.0])
@@ -46,41 +47,37 @@ _PLAN_LEGEND = (
 )
 
 
-def draw_plan(
-    loop: OpenLoop,
-    index: int,
-    record: OpenLoopKeyframe | None,
-    found: Mask,
-    scored: Mask,
-    appearing: Mask,
-) -> NDArray[np.uint8]:
-    """A picture (PICTURE_HEIGHT, PICTURE_WIDTH, 3) of keyframe `index` of a film from above, the
-    car driving to the right.
+def draw_plan(loop: OpenLoop, keyframe: SceneKeyframe) -> NDArray[np.uint8]:
+    """A picture (PICTURE_HEIGHT, PICTURE_WIDTH, 3) of a keyframe of a film from above, the car
+    driving to the right.
 
-    It shows the annotated objects (n,), which are `found`, not found, or beyond the range that is
-    `scored`; those `appearing` have a double line. It shows the returns of the fired cells and,
-    below, the angular grid with their ranges. `record` is None before the first scan. The episode
-    is left as it was.
+    It shows the annotated objects, which are found, not found, or beyond the range that is scored;
+    those that appear have a double line. It shows the returns of the fired cells and, below, the
+    angular grid with their ranges. The episode is left as it was.
     """
-    shot = loop.film.shots[index]
-    returned = _returned(shot.cloud, record, loop.rig.grid.size)
     canvas = Image.new("RGB", (PICTURE_WIDTH, PICTURE_HEIGHT), BACKGROUND)
-    draw = ImageDraw.Draw(canvas)
+    canvas.paste(map_from_above(loop, keyframe), (0, _TOP))
+    _write_words(ImageDraw.Draw(canvas), loop, keyframe)
+    draw_grid(canvas, (GRID_LEFT, PANELS_TOP), loop.rig.grid, ranges_of(loop, keyframe))
+    return np.asarray(canvas)
+
+
+def map_from_above(loop: OpenLoop, keyframe: SceneKeyframe) -> Image.Image:
+    """The part of the picture that shows the scene, `MAP_SIZE` pixels, the car in the middle."""
+    shot = loop.film.shots[keyframe.index]
     colours = [
         FOUND_COLOUR if one else MISSED_COLOUR if near else _OUT_OF_RANGE_COLOUR
-        for one, near in zip(found, scored, strict=True)
+        for one, near in zip(keyframe.found, keyframe.scored, strict=True)
     ]
-    canvas.paste(_map(shot.annotations.boxes, colours, appearing, returned.points), (0, _TOP))
-    _write_words(draw, loop, shot.time_s, record, int(found[scored].sum()), int(scored.sum()))
-    draw_grid(canvas, (GRID_LEFT, PANELS_TOP), loop.rig.grid, _ranges(loop, returned, record))
-    return np.asarray(canvas)
+    points = _returned(loop, keyframe).points
+    return _map(shot.annotations.boxes, colours, keyframe.appearing, points)
 
 
 def _map(
     boxes: Floats, colours: Sequence[drawing.Colour], appearing: Mask, points: Floats
 ) -> Image.Image:
     """Range rings, points (P, 3), the car and boxes (n, 7) with their colours."""
-    picture = Image.new("RGB", _MAP_SIZE, BACKGROUND)
+    picture = Image.new("RGB", MAP_SIZE, BACKGROUND)
     draw = ImageDraw.Draw(picture)
     for metres in _RINGS:
         (left, top), (right, bottom) = _pixels(
@@ -103,23 +100,16 @@ def _map(
     return picture
 
 
-def _write_words(
-    draw: ImageDraw.ImageDraw,
-    loop: OpenLoop,
-    time_s: float,
-    record: OpenLoopKeyframe | None,
-    found: int,
-    objects: int,
-) -> None:
+def _write_words(draw: ImageDraw.ImageDraw, loop: OpenLoop, keyframe: SceneKeyframe) -> None:
     budget, counted = loop.rig.budget, loop.rig.hardware.counted
     fired = (
         f"nothing fired yet, budget {budget} {counted}s"
-        if record is None
-        else f"{len(record.fired)} of {budget} {counted}s fired"
+        if keyframe.fired is None
+        else f"{len(keyframe.fired)} of {budget} {counted}s fired"
     )
     for x, text in (
-        (12, f"{time_s:.1f} s"),
-        (110, f"{found} of {objects} objects found"),
+        (12, f"{keyframe.time_s:.1f} s"),
+        (110, f"{keyframe.objects_found} of {keyframe.objects} objects found"),
         (420, fired),
     ):
         draw.text((x, 8), text, INK, drawing.font(20))
@@ -144,26 +134,26 @@ def _draw_box(draw: ImageDraw.ImageDraw, box: Floats, colour: drawing.Colour, wi
 
 def _pixels(places: Floats) -> Floats:
     """(n, 2) map pixels of places (n, 2) in the sensor frame: ahead is right, left is up."""
-    pixels: Floats = np.array(_MAP_SIZE) / 2 + places * [_PIXELS_PER_M, -_PIXELS_PER_M]
+    pixels: Floats = np.array(MAP_SIZE) / 2 + places * [_PIXELS_PER_M, -_PIXELS_PER_M]
     return pixels
 
 
-def _returned(cloud: Cloud, record: OpenLoopKeyframe | None, size: int) -> Cloud:
-    """The returns of the cells that fired, of a grid of that size."""
-    if record is None:
+def _returned(loop: OpenLoop, keyframe: SceneKeyframe) -> Cloud:
+    """The returns of the cells that fired."""
+    cloud = loop.film.shots[keyframe.index].cloud
+    if keyframe.fired is None:
         return cloud.take(np.zeros(len(cloud), bool))
-    fired, shots = shots_by_cell(record.fired, size)
+    fired, shots = shots_by_cell(keyframe.fired, loop.rig.grid.size)
     return cloud.take(np.isin(cloud.cells, fired)).to_shots(shots)
 
 
-def _ranges(
-    loop: OpenLoop, returned: Cloud, record: OpenLoopKeyframe | None
-) -> NDArray[np.float64]:
+def ranges_of(loop: OpenLoop, keyframe: SceneKeyframe) -> NDArray[np.float64]:
     """(E, A) metres as an observation has them: 0 not fired, the reach without a return."""
     grid = loop.rig.grid
     ranges = np.zeros(grid.size)
-    if record is not None:
+    if keyframe.fired is not None:
+        returned = _returned(loop, keyframe)
         # A recording may hold several points of one cell: the nearest counts.
-        ranges[record.fired] = grid.range_m
+        ranges[keyframe.fired] = grid.range_m
         np.minimum.at(ranges, returned.cells, grid.ranges_to(returned.cells, returned.points))
     return ranges.reshape(grid.shape)

@@ -1,5 +1,7 @@
 """What a recording holds: every entity with its content, unit and frame."""
 
+from collections.abc import Mapping
+
 from care_sim.core.types import CLASSES
 
 ABOUT_ENTITY = "about"
@@ -91,6 +93,30 @@ ENTITIES = {
 }
 """Entities of an episode, each below the name of its lane, and what they hold."""
 
+_OF_CARS_THAT_ACT = (
+    "world/first_sighting",
+    "world/lidar/path",
+    "measures/speed",
+    "measures/distance",
+    "measures/clearance",
+    "measures/braking",
+    "states/actor",
+    "states/brake",
+)
+SCENE_ENTITIES = {
+    **{name: told for name, told in ENTITIES.items() if name not in _OF_CARS_THAT_ACT},
+    "world/bodies": (
+        "boxes of the annotated objects (truth): green found by this scan, orange not found, grey "
+        "beyond 50 m; world frame"
+    ),
+    "world/lidar/camera": "the first camera that the policy knows; of its picture nothing is kept",
+    "measures/objects": "annotated objects within 50 m",
+    "measures/found": "how many of them this scan found",
+    "events": "who appears for the first time, and whether it was found at once",
+    "outcome": "the result of the play, `care_sim.evaluation.recall.SceneOutcome`",
+}
+"""The same of a play of the open loop."""
+
 BODY_COLOURS = dict(
     zip(
         CLASSES,
@@ -123,6 +149,8 @@ ACTOR_COLOURS = {
     "in view": _IN_VIEW_RGB,
     "detected": _DETECTED_RGB,
 }
+FOUND_RGB = _DETECTED_RGB
+NOT_FOUND_RGB = _IN_VIEW_RGB
 LANES = (
     (170, 225, 110),
     (230, 120, 200),
@@ -134,15 +162,24 @@ LANES = (
 """Colours of the curves of episodes that are played side by side."""
 
 
-def about() -> str:
+def about(entities: Mapping[str, str] = ENTITIES) -> str:
     """The entities, as a table in Markdown."""
-    rows = "\n".join(f"| `{path}` | {content} |" for path, content in ENTITIES.items())
     return (
         "Recorded with CARE-Sim. Metres, seconds, radians; timelines `seconds` (of the scan) and "
         "`keyframe` (from 0).\n"
         "Bodies, pictures, what was missed and the states are truth, which no policy is shown.\n\n"
-        f"| entity | content |\n|---|---|\n{rows}\n"
+        f"{_table(entities)}"
     )
 
 
-__doc__ = f"{__doc__}\n\n{about()}"
+def _table(entities: Mapping[str, str]) -> str:
+    rows = "\n".join(f"| `{path}` | {content} |" for path, content in entities.items())
+    return f"| entity | content |\n|---|---|\n{rows}\n"
+
+
+_OTHERWISE = {name: told for name, told in SCENE_ENTITIES.items() if told != ENTITIES.get(name)}
+__doc__ = (
+    f"{__doc__}\n\n{about()}\n"
+    f"Of the open loop {', '.join(f'`{name}`' for name in _OF_CARS_THAT_ACT)} are missing, and "
+    f"these hold something else:\n\n{_table(_OTHERWISE)}"
+)

@@ -18,15 +18,16 @@ _GRID_TITLE = (
 )
 
 
-def blueprint(lanes: Sequence[str]) -> rrb.Blueprint:
+def blueprint(lanes: Sequence[str], open_loop: bool = False) -> rrb.Blueprint:
     """The views of one episode, or of several side by side."""
-    story = _one(lanes[0]) if len(lanes) == 1 else _several(lanes)
+    curves = _scene_curves(lanes) if open_loop else [_states(lanes), *_plots(lanes)]
+    story = _one(lanes[0], curves) if len(lanes) == 1 else _several(lanes, curves)
     time = rrb.TimePanel(state="collapsed", timeline=SECONDS, play_state="playing", loop_mode="all")
     panels = rrb.BlueprintPanel(state="collapsed"), rrb.SelectionPanel(state="collapsed"), time
     return rrb.Blueprint(story, *panels, auto_layout=False, auto_views=False)
 
 
-def _one(lane: str) -> rrb.Vertical:
+def _one(lane: str, curves: Sequence[rrb.View]) -> rrb.Vertical:
     words = rrb.Tabs(
         rrb.TextLogView(
             origin=entity_path(lane, "events"),
@@ -38,7 +39,7 @@ def _one(lane: str) -> rrb.Vertical:
     )
     budget = rrb.TimeSeriesView(origin=entity_path(lane, "budget"), name="Budget, percent")
     side = rrb.Vertical(_camera(lane), words, row_shares=[3, 2])
-    below = rrb.Horizontal(_states([lane]), *_plots([lane]), budget)
+    below = rrb.Horizontal(*curves, budget)
     return rrb.Vertical(
         rrb.Horizontal(_chase(lane), side, column_shares=[3, 2]),
         _grid(lane),
@@ -47,12 +48,12 @@ def _one(lane: str) -> rrb.Vertical:
     )
 
 
-def _several(lanes: Sequence[str]) -> rrb.Vertical:
+def _several(lanes: Sequence[str], curves: Sequence[rrb.View]) -> rrb.Vertical:
     columns = [
         rrb.Vertical(_chase(lane), _camera(lane), _grid(lane), row_shares=[4, 3, 1.3])
         for lane in lanes
     ]
-    below = rrb.Horizontal(_states(lanes), *_plots(lanes))
+    below = rrb.Horizontal(*curves)
     return rrb.Vertical(rrb.Horizontal(*columns), below, row_shares=[4, 0.5 + 0.4 * len(lanes)])
 
 
@@ -92,3 +93,9 @@ def _plots(lanes: Sequence[str]) -> list[rrb.TimeSeriesView]:
         )
         for name, title in (("speed", "Speed, m/s"), ("clearance", "Clearance, m"))
     ]
+
+
+def _scene_curves(lanes: Sequence[str]) -> list[rrb.TimeSeriesView]:
+    names = [f"measures/{name}" for name in ("objects", "found")]
+    contents = [entity_path(lane, name) for lane in lanes for name in names]
+    return [rrb.TimeSeriesView(contents=contents, name="Objects within 50 m, and found")]

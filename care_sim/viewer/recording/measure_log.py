@@ -1,6 +1,6 @@
 """What is logged as curves, states and words: speed, distances, the budget, what happened when."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from care_sim.core.actions import ALONG, CHOSEN, EXPLOITATION, FLOOR, RESERVE, S
 from care_sim.core.arrays import Floats
 from care_sim.core.grid import Cells
 from care_sim.loops.records import Keyframe
-from care_sim.loops.watcher import WatchedKeyframe
+from care_sim.loops.watcher import Watched, WatchedKeyframe
 from care_sim.viewer.recording import entities
 from care_sim.viewer.recording.lane import Lane
 
@@ -24,6 +24,43 @@ _FIELDS = {
 }
 
 
+class BudgetLog:
+    """Counts the shares of a budget of B cells, and logs them as curves at the end."""
+
+    def __init__(self, lane: Lane, budget: int):
+        self._lane = lane
+        self._budget = budget
+        self._counts: list[Cells] = []
+        for name, colour in zip(SHARES[1:], entities.SHARE_COLOURS[1:], strict=True):
+            lane.fix(f"budget/{name}", rr.SeriesLines(names=f"{name} %", colors=colour))
+
+    def count(self, watched: Watched, fired: Cells) -> None:
+        """Count the cells of a keyframe; one that was fired several times was paid for as often."""
+        paid = watched.shares.ravel()[fired]
+        self._counts.append(np.bincount(paid, minlength=len(SHARES)))
+
+    def end(self, keyframes: Sequence[int], times_s: Sequence[float]) -> None:
+        """Log the curves of the shares that there are."""
+        percents = 100 * np.reshape(self._counts, (-1, len(SHARES))) / self._budget
+        # Either a policy's demand tells the shares, or a raw action scored the cells itself.
+        asked = (CHOSEN,) if percents[:, CHOSEN].any() else (EXPLOITATION, RESERVE)
+        for share in (*asked, ALONG if percents[:, ALONG].any() else FLOOR):
+            self._lane.log_curve(f"budget/{SHARES[share]}", keyframes, times_s, percents[:, share])
+
+
+def log_outcome(lane: Lane, outcome: Mapping[str, Any] | None) -> None:
+    """Log the result of an episode, None where it was left unfinished."""
+    lines = [
+        f"| {name} | {'-' if value is None else value} |" for name, value in (outcome or {}).items()
+    ]
+    text = (
+        "\n".join(["| outcome | |", "|---|---|", *lines])
+        if outcome
+        else "The episode was not finished."
+    )
+    lane.fix("outcome", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
+
+
 class MeasureLog:
     """Logs the numbers of an episode as curves in the colour of its lane, its states and its
     events; `budget` is B in cells.
@@ -31,19 +68,15 @@ class MeasureLog:
 
     def __init__(self, lane: Lane, budget: int, colour: tuple[int, int, int]):
         self._lane = lane
-        self._budget = budget
+        self._budget = BudgetLog(lane, budget)
         self._states: dict[str, str] = {}
         self._frames: list[Keyframe] = []
-        self._counts: list[Cells] = []
-        # Curves of numbers; those of the budget have a colour per share.
         for name, unit in _UNITS.items():
             step = InterpolationMode.StepAfter if name == "braking" else InterpolationMode.Linear
             series = rr.SeriesLines(
                 names=f"{lane.name} {name} {unit}".strip(), colors=colour, interpolation_mode=step
             )
             lane.fix(f"measures/{name}", series)
-        for name, colour_ in zip(SHARES[1:], entities.SHARE_COLOURS[1:], strict=True):
-            lane.fix(f"budget/{name}", rr.SeriesLines(names=f"{name} %", colors=colour_))
 
         # States with a name and a colour for each of their values.
         actor = entities.ACTOR_COLOURS
@@ -59,9 +92,7 @@ class MeasureLog:
         """A keyframe, with the state of the first-sighting actor."""
         frame = watched.record
         self._frames.append(frame)
-        # A cell that was fired several times was paid for as often.
-        paid = watched.shares.ravel()[frame.fired]
-        self._counts.append(np.bincount(paid, minlength=len(SHARES)))
+        self._budget.count(watched, frame.fired)
         brake = "on" if frame.braking else "off"
         self._change(
             "states/actor", state, f"actor {state}, {frame.distance_m:.1f} m from the sensor"
@@ -73,28 +104,15 @@ class MeasureLog:
     def end(self, outcome: Mapping[str, Any] | None) -> None:
         """Log the curves and the result of the episode, None where it was left unfinished."""
         self._log_curves()
-        lines = [
-            f"| {name} | {'-' if value is None else value} |"
-            for name, value in (outcome or {}).items()
-        ]
-        text = (
-            "\n".join(["| outcome | |", "|---|---|", *lines])
-            if outcome
-            else "The episode was not finished."
-        )
-        self._lane.fix("outcome", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
+        log_outcome(self._lane, outcome)
 
     def _log_curves(self) -> None:
         frames = self._frames
-        percents = 100 * np.reshape(self._counts, (-1, len(SHARES))) / self._budget
         for name, field in _FIELDS.items():
             self._log_curve(
                 f"measures/{name}", np.array([getattr(frame, field) for frame in frames], float)
             )
-        # Either a policy's demand tells the shares, or a raw action scored the cells itself.
-        asked = (CHOSEN,) if percents[:, CHOSEN].any() else (EXPLOITATION, RESERVE)
-        for share in (*asked, ALONG if percents[:, ALONG].any() else FLOOR):
-            self._log_curve(f"budget/{SHARES[share]}", percents[:, share])
+        self._budget.end([frame.index for frame in frames], [frame.time_s for frame in frames])
 
     def _log_curve(self, entity: str, values: Floats) -> None:
         # Without a first-sighting actor there is no distance, and no point of the curve.

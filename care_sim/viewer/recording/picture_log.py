@@ -6,17 +6,19 @@ from itertools import compress
 
 import numpy as np
 import rerun as rr
+from numpy.typing import NDArray
 from PIL import Image
 
 from care_sim.core.actions import SHARES
 from care_sim.core.arrays import Floats
 from care_sim.core.grid import Cells
 from care_sim.core.grid_stack import Grid
+from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.residual import wedges
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES, ImageDetections
 from care_sim.loops.closed_loop import ClosedLoop
-from care_sim.loops.watcher import TrueSituation, WatchedKeyframe
+from care_sim.loops.watcher import TrueSituation, Watched
 from care_sim.viewer.recording import entities
 from care_sim.viewer.recording.lane import THIN, Lane
 
@@ -73,9 +75,14 @@ class PictureLog:
         for entity, colour in _OUTLINE_COLOURS.items():
             lane.fix(f"grid/{entity}", rr.Boxes2D.from_fields(colors=[colour], radii=[THIN]))
 
-    def log(self, watched: WatchedKeyframe, photo: bytes) -> None:
-        """A keyframe and the JPEG of its camera."""
-        self._lane.log(_CAMERA, rr.EncodedImage(contents=photo, media_type="image/jpeg"))
+    def fix_photo(self, photo: bytes) -> None:
+        """A JPEG that stands for the camera's picture at every keyframe."""
+        self._lane.fix(_CAMERA, rr.EncodedImage(contents=photo, media_type="image/jpeg"))
+
+    def log(self, watched: Watched, photo: bytes = b"") -> None:
+        """A keyframe and the JPEG of its camera, if it has one of its own."""
+        if photo:
+            self._lane.log(_CAMERA, rr.EncodedImage(contents=photo, media_type="image/jpeg"))
         self._log_detections(watched.situation)
         self._log_grid(watched)
 
@@ -109,7 +116,7 @@ class PictureLog:
             lambda: (_boxes(boxes), rr.Points2D(below, labels=names)),
         )
 
-    def _log_grid(self, watched: WatchedKeyframe) -> None:
+    def _log_grid(self, watched: Watched) -> None:
         belief = watched.situation.belief
         known = watched.situation.known
         rig = self._rig
@@ -140,14 +147,28 @@ def photograph(loop: ClosedLoop) -> bytes:
     """A JPEG of what the camera shows now, small enough to keep, with sky and road behind it."""
     camera = loop.rig.cameras[0]
     picture = loop.world.bullet.colours(camera, loop.sensor)
-
-    # The renderer leaves white where no body is: sky above the middle of the picture, road below.
-    backdrop = np.full_like(picture, _ROAD)
-    backdrop[: camera.height // 2] = _SKY
+    # The renderer leaves white where no body is.
+    shown = _backdrop(camera)
     empty = (picture == _NOTHING).all(axis=2)
-    np.copyto(backdrop, picture, where=~empty[..., None])
+    np.copyto(shown, picture, where=~empty[..., None])
+    return _jpeg(shown)
+
+
+def empty_photo(camera: PinholeCamera) -> bytes:
+    """A JPEG for a camera of which a film keeps no picture: its detections are drawn on it."""
+    return _jpeg(_backdrop(camera))
+
+
+def _backdrop(camera: PinholeCamera) -> NDArray[np.uint8]:
+    """(H, W, 3) sky above the middle of the picture, road below."""
+    backdrop = np.full((camera.height, camera.width, 3), _ROAD, np.uint8)
+    backdrop[: camera.height // 2] = _SKY
+    return backdrop
+
+
+def _jpeg(picture: NDArray[np.uint8]) -> bytes:
     file = BytesIO()
-    Image.fromarray(backdrop).save(file, "JPEG", quality=_QUALITY)
+    Image.fromarray(picture).save(file, "JPEG", quality=_QUALITY)
     return file.getvalue()
 
 

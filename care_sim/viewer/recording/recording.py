@@ -11,24 +11,37 @@ from care_sim.base.errors import InvalidInput, unknown
 from care_sim.base.files import RERUN, replacing
 from care_sim.core.rig import Rig
 from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.loops.film_watcher import WatchedScene
+from care_sim.loops.open_loop import OpenLoop
 from care_sim.loops.watcher import WatchedKeyframe
-from care_sim.viewer.recording.entities import ABOUT_ENTITY, LANES, about
+from care_sim.viewer.recording.entities import (
+    ABOUT_ENTITY,
+    ENTITIES,
+    FOUND_RGB,
+    LANES,
+    NO_CLASS,
+    NOT_FOUND_RGB,
+    SCENE_ENTITIES,
+    about,
+)
+from care_sim.viewer.recording.found_log import FoundLog
 from care_sim.viewer.recording.lane import Lane
 from care_sim.viewer.recording.layout import blueprint
 from care_sim.viewer.recording.measure_log import MeasureLog
-from care_sim.viewer.recording.picture_log import PictureLog, photograph
+from care_sim.viewer.recording.picture_log import PictureLog, empty_photo, photograph
 from care_sim.viewer.recording.space_log import SpaceLog
 
 
 class Recording(AbstractContextManager["Recording"]):
-    """Writes `path` when it is closed; `lanes` are the names of the episodes that will be in it.
+    """Writes `path` when it is closed; `lanes` are the names of the episodes that will be in it,
+    all of the closed loop, or of the `open_loop`.
     Until then all is held in memory: 1 to 9 MB per episode.
 
     Raises InvalidInput for a lane with the name of the page `about`, and as
     `care_sim.base.files.replacing` does.
     """
 
-    def __init__(self, path: Path, lanes: Sequence[str]):
+    def __init__(self, path: Path, lanes: Sequence[str], open_loop: bool = False):
         if ABOUT_ENTITY in lanes:
             raise InvalidInput(
                 f"{ABOUT_ENTITY!r} is a page of every recording: name the episode otherwise"
@@ -40,19 +53,23 @@ class Recording(AbstractContextManager["Recording"]):
         # Rerun's own writer is a thread. A full disk ends it, and whatever waits for it then waits
         # for ever: so the recording is held in memory, and written here.
         self._memory = self._stream.memory_recording()
-        self._stream.send_blueprint(blueprint(self._lanes), make_active=False)
+        self._stream.send_blueprint(blueprint(self._lanes, open_loop), make_active=False)
         self._file.callback(self._write)
         self._stream.send_recording_name(path.stem)
+        told = about(SCENE_ENTITIES if open_loop else ENTITIES)
         self._stream.log(
-            ABOUT_ENTITY, rr.TextDocument(about(), media_type=rr.MediaType.MARKDOWN), static=True
+            ABOUT_ENTITY, rr.TextDocument(told, media_type=rr.MediaType.MARKDOWN), static=True
         )
 
-    def episode(self, name: str, loop: ClosedLoop) -> "RecordedEpisode":
+    def episode(self, name: str, loop: ClosedLoop | OpenLoop) -> "RecordedEpisode | RecordedScene":
         """Begin the lane `name`. Raises InvalidInput for a name that is none of `lanes`."""
         if name not in self._lanes:
             raise unknown("lane", name, self._lanes)
         colour = LANES[self._lanes.index(name) % len(LANES)]
-        return RecordedEpisode(Lane(self._stream, name), loop.rig, loop.guarded_m, colour)
+        lane = Lane(self._stream, name)
+        if isinstance(loop, OpenLoop):
+            return RecordedScene(lane, loop.rig, colour)
+        return RecordedEpisode(lane, loop.rig, loop.guarded_m, colour)
 
     def __exit__(self, *_: object) -> None:
         self.close()
@@ -88,6 +105,36 @@ class RecordedEpisode:
         self._space.log(watched, state)
         self._pictures.log(watched, self._photo)
         self._curves.log(watched, state)
+
+    def end(self, outcome: Mapping[str, Any] | None) -> None:
+        """Log how it ended."""
+        self._curves.end(outcome)
+
+
+class RecordedScene:
+    """Logs one play of the open loop, keyframe by keyframe."""
+
+    def __init__(self, lane: Lane, rig: Rig, colour: tuple[int, int, int]):
+        self._lane = lane
+        self._space = SpaceLog(lane, rig, guarded_m=0.0)
+        self._pictures = PictureLog(lane, rig)
+        self._pictures.fix_photo(empty_photo(rig.cameras[0]))
+        self._curves = FoundLog(lane, rig.budget, colour)
+
+    def look(self, _loop: OpenLoop) -> None:
+        """Nothing: a film keeps no pictures."""
+
+    def keep(self, watched: WatchedScene) -> None:
+        """Log a keyframe that was played."""
+        record = watched.record
+        self._lane.at(record.index, record.time_s)
+        colours = [
+            FOUND_RGB if found else NOT_FOUND_RGB if scored else NO_CLASS
+            for found, scored in zip(record.found, record.scored, strict=True)
+        ]
+        self._space.log(watched, "", colours)
+        self._pictures.log(watched)
+        self._curves.log(watched)
 
     def end(self, outcome: Mapping[str, Any] | None) -> None:
         """Log how it ended."""

@@ -1,6 +1,7 @@
 """What is logged in space: bodies, the car and its path, returns, tracks, wedges."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import rerun as rr
@@ -10,7 +11,7 @@ from care_sim.core.arrays import Floats
 from care_sim.core.residual import wedge_rays
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES
-from care_sim.loops.watcher import WAY_M, TrueSituation, WatchedKeyframe
+from care_sim.loops.watcher import WAY_M, TrueSituation, Watched
 from care_sim.viewer.recording import entities
 from care_sim.viewer.recording.lane import THIN, Lane, box_batch
 
@@ -26,7 +27,9 @@ _MARGIN_M = 0.15
 
 
 class SpaceLog:
-    """Logs the 3D part of an episode whose driver guards a strip `guarded_m` wide."""
+    """Logs the 3D part of an episode whose driver guards a strip `guarded_m` wide, 0 without a
+    driver.
+    """
 
     def __init__(self, lane: Lane, rig: Rig, guarded_m: float):
         self._lane = lane
@@ -39,10 +42,11 @@ class SpaceLog:
         lane.fix(
             "world/ego", rr.Boxes3D.from_fields(colors=[entities.EGO_RGB], fill_mode=FillMode.Solid)
         )
-        lane.fix(
-            "world/lidar/path",
-            rr.Boxes3D.from_fields(colors=[entities.PATH_RGB], fill_mode=FillMode.Solid),
-        )
+        if guarded_m:
+            lane.fix(
+                "world/lidar/path",
+                rr.Boxes3D.from_fields(colors=[entities.PATH_RGB], fill_mode=FillMode.Solid),
+            )
         lane.fix("world/bodies", rr.Boxes3D.from_fields(show_labels=False, fill_mode=_GLASSY))
         lane.fix(
             "world/driven", rr.LineStrips3D.from_fields(colors=[entities.EGO_RGB], radii=[THIN])
@@ -62,10 +66,14 @@ class SpaceLog:
                 rr.LineStrips3D.from_fields(colors=[colour], radii=[THIN]),
             )
 
-    def log(self, watched: WatchedKeyframe, state: str) -> None:
-        """A keyframe, with the state of the first-sighting actor."""
+    def log(
+        self, watched: Watched, state: str, colours: Sequence[tuple[int, int, int]] = ()
+    ) -> None:
+        """A keyframe, with the state of the first-sighting actor, and the colours of the bodies
+        where they are not those of their classes.
+        """
         situation = watched.situation
-        self._log_bodies(situation, state)
+        self._log_bodies(situation, state, colours)
         self._log_ego(situation)
         self._log_returns(watched)
         self._log_tracks(situation)
@@ -74,8 +82,10 @@ class SpaceLog:
                 kind, wedge_rays(situation.belief.detections, self._rig)[chosen][:, _CORNERS]
             )
 
-    def _log_bodies(self, situation: TrueSituation, state: str) -> None:
-        colours = [
+    def _log_bodies(
+        self, situation: TrueSituation, state: str, colours: Sequence[tuple[int, int, int]]
+    ) -> None:
+        colours = colours or [
             entities.NO_CLASS if label is None else entities.BODY_COLOURS[CLASSES[label]]
             for label in situation.labels
         ]
@@ -105,6 +115,8 @@ class SpaceLog:
     def _log_path(self, situation: TrueSituation) -> None:
         """The strip on the ground that the driver guards."""
         way = situation.way
+        if not self._guarded_m:
+            return
         length = WAY_M / len(way) * (_OVERLAP if len(way) > 1 else 1.0)
         strip = np.column_stack(
             [
@@ -116,7 +128,7 @@ class SpaceLog:
         )
         self._lane.log("world/lidar/path", box_batch(situation.sensor.boxes_to_local(strip)))
 
-    def _log_returns(self, watched: WatchedKeyframe) -> None:
+    def _log_returns(self, watched: Watched) -> None:
         cells, points = watched.returned(self._rig.grid)
         # Every nth return, so that there are at most MOST_POINTS.
         step = math.ceil(len(cells) / entities.MOST_POINTS) or 1

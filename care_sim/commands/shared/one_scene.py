@@ -1,0 +1,98 @@
+"""What `run` and `compare` play of the open loop: one scene of a source, named in the place of a
+scenario.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+from care_sim.base.checks import check_known
+from care_sim.base.errors import InvalidInput
+from care_sim.base.plugins import is_place
+from care_sim.core.conditions import DEFAULTS, OF_BOTH_LOOPS, ClosedLoopConditions
+from care_sim.sensors.setups import DEFAULT_SETUP
+from care_sim.sources.installed import SOURCES
+from care_sim.sources.named import source_name, source_of
+from care_sim.sources.scenes import Scene, Source, Streets
+from care_sim.study.play_config import PlayConfig, play_grid
+
+_STREET = "street"
+"""One of the generated streets, as `CARE-Street-v0` has them; `streets` says the same."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SceneOptions:
+    """Which scene of a source is played."""
+
+    scene: str | None = None
+    """Of a source of scenes: the name of the scene. Without it that of the seed on streets, of
+    recordings the first."""
+    split: str | None = None
+    """For streets: evaluation (150 scenes) or calibration (20). For nuScenes: val, all, or one of
+    splits.json.
+    """
+    version: str | None = None
+    """For nuScenes: the version, where the folder holds several."""
+
+    def check_unused(self) -> None:
+        """Raise InvalidInput where one is given, and no source is named."""
+        for field in fields(SceneOptions):
+            if getattr(self, field.name) is not None:
+                raise InvalidInput(f"--{field.name} has no meaning in the closed loop")
+
+    def source(self, text: str, sensor: str) -> Source:
+        """The source that is named in the place of a scenario."""
+        named = Streets.kind if text == _STREET else text
+        given = None if sensor == DEFAULT_SETUP else sensor
+        return source_of(named, split=self.split, version=self.version, sensor=given)
+
+    def scene_of(self, source: Source, seed: int) -> Scene:
+        """The scene that is named, or else that of the seed. Raises InvalidInput where there is
+        none.
+        """
+        scenes = source.scenes()
+        if self.scene is not None:
+            check_known("scene", self.scene, [each.name for each in scenes])
+            return next(each for each in scenes if each.name == self.scene)
+        seeds = {each.seed: each for each in scenes}
+        if seed in seeds:
+            return scenes[0] if len(seeds) == 1 else seeds[seed]
+        # Recordings all have one seed, which draws their faults and floor alone.
+        if len(seeds) == 1:
+            return scenes[0]._replace(seed=seed)
+        raise InvalidInput(
+            f"seed must be of a scene of {source.kind}, {min(seeds)} to {max(seeds)}, got {seed}"
+        )
+
+
+def is_source(text: str) -> bool:
+    """Whether what is named is a source of scenes, and no scenario."""
+    name = source_name(text)
+    if name in (_STREET, *SOURCES.names()):
+        return True
+    if not is_place(name):
+        return False
+    # What is no source, or cannot be loaded, is told of as a scenario.
+    try:
+        SOURCES.maker(name)
+    except InvalidInput:
+        return False
+    return True
+
+
+def scene_plays(
+    source: Source, scene: Scene, policies: Sequence[str], budget: float, given: dict[str, Any]
+) -> list[PlayConfig]:
+    """The plays of the policies, with the options that are `given` to a closed loop. Raises
+    InvalidInput for those that the open loop does not have.
+    """
+    given = dict(given)
+    given.pop("sensor")
+    if given.pop("scenario_parameters"):
+        raise InvalidInput("--scenario-parameters has no meaning in the open loop")
+    for field in fields(ClosedLoopConditions):
+        if field.name not in OF_BOTH_LOOPS and given.pop(field.name) != DEFAULTS[field.name]:
+            option = field.name.replace("_", "-")
+            raise InvalidInput(f"--{option} has no meaning in the open loop")
+    floors, latencies = (given.pop("floor_seed"),), (given.pop("camera_latency"),)
+    return play_grid(source, [scene], policies, [budget], floors, latencies, **given)

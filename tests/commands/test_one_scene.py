@@ -1,0 +1,111 @@
+"""A scene of the open loop is played and watched as an episode of the closed one is."""
+
+import re
+
+import pytest
+from PIL import Image
+
+from care_sim.cli import main
+from care_sim.sources.named import source_of
+from care_sim.sources.scenes import film_of
+from care_sim.study.play_config import play_grid
+from care_sim.study.scene_play import ScenePlayer
+from tests.helpers.short_streets import few_and_short
+
+
+@pytest.fixture
+def played(capsys):
+    def play(*arguments):
+        with pytest.raises(SystemExit) as end:
+            main([*map(str, arguments)])
+        out, err = capsys.readouterr()
+        return end.value.code, out, err
+
+    return play
+
+
+def test_a_log_is_told_by_its_first_sightings_and_is_the_play_of_the_protocol(played, drive):
+    source = source_of(f"argoverse2:{drive}")
+    (config,) = play_grid(source, source.scenes(), ["care"], [0.05])
+    row = ScenePlayer(config).row(config)
+    code, out, err = played("run", f"argoverse2:{drive}", "--budget", "0.05")
+    assert (code, err) == (0, "")
+    assert max(map(len, out.splitlines())) <= 80
+    told = dict(re.findall(r"^(\S.*?)  +(\S+)$", out, re.MULTILINE))
+    assert told["episode_hash"] == row["episode_hash"]
+    assert told["first sightings"] == f"{row['events']:.0f}" == "1"
+    assert float(told["found %"]) == pytest.approx(100 * row["found"] / row["frames"], abs=0.05)
+    (sighting,) = re.findall(r"^ +([\d.]+) s  (\S+) \d+, ([\d.]+) m: (.*)$", out, re.MULTILINE)
+    assert sighting[1:] == ("pedestrian", sighting[2], "found at once")
+    # The line of the table at which it appears: one new object, found at once.
+    assert re.search(rf"^ *{sighting[0]} .* 1 +1 +819 *$", out, re.MULTILINE)
+
+
+def test_the_seed_is_that_of_the_street_and_a_scene_has_a_name(played):
+    with few_and_short(4):
+        for options, name in (
+            (["--seed", "2"], "street-0002"),
+            (["--scene", "street-0001-bend"], "street-0001-bend"),
+            (["--seed", "1003", "--split", "calibration"], "street-1003"),
+        ):
+            code, out, err = played("run", "street", "--policy", "random", *options)
+            assert (code, err) == (0, "")
+            assert out.startswith(name)
+
+
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("run street --seed 400", "seed must be of a scene of streets, 0 to 149, got 400"),
+        ("run street --scene nowhere", "unknown scene 'nowhere'; known: street-0000"),
+        ("run street --driver careful-human", "--driver has no meaning in the open loop"),
+        ("run street --scenario-parameters x=1", "--scenario-parameters has no meaning in the"),
+        ("run street --export x", "--export has no meaning in the open loop"),
+        ("run street --engine bullet", "engine cannot be changed in the open loop"),
+        ("run argoverse2:nowhere", "source argoverse2:nowhere: nowhere is no folder"),
+        ("run dartout --scene x", "--scene has no meaning in the closed loop"),
+        ("compare dartout --split val", "--split has no meaning in the closed loop"),
+        ("compare street --policies nobody", "unknown policy 'nobody'"),
+    ],
+)
+def test_what_a_loop_does_not_have_is_refused_in_one_line(
+    line, told, played, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    code, _, err = played(*line.split())
+    assert code == 2
+    assert told in err
+    assert err.count("\n") == 1
+
+
+def test_policies_are_compared_on_one_film_and_filmed_side_by_side(played, drive, tmp_path):
+    film = tmp_path / "film.png"
+    source = source_of(f"argoverse2:{drive}")
+    names = ("history", "care", "full")
+    code, out, _ = played(
+        "compare", f"argoverse2:{drive}", "--policies", *names, "--budget", "0.05", "--video", film
+    )
+    assert code == 0
+    lines = {line.split()[0]: line.split()[1:] for line in out.splitlines() if line}
+    assert [lines[name][:3] for name in names] == [
+        ["0.05", "1", "0.0"],
+        ["0.05", "1", "100.0"],
+        ["1", "1", "100.0"],
+    ]
+    with Image.open(film) as pictures:
+        assert pictures.size == (3 * 512 + 2 * 8, 646)
+        # As long as the film: one picture a keyframe.
+        assert pictures.n_frames == len(film_of(source, source.scenes()[0]).shots)
+
+
+def test_one_that_fails_leaves_the_others(played, drive, install, tmp_path):
+    install(
+        "falling",
+        "import care_sim\nclass Falls(care_sim.Policy):\n"
+        "    def demand(self, belief):\n        return 1 / 0\n",
+        falls="Falls",
+    )
+    code, out, err = played("compare", f"argoverse2:{drive}", "--policies", "falls", "random")
+    assert code == 1
+    assert "random" in out
+    assert "ZeroDivisionError: division by zero (falling.py, line 4)" in err
