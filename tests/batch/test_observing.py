@@ -56,7 +56,7 @@ def told(egos, seen, known, live):
             rows[world, : len(part)] = part
         tables.append((np.array([*map(len, parts)]), rows))
     observed["ranges"][:] = 0.0
-    Observing(RIG).write(state, *tables, observed)
+    Observing(RIG, np.full(len(egos), RIG.budget)).write(state, *tables, observed)
     alone = [
         Limits(RIG)
         .belief(Ego(*ego), ImageDetections.from_rows(boxes), Tracks.from_rows(rows), NOWHERE)

@@ -122,7 +122,7 @@ class CompiledWorlds:
         """(W, B) the cells of all worlds, or (W,) arrays of each world's own."""
         cells, budgets = self._loop.fired.cells, self._budgets
         if self._one_budget:
-            return cells[:, : budgets[0]].copy()
+            return cells[:, : budgets[0]]
         fired = np.empty(len(budgets), object)
         fired[:] = [row[:budget].copy() for row, budget in zip(cells, budgets, strict=True)]
         return fired

@@ -209,8 +209,6 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
             ]
         )
         self._begun[:] = True
-        if len(parts) == 1:
-            return parts[0]
         single = {
             share.start + world: info
             for share, part in zip(self._shares, parts, strict=True)
@@ -309,7 +307,7 @@ def _autoreset(mode: AutoresetMode | str) -> AutoresetMode:
 
 
 def _joined(columns: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """The columns of the shares, one after the other."""
+    """The columns of the shares, one after the other, in arrays of their own."""
     return {
         name: _joined([part[name] for part in columns])
         if isinstance(column, dict)

@@ -12,8 +12,8 @@ from care_sim.envs.sensing import Observed
 
 class Stepped(NamedTuple):
     """What n worlds give at a step: rewards, terminations and truncations (n,), 0 and False of
-    those that did not play; what `info` says of all in `columns` (n, ...), by name; and what it
-    says of one alone in `single`, by world.
+    those that did not play; what `info` says of all in `columns` (n, ...), by name, which the next
+    step may write over; and what it says of one alone in `single`, by world.
     """
 
     rewards: Floats

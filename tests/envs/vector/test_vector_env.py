@@ -1,5 +1,6 @@
 """What a vector environment promises besides the episodes."""
 
+import copy
 import gc
 import multiprocessing
 import pickle
@@ -55,6 +56,17 @@ def test_observations_that_were_handed_out_stay(vector):
     kept = {name: rows.copy() for name, rows in first.items()}
     vector.step(zeros(vector))
     assert all(np.array_equal(first[name], kept[name]) for name in kept)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_infos_that_were_handed_out_stay(threads):
+    env = native(NAME, 2, threads=threads, copy=False)
+    env.reset(seed=0)
+    first = env.step(zeros(env))[4]
+    kept = copy.deepcopy(first)
+    env.step(np.random.default_rng(0).random(env.action_space.shape, np.float32))
+    assert difference(first, kept) is None
+    env.close()
 
 
 def test_observations_in_place():
