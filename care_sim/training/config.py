@@ -54,7 +54,7 @@ class AgentConfig:
     """Environments, or worlds, side by side."""
     processes: bool = False
     """Give every environment a process of its own. Without it they are the worlds of one vector
-    environment, on a thread for every core; what is learned is the same."""
+    environment, in threads where they are many; what is learned is the same."""
     threads: int = bounded(1, 1, 1024)
     """Threads of PyTorch."""
     learning_rate: float = bounded(1e-3, 1e-8, 1)
