@@ -54,9 +54,10 @@ class AgentConfig:
     """Environments, or worlds, side by side."""
     processes: bool = False
     """Give every environment a process of its own. Without it they are the worlds of one vector
-    environment, on a thread for every core; what is learned is the same."""
+    environment, in threads where they are many; what is learned is the same."""
     threads: int = bounded(1, 1, 1024)
-    """Threads of PyTorch."""
+    """Threads of PyTorch. Sums are added in another order by more of them: the last bits of the
+    weights differ, and then what is learned."""
     learning_rate: float = bounded(1e-3, 1e-8, 1)
     """Step size of Adam."""
     discount: float = bounded(0.9, 0, 1)

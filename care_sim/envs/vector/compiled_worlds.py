@@ -27,8 +27,8 @@ class CompiledWorlds:
     `models[i]`; these differ at most in budget and camera (`BatchLoop`).
 
     Unless `exact`, clearances that no reward needs are bounds (`BatchLoop`); outcomes are exact.
-    Infos hold the cells that were fired as one array, or, unless there is `one_budget`, also beside
-    these, as an array for each world.
+    `one_budget` says whether all worlds of the vector environment, those of other threads too, fire
+    equally many cells: infos then hold them as one array, else as one for each world.
     """
 
     def __init__(
