@@ -14,6 +14,7 @@ from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers
 from care_sim.sensors.engines.box_kernels import moved_up, note_pixels
 from care_sim.sensors.engines.silhouette_kernels import (
+    LOT,
     Silhouettes,
     lay_silhouettes,
     room_for,
@@ -25,7 +26,8 @@ from care_sim.world.polyhedra import Tables
 
 class Line(NamedTuple):
     """A row of a picture, by column: `ids` of bodies, NO_BODY where none is, the `inverse_depths`
-    of what is seen, 1 / m, and room for those of one polyhedron, `surface`.
+    of what is seen, 1 / m, and room for those of one polyhedron, `surface`. There are a lot of
+    columns more than in the picture.
     """
 
     ids: Integers
@@ -83,7 +85,8 @@ def _drawn(view: View, picture: Integers) -> Integers:
 @compiled()
 def empty_line(columns: int, depths: tuple[float, float]) -> Line:
     """A line on which nothing is seen up to the greater of two depths."""
-    return Line(np.full(columns, NO_BODY), np.full(columns, 1.0 / depths[1]), np.empty(columns))
+    room = columns + LOT
+    return Line(np.full(room, NO_BODY), np.full(room, 1.0 / depths[1]), np.empty(room))
 
 
 @compiled()
@@ -118,12 +121,21 @@ def draw_silhouettes(
         if len(picture):
             for column in range(left, right):
                 picture[row, column - left] = ids[column]
-        low, high = right, left
+        first, end = right, left
         for n in range(counts[row]):
-            low, high = min(low, stretches[row, n, 0]), max(high, stretches[row, n, 1])
-        for column in range(np.uint64(low), np.uint64(high)):
+            first, end = min(first, stretches[row, n, 0]), max(end, stretches[row, n, 1])
+        low, high = _in_lots(first, end)
+        for column in range(low, high):
             ids[column], inverse_depths[column] = NO_BODY, least
     return moved_up(found)
+
+
+@compiled()
+def _in_lots(first: int, end: int) -> tuple[np.uint64, np.uint64]:
+    """A stretch of columns, widened to whole lots: none is left over to be taken alone. For work
+    that does no harm beside the stretch.
+    """
+    return np.uint64(first) & np.uint64(-LOT), np.uint64(end + LOT - 1) & np.uint64(-LOT)
 
 
 @compiled()
@@ -136,17 +148,18 @@ def _lay_surface(
     numbers: Floats,
     surface: Floats,
 ) -> None:
-    """Fill `surface` from the column `first` to the one before `end` with the inverse depths of a
-    polyhedron in the row at `v`. Its faces are those of `facing` from the first number of `faces`
-    to the one before the second.
+    """Fill `surface` at least from the column `first` to the one before `end` with the inverse
+    depths of a polyhedron in the row at `v`. Its faces are those of `facing` from the first number
+    of `faces` to the one before the second.
     """
     # A ray is inside a convex body once it has passed all planes that face the camera. The farthest
     # of them has the least inverse depth. Three faces at once, and several pixels.
+    low, high = _in_lots(first, end)
     for n in range(faces[0], faces[1], 3):
         a, b, c = facing[n, 0], facing[n + 1, 0], facing[n + 2, 0]
         a_down, b_down, c_down = facing[n, 1] * v, facing[n + 1, 1] * v, facing[n + 2, 1] * v
         a_start, b_start, c_start = facing[n, 2], facing[n + 1, 2], facing[n + 2, 2]
-        for column in range(np.uint64(first), np.uint64(end)):
+        for column in range(low, high):
             u = numbers[column]
             least = math.inf if n == faces[0] else surface[column]
             least = min(least, a_start + a * u + a_down)
@@ -200,7 +213,8 @@ def _read_row(
             end = max(end, stretches[row, n, 1])
             n += 1
         pixels = 0
-        for column in range(np.uint64(first), np.uint64(end)):
+        low, high = _in_lots(first, end)
+        for column in range(low, high):
             pixels += ids[column] == owner
         if pixels > 0:
             while ids[first] != owner:

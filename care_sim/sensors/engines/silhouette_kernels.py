@@ -27,6 +27,8 @@ from care_sim.sensors.engines.view_kernels import (
 )
 from care_sim.world.bullet import PixelWindow
 
+LOT = 8
+"""Columns that are worked on together, as many as compiled code takes at once or a multiple."""
 Outline = tuple[Floats, Floats, Floats]
 """Of rows: where each is in the picture, and the first and the last column inside, not rounded."""
 
@@ -44,7 +46,7 @@ class Silhouettes(NamedTuple):
 
     For the work on one polyhedron: `planes` (f, 4) as `_lay_planes` and `lines` (e, 3) as
     `_lay_lines` have them, and an `outline`.
-    `numbers` are 0.0, 1.0, 2.0, for every column.
+    `numbers` are 0.0, 1.0, 2.0, for every column and a lot more of them.
     """
 
     owners: Integers
@@ -75,7 +77,7 @@ def room_for(counts: tuple[int, int, int], width: int, height: int) -> Silhouett
         np.empty((faces, 4)),
         np.empty((edges, 3)),
         (np.empty(height), np.empty(height), np.empty(height)),
-        np.arange(width).astype(np.float64),
+        np.arange(width + LOT).astype(np.float64),
     )
 
 
