@@ -56,7 +56,7 @@ class Impacts:
         return Impact(body, float(state.egos.speeds[world]), ahead)
 
 
-@compiled()
+@compiled(brief=True)
 def _near(
     looked: Mask, counts: Integers, boxes: Floats, egos: Integers, within: float
 ) -> tuple[Integers, Integers]:
