@@ -19,23 +19,25 @@ from numba.core import event
 _F = TypeVar("_F", bound=Callable[..., Any])
 
 
-def compiled(**options: Any) -> Callable[[_F], _F]:
+def compiled(*, brief: bool = False, **options: Any) -> Callable[[_F], _F]:
     """Compile a function at its first call; `options` are those of `numba.njit`. While it runs,
-    other threads of Python may run, too.
+    other threads of Python may run, too, unless it is `brief`.
 
     The code is kept beside the file, or in the user's cache folder, or where NUMBA_CACHE_DIR says.
     Where none of these can be written, every process compiles anew.
     """
+    # Whoever lets another thread in has to wait for it, which takes some tens of microseconds.
+    nogil = not brief
 
     def make(function: _F) -> Any:
         try:
-            kernel = njit(cache=True, nogil=True, **options)(function)
+            kernel = njit(cache=True, nogil=nogil, **options)(function)
         except RuntimeError:  # nowhere to keep it
-            return njit(nogil=True, **options)(function)
+            return njit(nogil=nogil, **options)(function)
         # Numba reads the version before anything else of what is kept, and drops code of another
         # one. So code from other sources is never even unpickled: the classes of its arguments may
         # be gone by now. Numba does not keep options apart, either.
-        kernel._cache._cache_file._version += f" {_sources_digest(function.__module__)} nogil"
+        kernel._cache._cache_file._version += f" {_sources_digest(function.__module__)} {nogil=}"
         return kernel
 
     return make

@@ -71,7 +71,7 @@ class Braking:
         return commands
 
 
-@compiled()
+@compiled(brief=True)
 def _headings(live: Mask, counts: Integers, tracks: Floats) -> Floats:
     """The headings of all tracks, world after world."""
     count = 0
@@ -86,7 +86,7 @@ def _headings(live: Mask, counts: Integers, tracks: Floats) -> Floats:
     return headings
 
 
-@compiled()
+@compiled(brief=True)
 def _command(
     live: Mask,
     given: tuple[Integers, Floats, tuple[Floats, Floats], Floats, Floats],

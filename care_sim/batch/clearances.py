@@ -95,7 +95,7 @@ class Clearances:
         return known
 
 
-@compiled()
+@compiled(brief=True)
 def _note(
     live: Mask,
     steps: Integers,

@@ -47,7 +47,7 @@ class Impacts:
         return self._judge.touch((ego, self._kinds[world][body]), poses)
 
 
-@compiled()
+@compiled(brief=True)
 def _near(
     looked: Mask, counts: Integers, boxes: Floats, egos: Integers, within: float
 ) -> tuple[Integers, Integers]:

@@ -62,7 +62,7 @@ class LaneColumns:
         _drive(moved, self.counts, self.rows, accelerations, shares, ratios, dt)
 
 
-@compiled(error_model="numpy")
+@compiled(brief=True, error_model="numpy")
 def _look_ahead(
     moved: Mask, counts: Integers, rows: Floats, shares: Floats, ratios: Floats
 ) -> None:
@@ -85,7 +85,7 @@ def _look_ahead(
             ratios[world, own] = gap / (apart if apart > _LEAST_APART_M else _LEAST_APART_M)
 
 
-@compiled()
+@compiled(brief=True)
 def _ahead(rows: Floats, count: int, own: int) -> int:
     """The vehicle that is the next ahead in its lane, of equally near ones the last; -1 if none."""
     row = rows[own]
@@ -99,7 +99,7 @@ def _ahead(rows: Floats, count: int, own: int) -> int:
     return found
 
 
-@compiled()
+@compiled(brief=True)
 def _drive(
     moved: Mask,
     counts: Integers,

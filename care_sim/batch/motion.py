@@ -236,7 +236,7 @@ def _copy(built: World, world: int, state: BatchState) -> None:
     state.egos.accelerations[world] = motion.acceleration
 
 
-@compiled()
+@compiled(brief=True)
 def _follow(
     live: Mask,
     together: Mask,

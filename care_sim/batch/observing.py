@@ -69,7 +69,7 @@ class Observing:
             observed[name][world] = told[name]
 
 
-@compiled()
+@compiled(brief=True)
 def _put(
     counts: Integers,
     rows: Floats,

@@ -140,7 +140,7 @@ def _lay_images(
             lay_ranges(images[w], fired.cells[w, :rays], ranges[w, :rays], reach)
 
 
-@compiled()
+@compiled(brief=True)
 def _find(live: Mask, returns: Returns, reported: Reported, least: int, found: Found) -> None:
     """See `Scanning.found`."""
     for w in range(len(live)):

@@ -133,7 +133,7 @@ class Sight:
         return silent
 
 
-@compiled()
+@compiled(brief=True)
 def _see_boxes(
     live: Mask, sensors: Sensors, bodies: Bodies, reported: Reported, boxes: Floats
 ) -> None:

@@ -78,7 +78,7 @@ def _make_room(state: BatchState, new: Integers) -> None:
         state.tracks = tracks._replace(rows=rows)
 
 
-@compiled()
+@compiled(brief=True)
 def _update(
     live: Mask,
     found: Found,
@@ -102,7 +102,7 @@ def _update(
                 crowded[w] = True
 
 
-@compiled()
+@compiled(brief=True)
 def _detected(
     rows: Integers, bodies: Bodies, reported: Reported, sensors: Sensors, w: int
 ) -> tuple[Integers, Floats]:
@@ -119,7 +119,7 @@ def _detected(
     return classes, placed_by(sensors, w, seen_by(sensors, w, boxes))
 
 
-@compiled()
+@compiled(brief=True)
 def _keep(
     tracks: TrackTables,
     w: int,
@@ -137,7 +137,7 @@ def _keep(
         tracks.next_ids[w] = max(tracks.next_ids[w], number + 1)
 
 
-@compiled()
+@compiled(brief=True)
 def _predict(live: Mask, tracks: TrackTables, seconds: float) -> None:
     """See `Tracking.predict`."""
     for w in range(len(live)):
@@ -145,7 +145,7 @@ def _predict(live: Mask, tracks: TrackTables, seconds: float) -> None:
             forecast_in_place(tracks.rows[w, : tracks.counts[w]], seconds)
 
 
-@compiled()
+@compiled(brief=True)
 def _see(live: Mask, tracks: TrackTables, sensors: Sensors, seen: Floats) -> None:
     """See `Tracking.seen`."""
     for w in range(len(live)):

@@ -26,7 +26,7 @@ def least_gap(box: Floats, other: Floats) -> float:
     return math.hypot(max(along, 0.0), max(across, 0.0))
 
 
-@compiled()
+@compiled(brief=True)
 def nearest_parts(own: Floats, other: Floats, poses: Floats) -> tuple[Floats, Integers]:
     """What the parts of two bodies are apart at least, metres, ascending, (n * m,); and which two
     each tells of: i * m + j is part i of n and part j of m. -inf where they may overlap.

@@ -5,10 +5,14 @@ import pty
 import select
 import subprocess
 import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
 from textwrap import dedent
 
+import numpy as np
 import pytest
 
+from care_sim.base.compiled import compiled
 from tests.helpers.forked import Forked
 
 NOWHERE = """
@@ -167,3 +171,23 @@ def test_who_waits_at_a_terminal_for_the_first_use_is_told(tmp_path):
             os.read(terminal, 1000).decode() if select.select([terminal], [], [], 0)[0] else ""
         )
     assert heard == ["care_sim: compiling; this takes up to a minute, once on a machine\r\n", ""]
+
+
+@pytest.mark.parametrize("brief", [False, True])
+def test_only_a_brief_function_keeps_other_threads_out(brief):
+    @compiled(brief=brief)
+    def work(rounds):
+        total = 0.0
+        for n in range(rounds):
+            total += np.sin(n)
+        return total
+
+    work(1)
+    with ThreadPoolExecutor(1) as thread:
+        # Some 0.3 s. One that lets nobody in is over before this thread can look again.
+        task = thread.submit(work, 30_000_000)
+        looks = 0
+        while not task.done() and looks < 3:
+            time.sleep(0.005)
+            looks += 1
+    assert (looks < 3) == brief
