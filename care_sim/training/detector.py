@@ -10,6 +10,7 @@ import time
 from collections import deque
 from collections.abc import Iterator
 from concurrent.futures import Executor
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,7 +24,7 @@ from care_sim.base.files import ZIP, check_output
 from care_sim.base.seed_ranges import TRAINING, VALIDATION
 from care_sim.base.torch_threads import one_thread
 from care_sim.perception.pillars.weights import CALIBRATION, save_detector
-from care_sim.study.executors import processes
+from care_sim.study.executors import Processes, processes
 from care_sim.study.provenance import machine_line, package_versions
 from care_sim.training.detector_data import Example, play
 from care_sim.training.detector_score import calibration_of, judged, scores_by_scan
@@ -78,7 +79,7 @@ class TrainDetector:
 
         check_output(self.out, ZIP)
         started = time.perf_counter()
-        with one_thread(torch), processes(1) as executor:
+        with one_thread(torch), _player() as executor:
             torch.manual_seed(self.seed)
             network = Learning()
             batches = _batches(played(executor, TRAINING), np.random.default_rng(self.seed))
@@ -90,7 +91,6 @@ class TrainDetector:
             )
             calibration = calibration_of(scores_by_scan(torch, network, fitted))
             result = judged(scores_by_scan(torch, network, apart, calibration))
-            executor.shutdown(cancel_futures=True)
         arrays = network.arrays() | {CALIBRATION: calibration.astype(np.float32)}
         save_detector(self.out, arrays, _card(self, network, curve, result))
         told = ", ".join(f"{name} {value:.3f}" for name, value in result.items())
@@ -132,6 +132,20 @@ def played(executor: Executor, first: int) -> Iterator[Example]:
         examples = under_way.popleft().result()
         under_way.append(executor.submit(play, first + AHEAD - 1))
         yield from examples
+
+
+@contextmanager
+def _player() -> Iterator[Executor]:
+    """One process that plays. What it is still at when all is learned, or when the learning is
+    broken off, nobody waits for.
+    """
+    executor = processes(1)
+    try:
+        yield executor
+    finally:
+        if isinstance(executor, Processes):
+            executor.end_at_once()
+        executor.shutdown(cancel_futures=True)
 
 
 def _batches(examples: Iterator[Example], rng: np.random.Generator) -> Iterator[list[Example]]:

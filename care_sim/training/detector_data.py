@@ -28,6 +28,7 @@ from care_sim.core.belief import Belief
 from care_sim.core.grid_stack import Grid
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.envs.open_loop import FilmEnv
+from care_sim.envs.scenarios import DriveEnv
 from care_sim.perception.pillars.box_kernels import points_within
 from care_sim.perception.pillars.plan import REACH_M
 from care_sim.policies import make_policy
@@ -50,8 +51,8 @@ DROPOUTS = (0.0, 0.05, 0.2)
 OTHER_SETUPS = ("m1-forward", "os1-64", "paper-vehicle", "roof-and-corners")
 PLAYS_OF_FILM = 3
 """A film costs thirty times what a play of it does."""
-KEPT = 12
-"""Keyframes of a play that become examples, drawn: neighbours resemble each other."""
+SHARE_KEPT = 1 / 3
+"""Of the keyframes of a play, drawn, that become examples: neighbours resemble each other."""
 DRIVE_KEYFRAME_S = 0.5
 """As far apart as those of a street."""
 _ROUND_BOX_M = 0.2
@@ -93,15 +94,9 @@ def _drive(seed: int, rng: np.random.Generator) -> Iterator[Example]:
     other = rng.random() < 0.5
     sensor = str(rng.choice(OTHER_SETUPS)) if other else DEFAULT_SETUP
     told: dict[str, Any] = {"sensor": sensor, "keyframe_s": DRIVE_KEYFRAME_S}
-    with closing(_Drive(**told, **_conditions(rng))) as env:
+    with closing(DriveEnv(**told, **_conditions(rng))) as env:
         keyframes = round(env.scenario.duration_s / DRIVE_KEYFRAME_S)
         yield from _examples(env, seed, rng, keyframes)
-
-
-class _Drive(ClosedLoopEnv):
-    """The drive by itself, without the wrappers of `gymnasium.make`."""
-
-    scenario_name = "drive"
 
 
 def _conditions(rng: np.random.Generator) -> dict[str, Any]:
@@ -120,14 +115,13 @@ def _examples(
 ) -> Iterator[Example]:
     full = env.rig.budget == env.rig.grid.size
     policy = make_policy("full" if full else str(rng.choice(POLICIES)), env)
-    kept = set(rng.choice(keyframes, min(KEPT, keyframes), replace=False).tolist())
     observation, _ = env.reset(seed=seed)
     policy.reset()
-    for keyframe in range(max(kept) + 1):
+    for _ in range(keyframes):
         # The truth of the scan is that of the time before the step, which moves the world on.
         present = _present(env)
         observation, _, terminated, truncated, _ = env.step(policy(observation))
-        if keyframe in kept:
+        if rng.random() < SHARE_KEPT:
             ranges = Belief.from_observation(observation).ranges
             points = scanned(env.rig.grid, ranges)
             yield _example(points, env.rig.sensor_height_m, present, full)

@@ -27,8 +27,8 @@ RIDGE = 1e-3
 
 
 class Judged(NamedTuple):
-    """The peaks of a scan, `right` (n,) those that serve an object, and how many `objects` there
-    were in range of a box; `full` says that every cell fired.
+    """The peaks of a scan, `right` (n,) those that serve an object, and how many `objects` with
+    a return stood on the plan; `full` says that every cell fired.
     """
 
     peaks: Peaks

@@ -181,6 +181,7 @@ def test_seeds_of_several_splits_are_no_study(command, capsys, tmp_path, monkeyp
         "bench --out",
         "parity --out",
         "train learned-scorer --out",
+        "train detector --out",
         "report NOTHING -o",
     ],
 )
@@ -239,6 +240,7 @@ def test_the_detectors_are_listed_with_a_line_each(capsys):
         "returns",
         "graded",
         "cluster",
+        "pillars",
         "torchscript",
     ]
     assert all(len(line.split()) > 5 for line in first)

@@ -75,7 +75,7 @@ def installed(install):
 
 
 def test_ours_are_known():
-    assert detector_names() == ["returns", "graded", "cluster", "torchscript"]
+    assert detector_names() == ["returns", "graded", "cluster", "pillars", "torchscript"]
     assert isinstance(make_detector("returns", HEIGHT, min_returns=5), ReturnsProxy)
 
 
@@ -85,7 +85,7 @@ def test_the_cluster_detector_finds_a_car_and_names_the_object():
 
 
 def test_an_installed_detector_is_listed_made_and_handed_points_only(installed):
-    assert detector_names()[4:] == [
+    assert detector_names()[5:] == [
         "blind",
         "listed",
         "loose",
@@ -153,7 +153,7 @@ def test_a_broken_one_gets_one_line(installed, name, line):
         (
             "yolo",
             {},
-            "unknown detector 'yolo'; known: cluster, graded, returns, torchscript; "
+            "unknown detector 'yolo'; known: cluster, graded, pillars, returns, torchscript; "
             "`care-sim detectors` tells what each is",
         ),
         (

@@ -25,6 +25,7 @@ PIECES = (
     "bullet",
     "returns",
     "cluster",
+    "pillars",
     "torchscript",
     "streets",
     "evaluation",
