@@ -454,13 +454,20 @@ def test_help_names_the_conditions_and_help_all_explains_them(command, capsys):
     all_code, whole, _ = run(capsys, command, "--help-all")
     assert (code, all_code) == (0, 0)
     options = {one for one in option_helps(COMMANDS[command].loaded()) if "--no-" not in one}
-    told = {one for one in options if re.search(rf"[|│] {one}(?![\w-])", short)}
-    named = {*re.findall(r"--[\w-]+", short.rpartition("--help-all explains:")[2])}
+    explained, _, rest = short.partition("Conditions, which --help-all explains:")
+    told = _explained(explained, options)
+    named = {*re.findall(r"--[\w-]+", rest)}
     assert told & named == set()
     assert told | named == options
     assert {f"--{name.replace('_', '-')}" for name in DEFAULTS} >= named
-    assert {one for one in options if re.search(rf"[|│] {one}(?![\w-])", whole)} == options
+    assert _explained(whole, options) == options
     assert len(short.splitlines()) < 110 < len(whole.splitlines())
+
+
+def _explained(text, options):
+    """The options at which a line of a help begins, whatever frame and colours it has."""
+    plain = re.sub(r"\x1b\[[\d;]*m", "", text)
+    return {one for one in options if re.search(rf"^[^\w-]*{one}(?![\w-])", plain, re.MULTILINE)}
 
 
 def test_a_picture_of_the_braking_car(capsys, tmp_path):
