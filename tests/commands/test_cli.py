@@ -454,6 +454,8 @@ def test_help_names_the_conditions_and_help_all_explains_them(command, capsys):
     all_code, whole, _ = run(capsys, command, "--help-all")
     assert (code, all_code) == (0, 0)
     options = {one for one in option_helps(COMMANDS[command].loaded()) if "--no-" not in one}
+    # Told by its place, not as an option.
+    options.discard("--scenario")
     explained, _, rest = short.partition("Conditions, which --help-all explains:")
     told = _explained(explained, options)
     named = {*re.findall(r"--[\w-]+", rest)}
