@@ -31,7 +31,8 @@ _ABOUT = (
 _USAGE = """usage: care-sim COMMAND [options]
 
 Benchmark for adaptive LiDAR sensing: a policy decides which cells fire."""
-_WAYS_ON = """care-sim COMMAND --help tells its options; care-sim --version the version.
+_WAYS_ON = """care-sim COMMAND --help tells its options, --help-all the conditions, too.
+care-sim --version tells the version.
 Begin with: care-sim run dartout"""
 _LONGEST = 2000
 """Characters of a complaint, at the most."""

@@ -29,8 +29,9 @@ class PrintReport:
     """HTML file for the page, which needs no other file; the folder is left as it is (extra
     'page').
     """
-    episodes: int = bounded(400, 0, LARGEST_INTEGER)
-    """At most this many episodes are played again for the page, seed by seed; 0 for none."""
+    episodes: int = bounded(40, 0, LARGEST_INTEGER)
+    """At most this many episodes are played again for the page, seed by seed; 0 for none. They take
+    as long as they did in the study."""
     workers: int = bounded(CORES, 1, MOST_WORKERS)
     """Processes that play them."""
 

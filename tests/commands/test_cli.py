@@ -15,6 +15,8 @@ from care_sim.cli import main
 from care_sim.commands.entries import COMMANDS, GROUPS
 from care_sim.commands.reproduce import Reproduce
 from care_sim.commands.shared.options import Options
+from care_sim.commands.shared.parsing import option_helps
+from care_sim.core.conditions import DEFAULTS
 from care_sim.policies import contenders
 from care_sim.scenarios import SCENARIOS
 from care_sim.sources.installed import SOURCES
@@ -446,6 +448,30 @@ for command in {["", "run", "sweep", "reproduce", "ablate", "faults", "crowding"
     assert seconds[0] < 4
     assert max(later - earlier for earlier, later in pairwise(seconds)) < 2.5
     assert "pyarrow" not in done.stderr
+
+
+@pytest.mark.parametrize("command", ["sweep", "run", "protocol"])
+def test_help_names_the_conditions_and_help_all_explains_them(command, capsys):
+    code, short, _ = run(capsys, command, "--help")
+    all_code, whole, _ = run(capsys, command, "--help-all")
+    assert (code, all_code) == (0, 0)
+    options = {one for one in option_helps(COMMANDS[command].loaded()) if "--no-" not in one}
+    # Told by its place, not as an option.
+    options.discard("--scenario")
+    explained, _, rest = short.partition("Conditions, which --help-all explains:")
+    told = _explained(explained, options)
+    named = {*re.findall(r"--[\w-]+", rest)}
+    assert told & named == set()
+    assert told | named == options
+    assert {f"--{name.replace('_', '-')}" for name in DEFAULTS} >= named
+    assert _explained(whole, options) == options
+    assert len(short.splitlines()) < 110 < len(whole.splitlines())
+
+
+def _explained(text, options):
+    """The options at which a line of a help begins, whatever frame and colours it has."""
+    plain = re.sub(r"\x1b\[[\d;]*m", "", text)
+    return {one for one in options if re.search(rf"^[^\w-]*{one}(?![\w-])", plain, re.MULTILINE)}
 
 
 def test_a_picture_of_the_braking_car(capsys, tmp_path):

@@ -5,8 +5,13 @@ import sys
 import pytest
 
 from care_sim.cli import main
+from care_sim.commands.report import PrintReport
+from care_sim.study.episode_config import grid
+from care_sim.study.episode_play import run_episode
 from care_sim.study.rows.parquet import write_rows
 from tests.helpers.made_rows import STUDY
+
+SHORT = {"scenario_parameters": (("duration_s", 0.2),)}
 
 
 def report(capsys, *arguments):
@@ -37,6 +42,19 @@ def test_a_page_is_written_and_the_folder_left_alone(results, tmp_path, capsys):
     assert [file.name for file in results.iterdir()] == ["episodes.parquet"]
     assert "src=" not in page
     assert "@import" not in page
+
+
+def test_few_episodes_are_played_again_and_how_to_get_all_is_told(tmp_path, capsys):
+    folder = tmp_path / "results"
+    folder.mkdir()
+    rows = [run_episode(config) for config in grid(["dartout"], ["random"], [0.1], [0, 1], **SHORT)]
+    write_rows(rows, folder / "episodes.parquet")
+    made = [folder, "-o", tmp_path / "report.html", "--workers", 1]
+    code, out, err = report(capsys, *made, "--episodes", 1)
+    assert (code, "1 episode to watch" in out) == (0, True)
+    assert "playing 1 episode again to be watched (--episodes 2: all)\n" in err
+    assert "playing 2 episodes again to be watched\n" in report(capsys, *made)[2]
+    assert PrintReport(folder=folder).episodes == 40
 
 
 def test_a_page_takes_the_place_of_the_one_before(results, tmp_path, capsys):

@@ -106,14 +106,20 @@ def test_files_that_a_page_names_are_there():
 
 def test_the_learner_in_one_file_learns(monkeypatch, capsys):
     pytest.importorskip("torch")
-    place = spec_from_file_location("train_ppo", ROOT / "docs" / "examples" / "train_ppo.py")
-    example = module_from_spec(place)
-    place.loader.exec_module(example)
+    example = loaded(ROOT / "docs" / "examples" / "train_ppo.py")
     for name, number in {"UPDATES": 2, "ROLLOUT": 60, "ENVIRONMENTS": 2, "BATCH": 40}.items():
         monkeypatch.setattr(example, name, number)
     example.main()
     steps = re.findall(r"^ *(\d+) steps: return +-?[\d.]+$", capsys.readouterr().out, re.M)
     assert steps == ["120", "240"]
+
+
+def loaded(file):
+    """The module of a file that is in no package."""
+    place = spec_from_file_location(file.stem, file)
+    module = module_from_spec(place)
+    place.loader.exec_module(module)
+    return module
 
 
 def test_the_policy_has_twenty_lines_at_most():
@@ -168,6 +174,21 @@ def test_every_environment_has_a_page():
     text = "".join(page.read_text() for page in SITE if page.parent.name == "environments")
     for entry_point in IDS.values():
         assert f"::: {entry_point.replace(':', '.')}\n" in text
+
+
+@pytest.mark.parametrize("page", sorted((ROOT / "docs" / "environments").glob("*.md")), ids=name_of)
+def test_a_page_of_environments_is_read_in_a_clone_and_says_what_docstrings_say(page):
+    environment_pages = loaded(ROOT / "docs" / "environment_pages.py")
+    # A text that is not as its docstring: python docs/environment_pages.py
+    assert environment_pages.written(page) == page.read_text()
+    shown = re.sub(r"<!--.*?-->", "", page.read_text(), flags=re.DOTALL)
+    assert ":::" not in shown
+    for name in re.findall(r"^::: care_sim\.envs\.\S+\.(\w+)$", page.read_text(), re.MULTILINE):
+        assert re.search(r"`CARE-\w+-v0`: [a-z]", shown), name
+    # The site makes its own of it.
+    on_site = environment_pages.on_page_markdown(page.read_text())
+    assert "<!--" not in on_site
+    assert on_site.count(":::") == page.read_text().count(":::")
 
 
 def test_the_site_is_built_without_a_warning(tmp_path):

@@ -32,7 +32,7 @@ NOTICES = (
     r"\d+ (episodes|plays)? ?of \d+ .* found in .*",
     r"\d+ (episodes?|plays?) .*",
     r"full fires every cell, whatever the budget",
-    r"playing \d+ episodes? again to be watched",
+    r"playing \d+ episodes? again to be watched( \(--episodes \d+: all\))?",
     r"interrupted: .*",
     r"the car never braked: no picture",
     r"measuring .*",

@@ -1,12 +1,15 @@
 """The command line, parsed by tyro; a mistake becomes one line."""
 
 import contextlib
+import inspect
 import io
 import re
+import shutil
+import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, Field, fields, is_dataclass
 from functools import partial
-from typing import Any, Literal, NamedTuple, get_type_hints
+from typing import Any, Literal, NamedTuple, cast, get_type_hints
 
 import docstring_parser
 import tyro
@@ -87,10 +90,10 @@ _READINGS: dict[Any, _Reading] = {
 }
 """Types of options that hold numbers: tyro reads them the same, but complains in its own words."""
 
-_RULES = ConstructorRegistry()
+_HELP_ALL = "--help-all"
+_HELPS = ("-h", "--help")
 
 
-@_RULES.primitive_rule
 def _number(asked: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Any] | None:
     reading = _READINGS.get(asked.type)
     if reading is None:
@@ -106,9 +109,10 @@ def _number(asked: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Any] | None:
     )
 
 
-@_RULES.struct_rule
-def _options(asked: StructTypeInfo) -> StructConstructorSpec | None:
-    """Fields of a command as tyro takes them, but the lines of their docstrings joined."""
+def _options(asked: StructTypeInfo, brief: bool = False) -> StructConstructorSpec | None:
+    """Fields of a command as tyro takes them, but the lines of their docstrings joined; with
+    `brief` without the conditions.
+    """
     if not (is_dataclass(asked.type) and asked.type.__module__.startswith("care_sim.")):
         return None
     types = get_type_hints(asked.type, include_extras=True)
@@ -117,7 +121,9 @@ def _options(asked: StructTypeInfo) -> StructConstructorSpec | None:
         tuple(
             StructFieldSpec(
                 field.name,
-                types[field.name],
+                tyro.conf.Suppress[types[field.name]]
+                if brief and _is_condition(asked.type, field.name)
+                else types[field.name],
                 _default_of(field, asked.default),
                 partial(_help_of, asked.type, field.name),
             )
@@ -125,6 +131,46 @@ def _options(asked: StructTypeInfo) -> StructConstructorSpec | None:
             if field.init
         ),
     )
+
+
+def _registry(brief: bool) -> ConstructorRegistry:
+    """How tyro reads options."""
+    rules = ConstructorRegistry()
+    rules.primitive_rule(_number)
+    rules.struct_rule(partial(_options, brief=brief))
+    return rules
+
+
+_RULES = _registry(brief=False)
+_BRIEF = _registry(brief=True)
+"""Of a help that leaves the conditions out; nothing is played by it."""
+
+
+def _is_condition(options: type, name: str) -> bool:
+    """Whether a field is of the conditions that both loops and all studies share."""
+    owner = next(one for one in options.__mro__ if name in inspect.get_annotations(one))
+    return owner.__module__.startswith("care_sim.core.")
+
+
+def _conditions(command: Any) -> list[str]:
+    """The options of a command that are conditions, as they are written."""
+    if not is_dataclass(command):
+        return []
+    names = []
+    for field in fields(command):
+        if is_dataclass(field.default):
+            names += _conditions(type(field.default))
+        elif _is_condition(cast(type, command), field.name):
+            names.append(f"--{field.name.replace('_', '-')}")
+    return names
+
+
+def _tell_conditions(command: Any) -> None:
+    """Print which options a help has left out."""
+    if names := _conditions(command):
+        told = f"Conditions, which {_HELP_ALL} explains: {', '.join(names)}."
+        columns = shutil.get_terminal_size().columns
+        print(textwrap.fill(told, columns, break_on_hyphens=False), end="\n\n")
 
 
 def _default_of(field: Field[Any], options: Any) -> Any:
@@ -151,22 +197,34 @@ def chosen_command(
     about: str | None,
     arguments: Sequence[str],
 ) -> Callable[[], int]:
-    """The command that the arguments name, with its options. Raises InvalidInput, in one line."""
+    """The command that the arguments name, with its options. Raises InvalidInput, in one line.
+
+    `--help` names the conditions at its end alone, `--help-all` explains them, too.
+    """
     if not arguments:
         raise InvalidInput(f"no command is given; those of {prog}: {', '.join(commands)}")
     named = arguments[0]
     if not named.startswith("-") and named.replace("_", "-") not in commands:
         raise unknown("command", named, commands)
     complaint = io.StringIO()
+    # Sixty conditions, each of several lines, would hide the few options that a command is about.
+    brief = not {*_HELPS}.isdisjoint(arguments)
+    arguments = [_HELPS[1] if one == _HELP_ALL else one for one in arguments]
     try:
         with contextlib.redirect_stderr(complaint):
             command: Callable[[], int] = tyro.extras.subcommand_cli_from_dict(
-                dict(commands), prog=prog, description=about, args=arguments, registry=_RULES
+                dict(commands),
+                prog=prog,
+                description=about,
+                args=arguments,
+                registry=_BRIEF if brief else _RULES,
             )
             return command
     except SystemExit as end:
         # Help ends with 0, and is what was asked for.
         if end.code in (0, None):
+            if brief:
+                _tell_conditions(commands.get(named))
             raise
         if refusal := _refusal(end):
             raise refusal from None

@@ -150,8 +150,11 @@ def write_page(
         about = provenance_of(folder, rows, study.results, left_out)
         watched = episodes_to_watch(rows, most) if study.results is EPISODES else []
         if watched:
+            left = len(rows) - len(watched)
+            rest = f" (--episodes {len(rows)}: all)" if left else ""
             print(
-                f"playing {counted(len(watched), 'episode')} again to be watched", file=sys.stderr
+                f"playing {counted(len(watched), 'episode')} again to be watched{rest}",
+                file=sys.stderr,
             )
         episodes = played_again(watched, workers, make_executor)
         page = Page(folder.resolve().name, study, rows, findings, about, episodes)
