@@ -1,7 +1,7 @@
 """The shared random floor, line 6 of Algorithm 1: a random order of all cells at every keyframe.
 
-The order is that of `numpy.random.Generator.permutation`, to the last cell. It is drawn here, in
-less than a third of the time, because it takes an eighth of a keyframe there.
+The order is that of `numpy.random.Generator.permutation`, to the last cell. It is drawn here, in a
+quarter of the time, because it takes an eighth of a keyframe there.
 """
 
 import numpy as np
