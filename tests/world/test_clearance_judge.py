@@ -48,7 +48,8 @@ def test_it_tells_what_the_world_of_the_bodies_tells(judge, others, place):
 
 @pytest.mark.parametrize("x", [3.0, 60.0, 104.0])
 def test_of_bodies_that_lie_on_their_side_all_parts_are_asked_about(judge, x):
-    lying = Frame(x, 1.0, 0.5, 0.3, 1.5, 0.2)
+    # The head, which is the highest part of who stands, points to the car.
+    lying = Frame(x, 1.0, 0.5, np.pi, 0.0, 1.5)
     with closing(BulletWorld()) as world:
         ego = world.add(CATALOGUE["ego"], (0.0, 0.0, 0.1), transparent=True)
         body = world.add(CATALOGUE["pedestrian"], lying)

@@ -225,17 +225,11 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
     ) -> dict[str, Any]:
         """Begin episodes in the worlds `who`, and add their infos."""
         self._begun[who] = False
-        tasks = [
-            partial(
-                worlds.begin, {world: seeds[share.start + world] for world in _places(who[share])}
-            )
-            for worlds, share in zip(self._worlds, self._shares, strict=True)
-            if who[share].any()
-        ]
-        starts = [share.start for share in self._shares if who[share].any()]
-        for start, begun in zip(starts, self._threads.all(tasks), strict=True):
-            for world, info in begun.items():
-                infos = self._add_info(infos, info, start + world)
+        # One share after the other: this is Python nearly alone, and threads would take turns.
+        for worlds, share in zip(self._worlds, self._shares, strict=True):
+            own = {world: seeds[share.start + world] for world in _places(who[share])}
+            for world, info in (worlds.begin(own) if own else {}).items():
+                infos = self._add_info(infos, info, share.start + world)
         self._over[who] = False
         self._begun[who] = True
         return infos
