@@ -4,7 +4,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter
 
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.types import CLASSES
@@ -42,8 +41,7 @@ def peaks_of(
     `calibration` (classes, 2) holds slopes and offsets from logits to those of scores.
     """
     sure = answer[: len(CLASSES)]
-    peak = sure == maximum_filter(sure, (1, 3, 3), mode="constant", cval=-np.inf)
-    classes, rows, columns = np.nonzero(peak)
+    classes, rows, columns = np.nonzero(sure == _highest_around(sure))
     logits = sure[classes, rows, columns].astype(np.float64)
     scores = score(calibration, classes, logits)
 
@@ -61,6 +59,14 @@ def score(calibration: Floats, classes: Integers, logits: Floats) -> Floats:
     slopes, offsets = calibration[classes].T
     # Beyond, the exponential would overflow, and the score is 0 or 1 to the last bit.
     return np.asarray(1 / (1 + np.exp(-np.clip(slopes * logits + offsets, -700, 700))))
+
+
+def _highest_around(planes: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(n, h, w) the highest of every cell of `planes` (n, h, w) and the eight around it."""
+    edged = np.pad(planes, ((0, 0), (1, 1), (1, 1)), constant_values=-np.inf)
+    rows = np.maximum(np.maximum(edged[:, :-2], edged[:, 1:-1]), edged[:, 2:])
+    highest: NDArray[np.float32] = np.maximum(rows[..., :-2], rows[..., 1:-1])
+    return np.maximum(highest, rows[..., 2:])
 
 
 def _boxes(told: NDArray[np.float32], rows: Integers, columns: Integers) -> Floats:

@@ -47,6 +47,20 @@ def test_the_order_of_the_points_does_not_matter_but_for_last_bits(file):
     assert np.allclose(one, other, atol=1e-4)
 
 
+def test_of_a_pillar_its_mean_point_counts_and_how_many_they_are(tmp_path):
+    """Without what is told of the number, a scan whose points all come twice is no other."""
+    arrays = drawn_arrays()
+    twice = np.repeat(POINTS, 2, axis=0)
+    answers_to = {}
+    for told in (True, False):
+        arrays["near0.weight"][:, LAYERS["point1"].outputs] *= told
+        weights.save_detector(tmp_path / "told.npz", arrays, {})
+        detector = PillarsDetector(tmp_path / "told.npz")
+        answers_to[told] = [detector.answer(points, HEIGHT) for points in (POINTS, twice)]
+    assert np.allclose(*answers_to[False], atol=1e-4)
+    assert not np.allclose(*answers_to[True], atol=1e-2)
+
+
 def test_only_the_height_above_the_road_and_the_sensor_enter_not_the_points_off_the_plan(file):
     detector = PillarsDetector(file)
     far = np.concatenate([POINTS, [[70.0, 0, 0], [10, 10, 9], [0.5, 0.5, -0.2]]])
