@@ -92,6 +92,8 @@ _READINGS: dict[Any, _Reading] = {
 
 _HELP_ALL = "--help-all"
 _HELPS = ("-h", "--help")
+_HIDDEN: Any = tyro.conf.Suppress
+"""Takes a type, and makes one of an option that no help shows."""
 
 
 def _number(asked: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Any] | None:
@@ -121,7 +123,7 @@ def _options(asked: StructTypeInfo, brief: bool = False) -> StructConstructorSpe
         tuple(
             StructFieldSpec(
                 field.name,
-                tyro.conf.Suppress[types[field.name]]
+                _HIDDEN[types[field.name]]
                 if brief and _is_condition(asked.type, field.name)
                 else types[field.name],
                 _default_of(field, asked.default),
