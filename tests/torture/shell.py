@@ -40,6 +40,7 @@ LISTS = (
     ["policies"],
     ["scenarios"],
     ["detectors"],
+    ["sources"],
     ["--help"],
     ["sweep", "--help"],
     ["report", "results"],
