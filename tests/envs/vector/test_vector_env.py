@@ -3,18 +3,14 @@
 import copy
 import gc
 import multiprocessing
-import pickle
 import threading
 import time
 
 import gymnasium
 import numpy as np
 import pytest
-from gymnasium.envs.registration import load_env_creator
 
 from care_sim import InvalidInput
-from care_sim.envs import CLOSED_LOOP
-from care_sim.envs.vector import scenarios as vector_scenarios
 from tests.helpers.vectors import difference, native, singles
 
 NAME = "CARE-Dartout-v0"
@@ -36,19 +32,6 @@ def test_it_is_what_gymnasium_makes_unless_it_is_asked_otherwise():
     assert type(env).__name__ == "DartoutVectorEnv"
     assert env.observation_space.contains(env.reset(seed=0)[0])
     env.close()
-
-
-@pytest.mark.parametrize("name", CLOSED_LOOP)
-def test_every_environment_has_many_of_itself(name):
-    spec = gymnasium.spec(name)
-    many, single = (load_env_creator(at) for at in (spec.vector_entry_point, spec.entry_point))
-    assert (many.single, many.__name__) == (single, f"{single.__name__[:-3]}VectorEnv")
-    assert pickle.loads(pickle.dumps(many)) is many is load_env_creator(spec.vector_entry_point)
-
-
-def test_of_what_is_no_environment_there_are_not_many():
-    for name in ("NoSuchVectorEnv", "DenseEnv", "Dense"):
-        assert not hasattr(vector_scenarios, name)
 
 
 def test_observations_that_were_handed_out_stay(vector):
