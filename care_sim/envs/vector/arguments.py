@@ -36,17 +36,16 @@ def makers_of(kind: type[ClosedLoopEnv], arguments: Mapping[str, Any], worlds: i
 
 def models_of(makers: Sequence[Maker]) -> list[ClosedLoopEnv]:
     """The environments, which nobody resets, that show what is fixed about each world: one for all
-    whose arguments are equal.
+    whose arguments are alike.
     """
-    made: list[tuple[list[Any], ClosedLoopEnv]] = []
+    made: dict[tuple[str, ...], ClosedLoopEnv] = {}
     models = []
     for make in makers:
-        own = [make.keywords.get(name) for name in OF_EACH_WORLD]
-        model = next((model for before, model in made if before == own), None)
-        if model is None:
-            model = make()
-            made.append((own, model))
-        models.append(model)
+        # As they are written: True equals 1, and yet is refused where 1 is taken.
+        own = tuple(repr(make.keywords.get(name)) for name in OF_EACH_WORLD)
+        if own not in made:
+            made[own] = make()
+        models.append(made[own])
     return models
 
 

@@ -24,7 +24,7 @@ from care_sim.envs.spaces import checked_scores
 from care_sim.envs.vector.arguments import Maker, makers_of, models_of
 from care_sim.envs.vector.compiled_worlds import CompiledWorlds
 from care_sim.envs.vector.coverage import why_separate
-from care_sim.envs.vector.infos import kept
+from care_sim.envs.vector.infos import joined, kept
 from care_sim.envs.vector.same_step import last_rows, same_step
 from care_sim.envs.vector.separate_worlds import SeparateWorlds
 from care_sim.envs.vector.threads import Threads
@@ -217,7 +217,7 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         rewards, terminated, truncated = (
             np.concatenate(column) for column in zip(*(part[:3] for part in parts), strict=True)
         )
-        columns = _joined([part.columns for part in parts])
+        columns = joined([part.columns for part in parts])
         return Stepped(rewards, terminated, truncated, columns, single)
 
     def _begin(
@@ -298,13 +298,3 @@ def _autoreset(mode: AutoresetMode | str) -> AutoresetMode:
     if mode not in allowed:
         raise InvalidInput(f"autoreset_mode must be one of {', '.join(allowed)}, got {shown(mode)}")
     return allowed[mode]
-
-
-def _joined(columns: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """The columns of the shares, one after the other, in arrays of their own."""
-    return {
-        name: _joined([part[name] for part in columns])
-        if isinstance(column, dict)
-        else np.concatenate([part[name] for part in columns])
-        for name, column in columns[0].items()
-    }

@@ -1,10 +1,21 @@
 """The infos of a vector environment, from columns over all worlds."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from care_sim.core.arrays import Mask
+
+
+def joined(parts: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """The columns of the shares of worlds, one after the other, in arrays of their own."""
+    return {
+        name: joined([part[name] for part in parts])
+        if isinstance(column, dict)
+        else np.concatenate([part[name] for part in parts])
+        for name, column in parts[0].items()
+    }
 
 
 def kept(columns: dict[str, Any], who: Mask) -> dict[str, Any]:

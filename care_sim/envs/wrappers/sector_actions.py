@@ -22,7 +22,7 @@ class _Sectors(gymnasium.ActionWrapper[Any, NDArray[np.float32], Action], Record
     def __init__(self, env: gymnasium.Env[Any, Any], azimuths: int = 32, elevations: int = 4):
         self._rig = sensing(env).rig
         self.sectors = Tiling(self._rig.grid, azimuths, elevations)
-        self._fired = SectorActions(self._rig, self.sectors, 1)
+        self._fired = SectorActions(self._rig, self.sectors, np.array([self._rig.budget]))
         RecordConstructorArgs.__init__(self, azimuths=azimuths, elevations=elevations)
         gymnasium.ActionWrapper.__init__(self, env)
         self.action_space = sectors_space(self.sectors)

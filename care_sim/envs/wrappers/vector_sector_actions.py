@@ -6,6 +6,7 @@ import numpy as np
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from care_sim.base.vectors import attribute_of_each
 from care_sim.core.arrays import Floats, Mask
 from care_sim.core.beliefs import Beliefs
 from care_sim.core.types import Action
@@ -23,8 +24,9 @@ class _VectorSectors(WorldsWrapper):
     def __init__(self, env: AnyVector, azimuths: int = 32, elevations: int = 4):
         self._rig = rig_of(env)
         super().__init__(env)
+        budgets = np.array([rig.budget for rig in attribute_of_each(env, "rig")])
         self.sectors = Tiling(self._rig.grid, azimuths, elevations)
-        self._fired = SectorActions(self._rig, self.sectors, self.num_envs)
+        self._fired = SectorActions(self._rig, self.sectors, budgets)
         self.single_action_space = sectors_space(self.sectors)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
 

@@ -74,14 +74,14 @@ class SectorChoice:
 
 
 class SectorActions:
-    """The actions (W, E, A) for scores (W, ...) of the `sectors` of W worlds, none with a larger
-    budget than the rig. They are read-only, and the next call overwrites them.
+    """The actions (W, E, A) for scores (W, ...) of the `sectors` of W worlds, each with its own of
+    the `budgets` (W,). They are read-only, and the next call overwrites them.
     """
 
-    def __init__(self, rig: Rig, sectors: Tiling, worlds: int):
+    def __init__(self, rig: Rig, sectors: Tiling, budgets: Integers):
         self._choice = SectorChoice(rig, sectors)
-        self._allocator = Allocator(rig, worlds)
-        self._budgets = np.full(worlds, rig.budget)
+        self._allocator = Allocator(rig, len(budgets))
+        self._budgets = budgets
 
     def reserve(self, beliefs: Beliefs, scores: NDArray[np.floating]) -> Action:
         """See `SectorChoice.reserve`; each world with the budget that it is told."""
@@ -90,6 +90,6 @@ class SectorActions:
         return self._allocator.scores([self._choice.hulls(beliefs), best], budgets)
 
     def alone(self, scores: NDArray[np.floating]) -> Action:
-        """See `SectorChoice.alone`. Of the cells, best first, a world fires what it can pay."""
+        """See `SectorChoice.alone`."""
         best = self._choice.best(scores, self._budgets)
         return self._allocator.scores([WorldSets.nothing(len(scores)), best], self._budgets)

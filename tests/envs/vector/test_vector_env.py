@@ -81,6 +81,8 @@ def test_seeds_count_up_or_are_told_one_by_one(vector):
         ({"camera_latency": (1,)}, "camera_latency must be one value, or"),
         ({"budget": [0.1, 2.0]}, r"budget must lie in \(0, 1\]"),
         ({"budget": [[0.1], [0.2]]}, "budget must"),
+        ({"budget": [0.1, np.full(2, 0.1)]}, "budget must"),
+        ({"camera_latency": [1, True]}, "camera_latency must"),
         ({"reserve_fraction": [0.1, 0.2]}, "reserve_fraction must"),
     ],
 )

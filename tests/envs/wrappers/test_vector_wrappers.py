@@ -42,9 +42,14 @@ CONDITIONS = {
     "order": ("CARE-Dense-v0", {"cell_order": "core-spread", "duration_s": 1.2}),
     # Without the floor infos are lists, which may differ in length.
     "budgets": ("CARE-Dense-v0", {"duration_s": 1.2, "floor": False}),
+    # Where the window stands depends on how many cells are demanded.
+    "window": (
+        "CARE-Dense-v0",
+        {"duration_s": 1.2, "floor": False, "firing": "azimuth-window:60"},
+    ),
     "drive": ("CARE-Drive-v0", {"duration_s": 1.0, "reserve_fraction": 0.0}),
 }
-BUDGETS = {"budgets": [0.02, 0.3, 0.1]}
+BUDGETS = {"budgets": [0.02, 0.3, 0.1], "window": [0.1, 0.5, 0.2]}
 """Of each world its own, in these conditions; else all have 3%."""
 
 
@@ -109,6 +114,7 @@ def vector(condition, mode, **further):
         *product(["dense"], PAIRS, ["SameStep"]),
         *product(["dense"], ["reserve inside"], ["NextStep", "Disabled"]),
         *product(["order", "budgets", "drive"], ["reserve inside", "scores"], ["SameStep"]),
+        ("window", "scores", "SameStep"),
     ],
 )
 def test_a_world_is_the_single_environment_to_the_last_bit(condition, pair, mode):

@@ -104,7 +104,8 @@ def test_every_world_acts_and_sees_as_if_it_were_alone(name, seed, worlds):
     rng = np.random.default_rng(seed)
     rig = RIGS[name]
     sectors, features = Tiling(rig.grid, 32, 4), GridFeatures(rig, 32, 4)
-    acting, choice = SectorActions(rig, sectors, worlds), SectorChoice(rig, sectors)
+    acting = SectorActions(rig, sectors, np.full(worlds, rig.budget))
+    choice = SectorChoice(rig, sectors)
     alone = [a_belief(rng, rig) for _ in range(worlds)]
     scores = np.round(rng.uniform(-1, 1, (worlds, 4, 32)), 1).astype(np.float32)
     scores[0] *= rng.integers(-1, 2)
