@@ -21,9 +21,9 @@ from care_sim.base.files import ZIP, replacing
 MOST_UNPACKED_BYTES = 2**26
 """Bytes that a file may hold when it is unpacked; the shipped ones hold some millions at most."""
 LARGEST_WEIGHT = 1e6
-"""What a weight may be, of either sign. Inputs are at most 1 and a file holds 2^24 numbers, so that
-three layers of any shape stay below 1e29, while float32 ends at 3e38; the shipped ones stay below
-100."""
+"""What a weight may be, of either sign; the shipped ones stay below 100. A file holds 2^24
+numbers, so that three layers of any shape, whose inputs are at most 1, stay below 1e29, while
+float32 ends at 3e38. Whoever has more layers looks at what they answer."""
 _CARD = "card"
 
 Arrays = dict[str, NDArray[np.float32]]

@@ -1,5 +1,6 @@
 """Where an error was raised in code that is not ours: the place that its author looks for."""
 
+import site
 import sysconfig
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -7,7 +8,13 @@ from traceback import walk_tb
 from types import FrameType
 
 _OURS = Path(__file__).parent.parent
-_LIBRARIES = [Path(sysconfig.get_path(name)) for name in ("stdlib", "purelib", "platlib")]
+_FOLDERS = (
+    *(sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib")),
+    # A system's own packages and those of `pip install --user` lie elsewhere.
+    *site.getsitepackages(),
+    site.getusersitepackages(),
+)
+_LIBRARIES = [Path(folder) for folder in dict.fromkeys(_FOLDERS)]
 _GROUPS = "care_sim."
 """How the names of our groups of entry points begin."""
 

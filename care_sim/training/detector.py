@@ -26,7 +26,7 @@ from care_sim.base.torch_threads import one_thread
 from care_sim.perception.pillars.weights import CALIBRATION, save_detector
 from care_sim.study.executors import Processes, processes
 from care_sim.study.provenance import machine_line, package_versions
-from care_sim.training.detector_data import Example, play
+from care_sim.training.detector_data import Example, play, within_plan
 from care_sim.training.detector_score import calibration_of, judged, scores_by_scan
 from care_sim.training.detector_targets import Targets, loss, targets_of
 
@@ -160,7 +160,9 @@ def _batches(examples: Iterator[Example], rng: np.random.Generator) -> Iterator[
 
 
 def turned_example(example: Example, rng: np.random.Generator) -> Example:
-    """The example as another way of the sensor would have it: mirrored or not, and turned."""
+    """The example as another way of the sensor would have it: mirrored or not, and turned. What
+    stood in a corner of the plan may stand beside it then, and is left out.
+    """
     side = float(rng.choice([-1.0, 1.0]))
     turn = float(rng.uniform(-MOST_TURN, MOST_TURN))
     cos, sin = np.cos(turn), np.sin(turn)
@@ -169,7 +171,10 @@ def turned_example(example: Example, rng: np.random.Generator) -> Example:
     points[:, :2] = points[:, :2] @ matrix.T.astype(np.float32)
     boxes[:, :2] = boxes[:, :2] @ matrix.T
     boxes[:, 6] = side * boxes[:, 6] + turn
-    return Example(points, example.sensor_height_m, example.classes, boxes, example.full)
+    kept = within_plan(boxes)
+    return Example(
+        points, example.sensor_height_m, example.classes[kept], boxes[kept], example.full
+    )
 
 
 def _card(

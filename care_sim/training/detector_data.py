@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.core.arrays import Floats, Integers
+from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.belief import Belief
 from care_sim.core.grid_stack import Grid
 from care_sim.envs.closed_loop import ClosedLoopEnv
@@ -157,7 +157,12 @@ def _example(points: Floats, sensor_height_m: float, present: Annotations, full:
     # The road beneath a body is no return of it.
     standing = points[points[:, 2] > _ROUND_BOX_M - sensor_height_m]
     returns = points_within(np.ascontiguousarray(standing), larger)
-    seen = (returns > 0) & (np.abs(boxes[:, :2]).max(axis=1, initial=0) < REACH_M)
+    seen = (returns > 0) & within_plan(boxes)
     return Example(
         points.astype(np.float32), sensor_height_m, present.classes[seen], boxes[seen], full
     )
+
+
+def within_plan(boxes: Floats) -> Mask:
+    """(n,) which of boxes (n, 7) have their middle on the plan."""
+    return np.asarray(np.abs(boxes[:, :2]).max(axis=1, initial=0) < REACH_M)

@@ -5,7 +5,9 @@ import re
 import pytest
 from PIL import Image
 
+from care_sim.base.errors import InvalidInput
 from care_sim.cli import main
+from care_sim.commands.shared.one_scene import SceneOptions
 from care_sim.sources.named import source_of
 from care_sim.sources.scenes import film_of
 from care_sim.study.play_config import play_grid
@@ -51,6 +53,33 @@ def test_the_seed_is_that_of_the_street_and_a_scene_has_a_name(played):
             code, out, err = played("run", "street", "--policy", "random", *options)
             assert (code, err) == (0, "")
             assert out.startswith(name)
+
+
+def test_the_seed_draws_the_floor_of_a_log_that_is_named_too(played, drive):
+    log = source_of(f"argoverse2:{drive}").scenes()[0].name
+    line = ("run", f"argoverse2:{drive}", "--policy", "random", "--budget", "0.02")
+    hashes = [
+        re.findall(r"^episode_hash +(\S+)$", played(*line, *options)[1], re.MULTILINE)
+        for options in ((), ("--seed", 5), ("--seed", 5, "--scene", log))
+    ]
+    assert hashes[0] != hashes[1] == hashes[2]
+
+
+def test_a_source_of_a_single_street_has_no_other_seed(tmp_path, monkeypatch):
+    (tmp_path / "onestreet.py").write_text(
+        "from dataclasses import dataclass\n"
+        "from care_sim.sources.scenes import Generated\n"
+        "from care_sim.streets.street import make_street\n"
+        "@dataclass(frozen=True)\nclass One(Generated):\n"
+        "    def seeds(self):\n        return [7]\n"
+        "    def street(self, seed):\n        return make_street(seed)\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    source = source_of("onestreet:One")
+    assert SceneOptions().scene_of(source, 7).seed == 7
+    with pytest.raises(InvalidInput, match=r"seed must be of a scene of onestreet:One.* got 3"):
+        SceneOptions().scene_of(source, 3)
+    assert SceneOptions(scene="one-0007").scene_of(source, 3).seed == 7
 
 
 @pytest.mark.parametrize(

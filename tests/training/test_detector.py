@@ -9,11 +9,12 @@ import pytest
 from care_sim.cli import main
 from care_sim.perception.pillars.detector import PillarsDetector
 from care_sim.perception.pillars.network import Fixed, answers, place_planes
-from care_sim.perception.pillars.plan import on_plan
+from care_sim.perception.pillars.plan import REACH_M, on_plan
 from care_sim.perception.pillars.weights import load_detector
 from care_sim.training import detector
 from care_sim.training.detector_data import Example
 from care_sim.training.detector_score import PLAIN, Judged, Peaks, calibration_of, right
+from care_sim.training.detector_targets import targets_of
 from tests.helpers.made_points import HEIGHT, road, shell
 
 torch = pytest.importorskip("torch")
@@ -107,6 +108,18 @@ def test_a_scan_turns_with_what_stands_in_it():
             assert near == pytest.approx(
                 np.hypot(*(before.points[:, :2] - old[:2] - was).T).min(), abs=1e-4
             )
+
+
+def test_what_a_turn_takes_off_the_plan_is_no_object_any_more():
+    corner = np.array([[50.0, -50.0, -1, 4.6, 1.9, 1.7, 0.0], [-50.0, 20.0, -1, 4.6, 1.9, 1.7, 0]])
+    before = Example(np.empty((0, 3), np.float32), HEIGHT, np.array([0, 1]), corner)
+    rng = np.random.default_rng(0)
+    turns = [detector.turned_example(before, rng) for _ in range(20)]
+    assert {len(after.classes) for after in turns} == {0, 1, 2}
+    for after in turns:
+        assert np.abs(after.boxes[:, :2]).max(initial=0) < REACH_M
+        # One cell for each, none for what is gone.
+        assert (targets_of([after]).sure == 1).sum() == len(after.classes) == len(after.boxes)
 
 
 def peaks(logits, places):

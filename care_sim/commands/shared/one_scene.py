@@ -13,6 +13,7 @@ from care_sim.core.conditions import DEFAULTS, OF_BOTH_LOOPS, ClosedLoopConditio
 from care_sim.sensors.setups import DEFAULT_SETUP
 from care_sim.sources.installed import SOURCES
 from care_sim.sources.named import source_name, source_of
+from care_sim.sources.recordings import Recordings
 from care_sim.sources.scenes import Scene, Source, Streets
 from care_sim.study.play_config import PlayConfig, play_grid
 
@@ -50,19 +51,21 @@ class SceneOptions:
         """The scene that is named, or else that of the seed. Raises InvalidInput where there is
         none.
         """
-        scenes = source.scenes()
+        scenes = {each.name: each for each in source.scenes()}
         if self.scene is not None:
-            check_known("scene", self.scene, [each.name for each in scenes])
-            return next(each for each in scenes if each.name == self.scene)
-        seeds = {each.seed: each for each in scenes}
+            check_known("scene", self.scene, [*scenes])
+        chosen = next(iter(scenes.values())) if self.scene is None else scenes[self.scene]
+        # Of a recording the seed draws the faults and the floor alone; a street is its seed.
+        kind: Any = SOURCES.maker(source.kind)
+        if issubclass(kind, Recordings):
+            return chosen._replace(seed=seed)
+        if self.scene is not None:
+            return chosen
+        seeds = {each.seed: each for each in scenes.values()}
         if seed in seeds:
-            return scenes[0] if len(seeds) == 1 else seeds[seed]
-        # Recordings all have one seed, which draws their faults and floor alone.
-        if len(seeds) == 1:
-            return scenes[0]._replace(seed=seed)
-        raise InvalidInput(
-            f"seed must be of a scene of {source.kind}, {min(seeds)} to {max(seeds)}, got {seed}"
-        )
+            return seeds[seed]
+        told = f"{min(seeds)} to {max(seeds)}, got {seed}"
+        raise InvalidInput(f"seed must be of a scene of {source.kind}, {told}")
 
 
 def is_source(text: str) -> bool:

@@ -17,7 +17,7 @@ from care_sim.perception.pillars.box_kernels import points_within
 from care_sim.perception.pillars.decoding import peaks_of
 from care_sim.perception.pillars.network import Fixed, answers, place_planes
 from care_sim.perception.pillars.plan import on_plan
-from care_sim.perception.pillars.weights import CALIBRATION, load_detector
+from care_sim.perception.pillars.weights import CALIBRATION, SHIPPED, load_detector
 
 LEAST_SCORE = 0.3
 """What is less sure does not become a track."""
@@ -36,6 +36,7 @@ class PillarsDetector:
     def __init__(self, file: str | PathLike[str] | None = None, least_score: float = LEAST_SCORE):
         check_number("least_score", least_score, 0.0, 1.0)
         self._torch = import_torch()
+        self._file = SHIPPED if file is None else file
         arrays, self.card = load_detector(file)
         self._network = Fixed(self._torch, arrays)
         self._places = place_planes(self._torch)
@@ -56,7 +57,9 @@ class PillarsDetector:
         return Detections(found.classes, found.boxes, returns, found.scores)
 
     def answer(self, points: Floats, sensor_height_m: float) -> NDArray[np.float32]:
-        """(OUTPUTS, CELLS, CELLS) what the network says of points (P, 3)."""
+        """(OUTPUTS, CELLS, CELLS) what the network says of points (P, 3). Raises InvalidInput where
+        that is not finite.
+        """
         torch = self._torch
         seen = on_plan(points, sensor_height_m)
         # One thread: several processes play at the same time, and sums have one order.
@@ -64,4 +67,8 @@ class PillarsDetector:
             inputs, pillars = torch.from_numpy(seen.inputs), torch.from_numpy(seen.pillars)
             answer = answers(torch, self._network, inputs, pillars, self._places)
         made: NDArray[np.float32] = answer[0].numpy()
+        # Weights may each be small enough, and their products still overflow. Nothing is a peak
+        # beside NaN, so the scan would look empty.
+        if not np.isfinite(made).all():
+            raise InvalidInput(f"weights {self._file}: the network answers numbers beyond float32")
         return made

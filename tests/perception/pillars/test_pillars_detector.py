@@ -122,6 +122,18 @@ def test_without_shipped_weights_the_command_that_makes_them_is_named(monkeypatc
     assert "\n" not in str(refused.value)
 
 
+def test_weights_whose_answer_is_no_number_are_told_of(tmp_path):
+    """Each number is allowed, but 25 layers of them leave what float32 holds."""
+    arrays = {name: array * np.float32(1e4) for name, array in drawn_arrays().items()}
+    arrays[weights.CALIBRATION][:] = 1, 0
+    weights.save_detector(tmp_path / "wild.npz", arrays, {})
+    with pytest.raises(
+        InvalidInput, match=r"^weights \S*wild\.npz: the network answers"
+    ) as refused:
+        PillarsDetector(tmp_path / "wild.npz").detect(POINTS, HEIGHT)
+    assert "\n" not in str(refused.value)
+
+
 def missing(path):
     path.unlink()
 
