@@ -266,6 +266,9 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         if seed is None:
             return [None] * self.num_envs
         if isinstance(seed, Iterable):
+            # An array without an axis calls itself Iterable, too.
+            if not getattr(seed, "ndim", 1):
+                check_seed(seed)
             seeds = [*seed]
         else:
             check_seed(seed)
