@@ -187,6 +187,11 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         for worlds in self._worlds:
             worlds.close()
 
+    def __getstate__(self) -> object:
+        # The worlds write into rows of the observations that are handed out. In a copy they would
+        # write elsewhere, and it would hand out what never changes.
+        raise InvalidInput("many worlds cannot be copied or pickled: make the environment anew")
+
     def _check_open(self) -> None:
         if self.closed:
             raise gymnasium.error.ClosedEnvironmentError("the environment is closed: make another")
@@ -261,6 +266,9 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         if seed is None:
             return [None] * self.num_envs
         if isinstance(seed, Iterable):
+            # An array without an axis calls itself Iterable, too.
+            if not getattr(seed, "ndim", 1):
+                check_seed(seed)
             seeds = [*seed]
         else:
             check_seed(seed)

@@ -99,11 +99,18 @@ def test_a_picture_of_many_is_refused_in_one_line_that_tells_the_way(vector):
         vector.render()
 
 
+@pytest.mark.parametrize("take", [copy.deepcopy, copy.copy, pickle.dumps])
+def test_a_copy_is_refused(vector, take):
+    with pytest.raises(InvalidInput, match="make the environment anew"):
+        take(vector)
+
+
 def test_wrong_seeds_and_masks_are_named(vector):
     with pytest.raises(InvalidInput, match="one for each of 3"):
         vector.reset(seed=[1, 2])
-    with pytest.raises(InvalidInput, match="seed"):
-        vector.reset(seed=-1)
+    for wrong in (-1, np.array(4)):
+        with pytest.raises(InvalidInput, match="seed"):
+            vector.reset(seed=wrong)
     with pytest.raises(InvalidInput, match="reset_mask"):
         vector.reset(options={"reset_mask": np.zeros(3, bool)})
     with pytest.raises(InvalidInput, match="no options but reset_mask"):
