@@ -69,8 +69,8 @@ def read_arrays(
 
 
 def _check_contents(entries: list[ZipInfo]) -> None:
-    # Of two entries of one name each reader would take its own.
-    if len({entry.filename for entry in entries}) < len(entries):
+    # Of two entries of one name each reader would take its own; NumPy leaves the ending out.
+    if len({entry.filename.removesuffix(".npy") for entry in entries}) < len(entries):
         raise ValueError("an entry comes twice")
     # Before anything is unpacked: a small archive can hold more than the memory does.
     if sum(entry.file_size for entry in entries) > MOST_UNPACKED_BYTES:

@@ -176,6 +176,12 @@ def of_another_format(path):
     write_arrays(path, drawn_arrays(), '{"format": "care-sim weights 1"}')
 
 
+def of_two_names(path):
+    """NumPy calls both entries by one name."""
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr("body0.bias", archive.read("body0.bias.npy"))
+
+
 def too_large(path):
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("card.npy", bytes(2**27))
@@ -183,7 +189,7 @@ def too_large(path):
 
 SPOILT = [
     missing, torn, text, pickled, objects, lacking, of_another_shape, not_finite, turned_round,
-    of_another_format, too_large,
+    of_another_format, of_two_names, too_large,
 ]  # fmt: skip
 
 
