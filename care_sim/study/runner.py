@@ -196,7 +196,8 @@ class _Run:
         # The worker computed the digest from its own code and files.
         elif ending["digest"] != config.key:
             self._fail([config], _OTHER_CODE)
-        else:
+        # An interrupt may come between the rows of a batch, all of which are recorded after it.
+        elif config.key not in self._journal:
             self._journal.append(ending)
             self._listener.finished(config, ending)
 

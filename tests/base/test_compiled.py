@@ -5,6 +5,7 @@ import pty
 import select
 import subprocess
 import sys
+import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from textwrap import dedent
@@ -183,9 +184,16 @@ def test_only_a_brief_function_keeps_other_threads_out(brief):
         return total
 
     work(1)
+    begins = threading.Event()
+
+    def begun():
+        begins.set()
+        work(30_000_000)
+
     with ThreadPoolExecutor(1) as thread:
         # Some 0.3 s. One that lets nobody in is over before this thread can look again.
-        task = thread.submit(work, 30_000_000)
+        task = thread.submit(begun)
+        begins.wait()
         looks = 0
         while not task.done() and looks < 3:
             time.sleep(0.005)

@@ -1,6 +1,7 @@
 """The interface: what reaches a real detector, and what it may return. The proxy over films."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +13,8 @@ from care_sim.perception.proxy import ReturnsProxy
 from care_sim.sensors.annotated import NO_OBJECT, Annotations, Cloud
 from tests.helpers.made_points import HEIGHT, shell
 
+HERE = rf"\({Path(__file__).name}, line \d+\)"
+"""Where code raises that is none of ours."""
 CAR = np.array([8.0, 6.0, 0.86 - HEIGHT, 4.61, 1.95, 1.72, 0.4])
 PERSON = np.array([12.0, -3.0, 0.88 - HEIGHT, 0.73, 0.66, 1.76, 0.0])
 OBJECTS = Annotations(np.array([30, 7]), np.array([0, 4]), np.stack([CAR, PERSON]))
@@ -186,7 +189,9 @@ def test_whatever_a_detector_raises_is_one_line_with_its_name(error, says):
         def detect(self, points, height):
             raise error
 
-    with pytest.raises(BrokenDetector, match=rf"^detector mine fails on \d+ points: {says}$"):
+    with pytest.raises(
+        BrokenDetector, match=rf"^detector mine fails on \d+ points: {says} {HERE}$"
+    ):
         PointsOnly("mine", Raises(), HEIGHT).detect(SCENE, OBJECTS)
 
 
@@ -205,7 +210,8 @@ def test_a_detector_that_fails_is_named():
             return {}["weights"]
 
     with pytest.raises(
-        BrokenDetector, match=r"^detector mine fails on \d+ points: KeyError: 'weights'$"
+        BrokenDetector,
+        match=rf"^detector mine fails on \d+ points: KeyError: 'weights' {HERE}$",
     ):
         PointsOnly("mine", Fails(), HEIGHT).detect(SCENE, OBJECTS)
 

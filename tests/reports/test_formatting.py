@@ -33,7 +33,7 @@ def made(measure, bound, *numbers, pairs=30, cautious=None):
             "~+8.0 [7.0,9.0]",
             True,
         ),
-        (made(DETECTION, Bound.EXACT, 8.0, 8.0, 8.0, pairs=1), "+8.0 [8.0,8.0]", False),
+        (made(DETECTION, Bound.EXACT, 8.0, 8.0, 8.0, pairs=1), "+8.0", False),
         (made(BRAKED, Bound.EXACT, 4.9, 1.2, 9.0), "+5 [1,9]", True),
         (made(BRAKED, Bound.EXACT, 5.0, 0.3, 9.0), "+5* [0.3,9]", True),
     ],

@@ -52,7 +52,7 @@ class Rewards:
         return weighted(self._weights, earned), earned
 
 
-@compiled()
+@compiled(brief=True)
 def _earn(
     who: Mask,
     courses: Courses,

@@ -3,6 +3,7 @@
 import copy
 import gc
 import multiprocessing
+import pickle
 import threading
 import time
 
