@@ -1,8 +1,9 @@
-"""Steps per second and memory of many worlds at once, on one thread and on two."""
+"""Steps per second and memory of many worlds at once, on threads and in processes."""
 
 import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import Executor
 from contextlib import closing
 from functools import partial
 from itertools import cycle, product
@@ -23,6 +24,9 @@ from care_sim.study.executors import processes
 
 WORLDS = 64
 _THREADS = {1: "one thread", 2: "two threads"}
+
+PROCESSES = f"{WORLDS} worlds, two processes"
+"""Half of the worlds in each, with a vector and a policy of its own, on one thread."""
 
 ENVPOOL = "EnvPool HighwayFast-v0"
 ENVPOOL_CONTAINS = (
@@ -52,13 +56,15 @@ def batches(config: BenchConfig) -> tuple[dict[str, Figures], list[str]]:
     # An episode that nobody times: what is compiled late, is compiled in it.
     for scoring_info in (True, False):
         _speed(partial(_playing, config, 1, scoring_info, worlds=2), 0.0)
-    rounds = [
-        {name: _speed(make, config.seconds) for name, make in makers.items()}
-        for _ in range(config.repeats)
-    ]
+    with processes(2) as pool:
+        rounds = [
+            {name: _speed(make, config.seconds) for name, make in makers.items()}
+            | {PROCESSES: _speed_of_two(pool, config)}
+            for _ in range(config.repeats)
+        ]
     return {
-        name: {figure: [one[name][figure] for one in rounds] for figure in rounds[0][name]}
-        for name in makers
+        name: {figure: [one[name][figure] for one in rounds] for figure in first}
+        for name, first in rounds[0].items()
     }, skipped
 
 
@@ -120,7 +126,7 @@ def _makers(config: BenchConfig) -> tuple[dict[str, Callable[[], _Playing]], lis
 
 
 def _playing(
-    config: BenchConfig, threads: int, scoring_info: bool, worlds: int = WORLDS
+    config: BenchConfig, threads: int, scoring_info: bool = True, worlds: int = WORLDS
 ) -> _Playing:
     vector = _vector(config, threads, scoring_info, worlds)
     policy = make_policy(config.policy, vector)
@@ -166,3 +172,20 @@ def _speed(make: Callable[[], _Playing], seconds: float) -> dict[str, float]:
             steps += len(over)
         taken, work = time.perf_counter() - started, time.process_time() - worked
     return {"steps_per_s": steps / taken, "steps_per_cpu_s": steps / work}
+
+
+def _speed_of_two(pool: Executor, config: BenchConfig) -> dict[str, float]:
+    halves = [pool.submit(_speed_of_half, config) for _ in range(2)]
+    first, second = (half.result() for half in halves)
+    return {
+        "steps_per_s": first["steps_per_s"] + second["steps_per_s"],
+        "steps_per_cpu_s": (first["steps_per_cpu_s"] + second["steps_per_cpu_s"]) / 2,
+    }
+
+
+def _speed_of_half(config: BenchConfig) -> dict[str, float]:
+    # An episode that nobody times: what is compiled or loaded late, is loaded in it. The same
+    # worlds are played by both, so that both are timed at the same time but for a moment.
+    make = partial(_playing, config, 1, worlds=WORLDS // 2)
+    _speed(make, 0.0)
+    return _speed(make, config.seconds)

@@ -73,6 +73,7 @@ def _batches(report: BenchReport) -> Table:
         f"worlds of {report['main']} at {config['budget']:.0%}, with {config['policy']} inside for "
         "all of them, copy=False; observations are handed out at every step; resets included",
         "scoring_info=False: infos without what is for scoring alone, and rewards the same",
+        "two processes: half of the worlds in each, with a vector and a policy of its own",
     ]
     if PPO in report["batches"]:
         notes.append(

@@ -3,6 +3,7 @@
 import json
 import sys
 import threading
+from concurrent.futures import Executor, Future
 
 import gymnasium
 import numpy as np
@@ -52,6 +53,20 @@ def test_every_world_begins_another_episode_however_short_the_time(monkeypatch):
 def test_rows_say_threads_and_infos():
     assert row(2) == "64 worlds, two threads"
     assert row(1, scoring_info=False) == "64 worlds, one thread, scoring_info=False"
+
+
+def test_two_processes_make_what_both_make():
+    halves = iter([(3000.0, 3100.0), (4000.0, 4500.0)])
+
+    class Pool(Executor):
+        def submit(self, measured, config):
+            done = Future()
+            done.set_result(
+                dict(zip(("steps_per_s", "steps_per_cpu_s"), next(halves), strict=True))
+            )
+            return done
+
+    assert batches._speed_of_two(Pool(), TINY) == {"steps_per_s": 7000.0, "steps_per_cpu_s": 3800.0}
 
 
 def test_what_is_not_installed_is_left_out_in_one_line(monkeypatch):
