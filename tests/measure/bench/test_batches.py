@@ -56,6 +56,7 @@ def test_rows_say_threads_and_infos():
 
 
 def test_two_processes_make_what_both_make():
+    figures = "steps_per_s", "steps_per_cpu_s"
     halves = iter([(3000.0, 3100.0), (4000.0, 4500.0)])
 
     class Pool(Executor):
