@@ -62,9 +62,7 @@ def test_two_processes_make_what_both_make():
     class Pool(Executor):
         def submit(self, measured, config):
             done = Future()
-            done.set_result(
-                dict(zip(("steps_per_s", "steps_per_cpu_s"), next(halves), strict=True))
-            )
+            done.set_result(dict(zip(figures, next(halves), strict=True)))
             return done
 
     assert batches._speed_of_two(Pool(), TINY) == {"steps_per_s": 7000.0, "steps_per_cpu_s": 3800.0}
