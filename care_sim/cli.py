@@ -11,7 +11,15 @@ from typing import Any, NoReturn
 
 import care_sim
 from care_sim.base import interrupts
-from care_sim.base.errors import InvalidInput, MissingExtra, error_line, one_line, shortened, shown
+from care_sim.base.errors import (
+    InvalidInput,
+    MissingExtra,
+    error_line,
+    is_own_fault,
+    one_line,
+    shortened,
+    shown,
+)
 from care_sim.base.foreign_code import foreign_place
 from care_sim.commands.entries import COMMANDS, GROUPS
 from care_sim.commands.shared.hints import ways_on
@@ -112,12 +120,15 @@ def _end_with(error: BaseException, trace: bool) -> NoReturn:
     """Say in one line what was wrong, and exit; a fault of the software is raised again where its
     trace is wanted.
     """
+    # A fault in code that somebody brought is theirs to mend.
     if isinstance(error, InvalidInput | MissingExtra):
-        _complain(str(error))
+        own = is_own_fault(error)
+        if own and trace:
+            raise error
+        _complain(str(error), _FAILED if own else _BAD_INPUT)
     if isinstance(error, BrokenPipeError):
         _leave_output()
         sys.exit(_UNREAD)
-    # A fault in code that somebody brought is theirs to mend.
     if foreign_place(error) and not trace:
         _complain(error_line(error), _FAILED)
     if isinstance(error, OSError):

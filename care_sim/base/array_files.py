@@ -33,9 +33,15 @@ _C = TypeVar("_C")
 def write_arrays(
     path: str | PathLike[str], arrays: Mapping[str, NDArray[np.floating]], card: str
 ) -> None:
-    """Write arrays, whole or not at all; the same arrays and card give the same bytes."""
+    """Write arrays, whole or not at all; the same arrays and card give the same bytes.
+
+    Raises InvalidInput for numbers that `read_arrays` would refuse.
+    """
     entries: dict[str, Any] = {_CARD: np.frombuffer(card.encode(), np.uint8)}
-    entries |= {name: np.asarray(array, np.float32) for name, array in arrays.items()}
+    try:
+        entries |= _checked({name: np.asarray(one, np.float32) for name, one in arrays.items()})
+    except ValueError as error:
+        raise InvalidInput(f"weights {path} are not written: {error}") from error
     with replacing(Path(path), ZIP) as unfinished, unfinished.open("wb") as file:
         np.savez(file, **entries)
 

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 
-from care_sim.base.foreign_code import foreign_place
+from care_sim.base.foreign_code import foreign_place, is_raised_by_foreign
 
 _QUOTED = 120
 """Characters of a value that a message quotes."""
@@ -30,6 +30,10 @@ class BrokenPolicy(InvalidInput):
 
 class BrokenScenario(InvalidInput):
     """A scenario of an installed package that cannot be loaded, made or built."""
+
+
+class BrokenSource(InvalidInput):
+    """A source of somebody's own whose code fails, or gives what ours cannot play."""
 
 
 class MissingExtra(ImportError):
@@ -62,6 +66,25 @@ def error_line(error: BaseException) -> str:
     """
     told = one_line(f"{type(error).__name__}: {error}").removesuffix(":")
     return told + foreign_place(error)
+
+
+def is_own_fault(error: BaseException) -> bool:
+    """Whether an error tells that code of the user's own failed, not that its input is bad. What
+    failed is among its causes.
+    """
+    if isinstance(error, BrokenSource):
+        return True
+    link: BaseException | None = error
+    while link is not None:
+        # What foreign code refuses by itself is bad input, whatever it knows it by.
+        if isinstance(link, InvalidInput) and is_raised_by_foreign(link):
+            return False
+        # A scenario's parameters are checked before it is built: what is refused then, it did.
+        counts = isinstance(error, BrokenScenario) or not isinstance(link, InvalidInput)
+        if counts and (isinstance(link, SyntaxError) or foreign_place(link)):
+            return True
+        link = link.__cause__
+    return False
 
 
 def shown(value: object) -> str:

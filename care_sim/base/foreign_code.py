@@ -1,5 +1,6 @@
 """Where an error was raised in code that is not ours: the place that its author looks for."""
 
+import inspect
 import site
 import sysconfig
 from importlib.metadata import entry_points
@@ -30,6 +31,21 @@ def foreign_place(error: BaseException) -> str:
     ]
     # The innermost one: what it calls is ours or a library's, and was called wrongly.
     return places[-1] if places else ""
+
+
+def is_raised_by_foreign(error: BaseException) -> bool:
+    """Whether foreign code raised an error itself, not what it called."""
+    frames = [frame for frame, _ in walk_tb(error.__traceback__)]
+    return bool(frames) and _is_foreign(frames[-1])
+
+
+def class_place(kind: type) -> str:
+    """A class with its file and line, in brackets after a space; empty where it has no file."""
+    try:
+        _, line = inspect.getsourcelines(kind)
+        return f" (class {kind.__name__}, {Path(inspect.getfile(kind)).name}, line {line})"
+    except (OSError, TypeError):
+        return ""
 
 
 def _is_foreign(frame: FrameType) -> bool:

@@ -16,6 +16,7 @@ from care_sim.commands.shared.one_scene import SceneOptions, is_source, scene_pl
 from care_sim.commands.shared.options import DEFAULT_OPTIONS, Options
 from care_sim.commands.shared.selection import playable
 from care_sim.commands.shared.study_command import DONE, FAILED, console
+from care_sim.commands.shared.written_files import finish_files
 from care_sim.envs.wrappers.record_rerun import RecordRerun, recording
 from care_sim.loops.film import Film
 from care_sim.reports.episodes.clips import Clip
@@ -120,10 +121,7 @@ def play_side_by_side(
     finally:
         # What was played is printed whatever happens to the others.
         failures = _report(configs, answers)
-    if record is not None:
-        print(f"Recorded in {record}: care-sim view {record}")
-    if film.write():
-        print(f"Filmed in {video}")
+    finish_files(record, film, video)
     return failures
 
 

@@ -11,6 +11,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.commands.shared.one_scene import SceneOptions, is_source, scene_plays
 from care_sim.commands.shared.options import DEFAULT_OPTIONS, Options
 from care_sim.commands.shared.study_command import console
+from care_sim.commands.shared.written_files import finish_files
 from care_sim.envs.wrappers.export_scans import ExportScans
 from care_sim.envs.wrappers.record_rerun import RecordRerun
 from care_sim.policies.base import Policy
@@ -69,7 +70,7 @@ class Run(SceneOptions):
             console(),
         )
         photographer.report()
-        film.write()
+        finish_files(self.record, film, self.video)
         return 0
 
     def _play_scene(self) -> int:
@@ -88,7 +89,7 @@ class Run(SceneOptions):
         film = Clip(self.video, draw_scene)
         played = trace_scene(config, config.film(), film.episode(self.policy), wrap=self._watched)
         print_scene_timeline(config, played, console())
-        film.write()
+        finish_files(self.record, film, self.video)
         return 0
 
     def _watched(self, env: GymEnv, policy: Policy) -> GymEnv:

@@ -138,4 +138,5 @@ def _summary(name: str) -> str:
         return f"(broken) {error}"
     # The module of a built-in detector begins with what it does; another tells it by itself.
     described = inspect.getmodule(make) if name in DETECTORS.built_in else make
-    return (inspect.getdoc(described) or "").partition("\n")[0]
+    about, _, _ = (inspect.getdoc(described) or "").partition("\n\n")
+    return " ".join(about.split())

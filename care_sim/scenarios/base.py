@@ -8,6 +8,7 @@ import numpy as np
 
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.errors import BrokenScenario, InvalidInput, error_line
+from care_sim.base.foreign_code import foreign_place, is_raised_by_foreign
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.streets.dimensions import LANE_WIDTH_M, PARKING_WIDTH_M, SPEED_LIMIT_MPS
@@ -55,7 +56,10 @@ class Scenario(ABC):
         own = f"scenario {type(self).__module__}:{type(self).__qualname__}"
         try:
             world = self.build(rng)
-        except InvalidInput:
+        except InvalidInput as error:
+            # What its code asks of ours in a wrong way is a fault of it.
+            if (place := foreign_place(error)) and not is_raised_by_foreign(error):
+                raise BrokenScenario(f"{own} cannot be built: {error}{place}") from error
             raise
         # Foreign code may fail in any way; some leaves by `sys.exit`.
         except (Exception, SystemExit) as error:

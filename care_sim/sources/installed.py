@@ -5,12 +5,13 @@ wrong with one is told with its name.
 import inspect
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import lru_cache
 from typing import Any
 
 from care_sim.base.checks import check_known
-from care_sim.base.errors import InvalidInput, MissingExtra, error_line, shown
+from care_sim.base.errors import BrokenSource, InvalidInput, MissingExtra, error_line, shown
+from care_sim.base.foreign_code import class_place, foreign_place
 from care_sim.base.plugins import Plugins, dataclass_faults
 from care_sim.core.return_settings import RAYS, FilmedReturns
 from care_sim.core.sensor_setup import SensorSetup
@@ -21,7 +22,7 @@ from care_sim.sources.scenes import Generated, Recorded, Scene, Source, Streets
 
 def source_faults(made: Any) -> Iterator[str]:
     """Why a loaded object is no source, one text per reason. `care_sim.base.plugins` asks it."""
-    if not (inspect.isclass(made) and issubclass(made, Recordings | Generated)):
+    if not _is_source(made):
         yield "is neither Recordings nor Generated"
         return
     yield from dataclass_faults(made, told=("folder",))
@@ -35,6 +36,18 @@ SOURCES: Plugins[Recordings | Generated] = Plugins(
 )
 
 
+def means_source(place: str) -> bool:
+    """Whether a place names a class of sources, even one with faults."""
+    try:
+        return _is_source(replace(SOURCES, faults=lambda _: ()).maker(place))
+    except InvalidInput:
+        return False
+
+
+def _is_source(made: Any) -> bool:
+    return inspect.isclass(made) and issubclass(made, Recordings | Generated)
+
+
 @dataclass(frozen=True)
 class Installed:
     """The source of another package that is called `name`, in a `folder` where it has one, with
@@ -42,7 +55,7 @@ class Installed:
     own.
 
     Raises InvalidInput with the name for one that cannot be loaded or refuses folder or options;
-    so do its methods for whatever its code raises.
+    its methods raise BrokenSource for whatever its code raises.
     """
 
     name: str
@@ -112,7 +125,10 @@ class Installed:
             raise InvalidInput(f"source {self.name}: {error}") from error
         # Foreign code may fail in any way; some leaves by `sys.exit`.
         except (Exception, SystemExit) as error:
-            raise InvalidInput(f"source {self.name} {what}: {error_line(error)}") from error
+            # What ours stumbles over was made by its class.
+            kind: Any = SOURCES.maker(self.name)
+            place = "" if foreign_place(error) else class_place(kind)
+            raise BrokenSource(f"source {self.name} {what}: {error_line(error)}{place}") from error
 
 
 @lru_cache(maxsize=8)

@@ -81,6 +81,7 @@ def _is_foreign(name: str) -> bool:
 def _unknown(text: str) -> InvalidInput:
     kinds = [f"{kind}:FOLDER" for kind in RECORDING_KINDS]
     known = [Streets.kind, *kinds, *SOURCES.names()[len(SOURCES.built_in) :]]
+    known.append("MODULE:CLASS")
     return InvalidInput(
         f"unknown source {text!r:.200}; known: {', '.join(known)}; `care-sim sources` tells what "
         "each is"

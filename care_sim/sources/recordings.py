@@ -123,8 +123,10 @@ def recordings(text: str, options: Mapping[str, object] | None = None) -> Record
     """
     kind, colon, folder = text.partition(":") if isinstance(text, str) else ("", "", "")
     if not (colon and folder) or kind not in RECORDING_KINDS:
-        known = " or ".join(f"{name}:FOLDER" for name in RECORDING_KINDS)
-        raise InvalidInput(f"source must be {known}, got {shown(text)}")
+        known = ", ".join(f"{name}:FOLDER" for name in RECORDING_KINDS)
+        raise InvalidInput(
+            f"source must be {known}, or one of your own, MODULE:CLASS, got {shown(text)}"
+        )
     return recordings_in(RECORDING_KINDS[kind], kind, folder, options or {})
 
 

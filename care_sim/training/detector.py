@@ -8,8 +8,8 @@ makes the same bytes.
 import sys
 import time
 from collections import deque
-from collections.abc import Iterator
-from concurrent.futures import Executor
+from collections.abc import Callable, Iterator
+from concurrent.futures import BrokenExecutor, Executor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,15 +19,18 @@ import numpy as np
 
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.checks import LARGEST_INTEGER
+from care_sim.base.errors import InvalidInput, report_problems
 from care_sim.base.extras import import_torch
 from care_sim.base.files import ZIP, check_output
 from care_sim.base.seed_ranges import TRAINING, VALIDATION
 from care_sim.base.torch_threads import one_thread
+from care_sim.core.arrays import Floats
 from care_sim.perception.pillars.weights import CALIBRATION, save_detector
 from care_sim.study.executors import Processes, processes
 from care_sim.study.provenance import machine_line, package_versions
+from care_sim.study.runner import DIED
 from care_sim.training.detector_data import Example, play, within_plan
-from care_sim.training.detector_score import calibration_of, judged, scores_by_scan
+from care_sim.training.detector_score import PLAIN, calibration_of, judged, scores_by_scan
 from care_sim.training.detector_targets import Targets, loss, targets_of
 
 if TYPE_CHECKING:
@@ -36,7 +39,7 @@ if TYPE_CHECKING:
 BATCH = 4
 """Scans per gradient."""
 LEARNING_RATE = 2e-3
-"""Of AdamW, at its highest, after a twentieth of the steps."""
+"""Of AdamW, at its highest."""
 WEIGHT_DECAY = 0.01
 STEEPEST = 10.0
 """The longest gradient; longer ones are shortened to it."""
@@ -48,8 +51,13 @@ AHEAD = 4
 MOST_TURN = 0.4
 """Radians by which a scan is turned for the learning, either way; every second one is mirrored,
 too. Generated streets are mostly straight."""
+RISING = 0.05
+"""Share of the steps in which the rate of learning rises."""
 CURVE_STEPS = 250
-"""Steps between two points of the curve that the card tells."""
+"""Steps between two points of the curve that the card tells, after which the weights are written,
+too."""
+FAILED = 1
+"""The exit code where the process that plays died."""
 CALIBRATING = range(VALIDATION, VALIDATION + 24)
 HELD_OUT = range(VALIDATION + 24, VALIDATION + 48)
 """Seeds of plays that nothing is learned from: those that scores are fitted to, and those by which
@@ -79,38 +87,85 @@ class TrainDetector:
 
         check_output(self.out, ZIP)
         started = time.perf_counter()
-        with one_thread(torch), _player() as executor:
-            torch.manual_seed(self.seed)
-            network = Learning()
-            batches = _batches(played(executor, TRAINING), np.random.default_rng(self.seed))
-            curve = train_detector(torch, network, batches, self.steps)
-            network.eval()
-            fitted, apart = (
-                [example for examples in executor.map(play, seeds) for example in examples]
-                for seeds in (CALIBRATING, HELD_OUT)
-            )
-            calibration = calibration_of(scores_by_scan(torch, network, fitted))
-            result = judged(scores_by_scan(torch, network, apart, calibration))
-        arrays = network.arrays() | {CALIBRATION: calibration.astype(np.float32)}
-        save_detector(self.out, arrays, _card(self, network, curve, result))
+        torch.manual_seed(self.seed)
+        network = Learning()
+        kept = 0
+
+        def keep(curve: list[float], steps: int) -> None:
+            nonlocal kept
+            self._save(network, curve, steps, PLAIN)
+            kept = steps
+
+        # Whatever ends the learning, or the check of it, what was learned until then is in the
+        # file.
+        try:
+            with one_thread(torch), _player() as executor:
+                _say(f"playing the first {SHUFFLED} scans to learn from")
+                batches = _batches(played(executor, TRAINING), np.random.default_rng(self.seed))
+                curve = train_detector(torch, network, batches, self.steps, keep)
+                network.eval()
+                _say(f"\nchecking on {len(CALIBRATING) + len(HELD_OUT)} further plays")
+                fitted, apart = (
+                    [example for examples in executor.map(play, seeds) for example in examples]
+                    for seeds in (CALIBRATING, HELD_OUT)
+                )
+                calibration = calibration_of(scores_by_scan(torch, network, fitted))
+                result = judged(scores_by_scan(torch, network, apart, calibration))
+        except BaseException as error:
+            if kept:
+                _say(f"\n{self.out} holds what {kept} steps have taught, not checked")
+            if isinstance(error, BrokenExecutor):
+                report_problems([f"{DIED} that plays what is learned from"])
+                return FAILED
+            raise
+        self._save(network, curve, self.steps, calibration, result)
         told = ", ".join(f"{name} {value:.3f}" for name, value in result.items())
         print(f"{self.out}: {told}; {time.perf_counter() - started:.0f} s")
         return 0
 
+    def _save(
+        self,
+        network: "Learning",
+        curve: list[float],
+        steps: int,
+        calibration: Floats,
+        result: dict[str, float] | None = None,
+    ) -> None:
+        """Write what was learned in so many steps; without a `result` nobody has checked it."""
+        arrays = network.arrays() | {CALIBRATION: calibration.astype(np.float32)}
+        save_detector(self.out, arrays, _card(self, network, curve, steps, result))
+
 
 def train_detector(
-    torch: Any, network: "Learning", batches: Iterator[list[Example]], steps: int
+    torch: Any,
+    network: "Learning",
+    batches: Iterator[list[Example]],
+    steps: int,
+    keep: Callable[[list[float], int], None] = lambda curve, steps: None,
 ) -> list[float]:
-    """Let the network learn from so many batches. Returns the mean loss of every CURVE_STEPS."""
+    """Let the network learn from so many batches. Returns the mean loss of every CURVE_STEPS, which
+    `keep` is handed every time, with the steps so far, and after the last step.
+
+    Raises InvalidInput where the loss is no number any more.
+    """
     network.train()
     optimizer = torch.optim.AdamW(network.parameters(), lr=LEARNING_RATE, weight_decay=WEIGHT_DECAY)
+    # Of so few steps that the rate would rise in one at most it rises in none: PyTorch divides by
+    # the steps after the first in which it does.
+    rising = RISING if RISING * steps > 1 else 0.0
     schedule = torch.optim.lr_scheduler.OneCycleLR(
-        optimizer, LEARNING_RATE, total_steps=max(steps, 2), pct_start=0.05, cycle_momentum=False
+        optimizer, LEARNING_RATE, total_steps=steps, pct_start=rising, cycle_momentum=False
     )
     losses: list[float] = []
     for step, batch in zip(range(steps), batches, strict=False):
         wanted = Targets(*map(torch.from_numpy, targets_of(batch)))
         off = loss(torch, network(batch), wanted)
+        # Every later step would be no number, either.
+        if not torch.isfinite(off):
+            raise InvalidInput(
+                f"the training diverged: the loss of step {step + 1} is {off.item()}; another "
+                "--seed may do better"
+            )
         optimizer.zero_grad()
         off.backward()
         torch.nn.utils.clip_grad_norm_(network.parameters(), STEEPEST)
@@ -120,6 +175,16 @@ def train_detector(
         lately = np.mean(losses[-CURVE_STEPS:])
         told = f"step {step + 1} of {steps}, loss {lately:.3f}"
         print(told, end="\r", file=sys.stderr, flush=True)
+        if (step + 1) % CURVE_STEPS == 0 or step + 1 == steps:
+            keep(_curve(losses), step + 1)
+    return _curve(losses)
+
+
+def _say(line: str) -> None:
+    print(line, file=sys.stderr, flush=True)
+
+
+def _curve(losses: list[float]) -> list[float]:
     parts = [losses[n : n + CURVE_STEPS] for n in range(0, len(losses), CURVE_STEPS)]
     return [round(float(np.mean(part)), 3) for part in parts]
 
@@ -178,13 +243,17 @@ def turned_example(example: Example, rng: np.random.Generator) -> Example:
 
 
 def _card(
-    made: TrainDetector, network: "Learning", curve: list[float], result: dict[str, float]
+    made: TrainDetector,
+    network: "Learning",
+    curve: list[float],
+    steps: int,
+    result: dict[str, float] | None,
 ) -> dict[str, Any]:
     numbers = sum(array.size for array in network.arrays().values())
     return {
         "kind": "pillars",
         "network": f"{numbers} numbers",
-        "data": f"{made.steps * BATCH} scans of generated streets and drives, of "
+        "data": f"{steps * BATCH} scans of generated streets and drives, of "
         "every budget, by the policies that know any grid; see care_sim.training.detector_data",
         "seeds": {
             "training from": TRAINING,
@@ -192,10 +261,13 @@ def _card(
             "held out": [HELD_OUT[0], HELD_OUT[-1]],
             "training": made.seed,
         },
-        "steps": made.steps,
+        "steps": steps,
+        "steps asked for": made.steps,
         "batch": BATCH,
         "curve": curve,
-        "result": {name: round(value, 4) for name, value in result.items()},
+        "result": "not checked, scores not calibrated"
+        if result is None
+        else {name: round(value, 4) for name, value in result.items()},
         "machine": machine_line(),
         "versions": package_versions("care-sim", "numpy", "torch"),
     }

@@ -10,6 +10,7 @@ from unittest.mock import Mock
 import pytest
 
 import care_sim
+from care_sim.base.errors import InvalidInput
 from care_sim.base.interrupts import SIGNALS
 from care_sim.cli import main
 from care_sim.commands.entries import COMMANDS, GROUPS
@@ -246,6 +247,10 @@ def test_the_detectors_are_listed_with_a_line_each(capsys):
         "torchscript",
     ]
     assert all(len(line.split()) > 5 for line in first)
+    # Whole sentences, however many lines they take.
+    told = " ".join(out.split())
+    assert "classes by size" in told, told
+    assert "trained on scans of every budget." in told
 
 
 def test_the_sources_are_listed_as_they_are_asked_for_and_a_broken_one_with_its_reason(
@@ -556,7 +561,9 @@ _FAULTY = """
 import numpy
 from dataclasses import dataclass
 from care_sim.policies.paper.history import History
+from care_sim.base.errors import InvalidInput
 from care_sim.scenarios.dartout import Dartout
+from care_sim.sources.scenes import Generated
 
 class Slips(History):
     def demand(self, belief):
@@ -575,18 +582,51 @@ class Cracked(Dartout):
     def build(self, rng):
         world = super().build(rng)
         return world.crack
+
+@dataclass(frozen=True)
+class Peopled(Dartout):
+    def build(self, rng):
+        world = super().build(rng)
+        world.add("x", "unicorn", (1.0, 2.0, 0.0))
+        return world
+
+@dataclass(frozen=True)
+class Refuses(Dartout):
+    def build(self, rng):
+        raise InvalidInput("no such gap")
+
+@dataclass(frozen=True)
+class Torn(Generated):
+    def seeds(self):
+        return 1 / 0
+    def street(self, seed):
+        pass
+
+@dataclass(frozen=True)
+class Single(Torn):
+    def seeds(self):
+        return 1
+
+@dataclass(frozen=True)
+class Seedless(Generated):
+    def street(self, seed):
+        pass
 """
 
 
 @pytest.mark.parametrize(
     ("arguments", "code", "place"),
     [
-        ("run dartout --policy faulty:Slips", 1, "faulty.py, line 9"),
-        ("compare dartout --policies faulty:Slips", 1, "faulty.py, line 9"),
-        ("sweep --scenarios dartout --policies faulty:Slips --seeds 1", 1, "faulty.py, line 9"),
-        ("run dartout --policy faulty:Lacks", 1, "faulty.py, line 13"),
-        ("run dartout --policy faulty:RefusesToStart", 2, "faulty.py, line 17"),
-        ("run faulty:Cracked", 2, "faulty.py, line 23"),
+        ("run dartout --policy faulty:Slips", 1, "faulty.py, line 11"),
+        ("compare dartout --policies faulty:Slips", 1, "faulty.py, line 11"),
+        ("sweep --scenarios dartout --policies faulty:Slips --seeds 1", 1, "faulty.py, line 11"),
+        ("run dartout --policy faulty:Lacks", 1, "faulty.py, line 15"),
+        ("run dartout --policy faulty:RefusesToStart", 1, "faulty.py, line 19"),
+        ("run faulty:Cracked", 1, "faulty.py, line 25"),
+        ("run faulty:Peopled", 1, "faulty.py, line 31"),
+        ("run faulty:Torn", 1, "faulty.py, line 42"),
+        # Ours stumbles over what it gave.
+        ("run faulty:Single", 1, "class Single, faulty.py, line 46"),
     ],
 )
 def test_a_fault_in_code_of_ones_own_is_told_with_its_file_and_line(
@@ -601,6 +641,40 @@ def test_a_fault_in_code_of_ones_own_is_told_with_its_file_and_line(
     (told,) = [line for line in err.splitlines() if "faulty.py" in line]
     assert f"({place})" in told
     assert "report it" not in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        ("run faulty:Refuses", "care-sim: no such gap\n"),
+        (
+            "run faulty:Seedless",
+            "care-sim: source faulty:Seedless cannot be loaded: faulty:Seedless",
+        ),
+        ("run faulty:Nobody", "care-sim: scenario faulty:Nobody cannot be loaded: AttributeError"),
+        ("run faulti:Refuses", "care-sim: scenario faulti:Refuses cannot be loaded: ModuleNot"),
+    ],
+)
+def test_what_code_of_ones_own_refuses_and_what_is_no_code_is_bad_input(
+    arguments, told, capsys, tmp_path, monkeypatch
+):
+    (tmp_path / "faulty.py").write_text(_FAULTY)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    ended, _, err = run(capsys, *arguments.split())
+    sys.modules.pop("faulty", None)
+    assert (ended, err[: len(told)]) == (2, told)
+
+
+def test_the_trace_of_a_fault_in_code_of_ones_own_is_shown_where_it_is_wanted(
+    tmp_path, monkeypatch
+):
+    (tmp_path / "faulty.py").write_text(_FAULTY)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(InvalidInput, match="crack"):
+        main(["run", "faulty:Cracked", "--debug"])
+    sys.modules.pop("faulty", None)
 
 
 @pytest.mark.parametrize(

@@ -91,6 +91,7 @@ def test_a_source_of_a_single_street_has_no_other_seed(tmp_path, monkeypatch):
         ("run street --scenario-parameters x=1", "--scenario-parameters has no meaning in the"),
         ("run street --export x", "--export has no meaning in the open loop"),
         ("run street --engine bullet", "engine cannot be changed in the open loop"),
+        ("run argoverse2", "source must be argoverse2:FOLDER, nuscenes:FOLDER, or one of your own"),
         ("run argoverse2:nowhere", "source argoverse2:nowhere: nowhere is no folder"),
         ("run dartout --scene x", "--scene has no meaning in the closed loop"),
         ("compare dartout --split val", "--split has no meaning in the closed loop"),

@@ -142,6 +142,19 @@ def test_compare_prints_and_records_the_same_seed_under_every_policy(capsys, tmp
     assert sighted["history"] == sighted["care"] == sighted["all-camera"]
 
 
+@pytest.mark.parametrize("scene", [False, True])
+def test_run_says_which_files_it_has_written_as_compare_does(capsys, tmp_path, drive, scene):
+    record, video = tmp_path / "one.rrd", tmp_path / "one.png"
+    played = [f"argoverse2:{drive}"] if scene else ["dartout", *SHORT]
+    for command, *options in (["run"], ["compare", "--policies", "care"]):
+        code, out, err = run(
+            capsys, command, *played, *options, "--record", record, "--video", video
+        )
+        assert (code, err) == (0, "")
+        assert out.endswith(f"Recorded in {record}: care-sim view {record}\nFilmed in {video}\n")
+    assert not re.findall("^(Recorded|Filmed)", run(capsys, "run", *played)[1], re.MULTILINE)
+
+
 def test_compare_without_a_recording_writes_nothing(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     code, out, _ = run(capsys, "compare", "cutin", *SHORT)

@@ -1,16 +1,17 @@
 """The training of the learned detector: it learns, and makes the same bytes again."""
 
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, ThreadPoolExecutor
 from itertools import repeat
 
 import numpy as np
 import pytest
 
+from care_sim.base.errors import InvalidInput
 from care_sim.cli import main
 from care_sim.perception.pillars.detector import PillarsDetector
 from care_sim.perception.pillars.network import Fixed, answers, place_planes
 from care_sim.perception.pillars.plan import REACH_M, on_plan
-from care_sim.perception.pillars.weights import load_detector
+from care_sim.perception.pillars.weights import load_detector, save_detector
 from care_sim.training import detector
 from care_sim.training.detector_data import Example
 from care_sim.training.detector_score import PLAIN, Judged, Peaks, calibration_of, right
@@ -64,9 +65,9 @@ def test_what_was_learned_acts_alike_once_it_is_fixed():
         assert torch.allclose(network(street(5)), fixed, atol=1e-3)
 
 
-def trained(path, monkeypatch, *options):
+def trained(path, monkeypatch, *options, play=street):
     monkeypatch.setattr(detector, "processes", ThreadPoolExecutor)
-    monkeypatch.setattr(detector, "play", street)
+    monkeypatch.setattr(detector, "play", play)
     monkeypatch.setattr(detector, "SHUFFLED", 6)
     monkeypatch.setattr(detector, "CALIBRATING", range(2))
     monkeypatch.setattr(detector, "HELD_OUT", range(2, 4))
@@ -85,6 +86,88 @@ def test_the_command_writes_the_same_file_again_with_its_card(tmp_path, monkeypa
     assert len(card["curve"]) == 1
     assert f"{one}: recall, all scans" in capsys.readouterr().out
     PillarsDetector(one).detect(road(), HEIGHT)
+
+
+class Falls(Exception):
+    """What no code catches."""
+
+
+def fall(*_):
+    raise Falls
+
+
+@pytest.mark.parametrize("ending", ["scores_by_scan", "calibration_of"])
+def test_what_was_learned_is_kept_where_the_check_of_it_fails(
+    tmp_path, monkeypatch, capsys, ending
+):
+    monkeypatch.setattr(detector, ending, fall)
+    path = tmp_path / "w.npz"
+    assert trained(path, monkeypatch, "--steps", "3") == 1
+    arrays, card = load_detector(path)
+    assert np.array_equal(arrays["calibration"], PLAIN)
+    assert (card["steps"], card["result"]) == (3, "not checked, scores not calibrated")
+    assert f"{path} holds what 3 steps have taught, not checked" in capsys.readouterr().err
+
+
+def test_an_interrupt_leaves_what_was_learned_until_then(tmp_path, monkeypatch, capsys):
+    steps = iter(range(5))
+
+    def interrupted(torch, answer, wanted):
+        if next(steps) == 4:
+            raise KeyboardInterrupt
+        return (answer**2).mean()
+
+    monkeypatch.setattr(detector, "loss", interrupted)
+    monkeypatch.setattr(detector, "CURVE_STEPS", 2)
+    assert trained(tmp_path / "w.npz", monkeypatch, "--steps", "9") == 130
+    _, card = load_detector(tmp_path / "w.npz")
+    assert (card["steps"], card["steps asked for"], len(card["curve"])) == (4, 9, 2)
+    assert "interrupted" in capsys.readouterr().err
+
+
+def test_a_player_that_dies_is_told_of_in_one_line(tmp_path, monkeypatch, capsys):
+    def dead(seed):
+        if seed in detector.HELD_OUT:
+            raise BrokenExecutor
+        return street(seed)
+
+    path = tmp_path / "w.npz"
+    assert trained(path, monkeypatch, "--steps", "2", play=dead) == 1
+    assert load_detector(path)[1]["steps"] == 2
+    error = capsys.readouterr().err
+    assert error.endswith("care-sim: the worker process died that plays what is learned from\n")
+
+
+def test_a_training_that_diverges_writes_nothing(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(detector, "loss", lambda torch, answer, wanted: answer.sum() * float("nan"))
+    assert trained(tmp_path / "w.npz", monkeypatch, "--steps", "2") == 2
+    assert not (tmp_path / "w.npz").exists()
+    assert "the training diverged: the loss of step 1 is nan" in capsys.readouterr().err
+
+
+def test_weights_that_nobody_could_read_are_not_written(tmp_path):
+    path = tmp_path / "w.npz"
+    one = Learning()
+    with torch.no_grad():
+        next(iter(one.parameters()))[0] = float("inf")
+    with pytest.raises(InvalidInput, match=r"not written: array 'point0.weight' is not of finite"):
+        save_detector(path, one.arrays(), {})
+    assert not path.exists()
+
+
+@pytest.mark.parametrize("steps", [*range(1, 8), 19, 20, 21, 39, 40, 41])
+def test_any_number_of_steps_has_a_rate_of_learning(monkeypatch, steps):
+    class One(torch.nn.Module):
+        def __init__(self):
+            super().__init__()
+            self.number = torch.nn.Parameter(torch.ones(1))
+
+        def forward(self, examples):
+            return self.number
+
+    monkeypatch.setattr(detector, "targets_of", lambda batch: [np.zeros(1)] * 3)
+    monkeypatch.setattr(detector, "loss", lambda torch, answer, wanted: answer.sum())
+    assert len(detector.train_detector(torch, One(), repeat(street(0)), steps)) == 1
 
 
 def test_plays_come_in_order_whatever_they_take(monkeypatch):

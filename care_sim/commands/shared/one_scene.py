@@ -11,7 +11,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.base.plugins import is_place
 from care_sim.core.conditions import DEFAULTS, OF_BOTH_LOOPS, ClosedLoopConditions
 from care_sim.sensors.setups import DEFAULT_SETUP
-from care_sim.sources.installed import SOURCES
+from care_sim.sources.installed import SOURCES, means_source
 from care_sim.sources.named import source_name, source_of
 from care_sim.sources.recordings import Recordings
 from care_sim.sources.scenes import Scene, Source, Streets
@@ -73,14 +73,8 @@ def is_source(text: str) -> bool:
     name = source_name(text)
     if name in (_STREET, *SOURCES.names()):
         return True
-    if not is_place(name):
-        return False
     # What is no source, or cannot be loaded, is told of as a scenario.
-    try:
-        SOURCES.maker(name)
-    except InvalidInput:
-        return False
-    return True
+    return is_place(name) and means_source(name)
 
 
 def scene_plays(

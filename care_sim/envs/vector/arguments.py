@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from care_sim.base.errors import InvalidInput, shown
-from care_sim.core.conditions import CAMERA_FAULTS
+from care_sim.core.conditions import CAMERA_FAULTS, DEFAULTS
 from care_sim.envs.closed_loop import ClosedLoopEnv
 
 OF_EACH_WORLD = ("budget", *CAMERA_FAULTS, "camera_confidence")
@@ -18,8 +18,16 @@ Maker = partial[ClosedLoopEnv]
 
 def makers_of(kind: type[ClosedLoopEnv], arguments: Mapping[str, Any], worlds: int) -> list[Maker]:
     """What makes the single environment of each of so many worlds, from the `arguments` of their
-    vector environment. Raises InvalidInput for a list of another length.
+    vector environment. Raises InvalidInput for a list of another length, and for one of what all
+    worlds share.
     """
+    for name, default in DEFAULTS.items():
+        lists_itself = name in OF_EACH_WORLD or isinstance(default, tuple)
+        if not lists_itself and _is_list(arguments.get(name)):
+            raise InvalidInput(
+                f"{name} takes one value for all worlds, got {shown(arguments[name])}; a list of "
+                "one for each may have budget and what the camera gets wrong (docs/vectors.md)"
+            )
     given = {name: arguments[name] for name in OF_EACH_WORLD if name in arguments}
     lists = {name: [*value] for name, value in given.items() if _is_list(value)}
     for name, values in lists.items():

@@ -144,7 +144,9 @@ class Weights:
 def save_weights(
     path: str | PathLike[str], arrays: Mapping[str, NDArray[np.floating]], card: Card
 ) -> None:
-    """Write weights, whole or not at all; the same arrays and card give the same bytes."""
+    """Write weights, whole or not at all; the same arrays and card give the same bytes. Raises
+    InvalidInput for numbers that `load_weights` would refuse.
+    """
     write_arrays(path, arrays, card.to_json())
 
 

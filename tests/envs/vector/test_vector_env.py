@@ -106,6 +106,14 @@ def test_a_copy_is_refused(vector, take):
         take(vector)
 
 
+def test_a_list_of_what_all_worlds_share_is_refused_by_name():
+    for name, given in (("lidar_dropout", [0.1, 0, 0]), ("min_returns", np.array([1, 2, 3]))):
+        with pytest.raises(InvalidInput, match=f"^{name} takes one value for all worlds, got"):
+            gymnasium.make_vec("CARE-Dense-v0", num_envs=3, **{name: given})
+    # A list is one value of these.
+    gymnasium.make_vec("CARE-Dense-v0", num_envs=2, lidar_dead_rows=[1, 2]).close()
+
+
 def test_wrong_seeds_and_masks_are_named(vector):
     with pytest.raises(InvalidInput, match="one for each of 3"):
         vector.reset(seed=[1, 2])

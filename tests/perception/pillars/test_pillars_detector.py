@@ -165,7 +165,9 @@ def of_another_shape(path):
 
 
 def not_finite(path):
-    weights.save_detector(path, drawn_arrays() | {"body0.bias": np.full(64, np.inf)}, {})
+    with np.load(path) as file:
+        entries = dict(file)
+    np.savez(path, **entries | {"body0.bias": np.full(64, np.inf, np.float32)})
 
 
 def turned_round(path):

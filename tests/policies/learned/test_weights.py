@@ -227,12 +227,16 @@ def doubles(path: Path) -> None:
     np.savez(path, card=card, weight=np.zeros(3))
 
 
+def _card_bytes():
+    return np.frombuffer(CARD.to_json().encode(), np.uint8)
+
+
 def not_finite(path: Path) -> None:
-    save_weights(path, {"weight": np.array([np.nan])}, CARD)
+    np.savez(path, card=_card_bytes(), weight=np.array([np.nan], np.float32))
 
 
 def too_large(path: Path) -> None:
-    save_weights(path, {"weight": np.array([0, -1.01 * LARGEST_WEIGHT])}, CARD)
+    np.savez(path, card=_card_bytes(), weight=np.float32([0, -1.01 * LARGEST_WEIGHT]))
 
 
 def cut(path: Path) -> None:
