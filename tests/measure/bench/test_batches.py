@@ -101,7 +101,9 @@ def test_the_worlds_of_a_batch_take_memory_and_leave_no_thread():
     before = threading.active_count()
     memory = batch_memory(TINY)
     assert memory["resets"] == WORLDS
-    assert 50 < memory["begun_mb"] <= memory["early_mb"] <= memory["peak_mb"] < 1000
+    # Linux sums up the pages of its cores late: a peak that is told later may lack some kB of it.
+    peaks = [memory[told] for told in ("begun_mb", "early_mb", "peak_mb")]
+    assert 50 < peaks[0] < peaks[1] + 1 < peaks[2] + 2 < 1000
     assert memory["threads_left"] == 0
     assert threading.active_count() == before
 
