@@ -25,8 +25,8 @@ def makers_of(kind: type[ClosedLoopEnv], arguments: Mapping[str, Any], worlds: i
         lists_itself = name in OF_EACH_WORLD or isinstance(default, tuple)
         if not lists_itself and _is_list(arguments.get(name)):
             raise InvalidInput(
-                f"{name} takes one value for all worlds, got {shown(arguments[name])}; a list of "
-                "one for each may have budget and what the camera gets wrong (docs/vectors.md)"
+                f"{name} takes one value for all worlds, got {shown(arguments[name])}; budget "
+                "and the camera's faults alone may be a list, one for each (docs/vectors.md)"
             )
     given = {name: arguments[name] for name in OF_EACH_WORLD if name in arguments}
     lists = {name: [*value] for name, value in given.items() if _is_list(value)}

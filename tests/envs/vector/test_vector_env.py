@@ -84,7 +84,7 @@ def test_seeds_count_up_or_are_told_one_by_one(vector):
         ({"budget": [[0.1], [0.2]]}, "budget must"),
         ({"budget": [0.1, np.full(2, 0.1)]}, "budget must"),
         ({"camera_latency": [1, True]}, "camera_latency must"),
-        ({"reserve_fraction": [0.1, 0.2]}, "reserve_fraction must"),
+        ({"reserve_fraction": [0.1, 0.2]}, "reserve_fraction takes one value for all worlds"),
     ],
 )
 def test_wrong_arguments_are_named(wrong, message):
