@@ -140,7 +140,7 @@ class _Gained:
         sums = (
             asdict(outcome(env.keyframes))
             if isinstance(env, ClosedLoopEnv)
-            else info.get("outcome", {})
+            else (asdict(env.score.tally()) if "outcome" in info else {})
         )
         # None has no bytes of its own: NaN stands for it.
         values = tuple((name, math.nan if value is None else value) for name, value in sums.items())
