@@ -26,7 +26,7 @@ def compiled(*, brief: bool = False, **options: Any) -> Callable[[_F], _F]:
     The code is kept beside the file, or in the user's cache folder, or where NUMBA_CACHE_DIR says.
     Where none of these can be written, every process compiles anew.
     """
-    # Whoever lets another thread in has to wait for it, which takes some tens of microseconds.
+    # Whoever lets another thread in has to wait until that one lets it in again.
     nogil = not brief
 
     def make(function: _F) -> Any:

@@ -13,7 +13,8 @@ from care_sim.base.files import write_text
 from care_sim.reports.captions import caption
 from care_sim.reports.figures.files import remove_others, save
 from care_sim.reports.latex import PREAMBLE, latex, paragraph
-from care_sim.reports.studies import STUDIES, SWEEP, Study, study_of
+from care_sim.reports.studies import STUDIES, SWEEP, study_of
+from care_sim.reports.study import Study
 from care_sim.reports.table import brief, unmarked
 from care_sim.study.results_formats import results_format_in
 from care_sim.study.rows.parquet import read_notes, read_rows

@@ -1,7 +1,6 @@
 """The studies by name: what is shown of their rows."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -37,7 +36,7 @@ from care_sim.reports.protocol.closing import protocol_closing
 from care_sim.reports.protocol.tables import protocol_tables
 from care_sim.reports.realism import episodes as realism
 from care_sim.reports.realism import plays as open_realism
-from care_sim.reports.table import Table
+from care_sim.reports.study import Study
 from care_sim.reports.tables.ablations import ablation_tables
 from care_sim.reports.tables.crowding import crowding_tables
 from care_sim.reports.tables.faults import fault_tables
@@ -48,7 +47,6 @@ from care_sim.reports.tables.r157 import r157_tables
 from care_sim.reports.tables.sweep import sweep_tables
 from care_sim.reports.tables.validate import validation_tables
 from care_sim.reports.vehicle.tables import vehicle_tables
-from care_sim.scenarios import SCENARIOS
 from care_sim.study.designs.crowding import VEHICLES_COLUMN
 from care_sim.study.designs.ncap import (
     REPORTED_COLUMN,
@@ -57,57 +55,10 @@ from care_sim.study.designs.ncap import (
     TEST_COLUMN,
 )
 from care_sim.study.designs.r157 import CASE_COLUMNS
-from care_sim.study.results_formats import EPISODES, MECHANISM, PLAYS, VEHICLE, ResultsFormat
+from care_sim.study.results_formats import MECHANISM, PLAYS, VEHICLE
 from care_sim.study.rows.parquet import read_notes
-from care_sim.study.rows.reading import setting_of
-from care_sim.study.rows.schema import COUNT, FLAG, SUM, TEXT, Column, Schema, as_optional
-from care_sim.study.rows.settings import SOURCES, Setting
+from care_sim.study.rows.schema import COUNT, FLAG, SUM, TEXT, as_optional
 from care_sim.study.run_config import Row
-
-
-@dataclass(frozen=True)
-class Study:
-    """How the rows of a study are shown; all functions are pure functions of the rows.
-
-    `title` names it to readers. `closing` are sentences after the tables. `figure_names` are all
-    figures that the study can draw, as patterns in which {world} stands for a scenario or source,
-    and a * for any text. `caption` says
-    how to read its tables. `results` is what it plays. `columns` are further columns that its
-    tables read: those that a row may leave empty may be missing where all rows do.
-    """
-
-    name: str
-    title: str
-    tables: Callable[[Sequence[Row]], list[Table]]
-    figures: Callable[[Sequence[Row]], dict[str, Figure]]
-    closing: Callable[[Sequence[Row]], list[str]]
-    figure_names: tuple[str, ...]
-    caption: tuple[captions.Remark, ...] = captions.EPISODES_CAPTION
-    results: ResultsFormat = EPISODES
-    columns: Mapping[str, Column] = field(default_factory=dict)
-
-    def figures_of(self, rows: Sequence[Row] = ()) -> list[str]:
-        """The figures that it can draw of the built-in worlds and those of the rows, as patterns in
-        which a * stands for any text.
-        """
-        # Names of figures are told apart by worlds: what a user draws beside them is not ours.
-        own = [Setting(setting_of(row).world).slug for row in rows]
-        worlds = dict.fromkeys([*SCENARIOS, *SOURCES, *own])
-        return [
-            *dict.fromkeys(
-                name.format(world=world) for name in self.figure_names for world in worlds
-            )
-        ]
-
-    @property
-    def schema(self) -> Schema:
-        """The columns that its rows must have, and those that are checked where they are."""
-        schema = self.results.schema
-        optional = {name: one for name, one in self.columns.items() if one.optional}
-        needed = {name: one for name, one in self.columns.items() if not one.optional}
-        return replace(
-            schema, needed={**schema.needed, **needed}, further={**schema.further, **optional}
-        )
 
 
 def _no_figures(_rows: Sequence[Row]) -> dict[str, Figure]:

@@ -11,7 +11,7 @@ from care_sim.commands.shared.folder_checks import (
     check_kind,
     check_results,
 )
-from care_sim.reports.studies import Study
+from care_sim.reports.study import Study
 from care_sim.study.journal import JOURNAL, is_written, read_journal
 from care_sim.study.run_config import RunConfig
 

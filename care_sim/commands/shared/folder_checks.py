@@ -8,7 +8,8 @@ from pathlib import Path
 from care_sim.base.errors import InvalidInput, counted
 from care_sim.core.conditions import DEFAULTS
 from care_sim.evaluation.sightings import ANNOTATED
-from care_sim.reports.studies import SWEEP, Study
+from care_sim.reports.studies import SWEEP
+from care_sim.reports.study import Study
 from care_sim.study.journal import Finished, Journal
 from care_sim.study.results_formats import RESULTS_FORMATS, is_parameter
 from care_sim.study.rows.parquet import read_notes, read_rows

@@ -10,7 +10,8 @@ from care_sim.base.errors import InvalidInput, counted
 from care_sim.base.files import write_text
 from care_sim.commands.shared.folder_checks import check_journal, check_kind, check_results, lost
 from care_sim.reports.report import StudyReport
-from care_sim.reports.studies import SWEEP, Study
+from care_sim.reports.studies import SWEEP
+from care_sim.reports.study import Study
 from care_sim.study.executors import ExecutorFactory, processes
 from care_sim.study.journal import JOURNAL, Journal
 from care_sim.study.progress import run_with_progress

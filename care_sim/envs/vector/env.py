@@ -1,7 +1,7 @@
 """The vector environments of the closed loop: thin Gymnasium adapters around `Worlds`."""
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import Any, ClassVar
 
@@ -11,7 +11,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space, create_empty_array
 from numpy.typing import NDArray
 
-from care_sim.base.checks import as_array, check_flag, check_seed, check_whole
+from care_sim.base.checks import as_array, check_flag, check_whole
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.vectors import shared_attribute
 from care_sim.core.arrays import Floats, Mask
@@ -25,6 +25,7 @@ from care_sim.envs.vector.arguments import Maker, makers_of, models_of
 from care_sim.envs.vector.compiled_worlds import CompiledWorlds
 from care_sim.envs.vector.coverage import why_separate
 from care_sim.envs.vector.infos import joined, kept
+from care_sim.envs.vector.resets import seeds_of, worlds_to_reset
 from care_sim.envs.vector.same_step import last_rows, same_step
 from care_sim.envs.vector.separate_worlds import SeparateWorlds
 from care_sim.envs.vector.threads import Threads
@@ -132,8 +133,8 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         gymnasium.error.ClosedEnvironmentError once the environment is closed, as `step` does.
         """
         self._check_open()
-        seeds = self._seeds(seed)
-        who = self._to_reset(options)
+        seeds = seeds_of(seed, self.num_envs)
+        who = worlds_to_reset(options, self.num_envs)
         infos = self._begin(who, seeds, {})
         return self._handed_out(), infos
 
@@ -261,37 +262,6 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         if not self.copy:
             return self._observed
         return {name: values.copy() for name, values in self._observed.items()}
-
-    def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
-        if seed is None:
-            return [None] * self.num_envs
-        if isinstance(seed, Iterable):
-            # An array without an axis calls itself Iterable, too.
-            if not getattr(seed, "ndim", 1):
-                check_seed(seed)
-            seeds = [*seed]
-        else:
-            check_seed(seed)
-            seeds = [int(seed) + world for world in range(self.num_envs)]
-        if len(seeds) != self.num_envs:
-            raise InvalidInput(f"seed must be one for each of {self.num_envs}, got {len(seeds)}")
-        for one in seeds:
-            if one is not None:
-                check_seed(one)
-        return seeds
-
-    def _to_reset(self, options: dict[str, Any] | None) -> Mask:
-        everybody = np.ones(self.num_envs, np.bool_)
-        if not options:
-            return everybody
-        if [*options] != ["reset_mask"]:
-            raise InvalidInput(f"reset takes no options but reset_mask, got {shown(options)}")
-        mask = as_array("reset_mask", options["reset_mask"])
-        if mask.dtype != np.bool_ or mask.shape != everybody.shape or not mask.any():
-            raise InvalidInput(
-                f"reset_mask must be {self.num_envs} flags, at least one of them True"
-            )
-        return mask
 
 
 def _places(who: Mask) -> list[int]:

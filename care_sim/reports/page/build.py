@@ -27,7 +27,7 @@ from care_sim.reports.page.protocol_charts import protocol_charts
 from care_sim.reports.page.provenance import Provenance, provenance_of
 from care_sim.reports.page.tables import blocks
 from care_sim.reports.report import read_results
-from care_sim.reports.studies import Study
+from care_sim.reports.study import Study
 from care_sim.reports.table import Table
 from care_sim.study.executors import ExecutorFactory, processes
 from care_sim.study.results_formats import EPISODES
