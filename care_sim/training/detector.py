@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +28,7 @@ from care_sim.base.torch_threads import one_thread
 from care_sim.core.arrays import Floats
 from care_sim.perception.pillars.weights import CALIBRATION, save_detector
 from care_sim.study.executors import Processes, processes
+from care_sim.study.progress import Show, rounded_duration, shown_progress
 from care_sim.study.provenance import machine_line, package_versions
 from care_sim.study.runner import DIED
 from care_sim.training.detector_data import Example, play, within_plan
@@ -100,11 +102,12 @@ class TrainDetector:
         # file.
         try:
             with one_thread(torch), _player() as executor:
-                _say(f"playing the first {SHUFFLED} scans to learn from")
-                batches = _batches(played(executor, TRAINING), np.random.default_rng(self.seed))
-                curve = train_detector(torch, network, batches, self.steps, keep)
+                waiting = _waiting(played(executor, TRAINING))
+                batches = _batches(*waiting, np.random.default_rng(self.seed))
+                with shown_progress(self.steps, "steps") as show:
+                    curve = train_detector(torch, network, batches, self.steps, keep, show)
                 network.eval()
-                _say(f"\nchecking on {len(CALIBRATING) + len(HELD_OUT)} further plays")
+                _say(f"checking on {len(CALIBRATING) + len(HELD_OUT)} further plays")
                 fitted, apart = (
                     [example for examples in executor.map(play, seeds) for example in examples]
                     for seeds in (CALIBRATING, HELD_OUT)
@@ -113,7 +116,7 @@ class TrainDetector:
                 result = judged(scores_by_scan(torch, network, apart, calibration))
         except BaseException as error:
             if kept:
-                _say(f"\n{self.out} holds what {kept} steps have taught, not checked")
+                _say(f"{self.out} holds what {kept} steps have taught, not checked")
             if isinstance(error, BrokenExecutor):
                 report_problems([f"{DIED} that plays what is learned from"])
                 return FAILED
@@ -142,9 +145,11 @@ def train_detector(
     batches: Iterator[list[Example]],
     steps: int,
     keep: Callable[[list[float], int], None] = lambda curve, steps: None,
+    show: Show = lambda steps, told: None,
 ) -> list[float]:
     """Let the network learn from so many batches. Returns the mean loss of every CURVE_STEPS, which
-    `keep` is handed every time, with the steps so far, and after the last step.
+    `keep` is handed every time, with the steps so far, and after the last step. `show` is told of
+    every step.
 
     Raises InvalidInput where the loss is no number any more.
     """
@@ -157,6 +162,7 @@ def train_detector(
         optimizer, LEARNING_RATE, total_steps=steps, pct_start=rising, cycle_momentum=False
     )
     losses: list[float] = []
+    started = time.monotonic()
     for step, batch in zip(range(steps), batches, strict=False):
         wanted = Targets(*map(torch.from_numpy, targets_of(batch)))
         off = loss(torch, network(batch), wanted)
@@ -172,9 +178,9 @@ def train_detector(
         optimizer.step()
         schedule.step()
         losses.append(off.item())
+        left = (time.monotonic() - started) / (step + 1) * (steps - step - 1)
         lately = np.mean(losses[-CURVE_STEPS:])
-        told = f"step {step + 1} of {steps}, loss {lately:.3f}"
-        print(told, end="\r", file=sys.stderr, flush=True)
+        show(step + 1, f"loss {lately:.3f}, {rounded_duration(left)} left")
         if (step + 1) % CURVE_STEPS == 0 or step + 1 == steps:
             keep(_curve(losses), step + 1)
     return _curve(losses)
@@ -213,12 +219,23 @@ def _player() -> Iterator[Executor]:
         executor.shutdown(cancel_futures=True)
 
 
-def _batches(examples: Iterator[Example], rng: np.random.Generator) -> Iterator[list[Example]]:
-    """Batches of examples, turned, each drawn from SHUFFLED that wait."""
-    waiting = [next(examples) for _ in range(SHUFFLED)]
+def _waiting(examples: Iterator[Example]) -> tuple[list[Example], Iterator[Example]]:
+    """The first SHUFFLED examples, and those after them."""
+    with shown_progress(SHUFFLED, "scans played before the first step") as show:
+        first = []
+        for example in islice(examples, SHUFFLED):
+            first.append(example)
+            show(len(first), "")
+    return first, examples
+
+
+def _batches(
+    waiting: list[Example], examples: Iterator[Example], rng: np.random.Generator
+) -> Iterator[list[Example]]:
+    """Batches of examples, turned, each drawn from those that wait, whose places others take."""
     while True:
         batch = []
-        for place in rng.choice(SHUFFLED, BATCH, replace=False).tolist():
+        for place in rng.choice(len(waiting), BATCH, replace=False).tolist():
             batch.append(turned_example(waiting[place], rng))
             waiting[place] = next(examples)
         yield batch

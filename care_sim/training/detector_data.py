@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.belief import Belief
 from care_sim.core.grid_stack import Grid
+from care_sim.core.types import CLASSES
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.envs.open_loop import FilmEnv
 from care_sim.envs.scenarios import DriveEnv
@@ -53,6 +54,9 @@ PLAYS_OF_FILM = 3
 """A film costs thirty times what a play of it does."""
 SHARE_KEPT = 1 / 3
 """Of the keyframes of a play, drawn, that become examples: neighbours resemble each other."""
+RARE = (CLASSES.index("bus"), CLASSES.index("bicycle"))
+"""Of the objects of the streets under 1 and 3 in a hundred: a keyframe with a return of one
+always becomes an example."""
 DRIVE_KEYFRAME_S = 0.5
 """As far apart as those of a street."""
 _ROUND_BOX_M = 0.2
@@ -121,10 +125,11 @@ def _examples(
         # The truth of the scan is that of the time before the step, which moves the world on.
         present = _present(env)
         observation, _, terminated, truncated, _ = env.step(policy(observation))
-        if rng.random() < SHARE_KEPT:
-            ranges = Belief.from_observation(observation).ranges
-            points = scanned(env.rig.grid, ranges)
-            yield _example(points, env.rig.sensor_height_m, present, full)
+        ranges = Belief.from_observation(observation).ranges
+        points = scanned(env.rig.grid, ranges)
+        example = _example(points, env.rig.sensor_height_m, present, full)
+        if rng.random() < SHARE_KEPT or np.isin(RARE, example.classes).any():
+            yield example
         if terminated or truncated:
             break
 
