@@ -8,7 +8,8 @@
 #                 CAMPAIGNS="commands files" CASES=1000 unless all; CASE=NAME plays one case alone
 # make official RESULTS=FILE DATA=FOLDER   score a file of `care-sim export` with the nuScenes devkit, which has an
 #                 environment of its own; SPLIT=val, VERSION=v1.0-trainval and OUT=FOLDER unless given otherwise
-# make test-official   test that with the devkit
+# make official-precision FOLDER=DIR   average precision by the devkit of what `care-sim judge --official` wrote to DIR
+# make test-official   test both with the devkit
 PYTHON ?= python3.11
 VENV := .venv
 BIN := $(VENV)/bin
@@ -21,6 +22,11 @@ SECONDS := 600
 SEED := 0
 OUT = $(basename $(RESULTS))-official
 
+ifneq ($(filter official-precision,$(MAKECMDGOALS)),)
+  ifneq ($(shell test -f "$(FOLDER)/official/truth.json" || echo no),)
+    $(error FOLDER=$(FOLDER) must be one to which care-sim judge --official has written)
+  endif
+endif
 ifneq ($(filter official,$(MAKECMDGOALS)),)
   ifeq ($(and $(RESULTS),$(DATA)),)
     $(error make official needs RESULTS=FILE and DATA=FOLDER)
@@ -33,7 +39,7 @@ ifneq ($(filter official,$(MAKECMDGOALS)),)
   endif
 endif
 
-.PHONY: setup reproduce test test-speed check docs lint torture official test-official clean
+.PHONY: setup reproduce test test-speed check docs lint torture official official-precision test-official clean
 
 setup: $(VENV)/.installed
 
@@ -85,6 +91,9 @@ $(OFFICIAL)/.installed: constraints-official.txt
 official: $(OFFICIAL)/.installed
 	$(OFFICIAL)/bin/python -m nuscenes.eval.detection.evaluate "$(RESULTS)" --dataroot "$(DATA)" \
 	  --eval_set "$(SPLIT)" --version "$(VERSION)" --output_dir "$(OUT)" --plot_examples 0 --render_curves 0
+
+official-precision: $(OFFICIAL)/.installed
+	$(OFFICIAL)/bin/python tests/official/average_precision.py "$(FOLDER)/official"
 
 test-official: $(VENV)/.developing $(OFFICIAL)/.installed
 	$(BIN)/python -m pytest tests/official

@@ -74,6 +74,11 @@ GROUPS = {
         "mechanism": CommandEntry(
             "mechanism", "Mechanism", "Find why one policy finds what another misses, ray by ray."
         ),
+        "judge": CommandEntry(
+            "judge",
+            "Judge",
+            "Judge detectors: what they find, how much of it is right, how sure they may be.",
+        ),
         "export": CommandEntry(
             "export", "Export", "Write a policy's detections for the official nuScenes devkit."
         ),

@@ -55,6 +55,11 @@ class Detections:
     def __len__(self) -> int:
         return len(self.classes)
 
+    def take(self, rows: Integers | Mask) -> "Detections":
+        """Some of them, by index or mask."""
+        scores = None if self.scores is None else self.scores[rows]
+        return Detections(self.classes[rows], self.boxes[rows], self.returns[rows], scores)
+
 
 class _Table:
     """Columns of one table. Made of its rows it reads each column off them when that is first asked

@@ -3,12 +3,11 @@
 """
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.arrays import Floats, Mask
+from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.types import Detections
 from care_sim.sensors.annotated import Annotations
 
@@ -16,10 +15,20 @@ MATCH_M = 2.0
 """Greatest planar distance between the centres of an object and of its detection, this value
 included.
 """
+UNSERVED = -1
+"""The place of the detection that serves an object which none does."""
 
 
 def found_objects(annotations: Annotations, detections: Detections) -> Mask:
-    """(n,) whether each annotated object has a detection of its class within 2 m, in the plane.
+    """(n,) whether each annotated object has a detection of its class within 2 m, in the plane
+    (`served_by`).
+    """
+    return served_by(annotations, detections) != UNSERVED
+
+
+def served_by(annotations: Annotations, detections: Detections) -> Integers:
+    """(n,) the detection of its class within 2 m, in the plane, that serves each annotated object,
+    or UNSERVED.
 
     A detection serves one object. Detections without scores are assigned so that they serve the
     most objects and, among such assignments, with the least sum of distances. Detections with
@@ -31,9 +40,9 @@ def found_objects(annotations: Annotations, detections: Detections) -> Mask:
     _check(detections)
     scores = detections.scores
     distances = _distances(annotations, detections)
-    rows = _optimal(distances) if scores is None else _by_score(distances, scores)
-    result = np.zeros(len(annotations), bool)
-    result[rows] = True
+    objects, servers = _optimal(distances) if scores is None else _by_score(distances, scores)
+    result = np.full(len(annotations), UNSERVED)
+    result[objects] = servers
     return result
 
 
@@ -44,31 +53,36 @@ def _distances(annotations: Annotations, detections: Detections) -> Floats:
     return np.where(matching, distances, np.inf)
 
 
-def _optimal(distances: Floats) -> NDArray[np.intp]:
+def _optimal(distances: Floats) -> tuple[Integers, Integers]:
+    """Objects, and the detections that serve them."""
     near = np.isfinite(distances)
     # Objects and detections without any match are left out first: the assignment grows with the
     # third power of their number.
-    rows = np.flatnonzero(near.any(axis=1))
-    distances = distances[rows][:, near.any(axis=0)]
+    rows, columns = (np.flatnonzero(near.any(axis=axis)) for axis in (1, 0))
+    distances = distances[rows][:, columns]
 
     # A pair that is no match costs more than all matches together. So an assignment of the least
     # cost serves as many objects as possible, and among such it has the least sum of distances.
     worse_than_all = MATCH_M * (min(distances.shape) + 1)
     served, by = linear_sum_assignment(np.minimum(distances, worse_than_all))
-    return rows[served[np.isfinite(distances[served, by])]]
+    matched = np.isfinite(distances[served, by])
+    return rows[served[matched]], columns[by[matched]]
 
 
-def _by_score(distances: Floats, scores: Floats) -> list[int]:
+def _by_score(distances: Floats, scores: Floats) -> tuple[list[int], list[int]]:
+    """Objects, and the detections that serve them."""
     # Stable, so that of equally sure detections the first reported chooses first.
     free = distances.copy()
     served: list[int] = []
+    servers: list[int] = []
     for detection in np.argsort(-scores, kind="stable") if len(distances) else ():
         nearest = int(free[:, detection].argmin())
         if np.isfinite(free[nearest, detection]):
             # An object that is served is as far as can be from every later detection.
             served.append(nearest)
+            servers.append(int(detection))
             free[nearest] = np.inf
-    return served
+    return served, servers
 
 
 def _check(detections: Detections) -> None:

@@ -1,0 +1,184 @@
+"""How good the boxes of a detector are: which are right, and which objects they find, from every
+score on.
+
+A box is right if it serves an object by the rule of the scoring (`care_sim.perception.matching`).
+By that rule detections choose in descending order of score. So those below a score take nothing
+from those above it, and one play tells what every least score would have found.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.boxes import planar_ranges
+from care_sim.core.types import Detections
+from care_sim.evaluation.sightings import Sightings
+from care_sim.perception.matching import UNSERVED, served_by
+
+UNFOUND = -np.inf
+"""The score of the box of an object that has none."""
+TENTHS = 10
+
+
+@dataclass(frozen=True)
+class SceneBoxes:
+    """The boxes of a detector in a scene.
+
+    Of those within range `scores` (d,), 1 of a detector that has none, their `classes` (d,) and
+    whether they are `right` (d,). Of the object frames within range `found_at` (r,), the score of
+    the box that serves each, or UNFOUND, and their `labels` (r,); `events` (e,) are the rows of
+    these that are first sightings. `scans` is how many keyframes the scene has.
+    """
+
+    scores: Floats
+    classes: Integers
+    right: Mask
+    found_at: Floats
+    labels: Integers
+    events: Integers
+    scans: int
+
+    def of_class(self, label: int) -> "SceneBoxes":
+        """The boxes and objects of one class alone."""
+        own, rows = self.classes == label, self.labels == label
+        events = np.zeros(len(rows), bool)
+        events[self.events] = True
+        return SceneBoxes(
+            self.scores[own],
+            self.classes[own],
+            self.right[own],
+            self.found_at[rows],
+            self.labels[rows],
+            np.flatnonzero(events[rows]),
+            self.scans,
+        )
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Sums of every scene (s,), of boxes from some score on: `boxes` and `right` ones, `frames` of
+    objects and `found` ones, `events` and `sighted` ones.
+    """
+
+    boxes: Floats
+    right: Floats
+    frames: Floats
+    found: Floats
+    events: Floats
+    sighted: Floats
+
+    @property
+    def precision(self) -> float:
+        """Share of the boxes that are right; nan without a box."""
+        return _share(self.right, self.boxes)
+
+    @property
+    def recall(self) -> float:
+        """Share of the object frames that are found."""
+        return _share(self.found, self.frames)
+
+    @property
+    def first_recall(self) -> float:
+        """Share of the first sightings that are found at once."""
+        return _share(self.sighted, self.events)
+
+
+def scene_boxes(sightings: Sightings, reports: Sequence[Detections]) -> SceneBoxes:
+    """What the detections of every keyframe, one after the other, are worth."""
+    scores, classes, right, found_at = [], [], [], []
+    for shown, report in zip(sightings.keyframes, reports, strict=True):
+        sure = np.ones(len(report)) if report.scores is None else report.scores
+        server = served_by(shown, report)
+        serves = np.zeros(len(report), bool)
+        serves[server[server != UNSERVED]] = True
+        # One beyond the scored range may be as right as any, but nobody asks for its object.
+        near = planar_ranges(report.boxes) <= sightings.range_m
+        scores.append(sure[near])
+        classes.append(report.classes[near])
+        right.append(serves[near])
+        found = np.full(len(shown), UNFOUND)
+        found[server != UNSERVED] = sure[server[server != UNSERVED]]
+        found_at.append(found)
+    return SceneBoxes(
+        np.concatenate(scores),
+        np.concatenate(classes),
+        np.concatenate(right),
+        np.concatenate(found_at)[sightings.in_range],
+        sightings.frames.classes,
+        sightings.events,
+        len(reports),
+    )
+
+
+def counts(scenes: Sequence[SceneBoxes], score: float = 0.0) -> Counts:
+    """The sums of boxes with this score or more."""
+    rows = [
+        (
+            np.sum(one.scores >= score),
+            np.sum(one.right[one.scores >= score]),
+            len(one.found_at),
+            np.sum(one.found_at >= score),
+            len(one.events),
+            np.sum(one.found_at[one.events] >= score),
+        )
+        for one in scenes
+    ]
+    return Counts(*np.array(rows, float).reshape(-1, 6).T)
+
+
+def score_of_precision(scenes: Sequence[SceneBoxes], precision: float) -> float | None:
+    """The least score from which on at least this share of all boxes is right; None where there is
+    none.
+    """
+    scores, shares = _by_least_score(scenes)
+    enough = np.flatnonzero(shares >= precision)
+    return float(scores[enough[-1]]) if len(enough) else None
+
+
+def curve(scenes: Sequence[SceneBoxes], points: int = 200) -> Floats:
+    """(n, 3) score, recall and precision from each of up to so many scores on, the highest
+    first.
+    """
+    scores, shares = _by_least_score(scenes)
+    rows = np.unique(np.linspace(0, max(len(scores) - 1, 0), min(points, len(scores))).astype(int))
+    found = np.sort(np.concatenate([one.found_at for one in scenes]))
+    recall = 1 - np.searchsorted(found, scores[rows]) / max(len(found), 1)
+    return np.stack([scores[rows], recall, shares[rows]], axis=1)
+
+
+def reliability(scenes: Sequence[SceneBoxes]) -> Floats:
+    """(TENTHS, 3) how many boxes have a score within each tenth, their mean score, and the share of
+    them that is right; nan in a tenth without a box.
+    """
+    scores = np.concatenate([one.scores for one in scenes])
+    right = np.concatenate([one.right for one in scenes])
+    tenths = np.minimum((scores * TENTHS).astype(int), TENTHS - 1)
+    many, sure, hits = (
+        np.bincount(tenths, weights, TENTHS) for weights in (None, scores, right.astype(float))
+    )
+    with np.errstate(invalid="ignore"):
+        return np.stack([many, sure / many, hits / many], axis=1).astype(float)
+
+
+def calibration_error(scenes: Sequence[SceneBoxes]) -> float:
+    """The mean distance, over boxes, of the mean score of a tenth from the share that is right
+    (Guo et al. 2017, Eq. 3).
+    """
+    many, sure, hits = reliability(scenes).T
+    return _share(np.nan_to_num(many * np.abs(sure - hits)), many)
+
+
+def _by_least_score(scenes: Sequence[SceneBoxes]) -> tuple[Floats, Floats]:
+    """Every score that a box has, descending, and the share of right ones from it on."""
+    scores = np.concatenate([one.scores for one in scenes])
+    order = np.argsort(-scores)
+    hits = np.cumsum(np.concatenate([one.right for one in scenes])[order])
+    # Of equal scores the last row tells of all.
+    last = np.flatnonzero(np.diff(scores[order], append=-np.inf))
+    return scores[order][last], hits[last] / (last + 1)
+
+
+def _share(part: Floats, whole: Floats) -> float:
+    return float(part.sum() / whole.sum()) if whole.sum() else float("nan")

@@ -1,0 +1,90 @@
+"""What detectors make of the scans of a scene, and how long they take for it."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from care_sim.core.arrays import Floats
+from care_sim.core.boxes import planar_ranges
+from care_sim.core.types import Detections
+from care_sim.envs.detection import detector_of
+from care_sim.evaluation.detector_quality import SceneBoxes, scene_boxes
+from care_sim.evaluation.sightings import RANGE_M
+from care_sim.loops.film import Film
+from care_sim.sensors.annotated import Annotations
+from care_sim.sources.nuscenes.results_form import result_boxes
+from care_sim.sources.nuscenes.table_files import JsonRow
+from care_sim.study.play_config import PlayConfig
+from care_sim.study.scene_play import play_through_film
+
+TIMED_SCANS = 8
+"""Full scans of a scene for which every detector is timed; as many before are not."""
+
+
+Samples = dict[str, list[JsonRow]]
+"""Boxes by keyframe in the official form (`care_sim.sources.nuscenes.results_form`)."""
+
+
+@dataclass(frozen=True)
+class JudgedScene:
+    """One detector in one scene: its `boxes`, the CPU time of full scans, `scan_ms` (t,), and what
+    is in range in the official form: what it `reported` and what was `true`.
+    """
+
+    boxes: SceneBoxes
+    scan_ms: Floats
+    reported: Samples
+    true: Samples
+
+
+def judge_scene(configs: Sequence[PlayConfig]) -> list[JudgedScene]:
+    """What the detectors of these plays, all of one scene, make of it.
+
+    Raises InvalidInput where the film of the scene cannot be made.
+    """
+    film = configs[0].film()
+    judged = []
+    for config in configs:
+        record = play_through_film(config, film)
+        reports = [keyframe.detections for keyframe in record.keyframes]
+        truths = [_as_detections(shot.annotations) for shot in film.shots]
+        judged.append(
+            JudgedScene(
+                scene_boxes(record.score.sightings, reports),
+                _scan_ms(config, film),
+                _in_range(film, reports),
+                _in_range(film, truths),
+            )
+        )
+    return judged
+
+
+def _in_range(film: Film, reports: Sequence[Detections]) -> Samples:
+    """By keyframe, the boxes that the scoring asks for. Their speeds are not told: 0."""
+    made = {}
+    for shot, report in zip(film.shots, reports, strict=True):
+        near = report.take(planar_ranges(report.boxes) <= RANGE_M)
+        made[shot.token] = result_boxes(shot, near, np.zeros((len(near), 2)))
+    return made
+
+
+def _as_detections(annotations: Annotations) -> Detections:
+    many = np.ones(len(annotations))
+    return Detections(annotations.classes, annotations.boxes, many.astype(np.int64), many)
+
+
+def _scan_ms(config: PlayConfig, film: Film) -> Floats:
+    with config.make_env(film) as env:
+        detector = detector_of(
+            config.detector, dict(config.detector_parameters), env.conditions, env.rig
+        )
+    # The first scans find caches cold that a drive would keep warm.
+    times = []
+    for shot in film.shots[: 2 * TIMED_SCANS]:
+        cloud = shot.cloud.to_shots()
+        started = time.thread_time()
+        detector.detect(cloud, shot.annotations)
+        times.append(1e3 * (time.thread_time() - started))
+    return np.array(times[len(times) // 2 :])
