@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from care_sim.core.arrays import Floats
 from care_sim.core.types import CLASSES
 from care_sim.evaluation.bootstrap import Interval, ratio_of_sums
 from care_sim.evaluation.detector_quality import (
@@ -19,6 +20,8 @@ from care_sim.study.judging import JudgedScene
 
 Judged = Mapping[str, Sequence[JudgedScene]]
 """By detector, scene after scene, the same for all."""
+FEWEST_SCENES = 5
+"""For an interval: of fewer every other resample is one of a handful."""
 _NOTES = (
     "Shares in percent; right is a box within 2 m of an object of its class that no surer one has "
     "(paper, Remark 1). Objects without a return count, too.",
@@ -76,8 +79,8 @@ def _overall(
         (
             *_NOTES,
             f"* from this score on it is as precise as all that {against} reports; minus: "
-            "percentage points with a 95% interval over scenes, paired. Calibration error: of all "
-            "that is reported.",
+            "percentage points, with a 95% interval over scenes, paired, of five scenes or more. "
+            "Calibration error: of all that is reported.",
         ),
     )  # fmt: skip
 
@@ -106,9 +109,11 @@ def _ahead(ours: Counts, theirs: Counts) -> Iterator[str]:
     yield _difference(ours.found - theirs.found, ours.frames)
 
 
-def _difference(more: np.ndarray, of: np.ndarray) -> str:
-    if len(of) < 2 or not of.any():
+def _difference(more: Floats, of: Floats) -> str:
+    if not of.any():
         return "-"
+    if len(of) < FEWEST_SCENES:
+        return f"{100 * more.sum() / of.sum():+.1f}"
     each = ratio_of_sums((more, of))
     shown = Interval(*(100 * value for value in each))
     text = f"{shown.mean:+.1f} {bounds(shown, 1)}"

@@ -1,0 +1,53 @@
+"""The tables of detectors, of scenes worked by hand."""
+
+import numpy as np
+
+from care_sim.evaluation.detector_quality import SceneBoxes
+from care_sim.reports.detectors import detector_tables
+from care_sim.study.judging import JudgedScene
+
+
+def scene(scores, right, found_at):
+    """Cars, the first of which is a first sighting."""
+    boxes = SceneBoxes(
+        np.array(scores, float),
+        np.zeros(len(scores), np.int64),
+        np.array(right, bool),
+        np.array(found_at, float),
+        np.zeros(len(found_at), np.int64),
+        np.array([0]),
+        2,
+    )
+    return JudgedScene(boxes, np.array([4.0, 6.0]), {}, {})
+
+
+PLAIN = scene([1, 1], [True, False], [-np.inf, 1])
+SURE = scene([0.9, 0.8, 0.4, 0.2], [True, True, False, False], [0.9, 0.8])
+
+
+def rows(judged, least=(0.3,)):
+    return detector_tables(judged, least, "plain")[0].rows
+
+
+def test_shares_and_what_is_found_at_the_precision_of_another():
+    plain, at_least, alike = rows({"plain": [PLAIN], "sure": [SURE]})
+    assert plain == ("plain", "-", "0.0", "50.0", "50.0", "1.0", "-", "5.0", "-", "-")
+    assert at_least[1:6] == ("0.3", "100.0", "100.0", "66.7", "1.5")
+    # From 0.2 on half of its boxes are right, as of all of the other's; one scene has no interval.
+    assert alike[1] == "0.200 *"
+    assert alike[-2:] == ("+100.0", "+50.0")
+
+
+def test_five_scenes_have_an_interval():
+    *_, alike = rows({"plain": [PLAIN] * 5, "sure": [SURE] * 5})
+    assert alike[-1] == "+50.0 [50.0,50.0]"
+
+
+def test_no_row_where_the_precision_is_out_of_reach():
+    wrong = scene([0.9, 0.5], [False, False], [-np.inf, -np.inf])
+    assert len(rows({"plain": [PLAIN], "wrong": [wrong]})) == 2
+
+
+def test_a_class_that_does_not_occur_has_no_share():
+    _, by_class = detector_tables({"sure": [SURE]}, [0.3], "plain")
+    assert by_class.rows[0][2:6] == ("100.0", "66.7", "-", "-")
