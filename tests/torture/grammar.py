@@ -160,6 +160,7 @@ LONG = (
     "validate",
     "protocol",
     "mechanism",
+    "judge",
     "bench",
     "parity",
     "certify",
