@@ -16,7 +16,7 @@ experience that SAC learns from is not kept (half a gigabyte): a resumed run gat
 
 import csv
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -140,10 +140,12 @@ class Folder:
             grid=rig.grid,
             setup=rig.setup,
             # Trained at several budgets, the weights fit any.
-            budget=rig.budget if len(config.budget) == 1 else None,
+            budget=rig.budget if len({*config.budget}) == 1 else None,
             wrapper=config.wrapping,
-            scenario=config.env,
-            data="episodes of the environment",
+            scenario=" ".join(config.env),
+            data="drawn episodes of the environments"
+            if config.drawn
+            else "episodes of the environment",
             seeds={
                 "learner": config.seed,
                 "training_from": TRAINING,
@@ -164,19 +166,24 @@ class Folder:
         # A folder of before tells nothing of the code.
         if (_CODE in before) and before[_CODE] != _own_code(self.config.env).get(_CODE):
             raise InvalidInput(
-                f"{self.path}: the code of {self.config.env} is another than when it was trained; "
-                "give another --out"
+                f"{self.path}: the code of {' '.join(self.config.env)} is another than when it was "
+                "trained; give another --out"
             )
 
 
-def _own_code(env: str) -> dict[str, str | None]:
-    """The hash of the code of a scenario of one's own, None where it cannot be read; nothing of
-    another environment.
+def _own_code(envs: Sequence[str]) -> dict[str, Any]:
+    """The hash of the code of a scenario of one's own, None where it cannot be read; of several
+    environments by name. Nothing where none is one's own.
     """
-    name = scenario_of(env)
-    if is_place(name) or name in PLUGINS.entries():
-        return {_CODE: scenario_digest(name)}
-    return {}
+    names = {env: scenario_of(env) for env in envs}
+    own = {
+        env: scenario_digest(name)
+        for env, name in names.items()
+        if is_place(name) or name in PLUGINS.entries()
+    }
+    if not own:
+        return {}
+    return {_CODE: own if len(envs) > 1 else own[envs[0]]}
 
 
 def read_config(path: Path) -> dict[str, Any]:
@@ -187,7 +194,9 @@ def read_config(path: Path) -> dict[str, Any]:
     config = _read_map(path)
     kinds: dict[str, Callable[[Any], bool]] = {
         "algorithm": _is_text,
-        "env": _is_text,
+        "env": lambda env: (
+            _is_text(env) or (isinstance(env, list) and bool(env) and all(map(_is_text, env)))
+        ),
         "budget": lambda budgets: (
             isinstance(budgets, list) and bool(budgets) and all(map(_is_finite, budgets))
         ),

@@ -75,11 +75,15 @@ def acting(learner: Learner) -> Choose:
 
 
 def rule(name: str, env: gymnasium.Env[Any, Any]) -> Choose:
-    """The choice of a policy by name."""
-    policy = care_sim.make_policy(name, env)
+    """The choice of a policy by name, made anew for every episode: where episodes are drawn, each
+    has a rig of its own.
+    """
+    policy: care_sim.Policy
 
     def choose(observation: Any, begins: bool) -> NDArray[np.float32]:
+        nonlocal policy
         if begins:
+            policy = care_sim.make_policy(name, env.unwrapped)
             policy.reset()
         return policy(observation)
 
