@@ -20,9 +20,9 @@ from care_sim.training.chances import MissedChances
 from care_sim.training.config import AgentConfig
 from care_sim.training.drawn_env import DrawnEnv
 from care_sim.training.drawn_street import DrawnStreet
-from care_sim.training.draws import Draw
+from care_sim.training.draws import Draw, drawn
 from care_sim.training.mirroring import Mirrored
-from care_sim.training.seeds import TrainingSeeds, VectorTrainingSeeds
+from care_sim.training.seeds import TrainingSeeds, VectorTrainingSeeds, validation_seeds
 
 if TYPE_CHECKING:
     from stable_baselines3.common.vec_env import VecEnv
@@ -89,6 +89,15 @@ def _as_drawn(
 ) -> gymnasium.Env[Any, Any]:
     pictured = _pictured(config, env)
     return Mirrored(pictured, pictured.features.shape) if draw.mirrored else pictured
+
+
+def validation_episodes(config: AgentConfig) -> dict[int, str]:
+    """The environment of every validation seed."""
+    names = config.env
+    return {
+        seed: names[drawn(seed, len(names), config.budget).place]
+        for seed in validation_seeds(config.episodes)
+    }
 
 
 def side_by_side(config: AgentConfig) -> "VecEnv":
