@@ -30,10 +30,10 @@ class DrawnEnv(gymnasium.Env[Any, Any]):
     ):
         self._make = make
         self._given = places, budgets, faulty
-        # The first one last: its spaces stay.
+        # Mirrored, since not every sensor can be. The first one last: its spaces stay.
         for place in reversed(range(places)):
             for budget in budgets:
-                self._env = make(Draw(place, budget, {}, False, 0, 0))
+                self._env = make(Draw(place, budget, {}, True, 0, 0))
                 self._env.close()
         self._follow()
 

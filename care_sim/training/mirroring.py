@@ -22,14 +22,17 @@ class Mirrored(gymnasium.Wrapper[GridArrays, NDArray[np.float32], Any, Any]):
     pictures.
 
     So it fits every environment, and a learner meets either side as often. Raises InvalidInput for
-    a sensor that is not the same on both sides.
+    a LiDAR that is not the same on both sides.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], shape: tuple[int, int, int]):
         super().__init__(env)
         self._shape = shape
-        if not is_symmetric(sensing(env).rig):
-            raise InvalidInput("sides can be drawn only where the sensor's are alike")
+        if not _is_symmetric(sensing(env).rig):
+            raise InvalidInput(
+                "sides can be drawn only of a LiDAR that stands in the middle of the car and is "
+                "alike on both"
+            )
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -52,7 +55,7 @@ class Mirrored(gymnasium.Wrapper[GridArrays, NDArray[np.float32], Any, Any]):
         return {"grid": grid, "ego": ego}
 
 
-def is_symmetric(rig: Rig) -> bool:
+def _is_symmetric(rig: Rig) -> bool:
     """Whether the grid's columns on the left are those on the right, reflected."""
     directions = rig.grid.directions.reshape(*rig.grid.shape, 3)
     reflected = directions[:, ::-1] * (1, -1, 1)
