@@ -8,10 +8,12 @@ from typing import Annotated, Any
 import tyro
 
 from care_sim.base.errors import InvalidInput
+from care_sim.commands.shared.study_command import console
 from care_sim.reports.figures.files import check_figure, save
 from care_sim.training.config import PpoConfig, RecurrentPpoConfig, SacConfig
 from care_sim.training.curves import grouped_runs, read_run
 from care_sim.training.curves_figure import curves_figure
+from care_sim.training.curves_table import curves_table
 from care_sim.training.detector import TrainDetector
 from care_sim.training.place_map import TrainPlace
 from care_sim.training.run import train_agent
@@ -64,7 +66,9 @@ class DrawCurves:
             )
         groups = grouped_runs(map(read_run, self.folders))
         check_figure(self.out)
+        table = curves_table(groups)
         save(curves_figure(groups), self.out)
+        console().print(table.rich())
         print(self.out.with_suffix(".png"))
         return 0
 

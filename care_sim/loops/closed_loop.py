@@ -176,17 +176,22 @@ class ClosedLoop:
         return self._lidar.peek(self.sensor)
 
     def detectable(self) -> bool:
-        """Whether a scan of every cell would give the first-sighting actor the returns that the
-        proxy needs, whatever the detector.
+        """Whether `would_detect` holds of the first-sighting actor, if perception reports it.
 
         Truth: for the reward alone.
         """
         target = self.world.first_sighting
-        if target is None or target.label is None:
-            return False
+        return target is not None and target.label is not None and self.would_detect(target.body)
+
+    def would_detect(self, body: int) -> bool:
+        """Whether a scan of every cell would give a body the returns that the proxy needs, whatever
+        the detector.
+
+        Truth: for rewards alone.
+        """
         # No cell outside its hull can hit it, so these stand for all.
-        (cells,) = self.rig.hulls(self._local_boxes(np.array([target.body], np.int64)))
-        return self._lidar.hits(target.body, cells, self.sensor) >= self._min_returns
+        (cells,) = self.rig.hulls(self._local_boxes(np.array([body], np.int64)))
+        return self._lidar.hits(body, cells, self.sensor) >= self._min_returns
 
     def shows(self, body: int) -> bool:
         """Whether a camera shows enough of a body for a box. Truth: for scoring and people."""

@@ -54,7 +54,8 @@ def _settings(config: AgentConfig, goes_round: bool) -> tuple[Any, dict[str, Any
     # The module subclasses PyTorch's and Stable-Baselines3's classes: optional extra 'rl'.
     from care_sim.training.networks import Sectored, SectorPolicy
 
-    seen = {"shape": (len(CHANNELS), config.rows, config.columns), "goes_round": goes_round}
+    shape = len(CHANNELS), config.rows, config.columns
+    seen = {"shape": shape, "goes_round": goes_round, "without": config.without}
     # PPO scores sectors with the network that `ppo` later runs in NumPy. The others keep their own
     # networks behind features of the sectors, since their critics or memories need a vector.
     own = {

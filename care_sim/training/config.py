@@ -4,16 +4,17 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, get_args
 
 from care_sim.base.bounds import bounded, check_fields
-from care_sim.base.checks import LARGEST_INTEGER
-from care_sim.base.errors import InvalidInput
+from care_sim.base.checks import LARGEST_INTEGER, check_known
+from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.seed_ranges import TRAINING, VALIDATION
 from care_sim.core.grid_rays import MOST_COLUMNS, MOST_ROWS
 from care_sim.envs.reward import HEAVIEST
 from care_sim.policies.learned.wrapping import Wrapping
 from care_sim.study.parameters import parameters
+from care_sim.training.ablations import Part
 
 HOW_LONG = ("steps", "out", "resume", "tensorboard", "threads", "processes")
 """Fields in which a resumed run may differ from the run before."""
@@ -25,15 +26,24 @@ class AgentConfig:
 
     algorithm: ClassVar[str]
 
-    env: str = "CARE-Dense-v0"
-    """Environment id, of an installed scenario too; or a scenario as `sweep` names it."""
+    env: tuple[str, ...] = ("CARE-Dense-v0",)
+    """Environment id, of an installed scenario too; or a scenario as `sweep` names it. Several need
+    --drawn; one that is named twice is drawn twice as often."""
     budget: tuple[float, ...] = (0.03,)
     """Share of the cells that may fire per keyframe. With several values, the environments take one
-    each in turn, and the weights fit any budget; the first one is evaluated."""
+    each in turn, and the weights fit any budget; the first one is evaluated. With --drawn all
+    are."""
     env_parameters: tuple[str, ...] = ()
     """Further arguments of the environment as NAME=VALUE, for example vehicles=5
-    false_negative_rate=0.2.
+    false_negative_rate=0.2; of one of several as CARE-NCAP-v0.test=drawn.
     """
+    drawn: bool = False
+    """Draw for every episode which of the environments, which budget, which faults of the camera,
+    and whether left and right change places. The reward is then minus the chances of a first
+    detection that were missed, in every environment."""
+    without: tuple[Part, ...] = ()
+    """What to leave out, to see what it is worth: the pictures; the place, that is the number of
+    its own that each sector has; what the pictures tell of tracks; faults of the camera."""
     action: Literal["SectorReserve", "SectorScores"] = "SectorReserve"
     """What the action scores: sectors for the reserve alone, or for everything."""
     azimuths: int = bounded(32, 1, MOST_COLUMNS)
@@ -74,32 +84,44 @@ class AgentConfig:
     """Write a log for TensorBoard beside the weights; needs the package tensorboard."""
 
     def __post_init__(self) -> None:
+        # One alone may be given as its name.
+        env: Any = self.env
+        if isinstance(env, str):
+            object.__setattr__(self, "env", (env,))
         check_fields(self)
+        check_drawn(self)
         if not 0 < len(self.budget) <= self.environments:
             raise InvalidInput(
                 f"budget needs one value to {self.environments}, the environments; got "
                 f"{self.budget}"
             )
-        # Both are properties that refuse what does not fit: now, not when training begins.
-        self.wrapping, self.arguments  # noqa: B018
+        # Both refuse what does not fit: now, not when training begins.
+        _ = self.wrapping, [self.arguments(name) for name in self.env]
 
     @property
     def wrapping(self) -> Wrapping:
         """The wrappers. Raises InvalidInput for numbers that do not fit each other."""
         return Wrapping(self.action, self.azimuths, self.elevations, self.columns, self.rows)
 
-    @property
-    def arguments(self) -> dict[str, Any]:
-        """Of the environment, besides the budget."""
-        given = dict(parameters(self.env_parameters))
+    def arguments(self, env: str) -> dict[str, Any]:
+        """Of one of the environments, besides the budget: those of all, and its own."""
+        given, own = dict[str, Any](), dict[str, Any]()
+        for name, value in parameters(self.env_parameters):
+            whose, dot, bare = name.rpartition(".")
+            if dot:
+                check_known(f"environment of env_parameter {name}", whose, self.env)
+            if whose in ("", env):
+                (own if dot else given)[bare] = value
         for name, option in (("budget", "--budget"), ("reward_weights", "--gain")):
-            if name in given:
+            if name in given | own:
                 raise InvalidInput(f"{name} is no env_parameter but set by {option}")
-        return given
+        return given | own
 
     def to_json(self) -> str:
         """As text that people can read."""
         plain = {"algorithm": self.algorithm} | asdict(self) | {"out": str(self.out)}
+        # One alone as its name, as it was before there could be several.
+        plain["env"] = self.env[0] if len(self.env) == 1 else self.env
         return json.dumps(plain, indent=1) + "\n"
 
     @property
@@ -116,6 +138,8 @@ class AgentConfig:
 
         The message names the first difference.
         """
+        # Runs of before knew neither: nothing was drawn, or left out.
+        before = {"drawn": False, "without": [], **before}
         for name, value in self.recipe.items():
             if before.get(name) != value:
                 raise InvalidInput(
@@ -170,6 +194,25 @@ class SacConfig(AgentConfig):
     """Steps that are kept to learn from; 25 kB each."""
     batch: int = bounded(256, 2, 1_000_000)
     """Steps per gradient."""
+
+
+def check_drawn(config: AgentConfig) -> None:
+    """Raise InvalidInput for what fits drawn episodes alone, or does not fit them."""
+    if not config.env or not all(isinstance(name, str) for name in config.env):
+        raise InvalidInput(f"env needs one name or more, got {shown(config.env)}")
+    for part in config.without:
+        check_known("part to be without", part, get_args(Part))
+    # Layers of their own tell them one sector from another.
+    if "place" in config.without and not isinstance(config, PpoConfig):
+        raise InvalidInput(f"without place needs ppo: {config.algorithm} sees all sectors at once")
+    if config.drawn:
+        if config.gain != type(config).gain:
+            raise InvalidInput("gain weighs a term of another reward than that of --drawn")
+        return
+    if len(config.env) > 1:
+        raise InvalidInput(f"{len(config.env)} environments need --drawn: each episode is of one")
+    if "faults" in config.without:
+        raise InvalidInput("without faults needs --drawn: else env_parameters alone say faults")
 
 
 ALGORITHMS = tuple(config.algorithm for config in (PpoConfig, RecurrentPpoConfig, SacConfig))

@@ -1,4 +1,6 @@
-"""The figure of learning curves: what is reached on validation seeds against the steps trained."""
+"""The figure of learning curves: what is reached on validation seeds against the steps trained,
+and in how many of the episodes how much.
+"""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -8,73 +10,127 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from care_sim.base.errors import percent
+from care_sim.core.arrays import Floats
 from care_sim.policies import tags_of
 from care_sim.reports.figures.styles import FULL_STYLE, styles
-from care_sim.training.curves import TrainingRun
+from care_sim.training.aggregates import interquartile_mean, performance_profile
+from care_sim.training.curves import TrainingRun, recipe_name, scores_at, shared_steps
+from care_sim.training.episodes import LEARNER
+
+_LEVELS = 60
+"""Points of a profile."""
 
 
 def curves_figure(groups: Sequence[Sequence[TrainingRun]]) -> Figure:
     """A panel per recipe.
 
-    It has a line per training seed, their mean where there are several, and rules as lines across.
+    It has a line per training seed, their interquartile mean with its interval where there are
+    several, and rules as lines across. Below it, where runs tell of their episodes, is the
+    performance profile of the last evaluation that all have.
     """
-    figure = Figure(figsize=(1.2 + 4.6 * len(groups), 3.9), layout="constrained")
-    panels = figure.subplots(1, len(groups), squeeze=False)[0]
-    for axes, runs in zip(panels, groups, strict=True):
+    rows = 1 + any(run.episodes for runs in groups for run in runs)
+    figure = Figure(figsize=(1.2 + 4.6 * len(groups), 3.9 * rows), layout="constrained")
+    panels = figure.subplots(rows, len(groups), squeeze=False)
+    for axes, runs in zip(panels[0], groups, strict=True):
         _draw(axes, runs)
-        axes.set_ylabel("first detection (m; 0 if never)" if runs[0].closed_loop else "return")
+        axes.set_ylabel(runs[0].unit)
+    for axes, runs in zip(panels[1:].ravel(), groups, strict=rows > 1):
+        _draw_profiles(axes, runs)
     return figure
 
 
 def _draw(axes: Axes, runs: Sequence[TrainingRun]) -> None:
     config = runs[0].config
-    marks = runs[0].marks
+    marks = {name: _middle(scores) for name, scores in runs[0].marks.items()}
     learner = config["algorithm"]
-    drawn = styles((name, tags_of(name)) for name in (*marks, learner)) | {"full": FULL_STYLE}
-    colours = {name: style.colour for name, style in drawn.items()}
+    colours = _colours((*marks, learner))
     for name, height in marks.items():
         axes.axhline(height, color=colours[name], linestyle="--", linewidth=1.1, zorder=1)
     for run in runs:
         axes.plot(
             run.steps,
-            run.values,
+            [_middle(scores) for scores in run.scores],
             color=colours[learner],
             linewidth=0.9,
             alpha=0.5 if len(runs) > 1 else 1.0,
         )
-    _mean(axes, runs, colours[learner])
+    _all_seeds(axes, runs, colours[learner])
     # A run is evaluated before its first step too, so the last step may be 0.
     axes.set_xlim(0, max(1, *(run.steps[-1] for run in runs)))
     if runs[0].closed_loop:
         axes.set_ylim(bottom=0)
-    _name_lines(axes, marks | {learner: float(np.mean([run.values[-1] for run in runs]))}, colours)
+    last = float(np.mean([_middle(run.scores[-1]) for run in runs]))
+    _name_lines(axes, marks | {learner: last}, colours)
     _describe(axes, config, len(runs))
 
 
 def _describe(axes: Axes, config: Mapping[str, Any], seeds: int) -> None:
     axes.set_title(
-        f"{config['algorithm']}, {config['env']}, {seeds} training seed{'s' * (seeds > 1)}",
+        f"{recipe_name(config)}, {seeds} training seed{'s' * (seeds > 1)}",
         loc="left",
         size=10,
     )
     trained = ", ".join(percent(budget) for budget in config["budget"])
-    drawn = "thin: each training seed, thick: their mean\n" if seeds > 1 else ""
+    thick = "their interquartile mean, 95% interval"
+    drawn = f"thin: each training seed, thick: {thick}\n" if seeds > 1 else ""
+    played = "all budgets" if config.get("drawn") else percent(config["budget"][0])
     axes.set_xlabel(
         f"environment steps, in thousands\n{drawn}trained at budget {trained}\n"
-        f"a point is the mean of {config['episodes']} validation episodes at "
-        f"{percent(config['budget'][0])}"
+        f"a point is the mean of {config['episodes']} validation episodes at {played}"
     )
     axes.xaxis.set_major_formatter(lambda steps, _: f"{steps / 1000:g}")
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(axis="y", color="0.92")
 
 
-def _mean(axes: Axes, runs: Sequence[TrainingRun], colour: str) -> None:
+def _all_seeds(axes: Axes, runs: Sequence[TrainingRun], colour: str) -> None:
     # Runs may be of different lengths, as far as they were evaluated at the same steps.
-    shared = min((run.steps for run in runs), key=len)
-    if len(runs) > 1 and all(run.steps[: len(shared)] == shared for run in runs):
-        values = np.mean([run.values[: len(shared)] for run in runs], axis=0)
-        axes.plot(shared, values, color=colour, linewidth=2.2)
+    shared = shared_steps(runs)
+    if len(runs) > 1 and shared:
+        reached = [interquartile_mean(scores_at(runs, steps)) for steps in shared]
+        axes.plot(shared, [one.value for one in reached], color=colour, linewidth=2.2)
+        low, high = ([getattr(one, end) for one in reached] for end in ("low", "high"))
+        axes.fill_between(shared, low, high, color=colour, alpha=0.15, linewidth=0)
+
+
+def _draw_profiles(axes: Axes, runs: Sequence[TrainingRun]) -> None:
+    """The share of episodes above a score, of the learner's runs and of the rules."""
+    learner, shared = runs[0].config["algorithm"], shared_steps(runs)
+    played = {rule: runs[0].each(rule)[None] for rule in runs[0].rules}
+    own = [run.each(LEARNER, shared[-1]) for run in runs] if shared else []
+    same = len({len(one) for one in own}) == 1
+    played |= {learner: np.array(own)} if same else {}
+    played = {name: scores for name, scores in played.items() if scores.size}
+    if not played:
+        axes.set_axis_off()
+        return
+    colours = _colours((*runs[0].rules, learner))
+    every = np.concatenate([scores.ravel() for scores in played.values()])
+    levels = np.linspace(every.min(), every.max(), _LEVELS)
+    for name, scores in played.items():
+        profile = performance_profile(scores, levels)
+        style: dict[str, Any] = (
+            {"linewidth": 2.2} if name == learner else {"linewidth": 1.1, "linestyle": "--"}
+        )
+        axes.plot(levels, [one.value for one in profile], color=colours[name], label=name, **style)
+        if len(scores) > 1:
+            low, high = ([getattr(one, end) for one in profile] for end in ("low", "high"))
+            axes.fill_between(levels, low, high, color=colours[name], alpha=0.15, linewidth=0)
+    axes.set_ylabel("share of episodes above")
+    unit = "return" if len(runs[0].tasks) > 1 else runs[0].unit
+    axes.set_xlabel(f"{unit}, after {shared[-1] / 1000:g} thousand steps" if same else unit)
+    axes.legend(frameon=False, fontsize=9)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def _middle(scores: Floats) -> float:
+    """Of the tasks (n,) of one run, or of a rule."""
+    return interquartile_mean(scores[None]).value
+
+
+def _colours(names: Sequence[str]) -> dict[str, str]:
+    drawn = styles((name, tags_of(name)) for name in names) | {"full": FULL_STYLE}
+    return {name: style.colour for name, style in drawn.items()}
 
 
 def _name_lines(axes: Axes, heights: dict[str, float], colours: dict[str, str]) -> None:

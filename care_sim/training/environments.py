@@ -16,12 +16,18 @@ from care_sim.envs.wrappers.sector_actions import SectorReserve, SectorScores
 from care_sim.envs.wrappers.vector_grid_observation import VectorGridObservation
 from care_sim.envs.wrappers.vector_sector_actions import VectorSectorReserve, VectorSectorScores
 from care_sim.envs.wrappers.vectors import AnyVector
+from care_sim.training.chances import MissedChances
 from care_sim.training.config import AgentConfig
-from care_sim.training.seeds import TrainingSeeds, VectorTrainingSeeds
+from care_sim.training.drawn_env import DrawnEnv
+from care_sim.training.drawn_street import DrawnStreet
+from care_sim.training.draws import Draw, drawn
+from care_sim.training.mirroring import Mirrored
+from care_sim.training.seeds import TrainingSeeds, VectorTrainingSeeds, validation_seeds
 
 if TYPE_CHECKING:
     from stable_baselines3.common.vec_env import VecEnv
 
+STREETS_ID = "CARE-Street-v0"
 WORLDS_A_THREAD = 32
 """With fewer, what a thread does once for all its worlds takes longer than what it saves."""
 ACTIONS = {wrapper.__name__: wrapper for wrapper in (SectorReserve, SectorScores)}
@@ -33,36 +39,81 @@ VECTOR_ACTIONS = {
 def plain(config: AgentConfig, budget: float | None = None) -> gymnasium.Env[Any, Any]:
     """The environment without wrappers, which the rules play.
 
-    Its budget is `budget`, or the first of the configuration. Raises InvalidInput for an unknown
-    environment or a wrong argument.
+    Its budget is `budget`, or the first of the configuration, or drawn for every episode. Raises
+    InvalidInput for an unknown environment or a wrong argument.
     """
+    if config.drawn:
+        return _drawn(config, budget, lambda env, _: env)
     return make_env(
-        config.env, **_arguments(config, config.budget[0] if budget is None else budget)
+        config.env[0],
+        **_arguments(config, config.env[0], config.budget[0] if budget is None else budget),
     )
 
 
 def wrapped(config: AgentConfig, budget: float | None = None) -> gymnasium.Env[Any, Any]:
     """As the learner acts and sees."""
-    acting = ACTIONS[config.action](plain(config, budget), config.azimuths, config.elevations)
-    return GridObservation(acting, config.columns, config.rows)
+    if config.drawn:
+        return _drawn(config, budget, partial(_as_drawn, config))
+    return _pictured(config, plain(config, budget))
 
 
-def training(config: AgentConfig, budget: float) -> gymnasium.Env[Any, Any]:
+def training(config: AgentConfig, budget: float | None = None) -> gymnasium.Env[Any, Any]:
     """The same, over episodes of training seeds."""
     return TrainingSeeds(wrapped(config, budget), config.seed)
 
 
+def _pictured(config: AgentConfig, env: gymnasium.Env[Any, Any]) -> GridObservation:
+    acting = ACTIONS[config.action](env, config.azimuths, config.elevations)
+    return GridObservation(acting, config.columns, config.rows)
+
+
+def _drawn(
+    config: AgentConfig,
+    budget: float | None,
+    finish: Callable[[gymnasium.Env[Any, Any], Draw], gymnasium.Env[Any, Any]],
+) -> DrawnEnv:
+    """Episodes that differ, with `budget` or with drawn ones, under the reward that all share."""
+
+    def make(draw: Draw) -> gymnasium.Env[Any, Any]:
+        name = config.env[draw.place]
+        given = {**_arguments(config, name, draw.budget), **draw.faults}
+        env = DrawnStreet(draw.street, **given) if name == STREETS_ID else make_env(name, **given)
+        return finish(MissedChances(env), draw)
+
+    budgets = config.budget if budget is None else (budget,)
+    return DrawnEnv(make, len(config.env), budgets, "faults" not in config.without)
+
+
+def _as_drawn(
+    config: AgentConfig, env: gymnasium.Env[Any, Any], draw: Draw
+) -> gymnasium.Env[Any, Any]:
+    pictured = _pictured(config, env)
+    return Mirrored(pictured, pictured.features.shape) if draw.mirrored else pictured
+
+
+def validation_episodes(config: AgentConfig) -> dict[int, str]:
+    """The environment of every validation seed."""
+    names = config.env
+    return {
+        seed: names[drawn(seed, len(names), config.budget).place]
+        for seed in validation_seeds(config.episodes)
+    }
+
+
 def side_by_side(config: AgentConfig) -> "VecEnv":
     """The training environments as one vector, which reports episodes to the learner's log."""
-    from stable_baselines3.common.vec_env import SubprocVecEnv, VecMonitor
+    from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv, VecMonitor
 
     from care_sim.training.vec_env import GymnasiumVecEnv
 
-    if not config.processes:
+    if not (config.processes or config.drawn):
         return VecMonitor(GymnasiumVecEnv(*many(config)))
     makers: list[Callable[[], gymnasium.Env[Any, Any]]] = [
-        partial(training, config, budget) for budget in _budgets(config)
+        partial(training, config, None if config.drawn else budget) for budget in _budgets(config)
     ]
+    # Worlds of one vector have one scenario, and episodes that are drawn do not.
+    if not config.processes:
+        return VecMonitor(DummyVecEnv(makers))
     # Spawned, not forked: PyTorch has threads by now, and a fork copies their locks.
     with starting():
         return VecMonitor(
@@ -87,16 +138,17 @@ def many(config: AgentConfig) -> list[AnyVector]:
 def _plain_vectors(config: AgentConfig) -> list[AnyVector]:
     # The pictures that learners see are drawn at once, and need no copies of what they show.
     budgets = _budgets(config)
-    if config.env in (*CLOSED_LOOP, *installed_ids()):
+    (name,) = config.env
+    if name in (*CLOSED_LOOP, *installed_ids()):
         return [
             gymnasium.make_vec(
-                f"care_sim:{config.env}",
+                f"care_sim:{name}",
                 config.environments,
                 "vector_entry_point",
                 autoreset_mode=AutoresetMode.DISABLED,
                 copy=False,
                 threads=_threads(config.environments),
-                **_arguments(config, budgets),
+                **_arguments(config, name, budgets),
             )
         ]
     count = len(config.budget)
@@ -120,11 +172,10 @@ def _budgets(config: AgentConfig) -> list[float]:
     return [*islice(cycle(config.budget), config.environments)]
 
 
-def _arguments(config: AgentConfig, budget: float | list[float]) -> dict[str, Any]:
-    # Only the closed loop has a reward of weighted terms.
-    reward: dict[str, Any] = (
-        {} if config.env in OPEN_LOOP else {"reward_weights": {"gain": config.gain}}
-    )
+def _arguments(config: AgentConfig, name: str, budget: float | list[float]) -> dict[str, Any]:
+    # Only the closed loop has a reward of weighted terms, and drawn episodes have another.
+    weighted = not (config.drawn or name in OPEN_LOOP)
+    reward: dict[str, Any] = {"reward_weights": {"gain": config.gain}} if weighted else {}
     # No learner reads it, and evaluations read outcomes, which stay.
     scoring = {"scoring_info": False}
-    return {"budget": budget} | reward | scoring | config.arguments
+    return {"budget": budget} | reward | scoring | config.arguments(name)

@@ -5,6 +5,7 @@
 | `config.json` | the effective configuration, and the hash of the code of a scenario of one's own |
 | `rules.json` | what rules score on the same validation seeds |
 | `curve.csv` | steps, seconds, return and detection distance of every evaluation |
+| `episodes.csv` | the same of every episode of it, and of the rules' |
 | `checkpoint.zip` | the learner, by Stable-Baselines3; loading it executes code: load your own |
 | `weights.npz` | `ppo` only: the weights with the best return on the validation seeds |
 
@@ -16,7 +17,7 @@ experience that SAC learns from is not kept (half a gigabyte): a resumed run gat
 
 import csv
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -33,6 +34,13 @@ from care_sim.policies.learned.weights import Card, save_weights
 from care_sim.scenarios import PLUGINS
 from care_sim.study.provenance import machine_line, package_versions, scenario_digest
 from care_sim.training.config import ALGORITHMS, AgentConfig
+from care_sim.training.episodes import (
+    LEARNER,
+    EpisodeRow,
+    Played,
+    read_episodes,
+    write_episodes,
+)
 from care_sim.training.seeds import validation_seeds
 from care_sim.training.validation import ValidationScore
 
@@ -69,6 +77,7 @@ class Folder:
                 f"{self.path} holds a run already; add --resume, or give another --out"
             )
         self._curve = read_curve(self.path / CURVE) if config.resume else []
+        self._episodes = read_episodes(self.path) if config.resume else []
 
     def begin(self, model: "BaseAlgorithm") -> None:
         """Write the configuration down, and the learner as it is.
@@ -81,14 +90,18 @@ class Folder:
         content = json.loads(self.config.to_json()) | _own_code(self.config.env)
         write_text(self.path / CONFIG, json.dumps(content, indent=1) + "\n")
 
-    def rules(self, score: Callable[[], dict[str, ValidationScore]]) -> dict[str, ValidationScore]:
+    def rules(self, play: Callable[[], dict[str, list[Played]]]) -> dict[str, ValidationScore]:
         """What rules score: measured at the beginning of a run, read when it is resumed."""
         path = self.path / RULES
         if not path.exists():
-            text = (
-                json.dumps({name: asdict(each) for name, each in score().items()}, indent=1) + "\n"
-            )
-            write_text(path, text)
+            played = play()
+            self._episodes = [
+                EpisodeRow(name, 0, one) for name, each in played.items() for one in each
+            ]
+            # The table first: where the scores are, its rows are, too.
+            write_episodes(self.path, self._episodes)
+            scores = {name: asdict(ValidationScore.of(each)) for name, each in played.items()}
+            write_text(path, json.dumps(scores, indent=1) + "\n")
         return {name: ValidationScore(**plain) for name, plain in read_rules(path).items()}
 
     @property
@@ -101,17 +114,24 @@ class Folder:
         return bool(self._curve) and self._curve[-1][0] >= model.num_timesteps
 
     def keep(
-        self, model: "BaseAlgorithm", score: ValidationScore, seconds: float, rig: Rig
-    ) -> None:
-        """Write an evaluation and, when it is the best yet, the weights."""
+        self, model: "BaseAlgorithm", played: Sequence[Played], seconds: float, rig: Rig
+    ) -> ValidationScore:
+        """Write an evaluation and, when it is the best yet, the weights. Returns its score."""
+        score = ValidationScore.of(played)
         # The weights first: when the curve knows an evaluation, its weights are there.
         if score.mean_return > max((row[2] for row in self._curve), default=float("-inf")):
             self._export(model, score, seconds, rig)
+        steps = model.num_timesteps
+        # An interruption before the curve was written left rows of this evaluation.
+        before = [row for row in self._episodes if (row.policy, row.steps) != (LEARNER, steps)]
+        self._episodes = [*before, *(EpisodeRow(LEARNER, steps, one) for one in played)]
+        write_episodes(self.path, self._episodes)
         self._curve.append(
             (model.num_timesteps, round(seconds, 1), score.mean_return, score.distance_m)
         )
         with replacing(self.path / CURVE) as unfinished, unfinished.open("w", newline="") as file:
             csv.writer(file).writerows([CURVE_COLUMNS, *self._curve])
+        return score
 
     def save(self, model: "BaseAlgorithm") -> None:
         """Write a checkpoint."""
@@ -140,10 +160,12 @@ class Folder:
             grid=rig.grid,
             setup=rig.setup,
             # Trained at several budgets, the weights fit any.
-            budget=rig.budget if len(config.budget) == 1 else None,
+            budget=rig.budget if len({*config.budget}) == 1 else None,
             wrapper=config.wrapping,
-            scenario=config.env,
-            data="episodes of the environment",
+            scenario=" ".join(config.env),
+            data="drawn episodes of the environments"
+            if config.drawn
+            else "episodes of the environment",
             seeds={
                 "learner": config.seed,
                 "training_from": TRAINING,
@@ -164,19 +186,24 @@ class Folder:
         # A folder of before tells nothing of the code.
         if (_CODE in before) and before[_CODE] != _own_code(self.config.env).get(_CODE):
             raise InvalidInput(
-                f"{self.path}: the code of {self.config.env} is another than when it was trained; "
-                "give another --out"
+                f"{self.path}: the code of {' '.join(self.config.env)} is another than when it was "
+                "trained; give another --out"
             )
 
 
-def _own_code(env: str) -> dict[str, str | None]:
-    """The hash of the code of a scenario of one's own, None where it cannot be read; nothing of
-    another environment.
+def _own_code(envs: Sequence[str]) -> dict[str, Any]:
+    """The hash of the code of a scenario of one's own, None where it cannot be read; of several
+    environments by name. Nothing where none is one's own.
     """
-    name = scenario_of(env)
-    if is_place(name) or name in PLUGINS.entries():
-        return {_CODE: scenario_digest(name)}
-    return {}
+    names = {env: scenario_of(env) for env in envs}
+    own = {
+        env: scenario_digest(name)
+        for env, name in names.items()
+        if is_place(name) or name in PLUGINS.entries()
+    }
+    if not own:
+        return {}
+    return {_CODE: own if len(envs) > 1 else own[envs[0]]}
 
 
 def read_config(path: Path) -> dict[str, Any]:
@@ -187,7 +214,9 @@ def read_config(path: Path) -> dict[str, Any]:
     config = _read_map(path)
     kinds: dict[str, Callable[[Any], bool]] = {
         "algorithm": _is_text,
-        "env": _is_text,
+        "env": lambda env: (
+            _is_text(env) or (isinstance(env, list) and bool(env) and all(map(_is_text, env)))
+        ),
         "budget": lambda budgets: (
             isinstance(budgets, list) and bool(budgets) and all(map(_is_finite, budgets))
         ),

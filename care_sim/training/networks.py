@@ -3,6 +3,7 @@
 `care_sim.policies.learned.score_map` computes the same network in NumPy.
 """
 
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from torch import Tensor, nn
 from care_sim.base.array_files import Arrays
 from care_sim.policies.learned.grid_features import EGO_INPUTS
 from care_sim.policies.learned.score_map import BLOCK_MARGIN
+from care_sim.training.ablations import mixing
 
 
 class Window(nn.Module):
@@ -22,8 +24,11 @@ class Window(nn.Module):
     car's motion. `care_sim.policies.learned.score_map` computes the same in NumPy.
 
     `shape` is (channels, rows, columns) of the blocks, `sectors` (elevations, azimuths);
-    `goes_round` says whether the grid does.
+    `goes_round` says whether the grid does; `without` what is left out of the pictures
+    (`care_sim.training.ablations`).
     """
+
+    mixing: Tensor
 
     def __init__(
         self,
@@ -31,10 +36,14 @@ class Window(nn.Module):
         sectors: tuple[int, int],
         hidden: int,
         goes_round: bool = True,
+        without: Collection[str] = (),
     ):
         super().__init__()
         self.shape = shape
         self.goes_round = goes_round
+        # Not kept in checkpoints, which hold what is learned.
+        self.register_buffer("mixing", torch.from_numpy(mixing(without)), persistent=False)
+        self._mixes = bool(without)
         stride = shape[1] // sectors[0], shape[2] // sectors[1]
         self.window = nn.Conv2d(
             shape[0], hidden, (stride[0] + 2 * BLOCK_MARGIN, stride[1] + 2 * BLOCK_MARGIN), stride
@@ -48,6 +57,8 @@ class Window(nn.Module):
         """
         channels, rows, columns = self.shape
         blocks = grid.view(-1, *self.shape)
+        if self._mixes:
+            blocks = torch.einsum("km,nmrc->nkrc", self.mixing, blocks)
         side = BLOCK_MARGIN
         result = blocks.new_zeros((len(blocks), channels, rows + 2 * side, columns + 2 * side))
         within = result[:, :, side:-side]
@@ -75,10 +86,11 @@ class Windows(nn.Module):
         sectors: tuple[int, int],
         hidden: int,
         goes_round: bool = True,
+        without: Collection[str] = (),
     ):
         super().__init__()
-        self.actor = Window(shape, sectors, hidden, goes_round)
-        self.critic = Window(shape, sectors, hidden, goes_round)
+        self.actor = Window(shape, sectors, hidden, goes_round, without)
+        self.critic = Window(shape, sectors, hidden, goes_round, without)
         self.valued = nn.Sequential(nn.Linear(2 * hidden + len(EGO_INPUTS), 2 * hidden), nn.ReLU())
         self.latent_dim_pi = hidden
         self.latent_dim_vf = 2 * hidden
@@ -149,9 +161,10 @@ class Sectored(BaseFeaturesExtractor):
         shape: tuple[int, int, int],
         sectors: tuple[int, int],
         goes_round: bool = True,
+        without: Collection[str] = (),
     ):
         super().__init__(observation_space, len(EGO_INPUTS) + 4 * sectors[0] * sectors[1])
-        self.window = Window(shape, sectors, 4, goes_round)
+        self.window = Window(shape, sectors, 4, goes_round, without)
 
     def forward(self, observation: dict[str, Tensor]) -> Tensor:
         """The car's motion, then four features per sector."""
@@ -160,7 +173,9 @@ class Sectored(BaseFeaturesExtractor):
 
 
 class SectorPolicy(ActorCriticPolicy):
-    """The score map as actor; `shape` and `goes_round` as of `Window`, `hidden` its width."""
+    """The score map as actor; `shape`, `goes_round` and `without` as of `Window`, `hidden` its
+    width.
+    """
 
     def __init__(
         self,
@@ -168,8 +183,10 @@ class SectorPolicy(ActorCriticPolicy):
         shape: tuple[int, int, int],
         hidden: int = 16,
         goes_round: bool = True,
+        without: Collection[str] = (),
         **kwargs: Any,
     ):
+        self._without = without
         self._shape = shape
         self._hidden = hidden
         self._goes_round = goes_round
@@ -177,7 +194,7 @@ class SectorPolicy(ActorCriticPolicy):
 
     def _build_mlp_extractor(self) -> None:
         self.mlp_extractor: Any = Windows(
-            self._shape, self._sectors, self._hidden, self._goes_round
+            self._shape, self._sectors, self._hidden, self._goes_round, self._without
         )
 
     def _build(self, lr_schedule: Any) -> None:
@@ -185,6 +202,8 @@ class SectorPolicy(ActorCriticPolicy):
         # The head that Stable-Baselines3 made mixes sectors. The optimizer that it made holds that
         # head's parameters, so it is made anew too.
         self.action_net: Any = ScoreHead(self._hidden, int(np.prod(self._sectors)))
+        # A parameter like any other, since checkpoints of before hold it; it stays 0.
+        self.action_net.place.requires_grad_("place" not in self._without)
         self.optimizer = self.optimizer_class(
             self.parameters(), lr=lr_schedule(1), **self.optimizer_kwargs
         )  # type: ignore[call-arg]
@@ -203,4 +222,7 @@ class SectorPolicy(ActorCriticPolicy):
         # The 1 x 1 convolution is a matrix, and its kernel axes are dropped.
         arrays["hidden.weight"] = arrays["hidden.weight"][:, :, 0, 0]
         arrays["place"] = arrays["place"].reshape(self._sectors)
+        if self._without:
+            mixed = np.einsum("hkrc,km->hmrc", arrays["window.weight"], mixing(self._without))
+            arrays["window.weight"] = np.ascontiguousarray(mixed, np.float32)
         return arrays

@@ -13,10 +13,10 @@ from care_sim.envs.sensing import sensing
 from care_sim.study.progress import ProgressLines, Show, progress_bar, rounded_duration
 from care_sim.training import algorithms
 from care_sim.training.config import AgentConfig
-from care_sim.training.environments import plain, side_by_side, wrapped
+from care_sim.training.environments import plain, side_by_side, validation_episodes, wrapped
+from care_sim.training.episodes import Played
 from care_sim.training.folder import Folder
-from care_sim.training.seeds import validation_seeds
-from care_sim.training.validation import ValidationScore, acting, evaluate, rule
+from care_sim.training.validation import acting, play, rule
 
 if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm
@@ -70,14 +70,14 @@ def _resumed(config: AgentConfig, folder: Folder, envs: Any) -> "BaseAlgorithm":
     return model
 
 
-def _rules(config: AgentConfig) -> dict[str, ValidationScore]:
-    """What the rules score on the validation seeds."""
-    scores = {}
+def _rules(config: AgentConfig) -> dict[str, list[Played]]:
+    """How the rules play the validation seeds."""
+    played = {}
     for name, budget in RULES.items():
         env = plain(config, budget)
-        scores[name] = evaluate(env, rule(name, env), validation_seeds(config.episodes))
+        played[name] = play(env, rule(name, env), validation_episodes(config))
         env.close()
-    return scores
+    return played
 
 
 def _learn(config: AgentConfig, folder: Folder, model: "BaseAlgorithm", env: Any) -> None:
@@ -97,8 +97,8 @@ def _learn(config: AgentConfig, folder: Folder, model: "BaseAlgorithm", env: Any
         while True:
             # A resumed run may have been interrupted between learning and evaluation.
             if not folder.evaluated(model):
-                score = evaluate(env, acting(model), validation_seeds(config.episodes))
-                folder.keep(model, score, clock.seconds, env.unwrapped.rig)
+                played = play(env, acting(model), validation_episodes(config))
+                score = folder.keep(model, played, clock.seconds, env.unwrapped.rig)
                 _say(f"{model.num_timesteps} steps: {score}")
             if (left := config.steps - model.num_timesteps) <= 0:
                 break

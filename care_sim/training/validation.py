@@ -1,6 +1,6 @@
 """Episodes of validation seeds, without exploration."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import care_sim
+from care_sim.training.episodes import Played
 
 Choose = Callable[[Any, bool], NDArray[np.float32]]
 """The action for an observation. The flag tells that the episode begins with it."""
@@ -29,12 +30,19 @@ class ValidationScore:
     """Means over episodes: the return, and the first-detection distance.
 
     That is the distance at which the first-sighting actor was detected, metres; 0 where it never
-    was, None in the open loop.
+    was, None unless every episode has one: in the open loop there is none.
     """
 
     episodes: int
     mean_return: float
     distance_m: float | None
+
+    @classmethod
+    def of(cls, played: Sequence[Played]) -> "ValidationScore":
+        """The means of one episode or more."""
+        metres = [one.distance_m for one in played if one.distance_m is not None]
+        mean_m = float(np.mean(metres)) if len(metres) == len(played) else None
+        return cls(len(played), float(np.mean([one.total for one in played])), mean_m)
 
     def __str__(self) -> str:
         seen = (
@@ -45,18 +53,9 @@ class ValidationScore:
         return f"return {self.mean_return:.2f}{seen}"
 
 
-def evaluate(env: gymnasium.Env[Any, Any], choose: Choose, seeds: Iterable[int]) -> ValidationScore:
-    """Play one episode per seed."""
-    played = [_episode(env, choose, seed) for seed in seeds]
-    # An actor who is never detected counts as 0 m, the worst there is. The open loop has no such
-    # distance.
-    distances = [
-        outcome["detection_distance_m"] or 0.0
-        for _, outcome in played
-        if "detection_distance_m" in outcome
-    ]
-    returns = float(np.mean([total for total, _ in played]))
-    return ValidationScore(len(played), returns, float(np.mean(distances)) if distances else None)
+def play(env: gymnasium.Env[Any, Any], choose: Choose, episodes: Mapping[int, str]) -> list[Played]:
+    """Play the episodes of the seeds, whose environments are named."""
+    return [_episode(env, choose, seed, name) for seed, name in episodes.items()]
 
 
 def acting(learner: Learner) -> Choose:
@@ -75,20 +74,22 @@ def acting(learner: Learner) -> Choose:
 
 
 def rule(name: str, env: gymnasium.Env[Any, Any]) -> Choose:
-    """The choice of a policy by name."""
-    policy = care_sim.make_policy(name, env)
+    """The choice of a policy by name, made anew for every episode: where episodes are drawn, each
+    has a rig of its own.
+    """
+    policy: care_sim.Policy
 
     def choose(observation: Any, begins: bool) -> NDArray[np.float32]:
+        nonlocal policy
         if begins:
+            policy = care_sim.make_policy(name, env.unwrapped)
             policy.reset()
         return policy(observation)
 
     return choose
 
 
-def _episode(
-    env: gymnasium.Env[Any, Any], choose: Choose, seed: int
-) -> tuple[float, dict[str, Any]]:
+def _episode(env: gymnasium.Env[Any, Any], choose: Choose, seed: int, name: str) -> Played:
     observation, _ = env.reset(seed=seed)
     total = 0.0
     begins = True
@@ -99,4 +100,7 @@ def _episode(
         begins = False
         over = terminated or truncated
     outcome: dict[str, Any] = info["outcome"]
-    return total, outcome
+    # An actor who is never detected counts as 0 m, the worst there is. The open loop has no such
+    # distance.
+    distance = outcome["detection_distance_m"] or 0.0 if "detection_distance_m" in outcome else None
+    return Played(seed, name, total, distance)

@@ -69,8 +69,8 @@ def test_a_panel_a_task_a_line_a_seed_and_their_mean(folders, tmp_path):
 
 def test_without_a_distance_the_return_is_drawn(tmp_path):
     run = read_run(folder(tmp_path / "street", PpoConfig(env="CARE-Street-v0"), (None, None)))
-    assert run.values == [-9.0, -8.0]
-    assert run.marks["random"] == -6.0
+    assert run.scores.tolist() == [[-9.0], [-8.0]]
+    assert run.marks["random"].tolist() == [-6.0]
     assert curves_figure([[run]]).axes[0].get_ylabel() == "return"
 
 
@@ -86,7 +86,9 @@ def test_the_command_draws_both_forms(folders, tmp_path, capsys):
             ]
         )
     assert end.value.code == 0
-    assert capsys.readouterr().out.strip().endswith("curves.png")
+    said = capsys.readouterr().out
+    assert said.strip().endswith("curves.png")
+    assert "Training runs" in said
     assert all(
         (tmp_path / "figures" / f"curves{ending}").stat().st_size > 1000
         for ending in (".png", ".svg")

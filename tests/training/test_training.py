@@ -20,7 +20,7 @@ from care_sim.training.config import PpoConfig, SacConfig
 from care_sim.training.environments import plain, training
 from care_sim.training.folder import Folder
 from care_sim.training.seeds import validation_seeds
-from care_sim.training.validation import evaluate, rule
+from care_sim.training.validation import ValidationScore, play, rule
 
 SHORT = ["--environments", "2", "--episodes", "2", "--env-parameters", "duration_s=1.0"]
 TOLD = ("scoring_info=True",)
@@ -68,8 +68,8 @@ def test_learners_of_neighbouring_seeds_share_no_episode():
 def test_an_evaluation_is_the_mean_of_its_episodes():
     env = plain(PpoConfig())
     care_rule, seeds = rule("care", env), [VALIDATION, VALIDATION + 1]
-    each = [evaluate(env, care_rule, [seed]) for seed in seeds]
-    both = evaluate(env, care_rule, seeds)
+    each = [ValidationScore.of(play(env, care_rule, {seed: ""})) for seed in seeds]
+    both = ValidationScore.of(play(env, care_rule, dict.fromkeys(seeds, "")))
     env.close()
     assert both.mean_return == pytest.approx(np.mean([score.mean_return for score in each]))
     assert both.distance_m == pytest.approx(np.mean([score.distance_m for score in each]))
@@ -130,7 +130,7 @@ def test_it_trains_keeps_and_goes_on(capsys, tmp_path):
 @pytest.mark.usefixtures("libraries")
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "moment", ["care_sim.training.run.evaluate", "care_sim.training.run._learn_steps"]
+    "moment", ["care_sim.training.run.play", "care_sim.training.run._learn_steps"]
 )
 def test_an_interrupted_run_goes_on(capsys, monkeypatch, tmp_path, moment):
     """Whether the rules are being measured or the first steps were just learned."""

@@ -25,7 +25,7 @@ from care_sim.policies.learned.weights import (
     shipped_weights,
 )
 from care_sim.policies.learned.wrapping import Wrapping
-from care_sim.training.validation import evaluate, rule
+from care_sim.training.validation import ValidationScore, play, rule
 from tests.helpers.untrained import shapes, untrained
 
 ACTIONS = {"SectorReserve": SectorReserve, "SectorScores": SectorScores}
@@ -199,7 +199,7 @@ def test_the_shipped_weights_fit_any_budget_and_see_the_person_early(name, budge
     distances = {}
     for policy in (name, "history"):
         env = gymnasium.make("CARE-Dense-v0", disable_env_checker=True, budget=budget)
-        score = evaluate(env, rule(policy, env), range(3))
+        score = ValidationScore.of(play(env, rule(policy, env), dict.fromkeys(range(3), "")))
         distances[policy] = score.distance_m
         env.close()
     assert distances[name] > distances["history"] + 2
@@ -219,9 +219,8 @@ def test_on_the_dense_street_a_place_is_enough_and_so_are_pictures(tmp_path, env
     distances = []
     for path in paths:
         policy = care_sim.make_policy("ppo", env, path=path)
-        distances.append(
-            evaluate(env, lambda seen, _, policy=policy: policy(seen), range(3)).distance_m
-        )
+        played = play(env, lambda seen, _, policy=policy: policy(seen), dict.fromkeys(range(3), ""))
+        distances.append(ValidationScore.of(played).distance_m)
     assert distances[0] == distances[1] > 15
     assert distances[2] > distances[0] - 1
 

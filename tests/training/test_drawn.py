@@ -1,0 +1,206 @@
+"""Episodes that differ: what a seed draws, and that it is then played."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from care_sim import SensorSetup
+from care_sim.base.errors import InvalidInput
+from care_sim.base.seed_ranges import TRAINING, VALIDATION, split_of
+from care_sim.core.grid import AngularGrid
+from care_sim.envs import make_env
+from care_sim.envs.sensing import sensing
+from care_sim.training.config import PpoConfig, RecurrentPpoConfig, SacConfig
+from care_sim.training.draws import STREETS, drawn
+from care_sim.training.environments import plain, training, validation_episodes, wrapped
+from care_sim.training.mirroring import Mirrored
+from care_sim.wrappers import GridObservation, SectorReserve
+
+BUDGETS = (0.01, 0.03, 0.1)
+TOLD = {"env_parameters": ("scoring_info=True", "CARE-NCAP-v0.test=drawn",
+                           "CARE-NCAP-v0.speed_kph=0")}  # fmt: skip
+CONFIG = PpoConfig(drawn=True, env=("CARE-Dense-v0", "CARE-NCAP-v0"), budget=BUDGETS, **TOLD)
+
+
+@given(seed=st.integers(0, 2**31 - 2))
+def test_a_seed_draws_one_episode_of_its_own_split(seed):
+    draw = drawn(seed, 3, BUDGETS)
+    assert draw == drawn(seed, 3, BUDGETS)
+    assert draw.seed == seed
+    assert split_of([seed, draw.street]) == split_of([seed])
+    without = drawn(seed, 3, BUDGETS, faulty=False)
+    assert without == drawn(seed, 3, BUDGETS, faulty=False)
+    assert without.faults == {}
+    assert vars(without) | {"faults": draw.faults} == vars(draw)
+
+
+def test_all_there_is_is_drawn_and_as_often_as_the_page_says():
+    draws = [drawn(seed, 3, BUDGETS) for seed in range(TRAINING, TRAINING + 3000)]
+    for values, count in (
+        ([draw.place for draw in draws], 3),
+        ([draw.budget for draw in draws], 3),
+        ([draw.mirrored for draw in draws], 2),
+        ([draw.street for draw in draws], STREETS),
+    ):
+        shares = np.unique(values, return_counts=True)[1] / len(draws)
+        np.testing.assert_allclose(shares, 1 / count, atol=0.04)
+    faults = [draw.faults for draw in draws]
+    for expected, there in (
+        (0.40, [not fault for fault in faults]),
+        (0.15, [fault == {"false_negative_rate": 1.0} for fault in faults]),
+        (0.20, ["camera_latency" in fault for fault in faults]),
+        (0.25, ["false_negative_burst" in fault for fault in faults]),
+    ):
+        assert np.mean(there) == pytest.approx(expected, abs=0.03)
+
+
+def test_an_episode_is_that_of_the_environment_which_was_drawn():
+    """World, budget, faults and floor, to the last bit."""
+    env = plain(CONFIG)
+    met = set()
+    for seed in range(TRAINING, TRAINING + 6):
+        draw = drawn(seed, 2, BUDGETS)
+        name = CONFIG.env[draw.place]
+        own = make_env(name, budget=draw.budget, **CONFIG.arguments(name), **draw.faults)
+        np.testing.assert_equal(env.reset(seed=seed)[0], own.reset(seed=seed)[0])
+        for n in range(3):
+            action = np.random.default_rng(n).random(own.action_space.shape, np.float32)
+            np.testing.assert_equal(env.step(action)[0], own.step(action)[0])
+        assert env.rig == own.unwrapped.rig
+        met.add(name)
+        own.close()
+    env.close()
+    assert met == set(CONFIG.env)
+
+
+def test_one_seed_one_episode_and_training_seeds_alone():
+    with training(CONFIG) as env:
+        seeds = [env.reset(seed=0 if n == 0 else None)[1]["seed"] for n in range(10)]
+        again = [env.reset(seed=0 if n == 0 else None)[1]["seed"] for n in range(10)]
+    assert seeds == again
+    assert min(seeds) >= TRAINING
+    assert min(validation_episodes(CONFIG)) >= VALIDATION
+    assert set(validation_episodes(CONFIG).values()) == set(CONFIG.env)
+
+
+def test_without_a_seed_every_reset_draws_another_episode():
+    with plain(CONFIG) as env:
+        env.reset(seed=5)
+        first, second = (env.reset()[1]["seed"] for _ in range(2))
+        env.reset(seed=5)
+        assert env.reset()[1]["seed"] == first != second
+
+
+def test_an_environment_named_twice_is_drawn_twice_as_often():
+    config = PpoConfig(drawn=True, env=("CARE-Dense-v0", *("CARE-CutIn-v0",) * 2), episodes=600)
+    names = [*validation_episodes(config).values()]
+    assert names.count("CARE-CutIn-v0") / len(names) == pytest.approx(2 / 3, abs=0.05)
+
+
+def pictured(**arguments):
+    return GridObservation(SectorReserve(make_env("CARE-Dense-v0", **arguments)))
+
+
+def test_a_mirrored_picture_is_that_of_the_mirrored_world():
+    """The scenario reflects its world itself; what the camera shows of it is reflected alike."""
+    world, picture = pictured(mirrored="always"), Mirrored(pictured(), (6, 8, 64))
+    told = (("residual", 1, False), ("explained", 2, True))
+    seen = [env.reset(seed=3)[0] for env in (world, picture)]
+    for _ in range(12):
+        # Hulls and wedges; what fires at random beside them is not reflected.
+        scores = np.zeros((4, 32), np.float32)
+        seen = [env.step(scores)[0] for env in (world, picture)]
+    for name, channel, wanted in told:
+        one, other = (each["grid"].reshape(6, 8, 64)[channel] for each in seen)
+        # Pixels are not quite symmetric about the middle of a picture.
+        np.testing.assert_allclose(one, other, atol=0.25, err_msg=name)
+        assert not wanted or one.any()
+        assert not np.array_equal(one, one[:, ::-1]) or not wanted
+    np.testing.assert_allclose(seen[0]["ego"], seen[1]["ego"], atol=1e-6)
+    world.close()
+    picture.close()
+
+
+def test_a_sector_scored_in_a_mirrored_episode_fires_on_the_other_side():
+    env = Mirrored(pictured(budget=0.01, reserve_fraction=1.0), (6, 8, 64))
+    env.reset(seed=0)
+    scores = np.zeros((4, 32), np.float32)
+    scores[1, 3] = 1.0
+    fired = env.step(scores)[-1]["fired"]
+    own = pictured(budget=0.01, reserve_fraction=1.0)
+    own.reset(seed=0)
+    scores[1, 3], scores[1, 28] = 0.0, 1.0
+    np.testing.assert_array_equal(fired, own.step(scores)[-1]["fired"])
+    env.close()
+    own.close()
+
+
+@pytest.mark.parametrize(
+    "setup",
+    [
+        SensorSetup("turned", AngularGrid(heading=0.3)),
+        SensorSetup("tilted", AngularGrid(roll=0.1)),
+        SensorSetup("aside", position=(0.0, 0.5, 1.84)),
+    ],
+)
+def test_sides_of_a_sensor_that_are_not_alike_are_not_exchanged(setup):
+    with (
+        pictured(sensor=setup) as env,
+        pytest.raises(InvalidInput, match="sides can be drawn only of a LiDAR that stands in the"),
+    ):
+        Mirrored(env, (6, 8, 64))
+
+
+def test_the_running_episode_is_what_an_environment_shows():
+    env = wrapped(CONFIG)
+    for seed in range(TRAINING, TRAINING + 8):
+        seen, _ = env.reset(seed=seed)
+        draw = drawn(seed, 2, BUDGETS)
+        assert seen in env.observation_space
+        assert env.unwrapped.rig.budget == round(draw.budget * 16_384)
+        assert isinstance(env._env, Mirrored) == draw.mirrored
+        assert sensing(env).conditions.false_negative_rate == draw.faults.get(
+            "false_negative_rate", 0
+        )
+    env.close()
+
+
+@pytest.mark.parametrize(
+    ("kind", "options", "message"),
+    [
+        (PpoConfig, {"env": ("CARE-Dense-v0", "CARE-CutIn-v0")}, "2 environments need --drawn"),
+        (PpoConfig, {"env": ()}, r"env needs one name or more, got \(\)"),
+        (PpoConfig, {"drawn": True, "gain": 3.0}, "gain weighs a term of another reward"),
+        (PpoConfig, {"without": ("faults",)}, "without faults needs --drawn"),
+        (PpoConfig, {"without": ("wheels",)}, "unknown part to be without 'wheels'"),
+        (SacConfig, {"without": ("place",)}, "without place needs ppo: sac sees all sectors"),
+        (RecurrentPpoConfig, {"without": ("place",)}, "without place needs ppo"),
+        (
+            PpoConfig,
+            {"env_parameters": ("CARE-Moon-v0.gravity=1",)},
+            "unknown environment of env_parameter CARE-Moon-v0.gravity",
+        ),
+        (PpoConfig, {"env_parameters": ("CARE-Dense-v0.budget=1",)}, "budget is no env_parameter"),
+    ],
+)
+def test_what_does_not_fit_is_refused_at_once(kind, options, message):
+    with pytest.raises(InvalidInput, match=message):
+        kind(**options)
+
+
+def test_what_is_wrong_with_any_of_the_environments_is_told_before_the_first_episode():
+    for wrong in ({"env": ("CARE-Dense-v0", "CARE-Moon-v0")}, {"budget": (0.03, 2.0)}):
+        config = PpoConfig(**{"drawn": True, "env": ("CARE-Dense-v0",)} | wrong)
+        with pytest.raises(InvalidInput, match=r"Moon|budget"):
+            wrapped(config)
+
+
+def test_a_lone_environment_is_written_as_it_was_before_there_could_be_several():
+    assert PpoConfig(env="CARE-CutIn-v0").recipe["env"] == "CARE-CutIn-v0"
+    assert PpoConfig(env="CARE-CutIn-v0") == PpoConfig(env=("CARE-CutIn-v0",))
+    before = PpoConfig().recipe
+    del before["drawn"], before["without"]
+    PpoConfig().check_same(before)
+    with pytest.raises(InvalidInput, match="trained with drawn False, asked is True"):
+        PpoConfig(drawn=True).check_same(before)
