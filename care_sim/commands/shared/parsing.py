@@ -210,7 +210,7 @@ def chosen_command(
         raise unknown("command", named, commands)
     complaint = io.StringIO()
     # Sixty conditions, each of several lines, would hide the few options that a command is about.
-    brief = not {*_HELPS}.isdisjoint(arguments)
+    brief = _HELP_ALL not in arguments and not {*_HELPS}.isdisjoint(arguments)
     arguments = [_HELPS[1] if one == _HELP_ALL else one for one in arguments]
     try:
         with contextlib.redirect_stderr(complaint):
