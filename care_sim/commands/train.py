@@ -9,6 +9,7 @@ from typing import Annotated, Any, ClassVar
 import tyro
 
 from care_sim.base.errors import InvalidInput
+from care_sim.commands.shared.end_of_training import end_of_training
 from care_sim.reports.figures.files import check_figure, save
 from care_sim.training.config import AgentConfig, PpoConfig, RecurrentPpoConfig, SacConfig
 from care_sim.training.curves import grouped_runs, read_run
@@ -48,7 +49,9 @@ class Learner(AgentConfig):
         config = self.kind(**{one.name: getattr(self, one.name) for one in fields(self.kind)})
         table = read_hyperparameters(self.kind, self.env, self.hyperparameters)
         print(*table.told(config), sep="\n", flush=True)
-        return train_agent(config)
+        train_agent(config)
+        print(*end_of_training(config), sep="\n")
+        return 0
 
 
 @dataclass(frozen=True, kw_only=True)

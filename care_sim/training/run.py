@@ -110,7 +110,6 @@ def _learn(config: AgentConfig, folder: Folder, model: "BaseAlgorithm", env: Any
         _say(
             f"{rate:.0f} environment steps per second inside {config.algorithm}, learning included"
         )
-    _say(f"kept in {folder.path}")
 
 
 def _learn_steps(
