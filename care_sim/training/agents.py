@@ -136,14 +136,6 @@ def shipped_agents() -> list[ShippedAgent]:
     ]
 
 
-def agents_table() -> str:
-    """The agents that come with the package as a table of Markdown."""
-    rows = [agent.columns for agent in shipped_agents()]
-    head = [*rows[0]]
-    lines = [head, ["---"] * len(head), *([*row.values()] for row in rows)]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
-
-
 def _budget(card: Card) -> str:
     return "any" if card.budget is None else f"{card.budget / card.grid.size:.4g}"
 
