@@ -10,6 +10,8 @@ from care_sim.base.foreign_code import foreign_place, is_raised_by_foreign
 
 _QUOTED = 120
 """Characters of a value that a message quotes."""
+_MOST_NAMES = 80
+"""Known names that a message lists; of more it tells the first, the last and how many."""
 _LISTINGS = {
     "command": "care-sim",
     "policy": "care-sim policies",
@@ -46,12 +48,18 @@ def unknown(kind: str, name: object, known: Iterable[str]) -> InvalidInput:
     """
     names = sorted(known)
     told = [f"unknown {kind} {shown(name if isinstance(name, str) else shown(name))}"]
-    told.append(f"known: {', '.join(names) or 'none'}")
+    told.append(f"known: {_listed(names)}")
     if isinstance(name, str) and (nearest := get_close_matches(name, names, 1)):
         told.append(f"the nearest is {nearest[0]}")
     if kind in _LISTINGS:
         told.append(f"`{_LISTINGS[kind]}` tells what each is")
     return InvalidInput("; ".join(told))
+
+
+def _listed(names: Sequence[str]) -> str:
+    if len(names) > _MOST_NAMES:
+        return f"{names[0]} to {names[-1]}, {len(names)} in all"
+    return ", ".join(names) or "none"
 
 
 def report_problems(problems: Sequence[str]) -> None:

@@ -28,6 +28,9 @@ GROUPS = {
         "compare": CommandEntry(
             "compare", "Compare", "Play one seed under several policies, side by side."
         ),
+        "enjoy": CommandEntry(
+            "enjoy", "Enjoy", "Play a trained agent: timeline, clip, recording or viewer."
+        ),
         "view": CommandEntry("view", "View", "Open a recording in the Rerun viewer."),
     },
     "Report a result": {
@@ -108,6 +111,7 @@ GROUPS = {
         "policies": CommandEntry(
             "listings", "Policies", "List the policies: tags, parameters, sources."
         ),
+        "agents": CommandEntry("listings", "Agents", "List the trained agents of the package."),
         "scenarios": CommandEntry(
             "listings", "Scenarios", "List the scenarios and their parameters."
         ),

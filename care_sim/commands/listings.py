@@ -1,4 +1,6 @@
-"""`care-sim policies`, `detectors`, `sensors`, `scenarios` and `sources`: what can be named."""
+"""`care-sim policies`, `agents`, `detectors`, `sensors`, `scenarios` and `sources`: what can be
+named.
+"""
 
 import inspect
 import shutil
@@ -23,6 +25,7 @@ from care_sim.sensors.setups import setup_lines
 from care_sim.sources.installed import SOURCES
 from care_sim.sources.recordings import Recordings
 from care_sim.streets.encounters import COMERS
+from care_sim.training.agents import shipped_agents
 
 
 @dataclass(frozen=True)
@@ -32,6 +35,18 @@ class Policies:
     def __call__(self) -> int:
         """Run it."""
         print(*policy_paragraphs(), sep="\n")
+        return 0
+
+
+@dataclass(frozen=True)
+class Agents:
+    """List the trained agents of the package."""
+
+    def __call__(self) -> int:
+        """Run it."""
+        for agent in shipped_agents():
+            policy, *told = agent.columns.items()
+            print(policy[1], *(f"    {name}: {value}" for name, value in told if value), sep="\n")
         return 0
 
 

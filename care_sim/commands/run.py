@@ -24,18 +24,9 @@ from care_sim.study.scene_trace import trace_scene
 
 
 @dataclass(frozen=True, kw_only=True)
-class Run(SceneOptions):
-    """Play one episode and print its timeline and outcome."""
+class Watched(SceneOptions):
+    """Of one episode or scene: its seed, what is kept of it, and the conditions."""
 
-    scenario: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCENARIO")]
-    """dartout, dense, cutin, ncap, r157, drive, that of an installed package, or MODULE:CLASS;
-    `care-sim scenarios` lists their parameters. For the open loop street, argoverse2:FOLDER,
-    nuscenes:FOLDER, or another of `care-sim sources`.
-    """
-    policy: str = "care"
-    """`care-sim policies` lists them. `full` always runs with budget 1.0."""
-    budget: float = 0.1
-    """Share of the cells that may fire at a keyframe, above 0 and at most 1."""
     seed: int = 0
     """Seed of scenario, camera faults, noise and floor."""
     picture: Path | None = None
@@ -51,6 +42,21 @@ class Run(SceneOptions):
     'open3d')."""
     conditions: Annotated[Options, tyro.conf.arg(name="")] = DEFAULT_OPTIONS
     """Further conditions."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run(Watched):
+    """Play one episode and print its timeline and outcome."""
+
+    scenario: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCENARIO")]
+    """dartout, dense, cutin, ncap, r157, drive, that of an installed package, or MODULE:CLASS;
+    `care-sim scenarios` lists their parameters. For the open loop street, argoverse2:FOLDER,
+    nuscenes:FOLDER, or another of `care-sim sources`.
+    """
+    policy: str = "care"
+    """`care-sim policies` lists them. `full` always runs with budget 1.0."""
+    budget: float = 0.1
+    """Share of the cells that may fire at a keyframe, above 0 and at most 1."""
 
     def __call__(self) -> int:
         """Run it."""

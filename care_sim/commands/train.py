@@ -1,50 +1,80 @@
 """`care-sim train`: the learners, each a command of its own, and the figure of learning curves."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from argparse import ArgumentError, ArgumentParser
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import tyro
 
 from care_sim.base.errors import InvalidInput
+from care_sim.commands.shared.end_of_training import end_of_training
 from care_sim.commands.shared.study_command import console
 from care_sim.reports.figures.files import check_figure, save
-from care_sim.training.config import PpoConfig, RecurrentPpoConfig, SacConfig
+from care_sim.training.config import AgentConfig, PpoConfig, RecurrentPpoConfig, SacConfig
 from care_sim.training.curves import grouped_runs, read_run
 from care_sim.training.curves_figure import curves_figure
 from care_sim.training.curves_table import curves_table
 from care_sim.training.detector import TrainDetector
+from care_sim.training.hyperparameters import read_hyperparameters
 from care_sim.training.place_map import TrainPlace
 from care_sim.training.run import train_agent
 from care_sim.training.scorer import TrainScorer
 
 
 @dataclass(frozen=True, kw_only=True)
-class TrainPpo(PpoConfig):
+class Learner(AgentConfig):
+    """What the commands of learners take beside the configuration."""
+
+    kind: ClassVar[type[AgentConfig]]
+
+    hyperparameters: Path | None = None
+    """TOML file of hyperparameters by environment, in the place of the one that comes with the
+    package. Options win over both."""
+
+    @classmethod
+    def own_defaults(cls, arguments: Sequence[str]) -> Mapping[str, Any]:
+        """Those of the environment that the arguments name."""
+        asked = ArgumentParser(add_help=False, allow_abbrev=False, exit_on_error=False)
+        asked.add_argument("--env", nargs="+", default=cls.env)
+        asked.add_argument("--hyperparameters", type=Path)
+        try:
+            told, _ = asked.parse_known_args([*arguments])
+        except ArgumentError:
+            # An option without its value, which is told where all of them are read.
+            return {}
+        return read_hyperparameters(cls.kind, told.env, told.hyperparameters).values
+
+    def __call__(self) -> int:
+        """Train it."""
+        config = self.kind(**{one.name: getattr(self, one.name) for one in fields(self.kind)})
+        table = read_hyperparameters(self.kind, self.env, self.hyperparameters)
+        print(*table.told(config), sep="\n", flush=True)
+        train_agent(config)
+        print(*end_of_training(config), sep="\n")
+        return 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainPpo(PpoConfig, Learner):
     """Train an allocator by proximal policy optimisation; its weights become the policy `ppo`."""
 
-    def __call__(self) -> int:
-        """Train it."""
-        return train_agent(self)
+    kind = PpoConfig
 
 
 @dataclass(frozen=True, kw_only=True)
-class TrainSac(SacConfig):
+class TrainSac(SacConfig, Learner):
     """Train an allocator by soft actor-critic."""
 
-    def __call__(self) -> int:
-        """Train it."""
-        return train_agent(self)
+    kind = SacConfig
 
 
 @dataclass(frozen=True, kw_only=True)
-class TrainRecurrentPpo(RecurrentPpoConfig):
+class TrainRecurrentPpo(RecurrentPpoConfig, Learner):
     """Train an allocator with a memory (an LSTM) by proximal policy optimisation."""
 
-    def __call__(self) -> int:
-        """Train it."""
-        return train_agent(self)
+    kind = RecurrentPpoConfig
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,8 @@ def found_objects(annotations: Annotations, detections: Detections) -> Mask:
     """(n,) whether each annotated object has a detection of its class within 2 m, in the plane
     (`served_by`).
     """
-    return served_by(annotations, detections) != UNSERVED
+    found: Mask = served_by(annotations, detections) != UNSERVED
+    return found
 
 
 def served_by(annotations: Annotations, detections: Detections) -> Integers:

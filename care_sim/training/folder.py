@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm
 
 CONFIG, RULES, CURVE = "config.json", "rules.json", "curve.csv"
+CHECKPOINT, WEIGHTS = "checkpoint.zip", "weights.npz"
 CURVE_COLUMNS = ("steps", "seconds", "return", "distance_m")
 _CODE = "scenario_code"
 """Of the configuration of a run on a scenario of one's own: the hash of its code."""
@@ -68,8 +69,8 @@ class Folder:
     def __init__(self, config: AgentConfig):
         self.config = config
         self.path = config.out
-        self.checkpoint = self.path / "checkpoint.zip"
-        self.weights = self.path / "weights.npz"
+        self.checkpoint = self.path / CHECKPOINT
+        self.weights = self.path / WEIGHTS
         if config.resume:
             self._check_resumable()
         elif (self.path / CONFIG).exists():

@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any
 from care_sim.base.errors import InvalidInput, MissingExtra
 from care_sim.base.extras import import_torch
 from care_sim.envs.sensing import sensing
-from care_sim.study.progress import ProgressLines, Show, progress_bar, rounded_duration
+from care_sim.study.progress import ProgressLines, Show, progress_bar
 from care_sim.training import algorithms
 from care_sim.training.config import AgentConfig
 from care_sim.training.environments import plain, side_by_side, validation_episodes, wrapped
 from care_sim.training.episodes import Played
 from care_sim.training.folder import Folder
+from care_sim.training.pace import Pace
 from care_sim.training.validation import acting, play, rule
 
 if TYPE_CHECKING:
@@ -93,7 +94,7 @@ def _learn(config: AgentConfig, folder: Folder, model: "BaseAlgorithm", env: Any
         if sys.stderr.isatty()
         else nullcontext(ProgressLines(config.steps, "steps")) as show
     ):
-        shown = _progress(show, config, clock, begun)
+        shown = _progress(show, config, clock)
         while True:
             # A resumed run may have been interrupted between learning and evaluation.
             if not folder.evaluated(model):
@@ -109,16 +110,18 @@ def _learn(config: AgentConfig, folder: Folder, model: "BaseAlgorithm", env: Any
         _say(
             f"{rate:.0f} environment steps per second inside {config.algorithm}, learning included"
         )
-    _say(f"kept in {folder.path}")
 
 
 def _learn_steps(
-    model: "BaseAlgorithm", steps: int, shown: Callable[[int], None], folder: Folder
+    model: "BaseAlgorithm",
+    steps: int,
+    shown: Callable[["BaseAlgorithm"], None],
+    folder: Folder,
 ) -> None:
     from stable_baselines3.common.callbacks import ConvertCallback
 
     def each(local: dict[str, Any], _: dict[str, Any]) -> bool:
-        shown(local["self"].num_timesteps)
+        shown(local["self"])
         return True
 
     # An interrupt ends `learn` anywhere; what was learned until then is kept.
@@ -129,12 +132,13 @@ def _learn_steps(
 
 
 def _progress(
-    show: Show, config: AgentConfig, clock: "Stopwatch", begun: int
-) -> Callable[[int], None]:
-    def shown(steps: int) -> None:
-        rate = (steps - begun) / max(clock.own_seconds, 1e-9)
-        left = max(config.steps - steps, 0) / rate if rate else 0.0
-        show(min(steps, config.steps), f"{rate:.0f} steps/s, {rounded_duration(left)} left")
+    show: Show, config: AgentConfig, clock: "Stopwatch"
+) -> Callable[["BaseAlgorithm"], None]:
+    pace = Pace(config.steps)
+
+    def shown(model: "BaseAlgorithm") -> None:
+        steps, updates = model.num_timesteps, model._n_updates
+        show(min(steps, config.steps), pace.told(steps, updates, clock.own_seconds))
 
     return shown
 

@@ -459,6 +459,9 @@ for command in {["", "run", "sweep", "reproduce", "ablate", "faults", "crowding"
 def test_help_names_the_conditions_and_help_all_explains_them(command, capsys):
     code, short, _ = run(capsys, command, "--help")
     all_code, whole, _ = run(capsys, command, "--help-all")
+    # Who asks for both wants all of it.
+    for both in (("--help", "--help-all"), ("--help-all", "-h")):
+        assert run(capsys, command, *both) == (0, whole, "")
     assert (code, all_code) == (0, 0)
     options = {one for one in option_helps(COMMANDS[command].loaded()) if "--no-" not in one}
     # Told by its place, not as an option.

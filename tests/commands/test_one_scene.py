@@ -55,6 +55,18 @@ def test_the_seed_is_that_of_the_street_and_a_scene_has_a_name(played):
             assert out.startswith(name)
 
 
+def test_a_scene_and_another_seed_are_told_to_be_one_too_many(played):
+    with few_and_short(4):
+        line = ("run", "street", "--policy", "random", "--scene", "street-0001-bend")
+        plain, named, other = (played(*line, *more) for more in ((), ("--seed", 1), ("--seed", 2)))
+    assert plain[2] == named[2] == ""
+    assert other[2] == "street-0001-bend is that of --scene, --seed 2 changes nothing\n"
+    # The line tells how long it took.
+    hashes = {re.search(r"^episode_hash +(\S+)$", out, re.MULTILINE)[1] for _, out, _ in
+              (plain, named, other)}  # fmt: skip
+    assert len(hashes) == 1
+
+
 def test_the_seed_draws_the_floor_of_a_log_that_is_named_too(played, drive):
     log = source_of(f"argoverse2:{drive}").scenes()[0].name
     line = ("run", f"argoverse2:{drive}", "--policy", "random", "--budget", "0.02")
@@ -87,6 +99,7 @@ def test_a_source_of_a_single_street_has_no_other_seed(tmp_path, monkeypatch):
     [
         ("run street --seed 400", "seed must be of a scene of streets, 0 to 149, got 400"),
         ("run street --scene nowhere", "unknown scene 'nowhere'; known: street-0000"),
+        ("run street --scene 3", "0149-bend, 150 in all; --seed 3 plays that of the seed"),
         ("run street --driver careful-human", "--driver has no meaning in the open loop"),
         ("run street --scenario-parameters x=1", "--scenario-parameters has no meaning in the"),
         ("run street --export x", "--export has no meaning in the open loop"),

@@ -176,6 +176,14 @@ def test_every_environment_has_a_page():
         assert f"::: {entry_point.replace(':', '.')}\n" in text
 
 
+def test_the_table_of_agents_says_what_their_cards_say():
+    agents_table = loaded(ROOT / "docs" / "agents_table.py")
+    # A table that is not as the cards: python docs/agents_table.py
+    page = (ROOT / "docs" / "learning.md").read_text()
+    assert agents_table.written(page) == page
+    assert agents_table.written(page.replace("122,880", "1")) == page
+
+
 @pytest.mark.parametrize("page", sorted((ROOT / "docs" / "environments").glob("*.md")), ids=name_of)
 def test_a_page_of_environments_is_read_in_a_clone_and_says_what_docstrings_say(page):
     environment_pages = loaded(ROOT / "docs" / "environment_pages.py")

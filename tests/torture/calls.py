@@ -422,11 +422,12 @@ def wrapper(case):
     case.tell(name)
     env = good_env() if case.rng.random() < 0.9 else some(case)
     arguments = {
-        "GridObservation": ("columns", "rows"),
+        "GridObservation": ("columns", "rows", "pictures"),
         "RecordRerun": ("path", "policy", "name"),
         "ExportScans": ("path", "policy"),
     }.get(name, ("azimuths", "elevations"))
     numbers = {one: (lambda: case.rng.choice((1, 2, 4, 8, 16, 32, 64))) for one in arguments}
+    numbers |= {"pictures": lambda: case.rng.random() < 0.5} if "pictures" in arguments else {}
     numbers |= {"path": lambda: "x/y", "policy": None, "name": None} if "path" in arguments else {}
     made = getattr(wrappers, name)(env, **draw(case, numbers))
     if "path" in arguments:

@@ -2,6 +2,8 @@
 
 import csv
 import json
+import re
+import shlex
 import sys
 
 import numpy as np
@@ -10,7 +12,7 @@ import pytest
 import care_sim
 from care_sim.base.errors import InvalidInput, MissingExtra
 from care_sim.base.seed_ranges import TRAINING, VALIDATION
-from care_sim.cli import main
+from care_sim.cli import main, parsed_command
 from care_sim.policies.learned.weights import load_weights
 from care_sim.policies.learned.wrapping import Wrapping
 from care_sim.scenarios import PLUGINS
@@ -32,6 +34,11 @@ def care(capsys, *arguments):
     with pytest.raises(SystemExit) as end:
         main([str(argument) for argument in arguments])
     return end.value.code, *capsys.readouterr()
+
+
+def hash_of(played):
+    """Of the episode whose timeline was printed."""
+    return re.search(r"^episode_hash +(\S+)$", played, re.MULTILINE)[1]
 
 
 @pytest.fixture
@@ -83,10 +90,38 @@ def test_it_trains_keeps_and_goes_on(capsys, tmp_path):
     command = ["train", "ppo", *TINY, "--out", out, "--evaluate-every", "64"]
     code, said, _ = care(capsys, *command, "--steps", "128")
     assert code == 0
-    assert [line.partition(":")[0] for line in said.splitlines()[:-2]] == [
+    first, *lines = said.splitlines()
+    assert first.startswith("hyperparameters of ")
+    assert lines[0] == (
+        "but, by options: steps 128, environments 2, rollout 32, batch 32, epochs 1, hidden 4"
+    )
+    assert [line.partition(":")[0] for line in lines[1:8]] == [
         "random", "history", "care", "full", "0 steps", "64 steps", "128 steps",
     ]  # fmt: skip
-    assert "environment steps per second inside ppo" in said.splitlines()[-2]
+    assert "environment steps per second inside ppo" in lines[8]
+    steps, value = re.match(
+        r"best after (\d+) steps: return (\S+) on 2 validation episodes; random .*, full ", lines[9]
+    ).groups()
+    curve = {
+        row["steps"]: float(row["return"]) for row in csv.DictReader((out / "curve.csv").open())
+    }
+    assert max(curve, key=curve.get) == steps
+    assert float(value) == pytest.approx(curve[steps], abs=0.005)
+    assert lines[10] == f"kept: the weights of that step, {out / 'weights.npz'}"
+    assert load_weights(out / "weights.npz").card.steps == int(steps)
+    play, beside = (line.partition(": ")[2] for line in lines[11:])
+    assert play == f"care-sim enjoy {out}"
+    # It goes as it is told, and learns of the parameters of the training.
+    assert beside == (
+        "care-sim sweep --scenarios dense --policies care ppo --budgets 0.03 "
+        f"--scenario-parameters duration_s=1.0 --policy-parameters ppo.path={out / 'weights.npz'}"
+    )
+    assert parsed_command(shlex.split(beside)[1:]).budgets == (0.03,)
+    code, played, complaint = care(capsys, *shlex.split(play)[1:], "--seed", "5")
+    line = f"run dense --policy ppo --budget 0.03 --policy-parameters path={out / 'weights.npz'}"
+    again = care(capsys, *line.split(), "--scenario-parameters", "duration_s=1.0", "--seed", 5)[1]
+    assert (code, complaint) == (0, "")
+    assert [*map(hash_of, (played, again))] == [hash_of(played)] * 2
     settings = json.loads((out / "config.json").read_text())
     assert (settings["algorithm"], settings["budget"], settings["hidden"]) == ("ppo", [0.03], 4)
 

@@ -2,7 +2,8 @@
 scenario.
 """
 
-from collections.abc import Sequence
+import sys
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -52,20 +53,35 @@ class SceneOptions:
         none.
         """
         scenes = {each.name: each for each in source.scenes()}
-        if self.scene is not None:
-            check_known("scene", self.scene, [*scenes])
+        self._check_scene(scenes)
         chosen = next(iter(scenes.values())) if self.scene is None else scenes[self.scene]
         # Of a recording the seed draws the faults and the floor alone; a street is its seed.
         kind: Any = SOURCES.maker(source.kind)
         if issubclass(kind, Recordings):
             return chosen._replace(seed=seed)
         if self.scene is not None:
+            # Of the seed that nobody gave there is nothing to say.
+            if seed not in (0, chosen.seed):
+                told = f"{chosen.name} is that of --scene, --seed {seed} changes nothing"
+                print(told, file=sys.stderr)
             return chosen
         seeds = {each.seed: each for each in scenes.values()}
         if seed in seeds:
             return seeds[seed]
         told = f"{min(seeds)} to {max(seeds)}, got {seed}"
         raise InvalidInput(f"seed must be of a scene of {source.kind}, {told}")
+
+    def _check_scene(self, scenes: Mapping[str, Scene]) -> None:
+        if self.scene is None:
+            return
+        try:
+            check_known("scene", self.scene, scenes)
+        except InvalidInput as error:
+            # A number is meant for a seed, where scenes have each their own.
+            seeds = {str(each.seed) for each in scenes.values()}
+            is_seed = len(seeds) == len(scenes) and self.scene in seeds
+            hint = f"; --seed {self.scene} plays that of the seed" if is_seed else ""
+            raise InvalidInput(f"{error}{hint}") from None
 
 
 def is_source(text: str) -> bool:

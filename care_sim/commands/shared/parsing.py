@@ -24,6 +24,7 @@ from tyro.constructors import (
 )
 
 from care_sim.base.errors import InvalidInput, shown, unknown
+from care_sim.commands.shared.own_defaults import settled_command
 
 UNRECOGNIZED = "Unrecognized options"
 """How a complaint begins that is of options which a command lacks."""
@@ -206,11 +207,14 @@ def chosen_command(
     if not arguments:
         raise InvalidInput(f"no command is given; those of {prog}: {', '.join(commands)}")
     named = arguments[0]
-    if not named.startswith("-") and named.replace("_", "-") not in commands:
+    known = named.replace("_", "-")
+    if not named.startswith("-") and known not in commands:
         raise unknown("command", named, commands)
+    if known in commands:
+        commands = {**commands, known: settled_command(commands[known], arguments[1:])}
     complaint = io.StringIO()
     # Sixty conditions, each of several lines, would hide the few options that a command is about.
-    brief = not {*_HELPS}.isdisjoint(arguments)
+    brief = _HELP_ALL not in arguments and not {*_HELPS}.isdisjoint(arguments)
     arguments = [_HELPS[1] if one == _HELP_ALL else one for one in arguments]
     try:
         with contextlib.redirect_stderr(complaint):

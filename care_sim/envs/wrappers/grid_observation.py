@@ -8,6 +8,7 @@ from gymnasium import spaces
 from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
+from care_sim.base.checks import check_flag
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.belief import OBSERVED, Observation
 from care_sim.envs.sensing import sensing, shows_belief
@@ -25,13 +26,13 @@ class GridObservation(
     The pictures are six channels over `columns` x `rows` blocks of the grid.
 
     ### Observation
-    A `Dict` of float32 vectors. `grid` is flat, since Stable-Baselines3 takes anything of three
-    dimensions for a picture of bytes: `grid.reshape(6, rows, columns)` gives the channels, row 0
-    highest, column 0 straight behind.
+    A `Dict` of float32 vectors. `grid` is flat, as networks without convolutions take it: with
+    `pictures` it has the shape (6, rows, columns), channels first, the same numbers in the same
+    order. Row 0 is highest, column 0 straight behind.
 
     | key | shape | bounds | content |
     |---|---|---|---|
-    | `grid` | (6 * rows * columns,) | 0 to 1 | the channels below, one after the other |
+    | `grid` | (6 * rows * columns,), or (6, rows, columns) | 0 to 1 | the channels below |
     | `ego` | (4,) | -1 to 1 | speed / 30 m/s, yaw rate / 1 rad/s, acceleration / 10 m/s^2, B / N |
 
     | channel | a block's value |
@@ -48,7 +49,8 @@ class GridObservation(
 
     ### Arguments
     `columns` (64) and `rows` (8) of blocks; each must divide the grid, 512 x 32: a block of 8 x 4
-    cells is 5.6 by 5.3 degrees, about the width of a person's wedge at 15 m.
+    cells is 5.6 by 5.3 degrees, about the width of a person's wedge at 15 m. `pictures` (False)
+    gives `grid` its three dimensions.
 
     It draws the observation that it is given and reads nothing else. A wrapper between it and the
     environment therefore counts: one that hides a detection hides it in the pictures. Such a
@@ -61,15 +63,22 @@ class GridObservation(
 
     ### Example
     ```python
-    env = GridObservation(SectorReserve(gymnasium.make("CARE-Dense-v0", budget=0.03)))
+    env = SectorReserve(gymnasium.make("CARE-Dense-v0", budget=0.03))
+    env = GridObservation(env, pictures=True)
     observation, info = env.reset(seed=0)
-    pictures = observation["grid"].reshape(env.features.shape)  # (6, 8, 64)
-    forecasts = pictures[0]  # row 0 highest, column 0 straight behind
+    forecasts = observation["grid"][0]  # (8, 64), row 0 highest, column 0 straight behind
     observation["ego"]  # (4,) the car's own motion and the budget
     ```
     """
 
-    def __init__(self, env: gymnasium.Env[Any, Any], columns: int = 64, rows: int = 8):
+    def __init__(
+        self,
+        env: gymnasium.Env[Any, Any],
+        columns: int = 64,
+        rows: int = 8,
+        pictures: bool = False,
+    ):
+        check_flag("pictures", pictures)
         rig = sensing(env).rig
         if not shows_belief(env):
             raise InvalidInput(
@@ -79,22 +88,33 @@ class GridObservation(
         self.features = GridFeatures(rig, columns, rows)
         # Nothing stands between it and a wrapper that it is put around at once.
         self.reading = Reading(rig, read_one, reading_of(env))
-        RecordConstructorArgs.__init__(self, columns=columns, rows=rows)
+        RecordConstructorArgs.__init__(self, columns=columns, rows=rows, pictures=pictures)
         gymnasium.ObservationWrapper.__init__(self, env)
-        self.observation_space = pictures_space(self.features)
+        self._shape = grid_shape(self.features, pictures)
+        self.observation_space = grid_space(self._shape)
 
     def observation(self, observation: Observation) -> GridArrays:
         """The pictures of the observation that was given. Raises InvalidInput for another form."""
         self.reading.take(observation)
-        return {name: rows[0] for name, rows in self.features.of_all(self.reading.beliefs).items()}
+        told = shaped(self.features.of_all(self.reading.beliefs), self._shape)
+        return {name: rows[0] for name, rows in told.items()}
 
 
-def pictures_space(features: GridFeatures) -> spaces.Space[Any]:
-    """The space of the pictures and the motion that `features` tell."""
-    cells = int(np.prod(features.shape))
+def grid_shape(features: GridFeatures, pictures: bool) -> tuple[int, ...]:
+    """Of the pictures of a world: three dimensions, or all in one."""
+    return features.shape if pictures else (int(np.prod(features.shape)),)
+
+
+def shaped(told: GridArrays, shape: tuple[int, ...]) -> GridArrays:
+    """What is told of W worlds, with pictures (W, *shape)."""
+    return told | {"grid": told["grid"].reshape(-1, *shape)}
+
+
+def grid_space(shape: tuple[int, ...]) -> spaces.Space[Any]:
+    """The space of pictures of that shape and of the motion of a world."""
     return spaces.Dict(
         {
-            "grid": spaces.Box(0.0, 1.0, (cells,), np.float32),
+            "grid": spaces.Box(0.0, 1.0, shape, np.float32),
             "ego": spaces.Box(-1.0, 1.0, (len(EGO_INPUTS),), np.float32),
         }
     )

@@ -35,7 +35,10 @@ PAIRS = {
         lambda env: VectorGridObservation(VectorSectorScores(env, 16, 2), 32, 4),
     ),
     "actions alone": (SectorReserve, VectorSectorReserve),
-    "pictures alone": (GridObservation, VectorGridObservation),
+    "pictures alone": (
+        partial(GridObservation, pictures=True),
+        partial(VectorGridObservation, pictures=True),
+    ),
 }
 CONDITIONS = {
     "dense": ("CARE-Dense-v0", {"false_negative_rate": 0.2, "duration_s": 1.5}),

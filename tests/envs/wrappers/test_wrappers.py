@@ -122,6 +122,25 @@ def test_wrapping_leaves_the_environment_as_it_is(env):
     assert fired(env, [care] * 5) == before
 
 
+def test_pictures_are_the_flat_numbers_with_the_channels_first(env):
+    flat, pictures = (GridObservation(env, 32, 4, pictures=drawn) for drawn in (False, True))
+    care = care_sim.make_policy("care", env)
+    observation, _ = env.reset(seed=4)
+    for _ in range(3):
+        observation, *_ = env.step(care(observation))
+        drawn, told = pictures.observation(observation), flat.observation(observation)
+        assert drawn["grid"].shape == (6, 4, 32)
+        assert pictures.observation_space.contains(drawn)
+        assert drawn["grid"].any()
+        np.testing.assert_array_equal(drawn["grid"], told["grid"].reshape(6, 4, 32))
+        np.testing.assert_array_equal(drawn["ego"], told["ego"])
+    assert pictures.spec.additional_wrappers[-1].kwargs == {
+        "columns": 32, "rows": 4, "pictures": True,
+    }  # fmt: skip
+    with pytest.raises(InvalidInput, match="pictures must be True or False, got 1"):
+        GridObservation(env, pictures=1)
+
+
 class Hidden(gymnasium.ObservationWrapper):
     """Hides rows of a table from whatever stands around it."""
 

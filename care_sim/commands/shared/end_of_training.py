@@ -1,0 +1,29 @@
+"""What the end of a training tells: which step was kept, what it reached, and how it is played."""
+
+import shlex
+from collections.abc import Iterator
+
+from care_sim.commands.shared.agent_play import AgentPlay
+from care_sim.training.agents import Agent
+from care_sim.training.config import AgentConfig
+from care_sim.training.folder import CHECKPOINT, CURVE, RULES, WEIGHTS, read_curve, read_rules
+
+
+def end_of_training(config: AgentConfig) -> Iterator[str]:
+    """The lines that end the training of a configuration, from what its folder holds."""
+    out = config.out
+    # The earliest of equals, whose weights are those that were kept.
+    steps, _, best, _ = max(read_curve(out / CURVE), key=lambda row: row[2])
+    rules = read_rules(out / RULES).items()
+    beside = ", ".join(f"{name} {score['mean_return']:.2f}" for name, score in rules)
+    yield (
+        f"best after {steps} steps: return {best:.2f} on {config.episodes} validation episodes; "
+        f"{beside}"
+    )
+    # Only the network of `ppo` has a twin outside of PyTorch.
+    if not (out / WEIGHTS).exists():
+        yield f"kept: the learner of the last step, {out / CHECKPOINT}; --resume goes on with it"
+        return
+    yield f"kept: the weights of that step, {out / WEIGHTS}"
+    yield f"play it: {shlex.join(['care-sim', 'enjoy', str(out)])}"
+    yield f"beside care: {AgentPlay(Agent.of_run(config, out / WEIGHTS)).study_line()}"

@@ -1,0 +1,168 @@
+"""Agents that were trained: those that come with the package, and those in folders and files."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from care_sim.base.checks import check_path, is_number
+from care_sim.base.errors import InvalidInput, shown
+from care_sim.policies import BUILT_IN
+from care_sim.policies.learned.weights import Card, load_weights, shipped_weights
+from care_sim.study.parameters import Parameters, parameters
+from care_sim.training.config import AgentConfig
+from care_sim.training.folder import CONFIG, WEIGHTS, read_config
+
+_PACKAGE = Path(__file__).parents[1]
+_SECONDS = re.compile(r", (\d+) s$")
+"""Of learning, at the end of what a card says of the machine."""
+
+
+@dataclass(frozen=True)
+class Agent:
+    """A policy that was learned: its name, the file of its weights where they are not those that
+    the policy acts with by itself, where it learned, in the first of several environments, and with
+    which parameters of it.
+    """
+
+    policy: str
+    path: Path | None
+    env: str
+    budget: float
+    env_parameters: Parameters = ()
+
+    @classmethod
+    def of_run(cls, config: AgentConfig, weights: Path) -> "Agent":
+        """What a run has trained."""
+        env = config.env[0]
+        given = tuple(config.arguments(env).items())
+        return cls(config.algorithm, weights, env, config.budget[0], given)
+
+    @classmethod
+    def of_card(cls, policy: str, path: Path | None, card: Card) -> "Agent":
+        """What a card tells of. Raises InvalidInput for one that names no environment."""
+        if card.scenario is None:
+            raise InvalidInput(f"weights {path}: the card names no environment")
+        config = _config(card)
+        # A card of one budget tells its cells; of those that fit any, that of a user's own.
+        cells = card.budget / card.grid.size if card.budget is not None else _ANY_BUDGET
+        (budget, *_) = config.get("budget") or [cells]
+        # Of several environments the first; a parameter may be of one of them alone.
+        env = card.scenario.split()[0]
+        texts = [one for one in config.get("env_parameters", ()) if _is_text(one)]
+        given = tuple(
+            (name.rpartition(".")[2], value)
+            for name, value in parameters(texts)
+            if name.rpartition(".")[0] in ("", env)
+        )
+        return cls(policy, path, env, budget if is_number(budget) else cells, given)
+
+
+_ANY_BUDGET = 0.1
+"""What is played where nothing else is said, as by `care-sim run`."""
+
+
+def find_agent(named: str) -> Agent:
+    """The agent of that name, in that file, or in that folder of `care-sim train`.
+
+    Raises InvalidInput where there is none that acts outside of its training, and for a file that
+    is damaged.
+    """
+    for agent in shipped_agents():
+        if named in (agent.name, agent.policy):
+            return Agent.of_card(agent.policy, None, agent.card)
+    check_path("agent", named)
+    path = Path(named)
+    if path.is_dir():
+        path = _weights_in(path)
+    if not path.is_file():
+        known = ", ".join(sorted({agent.policy for agent in shipped_agents()}))
+        raise InvalidInput(
+            f"unknown agent {shown(named)}; known: {known}, or a folder or weights file of "
+            "`care-sim train`"
+        )
+    card = load_weights(path).card
+    return Agent.of_card(card.kind, path, card)
+
+
+def _weights_in(folder: Path) -> Path:
+    weights = folder / WEIGHTS
+    if weights.is_file():
+        return weights
+    if not (folder / CONFIG).is_file():
+        raise InvalidInput(f"{folder} holds no agent: no {WEIGHTS}")
+    algorithm = read_config(folder / CONFIG)["algorithm"]
+    raise InvalidInput(
+        f"{folder} holds no {WEIGHTS}: "
+        + (
+            "its training was not evaluated yet"
+            if algorithm == "ppo"
+            else f"an agent of {algorithm} acts from its checkpoint alone, of ppo from its weights"
+        )
+    )
+
+
+@dataclass(frozen=True)
+class ShippedAgent:
+    """An agent that comes with the package: `name` of its file, the policy that acts with it, and
+    its card.
+    """
+
+    name: str
+    policy: str
+    card: Card
+
+    @property
+    def columns(self) -> dict[str, str]:
+        """What its card says, as people read it; empty where it says nothing."""
+        card, config = self.card, _config(self.card)
+        seconds = _SECONDS.search(card.machine)
+        seed = card.seeds.get("learner", card.seeds.get("training"))
+        lies = shipped_weights(self.name).relative_to(_PACKAGE.parent)
+        return {
+            "policy": self.policy,
+            "environment": card.scenario or "",
+            "algorithm": str(config.get("algorithm", card.kind)),
+            "budgets": ", ".join(map(str, config.get("budget", ()))) or _budget(card),
+            "steps": f"{card.steps:,}" if card.steps else "",
+            "seed": "" if seed is None else str(seed),
+            "wall time": f"{round(int(seconds[1]) / 60)} min" if seconds else "",
+            "validation": _validation(card.result),
+            "file": str(lies),
+        }
+
+
+def shipped_agents() -> list[ShippedAgent]:
+    """Those that come with the package, by name."""
+    # Weights are called as the policy that acts with them, unless it says otherwise.
+    acting = {getattr(made, "weights", name): name for name, made in BUILT_IN.items()}
+    files = sorted(shipped_weights("").parent.glob("*.npz"))
+    return [
+        ShippedAgent(file.stem, acting[file.stem], load_weights(file).card)
+        for file in files
+        if file.stem in acting
+    ]
+
+
+def _budget(card: Card) -> str:
+    return "any" if card.budget is None else f"{card.budget / card.grid.size:.4g}"
+
+
+def _validation(result: Mapping[str, Any]) -> str:
+    """The figure that told the kept weights from others; empty where none did."""
+    scored = result.get("validation")
+    if isinstance(scored, dict):
+        return f"return {scored['mean_return']:.2f}, {scored['episodes']} episodes"
+    held_out = [f"{name} {loss:.3f}" for name, loss in result.items() if "held out" in name]
+    return ", ".join(held_out)
+
+
+def _config(card: Card) -> dict[str, Any]:
+    """The configuration of the run that a card tells of; empty where it tells none."""
+    config = card.result.get("config")
+    return config if isinstance(config, dict) else {}
+
+
+def _is_text(value: object) -> bool:
+    return isinstance(value, str)

@@ -1,0 +1,130 @@
+"""Hyperparameters in files: a TOML table for every environment, as RL Zoo has them.
+
+Those that come with the package lie in `recipes`, one file for each learner.
+"""
+
+import json
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from care_sim.base.checks import check_arguments, check_path, is_number
+from care_sim.base.errors import InvalidInput, shown
+from care_sim.base.scenario_names import scenario_of
+from care_sim.training.config import HOW_LONG, AgentConfig
+
+DEFAULT = "default"
+"""The table of every environment that has none of its own."""
+_NOT_OF_A_FILE = {*HOW_LONG, "env", "seed"} - {"steps"}
+"""Fields of a configuration that belong to one run and one machine."""
+
+
+@dataclass(frozen=True)
+class Hyperparameters:
+    """The values of a table, and where it stands: the file, and the table's name, None where the
+    file has no table for the environment.
+    """
+
+    values: Mapping[str, Any]
+    path: Path
+    table: str | None
+
+    def told(self, config: AgentConfig) -> list[str]:
+        """What counts, in a line, and in another what departs from the table."""
+        if self.table is None:
+            return [f"hyperparameters: {self.path.name} has none for {' '.join(config.env)}"]
+        effective = {name: getattr(config, name) for name in self.values}
+        departing = {name: value for name, value in effective.items() if value != self.values[name]}
+        lines = [f"hyperparameters of {self.path} [{self.table}]: {_listed(self.values)}"]
+        return lines + ([f"but, by options: {_listed(departing)}"] if departing else [])
+
+
+def shipped_file(algorithm: str) -> Path:
+    """The file that comes with the package."""
+    return Path(__file__).parent / "recipes" / f"{algorithm}.toml"
+
+
+def names_of(kind: type[AgentConfig]) -> list[str]:
+    """The hyperparameters that a file may hold for a learner."""
+    return [field.name for field in fields(kind) if field.name not in _NOT_OF_A_FILE]
+
+
+def read_hyperparameters(
+    kind: type[AgentConfig], envs: Sequence[str], path: Path | None = None
+) -> Hyperparameters:
+    """What the file at `path`, or else the one that comes with the package, says of a learner in an
+    environment, or in several, which the table DEFAULT is for.
+
+    Raises InvalidInput for a file that is missing, damaged or has another form, for a name that is
+    no hyperparameter, and for a value that the learner does not take.
+    """
+    path = shipped_file(kind.algorithm) if path is None else path
+    tables = _tables(path)
+    # An environment has one table, whether it is asked for by its id or as its scenario.
+    asked = {scenario_of(env) for env in envs}
+    ids = [name for name in tables if name != DEFAULT and asked == {scenario_of(name)}]
+    table = next(iter(ids), DEFAULT if DEFAULT in tables else None)
+    if table is None:
+        return Hyperparameters({}, path, None)
+    where = f"{path} [{table}]"
+    check_arguments(where, tables[table], names_of(kind))
+    values = {name: _settled(kind, where, name, value) for name, value in tables[table].items()}
+    try:
+        kind(**values)
+    except InvalidInput as error:
+        raise InvalidInput(f"{where}: {error}") from error
+    return Hyperparameters(values, path, table)
+
+
+def as_table(env: str, values: Mapping[str, Any]) -> str:
+    """A file of one environment's table, as `read_hyperparameters` takes it."""
+    lines = [f"{name} = {_toml(value)}" for name, value in values.items()]
+    return "\n".join([f"[{_toml(env)}]", *lines, ""])
+
+
+def _tables(path: Path) -> dict[str, dict[str, Any]]:
+    check_path("hyperparameters", path)
+    if not path.is_file():
+        raise InvalidInput(f"hyperparameters {path}: no such file")
+    try:
+        tables = tomllib.loads(path.read_text(encoding="utf-8"))
+    # Tables within tables without end are an error of recursion.
+    except (ValueError, RecursionError) as error:
+        raise InvalidInput(f"hyperparameters {path} is no TOML file: {error}") from error
+    for name, table in tables.items():
+        if not isinstance(table, dict):
+            raise InvalidInput(
+                f"hyperparameters {path}: {name} stands in no table; a file holds one for every "
+                f'environment, such as ["CARE-Dense-v0"] or [{DEFAULT}]'
+            )
+    return tables
+
+
+def _settled(kind: type[AgentConfig], where: str, name: str, value: Any) -> Any:
+    """A value as the field holds it. What is no list is checked by the configuration."""
+    default = next(field.default for field in fields(kind) if field.name == name)
+    if not isinstance(default, tuple):
+        return value
+    is_one = is_number if name == "budget" else lambda one: isinstance(one, str)
+    if not (isinstance(value, list) and all(map(is_one, value))):
+        wanted = "numbers" if name == "budget" else "texts NAME=VALUE"
+        raise InvalidInput(f"{where}: {name} must be a list of {wanted}, got {shown(value)}")
+    return tuple(value)
+
+
+def _listed(values: Mapping[str, Any]) -> str:
+    return ", ".join(f"{name} {_toml(value)}" for name, value in values.items())
+
+
+def _toml(value: Any) -> str:
+    """A value as TOML writes it."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(_toml, value))}]"
+    if isinstance(value, str):
+        # What TOML escapes in a basic string, JSON escapes alike.
+        return json.dumps(value, ensure_ascii=False)
+    return repr(value)

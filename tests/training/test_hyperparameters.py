@@ -1,0 +1,174 @@
+"""Hyperparameters in files: those of the environment are the defaults, and options win."""
+
+from dataclasses import fields
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from care_sim.base.errors import InvalidInput
+from care_sim.cli import parsed_command
+from care_sim.envs import IDS
+from care_sim.policies.learned.weights import load_weights, shipped_weights
+from care_sim.training.config import PpoConfig, RecurrentPpoConfig, SacConfig
+from care_sim.training.hyperparameters import (
+    DEFAULT,
+    as_table,
+    names_of,
+    read_hyperparameters,
+    shipped_file,
+)
+
+KINDS = (PpoConfig, SacConfig, RecurrentPpoConfig)
+OWN = """
+["CARE-CutIn-v0"]
+learning_rate = 3e-4
+epochs = 2
+budget = [0.05, 1]
+env_parameters = ["duration_s=2"]
+[default]
+noise = 1
+"""
+
+
+@pytest.fixture
+def own(tmp_path):
+    path = tmp_path / "own.toml"
+    path.write_text(OWN)
+    return path
+
+
+def asked(*line):
+    """The command of `care-sim train`."""
+    return parsed_command(["train", *map(str, line)])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_learner_has_a_file_whose_tables_are_of_environments(kind):
+    tables = [
+        line.strip('[]"\n') for line in shipped_file(kind.algorithm).open() if line.startswith("[")
+    ]
+    assert {*tables} - {DEFAULT} <= {*IDS}
+    assert DEFAULT in tables
+    for env in (*IDS, "dense", "mine:Mine"):
+        assert read_hyperparameters(kind, [env]).values
+
+
+@pytest.mark.parametrize("name", ["ppo-dense", "ppo-dartout"])
+def test_the_file_holds_the_recipe_of_the_shipped_agents(name):
+    recipe = load_weights(shipped_weights(name)).card.result["config"]
+    command = asked("ppo", "--env", recipe["env"], "--budget", *recipe["budget"])
+    config = {one: getattr(command, one) for one in recipe if one != "algorithm"}
+    plain = {one: [*v] if isinstance(v, tuple) else v for one, v in config.items()}
+    assert {"algorithm": command.kind.algorithm} | plain == recipe
+    assert command.steps == 200_000
+
+
+def test_the_defaults_of_a_command_are_those_of_its_environment(own):
+    of_cutin = asked("ppo", "--env", "CARE-CutIn-v0", "--hyperparameters", own)
+    assert (of_cutin.learning_rate, of_cutin.epochs, of_cutin.budget) == (3e-4, 2, (0.05, 1))
+    assert of_cutin.env_parameters == ("duration_s=2",)
+    assert of_cutin.noise == PpoConfig().noise
+    for line in (["--env", "cutin"], ["--env=CARE-CutIn-v0"]):
+        assert asked("ppo", f"--hyperparameters={own}", *line).epochs == 2
+    # Another has the table of all others.
+    other = asked("ppo", "--hyperparameters", own)
+    assert (other.noise, other.epochs) == (1, PpoConfig().epochs)
+
+
+def test_an_option_wins_also_where_it_is_the_default_of_the_command(own):
+    default = PpoConfig().epochs
+    line = ("ppo", "--env", "cutin", "--hyperparameters", own, "--epochs", default)
+    command = asked(*line, "--budget", "0.2")
+    assert (command.epochs, command.budget, command.learning_rate) == (default, (0.2,), 3e-4)
+    table = read_hyperparameters(PpoConfig, ["cutin"], own)
+    first, second = table.told(command)
+    assert first == (
+        f"hyperparameters of {own} [CARE-CutIn-v0]: learning_rate 0.0003, epochs 2, "
+        'budget [0.05, 1], env_parameters ["duration_s=2"]'
+    )
+    assert second == f"but, by options: epochs {default}, budget [0.2]"
+
+
+def test_a_file_without_a_table_for_the_environment_says_so(tmp_path):
+    path = tmp_path / "own.toml"
+    path.write_text('["CARE-CutIn-v0"]\nepochs = 2\n')
+    command = asked("ppo", "--hyperparameters", path)
+    assert command.epochs == PpoConfig().epochs
+    table = read_hyperparameters(PpoConfig, command.env, path)
+    assert table.told(command) == ["hyperparameters: own.toml has none for CARE-Dense-v0"]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            "[default]\nepoch = 2",
+            "own.toml [default] 'epoch', the nearest is epochs; known: action",
+        ),
+        ("[default]\nmemory = 2", "unknown argument of "),
+        ("[default]\nseed = 2", "unknown argument of "),
+        ("[default]\nout = 'x'", "unknown argument of "),
+        ("[default]\nepochs = 0", "own.toml [default]: epochs must be a whole number >= 1"),
+        ("[default]\nepochs = 1.5", "epochs must be a whole number >= 1"),
+        ("[default]\nepochs = true", "epochs must be a whole number >= 1"),
+        ("[default]\nlearning_rate = 'fast'", "learning_rate must lie in [1e-08, 1], got 'fast'"),
+        ("[default]\nlearning_rate = nan", "learning_rate must lie in"),
+        ("[default]\naction = 'Fire'", "unknown action 'Fire'; known: SectorReserve"),
+        ("[default]\nbudget = 0.1", "budget must be a list of numbers, got 0.1"),
+        ("[default]\nenv_parameters = [1]", "env_parameters must be a list of texts NAME=VALUE"),
+        ("[default]\nepochs = {}", "epochs must be a whole number >= 1"),
+        ("epochs = 2", "own.toml: epochs stands in no table"),
+        ("[default", "own.toml is no TOML file"),
+        ("a=" + "[" * 5000, "own.toml is no TOML file"),
+    ],
+)
+def test_a_file_that_is_wrong_is_told_in_one_line(tmp_path, text, message):
+    path = tmp_path / "own.toml"
+    path.write_text(text)
+    with pytest.raises(InvalidInput) as refused:
+        read_hyperparameters(PpoConfig, ["CARE-Dense-v0"], path)
+    assert message in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_file_that_is_not_there_is_told(tmp_path):
+    with pytest.raises(InvalidInput, match=r"hyperparameters .*none.toml: no such file"):
+        asked("sac", "--hyperparameters", tmp_path / "none.toml")
+
+
+numbers = st.floats(1e-8, 1, allow_nan=False)
+
+
+@settings(max_examples=20)
+@given(
+    rate=numbers,
+    epochs=st.integers(1, 1000),
+    budget=st.lists(numbers, min_size=1, max_size=8),
+    # No file of TOML holds a DEL as it is.
+    place=st.text(st.characters(codec="utf-8", exclude_characters="\x7f")),
+)
+def test_a_table_that_is_written_reads_the_same(tmp_path_factory, rate, epochs, budget, place):
+    path = tmp_path_factory.getbasetemp() / "own.toml"
+    values = {
+        "learning_rate": rate,
+        "epochs": epochs,
+        "budget": tuple(budget),
+        "env_parameters": ("duration_s=2",),
+        "action": "SectorScores",
+    }
+    path.write_text(as_table(f"{place}:Mine", values), encoding="utf-8")
+    assert dict(read_hyperparameters(PpoConfig, [f"{place}:Mine"], path).values) == values
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_belongs_to_one_run_is_no_hyperparameter(kind):
+    assert {field.name for field in fields(kind)} - {*names_of(kind)} == {
+        "env",
+        "seed",
+        "out",
+        "resume",
+        "tensorboard",
+        "threads",
+        "processes",
+    }
