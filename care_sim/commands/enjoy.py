@@ -1,18 +1,19 @@
 """`care-sim enjoy`: an episode of a trained agent, to be watched."""
 
-import tempfile
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated
 
 import tyro
 
-from care_sim.base.errors import InvalidInput, report_problems
+from care_sim.base.errors import report_problems
 from care_sim.base.extras import import_rerun
 from care_sim.commands.run import Run, Watched
 from care_sim.commands.shared.agent_play import AgentPlay
 from care_sim.commands.view import View
 from care_sim.training.agents import find_agent
+
+_RECORD = Path("runs/enjoy.rrd")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,19 +32,17 @@ class Enjoy(Watched):
     budget: float | None = None
     """Share of the cells that may fire at a keyframe; without it the first of its training."""
     view: bool = False
-    """Open the viewer on the episode once it is played (extra 'viewer')."""
+    """Open the viewer on the recording once the episode is played (extra 'viewer'); without
+    --record it is runs/enjoy.rrd."""
 
     def __call__(self) -> int:
         """Run it."""
         if not self.view:
             return self._run(self.record)
-        if self.record is not None:
-            raise InvalidInput("--view shows a recording of its own; give --record or --view")
         import_rerun()
-        with tempfile.TemporaryDirectory() as folder:
-            # Named as the page of the viewer shows it.
-            record = Path(folder) / "episode.rrd"
-            return self._run(record) or View(file=record)()
+        record = self.record or _RECORD
+        record.parent.mkdir(parents=True, exist_ok=True)
+        return self._run(record) or View(file=record)()
 
     def _run(self, record: Path | None) -> int:
         play = AgentPlay(find_agent(self.agent))

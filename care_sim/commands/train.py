@@ -1,5 +1,6 @@
 """`care-sim train`: the learners, each a command of its own, and the figure of learning curves."""
 
+import shlex
 from argparse import ArgumentError, ArgumentParser
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -8,6 +9,7 @@ from typing import Annotated, Any, ClassVar
 
 import tyro
 
+from care_sim.base.bounds import bounded
 from care_sim.base.errors import InvalidInput
 from care_sim.commands.shared.end_of_training import end_of_training
 from care_sim.commands.shared.study_command import console
@@ -21,6 +23,7 @@ from care_sim.training.hyperparameters import read_hyperparameters
 from care_sim.training.place_map import TrainPlace
 from care_sim.training.run import train_agent
 from care_sim.training.scorer import TrainScorer
+from care_sim.training.tuning import tune
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,6 +35,9 @@ class Learner(AgentConfig):
     hyperparameters: Path | None = None
     """TOML file of hyperparameters by environment, in the place of the one that comes with the
     package. Options win over both."""
+    tune: int = bounded(0, 0, 10_000)
+    """Try so many sets of hyperparameters instead, each in a training run of --steps (extra
+    'tune'), and write the best as a file for --hyperparameters."""
 
     @classmethod
     def own_defaults(cls, arguments: Sequence[str]) -> Mapping[str, Any]:
@@ -51,6 +57,12 @@ class Learner(AgentConfig):
         config = self.kind(**{one.name: getattr(self, one.name) for one in fields(self.kind)})
         table = read_hyperparameters(self.kind, self.env, self.hyperparameters)
         print(*table.told(config), sep="\n", flush=True)
+        if self.tune:
+            best = tune(config, self.tune, train_agent)
+            print(best.read_text(encoding="utf-8"), end="")
+            line = ["care-sim", "train", config.algorithm, "--env", config.env]
+            print(f"train with them: {shlex.join([*line, '--hyperparameters', str(best)])}")
+            return 0
         train_agent(config)
         print(*end_of_training(config), sep="\n")
         return 0

@@ -44,19 +44,21 @@ class Agent:
         """What a card tells of. Raises InvalidInput for one that names no environment."""
         if card.scenario is None:
             raise InvalidInput(f"weights {path}: the card names no environment")
-        config = _config(card)
         # A card of one budget tells its cells; of those that fit any, that of a user's own.
         cells = card.budget / card.grid.size if card.budget is not None else _ANY_BUDGET
-        (budget, *_) = config.get("budget") or [cells]
+        budgets = [one for one in _listed(card, "budget") if is_number(one)]
         # Of several environments the first; a parameter may be of one of them alone.
-        env = card.scenario.split()[0]
-        texts = [one for one in config.get("env_parameters", ()) if _is_text(one)]
+        env = card.scenario.partition(" ")[0]
+        try:
+            texts = parameters([one for one in _listed(card, "env_parameters") if _is_text(one)])
+        except InvalidInput as error:
+            raise InvalidInput(f"weights {path}: of its card, {error}") from error
         given = tuple(
             (name.rpartition(".")[2], value)
-            for name, value in parameters(texts)
+            for name, value in texts
             if name.rpartition(".")[0] in ("", env)
         )
-        return cls(policy, path, env, budget if is_number(budget) else cells, given)
+        return cls(policy, path, env, next(iter(budgets), cells), given)
 
 
 _ANY_BUDGET = 0.1
@@ -124,7 +126,7 @@ class ShippedAgent:
             "policy": self.policy,
             "environment": card.scenario or "",
             "algorithm": str(config.get("algorithm", card.kind)),
-            "budgets": ", ".join(map(str, config.get("budget", ()))) or _budget(card),
+            "budgets": ", ".join(map(str, _listed(card, "budget"))) or _budget(card),
             "steps": f"{card.steps:,}" if card.steps else "",
             "seed": "" if seed is None else str(seed),
             "wall time": f"{round(int(seconds[1]) / 60)} min" if seconds else "",
@@ -162,6 +164,12 @@ def _config(card: Card) -> dict[str, Any]:
     """The configuration of the run that a card tells of; empty where it tells none."""
     config = card.result.get("config")
     return config if isinstance(config, dict) else {}
+
+
+def _listed(card: Card, name: str) -> list[Any]:
+    """A list of that configuration; empty where there is none."""
+    told = _config(card).get(name)
+    return told if isinstance(told, list) else []
 
 
 def _is_text(value: object) -> bool:

@@ -81,7 +81,7 @@ class AgentConfig:
     resume: bool = False
     """Continue from the checkpoint in `out`."""
     tensorboard: bool = False
-    """Write a log for TensorBoard beside the weights; needs the package tensorboard."""
+    """Write a log for TensorBoard into the folder: `tensorboard --logdir FOLDER` shows it."""
 
     def __post_init__(self) -> None:
         # One alone may be given as its name.

@@ -26,8 +26,11 @@ RULES = {"random": None, "history": None, "care": None, "full": 1.0}
 """The rules that the learner is compared with, and their budget where it is not the learner's."""
 
 
-def train_agent(config: AgentConfig) -> int:
-    """Train, and keep everything in `config.out`; see `care_sim.training.folder`.
+def train_agent(
+    config: AgentConfig, evaluated: Callable[[float], None] = lambda _return: None
+) -> int:
+    """Train, and keep everything in `config.out`; see `care_sim.training.folder`. `evaluated` is
+    told the mean return of every evaluation, once it is kept.
 
     Raises InvalidInput for what does not fit, MissingExtra for a library that is not installed.
     """
@@ -47,7 +50,7 @@ def train_agent(config: AgentConfig) -> int:
         folder.begin(model)
         for name, score in folder.rules(partial(_rules, config)).items():
             _say(f"{name}: {score}")
-        _learn(config, folder, model, env)
+        _learn(config, folder, model, env, evaluated)
     finally:
         envs.close()
         env.close()
@@ -81,7 +84,13 @@ def _rules(config: AgentConfig) -> dict[str, list[Played]]:
     return played
 
 
-def _learn(config: AgentConfig, folder: Folder, model: "BaseAlgorithm", env: Any) -> None:
+def _learn(
+    config: AgentConfig,
+    folder: Folder,
+    model: "BaseAlgorithm",
+    env: Any,
+    evaluated: Callable[[float], None],
+) -> None:
     """Evaluate and learn in turn, until the last step is evaluated.
 
     Stable-Baselines3's EvalCallback and CheckpointCallback cannot do it: the one evaluates episodes
@@ -101,6 +110,7 @@ def _learn(config: AgentConfig, folder: Folder, model: "BaseAlgorithm", env: Any
                 played = play(env, acting(model), validation_episodes(config))
                 score = folder.keep(model, played, clock.seconds, env.unwrapped.rig)
                 _say(f"{model.num_timesteps} steps: {score}")
+                evaluated(score.mean_return)
             if (left := config.steps - model.num_timesteps) <= 0:
                 break
             with clock:
@@ -175,7 +185,7 @@ def _check_tensorboard(config: AgentConfig) -> None:
             import tensorboard  # noqa: F401
         except ImportError as error:
             raise MissingExtra(
-                f"--tensorboard needs it: pip install tensorboard ({error})"
+                f"--tensorboard needs the extra 'rl': pip install 'care-sim[rl]' ({error})"
             ) from error
 
 
