@@ -2,6 +2,7 @@
 
 import json
 
+import numpy as np
 import pytest
 
 from care_sim.base.errors import InvalidInput
@@ -9,6 +10,8 @@ from care_sim.cli import main
 from care_sim.training.config import PpoConfig, SacConfig
 from care_sim.training.curves import grouped_runs, read_run
 from care_sim.training.curves_figure import curves_figure
+from care_sim.training.curves_table import curves_table
+from care_sim.training.episodes import EpisodeRow, Played, write_episodes
 
 DISTANCES = (4.0, 10.0, 16.0)
 
@@ -33,6 +36,106 @@ def folder(path, config, distances=DISTANCES):
     )
     (path / "curve.csv").write_text("\n".join(["steps,seconds,return,distance_m", *lines]) + "\n")
     return path
+
+
+def varied(path, config, scores, seconds=60.0):
+    """A run in two environments, evaluated every hundred steps: `scores` are, at each evaluation,
+    of the first and of the second between random, 0, and full, 1. Returns are from -20 or -200 on.
+    """
+    folder(path, config, (None,) * len(scores))
+    lines = [f"{100 * n},{seconds * n},-1.0," for n in range(len(scores))]
+    (path / "curve.csv").write_text("\n".join(["steps,seconds,return,distance_m", *lines]) + "\n")
+    heights = {"random": (0.0, 0.0), "care": (0.5, 0.5), "full": (1.0, 1.0)}
+    reached = [(rule, 0, both) for rule, both in heights.items()]
+    reached += [("learner", 100 * n, both) for n, both in enumerate(scores)]
+    write_episodes(
+        path,
+        [
+            EpisodeRow(policy, steps, Played(2000 + 2 * n + place, env, span * (score - 1), None))
+            for policy, steps, both in reached
+            for place, (env, span, score) in enumerate(
+                zip(("CARE-NCAP-v0", "CARE-Street-v0"), (20, 200), both, strict=True)
+            )
+            for n in range(2)
+        ],
+    )
+    return path
+
+
+VARIED = {"drawn": True, "env": ("CARE-NCAP-v0", "CARE-Street-v0")}
+
+
+def test_environments_weigh_alike_whatever_their_returns_are(tmp_path):
+    first = varied(tmp_path / "0", PpoConfig(**VARIED), [(0, 0.2), (0.4, 0.8)], 60)
+    second = varied(tmp_path / "1", PpoConfig(**VARIED, seed=1), [(0, 0.2), (0.6, 1.0)], 120)
+    (runs,) = grouped_runs(map(read_run, (first, second)))
+    assert runs[0].tasks == ["CARE-NCAP-v0", "CARE-Street-v0"]
+    np.testing.assert_allclose(runs[0].scores, [[0, 0.2], [0.4, 0.8]])
+    np.testing.assert_allclose(runs[0].marks["care"], [0.5, 0.5])
+
+    (row,) = curves_table([runs]).rows
+    assert row[:2] == ("ppo, CARE-NCAP-v0, CARE-Street-v0", "2")
+    # The middle two of 0.4, 0.6, 0.8 and 1; in each environment the worse or the better run.
+    assert row[2:5] == ("100", "0.70 [0.60, 0.80]", "score (random 0, full 1)")
+    assert row[5:] == ("random from 0, care from 100", "2 min")
+
+    figure = curves_figure([runs])
+    curve, profile = figure.axes
+    (thick,) = (line for line in curve.lines if line.get_linewidth() > 2)
+    np.testing.assert_allclose(thick.get_ydata(), [0.1, 0.7])
+    (own,) = (line for line in profile.lines if line.get_label() == "ppo")
+    # Returns of -12, -8, -40 and 0, twice each: all above -200, none above 0.
+    assert own.get_ydata()[0] == 1.0
+    assert own.get_ydata()[-1] == 0.0
+    assert own.get_ydata()[np.searchsorted(own.get_xdata(), -30)] == 0.75
+
+
+def test_an_environment_that_tells_nothing_is_left_out(tmp_path):
+    path = varied(tmp_path / "0", PpoConfig(**VARIED), [(0.4, 0.8)])
+    rows = [
+        row._replace(played=row.played._replace(total=0.0))
+        if row.played.env == "CARE-NCAP-v0"
+        else row
+        for row in read_run(path).episodes
+    ]
+    write_episodes(path, [*rows, EpisodeRow("random", 0, rows[-1].played._replace(env="else"))])
+    run = read_run(path)
+    assert run.tasks == ["CARE-Street-v0"]
+
+
+def test_recipes_that_leave_something_out_are_recipes_of_their_own(tmp_path):
+    configs = [PpoConfig(), PpoConfig(without=("tracks",))]
+    runs = [read_run(folder(tmp_path / str(n), one)) for n, one in enumerate(configs)]
+    groups = grouped_runs(runs)
+    assert [row[0] for row in curves_table(groups).rows] == [
+        "ppo, CARE-Dense-v0",
+        "ppo, CARE-Dense-v0, without tracks",
+    ]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "policy,steps\ncare,0\n",
+        "policy,steps,seed,env,return,distance_m\ncare,0,2000,E,nan,\n",
+        "policy,steps,seed,env,return,distance_m\ncare,-1,2000,E,1,\n",
+        "policy,steps,seed,env,return,distance_m\ncare,0,2000,E\n",
+        "",
+    ],
+)
+def test_a_damaged_table_of_episodes_is_named(folders, text):
+    (folders[0] / "episodes.csv").write_text(text)
+    with pytest.raises(InvalidInput, match=r"episodes\.csv is damaged") as error:
+        read_run(folders[0])
+    assert "\n" not in str(error.value)
+
+
+def test_episodes_that_are_missing_are_named(tmp_path):
+    path = varied(tmp_path / "0", PpoConfig(**VARIED), [(0.4, 0.8)])
+    rows = [row for row in read_run(path).episodes if row.policy != "care"]
+    write_episodes(path, rows)
+    with pytest.raises(InvalidInput, match="lack those of care after 0 steps in 'CARE-NCAP-v0'"):
+        read_run(path).marks  # noqa: B018
 
 
 @pytest.fixture

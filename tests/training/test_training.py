@@ -5,6 +5,7 @@ import json
 import re
 import shlex
 import sys
+from collections import Counter
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from care_sim.study import provenance
 from care_sim.training.algorithms import algorithm
 from care_sim.training.config import PpoConfig, SacConfig
 from care_sim.training.environments import plain, training
+from care_sim.training.episodes import read_episodes
 from care_sim.training.folder import Folder
 from care_sim.training.seeds import validation_seeds
 from care_sim.training.validation import ValidationScore, play, rule
@@ -195,6 +197,43 @@ def test_an_interrupted_run_goes_on(capsys, monkeypatch, tmp_path, moment):
 
 @pytest.mark.usefixtures("libraries")
 @pytest.mark.slow
+def test_it_learns_in_drawn_episodes_and_goes_on(capsys, tmp_path):
+    out = tmp_path / "run"
+    names = ["CARE-Dense-v0", "CARE-NCAP-v0"]
+    command = ["train", "ppo", "--drawn", *TINY, "--env", *names, "--budget", "0.02", "0.05"]
+    command += ["--episodes", "6", "--without", "tracks", "--out", out]
+    assert care(capsys, *command, "--steps", "64")[0] == 0
+    code, said, _ = care(capsys, *command, "--steps", "128", "--resume")
+    assert code == 0
+    assert "full: return 0.00" in said
+
+    rows = read_episodes(out)
+    played = Counter((row.policy, row.steps) for row in rows)
+    policies = [(rule, 0) for rule in ("random", "history", "care", "full")]
+    assert played == dict.fromkeys(
+        [*policies, ("learner", 0), ("learner", 64), ("learner", 128)], 6
+    )
+    assert {row.played.env for row in rows} == set(names)
+    totals = [row.played.total for row in rows if row[:2] == ("learner", 128)]
+    curve = list(csv.DictReader((out / "curve.csv").open()))
+    assert float(curve[-1]["return"]) == pytest.approx(np.mean(totals))
+
+    card = load_weights(out / "weights.npz").card
+    assert (card.budget, card.scenario) == (None, " ".join(names))
+    assert card.result["config"]["drawn"]
+    assert card.result["config"]["without"] == ["tracks"]
+
+    code, _, complaint = care(
+        capsys, *command, "--steps", "256", "--resume", "--env", "CARE-Dense-v0"
+    )
+    assert (code, complaint.count("\n")) == (2, 1)
+    assert (
+        "trained with env ['CARE-Dense-v0', 'CARE-NCAP-v0'], asked is 'CARE-Dense-v0'" in complaint
+    )
+
+
+@pytest.mark.usefixtures("libraries")
+@pytest.mark.slow
 def test_weights_of_several_budgets_fit_any(capsys, tmp_path):
     command = ["train", "ppo", *TINY, "--out", tmp_path, "--evaluate-every", "64", "--steps", "64"]
     assert care(capsys, *command, "--budget", "0.05", "0.1")[0] == 0
@@ -232,6 +271,10 @@ def test_the_other_learners_by_name(capsys, tmp_path, name):
         (["--env-parameters", "vehicles"], "parameters are given as NAME=VALUE"),
         (["--env-parameters", "wheels=3"], "wheels"),
         (["--resume"], "holds no run to be resumed"),
+        (["--env", "CARE-Dense-v0", "CARE-CutIn-v0"], "2 environments need --drawn"),
+        (["--drawn", "--env", "CARE-Dense-v0", "CARE-Moon-v0"], "unknown environment 'CARE-Moon"),
+        (["--drawn", "--budget", "0.1", "2"], "budget must lie in (0, 1]"),
+        (["--without", "faults"], "without faults needs --drawn"),
     ],
 )
 @pytest.mark.usefixtures("libraries")
