@@ -60,7 +60,8 @@ class Learner(AgentConfig):
         if self.tune:
             best = tune(config, self.tune, train_agent)
             print(best.read_text(encoding="utf-8"), end="")
-            line = ["care-sim", "train", config.algorithm, "--env", config.env]
+            line = ["care-sim", "train", config.algorithm, "--env", *config.env]
+            line += ["--drawn"] if config.drawn else []
             print(f"train with them: {shlex.join([*line, '--hyperparameters', str(best)])}")
             return 0
         train_agent(config)

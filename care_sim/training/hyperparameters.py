@@ -17,8 +17,8 @@ from care_sim.training.config import HOW_LONG, AgentConfig
 
 DEFAULT = "default"
 """The table of every environment that has none of its own."""
-_NOT_OF_A_FILE = {*HOW_LONG, "env", "seed"} - {"steps"}
-"""Fields of a configuration that belong to one run and one machine."""
+_NOT_OF_A_FILE = {*HOW_LONG, "env", "seed", "drawn", "without"} - {"steps"}
+"""Fields of a configuration that belong to one run and one machine, or say what is played."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +76,11 @@ def read_hyperparameters(
     except InvalidInput as error:
         raise InvalidInput(f"{where}: {error}") from error
     return Hyperparameters(values, path, table)
+
+
+def table_of(envs: Sequence[str]) -> str:
+    """The table of an environment, or that of several."""
+    return envs[0] if len(envs) == 1 else DEFAULT
 
 
 def as_table(env: str, values: Mapping[str, Any]) -> str:

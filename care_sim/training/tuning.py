@@ -24,7 +24,7 @@ from care_sim.base.errors import InvalidInput, MissingExtra, one_line
 from care_sim.base.files import write_text
 from care_sim.training.config import AgentConfig
 from care_sim.training.folder import CONFIG, CURVE, RULES, read_curve
-from care_sim.training.hyperparameters import as_table, names_of
+from care_sim.training.hyperparameters import as_table, names_of, table_of
 
 STUDY, TRIALS, BEST = "study.journal", "trials", "best.toml"
 SPACES: dict[str, Any] = {
@@ -200,7 +200,7 @@ def _write_best(optuna: Any, study: Any, config: AgentConfig) -> Path:
         trained = replace(config, **best.params)
         values = {name: getattr(trained, name) for name in names_of(type(config))}
         about = f"# Trial {best.number} of {len(study.trials)}: validation return {best.value:.4g}."
-        write_text(path, f"{about}\n{as_table(config.env, values)}")
+        write_text(path, f"{about}\n{as_table(table_of(config.env), values)}")
     return path
 
 
