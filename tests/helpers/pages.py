@@ -8,8 +8,8 @@ README = ROOT / "README.md"
 SITE = sorted(page for page in (ROOT / "docs").rglob("*.md") if not page.is_symlink())
 RESULTS = sorted((ROOT / "results").glob("*.md"))
 """Those of the results that are written, not made: `tables.md` lie in the folders."""
-SHIPPED = ROOT / "care_sim" / "policies" / "learned" / "shipped" / "README.md"
-PAGES = [README, ROOT / "CONTRIBUTING.md", SHIPPED, *RESULTS, *SITE]
+SHIPPED = sorted((ROOT / "care_sim").glob("*/*/shipped/README.md"))
+PAGES = [README, ROOT / "CONTRIBUTING.md", *SHIPPED, *RESULTS, *SITE]
 
 
 def fenced(page, language):

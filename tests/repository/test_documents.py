@@ -13,6 +13,7 @@ from html.parser import HTMLParser
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
+import numpy as np
 import pytest
 from pyarrow.parquet import read_schema
 
@@ -21,7 +22,9 @@ from care_sim import cli
 from care_sim.base.errors import InvalidInput
 from care_sim.commands.entries import COMMANDS
 from care_sim.core.conditions import DEFAULTS
+from care_sim.core.types import CLASSES
 from care_sim.envs import IDS
+from care_sim.sources.street_films import street_film
 from care_sim.study.results_formats import RESULTS_FORMATS
 from care_sim.viewer.recording.entities import ENTITIES
 from tests.helpers.forked import LEARNING, LIBRARIES, Forked
@@ -112,6 +115,22 @@ def test_the_learner_in_one_file_learns(monkeypatch, capsys):
     example.main()
     steps = re.findall(r"^ *(\d+) steps: return +-?[\d.]+$", capsys.readouterr().out, re.M)
     assert steps == ["120", "240"]
+
+
+def test_a_detector_runs_on_a_sweep_in_one_file(tmp_path, monkeypatch, capsys):
+    pytest.importorskip("torch")
+    example = loaded(ROOT / "docs" / "examples" / "detect_a_sweep.py")
+    film = street_film(2500)
+    forward, left, up = film.shots[0].cloud.points.T
+    monkeypatch.setattr(example, "HEIGHT_M", film.sensor_height_m)
+    rest = np.zeros_like(up)
+    rows = np.stack([-left, forward, up, rest, rest], axis=1)
+    rows.astype(np.float32).tofile(tmp_path / "sweep.bin")
+    example.main(tmp_path / "sweep.bin", tmp_path / "out.png")
+    counts = dict(line.split() for line in capsys.readouterr().out.splitlines())
+    cars = np.sum(film.shots[0].annotations.classes == CLASSES.index("car"))
+    assert 0.5 * cars < int(counts["car"]) < 1.5 * cars
+    assert (tmp_path / "out.png").stat().st_size > 10_000
 
 
 def loaded(file):

@@ -37,11 +37,6 @@ def load_detector(path: str | PathLike[str] | None = None) -> tuple[Arrays, dict
 
     Raises InvalidInput for a file that is missing, damaged, or does not hold exactly these arrays.
     """
-    if path is None and not SHIPPED.is_file():
-        raise InvalidInput(
-            "no weights of the detector pillars come with this version: make them with "
-            f"`{COMMAND} --out FILE` and give file=FILE"
-        )
     path = SHIPPED if path is None else path
     arrays, card = read_arrays(path, _card, COMMAND)
     wanted = array_shapes()

@@ -8,12 +8,15 @@ import pytest
 
 from care_sim.base.array_files import write_arrays
 from care_sim.base.errors import InvalidInput, MissingExtra
+from care_sim.core.boxes import planar_ranges
 from care_sim.perception.detectors import make_detector
+from care_sim.perception.matching import found_objects
 from care_sim.perception.pillars import weights
 from care_sim.perception.pillars.detector import PillarsDetector
 from care_sim.perception.pillars.network import LAYERS, Fixed, answers, place_planes
 from care_sim.perception.pillars.plan import PILLARS, on_plan
 from care_sim.perception.points_only import PointsOnly, checked
+from care_sim.sources.street_films import street_film
 from tests.helpers.detector_weights import drawn_arrays, drawn_weights
 from tests.helpers.made_points import HEIGHT, road, shell
 
@@ -115,11 +118,26 @@ def test_without_pytorch_the_extra_is_named(file, monkeypatch):
         make_detector("pillars", HEIGHT, file=file)
 
 
-def test_without_shipped_weights_the_command_that_makes_them_is_named(monkeypatch, tmp_path):
-    monkeypatch.setattr(weights, "SHIPPED", tmp_path / "none.npz")
-    with pytest.raises(InvalidInput, match=r"`care-sim train detector --out FILE`") as refused:
-        make_detector("pillars", HEIGHT)
-    assert "\n" not in str(refused.value)
+def test_the_shipped_detector_finds_most_of_a_street():
+    film = street_film(2500)
+    made = make_detector("pillars", film.sensor_height_m)
+    found = seen = 0
+    for shot in film.shots[::10]:
+        near = planar_ranges(shot.annotations.boxes) <= 50
+        reported, _ = made.detect(shot.cloud, shot.annotations)
+        found += found_objects(shot.annotations, reported)[near].sum()
+        seen += near.sum()
+    assert found > 0.75 * seen > 20
+
+
+def test_the_shipped_card_says_what_the_readme_does():
+    made = PillarsDetector()
+    told = (weights.SHIPPED.parent / "README.md").read_text()
+    result = made.card["result"]
+    for name in ("recall, all scans", "recall, full scans", "precision, all scans"):
+        assert f"{100 * result[name]:.1f}" in told
+    assert f"{result['calibration error']:.3f}" in told
+    assert made.card["steps"] == made.card["steps asked for"] == 10_000
 
 
 def test_weights_whose_answer_is_no_number_are_told_of(tmp_path):
