@@ -50,12 +50,15 @@ class Learner(AgentConfig):
         except ArgumentError:
             # An option without its value, which is told where all of them are read.
             return {}
+        # A file that is not there is told when the command runs, as that of any other option.
+        if told.hyperparameters is not None and not told.hyperparameters.exists():
+            return {}
         return read_hyperparameters(cls.kind, told.env, told.hyperparameters).values
 
     def __call__(self) -> int:
         """Train it."""
-        config = self.kind(**{one.name: getattr(self, one.name) for one in fields(self.kind)})
         table = read_hyperparameters(self.kind, self.env, self.hyperparameters)
+        config = self.kind(**{one.name: getattr(self, one.name) for one in fields(self.kind)})
         print(*table.told(config), sep="\n", flush=True)
         if self.tune:
             best = tune(config, self.tune, train_agent)

@@ -271,7 +271,7 @@ def test_the_sources_are_listed_as_they_are_asked_for_and_a_broken_one_with_its_
 
 
 @pytest.mark.parametrize(
-    "command", ["policies", "scenarios", "sources", "sensors", "detectors", "compare"]
+    "command", ["policies", "agents", "scenarios", "sources", "sensors", "detectors", "compare"]
 )
 def test_lists_and_tables_fit_eighty_columns_and_lose_nothing(command, capsys):
     short = ["dartout", "--scenario-parameters", "duration_s=0.1"]

@@ -34,11 +34,11 @@ def hash_of(out):
 
 @pytest.fixture
 def mine(tmp_path):
-    """The folder of a run that learned in the dart-out at 5% of the cells, with a bad camera."""
+    """The folder of a run that learned in the dart-out at 5% of the cells, with a bad LiDAR."""
     file = load_weights(shipped_weights("ppo-dense"))
     learned = file.card.result["config"] | {
         "budget": [0.05],
-        "env_parameters": ["false_negative_rate=0.9", "duration_s=0.5", "keyframe_s=0.1"],
+        "env_parameters": ["lidar_dropout=0.5", "duration_s=0.5", "keyframe_s=0.1"],
     }
     card = replace(file.card, scenario="CARE-Dartout-v0", budget=819, result={"config": learned})
     (tmp_path / "mine").mkdir()
@@ -49,7 +49,7 @@ def mine(tmp_path):
 def test_it_plays_where_the_agent_learned_and_with_its_conditions(capsys, mine):
     path = mine / "weights.npz"
     line = f"run dartout --policy ppo --budget 0.05 --policy-parameters path={path} --seed 2"
-    conditions = "--false-negative-rate 0.9 --scenario-parameters duration_s=0.5"
+    conditions = "--lidar-dropout 0.5 --scenario-parameters duration_s=0.5"
     wanted = hash_of(run(capsys, *line.split(), *conditions.split())[1])
     for named in (mine, path):
         code, out, complaint = run(capsys, "enjoy", named, "--seed", 2)
@@ -57,7 +57,7 @@ def test_it_plays_where_the_agent_learned_and_with_its_conditions(capsys, mine):
         assert hash_of(out) == wanted
         assert complaint == "care-sim: played without what no command takes: keyframe_s\n"
     # What is given wins over what was learned with.
-    given = ("--false-negative-rate", 0.1, *SHORT)
+    given = ("--lidar-dropout", 0.1, *SHORT)
     other = [*line.split(), *given]
     assert hash_of(run(capsys, "enjoy", mine, *given, "--seed", 2)[1]) == hash_of(
         run(capsys, *other)[1]

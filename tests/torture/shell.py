@@ -38,6 +38,7 @@ SURROUNDINGS = (
 )
 LISTS = (
     ["policies"],
+    ["agents"],
     ["scenarios"],
     ["detectors"],
     ["sources"],

@@ -134,7 +134,7 @@ def test_a_file_that_is_wrong_is_told_in_one_line(tmp_path, text, message):
 
 def test_a_file_that_is_not_there_is_told(tmp_path):
     with pytest.raises(InvalidInput, match=r"hyperparameters .*none.toml: no such file"):
-        asked("sac", "--hyperparameters", tmp_path / "none.toml")
+        asked("sac", "--hyperparameters", tmp_path / "none.toml")()
 
 
 numbers = st.floats(1e-8, 1, allow_nan=False)

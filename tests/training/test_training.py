@@ -6,6 +6,7 @@ import re
 import shlex
 import sys
 from collections import Counter
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -248,7 +249,12 @@ def test_the_other_learners_by_name(capsys, tmp_path, name):
         pytest.importorskip("sb3_contrib")
     own = ["--memory", "500"] if name == "sac" else ["--rollout", "32", "--batch", "32"]
     command = ["train", name, *SHORT, *own, "--out", tmp_path, "--evaluate-every", "128"]
-    assert care(capsys, *command, "--steps", "128")[0] == 0
+    logs = ["--tensorboard"] if find_spec("tensorboard") else []
+    code, said, _ = care(capsys, *command, "--steps", "128", *logs)
+    assert code == 0
+    # Weights that act outside of its library are those of `ppo` alone.
+    assert said.endswith(f"{tmp_path / 'checkpoint.zip'}; --resume goes on with it\n")
+    assert len([*tmp_path.glob("tensorboard/*/events.*")]) == len(logs)
     assert care(capsys, *command, "--steps", "256", "--resume")[0] == 0
     assert len((tmp_path / "curve.csv").read_text().splitlines()) == 4
 
