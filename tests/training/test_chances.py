@@ -1,12 +1,14 @@
 """The reward that all environments share: chances of a first detection that were missed."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from care_sim.envs import make_env
 from care_sim.envs.open_loop import FilmEnv
 from care_sim.training.chances import MissedChances
-from tests.helpers.handmade_film import BEHIND, BESIDE, WALKER, handmade_film, returns_of
+from tests.helpers.handmade_film import BEHIND, BESIDE, ENTRY, WALKER, handmade_film, returns_of
 
 
 def played(env, choose, seed=0):
@@ -99,6 +101,16 @@ def test_an_event_counts_until_it_is_censored():
     env = MissedChances(FilmEnv(handmade_film(10), budget=0.5, floor=False))
     nothing = np.zeros((32, 512), np.float32)
     assert played(env, lambda: nothing) == [0, -1, *[-4] * 5, -3, 0, 0]
+
+
+def test_who_is_out_of_range_or_gone_is_no_chance():
+    """The bus is beyond 50 m and two are gone again, at keyframes 2 and 3."""
+    film = handmade_film()
+    near, far = film.shots[ENTRY], film.shots[1]
+    film = replace(film, shots=(film.shots[0], near, far, far))
+    env = MissedChances(FilmEnv(film, budget=0.5, floor=False))
+    nothing = np.zeros((32, 512), np.float32)
+    assert played(env, lambda: nothing) == [0, -4, -1, -1]
 
 
 def test_observation_and_end_stay_as_they_are():
