@@ -5,7 +5,6 @@ Scores are (runs, tasks). Runs are of one recipe and differ by their training se
 """
 
 from collections.abc import Callable
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +15,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats
 
 RESAMPLES = 2_000
-"""As many as in that paper."""
+"""Drawn for one interval."""
 CONFIDENCE = 0.95
 _CUT = 0.25
 """Share of the scores that is left out at either end."""
@@ -47,12 +46,18 @@ def interquartile_mean(scores: ArrayLike) -> Aggregate:
 
 
 def performance_profile(scores: ArrayLike, levels: ArrayLike) -> list[Aggregate]:
-    """The share of all runs and tasks whose score lies above each of `levels`, with the intervals
-    of the same bootstrap.
+    """The share of the scores (runs, episodes) that lie above each of `levels`.
+
+    The interval is that of the bootstrap over whole runs: a run plays all episodes, and what it is
+    better or worse at than another shows in all of them. Drawn episode by episode, runs would
+    cancel, and the interval would vanish as episodes become more.
     """
     table = _table(scores)
-    above = [partial(_share_above, level) for level in np.atleast_1d(np.asarray(levels, float))]
-    return [Aggregate(float(share(table.ravel())), *_ends(table, share)) for share in above]
+    shares = [
+        (table > level).mean(axis=1, keepdims=True)
+        for level in np.atleast_1d(np.asarray(levels, float))
+    ]
+    return [Aggregate(float(each.mean()), *_ends(each, _mean)) for each in shares]
 
 
 def _middle(scores: Floats) -> Floats:
@@ -60,8 +65,8 @@ def _middle(scores: Floats) -> Floats:
     return result
 
 
-def _share_above(level: float, scores: Floats) -> Floats:
-    result: Floats = np.asarray((scores > level).mean(axis=-1))
+def _mean(scores: Floats) -> Floats:
+    result: Floats = np.asarray(scores.mean(axis=-1))
     return result
 
 

@@ -72,6 +72,14 @@ def test_a_profile_is_the_share_above_each_level():
     assert profile[0][1:] == (1.0, 1.0)
 
 
+def test_runs_of_a_profile_are_drawn_whole():
+    """One run is above the level in all of many episodes, the other in none: with so few runs the
+    share may be anything, however many episodes there are.
+    """
+    scores = np.repeat([[0.0], [1.0]], 50, axis=1)
+    assert performance_profile(scores, 0.5) == [(0.5, 0.0, 1.0)]
+
+
 @pytest.mark.parametrize("scores", [[], [1.0, 2.0], [[1.0, np.nan]], [[]]])
 def test_what_is_no_table_of_scores_is_refused(scores):
     with pytest.raises(InvalidInput, match=r"scores must be finite \(runs, tasks\)"):
