@@ -5,7 +5,7 @@
 | `pictures` | all six pictures: what is left is the car's motion, the budget and the place |
 | `place` | the number of its own that each sector has: what is seen alone decides its score |
 | `tracks` | all that forecasts tell in the pictures; the allocator goes on to fire at their hulls |
-| `faults` | faults of the camera in the episodes that are drawn |
+| `faults` | faults of the camera in the training episodes; those of the validation keep them |
 
 Pictures are taken away by a matrix before the first layer. It is multiplied into the weights that
 are kept, which therefore act in NumPy like any others. Tracks are in four pictures: `forecast` and

@@ -43,7 +43,7 @@ def plain(config: AgentConfig, budget: float | None = None) -> gymnasium.Env[Any
     InvalidInput for an unknown environment or a wrong argument.
     """
     if config.drawn:
-        return _drawn(config, budget, lambda env, _: env)
+        return _drawn(config, lambda env, _: env, budget)
     return make_env(
         config.env[0],
         **_arguments(config, config.env[0], config.budget[0] if budget is None else budget),
@@ -53,12 +53,17 @@ def plain(config: AgentConfig, budget: float | None = None) -> gymnasium.Env[Any
 def wrapped(config: AgentConfig, budget: float | None = None) -> gymnasium.Env[Any, Any]:
     """As the learner acts and sees."""
     if config.drawn:
-        return _drawn(config, budget, partial(_as_drawn, config))
+        return _drawn(config, partial(_as_drawn, config))
     return _pictured(config, plain(config, budget))
 
 
 def training(config: AgentConfig, budget: float | None = None) -> gymnasium.Env[Any, Any]:
-    """The same, over episodes of training seeds."""
+    """The same, over episodes of training seeds, and without faults where it is to learn without.
+    Validations keep them: recipes are measured in the same episodes.
+    """
+    if config.drawn:
+        env = _drawn(config, partial(_as_drawn, config), faulty="faults" not in config.without)
+        return TrainingSeeds(env, config.seed)
     return TrainingSeeds(wrapped(config, budget), config.seed)
 
 
@@ -69,19 +74,22 @@ def _pictured(config: AgentConfig, env: gymnasium.Env[Any, Any]) -> GridObservat
 
 def _drawn(
     config: AgentConfig,
-    budget: float | None,
     finish: Callable[[gymnasium.Env[Any, Any], Draw], gymnasium.Env[Any, Any]],
+    budget: float | None = None,
+    faulty: bool = True,
 ) -> DrawnEnv:
-    """Episodes that differ, with `budget` or with drawn ones, under the reward that all share."""
+    """Episodes that differ, under the reward that all share; `budget` takes the place of those that
+    are drawn, and all else of an episode stays.
+    """
 
     def make(draw: Draw) -> gymnasium.Env[Any, Any]:
         name = config.env[draw.place]
-        given = {**_arguments(config, name, draw.budget), **draw.faults}
+        share = draw.budget if budget is None else budget
+        given = {**_arguments(config, name, share), **draw.faults}
         env = DrawnStreet(draw.street, **given) if name == STREETS_ID else make_env(name, **given)
         return finish(MissedChances(env), draw)
 
-    budgets = config.budget if budget is None else (budget,)
-    return DrawnEnv(make, len(config.env), budgets, "faults" not in config.without)
+    return DrawnEnv(make, len(config.env), config.budget, faulty)
 
 
 def _as_drawn(

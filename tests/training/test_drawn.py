@@ -1,5 +1,7 @@
 """Episodes that differ: what a seed draws, and that it is then played."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -72,6 +74,33 @@ def test_an_episode_is_that_of_the_environment_which_was_drawn():
         own.close()
     env.close()
     assert met == set(CONFIG.env)
+
+
+def test_a_budget_of_ones_own_changes_nothing_else():
+    """What `full` plays is what the others play."""
+    drawn_budgets, whole = plain(CONFIG), plain(CONFIG, 1.0)
+    for seed in range(VALIDATION, VALIDATION + 8):
+        told = [env.reset(seed=seed)[1] for env in (drawn_budgets, whole)]
+        np.testing.assert_equal(*told)
+        assert drawn_budgets.unwrapped.conditions == whole.unwrapped.conditions
+        assert whole.rig.budget == 16_384
+    drawn_budgets.close()
+    whole.close()
+
+
+def test_who_learns_without_faults_is_validated_with_them():
+    config = replace(CONFIG, env=("CARE-Dense-v0",), without=("faults",), env_parameters=())
+    learns, shown = training(config), wrapped(config)
+    faulty = {seed for seed in range(VALIDATION, VALIDATION + 12) if drawn(seed, 1, BUDGETS).faults}
+    assert faulty
+    for seed in range(VALIDATION, VALIDATION + 12):
+        learns.env.reset(seed=seed)
+        shown.reset(seed=seed)
+        usual = sensing(make_env("CARE-Dense-v0")).conditions
+        assert sensing(learns.env).conditions == usual
+        assert (sensing(shown).conditions != usual) == (seed in faulty)
+    learns.close()
+    shown.close()
 
 
 def test_one_seed_one_episode_and_training_seeds_alone():
