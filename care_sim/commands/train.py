@@ -1,7 +1,7 @@
 """`care-sim train`: the learners, each a command of its own, and the figure of learning curves."""
 
 import shlex
-from argparse import ArgumentError, ArgumentParser
+from argparse import ArgumentError, ArgumentParser, BooleanOptionalAction
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -44,6 +44,7 @@ class Learner(AgentConfig):
         """Those of the environment that the arguments name."""
         asked = ArgumentParser(add_help=False, allow_abbrev=False, exit_on_error=False)
         asked.add_argument("--env", nargs="+", default=cls.env)
+        asked.add_argument("--drawn", action=BooleanOptionalAction, default=cls.drawn)
         asked.add_argument("--hyperparameters", type=Path)
         try:
             told, _ = asked.parse_known_args([*arguments])
@@ -53,11 +54,11 @@ class Learner(AgentConfig):
         # A file that is not there is told when the command runs, as that of any other option.
         if told.hyperparameters is not None and not told.hyperparameters.exists():
             return {}
-        return read_hyperparameters(cls.kind, told.env, told.hyperparameters).values
+        return read_hyperparameters(cls.kind, told.env, told.hyperparameters, told.drawn).values
 
     def __call__(self) -> int:
         """Train it."""
-        table = read_hyperparameters(self.kind, self.env, self.hyperparameters)
+        table = read_hyperparameters(self.kind, self.env, self.hyperparameters, self.drawn)
         config = self.kind(**{one.name: getattr(self, one.name) for one in fields(self.kind)})
         print(*table.told(config), sep="\n", flush=True)
         if self.tune:
@@ -65,6 +66,7 @@ class Learner(AgentConfig):
             print(best.read_text(encoding="utf-8"), end="")
             line = ["care-sim", "train", config.algorithm, "--env", *config.env]
             line += ["--drawn"] if config.drawn else []
+            line += ["--without", *config.without] if config.without else []
             print(f"train with them: {shlex.join([*line, '--hyperparameters', str(best)])}")
             return 0
         train_agent(config)

@@ -10,8 +10,8 @@ from care_sim.base.checks import check_path, is_number
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.policies import BUILT_IN
 from care_sim.policies.learned.weights import Card, load_weights, shipped_weights
-from care_sim.study.parameters import Parameters, parameters
-from care_sim.training.config import AgentConfig
+from care_sim.study.parameters import Parameters
+from care_sim.training.config import AgentConfig, arguments_of
 from care_sim.training.folder import CONFIG, WEIGHTS, read_config
 
 _PACKAGE = Path(__file__).parents[1]
@@ -50,14 +50,10 @@ class Agent:
         # Of several environments the first; a parameter may be of one of them alone.
         env = card.scenario.partition(" ")[0]
         try:
-            texts = parameters([one for one in _listed(card, "env_parameters") if _is_text(one)])
+            texts = [one for one in _listed(card, "env_parameters") if _is_text(one)]
+            given = tuple(arguments_of(texts, env).items())
         except InvalidInput as error:
             raise InvalidInput(f"weights {path}: of its card, {error}") from error
-        given = tuple(
-            (name.rpartition(".")[2], value)
-            for name, value in texts
-            if name.rpartition(".")[0] in ("", env)
-        )
         return cls(policy, path, env, next(iter(budgets), cells), given)
 
 

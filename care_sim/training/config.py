@@ -1,7 +1,7 @@
 """What is trained, on what, and how long."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Literal, get_args
@@ -18,6 +18,8 @@ from care_sim.training.ablations import Part
 
 HOW_LONG = ("steps", "out", "resume", "tensorboard", "threads", "processes")
 """Fields in which a resumed run may differ from the run before."""
+BEFORE: Mapping[str, Any] = {"drawn": False, "without": []}
+"""Of runs that know neither: nothing was drawn, or left out."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,17 +107,15 @@ class AgentConfig:
 
     def arguments(self, env: str) -> dict[str, Any]:
         """Of one of the environments, besides the budget: those of all, and its own."""
-        given, own = dict[str, Any](), dict[str, Any]()
-        for name, value in parameters(self.env_parameters):
-            whose, dot, bare = name.rpartition(".")
+        for name, _ in parameters(self.env_parameters):
+            whose, dot, _ = name.rpartition(".")
             if dot:
                 check_known(f"environment of env_parameter {name}", whose, self.env)
-            if whose in ("", env):
-                (own if dot else given)[bare] = value
+        given = arguments_of(self.env_parameters, env)
         for name, option in (("budget", "--budget"), ("reward_weights", "--gain")):
-            if name in given | own:
+            if name in given:
                 raise InvalidInput(f"{name} is no env_parameter but set by {option}")
-        return given | own
+        return given
 
     def to_json(self) -> str:
         """As text that people can read."""
@@ -138,8 +138,7 @@ class AgentConfig:
 
         The message names the first difference.
         """
-        # Runs of before knew neither: nothing was drawn, or left out.
-        before = {"drawn": False, "without": [], **before}
+        before = {**BEFORE, **before}
         for name, value in self.recipe.items():
             if before.get(name) != value:
                 raise InvalidInput(
@@ -194,6 +193,18 @@ class SacConfig(AgentConfig):
     """Steps that are kept to learn from; 25 kB each."""
     batch: int = bounded(256, 2, 1_000_000)
     """Steps per gradient."""
+
+
+def arguments_of(env_parameters: Sequence[str], env: str) -> dict[str, Any]:
+    """The arguments NAME=VALUE of one of several environments: those of all, over which its own,
+    ENV.NAME=VALUE, win wherever they stand. Raises InvalidInput for another form.
+    """
+    given, own = dict[str, Any](), dict[str, Any]()
+    for name, value in parameters(env_parameters):
+        whose, dot, bare = name.rpartition(".")
+        if whose in ("", env):
+            (own if dot else given)[bare] = value
+    return given | own
 
 
 def check_drawn(config: AgentConfig) -> None:

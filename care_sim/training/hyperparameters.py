@@ -52,10 +52,11 @@ def names_of(kind: type[AgentConfig]) -> list[str]:
 
 
 def read_hyperparameters(
-    kind: type[AgentConfig], envs: Sequence[str], path: Path | None = None
+    kind: type[AgentConfig], envs: Sequence[str], path: Path | None = None, drawn: bool = False
 ) -> Hyperparameters:
     """What the file at `path`, or else the one that comes with the package, says of a learner in an
-    environment, or in several, which the table DEFAULT is for.
+    environment, or in several, which the table DEFAULT is for. Episodes that are `drawn` have a
+    reward without the term that `gain` weighs, which then says nothing.
 
     Raises InvalidInput for a file that is missing, damaged or has another form, for a name that is
     no hyperparameter, and for a value that the learner does not take.
@@ -71,8 +72,11 @@ def read_hyperparameters(
     where = f"{path} [{table}]"
     check_arguments(where, tables[table], names_of(kind))
     values = {name: _settled(kind, where, name, value) for name, value in tables[table].items()}
+    if drawn:
+        values.pop("gain", None)
     try:
-        kind(**values)
+        # In the environments, of one of which an env_parameter may be.
+        kind(**values, env=tuple(envs), drawn=drawn or len(envs) > 1)
     except InvalidInput as error:
         raise InvalidInput(f"{where}: {error}") from error
     return Hyperparameters(values, path, table)

@@ -76,6 +76,27 @@ def test_the_defaults_of_a_command_are_those_of_its_environment(own):
     assert (other.noise, other.epochs) == (1, PpoConfig().epochs)
 
 
+def test_what_is_of_one_of_several_environments_may_stand_in_a_file(tmp_path):
+    path = tmp_path / "own.toml"
+    path.write_text('[default]\nenv_parameters = ["CARE-NCAP-v0.speed_kph=0"]\n')
+    several = ("--env", "CARE-Dense-v0", "CARE-NCAP-v0", "--hyperparameters", path)
+    assert asked("ppo", "--drawn", *several).arguments("CARE-NCAP-v0") == {"speed_kph": 0}
+    with pytest.raises(InvalidInput, match="unknown environment of env_parameter CARE-NCAP"):
+        asked("ppo", "--hyperparameters", path)
+
+
+def test_the_gain_of_a_table_says_nothing_of_drawn_episodes(tmp_path):
+    path = tmp_path / "own.toml"
+    path.write_text("[default]\ngain = 3.0\nepochs = 2\n")
+    command = asked("ppo", "--drawn", "--hyperparameters", path)
+    assert (command.gain, command.epochs) == (PpoConfig.gain, 2)
+    assert asked("ppo", "--hyperparameters", path).gain == 3.0
+    table = read_hyperparameters(PpoConfig, command.env, path, drawn=True)
+    assert table.told(command) == [f"hyperparameters of {path} [default]: epochs 2"]
+    with pytest.raises(InvalidInput, match="gain weighs a term of another reward"):
+        asked("ppo", "--drawn", "--hyperparameters", path, "--gain", 3.0)
+
+
 def test_an_option_wins_also_where_it_is_the_default_of_the_command(own):
     default = PpoConfig().epochs
     line = ("ppo", "--env", "cutin", "--hyperparameters", own, "--epochs", default)
@@ -165,6 +186,8 @@ def test_a_table_that_is_written_reads_the_same(tmp_path_factory, rate, epochs, 
 def test_what_belongs_to_one_run_is_no_hyperparameter(kind):
     assert {field.name for field in fields(kind)} - {*names_of(kind)} == {
         "env",
+        "drawn",
+        "without",
         "seed",
         "out",
         "resume",
