@@ -79,6 +79,10 @@ class Folder:
             )
         self._curve = read_curve(self.path / CURVE) if config.resume else []
         self._episodes = read_episodes(self.path) if config.resume else []
+        # A trial begins with the rules that were scored before.
+        if not config.resume and (self.path / RULES).exists():
+            rows = read_episodes(self.path)
+            self._episodes = [row for row in rows if row.policy != LEARNER]
 
     def begin(self, model: "BaseAlgorithm") -> None:
         """Write the configuration down, and the learner as it is.

@@ -23,6 +23,7 @@ from typing import Any
 from care_sim.base.errors import InvalidInput, MissingExtra, one_line
 from care_sim.base.files import write_text
 from care_sim.training.config import AgentConfig
+from care_sim.training.episodes import LEARNER, read_episodes, write_episodes
 from care_sim.training.folder import CONFIG, CURVE, RULES, read_curve
 from care_sim.training.hyperparameters import as_table, names_of, table_of
 
@@ -55,7 +56,7 @@ def tune(config: AgentConfig, trials: int, train: Train) -> Path:
     """Try sets of hyperparameters until so many `trials` are done; returns the file of the best.
 
     Raises InvalidInput where the folder holds another study, or one that `config.resume` does not
-    ask for; MissingExtra without Optuna.
+    ask for, and where no trial could be completed; MissingExtra without Optuna.
     """
     optuna = _import_optuna()
     study = _opened(optuna, config)
@@ -71,7 +72,10 @@ def tune(config: AgentConfig, trials: int, train: Train) -> Path:
         told = "" if reached is None else f", return {reached:.2f}"
         _say(f"trial {trial.number}: {state.name.lower()}{told}")
         _write_best(optuna, study, config)
-    return _write_best(optuna, study, config)
+    best = _write_best(optuna, study, config)
+    if not best.exists():
+        raise InvalidInput(f"{config.out}: none of the trials was completed, {trials} were begun")
+    return best
 
 
 def spaces_of(config: AgentConfig) -> Iterator[str]:
@@ -164,6 +168,8 @@ def _take_rules(first: Path, folder: Path) -> None:
     """Rules are scored once: all trials are evaluated on the same episodes."""
     if (first / RULES).exists() and not (folder / RULES).exists():
         folder.mkdir(parents=True, exist_ok=True)
+        # The table first, as a run writes them.
+        write_episodes(folder, [row for row in read_episodes(first) if row.policy != LEARNER])
         write_text(folder / RULES, (first / RULES).read_text(encoding="utf-8"))
 
 

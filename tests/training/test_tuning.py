@@ -8,9 +8,11 @@ from dataclasses import replace
 import pytest
 
 from care_sim.base.errors import InvalidInput, MissingExtra
+from care_sim.base.seed_ranges import VALIDATION
 from care_sim.cli import main
 from care_sim.training.config import PpoConfig, SacConfig
-from care_sim.training.folder import CONFIG, CURVE, CURVE_COLUMNS
+from care_sim.training.episodes import LEARNER, EpisodeRow, Played, read_episodes, write_episodes
+from care_sim.training.folder import CONFIG, CURVE, CURVE_COLUMNS, Folder
 from care_sim.training.hyperparameters import names_of, read_hyperparameters
 from care_sim.training.tuning import BEST, SPACES, TRIALS, spaces_of, tune
 
@@ -73,7 +75,9 @@ def test_trials_begin_with_what_is_given_and_the_best_is_written(config):
     assert trials["000"] == {name: getattr(config, name) for name in SPACES}
     assert len({tuple(values.values()) for values in trials.values()}) == 9
     # All else, the seed too, is as asked.
-    assert {(one.seed, one.hidden, one.env) for one in learner.trained} == {(0, 4, "CARE-CutIn-v0")}
+    assert {(one.seed, one.hidden, one.env) for one in learner.trained} == {
+        (0, 4, ("CARE-CutIn-v0",))
+    }
     # A curve counts by its best evaluation, which is the last but one.
     returns = {
         name: -abs(math.log(values["learning_rate"] / BEST_RATE))
@@ -81,7 +85,7 @@ def test_trials_begin_with_what_is_given_and_the_best_is_written(config):
         if len((config.out / TRIALS / name / CURVE).read_text().splitlines()) == 4
     }
     best = max(returns, key=returns.get)
-    table = read_hyperparameters(PpoConfig, "cutin", path)
+    table = read_hyperparameters(PpoConfig, ["cutin"], path)
     assert {name: table.values[name] for name in SPACES} == trials[best]
     assert [*table.values] == names_of(PpoConfig)
     assert table.values["hidden"] == 4
@@ -127,6 +131,37 @@ def test_a_trial_whose_numbers_burst_fails_alone(config, capsys):
     told = capsys.readouterr().out
     assert "trial 1: Expected parameter loc to satisfy the constraint Real()\ntrial 1: fail" in told
     assert "trial 2: complete" in told
+
+
+def test_where_every_trial_fails_that_is_told(config):
+    def train(*_):
+        raise ValueError("no number")
+
+    with pytest.raises(InvalidInput, match="study: none of the trials was completed, 2 were begun"):
+        tune(config, 2, train)
+
+
+def test_every_trial_tells_of_the_episodes_of_the_rules(config):
+    """Scored in the first, they are kept by the others, which begin a run of their own."""
+    played = Played(VALIDATION, "CARE-CutIn-v0", -1.0, 20.0)
+    scored = []
+
+    def train(one, evaluated):
+        folder = Folder(one)
+
+        def score():
+            scored.append(one.out.name)
+            return {"care": [played]}
+
+        folder.rules(score)
+        write_episodes(one.out, [*folder._episodes, EpisodeRow(LEARNER, 0, played)])
+        Learner()(one, evaluated)
+
+    tune(config, 3, train)
+    assert scored == ["000"]
+    rows = [EpisodeRow("care", 0, played), EpisodeRow(LEARNER, 0, played)]
+    for number in range(3):
+        assert read_episodes(config.out / TRIALS / f"{number:03d}") == rows
 
 
 def test_another_study_is_not_mixed_in(config):
