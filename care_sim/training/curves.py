@@ -14,7 +14,7 @@ import numpy as np
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats
-from care_sim.training.config import HOW_LONG
+from care_sim.training.config import BEFORE, HOW_LONG
 from care_sim.training.episodes import LEARNER, EpisodeRow, read_episodes
 from care_sim.training.folder import (
     CONFIG,
@@ -44,8 +44,9 @@ class TrainingRun:
     @property
     def recipe(self) -> str:
         """What is the same in all runs of a panel: the configuration without seed and length."""
+        told = {**BEFORE, **self.config}
         return json.dumps(
-            {name: self.config[name] for name in self.config if name not in ("seed", *HOW_LONG)}
+            {name: told[name] for name in told if name not in ("seed", *HOW_LONG)}, sort_keys=True
         )
 
     @property
@@ -173,7 +174,8 @@ def scores_at(runs: Sequence[TrainingRun], steps: int) -> Floats:
 
 
 def recipe_name(config: Mapping[str, Any]) -> str:
-    """The learner, its environments, and what it was trained without."""
+    """The learner, its environments, whether episodes were drawn, and what was left out."""
     envs = ", ".join(np.atleast_1d(config["env"]).tolist())
     without = " ".join(config.get("without", ()))
-    return f"{config['algorithm']}, {envs}" + (f", without {without}" if without else "")
+    drawn = ", drawn" if config.get("drawn") else ""
+    return f"{config['algorithm']}, {envs}{drawn}" + (f", without {without}" if without else "")

@@ -57,7 +57,8 @@ def _draw(axes: Axes, runs: Sequence[TrainingRun]) -> None:
     _all_seeds(axes, runs, colours[learner])
     # A run is evaluated before its first step too, so the last step may be 0.
     axes.set_xlim(0, max(1, *(run.steps[-1] for run in runs)))
-    if runs[0].closed_loop:
+    # Metres are never below 0; a score is where a learner falls behind `random`.
+    if runs[0].closed_loop and len(runs[0].tasks) == 1:
         axes.set_ylim(bottom=0)
     last = float(np.mean([_middle(run.scores[-1]) for run in runs]))
     _name_lines(axes, marks | {learner: last}, colours)

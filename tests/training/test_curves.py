@@ -74,7 +74,7 @@ def test_environments_weigh_alike_whatever_their_returns_are(tmp_path):
     np.testing.assert_allclose(runs[0].marks["care"], [0.5, 0.5])
 
     (row,) = curves_table([runs]).rows
-    assert row[:2] == ("ppo, CARE-NCAP-v0, CARE-Street-v0", "2")
+    assert row[:2] == ("ppo, CARE-NCAP-v0, CARE-Street-v0, drawn", "2")
     # The middle two of 0.4, 0.6, 0.8 and 1; in each environment the worse or the better run.
     assert row[2:5] == ("100", "0.70 [0.60, 0.80]", "score (random 0, full 1)")
     assert row[5:] == ("random from 0, care from 100", "2 min")
@@ -151,6 +151,21 @@ def learned(axes):
 
 def test_runs_that_differ_by_their_seed_lie_together(folders):
     assert [len(group) for group in grouped_runs(map(read_run, folders))] == [2, 1, 1]
+
+
+def test_a_run_of_before_lies_with_those_of_its_recipe(folders):
+    config = json.loads((folders[0] / "config.json").read_text())
+    del config["drawn"], config["without"]
+    (folders[0] / "config.json").write_text(json.dumps(config))
+    assert [len(group) for group in grouped_runs(map(read_run, folders))] == [2, 1, 1]
+
+
+def test_who_is_behind_random_is_drawn_below_0(tmp_path):
+    path = varied(tmp_path / "0", PpoConfig(**VARIED), [(-0.5, -0.5), (0.4, 0.8)])
+    lines = (path / "curve.csv").read_text().splitlines()
+    # Both environments have metres.
+    (path / "curve.csv").write_text("\n".join([lines[0], *(f"{one}10" for one in lines[1:])]))
+    assert curves_figure([[read_run(path)]]).axes[0].get_ylim()[0] < -0.5
 
 
 def test_a_panel_a_task_a_line_a_seed_and_their_mean(folders, tmp_path):
