@@ -5,6 +5,8 @@ from typing import Any
 
 import gymnasium
 
+from care_sim.base.errors import InvalidInput
+from care_sim.core.grid_stack import Grid
 from care_sim.core.rig import Rig
 from care_sim.envs.sensing import SensingEnv, sensing
 from care_sim.training.draws import Draw, drawn
@@ -18,7 +20,7 @@ class DrawnEnv(gymnasium.Env[Any, Any]):
 
     `unwrapped` and `rig` are those of the running episode; before the first one, of an episode of
     the first environment. Raises InvalidInput at once for what is wrong with any of the
-    environments.
+    environments, and for LiDARs that differ.
     """
 
     def __init__(
@@ -30,11 +32,16 @@ class DrawnEnv(gymnasium.Env[Any, Any]):
     ):
         self._make = make
         self._given = places, budgets, faulty
+        grids = list[Grid]()
         # Mirrored, since not every sensor can be. The first one last: its spaces stay.
         for place in reversed(range(places)):
             for budget in budgets:
                 self._env = make(Draw(place, budget, {}, True, 0, 0))
                 self._env.close()
+            grids.append(self.rig.grid)
+        # What is kept is of one grid, and its card tells that of the last episode.
+        if any(grid != grids[0] for grid in grids):
+            raise InvalidInput("episodes can be drawn only of environments with the same LiDAR")
         self._follow()
 
     @property

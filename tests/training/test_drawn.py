@@ -225,6 +225,13 @@ def test_what_is_wrong_with_any_of_the_environments_is_told_before_the_first_epi
             wrapped(config)
 
 
+def test_environments_with_other_lidars_are_refused():
+    """Pictures of both fit one network, but its weights would fit one grid alone."""
+    config = replace(CONFIG, env_parameters=("CARE-NCAP-v0.sensor=os1-64",))
+    with pytest.raises(InvalidInput, match="only of environments with the same LiDAR"):
+        wrapped(config)
+
+
 def test_a_lone_environment_is_written_as_it_was_before_there_could_be_several():
     assert PpoConfig(env="CARE-CutIn-v0").recipe["env"] == "CARE-CutIn-v0"
     assert PpoConfig(env="CARE-CutIn-v0") == PpoConfig(env=("CARE-CutIn-v0",))
