@@ -21,8 +21,8 @@ class Enjoy(Watched):
     """Play a trained agent: timeline, clip, recording or viewer.
 
     Play one episode of a trained agent, where it learned unless told otherwise: timeline, clip,
-    recording or viewer. What it learned with counts where an option has its default; with
-    --scenario it does not count at all.
+    recording or viewer. Of several environments that is the first, without drawn faults. What it
+    learned with counts where an option has its default; with --scenario it does not count at all.
     """
 
     agent: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="AGENT")]

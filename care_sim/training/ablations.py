@@ -9,7 +9,8 @@
 
 Pictures are taken away by a matrix before the first layer. It is multiplied into the weights that
 are kept, which therefore act in NumPy like any others. Tracks are in four pictures: `forecast` and
-`undetected` vanish, and `residual` and `explained`, which forecasts tell apart, become one.
+`undetected` vanish, and `residual` and `explained`, which forecasts tell apart, become one. `fired`
+and `nearness` stay: they show the last scan, hulls at which the allocator fired among the rest.
 """
 
 from collections.abc import Collection

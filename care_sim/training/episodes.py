@@ -22,7 +22,7 @@ _LARGEST_DRAWN = 1e30
 
 class Played(NamedTuple):
     """How an episode was played: the return, and the metres at which the first-sighting actor was
-    detected, 0 where it never was; None where nobody is to be met.
+    detected, 0 where it never was; None in the open loop.
     """
 
     seed: int

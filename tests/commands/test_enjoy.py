@@ -70,6 +70,21 @@ def test_it_plays_where_the_agent_learned_and_with_its_conditions(capsys, mine):
     assert hash_of(away[1]) == hash_of(there[1])
 
 
+def test_of_several_environments_the_first_counts_and_its_own_parameter_wins(mine):
+    file = load_weights(mine / "weights.npz")
+    own = ["CARE-NCAP-v0.speed_kph=0", "speed_kph=20", "CARE-Dense-v0.vehicles=2"]
+    learned = file.card.result["config"] | {"env_parameters": [*own, "scoring_info=True"]}
+    names = "CARE-NCAP-v0 CARE-Dense-v0"
+    card = replace(file.card, scenario=names, result={"config": learned})
+    save_weights(mine / "weights.npz", file.arrays, card)
+    agent = find_agent(str(mine))
+    assert agent.env == "CARE-NCAP-v0"
+    assert dict(agent.env_parameters) == {"speed_kph": 0, "scoring_info": True}
+    play = AgentPlay(agent)
+    assert play.left_out() == ["scoring_info"]
+    assert play.options(Options()).scenario_parameters == ("speed_kph=0",)
+
+
 def test_a_shipped_agent_plays_by_either_name_and_is_filmed(capsys, tmp_path):
     film = tmp_path / "film.gif"
     line = ["run", "dense", "--policy", "ppo", "--budget", 0.03, *SHORT]

@@ -21,7 +21,14 @@ _OPTIONS = {one.name for one in fields(Options)} - {"detector_parameters"}
 """Parameters of environments that are options of commands, in the same form."""
 _OF_REPLAY = ("source", "scene", "split", "version")
 """Parameters that say which scene is played."""
-_NO_OPTION = ("detector_parameters", "keyframe_s", "presence", "render_mode", "secret")
+_NO_OPTION = (
+    "detector_parameters",
+    "keyframe_s",
+    "presence",
+    "render_mode",
+    "scoring_info",
+    "secret",
+)
 """Parameters that no command which plays one episode takes."""
 
 
