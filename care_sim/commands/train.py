@@ -16,6 +16,7 @@ from care_sim.training.detector import TrainDetector
 from care_sim.training.place_map import TrainPlace
 from care_sim.training.run import train_agent
 from care_sim.training.scorer import TrainScorer
+from care_sim.training.sets import TrainSets
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,6 +75,7 @@ LEARNERS: dict[str, Callable[..., Any]] = {
     "sac": TrainSac,
     "recurrent-ppo": TrainRecurrentPpo,
     "learned-scorer": TrainScorer,
+    "learned-sets": TrainSets,
     "place": TrainPlace,
     "detector": TrainDetector,
     "curves": DrawCurves,
