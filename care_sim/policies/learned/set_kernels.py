@@ -181,7 +181,7 @@ def _cut(
 
 @compiled()
 def _next_corner(
-    gains: Numbers, steps: Integers, done: int, size: int, gained: float
+    gains: Numbers, steps: Integers, done: int, size: int, gained: np.float32
 ) -> tuple[np.float32, int]:
     """The step that gains most per cell after `done` cells, which have `gained` so much, and that
     gain; -1 where no step gains.
