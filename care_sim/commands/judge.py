@@ -1,9 +1,10 @@
 """`care-sim judge`: detectors against what is there."""
 
 import json
-import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from concurrent.futures import BrokenExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,17 +12,18 @@ import numpy as np
 import tyro
 
 from care_sim.base.bounds import bounded, check_fields
-from care_sim.base.errors import InvalidInput
+from care_sim.base.errors import InvalidInput, report_problems
 from care_sim.base.files import JSON, check_output, write_text
 from care_sim.commands.shared.play_options import PlayOptions
 from care_sim.commands.shared.selection import check_values
-from care_sim.commands.shared.study_command import DONE, console
+from care_sim.commands.shared.study_command import DONE, FAILED, console
 from care_sim.evaluation.detector_quality import Counts, SceneBoxes, counts, curve, reliability
 from care_sim.perception.detectors import CLUSTER, PILLARS, PROXY, check_detector
 from care_sim.reports.detectors import Judged, detector_tables
 from care_sim.reports.figures.detectors import DETECTORS_FIGURE, detectors_figure
 from care_sim.reports.figures.files import check_figure, save
 from care_sim.sources.scenes import Scene, chosen_scenes
+from care_sim.study.episode_play import result_or_reason
 from care_sim.study.executors import CORES, MOST_WORKERS, processes
 from care_sim.study.judging import JudgedScene, Samples, judge_scene
 from care_sim.study.parameters import Parameters, parameters
@@ -29,6 +31,7 @@ from care_sim.study.play_config import PlayConfig, play_grid
 from care_sim.study.progress import shown_progress
 from care_sim.study.provenance import machine, versions
 from care_sim.study.run_config import FULL
+from care_sim.study.runner import DIED
 
 _FIGURES = "judge.json"
 _TABLES = "tables.md"
@@ -73,6 +76,8 @@ class Judge(PlayOptions):
         check_fields(self)
         check_values(self, "detectors", "least_scores")
         check_detector(self.against)
+        if self.detector != PROXY:
+            raise InvalidInput("judge takes --detectors, one or several, in place of --detector")
         for score in self.least_scores:
             if not 0 <= score <= 1:
                 raise InvalidInput(f"least_scores must be from 0 to 1, got {score:g}")
@@ -89,21 +94,34 @@ class Judge(PlayOptions):
         check_output(self.out / _FIGURES, JSON)
         check_output(self.out / _TABLES)
         check_figure(self.out / DETECTORS_FIGURE)
-        judged: dict[str, list[JudgedScene]] = {name: [] for name in self.detectors}
+        judged: dict[str, dict[str, JudgedScene]] = {name: {} for name in self._names}
+        problems = []
         # Whatever ends it, what is judged by then is told.
         try:
             with (
                 processes(self.workers) as pool,
                 shown_progress(len(plays), "scenes") as show,
             ):
-                for number, found in enumerate(pool.map(judge_scene, plays), 1):
-                    for name, one in zip(self.detectors, found, strict=True):
-                        judged[name].append(one)
+                found = pool.map(partial(result_or_reason, judge_scene), plays)
+                for number, (scene, each) in enumerate(zip(scenes, found, strict=True), 1):
+                    if isinstance(each, str):
+                        problems.append(f"failed: {scene.name}: {each}")
+                    else:
+                        for name, one in zip(self._names, each, strict=True):
+                            judged[name][scene.name] = one
                     show(number, "")
+        except BrokenExecutor:
+            problems.append(f"{DIED} that judges")
         finally:
-            if judged[self.detectors[0]]:
-                self._tell(scenes, judged)
-        return DONE
+            if judged[self._names[0]]:
+                self._tell(judged, plays[0][0])
+        report_problems(problems)
+        return FAILED if problems else DONE
+
+    @property
+    def _names(self) -> list[str]:
+        """The detectors, each once."""
+        return [*dict.fromkeys(self.detectors)]
 
     def _scenes(self) -> Sequence[Scene]:
         return chosen_scenes(self.scene_source().scenes(), self.scenes)
@@ -114,7 +132,7 @@ class Judge(PlayOptions):
         common = self.common([self.policy])
         floors, latencies = [common.pop("floor_seed")], [common.pop("camera_latency")]
         made = []
-        for name in self.detectors:
+        for name in self._names:
             check_detector(name)
             own = common | {"detector": name, "detector_parameters": self._parameters(name)}
             made.append(
@@ -124,45 +142,49 @@ class Judge(PlayOptions):
 
     def _parameters(self, detector: str) -> Parameters:
         given = parameters(self.detector_parameters)
-        owners = {name: name.partition(".")[0] for name, _ in given}
+        # A detector may be named by its place, which has dots, too.
+        owners = {name: name.rpartition(".")[0] for name, _ in given}
         if foreign := [name for name, owner in owners.items() if owner not in self.detectors]:
             raise InvalidInput(
                 f"detector parameters are given as DETECTOR.NAME=VALUE of one of "
                 f"{', '.join(self.detectors)}, got {foreign[0]}"
             )
         return tuple(
-            (name.partition(".")[2], value) for name, value in given if owners[name] == detector
+            (name.rpartition(".")[2], value) for name, value in given if owners[name] == detector
         )
 
-    def _tell(self, scenes: Sequence[Scene], judged: Judged) -> None:
-        boxes = {name: [one.boxes for one in own] for name, own in judged.items()}
-        tables = detector_tables(judged, self.least_scores, self.against)
-        played = [scene.name for scene, _ in zip(scenes, boxes[self.detectors[0]], strict=False)]
-        write_text(self.out / _FIGURES, json.dumps(self._report(played, judged), indent=1) + "\n")
+    def _tell(self, judged: Mapping[str, Mapping[str, JudgedScene]], play: PlayConfig) -> None:
+        scenes = {name: [*own.values()] for name, own in judged.items()}
+        boxes = {name: [one.boxes for one in own] for name, own in scenes.items()}
+        tables = detector_tables(scenes, self.least_scores, self.against)
+        told = self._report([*judged[self._names[0]]], scenes, play)
+        write_text(self.out / _FIGURES, json.dumps(told, indent=1) + "\n")
         write_text(self.out / _TABLES, "\n".join(table.markdown() for table in tables))
         save(detectors_figure(boxes), self.out / DETECTORS_FIGURE)
+        # Samples of another run beside these would be scored as if they were of these scenes.
+        for old in (self.out / _OFFICIAL).glob("*.json"):
+            old.unlink()
         if self.official:
-            for name, own in judged.items():
+            for name, own in scenes.items():
                 self._write_samples(name, [one.reported for one in own])
-            self._write_samples(_TRUTH, [one.true for one in judged[self.detectors[0]]])
+            self._write_samples(_TRUTH, [one.true for one in scenes[self._names[0]]])
         for table in tables:
             console().print(table.rich(self.out / _TABLES))
-        if len(played) < len(scenes):
-            print(f"of the first {len(played)} of {len(scenes)} scenes alone", file=sys.stderr)
         print(f"Tables: {self.out / _TABLES}\nFigure: {self.out / DETECTORS_FIGURE}.png")
 
     def _write_samples(self, name: str, scenes: Sequence[Samples]) -> None:
         samples = {token: boxes for scene in scenes for token, boxes in scene.items()}
         write_text(self.out / _OFFICIAL / f"{name}.json", json.dumps(samples))
 
-    def _report(self, scenes: Sequence[str], judged: Judged) -> dict[str, Any]:
-        """Everything that the tables and the figure show, as plain values."""
+    def _report(self, names: Sequence[str], judged: Judged, play: PlayConfig) -> dict[str, Any]:
+        """Everything that the tables and the figure show, and what was played, as plain values."""
+        row = play.row()
+        conditions = {name: row[name] for name in row if not name.startswith(("scene", "detector"))}
         return {
-            "source": self.source.partition(":")[0],
-            "scenes": scenes,
-            "policy": self.policy,
-            "budget": self.budget,
+            "scenes": [*names],
+            "conditions": conditions,
             "detector_parameters": [list(pair) for pair in parameters(self.detector_parameters)],
+            "least_scores": list(self.least_scores),
             "versions": versions(),
             "machine": machine(),
             "detectors": {

@@ -23,6 +23,7 @@ from care_sim.training.hyperparameters import read_hyperparameters
 from care_sim.training.place_map import TrainPlace
 from care_sim.training.run import train_agent
 from care_sim.training.scorer import TrainScorer
+from care_sim.training.sets import TrainSets
 from care_sim.training.tuning import tune
 
 
@@ -126,6 +127,7 @@ LEARNERS: dict[str, Callable[..., Any]] = {
     "sac": TrainSac,
     "recurrent-ppo": TrainRecurrentPpo,
     "learned-scorer": TrainScorer,
+    "learned-sets": TrainSets,
     "place": TrainPlace,
     "detector": TrainDetector,
     "curves": DrawCurves,

@@ -2,8 +2,8 @@
 score on.
 
 A box is right if it serves an object by the rule of the scoring (`care_sim.perception.matching`).
-By that rule detections choose in descending order of score. So those below a score take nothing
-from those above it, and one play tells what every least score would have found.
+By that rule detections with scores choose in descending order of them. So those below a score take
+nothing from those above it, and one play tells what every least score would have found.
 """
 
 from collections.abc import Sequence
@@ -144,7 +144,8 @@ def curve(scenes: Sequence[SceneBoxes], points: int = 200) -> Floats:
     scores, shares = _by_least_score(scenes)
     rows = np.unique(np.linspace(0, max(len(scores) - 1, 0), min(points, len(scores))).astype(int))
     found = np.sort(np.concatenate([one.found_at for one in scenes]))
-    recall = 1 - np.searchsorted(found, scores[rows]) / max(len(found), 1)
+    missed = np.searchsorted(found, scores[rows])
+    recall = 1 - missed / len(found) if len(found) else np.full(len(rows), np.nan)
     return np.stack([scores[rows], recall, shares[rows]], axis=1)
 
 

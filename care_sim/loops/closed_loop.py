@@ -169,6 +169,18 @@ class ClosedLoop:
             ),
         )
 
+    def true_objects(self, tracks: Tracks) -> Integers:
+        """(n,) the bodies behind tracks, NO_OBJECT for a track without one. Truth: for training
+        alone.
+        """
+        return self._track_objects.behind(tracks)
+
+    def bodies_behind_cells(self) -> Integers:
+        """(N,) the body that every cell would return from now, NO_BODY for none. Truth: for
+        training alone.
+        """
+        return self._lidar.bodies(self.sensor)
+
     def full_scan(self) -> Scan:
         """What every cell would return now, before noise and dropout. Truth: for the privileged
         alone.

@@ -23,6 +23,7 @@ from care_sim.policies.controls.rows import Rows
 from care_sim.policies.controls.stride import Stride
 from care_sim.policies.controls.sweep import Sweep
 from care_sim.policies.learned.learned_scorer import LearnedScorer
+from care_sim.policies.learned.learned_sets import LearnedSets
 from care_sim.policies.learned.ppo import PpoDartoutPolicy, PpoPolicy
 from care_sim.policies.makers import (
     PolicyMaker,
@@ -81,6 +82,7 @@ BUILT_IN: dict[str, PolicyMaker | EntryPoint] = {
         RandomPoints,
         FarthestPoints,
         LearnedScorer,
+        LearnedSets,
         PpoPolicy,
         PpoDartoutPolicy,
         CareSpread,

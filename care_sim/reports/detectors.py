@@ -35,7 +35,7 @@ def detector_tables(judged: Judged, least_scores: Sequence[float], against: str)
     class by class.
     """
     boxes = {name: [scene.boxes for scene in scenes] for name, scenes in judged.items()}
-    return [_overall(judged, boxes, least_scores, against), _by_class(boxes, least_scores)]
+    return [_overall(judged, boxes, least_scores, against), _by_class(boxes, least_scores, against)]
 
 
 def has_scores(scenes: Sequence[SceneBoxes]) -> bool:
@@ -61,13 +61,18 @@ def _overall(
         for least in least_scores:
             found = counts(scenes, least)
             rows.append((name, f"{least:g}", *_shares(found, scans), error, time, "-", "-"))
-        if theirs is None or name == against:
+        if theirs is None:
+            continue
+        if name == against:
+            rows.append((name, "all", *_shares(theirs, scans), error, time, "-", "-"))
             continue
         alike = score_of_precision(scenes, theirs.precision)
-        if alike is not None:
-            ours = counts(scenes, alike)
-            label = f"{alike:.3f} *"
-            rows.append((name, label, *_shares(ours, scans), error, time, *_ahead(ours, theirs)))
+        if alike is None:
+            rows.append((name, "none *", *["-"] * 4, error, time, "-", "-"))
+            continue
+        ours = counts(scenes, alike)
+        label = f"{alike:.3f} *"
+        rows.append((name, label, *_shares(ours, scans), error, time, *_ahead(ours, theirs)))
     return Table(
         "Detectors",
         (
@@ -78,15 +83,18 @@ def _overall(
         tuple(rows),
         (
             *_NOTES,
-            f"* from this score on it is as precise as all that {against} reports; minus: "
-            "percentage points, with a 95% interval over scenes, paired, of five scenes or more. "
-            "Calibration error: of all that is reported.",
+            f"* the least score from which on it is at least as precise as all that {against} "
+            "reports, read off these scenes; minus: percentage points, with a 95% interval over "
+            "scenes, paired, of five scenes or more, for that score. Calibration error: of all "
+            "that is reported.",
         ),
     )  # fmt: skip
 
 
-def _by_class(boxes: Mapping[str, Sequence[SceneBoxes]], least_scores: Sequence[float]) -> Table:
-    rows = []
+def _by_class(
+    boxes: Mapping[str, Sequence[SceneBoxes]], least_scores: Sequence[float], against: str
+) -> Table:
+    rows: list[TableRow] = []
     for name, scenes in boxes.items():
         for least in least_scores if has_scores(scenes) else [0.0]:
             entries: list[str] = []
@@ -94,8 +102,25 @@ def _by_class(boxes: Mapping[str, Sequence[SceneBoxes]], least_scores: Sequence[
                 own = counts([scene.of_class(label) for scene in scenes], least)
                 entries += [_percent(own.recall), _percent(own.precision)]
             rows.append((name, f"{least:g}" if least else "-", *entries))
+        # At the precision of the other class by class: over all, a class of which one reports much
+        # that is wrong would decide.
+        if against in boxes and name != against and has_scores(scenes):
+            entries = []
+            for label in range(len(CLASSES)):
+                ours, theirs = (
+                    [scene.of_class(label) for scene in each] for each in (scenes, boxes[against])
+                )
+                alike = score_of_precision(ours, counts(theirs).precision)
+                same = None if alike is None else counts(ours, alike)
+                entries += [_percent(same.recall), _percent(same.precision)] if same else ["-", "-"]
+            rows.append((name, "*", *entries))
     columns = [f"{name}, {what}" for name in CLASSES for what in ("recall", "precision")]
-    return Table("By class", ("detector", "score from", *columns), tuple(rows), _NOTES[:1], names=2)
+    note = (
+        f"* in each class from the least score on from which it is as precise as {against} there."
+    )
+    return Table(
+        "By class", ("detector", "score from", *columns), tuple(rows), (*_NOTES[:1], note), names=2
+    )
 
 
 def _shares(found: Counts, scans: int) -> Iterator[str]:

@@ -47,6 +47,17 @@ class Lidar:
             scan = scan.take(np.diff(scan.cells, prepend=-1) > 0)
         return _without(scan, self._faults.dead)
 
+    def bodies(self, sensor: Frame) -> Integers:
+        """(N,) the body that every cell, fired once, would hit, NO_BODY for none; as in `peek`
+        nothing is drawn.
+        """
+        scan, bodies = self._cast(np.arange(self.grid.size), sensor)
+        found = np.full(self.grid.size, NO_BODY)
+        # Backwards, so that of a cell with two returns the nearer one, which comes first, stays.
+        found[scan.cells[::-1]] = bodies[::-1]
+        found[self._faults.dead] = NO_BODY
+        return found
+
     def hits(self, body: int, cells: Cells, sensor: Frame) -> int:
         """How many of `cells`, each fired once, would hit a body, before noise, crosstalk and
         dropout, which stay undrawn.

@@ -184,6 +184,7 @@ def test_seeds_of_several_splits_are_no_study(command, capsys, tmp_path, monkeyp
         "bench --out",
         "parity --out",
         "train learned-scorer --out",
+        "train learned-sets --out",
         "train detector --out",
         "report NOTHING -o",
     ],

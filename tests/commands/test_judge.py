@@ -1,6 +1,7 @@
 """`care-sim judge` over a hand-built drive."""
 
 import json
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
@@ -15,13 +16,15 @@ def run(*arguments):
 
 def test_detectors_are_judged_told_and_not_replaced(drive, tmp_path, capsys):
     out = tmp_path / "out"
-    options = ("--source", f"argoverse2:{drive}", "--workers", "1", "--out", str(out))
-    detectors = ("--detectors", "returns", "cluster", "graded", "--least-scores", "0.2")
+    played = ("--source", f"argoverse2:{drive}", "--workers", "1", "--out", str(out))
+    options = (*played, "--lidar-dropout", "0.1")
+    detectors = ("--detectors", "returns", "cluster", "graded", "returns", "--least-scores", "0.2")
     assert run(*options, *detectors) == 0
     printed = capsys.readouterr().out
     assert f"Tables: {out / 'tables.md'}" in printed
     told = json.loads((out / "judge.json").read_text())
-    assert told["source"] == "argoverse2"
+    assert told["conditions"]["source"] == "argoverse2"
+    assert told["conditions"]["lidar_dropout"] == 0.1
     sums = told["detectors"]["returns"]["from score"]["0"]
     # What the proxy reports it has the true boxes of.
     assert sums["right"] == sums["boxes"] == sums["found"] > 0
@@ -36,13 +39,40 @@ def test_detectors_are_judged_told_and_not_replaced(drive, tmp_path, capsys):
 
     assert run(*options, *detectors) == 2
     assert "holds what was judged before" in capsys.readouterr().err
+    (out / "official").mkdir()
+    (out / "official" / "of-before.json").write_text("{}")
     assert run(*options, "--detectors", "returns", "--force", "--official") == 0
+    assert not (out / "official" / "of-before.json").exists()
     truth, reported = (
         json.loads((out / "official" / f"{name}.json").read_text()) for name in ("truth", "returns")
     )
     assert [*truth] == [*reported]
     assert sum(map(len, reported.values())) == sums["boxes"]
     assert sum(map(len, truth.values())) == sums["frames"]
+
+
+class Fails:
+    """A detector that no scan suits."""
+
+    def detect(self, points, sensor_height_m):
+        raise RuntimeError("too bright")
+
+
+def test_a_detector_that_fails_is_named_and_ends_with_1(drive, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("care_sim.commands.judge.processes", ThreadPoolExecutor)
+    options = ("--source", f"argoverse2:{drive}", "--workers", "1", "--out", str(tmp_path / "out"))
+    assert run(*options, "--detectors", "returns", f"{__name__}:Fails") == 1
+    error = capsys.readouterr().err
+    assert "failed: drive: " in error
+    assert "RuntimeError: too bright" in error
+
+
+def test_parameters_of_a_detector_named_by_its_place_are_its_own(drive, tmp_path, capsys):
+    place = f"{__name__}:Fails"
+    options = ("--source", f"argoverse2:{drive}", "--out", str(tmp_path / "out"))
+    given = ("--detectors", place, "--detector-parameters", f"{place}.least=5")
+    assert run(*options, *given) == 2
+    assert f"unknown parameter of detector {place} 'least'" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -59,6 +89,7 @@ def test_detectors_are_judged_told_and_not_replaced(drive, tmp_path, capsys):
         (["--detectors", "cluster", "--scenes", "nowhere"], "nowhere"),
         (["--policy", "nobody", "--detectors", "cluster"], "unknown policy 'nobody'"),
         (["--detectors", "cluster", "--against", "nobody"], "unknown detector 'nobody'"),
+        (["--detector", "cluster"], "judge takes --detectors, one or several"),
     ],
 )
 def test_bad_options_are_refused_before_anything_is_played(

@@ -33,7 +33,7 @@ own.
 KEYFRAMES = 6
 OWN = {"care-spread": 1, "care-sightlines": 2, "care-sector": 2}
 """The policies of our own, and the layer of each in which its hulls come first."""
-CORE_FIRST = (*OWN, "place-hulls", "care-units")
+CORE_FIRST = (*OWN, "place-hulls", "care-units", "learned-sets")
 """The policies that list their sets with the core first."""
 PATTERNS = ("rows", "fan", "stride", "sweep", "place")
 

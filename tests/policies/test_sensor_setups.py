@@ -31,6 +31,7 @@ OF_A_GRID = (
     "place-hulls",
     "history-place",
     "learned-scorer",
+    "learned-sets",
     *(name for name in BUILT_IN if name.startswith("ppo")),
 )
 """Their weights fit the default grid alone."""

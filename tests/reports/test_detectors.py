@@ -45,7 +45,13 @@ def test_five_scenes_have_an_interval():
 
 def test_no_row_where_the_precision_is_out_of_reach():
     wrong = scene([0.9, 0.5], [False, False], [-np.inf, -np.inf])
-    assert len(rows({"plain": [PLAIN], "wrong": [wrong]})) == 2
+    *_, told = rows({"plain": [PLAIN], "wrong": [wrong]})
+    assert told == ("wrong", "none *", "-", "-", "-", "-", "70.0", "5.0", "-", "-")
+
+
+def test_at_the_precision_of_the_other_class_by_class():
+    _, by_class = detector_tables({"plain": [PLAIN], "sure": [SURE]}, [0.3], "plain")
+    assert by_class.rows[-1][:4] == ("sure", "*", "100.0", "50.0")
 
 
 def test_a_class_that_does_not_occur_has_no_share():

@@ -350,7 +350,7 @@ def test_a_budget_below_a_cell_and_weights_of_another_grid_are_refused():
     with pytest.raises(InvalidInput, match="leaves no cell of 16384"):
         gymnasium.make("CARE-Dense-v0", budget=1e-6)
     with gymnasium.make("CARE-Dense-v0", sensor="os1-64") as env:
-        for policy in ("place", "learned-scorer", "ppo"):
+        for policy in ("place", "learned-scorer", "learned-sets", "ppo"):
             with pytest.raises(InvalidInput, match=r"grid is columns 512 .*needed is columns 1024"):
                 care_sim.make_policy(policy, env)
 

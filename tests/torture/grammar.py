@@ -379,6 +379,7 @@ def _parameter_names(option):
         "path",
         "ppo.path",
         "learned-scorer.path",
+        "learned-sets.path",
         "none.x",
         "rig",
     ]

@@ -29,7 +29,7 @@ class CertifyConfig:
     """
 
     every: Annotated[bool, tyro.conf.arg(name="all"), tyro.conf.FlagCreatePairsOff] = False
-    """All 10,000 episodes, not only the first 2,100."""
+    """All 10,000 episodes, not only the first 3,050."""
     episode: int | None = None
     """This episode alone, by its number in the list."""
     workers: int = bounded(os.cpu_count() or 1, 1, MOST_WORKERS)

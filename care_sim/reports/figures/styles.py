@@ -31,6 +31,7 @@ _KNOWN = {
     "beam-reduce": ("#332288", ">"),
     "random": ("#999933", "X"),
     "learned-scorer": ("#117733", "p"),
+    "learned-sets": ("#1B7837", "3"),
     "ppo": ("#AA4499", "h"),
     "ppo-dartout": ("#661100", "*"),
     "care-sightlines": ("#000000", "d"),

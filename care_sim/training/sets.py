@@ -1,0 +1,118 @@
+"""Train the policy `learned-sets`: `care-sim train learned-sets` makes the shipped weights from
+nothing.
+
+Two rounds: in the first somebody else's policies play, in the second mostly this one with what the
+first has taught it, and it learns anew from the keyframes of both. One thread and fixed seeds: the
+same machine makes the same bytes.
+"""
+
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from care_sim.base.bounds import bounded, check_fields
+from care_sim.base.checks import LARGEST_INTEGER
+from care_sim.base.extras import import_torch
+from care_sim.base.files import ZIP, check_output
+from care_sim.base.seed_ranges import TRAINING, VALIDATION
+from care_sim.core.grid import AngularGrid
+from care_sim.core.rig import Rig
+from care_sim.policies.learned.learned_sets import LearnedSets
+from care_sim.policies.learned.set_items import ItemReader
+from care_sim.policies.learned.weights import Card, save_weights
+from care_sim.sensors.setups import DEFAULT_SETUP, sensor_setup
+from care_sim.study.provenance import machine_line, package_versions
+from care_sim.training.sets_data import Example, play
+from care_sim.training.sets_network import learn, losses_of
+
+ROUNDS: tuple[Mapping[str, int], ...] = (
+    {"drive": 24, "ncap": 48, "street": 10},
+    {"drive": 48, "ncap": 96, "street": 20},
+)
+"""How many worlds of each kind are played in each round."""
+HELD_OUT: Mapping[str, int] = {"drive": 4, "ncap": 8, "street": 2}
+"""Worlds of validation seeds, played as in the second round; the card tells the loss on them."""
+
+
+@dataclass(frozen=True)
+class TrainSets:
+    """Train `learned-sets` on drives, tests of Euro NCAP and streets of training seeds and write
+    its weights; needs the extra `rl`.
+    """
+
+    out: Path
+    """File to write."""
+    seed: int = bounded(0, 0, LARGEST_INTEGER)
+    """Of the first weights and the order of the examples."""
+    steps: int = bounded(3000, 1, LARGEST_INTEGER)
+    """Batches that are learned from in each round."""
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    def __call__(self) -> int:
+        """Run it."""
+        import_torch()
+        check_output(self.out, ZIP)
+        started = time.perf_counter()
+        places = place_count()
+        examples: list[Example] = []
+        first = TRAINING
+        with TemporaryDirectory() as folder:
+            own = None
+            for worlds in ROUNDS:
+                examples += gathered(worlds, first, own)
+                first += max(worlds.values())
+                own = Path(folder) / "own.npz"
+                arrays = learn(examples, places, self.seed, self.steps)
+                save_weights(own, arrays, Card(LearnedSets.name, AngularGrid()))
+            held_out = gathered(HELD_OUT, VALIDATION, own)
+        losses = {
+            f"loss per {what}, {name}": loss
+            for name, data in (("learned", examples), ("held out", held_out))
+            for what, loss in losses_of(arrays, data).items()
+        }
+        save_weights(self.out, arrays, _card(self, examples, losses))
+        told = ", ".join(f"{name} {loss:.4f}" for name, loss in losses.items())
+        print(f"{self.out}: {told}; {time.perf_counter() - started:.0f} s")
+        return 0
+
+
+def place_count() -> int:
+    """How many places of strips there are on the paper's grid."""
+    return int(ItemReader(Rig(), 1).places.max()) + 1
+
+
+def gathered(worlds: Mapping[str, int], first: int, own: Path | None) -> list[Example]:
+    """The keyframes of so many worlds of each kind, with seeds from the first on."""
+    examples: list[Example] = []
+    for kind, count in worlds.items():
+        for number in range(count):
+            told = f"{kind} {number + 1} of {count}"
+            print(told, end="   \r", file=sys.stderr, flush=True)
+            examples += play(kind, first + number, own)
+    return examples
+
+
+def _card(made: TrainSets, examples: Sequence[Example], losses: Mapping[str, float]) -> Card:
+    played = ", then ".join(
+        ", ".join(f"{count} of {kind}" for kind, count in worlds.items()) for worlds in ROUNDS
+    )
+    items = sum(len(one.answers) for one in examples)
+    last = TRAINING + sum(max(worlds.values()) for worlds in ROUNDS) - 1
+    return Card(
+        LearnedSets.name,
+        AngularGrid(),
+        setup=sensor_setup(DEFAULT_SETUP).label,
+        scenario="CARE-Drive-v0, CARE-NCAP-v0 and CARE-Street-v0",
+        data=f"{items} boxes and tracks of {len(examples)} keyframes; worlds {played}, the second "
+        "time mostly by itself",
+        seeds={"worlds": [TRAINING, last], "training": made.seed},
+        steps=made.steps,
+        machine=machine_line(),
+        versions=package_versions("care-sim", "numpy", "torch"),
+        result={name: round(loss, 5) for name, loss in losses.items()},
+    )

@@ -1,0 +1,157 @@
+"""The training of the sets: its labels are true, it learns, and it makes the same bytes again."""
+
+from contextlib import closing
+
+import numpy as np
+import pytest
+
+import care_sim
+from care_sim.cli import main
+from care_sim.core.boxes import planar_ranges
+from care_sim.core.grid import AngularGrid
+from care_sim.envs.scenarios import DriveEnv
+from care_sim.policies.learned.set_items import ITEM_INPUTS, STRIP_INPUTS, ItemReader, Items
+from care_sim.policies.learned.set_network import LEARNED_RETURNS, STEPS, SetNetwork
+from care_sim.policies.learned.weights import Card, load_weights, save_weights
+from care_sim.training import sets, sets_data, sets_network
+from care_sim.training.sets_data import Example
+
+torch = pytest.importorskip("torch")
+PLACES = 13 * 32
+
+
+def drawn(seed, count=200):
+    """Keyframes whose items are found after 6 cells if they are camera boxes, never if not."""
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        items = int(rng.integers(0, 6))
+        inputs = rng.random((items, len(ITEM_INPUTS))).astype(np.float32)
+        inputs[:, 0] = inputs[:, 0].round()
+        answers = np.where(inputs[:, 0] > 0, STEPS.index(6), len(STEPS)).astype(np.int8)
+        strips = rng.random((8, len(STRIP_INPUTS))).astype(np.float32)
+        places = rng.integers(0, PLACES, 8).astype(np.int16)
+        found = (places < 40).astype(np.float32)
+        yield Example(inputs, items, answers, places, strips, found, np.ones(8, np.float32))
+
+
+@pytest.fixture(scope="module")
+def learned():
+    return sets_network.learn([*drawn(0)], PLACES, 0, 300)
+
+
+def test_it_learns_what_there_is_to_learn(learned):
+    untaught = sets_network.learn([*drawn(0)], PLACES, 0, 1)
+    before, after = (sets_network.losses_of(one, [*drawn(1)]) for one in (untaught, learned))
+    assert after["items"] < 0.1 < before["items"]
+    assert after["strips"] < 0.5 * before["strips"]
+
+
+def test_what_acts_is_what_has_learned(learned, tmp_path):
+    """The loss by the chances of NumPy is that of PyTorch."""
+    save_weights(tmp_path / "w.npz", learned, Card("learned-sets", AngularGrid()))
+    network = SetNetwork(load_weights(tmp_path / "w.npz"), PLACES)
+    one = next(example for example in drawn(5) if len(example.answers) == 5)
+    items = Items(None, 0, one.inputs, one.strips)
+    shares = np.diff(network.chances(items), prepend=0, append=1)
+    told = -np.log(shares[np.arange(5), one.answers]).mean()
+    chances = network.strip_chances(items, one.places)
+    strips = -np.log(np.where(one.found > 0, chances, 1 - chances)).mean()
+    losses = sets_network.losses_of(learned, [one])
+    assert losses["items"] == pytest.approx(told, rel=1e-2)
+    assert losses["strips"] == pytest.approx(strips, rel=1e-3)
+
+
+def test_what_the_labels_say_comes_true():
+    """Of a drive under way: fired so many cells of a track, its object returns three times, and not
+    before; and every object that is new in a box is one that no track has.
+    """
+    rng = np.random.default_rng(0)
+    checked = new = 0
+    with closing(DriveEnv(budget=0.1, keyframe_s=0.5, duration_s=10.0)) as env:
+        policy = care_sim.make_policy("care-spread", env)
+        observation, _ = env.reset(seed=10_001)
+        reader = ItemReader(env.rig, STEPS[-1])
+        for _ in range(12):
+            items = reader.of(env.rig.read(observation))
+            example = sets_data._example(env, reader, items, rng)
+            behind = env.loop.bodies_behind_cells()
+            tracked = env.loop.true_objects(env.loop.belief.tracks)
+            present = [*env.loop.world.labels()]
+            boxes = env.loop.sensor.boxes_to_local(env.loop.world.boxes_of(np.array(present)))
+            near = {
+                body for body, far in zip(present, planar_ranges(boxes), strict=True) if far <= 50
+            }
+            assert len(example.answers) == len(items.sets) == items.boxes + len(tracked)
+            for row, answer in enumerate(example.answers.tolist()):
+                low = STEPS[answer - 1] if answer else 0
+                first, last = (items.sets[row][:end] for end in (low, (*STEPS, STEPS[-1])[answer]))
+                if row >= items.boxes:
+                    body = tracked[row - items.boxes]
+                    is_found = answer < len(STEPS)
+                    assert (
+                        (behind[last] == body).sum() >= LEARNED_RETURNS and body in near
+                    ) == is_found
+                    assert (behind[first] == body).sum() < LEARNED_RETURNS or not is_found
+                    checked += is_found
+                elif answer < len(STEPS):
+                    bodies, counts = np.unique(behind[last], return_counts=True)
+                    often = {*bodies[counts >= LEARNED_RETURNS].tolist()} & near
+                    assert often - {*tracked.tolist()}
+                    new += 1
+            observation, *_ = env.step(policy(observation))
+    assert checked > 20
+    assert new > 3
+
+
+def test_a_strip_is_found_by_its_returns_and_an_object_once():
+    numbers = np.full(16384, -1)
+    reader = ItemReader(care_sim.Rig(), 48)
+    numbers[reader.strips[10][:2]] = 0
+    numbers[reader.strips[11][:5]] = 0
+    numbers[reader.strips[20][:2]] = 1
+    numbers[reader.strips[30]] = 2
+    shares = sets_data._strip_shares(reader, numbers, np.array([True, True, False]))
+    assert np.flatnonzero(shares).tolist() == [11, 20]
+    assert shares[[11, 20]].tolist() == [1, 2 / 3]
+
+
+def trained(path, monkeypatch, *options):
+    monkeypatch.setattr(sets, "gathered", lambda worlds, first, own: [*drawn(first, 20)])
+    with pytest.raises(SystemExit) as end:
+        main(["train", "learned-sets", "--out", str(path), *options])
+    return end.value.code
+
+
+def test_the_command_writes_the_same_file_again_with_its_card(tmp_path, monkeypatch, capsys):
+    for name in ("one.npz", "two.npz"):
+        assert trained(tmp_path / "new" / name, monkeypatch, "--steps", "5", "--seed", "3") == 0
+    one, two = (tmp_path / "new" / name for name in ("one.npz", "two.npz"))
+    assert one.read_bytes() == two.read_bytes()
+    card = load_weights(one).card
+    assert (card.kind, card.steps, card.seeds["training"]) == ("learned-sets", 5, 3)
+    assert len(card.result) == 4
+    assert f"{one}: loss per items, learned" in capsys.readouterr().out
+
+
+def test_worlds_of_a_round_are_of_training_seeds_and_none_comes_twice(monkeypatch):
+    asked = []
+    monkeypatch.setattr(sets, "play", lambda *which: asked.append(which) or [])
+    first = 10_000
+    for worlds in sets.ROUNDS:
+        sets.gathered(worlds, first, None)
+        first += max(worlds.values())
+    played = [(kind, seed) for kind, seed, _ in asked]
+    assert len({*played}) == len(played)
+    assert min(seed for _, seed in played) == 10_000
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [(("--steps", "0"), "steps must be a whole number >= 1, got 0"), (("--sead", "0"), "--sead")],
+)
+def test_bad_options_are_refused_in_one_line(tmp_path, monkeypatch, capsys, options, message):
+    assert trained(tmp_path / "w.npz", monkeypatch, *options) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.startswith("care-sim: ")
+    assert error.count("\n") == 1
