@@ -80,7 +80,7 @@ GROUPS = {
         "judge": CommandEntry(
             "judge",
             "Judge",
-            "Judge detectors: what they find, how much of it is right, how sure they may be.",
+            "Judge detectors: what they find, and how much of it is right.",
         ),
         "export": CommandEntry(
             "export", "Export", "Write a policy's detections for the official nuScenes devkit."

@@ -41,7 +41,7 @@ _TRUTH = "truth"
 
 @dataclass(frozen=True, kw_only=True)
 class Judge(PlayOptions):
-    """Judge detectors: what they find, how much of it is right, how sure they may be.
+    """Judge detectors: what they find, and how much of it is right.
 
     Judge detectors on full scans, or on those of a policy: what they find, how much of it is right,
     how sure they may be, how long they take.

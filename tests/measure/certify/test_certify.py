@@ -96,7 +96,9 @@ def test_recordings_and_privileged_policies_play_in_vectors_too(source):
     beyond = replace(recorded[0], policy="history-oracle", keyframes=40)
     assert play_in_mode("sync", [beyond], source) == [alone(beyond, source)]
     privileged = of(
-        [e for e in LIST if e.policy == "history-oracle" and e.environment in CLOSED], 3
+        # A drive has six cameras, and no vector holds it beside another world.
+        [e for e in LIST if e.policy == "history-oracle" and e.environment in {*CLOSED} - {DRIVE}],
+        3,
     )
     assert play_in_mode("sync", privileged, source) == [alone(episode) for episode in privileged]
 
