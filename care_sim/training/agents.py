@@ -47,8 +47,9 @@ class Agent:
         # A card of one budget tells its cells; of those that fit any, that of a user's own.
         cells = card.budget / card.grid.size if card.budget is not None else _ANY_BUDGET
         budgets = [one for one in _listed(card, "budget") if is_number(one)]
-        # Of several environments the first; a parameter may be of one of them alone.
-        env = card.scenario.partition(" ")[0]
+        # Of several environments, with commas or without, the first; a parameter may be of one of
+        # them alone.
+        env = card.scenario.partition(" ")[0].rstrip(",")
         try:
             texts = [one for one in _listed(card, "env_parameters") if _is_text(one)]
             given = tuple(arguments_of(texts, env).items())

@@ -122,6 +122,13 @@ def test_every_agent_of_the_package_is_found_and_has_a_world():
         assert name in parsed_command(line[1:]).policies
 
 
+@pytest.mark.parametrize("agent", shipped_agents(), ids=lambda agent: agent.name)
+def test_every_agent_of_the_package_can_be_enjoyed(capsys, agent):
+    code, out, complaint = run(capsys, "enjoy", agent.name)
+    assert (code, complaint) == (0, "")
+    assert hash_of(out)
+
+
 @pytest.mark.parametrize(
     ("env", "given", "line"),
     [
