@@ -45,17 +45,17 @@ def judge_scene(configs: Sequence[PlayConfig]) -> list[JudgedScene]:
     Raises InvalidInput where the film of the scene cannot be made.
     """
     film = configs[0].film()
+    true = _in_range(film, [_as_detections(shot.annotations) for shot in film.shots])
     judged = []
     for config in configs:
         record = play_through_film(config, film)
         reports = [keyframe.detections for keyframe in record.keyframes]
-        truths = [_as_detections(shot.annotations) for shot in film.shots]
         judged.append(
             JudgedScene(
                 scene_boxes(record.score.sightings, reports),
                 _scan_ms(config, film),
                 _in_range(film, reports),
-                _in_range(film, truths),
+                true,
             )
         )
     return judged

@@ -51,7 +51,7 @@ RANGE_SIGMAS_M = (0.0, 0.02, 0.05)
 DROPOUTS = (0.0, 0.05, 0.2)
 OTHER_SETUPS = ("m1-forward", "os1-64", "paper-vehicle", "roof-and-corners")
 PLAYS_OF_FILM = 3
-"""A film costs thirty times what a play of it does."""
+"""Plays for which a film is made once."""
 SHARE_KEPT = 1 / 3
 """Of the keyframes of a play, drawn, that become examples: neighbours resemble each other."""
 RARE = (CLASSES.index("bus"), CLASSES.index("bicycle"))

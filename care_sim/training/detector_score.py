@@ -6,7 +6,7 @@ import numpy as np
 
 from care_sim.core.arrays import Floats, Mask
 from care_sim.core.types import CLASSES, Detections
-from care_sim.perception.matching import found_objects
+from care_sim.perception.matching import UNSERVED, served_by
 from care_sim.perception.pillars.decoding import Peaks, peaks_of
 from care_sim.perception.pillars.detector import LEAST_SCORE
 from care_sim.sensors.annotated import Annotations
@@ -53,14 +53,11 @@ def scores_by_scan(
 
 def right(peaks: Peaks, example: Example) -> Mask:
     """(n,) which peaks lie within 2 m of an object of their class that no surer one serves."""
-    free = np.ones(len(example.classes), bool)
+    there = Annotations(np.arange(len(example.classes)), example.classes, example.boxes)
+    many = np.ones(len(peaks.classes), np.int64)
+    server = served_by(there, Detections(peaks.classes, peaks.boxes, many, peaks.scores))
     served = np.zeros(len(peaks.classes), bool)
-    for n, (label, box) in enumerate(zip(peaks.classes, peaks.boxes, strict=True)):
-        alone = Annotations(np.flatnonzero(free), example.classes[free], example.boxes[free])
-        one = Detections(np.array([label]), box[None], np.array([1]), np.array([1.0]))
-        found = alone.objects[found_objects(alone, one)]
-        free[found] = False
-        served[n] = len(found) > 0
+    served[server[server != UNSERVED]] = True
     return served
 
 

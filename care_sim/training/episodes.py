@@ -10,9 +10,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from care_sim.base.checks import LARGEST_INTEGER, is_number
-from care_sim.base.errors import InvalidInput
 from care_sim.base.files import replacing
-from care_sim.base.json_text import check_file_size
+from care_sim.training.csv_tables import read_table
 
 EPISODES = "episodes.csv"
 LEARNER = "learner"
@@ -54,18 +53,7 @@ def read_episodes(folder: Path) -> list[EpisodeRow]:
     """The table of a run; of a run before there was one it is empty. Raises InvalidInput for a
     damaged file.
     """
-    path = folder / EPISODES
-    if not path.exists():
-        return []
-    try:
-        check_file_size(path)
-        with path.open(newline="", encoding="utf-8") as file:
-            head, *rows = csv.reader(file)
-        if tuple(head) != COLUMNS:
-            raise ValueError(f"its columns are not {', '.join(COLUMNS)}")
-        return [_row(row) for row in rows]
-    except (ValueError, csv.Error) as error:
-        raise InvalidInput(f"{path} is damaged: {error}") from error
+    return read_table(folder / EPISODES, COLUMNS, _row)
 
 
 def _row(row: Sequence[str]) -> EpisodeRow:

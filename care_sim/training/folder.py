@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any
 from care_sim.base.checks import LARGEST_INTEGER, check_known, is_number
 from care_sim.base.errors import InvalidInput
 from care_sim.base.files import replacing, write_text
-from care_sim.base.json_text import check_file_size, json_content
+from care_sim.base.json_text import json_content
 from care_sim.base.plugins import is_place
 from care_sim.base.scenario_names import scenario_of
 from care_sim.base.seed_ranges import TRAINING
@@ -34,6 +34,7 @@ from care_sim.policies.learned.weights import Card, save_weights
 from care_sim.scenarios import PLUGINS
 from care_sim.study.provenance import machine_line, package_versions, scenario_digest
 from care_sim.training.config import ALGORITHMS, AgentConfig
+from care_sim.training.csv_tables import read_table
 from care_sim.training.episodes import (
     LEARNER,
     EpisodeRow,
@@ -265,17 +266,7 @@ def _read_map(path: Path) -> dict[str, Any]:
 
 def read_curve(path: Path) -> list[Evaluation]:
     """The evaluations of a run, none yet included. Raises InvalidInput for a damaged file."""
-    if not path.exists():
-        return []
-    try:
-        check_file_size(path)
-        with path.open(newline="", encoding="utf-8") as file:
-            head, *rows = csv.reader(file)
-        if tuple(head) != CURVE_COLUMNS:
-            raise ValueError(f"its columns are not {', '.join(CURVE_COLUMNS)}")
-        return [_evaluation(row) for row in rows]
-    except (ValueError, csv.Error) as error:
-        raise InvalidInput(f"{path} is damaged: {error}") from error
+    return read_table(path, CURVE_COLUMNS, _evaluation)
 
 
 def _evaluation(row: list[str]) -> Evaluation:

@@ -46,7 +46,7 @@ OWN_SHARE = 0.6
 """Of the plays of later rounds that this policy plays itself."""
 LEAST_BUDGET, MOST_BUDGET = 0.005, 0.2
 PLAYS_OF_FILM = 8
-"""A film costs a hundred times what a play of it does."""
+"""Plays for which a film is made once."""
 KEYFRAMES_S = (0.1, 0.1, 0.2, 0.5)
 """Between two keyframes of a drive or a test."""
 KEPT_PER_S = 2
