@@ -12,9 +12,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import get_args
 
 from care_sim.base.bounds import bounded, check_fields
-from care_sim.base.checks import LARGEST_INTEGER
+from care_sim.base.checks import LARGEST_INTEGER, check_known
 from care_sim.base.extras import import_torch
 from care_sim.base.files import ZIP, check_output
 from care_sim.base.seed_ranges import TRAINING, VALIDATION
@@ -25,6 +26,7 @@ from care_sim.policies.learned.set_items import ItemReader
 from care_sim.policies.learned.weights import Card, save_weights
 from care_sim.sensors.setups import DEFAULT_SETUP, sensor_setup
 from care_sim.study.provenance import machine_line, package_versions
+from care_sim.training.set_ablations import Part
 from care_sim.training.sets_data import Example, play
 from care_sim.training.sets_network import learn, losses_of
 
@@ -49,9 +51,14 @@ class TrainSets:
     """Of the first weights and the order of the examples."""
     steps: int = bounded(3000, 1, LARGEST_INTEGER)
     """Batches that are learned from in each round."""
+    without: tuple[Part, ...] = ()
+    """What to leave out, to see what it is worth: what an item is told of the others; all that is
+    told of it but its kind; the map of places; faults of the camera."""
 
     def __post_init__(self) -> None:
         check_fields(self)
+        for part in self.without:
+            check_known("part to be without", part, get_args(Part))
 
     def __call__(self) -> int:
         """Run it."""
@@ -64,10 +71,10 @@ class TrainSets:
         with TemporaryDirectory() as folder:
             own = None
             for worlds in ROUNDS:
-                examples += gathered(worlds, first, own)
+                examples += gathered(worlds, first, own, "faults" not in self.without)
                 first += max(worlds.values())
                 own = Path(folder) / "own.npz"
-                arrays = learn(examples, places, self.seed, self.steps)
+                arrays = learn(examples, places, self.seed, self.steps, self.without)
                 save_weights(own, arrays, Card(LearnedSets.name, AngularGrid()))
             held_out = gathered(HELD_OUT, VALIDATION, own)
         losses = {
@@ -86,14 +93,16 @@ def place_count() -> int:
     return int(ItemReader(Rig(), 1).places.max()) + 1
 
 
-def gathered(worlds: Mapping[str, int], first: int, own: Path | None) -> list[Example]:
+def gathered(
+    worlds: Mapping[str, int], first: int, own: Path | None, faulty: bool = True
+) -> list[Example]:
     """The keyframes of so many worlds of each kind, with seeds from the first on."""
     examples: list[Example] = []
     for kind, count in worlds.items():
         for number in range(count):
             told = f"{kind} {number + 1} of {count}"
             print(told, end="   \r", file=sys.stderr, flush=True)
-            examples += play(kind, first + number, own)
+            examples += play(kind, first + number, own, faulty)
     return examples
 
 
@@ -109,7 +118,8 @@ def _card(made: TrainSets, examples: Sequence[Example], losses: Mapping[str, flo
         setup=sensor_setup(DEFAULT_SETUP).label,
         scenario="CARE-Drive-v0, CARE-NCAP-v0 and CARE-Street-v0",
         data=f"{items} boxes and tracks of {len(examples)} keyframes; worlds {played}, the second "
-        "time mostly by itself",
+        "time mostly by itself"
+        + (f"; without {' and '.join(made.without)}" if made.without else ""),
         seeds={"worlds": [TRAINING, last], "training": made.seed},
         steps=made.steps,
         machine=machine_line(),

@@ -72,39 +72,46 @@ class Example:
     weights: Numbers
 
 
-def play(kind: str, seed: int, own: Path | None) -> list[Example]:
+def play(kind: str, seed: int, own: Path | None, faulty: bool = True) -> list[Example]:
     """The examples of the street, the drive or the test of a seed. `own` are this policy's weights,
-    of the round before, None in the first.
+    of the round before, None in the first. Without `faulty` the camera has no fault.
     """
-    return [*_PLAYS[kind](seed, np.random.default_rng([seed, len(kind), own is not None]), own)]
+    rng = np.random.default_rng([seed, len(kind), own is not None])
+    return [*_PLAYS[kind](seed, rng, own, faulty)]
 
 
-def _street(seed: int, rng: np.random.Generator, own: Path | None) -> Iterator[Example]:
+def _street(
+    seed: int, rng: np.random.Generator, own: Path | None, faulty: bool
+) -> Iterator[Example]:
     film = record(make_street(seed))
     for shown in (film, front_alone(film)):
         for _ in range(PLAYS_OF_FILM // 2):
-            with closing(FilmEnv(shown, **_conditions(rng))) as env:
+            with closing(FilmEnv(shown, **_conditions(rng, faulty))) as env:
                 yield from _examples(env, seed, rng, own)
 
 
-def _drive(seed: int, rng: np.random.Generator, own: Path | None) -> Iterator[Example]:
+def _drive(
+    seed: int, rng: np.random.Generator, own: Path | None, faulty: bool
+) -> Iterator[Example]:
     told: dict[str, Any] = {"keyframe_s": float(rng.choice(KEYFRAMES_S))}
-    with closing(DriveEnv(**told, **_conditions(rng))) as env:
+    with closing(DriveEnv(**told, **_conditions(rng, faulty))) as env:
         yield from _examples(env, seed, rng, own)
 
 
-def _ncap(seed: int, rng: np.random.Generator, own: Path | None) -> Iterator[Example]:
+def _ncap(seed: int, rng: np.random.Generator, own: Path | None, faulty: bool) -> Iterator[Example]:
     told: dict[str, Any] = {"keyframe_s": float(rng.choice(KEYFRAMES_S))}
-    with closing(NcapEnv(test="drawn", speed_kph=0, **told, **_conditions(rng))) as env:
+    with closing(NcapEnv(test="drawn", speed_kph=0, **told, **_conditions(rng, faulty))) as env:
         yield from _examples(env, seed, rng, own)
 
 
 _PLAYS = {"street": _street, "drive": _drive, "ncap": _ncap}
 
 
-def _conditions(rng: np.random.Generator) -> dict[str, Any]:
+def _conditions(rng: np.random.Generator, faulty: bool) -> dict[str, Any]:
     low, high = np.log([LEAST_BUDGET, MOST_BUDGET])
     drawn = {"budget": float(np.exp(rng.uniform(low, high)))}
+    if not faulty:
+        return drawn
     kind = rng.random()
     if kind < BLIND_SHARE:
         return {**drawn, "false_negative_rate": 1.0}

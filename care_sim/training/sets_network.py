@@ -5,7 +5,7 @@ never: cross-entropy. What it says of a strip is a chance: logistic loss, agains
 detection. Both are proper, so that chances are chances, which the choice of cells relies on.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from care_sim.base.extras import import_torch
 from care_sim.base.torch_threads import one_thread
 from care_sim.policies.learned.set_items import ITEM_INPUTS, MIRRORED, STRIP_INPUTS
 from care_sim.policies.learned.set_network import STEPS
+from care_sim.training.set_ablations import kept_weights
 from care_sim.training.sets_data import Example
 
 UNITS, WIDTH, STRIP_UNITS = 48, 16, 16
@@ -26,12 +27,21 @@ RARE = 0.001
 """About the chance of a strip, from which the map begins."""
 
 
-def learn(examples: Sequence[Example], places: int, seed: int, steps: int) -> Arrays:
-    """The weights, after so many steps over shuffled batches; one thread."""
+def learn(
+    examples: Sequence[Example],
+    places: int,
+    seed: int,
+    steps: int,
+    without: Collection[str] = (),
+) -> Arrays:
+    """The weights, after so many steps over shuffled batches; one thread. `without` is what is left
+    out (`care_sim.training.set_ablations`).
+    """
     torch = import_torch()
     with one_thread(torch):
         torch.manual_seed(seed)
         arrays = _first_weights(torch, places)
+        _leave_out(torch, arrays, kept_weights(without))
         optimizer = torch.optim.Adam(arrays.values(), lr=LEARNING_RATE)
         schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, steps)
         rng = np.random.default_rng(seed)
@@ -80,6 +90,15 @@ def _first_weights(torch: Any, places: int) -> dict[str, Any]:
         "strip_out": torch.zeros(STRIP_UNITS),
     }
     return {name: array.requires_grad_() for name, array in arrays.items()}
+
+
+def _leave_out(torch: Any, arrays: dict[str, Any], kept: Arrays) -> None:
+    """What is not kept begins at 0, the map at its first value, and gets no gradient."""
+    for name, told in kept.items():
+        mask = torch.from_numpy(told)
+        if name != "map":
+            arrays[name].data *= mask
+        arrays[name].register_hook(mask.mul)
 
 
 def _losses(

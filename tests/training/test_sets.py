@@ -61,6 +61,51 @@ def test_what_acts_is_what_has_learned(learned, tmp_path):
     assert losses["strips"] == pytest.approx(strips, rel=1e-3)
 
 
+@pytest.mark.parametrize("without", [["attention"], ["inputs"], ["attention", "inputs", "place"]])
+def test_what_is_left_out_decides_nothing(without, tmp_path):
+    """And what is not left out does: weights of the same form, which act in NumPy."""
+    arrays = sets_network.learn([*drawn(0)], PLACES, 0, 60, without)
+    save_weights(tmp_path / "w.npz", arrays, Card("learned-sets", AngularGrid()))
+    network = SetNetwork(load_weights(tmp_path / "w.npz"), PLACES)
+    rng = np.random.default_rng(4)
+    inputs = rng.random((6, len(ITEM_INPUTS))).astype(np.float32)
+    inputs[:, 0] = inputs[:, ITEM_INPUTS.index("explained")] = 1
+    strips = rng.random((6, len(STRIP_INPUTS))).astype(np.float32)
+    chances = network.chances(Items(None, 0, inputs, strips))
+    others = inputs.copy()
+    others[1:, 0] = 0
+    among = network.chances(Items(None, 0, others, strips))
+    of_strips = network.strip_chances(Items(None, 0, inputs, strips), np.arange(6))
+    assert np.allclose(chances[0], among[0]) == ("attention" in without)
+    assert (np.ptp(chances, axis=0) < 1e-6).all() == ("inputs" in without)
+    assert (np.ptp(of_strips) < 1e-9) == ("place" in without)
+
+
+def test_constants_are_the_shares_of_each_kind():
+    """Without anything to tell items of a kind apart, what is learned are frequencies."""
+    constants = sets_network.learn([*drawn(0)], PLACES, 0, 300, ["attention", "inputs", "place"])
+    known = {name: np.asarray(array, np.float64) for name, array in constants.items()}
+    for kind, answer in ((0, len(STEPS)), (1, STEPS.index(6))):
+        inputs = np.zeros((1, len(ITEM_INPUTS)))
+        inputs[0, 0] = kind
+        units = np.maximum(inputs @ known["first"] + known["first_bias"], 0)
+        units = np.maximum(
+            np.hstack([units, 0 * units]) @ known["second"] + known["second_bias"], 0
+        )
+        assert (units @ known["out"] + known["out_bias"]).argmax() == answer
+
+
+def test_without_faults_the_camera_has_none(monkeypatch):
+    told = [sets_data._conditions(np.random.default_rng(seed), False) for seed in range(50)]
+    assert {name for one in told for name in one} == {"budget"}
+    faulty = [sets_data._conditions(np.random.default_rng(seed), True) for seed in range(50)]
+    assert [one["budget"] for one in told] == [one["budget"] for one in faulty]
+    asked = []
+    monkeypatch.setattr(sets, "play", lambda *which: asked.append(which[-1]) or [])
+    sets.gathered({"drive": 2}, 10_000, None, False)
+    assert asked == [False, False]
+
+
 def test_what_the_labels_say_comes_true():
     """Of a drive under way: fired so many cells of a track, its object returns three times, and not
     before; and every object that is new in a box is one that no track has.
@@ -116,7 +161,7 @@ def test_a_strip_is_found_by_its_returns_and_an_object_once():
 
 
 def trained(path, monkeypatch, *options):
-    monkeypatch.setattr(sets, "gathered", lambda worlds, first, own: [*drawn(first, 20)])
+    monkeypatch.setattr(sets, "gathered", lambda worlds, first, *_: [*drawn(first, 20)])
     with pytest.raises(SystemExit) as end:
         main(["train", "learned-sets", "--out", str(path), *options])
     return end.value.code
@@ -140,14 +185,18 @@ def test_worlds_of_a_round_are_of_training_seeds_and_none_comes_twice(monkeypatc
     for worlds in sets.ROUNDS:
         sets.gathered(worlds, first, None)
         first += max(worlds.values())
-    played = [(kind, seed) for kind, seed, _ in asked]
+    played = [(kind, seed) for kind, seed, *_ in asked]
     assert len({*played}) == len(played)
     assert min(seed for _, seed in played) == 10_000
 
 
 @pytest.mark.parametrize(
     ("options", "message"),
-    [(("--steps", "0"), "steps must be a whole number >= 1, got 0"), (("--sead", "0"), "--sead")],
+    [
+        (("--steps", "0"), "steps must be a whole number >= 1, got 0"),
+        (("--sead", "0"), "--sead"),
+        (("--without", "boxes"), "boxes"),
+    ],
 )
 def test_bad_options_are_refused_in_one_line(tmp_path, monkeypatch, capsys, options, message):
     assert trained(tmp_path / "w.npz", monkeypatch, *options) == 2
