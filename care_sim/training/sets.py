@@ -11,7 +11,6 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import get_args
 
 from care_sim.base.bounds import bounded, check_fields
@@ -68,21 +67,28 @@ class TrainSets:
         places = place_count()
         examples: list[Example] = []
         first = TRAINING
-        with TemporaryDirectory() as folder:
-            own = None
+        rounds = 0
+        # Whatever ends the learning, what the rounds before have taught is in the file.
+        try:
             for worlds in ROUNDS:
+                own = self.out if rounds else None
                 examples += gathered(worlds, first, own, "faults" not in self.without)
                 first += max(worlds.values())
-                own = Path(folder) / "own.npz"
                 arrays = learn(examples, places, self.seed, self.steps, self.without)
-                save_weights(own, arrays, Card(LearnedSets.name, AngularGrid()))
-            held_out = gathered(HELD_OUT, VALIDATION, own)
+                rounds += 1
+                save_weights(self.out, arrays, _card(self, examples, ROUNDS[:rounds]))
+            held_out = gathered(HELD_OUT, VALIDATION, self.out)
+        except BaseException:
+            if rounds:
+                told = f"{self.out} holds what {rounds} of {len(ROUNDS)} rounds have taught"
+                print(told, file=sys.stderr, flush=True)
+            raise
         losses = {
             f"loss per {what}, {name}": loss
             for name, data in (("learned", examples), ("held out", held_out))
             for what, loss in losses_of(arrays, data).items()
         }
-        save_weights(self.out, arrays, _card(self, examples, losses))
+        save_weights(self.out, arrays, _card(self, examples, ROUNDS, losses))
         told = ", ".join(f"{name} {loss:.4f}" for name, loss in losses.items())
         print(f"{self.out}: {told}; {time.perf_counter() - started:.0f} s")
         return 0
@@ -106,23 +112,28 @@ def gathered(
     return examples
 
 
-def _card(made: TrainSets, examples: Sequence[Example], losses: Mapping[str, float]) -> Card:
+def _card(
+    made: TrainSets,
+    examples: Sequence[Example],
+    rounds: Sequence[Mapping[str, int]],
+    losses: Mapping[str, float] | None = None,
+) -> Card:
     played = ", then ".join(
-        ", ".join(f"{count} of {kind}" for kind, count in worlds.items()) for worlds in ROUNDS
+        ", ".join(f"{count} of {kind}" for kind, count in worlds.items()) for worlds in rounds
     )
     items = sum(len(one.answers) for one in examples)
-    last = TRAINING + sum(max(worlds.values()) for worlds in ROUNDS) - 1
+    last = TRAINING + sum(max(worlds.values()) for worlds in rounds) - 1
     return Card(
         LearnedSets.name,
         AngularGrid(),
         setup=sensor_setup(DEFAULT_SETUP).label,
         scenario="CARE-Drive-v0, CARE-NCAP-v0 and CARE-Street-v0",
-        data=f"{items} boxes and tracks of {len(examples)} keyframes; worlds {played}, the second "
-        "time mostly by itself"
+        data=f"{items} boxes and tracks of {len(examples)} keyframes; worlds {played}"
+        + (", the second time mostly by itself" if len(rounds) > 1 else "")
         + (f"; without {' and '.join(made.without)}" if made.without else ""),
         seeds={"worlds": [TRAINING, last], "training": made.seed},
         steps=made.steps,
         machine=machine_line(),
         versions=package_versions("care-sim", "numpy", "torch"),
-        result={name: round(loss, 5) for name, loss in losses.items()},
+        result={name: round(loss, 5) for name, loss in (losses or {}).items()},
     )

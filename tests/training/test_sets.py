@@ -178,6 +178,22 @@ def test_the_command_writes_the_same_file_again_with_its_card(tmp_path, monkeypa
     assert f"{one}: loss per items, learned" in capsys.readouterr().out
 
 
+def test_an_interrupt_keeps_what_the_first_round_has_taught(tmp_path, monkeypatch, capsys):
+    def interrupted(worlds, first, own, *_):
+        if own is not None:
+            raise KeyboardInterrupt
+        return [*drawn(first, 20)]
+
+    monkeypatch.setattr(sets, "gathered", interrupted)
+    with pytest.raises(SystemExit):
+        main(["train", "learned-sets", "--out", str(tmp_path / "w.npz"), "--steps", "5"])
+    assert "w.npz holds what 1 of 2 rounds have taught" in capsys.readouterr().err
+    card = load_weights(tmp_path / "w.npz").card
+    assert "10 of street" in card.data
+    assert "then" not in card.data
+    assert not card.result
+
+
 def test_worlds_of_a_round_are_of_training_seeds_and_none_comes_twice(monkeypatch):
     asked = []
     monkeypatch.setattr(sets, "play", lambda *which: asked.append(which) or [])
