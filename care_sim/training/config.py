@@ -92,7 +92,9 @@ class AgentConfig:
             object.__setattr__(self, "env", (env,))
         check_fields(self)
         check_drawn(self)
-        if not 0 < len(self.budget) <= self.environments:
+        if not self.budget:
+            raise InvalidInput("budget needs one value or more")
+        if len(self.budget) > self.environments and not self.drawn:
             raise InvalidInput(
                 f"budget needs one value to {self.environments}, the environments; got "
                 f"{self.budget}"

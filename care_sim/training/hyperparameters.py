@@ -17,6 +17,8 @@ from care_sim.training.config import HOW_LONG, AgentConfig
 
 DEFAULT = "default"
 """The table of every environment that has none of its own."""
+DRAWN = "drawn"
+"""The table of episodes that are drawn, whatever their environments."""
 _NOT_OF_A_FILE = {*HOW_LONG, "env", "seed", "drawn", "without"} - {"steps"}
 """Fields of a configuration that belong to one run and one machine, or say what is played."""
 
@@ -55,8 +57,9 @@ def read_hyperparameters(
     kind: type[AgentConfig], envs: Sequence[str], path: Path | None = None, drawn: bool = False
 ) -> Hyperparameters:
     """What the file at `path`, or else the one that comes with the package, says of a learner in an
-    environment, or in several, which the table DEFAULT is for. Episodes that are `drawn` have a
-    reward without the term that `gain` weighs, which then says nothing.
+    environment. Episodes that are `drawn` have the table DRAWN if there is one; several
+    environments without it have DEFAULT. The reward of drawn episodes has no term that `gain`
+    weighs, which then says nothing.
 
     Raises InvalidInput for a file that is missing, damaged or has another form, for a name that is
     no hyperparameter, and for a value that the learner does not take.
@@ -65,8 +68,9 @@ def read_hyperparameters(
     tables = _tables(path)
     # An environment has one table, whether it is asked for by its id or as its scenario.
     asked = {scenario_of(env) for env in envs}
-    ids = [name for name in tables if name != DEFAULT and asked == {scenario_of(name)}]
-    table = next(iter(ids), DEFAULT if DEFAULT in tables else None)
+    named = [name for name in tables if name not in (DEFAULT, DRAWN)]
+    found = [*([DRAWN] if drawn else []), *(one for one in named if asked == {scenario_of(one)})]
+    table = next((name for name in [*found, DEFAULT] if name in tables), None)
     if table is None:
         return Hyperparameters({}, path, None)
     where = f"{path} [{table}]"

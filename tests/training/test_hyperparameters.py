@@ -13,6 +13,7 @@ from care_sim.policies.learned.weights import load_weights, shipped_weights
 from care_sim.training.config import PpoConfig, RecurrentPpoConfig, SacConfig
 from care_sim.training.hyperparameters import (
     DEFAULT,
+    DRAWN,
     as_table,
     names_of,
     read_hyperparameters,
@@ -48,7 +49,7 @@ def test_every_learner_has_a_file_whose_tables_are_of_environments(kind):
     tables = [
         line.strip('[]"\n') for line in shipped_file(kind.algorithm).open() if line.startswith("[")
     ]
-    assert {*tables} - {DEFAULT} <= {*IDS}
+    assert {*tables} - {DEFAULT, DRAWN} <= {*IDS}
     assert DEFAULT in tables
     for env in (*IDS, "dense", "mine:Mine"):
         assert read_hyperparameters(kind, [env]).values
@@ -83,6 +84,23 @@ def test_what_is_of_one_of_several_environments_may_stand_in_a_file(tmp_path):
     assert asked("ppo", "--drawn", *several).arguments("CARE-NCAP-v0") == {"speed_kph": 0}
     with pytest.raises(InvalidInput, match="unknown environment of env_parameter CARE-NCAP"):
         asked("ppo", "--hyperparameters", path)
+
+
+def test_drawn_episodes_have_a_table_of_their_own(tmp_path):
+    path = tmp_path / "own.toml"
+    path.write_text("[drawn]\nepochs = 2\n[CARE-Dense-v0]\nepochs = 3\n[default]\nepochs = 5\n")
+    epochs = {
+        line: asked("ppo", "--hyperparameters", path, *line).epochs
+        for line in (
+            (),
+            ("--drawn",),
+            ("--drawn", "--env", "CARE-Drive-v0", "CARE-NCAP-v0"),
+            ("--env", "CARE-Drive-v0"),
+        )
+    }
+    assert [*epochs.values()] == [3, 2, 2, 5]
+    # All of its budgets are drawn, however few environments there are.
+    assert asked("ppo", "--drawn", "--environments", 1).budget == (0.02, 0.05, 0.1, 0.2)
 
 
 def test_the_gain_of_a_table_says_nothing_of_drawn_episodes(tmp_path):
