@@ -21,13 +21,13 @@ def on_page_markdown(markdown: str, *, page: Page, config: MkDocsConfig, **_: An
         return markdown
     repository = Path(config.docs_dir).parent.resolve()
     place = Path(page.file.abs_src_path).resolve().relative_to(repository).as_posix()
-    return _LINK.sub(lambda link: _on_site(link, place, page.file.src_uri), markdown)
+    return _LINK.sub(lambda link: _on_site(link, place, page.file.src_uri, config), markdown)
 
 
-def _on_site(link: re.Match[str], place: str, page: str) -> str:
+def _on_site(link: re.Match[str], place: str, page: str, config: MkDocsConfig) -> str:
     text, target, anchor = link.groups()
     target = posixpath.normpath(posixpath.join(posixpath.dirname(place), target))
-    if not target.startswith(("docs/", "results/")):
+    if not target.startswith(("docs/", "results/")) or config.exclude_docs.match_file(target):
         # The site does not hold the code: whoever reads it is told where the file lies.
         return f"{text} (`{target}`)"
     # A file view shows a notebook, the site has a page made of it (`notebook_page.py`).

@@ -8,15 +8,16 @@ import tyro
 
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.checks import LARGEST_INTEGER
-from care_sim.base.errors import counted, report_problems
+from care_sim.base.errors import InvalidInput, counted, report_problems
 from care_sim.base.extras import check_page
+from care_sim.commands.shared.play_options import SourceOptions
 from care_sim.commands.shared.study_command import console
 from care_sim.reports.report import print_report, read_results, where_it_lies, write_report
 from care_sim.study.executors import CORES, MOST_WORKERS
 
 
 @dataclass(frozen=True, kw_only=True)
-class PrintReport:
+class PrintReport(SourceOptions):
     """Print a folder's tables and figures again, or make one page.
 
     Print the tables of a folder of results and draw its figures again, or make one web page of
@@ -34,9 +35,16 @@ class PrintReport:
     as long as they did in the study."""
     workers: int = bounded(CORES, 1, MOST_WORKERS)
     """Processes that play them."""
+    source: str | None = None
+    """Where the recordings lie that a study of the open loop played, for its page:
+    argoverse2:FOLDER, nuscenes:FOLDER, or a source of your own. Streets need none."""
 
     def __post_init__(self) -> None:
         check_fields(self)
+        if self.source is None and (given := self.source_options()):
+            raise InvalidInput(f"--{given[0].replace('_', '-')} has no meaning without --source")
+        if self.source is not None and self.page is None:
+            raise InvalidInput("--source has no meaning without --page: nothing is played again")
 
     def __call__(self) -> int:
         """Run it."""
@@ -55,7 +63,8 @@ class PrintReport:
         # and figures need neither.
         from care_sim.reports.page.build import write_page
 
-        page = write_page(self.folder, path, self.episodes, self.workers)
+        source = None if self.source is None else self.source_named(self.source)
+        page = write_page(self.folder, path, self.episodes, self.workers, source=source)
         report_problems(page.warnings)
         print(
             f"{path}: {path.stat().st_size / 1e6:.1f} MB, {counted(page.watchable, 'episode')} to "

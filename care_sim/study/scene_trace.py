@@ -32,14 +32,16 @@ def trace_scene(
     config: PlayConfig,
     film: Film,
     *watchers: SceneWatcher,
+    begin: Callable[[OpenLoop], None] = lambda _loop: None,
     wrap: Callable[[GymEnv, Policy], GymEnv] = lambda env, _policy: env,
 ) -> PlayedScene:
     """Play a policy through the film of its scene.
 
     The row has every parameter of `PlayConfig.row`, the fields of
     `care_sim.evaluation.recall.SceneOutcome`, `version`, `keyframes`, `wall_s` and the
-    `episode_hash` that `care_sim.study.scene_play` gives the same play. `watchers` are called after
-    each keyframe; `wrap` puts wrappers that watch around the environment.
+    `episode_hash` that `care_sim.study.scene_play` gives the same play. `begin` is called before
+    the first keyframe, `watchers` after each; `wrap` puts wrappers that watch around the
+    environment.
     """
     started = time.perf_counter()
     inner = config.make_env(film)
@@ -49,6 +51,7 @@ def trace_scene(
         played = cast(OpenLoopEnv, env.unwrapped)
         observation, _ = env.reset(seed=config.scene.seed)
         policy.reset()
+        begin(played.loop)
         while not played.loop.over:
             observation, *_ = env.step(policy(observation))
             keyframes.append(played.last)

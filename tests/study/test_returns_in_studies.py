@@ -5,7 +5,7 @@ from functools import partial
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.reports.page.episodes import config_of
+from care_sim.reports.page.played_rows import config_of
 from care_sim.sources import scenes
 from care_sim.sources.named import source_of
 from care_sim.sources.scenes import Streets

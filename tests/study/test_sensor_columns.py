@@ -6,7 +6,7 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.sensor_setup import SensorSetup
-from care_sim.reports.page.episodes import config_of
+from care_sim.reports.page.played_rows import config_of
 from care_sim.reports.page.replay import replayed
 from care_sim.sensors.setups import sensor_setup
 from care_sim.sources.named import source_of

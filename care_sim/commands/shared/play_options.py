@@ -1,7 +1,7 @@
 """Options of the commands of the open loop: source of the scenes, detector, conditions."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -52,13 +52,13 @@ class SourceOptions:
         kind = text.partition(":")[0]
         report_problems([line for one, line in SOURCES.refusals() if one.name == kind])
         return source_of(
-            text,
-            split=self.split,
-            version=self.version,
-            sensor=self.sensor,
-            camera_detections=self.camera_detections,
-            sweeps=self.sweeps,
+            text, **{field.name: getattr(self, field.name) for field in fields(SourceOptions)}
         )
+
+    def source_options(self) -> list[str]:
+        """Those that are given."""
+        names = [field.name for field in fields(SourceOptions)]
+        return [name for name in names if getattr(self, name) is not None]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,21 +16,24 @@ import care_sim
 from care_sim.base.errors import counted
 from care_sim.base.extras import vega_bundle
 from care_sim.base.files import HTML, replacing
+from care_sim.evaluation.recall import CENSORED_AT
+from care_sim.evaluation.sightings import RANGE_M
 from care_sim.reports.captions import caption
 from care_sim.reports.page.budget_charts import budget_charts
 from care_sim.reports.page.chart import Chart
 from care_sim.reports.page.crowding_charts import crowding_charts
 from care_sim.reports.page.episodes import Episode, episodes_to_watch, played_again
 from care_sim.reports.page.fault_charts import fault_charts
-from care_sim.reports.page.listing import Group, episode_groups, replay_data
+from care_sim.reports.page.listing import episode_groups, replay_data
 from care_sim.reports.page.protocol_charts import protocol_charts
 from care_sim.reports.page.provenance import Provenance, provenance_of
 from care_sim.reports.page.tables import blocks
 from care_sim.reports.report import read_results
 from care_sim.reports.study import Study
 from care_sim.reports.table import Table
+from care_sim.sources.scenes import Source
 from care_sim.study.executors import ExecutorFactory, processes
-from care_sim.study.results_formats import EPISODES
+from care_sim.study.results_formats import EPISODES, PLAYS, VEHICLE
 from care_sim.study.run_config import Row
 
 CHARTS: dict[str, Callable[[Sequence[Row]], list[Chart]]] = {
@@ -41,6 +44,8 @@ CHARTS: dict[str, Callable[[Sequence[Row]], list[Chart]]] = {
     "protocol": protocol_charts,
 }
 """The interactive charts of the studies that have any."""
+WATCHED = (EPISODES, VEHICLE, PLAYS)
+"""What can be played again to be watched. A row of the mechanism is no play by itself."""
 
 
 @dataclass(frozen=True)
@@ -73,9 +78,9 @@ class Page:
     episodes: Sequence[Episode]
 
     @property
-    def closed_loop(self) -> bool:
-        """Whether there are episodes to watch: in the open loop nothing reacts."""
-        return self.study.results is EPISODES
+    def open_loop(self) -> bool:
+        """Whether its episodes are plays of scenes, in which nothing reacts."""
+        return self.study.results is PLAYS
 
     def html(self) -> str:
         """The page as one file."""
@@ -92,16 +97,24 @@ class Page:
                 tables=[(table, blocks(table)) for table in self.findings.tables],
                 reading=self.findings.reading,
                 closing=self.findings.closing,
-                groups=self.groups(),
+                groups=episode_groups(self.rows, self.episodes) if self.listed else [],
                 replays=_embedded(replay_data(self.episodes)),
                 asset=_asset,
                 counted=counted,
+                range_m=f"{RANGE_M:g}",
+                censored_at=CENSORED_AT,
             )
         )
 
-    def groups(self) -> list[Group]:
-        """The episodes by setting; none in the open loop."""
-        return episode_groups(self.rows, self.episodes) if self.closed_loop else []
+    @property
+    def watched(self) -> bool:
+        """Whether its rows can be played again."""
+        return self.study.results in WATCHED
+
+    @property
+    def listed(self) -> bool:
+        """Whether the page lists episodes: of the open loop those in scenes that can be watched."""
+        return bool(self.watchable) if self.open_loop else self.watched
 
     @property
     def warnings(self) -> list[str]:
@@ -137,9 +150,15 @@ class Page:
 
 
 def write_page(
-    folder: Path, path: Path, most: int, workers: int, make_executor: ExecutorFactory = processes
+    folder: Path,
+    path: Path,
+    most: int,
+    workers: int,
+    make_executor: ExecutorFactory = processes,
+    source: Source | None = None,
 ) -> Page:
     """Write the page of a folder of results, with at most so many episodes to watch, to `path`.
+    `source` is where the scenes of recordings are found.
 
     Raises InvalidInput where there are no results, and MissingExtra without the libraries.
     """
@@ -148,7 +167,7 @@ def write_page(
     with replacing(path, HTML) as unfinished:
         findings = Findings.of(study, rows)
         about = provenance_of(folder, rows, study.results, left_out)
-        watched = episodes_to_watch(rows, most) if study.results is EPISODES else []
+        watched = episodes_to_watch(rows, most) if study.results in WATCHED else []
         if watched:
             left = len(rows) - len(watched)
             rest = f" (--episodes {len(rows)}: all)" if left else ""
@@ -156,7 +175,7 @@ def write_page(
                 f"playing {counted(len(watched), 'episode')} again to be watched{rest}",
                 file=sys.stderr,
             )
-        episodes = played_again(watched, workers, make_executor)
+        episodes = played_again(watched, workers, make_executor, source)
         page = Page(folder.resolve().name, study, rows, findings, about, episodes)
         # Lone surrogates, which names of files may hold, are written as escapes.
         unfinished.write_text(page.html(), encoding="utf-8", errors="backslashreplace")

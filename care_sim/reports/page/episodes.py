@@ -8,15 +8,14 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import BrokenExecutor, Future, as_completed
 from dataclasses import dataclass
 
-from care_sim.loops.records import Outcome
+from care_sim.reports.page.played_rows import config_of, play_config_of
 from care_sim.reports.page.replay import Replay, replayed
-from care_sim.sensors.setups import setup_of_columns
-from care_sim.study.episode_config import PLAIN_FIELDS, EpisodeConfig
+from care_sim.reports.page.scene_replay import replayed_scene
+from care_sim.sources.scenes import Source
 from care_sim.study.episode_play import result_or_reason
 from care_sim.study.executors import ExecutorFactory, processes
-from care_sim.study.parameters import Parameters
 from care_sim.study.progress import Show, rounded_duration, shown_progress
-from care_sim.study.run_config import Row
+from care_sim.study.run_config import FULL, Row
 from care_sim.study.runner import DIED
 
 _TOLERANCE = 1e-6
@@ -50,9 +49,7 @@ class Episode:
         """The outcomes in which the replay departs from the row, each as NAME THEN -> NOW."""
         if self.replay is None:
             return []
-        pairs = {
-            name: (self.row[name], self.replay.row[name]) for name in Outcome.__dataclass_fields__
-        }
+        pairs = {name: (self.row[name], self.replay.row[name]) for name in self.replay.ending}
         return [
             f"{name} {_text(was)} → {_text(now)}"
             for name, (was, now) in pairs.items()
@@ -60,26 +57,44 @@ class Episode:
         ]
 
 
+def in_open_loop(row: Row) -> bool:
+    """Whether a row is of a play in a scene of a source."""
+    return "scene" in row
+
+
 def episodes_to_watch(rows: Sequence[Row], most: int) -> list[Row]:
-    """At most so many rows: all of the first seed, then those of the next, so that policies can be
-    seen side by side.
+    """At most so many rows: all of the first seed, of the open loop of the first scene, then those
+    of the next, so that policies can be seen side by side. Of a scene the full scan comes first,
+    then budget by budget.
     """
-    # The sort is stable: within a seed the rows keep their order.
-    return sorted(rows, key=lambda row: row["seed"])[:most]
+    scenes = {name: n for n, name in enumerate(dict.fromkeys(row.get("scene") for row in rows))}
+
+    def turn(row: Row) -> tuple[float, ...]:
+        if not in_open_loop(row):
+            return (row["seed"],)
+        budget = 0.0 if row["policy"] == FULL else row["budget"]
+        return row["floor_seed"], scenes[row["scene"]], budget
+
+    # The sort is stable: what comes at one turn keeps its order.
+    return sorted(rows, key=turn)[:most]
 
 
 def played_again(
-    rows: Sequence[Row], workers: int, make_executor: ExecutorFactory = processes
+    rows: Sequence[Row],
+    workers: int,
+    make_executor: ExecutorFactory = processes,
+    source: Source | None = None,
 ) -> list[Episode]:
-    """Play the episodes of rows again, in processes, and show on stderr how far they are. An
-    interrupt does not wait for episodes that have not begun.
+    """Play the episodes of rows again, in processes, and show on stderr how far they are. `source`
+    is where the scenes of recordings are found. An interrupt does not wait for episodes that have
+    not begun.
     """
     if not rows:
         return []
     executor = make_executor(min(workers, len(rows)))
     try:
         # Each by itself: what was played before the death of a worker stays.
-        futures = [executor.submit(result_or_reason, _replay_of, row) for row in rows]
+        futures = [executor.submit(result_or_reason, _replay_of, row, source) for row in rows]
         with shown_progress(len(rows), "episodes") as show:
             follow(futures, show)
         return [Episode(row, _ending(future)) for row, future in zip(rows, futures, strict=True)]
@@ -101,32 +116,9 @@ def follow(
         show(done, f"{rounded_duration(left_s)} left")
 
 
-def config_of(row: Row) -> EpisodeConfig:
-    """The configuration that a row was played with. Raises InvalidInput for one that this version
-    does not accept, and for a sensor set-up that is neither told nor comes with it.
-    """
-    # A condition that the file's version did not know, or the row does not tell, is the default.
-    plain = {name: row[name] for name in PLAIN_FIELDS if row.get(name) is not None}
-    for name in ("detector", "keyframe_s"):
-        if row.get(name) is not None:
-            plain[name] = row[name]
-    plain["sensor"] = setup_of_columns(row)
-    for kind in ("detector", "scenario", "policy"):
-        plain[f"{kind}_parameters"] = _parameters(row, kind)
-    return EpisodeConfig(**plain)
-
-
-def _parameters(row: Row, kind: str) -> Parameters:
-    named = (
-        (name.removeprefix(f"{kind}."), value)
-        for name, value in row.items()
-        if name.startswith(f"{kind}.")
-    )
-    # A column holds nothing in the rows whose scenario or policy lacks the parameter.
-    return tuple((name, value) for name, value in named if value is not None)
-
-
-def _replay_of(row: Row) -> Replay:
+def _replay_of(row: Row, source: Source | None) -> Replay:
+    if in_open_loop(row):
+        return replayed_scene(play_config_of(row, source))
     return replayed(config_of(row))
 
 

@@ -9,7 +9,13 @@ import altair as alt
 
 from care_sim.base.errors import counted
 from care_sim.reports.cells import StudyCells
-from care_sim.reports.figures.faults import MEASURES, CurveMeasure
+from care_sim.reports.figures.faults import (
+    MEASURES,
+    CurveMeasure,
+    fault_curves,
+    flat_faults,
+    flat_line,
+)
 from care_sim.reports.figures.styles import FULL_STYLE, styles
 from care_sim.reports.page.chart import PANEL_WIDTH, Chart, Encoding, inline, specification
 from care_sim.reports.tables.faults import policies_of
@@ -44,16 +50,20 @@ def _chart(study: StudyCells, place: Place, measure: CurveMeasure) -> Chart:
         for number, policy in enumerate(names)
         for value in _values(study, place, measure, policy)
     ]
+    curves = {fault.label: fault_curves(study, names, fault, place, measure) for fault in FAULTS}
+    flat = flat_faults(curves)
+    values = [value for value in values if value["fault"] not in flat]
     chart = _panels(encoding, values)
     seeds = counted(len({row["seed"] for row in study.rows}), "seed")
     apart = "Marks of later policies are smaller, so that equal ones stay visible."
     hollow = "Hollow, at the bottom: the median is an actor that was not detected."
     return Chart(
         f"{place}: {measure.label}, {seeds}",
-        f"{measure.label} at every strength of {len(FAULTS)} faults, a panel a fault, a curve a "
-        "policy.",
+        f"{measure.label} at every strength of {counted(len(FAULTS) - len(flat), 'fault')}, "
+        "a panel a fault, a curve a policy.",
         (
             apart,
+            *([flat_line([label.partition(", ")[0] for label in flat])] if flat else []),
             *([hollow] if any(value["value"] is None for value in values) else []),
             *study.notes(study.policies),
         ),

@@ -1,15 +1,15 @@
 """The episodes of a page as it lists them, setting by setting: one line per configuration, one
-entry per seed.
+entry per seed, of the open loop per scene.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from care_sim.base.errors import percent
+from care_sim.base.errors import counted, percent
 from care_sim.reports.formatting import marked
-from care_sim.reports.page.episodes import Episode
-from care_sim.reports.page.replay import packed
+from care_sim.reports.page.episodes import Episode, in_open_loop
+from care_sim.reports.page.story import packed
 from care_sim.study.rows.reading import policy_of, setting_of, tags_of_row
 from care_sim.study.rows.settings import Setting
 from care_sim.study.run_config import Row
@@ -30,7 +30,7 @@ class EpisodeEntry:
 
 @dataclass(frozen=True)
 class Configuration:
-    """A policy at a budget, and its outcomes by seed; None for a seed that was not played."""
+    """A policy at a budget, and its outcomes by world; None for one that was not played."""
 
     policy: str
     budget: str
@@ -39,28 +39,31 @@ class Configuration:
 
 @dataclass(frozen=True)
 class Group:
-    """The configurations of a setting, and their seeds; `watchable` counts the episodes that can be
-    watched.
+    """The configurations of a setting, and the `worlds` that they were played in, seeds or scenes;
+    `watchable` counts the episodes that can be watched.
     """
 
     label: str
-    seeds: tuple[int, ...]
+    worlds: tuple[str, ...]
     configurations: tuple[Configuration, ...]
     watchable: int
 
 
 def episode_groups(rows: Sequence[Row], episodes: Sequence[Episode]) -> list[Group]:
-    """All rows by setting; `episodes` are those of them that were played again, in the order of
-    `replay_data`.
+    """All rows by setting, of the open loop those in scenes that can be watched; `episodes` are
+    those of them that were played again, in the order of `replay_data`.
     """
     held = {
         # By its configuration, which is unique in the rows of a study.
         _place(episode.row): (number, episode)
         for number, episode in enumerate(_watchable(episodes))
     }
+    # A study of the open loop has up to 150 scenes, of which few are played again.
+    shown = {_column(episode.row) for _, episode in held.values()}
     by_setting: dict[Setting, list[Row]] = {}
     for row in rows:
-        by_setting.setdefault(setting_of(row), []).append(row)
+        if not in_open_loop(row) or _column(row) in shown:
+            by_setting.setdefault(setting_of(row), []).append(row)
     return [_group(setting, own, held) for setting, own in by_setting.items()]
 
 
@@ -82,7 +85,7 @@ def replay_data(episodes: Sequence[Episode]) -> dict[str, Any]:
             {
                 "policy": f"{marked(policy_of(row), tags_of_row(row))} {percent(row['budget'])}",
                 "setting": setting_of(row).label,
-                "seed": row["seed"],
+                "where": _where(row),
                 "world": worlds.setdefault(_world(row), len(worlds)),
                 "bodies": number,
                 "differences": episode.differences,
@@ -97,35 +100,61 @@ def _watchable(episodes: Sequence[Episode]) -> list[Episode]:
 
 
 def _group(setting: Setting, rows: Sequence[Row], held: dict[Any, tuple[int, Episode]]) -> Group:
-    seeds = sorted({row["seed"] for row in rows})
-    lines: dict[tuple[str, str], dict[int, EpisodeEntry]] = {}
+    columns = sorted({_column(row) for row in rows})
+    lines: dict[tuple[str, str], dict[Any, EpisodeEntry]] = {}
     for row in rows:
         key = marked(policy_of(row), tags_of_row(row)), percent(row["budget"])
-        lines.setdefault(key, {})[row["seed"]] = _outcome(row, *held.get(_place(row), (None, None)))
-    # A seed that this configuration was not played with leaves its place empty.
-    configurations = [Configuration(*key, tuple(map(own.get, seeds))) for key, own in lines.items()]
+        entry = _entry(row, *held.get(_place(row), (None, None)))
+        lines.setdefault(key, {})[_column(row)] = entry
+    # A world that this configuration was not played in leaves its place empty.
+    configurations = [
+        Configuration(*key, tuple(map(own.get, columns))) for key, own in lines.items()
+    ]
+    worlds = {_column(row): _where(row) for row in rows}
     watchable = sum(_place(row) in held for row in rows)
-    return Group(setting.label, tuple(seeds), tuple(configurations), watchable)
+    return Group(
+        setting.label, tuple(worlds[each] for each in columns), tuple(configurations), watchable
+    )
 
 
-def _outcome(row: Row, number: int | None, episode: Episode | None) -> EpisodeEntry:
+def _entry(row: Row, number: int | None, episode: Episode | None) -> EpisodeEntry:
+    differs = bool(episode and episode.differences)
+    if in_open_loop(row):
+        found, events = int(row["sighted"]), int(row["events"])
+        about = f"{found} of {counted(events, 'first sighting')} found at once"
+        return EpisodeEntry(f"{found}/{events}", about, False, differs, number)
     distance = row["detection_distance_m"]
     said = [
         "never detected" if distance is None else f"first detected at {distance:.1f} m",
         "braked" if row["braked"] else "did not brake",
         *(["collided"] if row["collision"] else []),
     ]
-    differs = bool(episode and episode.differences)
     text = "never" if distance is None else f"{distance:.1f}"
     return EpisodeEntry(text, ", ".join(said), row["collision"], differs, number)
 
 
+def _column(row: Row) -> Any:
+    """What puts worlds into their order: the seed, of the open loop the scene and the floor."""
+    return (row["scene"], row["floor_seed"]) if in_open_loop(row) else row["seed"]
+
+
+def _where(row: Row) -> str:
+    if not in_open_loop(row):
+        return f"seed {row['seed']}"
+    floor = f", floor {row['floor_seed']}" if row["floor_seed"] else ""
+    return f"{row['scene']}{floor}"
+
+
 def _place(row: Row) -> tuple[Any, ...]:
-    return setting_of(row), policy_of(row), row["budget"], row["seed"]
+    return setting_of(row), policy_of(row), row["budget"], _column(row)
 
 
 def _world(row: Row) -> tuple[Any, ...]:
-    """What two episodes share that can be watched side by side: scenario, physics, seed."""
+    """What two episodes share that can be watched side by side: scenario, physics, seed, or the
+    scene.
+    """
+    if in_open_loop(row):
+        return row["source"], row["scene"]
     # None is a parameter that was not given; 0 is one that was.
     physics = sorted(
         (name, repr(value))

@@ -10,13 +10,16 @@ from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.residual import explained
 from care_sim.core.types import CLASSES
 from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.sensors.annotated import NO_OBJECT
 from care_sim.viewer.pictures import drawing
 from care_sim.viewer.pictures.drawing import FAINT_INK, INK
 from care_sim.viewer.pictures.furnished_world import photograph
+from care_sim.viewer.pictures.labels import Labels
 from care_sim.world.bullet import BulletWorld
 
 EXPLAINED_COLOUR = (90, 220, 255)
 UNEXPLAINED_COLOUR = (255, 170, 40)
+FALSE_COLOUR = (255, 105, 180)
 ROW_HEIGHT = 140
 """Of a row of cameras with its words, pixels."""
 ALONE_SIZE = (352, 180)
@@ -27,7 +30,7 @@ _AHEAD_RAD = np.deg2rad(10.0)
 
 def take_pictures(scene: BulletWorld, loop: ClosedLoop, width: int) -> list[Image.Image]:
     """What every camera sees, with its detections: those that a forecast explains in one colour,
-    the others in another.
+    the others in another, and in a third, crossed out, those that show nothing.
 
     That of a single camera is as large as the camera's, within `ALONE_SIZE`, and the classes stand
     beside the boxes. Several share `width` pixels and have no room for words. They come in the
@@ -52,7 +55,8 @@ def paste_pictures(
     words = (
         (20, "Cameras:" if row else "Front camera:", INK),
         (124, "explained by a track", EXPLAINED_COLOUR),
-        (280, "new", UNEXPLAINED_COLOUR),
+        (264, "new", UNEXPLAINED_COLOUR),
+        (304, "× false", FALSE_COLOUR),
     )
     for x, text, colour in words:
         draw.text((x, top + 8), text, colour, drawing.font(14))
@@ -76,13 +80,34 @@ def _picture(
     picture = photograph(scene, small, loop.sensor)
     seen = loop.belief.detections
     (own,) = np.nonzero(seen.cameras == number)
-    drawing.image_boxes(
-        ImageDraw.Draw(picture),
-        scale * seen.boxes[own],
-        [CLASSES[label] if len(loop.rig.cameras) == 1 else "" for label in seen.classes[own]],
-        [EXPLAINED_COLOUR if is_known else UNEXPLAINED_COLOUR for is_known in known[own]],
-    )
+    marks = [
+        ((scale * seen.boxes[row]).tolist(), CLASSES[seen.classes[row]], _colour(loop, known, row))
+        for row in own.tolist()
+    ]
+    draw, alone = ImageDraw.Draw(picture), len(loop.rig.cameras) == 1
+    for (left, top, right, bottom), _, colour in marks:
+        draw.rectangle((left, top, right, bottom), outline=colour, width=2 if alone else 1)
+        if colour == FALSE_COLOUR:
+            draw.line((left, top, right, bottom), colour)
+            draw.line((left, bottom, right, top), colour)
+    labels = Labels(draw)
+    # The highest are the nearest, whose names keep their places.
+    for (left, top, right, _), name, colour in sorted(marks, key=_height, reverse=True):
+        if alone:
+            labels.over(((left + right) / 2, top), name, colour, 11)
     return picture
+
+
+def _colour(loop: ClosedLoop, known: Mask, row: int) -> drawing.Colour:
+    """That of a detection: a false box is told, whether a track explains it or not."""
+    if loop.detected_bodies[row] == NO_OBJECT:
+        return FALSE_COLOUR
+    return EXPLAINED_COLOUR if known[row] else UNEXPLAINED_COLOUR
+
+
+def _height(mark: tuple[list[float], str, drawing.Colour]) -> float:
+    (_, top, _, bottom), _, _ = mark
+    return bottom - top
 
 
 def _from_left(cameras: tuple[PinholeCamera, ...]) -> list[int]:

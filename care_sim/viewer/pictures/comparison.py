@@ -11,14 +11,16 @@ from PIL import Image, ImageDraw
 
 from care_sim.core.grid_stack import Grid
 from care_sim.core.pinhole import PinholeCamera
+from care_sim.core.rig import Rig
 from care_sim.evaluation.metrics import outcome
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.records import Keyframe
 from care_sim.viewer.pictures import drawing
-from care_sim.viewer.pictures.drawing import BACKGROUND, FAINT_INK, INK
+from care_sim.viewer.pictures.camera_views import EXPLAINED_COLOUR
+from care_sim.viewer.pictures.drawing import BACKGROUND, FAINT_INK, INK, NO_RETURN_COLOUR
 from care_sim.viewer.pictures.furnished_world import add_car, furnished, photograph
-from care_sim.viewer.pictures.keyframe import BRAKING_COLOUR, mark_tracks
-from care_sim.viewer.pictures.sought import DETECTED, HIT, IN_VIEW, contact_text, mark_sought
+from care_sim.viewer.pictures.keyframe import BOXES_MEAN, BRAKING_COLOUR, mark_chase
+from care_sim.viewer.pictures.sought import DETECTED, HIT, IN_VIEW, contact_text
 
 _VIEW_SIZE = (512, 320)
 _CAMERA = PinholeCamera(*_VIEW_SIZE, np.deg2rad(52.0), (-11.0, 0.0, 3.8), 0.0, np.deg2rad(-11.0))
@@ -44,12 +46,7 @@ def draw_panel(name: str, loop: ClosedLoop, frames: Sequence[Keyframe]) -> Image
     draw = ImageDraw.Draw(canvas)
     _write_header(draw, name, loop, frames[-1])
     canvas.paste(_chase_view(loop, frames[-1]), (0, _TOP))
-    draw.text(
-        (8, _GRID_TOP - 20),
-        f"{len(frames[-1].fired)} LiDAR {loop.rig.hardware.counted}s fired, those ahead:",
-        FAINT_INK,
-        drawing.font(14),
-    )
+    write_cells_line(canvas, _GRID_TOP - 20, len(frames[-1].fired), loop.rig)
     canvas.paste(cells_ahead(loop.rig.grid, loop.belief.ranges), (0, _GRID_TOP))
     contact = contact_text(loop, frames[-1])
     text, colour = (contact, HIT.colour) if contact else verdict_text(frames, loop.rig.keyframe_s)
@@ -70,10 +67,25 @@ def _chase_view(loop: ClosedLoop, frame: Keyframe) -> Image.Image:
     with furnished(loop.world) as scene:
         add_car(scene, loop.world, loop.rig.sensor_x_m, loop.guarded_m)
         view = photograph(scene, _CAMERA, loop.sensor)
-    draw = ImageDraw.Draw(view)
-    mark_tracks(draw, _CAMERA, loop.belief.tracks)
-    mark_sought(draw, _CAMERA, loop, frame)
+    labels = mark_chase(ImageDraw.Draw(view), _CAMERA, loop, frame)
+    labels.over((0, _VIEW_SIZE[1]), BOXES_MEAN, EXPLAINED_COLOUR, 11)
     return view
+
+
+def write_cells_line(canvas: Image.Image, top: int, fired: int, rig: Rig) -> None:
+    """The line over the cells ahead: how many fired, and what their colours mean."""
+    draw = ImageDraw.Draw(canvas)
+    words = f"{fired} LiDAR {rig.hardware.counted}s fired, those ahead:"
+    draw.text((8, top), words, FAINT_INK, drawing.font(14))
+    scale = np.tile(drawing.range_colours(np.linspace(0.0, 1.0, 40)), (10, 1, 1))
+    canvas.paste(Image.fromarray(scale), (306, top + 4))
+    draw.rectangle((408, top + 4, 420, top + 13), NO_RETURN_COLOUR)
+    for x, text, anchor in (
+        (302, "0 m", "ra"),
+        (350, f"{rig.grid.range_m:.0f} m", "la"),
+        (425, "no return", "la"),
+    ):
+        draw.text((x, top + 1), text, FAINT_INK, drawing.font(12), anchor=anchor)
 
 
 def cells_ahead(grid: Grid, ranges: NDArray[np.floating]) -> Image.Image:

@@ -1,6 +1,4 @@
-"""Parts of pictures: boxes in space, boxes in the image, labels, the angular grid in colours."""
-
-from collections.abc import Iterable
+"""Parts of pictures: boxes in space, the angular grid in colours, and what they are drawn with."""
 
 import numpy as np
 from matplotlib import colormaps
@@ -27,21 +25,6 @@ def font(size: int) -> ImageFont.ImageFont | ImageFont.FreeTypeFont:
     return ImageFont.load_default(size)
 
 
-def label(
-    draw: ImageDraw.ImageDraw, at: tuple[float, float], text: str, colour: Colour, size: int = 13
-) -> None:
-    """Text centred over a point, on a dark plate, kept inside the picture."""
-    # A text does not begin at its own origin: its box tells where the ink lies.
-    left, top, right, bottom = draw.textbbox((0, 0), text, font(size))
-    width = right - left + 6
-    height = bottom - top + 6
-    canvas = draw.im.size
-    x = min(max(at[0] - width / 2, 0), canvas[0] - width)
-    y = min(max(at[1] - height - 2, 0), canvas[1] - height)
-    draw.rectangle((x, y, x + width, y + height), BACKGROUND)
-    draw.text((x + 3 - left, y + 3 - top), text, colour, font(size))
-
-
 def wireframe(
     draw: ImageDraw.ImageDraw, camera: PinholeCamera, box: Floats, colour: Colour, width: int
 ) -> None:
@@ -57,24 +40,6 @@ def point_above(camera: PinholeCamera, box: Floats) -> tuple[float, float] | Non
     (pixel,), (depth,) = camera.project([[box[0], box[1], box[2] + box[5] / 2]])
     inside = depth > NEAR_M and 0 <= pixel[0] < camera.width and 0 <= pixel[1] < camera.height
     return (float(pixel[0]), float(pixel[1])) if inside else None
-
-
-def arrow(draw: ImageDraw.ImageDraw, tip: tuple[float, float], text: str, colour: Colour) -> None:
-    """An arrow that points down at the label of `tip`, with a text of its own over it."""
-    x, y = tip[0], tip[1] - 20
-    draw.line((x, y - 34, x, y - 8), colour, 4)
-    draw.polygon([(x - 9, y - 14), (x + 9, y - 14), (x, y)], colour)
-    label(draw, (x, y - 36), text, colour, 15)
-
-
-def image_boxes(
-    draw: ImageDraw.ImageDraw, boxes: Floats, names: Iterable[str], colours: Iterable[Colour]
-) -> None:
-    """Boxes (n, 4: left, top, right, bottom in pixels) with their names, thin ones without."""
-    for box, name, colour in zip(boxes.tolist(), names, colours, strict=True):
-        draw.rectangle(box, outline=colour, width=2 if name else 1)
-        if name:
-            label(draw, ((box[0] + box[2]) / 2, box[1]), name, colour, 11)
 
 
 def grid_picture(grid: Grid, ranges: NDArray[np.floating]) -> Image.Image:

@@ -10,7 +10,7 @@ from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.core.grid_stack import Grid
 from care_sim.core.pinhole import PinholeCamera
-from care_sim.core.types import CLASSES, Tracks
+from care_sim.core.types import CLASSES
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.records import Keyframe
 from care_sim.loops.watcher import way_ahead
@@ -36,6 +36,7 @@ from care_sim.viewer.pictures.furnished_world import (
     furnished,
     photograph,
 )
+from care_sim.viewer.pictures.labels import Labels
 from care_sim.viewer.pictures.sought import HIT, contact_text, mark_sought
 
 PICTURE_WIDTH = 960
@@ -57,7 +58,7 @@ _DIRECTIONS = {
     "right": -np.pi / 2,
 }
 """Azimuths that are named below the grid."""
-_BOXES_MEAN = "boxes: tracks, faint when the last scan missed them"
+BOXES_MEAN = "boxes: tracks, faint when the last scan missed them"
 
 _COASTING_COLOUR = (120, 140, 190)
 BRAKING_COLOUR = HIT.colour
@@ -119,28 +120,36 @@ def _write_header(draw: ImageDraw.ImageDraw, loop: ClosedLoop, frame: Keyframe |
 
 
 def _annotate_chase(chase: Image.Image, loop: ClosedLoop, frame: Keyframe | None) -> None:
-    draw = ImageDraw.Draw(chase)
+    labels = mark_chase(ImageDraw.Draw(chase), CHASE_CAMERA, loop, frame)
+    labels.over((0, CHASE_SIZE[1]), BOXES_MEAN, EXPLAINED_COLOUR)
     # Numbers stand beside the bars, 1.6 m to the left, on the ground.
     for metres in METRE_MARKS:
         bar = Frame.mounted(way_ahead(loop.world, loop.rig.sensor_x_m, metres), (0.0, 1.6, 0.0))
         (ground,) = loop.sensor.boxes_to_local(np.array([[bar.x, bar.y, *[0.0] * 5]]))
         if at := drawing.point_above(CHASE_CAMERA, ground):
-            draw.text(at, f"{metres:.0f} m", INK, drawing.font(12), anchor="rm")
-    mark_tracks(draw, CHASE_CAMERA, loop.belief.tracks)
-    mark_sought(draw, CHASE_CAMERA, loop, frame)
-    drawing.label(draw, (0, CHASE_SIZE[1]), _BOXES_MEAN, EXPLAINED_COLOUR)
+            labels.beside(at, f"{metres:.0f} m", INK, 12)
 
 
-def mark_tracks(draw: ImageDraw.ImageDraw, camera: PinholeCamera, tracks: Tracks) -> None:
-    """Tracks as wireframes with their classes; those that the last scan missed are faint."""
-    # Tracks come nearest first: the nearest is drawn last, over the others.
-    for box, number, misses in reversed(
-        list(zip(tracks.boxes, tracks.classes, tracks.misses, strict=True))
-    ):
-        colour = _COASTING_COLOUR if misses else EXPLAINED_COLOUR
+def mark_chase(
+    draw: ImageDraw.ImageDraw, camera: PinholeCamera, loop: ClosedLoop, frame: Keyframe | None
+) -> Labels:
+    """Tracks as wireframes with their classes, those that the last scan missed faint, and arrows at
+    whom the episode is about. Gives the labels, for more.
+    """
+    tracks = loop.belief.tracks
+    marks = [
+        (box, CLASSES[number], misses, _COASTING_COLOUR if misses else EXPLAINED_COLOUR)
+        for box, number, misses in zip(tracks.boxes, tracks.classes, tracks.misses, strict=True)
+    ]
+    # Tracks come nearest first: the nearest is drawn last, over the others, and named first.
+    for box, _, misses, colour in reversed(marks):
         drawing.wireframe(draw, camera, box, colour, 1 if misses else 2)
+    labels = Labels(draw)
+    mark_sought(labels, camera, loop, frame)
+    for box, name, _, colour in marks:
         if at := drawing.point_above(camera, box):
-            drawing.label(draw, at, CLASSES[number], colour)
+            labels.over(at, name, colour)
+    return labels
 
 
 def draw_grid(

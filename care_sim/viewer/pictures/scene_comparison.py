@@ -9,12 +9,18 @@ from PIL import Image, ImageDraw
 from care_sim.loops.open_loop import OpenLoop
 from care_sim.loops.scene_records import SceneKeyframe
 from care_sim.viewer.pictures import drawing
-from care_sim.viewer.pictures.comparison import CELLS_SIZE, COMPARISON_WIDTH, cells_ahead
+from care_sim.viewer.pictures.comparison import (
+    CELLS_SIZE,
+    COMPARISON_WIDTH,
+    cells_ahead,
+    write_cells_line,
+)
 from care_sim.viewer.pictures.drawing import BACKGROUND, FAINT_INK, INK
 from care_sim.viewer.pictures.scene_from_above import (
     FOUND_COLOUR,
     MAP_SIZE,
     MISSED_COLOUR,
+    PLAN_LEGEND,
     map_from_above,
     ranges_of,
 )
@@ -40,8 +46,9 @@ def draw_scene_panel(name: str, loop: OpenLoop, frames: Sequence[SceneKeyframe])
     box = (left, 0, left + COMPARISON_WIDTH, MAP_SIZE[1])
     canvas.paste(map_from_above(loop, last).crop(box), (0, _TOP))
     fired = 0 if last.fired is None else len(last.fired)
-    words = f"{fired} LiDAR {loop.rig.hardware.counted}s fired, those ahead:"
-    draw.text((8, _GRID_TOP - 20), words, FAINT_INK, drawing.font(14))
+    write_cells_line(canvas, _GRID_TOP - 20, fired, loop.rig)
+    for row, (name_of, colour) in enumerate(reversed(PLAN_LEGEND)):
+        draw.text((8, _TOP + MAP_SIZE[1] - 18 * (row + 1)), name_of, colour, drawing.font(13))
     canvas.paste(cells_ahead(loop.rig.grid, ranges_of(loop, last)), (0, _GRID_TOP))
     text, colour = _verdict(frames)
     draw.text((8, _HEIGHT - 26), text, colour, drawing.font(16))

@@ -39,7 +39,7 @@ MISSED_COLOUR = (255, 120, 60)
 _OUT_OF_RANGE_COLOUR = (95, 100, 108)
 _RING_COLOUR = (52, 56, 63)
 RETURN_COLOUR = (172, 176, 184)
-_PLAN_LEGEND = (
+PLAN_LEGEND = (
     ("found", FOUND_COLOUR),
     ("not found", MISSED_COLOUR),
     ("beyond 50 m", _OUT_OF_RANGE_COLOUR),
@@ -117,10 +117,10 @@ def _write_words(draw: ImageDraw.ImageDraw, loop: OpenLoop, keyframe: SceneKeyfr
         (PICTURE_WIDTH - 12, 12), loop.film.name[:28], FAINT_INK, drawing.font(14), anchor="ra"
     )
     draw.text((20, _BOTTOM + 8), "From above, driving to the right:", INK, drawing.font(14))
-    for row, (text, colour) in enumerate(_PLAN_LEGEND):
+    for row, (text, colour) in enumerate(PLAN_LEGEND):
         draw.text((20, _BOTTOM + 40 + 24 * row), text, colour, drawing.font(16))
     draw.text(
-        (20, _BOTTOM + 40 + 24 * len(_PLAN_LEGEND)),
+        (20, _BOTTOM + 40 + 24 * len(PLAN_LEGEND)),
         "dots: returns",
         RETURN_COLOUR,
         drawing.font(16),

@@ -4,14 +4,13 @@ whom the car hit.
 
 from typing import NamedTuple
 
-from PIL import ImageDraw
-
 from care_sim.core.boxes import planar_ranges
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.records import Keyframe
 from care_sim.loops.watcher import sought
 from care_sim.viewer.pictures import drawing
+from care_sim.viewer.pictures.labels import Labels
 from care_sim.world.world import Actor
 
 
@@ -29,7 +28,7 @@ HIT = State("hit", (255, 80, 70))
 
 
 def mark_sought(
-    draw: ImageDraw.ImageDraw, camera: PinholeCamera, loop: ClosedLoop, frame: Keyframe | None
+    labels: Labels, camera: PinholeCamera, loop: ClosedLoop, frame: Keyframe | None
 ) -> None:
     """An arrow at everybody whom the episode is about, and at whom the car hit.
 
@@ -46,7 +45,7 @@ def mark_sought(
             continue
         state = HIT if actor is hit else _state(loop, frame, actor)
         if at := drawing.point_above(camera, box):
-            drawing.arrow(draw, at, f"{actor.name}: {state.words}", state.colour)
+            labels.arrow(at, f"{actor.name}: {state.words}", state.colour)
 
 
 def contact_text(loop: ClosedLoop, frame: Keyframe) -> str | None:

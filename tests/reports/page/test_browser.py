@@ -14,12 +14,15 @@ from PIL import Image, ImageColor
 
 from care_sim.reports.figures.styles import styles
 from care_sim.reports.page.build import write_page
-from care_sim.reports.page.replay import packed
+from care_sim.reports.page.story import packed
+from care_sim.sources.named import source_of
 from care_sim.study.designs import ablations, faults, order
 from care_sim.study.episode_config import PLAIN_FIELDS, grid
 from care_sim.study.episode_play import run_episode
+from care_sim.study.play_config import play_grid
 from care_sim.study.rows.parquet import write_rows
-from care_sim.study.rows.reading import with_added_columns
+from care_sim.study.rows.reading import with_added_columns, with_tags
+from care_sim.study.scene_play import play_scene
 from tests.helpers import made_plays
 from tests.helpers.made_rows import CROWD, STUDY, row, rows
 from tests.helpers.places import ROOT
@@ -75,11 +78,10 @@ def folder_of(rows, folder, study):
     return folder
 
 
-def written(folder, rows, study, most=0):
+def written(folder, rows, study, most=0, source=None):
     path = folder / "report.html"
-    write_page(
-        folder_of(rows, folder, study), path, most, 1, lambda _workers: ThreadPoolExecutor(1)
-    )
+    threads = lambda _workers: ThreadPoolExecutor(1)  # noqa: E731
+    write_page(folder_of(rows, folder, study), path, most, 1, threads, source)
     return path
 
 
@@ -116,6 +118,36 @@ def test_a_drive_shows_its_way_whom_the_car_meets_and_the_collision(opened, tmp_
     assert page.inner_text(".now").endswith("the car hits the bicycle with 7.7 m/s.")
     assert page.locator(".view .ring").count() == 3
     assert page.locator(".view .way").count() == 1
+
+
+def test_a_play_of_the_open_loop_is_watched_beside_another(opened, drive, tmp_path):
+    source = source_of(f"argoverse2:{drive.parent}")
+    rows = with_tags(
+        play_scene(play_grid(source, source.scenes(), ["history", "care", "full"], [0.1]))
+    )
+    page = opened(written(tmp_path, rows, "protocol", 9, source), READY)
+    assert "3 of 3 are the same as in the results" in page.inner_text("#episodes")
+    page.locator("[data-episode]").nth(2).click()
+    page.wait_for_function("document.querySelectorAll('.view').length === 1")
+    page.select_option("#beside", label="care 10%")
+    page.wait_for_function("document.querySelectorAll('.view').length === 2")
+    titles = page.locator(".view h3").all_inner_texts()
+    assert [title.partition(",")[0] for title in titles] == ["full 100%", "care 10%"]
+    last = int(page.get_attribute("#moment", "max"))
+    page.locator("#moment").fill(str(last))
+    found = re.search(r"(\d+) of (\d+) objects found", page.inner_text(".now >> nth=0"))
+    drawn = page.locator(".view >> nth=0").locator("rect.spotted:visible, rect.missed:visible")
+    assert drawn.count() == int(found[2]) > 0
+    spotted = page.locator(".view >> nth=0").locator("rect.spotted:visible")
+    assert spotted.count() == int(found[1])
+    # The person who stepped out of the house is not there before.
+    assert page.locator(".view >> nth=0").locator("rect:has(title:text('pedestrian'))").count()
+    page.locator("#moment").fill("0")
+    assert "hidden" in page.locator(".view >> nth=0").locator("g[style]").evaluate_all(
+        "all => all.map(each => each.style.visibility)"
+    )
+    page.locator("#play").click()
+    page.wait_for_function(f"document.querySelector('#moment').value === '{last}'")
 
 
 def test_a_heading_sorts_its_column_up_and_down(opened, played):
@@ -322,7 +354,7 @@ STUDIES = {
     "faults": (FAULTY, "Where the order of policies changes", 6),
     "ablate": (ABLATED, "Collisions: 0 in 12 episodes", 0),
     "order": (ORDERED, "First detection by order of cells", 0),
-    "protocol": (PLAYED, "There are none to watch", 3),
+    "protocol": (PLAYED, "None was played again", 3),
 }
 
 

@@ -71,7 +71,11 @@ def test_a_table_of_one_column_has_no_headings():
 def test_the_listing_has_a_line_a_configuration_and_an_entry_a_seed():
     played = [*STUDY, *rows("care", [9.0], budget=0.05, changes={"collision": True})]
     (group,) = episode_groups(played, [])
-    assert (group.label, group.seeds, group.watchable) == ("dense", (0, 1, 2, 3, 4), 0)
+    assert (group.label, group.worlds, group.watchable) == (
+        "dense",
+        ("seed 0", "seed 1", "seed 2", "seed 3", "seed 4"),
+        0,
+    )
     by_name = {(line.policy, line.budget): line.outcomes for line in group.configurations}
     assert [outcome.text for outcome in by_name["history", "3%"]] == [
         "4.0",

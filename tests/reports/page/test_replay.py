@@ -11,14 +11,10 @@ import pytest
 
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
-from care_sim.reports.page.episodes import (
-    Episode,
-    config_of,
-    episodes_to_watch,
-    follow,
-    played_again,
-)
-from care_sim.reports.page.replay import SECTORS, fullness, packed, replayed, sightlines
+from care_sim.reports.page.episodes import Episode, episodes_to_watch, follow, played_again
+from care_sim.reports.page.played_rows import config_of
+from care_sim.reports.page.replay import replayed
+from care_sim.reports.page.story import SECTORS, fullness, packed, sightlines
 from care_sim.scenarios import SCENARIOS
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.episode_play import run_episode, trace

@@ -4,8 +4,10 @@ import gymnasium
 import numpy as np
 import pytest
 
+from care_sim.sensors.annotated import NO_OBJECT
 from care_sim.viewer.pictures.camera_views import (
     EXPLAINED_COLOUR,
+    FALSE_COLOUR,
     UNEXPLAINED_COLOUR,
     take_pictures,
 )
@@ -45,6 +47,24 @@ def test_they_come_as_the_columns_of_the_grid_do_and_show_their_own_boxes(loop, 
             edge = picture[int(top) : int(bottom) + 1, max(column - 1, 0) : column + 2]
             assert np.any(np.all(edge == UNEXPLAINED_COLOUR, axis=-1))
         assert not np.any(np.all(picture == EXPLAINED_COLOUR, axis=-1))
+
+
+def test_a_false_box_has_a_colour_of_its_own_and_a_cross(loop):
+    with gymnasium.make("CARE-Dense-v0", disable_env_checker=True, false_positive_rate=3.0) as env:
+        env.reset(seed=0)
+        own = env.unwrapped.loop
+        false = own.detected_bodies == NO_OBJECT
+        assert 0 < false.sum() < len(false)
+        with furnished(own.world) as scene:
+            (picture,) = (np.asarray(each) for each in take_pictures(scene, own, PICTURE_WIDTH))
+    scale = picture.shape[1] / own.rig.cameras[0].width
+    shown = np.all(picture == FALSE_COLOUR, axis=-1)
+    for box in scale * own.belief.detections.boxes[false]:
+        left, top, right, bottom = np.clip(box.round().astype(int), 0, None)
+        assert shown[top : bottom + 1, left : right + 1].sum() >= bottom - top
+    with furnished(loop.world) as scene:
+        for each in take_pictures(scene, loop, PICTURE_WIDTH):
+            assert not np.any(np.all(np.asarray(each) == FALSE_COLOUR, axis=-1))
 
 
 def test_the_sky_is_darker_than_the_words_on_it(pictures):

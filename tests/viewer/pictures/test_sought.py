@@ -12,6 +12,7 @@ from care_sim.loops.records import Sight
 from care_sim.loops.watcher import sought
 from care_sim.viewer.pictures.furnished_world import CHASE_CAMERA, CHASE_SIZE
 from care_sim.viewer.pictures.keyframe import draw_keyframe
+from care_sim.viewer.pictures.labels import Labels
 from care_sim.viewer.pictures.sought import (
     DETECTED,
     HIT,
@@ -39,7 +40,7 @@ def drive():
 def arrows(loop, frame):
     """The colours of states that the arrows have."""
     canvas = Image.new("RGB", CHASE_SIZE)
-    mark_sought(ImageDraw.Draw(canvas), CHASE_CAMERA, loop, frame)
+    mark_sought(Labels(ImageDraw.Draw(canvas)), CHASE_CAMERA, loop, frame)
     drawn = {colour for _, colour in canvas.getcolors(2**20)}
     return {state for state in (DETECTED, HIT, IN_VIEW, OUT_OF_VIEW) if state.colour in drawn}
 

@@ -35,11 +35,13 @@ class Player {
     const stories = await Promise.all(chosen.map((episode) => unpack(episode.story)));
     if (wish !== this.wish) return; // another was chosen meanwhile
     this.part("views").replaceChildren();
-    this.views = chosen.map((episode, n) => new View(this.part("views"), episode, this.replays.bodies[episode.bodies], stories[n]));
+    this.views = chosen.map((episode, n) => {
+      const Kind = stories[n].entries ? SceneView : View;
+      return new Kind(this.part("views"), episode, this.replays.bodies[episode.bodies], stories[n]);
+    });
     this.last = Math.max(...this.views.map((view) => view.last));
     this.part("moment").max = this.last;
-    const first = (flags) => (flags.includes("1") ? flags.indexOf("1") : 0);
-    this.seek(position ?? (first(stories[0].found) || first(stories[0].in_view)));
+    this.seek(position ?? this.views[0].start);
   }
 
   seek(position) {

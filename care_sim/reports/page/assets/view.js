@@ -1,8 +1,8 @@
 // Episodes from above: lengths come in centimetres, angles in milliradians, y to the left; here metres, y down.
 
 const SVG = "http://www.w3.org/2000/svg";
-const VIEW = { behind: 9, ahead: 41, side: 9.5 };
-const NARROW = { behind: 6, ahead: 26, side: 9.5 };
+const VIEW = { behind: 9, ahead: 41, side: 9.5, ring: 1.5 };
+const NARROW = { behind: 6, ahead: 26, side: 9.5, ring: 1.5 };
 const PATH = 40;
 const STATES = ["unseen", "in-view", "found"];
 
@@ -18,7 +18,8 @@ const place = ([x, y, yaw]) => `translate(${x / 100} ${-y / 100}) rotate(${degre
 const HALF_TURN = 1000 * Math.PI;
 const turn = (from, to) => ((((to - from + HALF_TURN) % (2 * HALF_TURN)) + 2 * HALF_TURN) % (2 * HALF_TURN)) - HALF_TURN;
 const mix = ([x, y, yaw], to, share) => [x + share * (to[0] - x), y + share * (to[1] - y), yaw + share * turn(yaw, to[2])];
-const at = (poses, k, share) => (share && k + 1 < poses.length ? mix(poses[k], poses[k + 1], share) : poses[k]);
+// No pose: a body that is not there at the moment.
+const at = (poses, k, share) => (share && poses[k] && poses[k + 1] ? mix(poses[k], poses[k + 1], share) : poses[k]);
 const box = (parent, [length, width], className) =>
   add(parent, "rect", { x: -length / 200, y: -width / 200, width: length / 100, height: width / 100, class: className });
 const direction = (milliradians, reach) =>
@@ -40,14 +41,29 @@ class View {
     this.figure = root.appendChild(document.createElement("figure"));
     this.figure.className = "view";
     const title = this.figure.appendChild(document.createElement("h3"));
-    title.textContent = `${episode.policy}, ${episode.setting}, seed ${episode.seed}`;
-    this.window = root.clientWidth < 500 ? NARROW : VIEW;
+    title.textContent = `${episode.policy}, ${episode.setting}, ${episode.where}`;
+    this.window = this.windowFor(root.clientWidth);
     this.stage = add(this.figure, "svg", { role: "img", "aria-label": `${title.textContent}, seen from above` });
     this.furnish(standing);
     this.now = this.line("now");
     this.now.setAttribute("aria-live", "polite");
     this.line("tale").textContent = this.tale(episode);
     this.addStrips();
+  }
+
+  windowFor(width) {
+    return width < 500 ? NARROW : VIEW;
+  }
+
+  get start() {
+    // The moment to open at: the first detection, or else the first sight.
+    const first = (flags) => (flags.includes("1") ? flags.indexOf("1") : 0);
+    return first(this.story.found) || first(this.story.in_view);
+  }
+
+  frameAt(k) {
+    // After the last keyframe there is one moment more.
+    return Math.min(k, this.last - 1);
   }
 
   line(className) {
@@ -74,7 +90,7 @@ class View {
     for (const body of [...standing, ...moving]) this.addBody(body);
     for (const x of tens) add(this.world, "text", { x: x + 0.2, y: side - 0.4, class: "metres" }, `${x} m`);
     this.tracks = add(this.world, "g");
-    this.rings = this.story.sought.map(() => add(this.world, "circle", { r: 1.5, class: "ring" }));
+    this.rings = this.ringed().map(() => add(this.world, "circle", { r: this.window.ring, class: "ring" }));
     this.ego = add(this.world, "g");
     const wide = ego.size[1] / 100 + 0.6;
     if (this.turns) {
@@ -85,8 +101,17 @@ class View {
     this.lights = add(this.ego, "rect", { x: -ego.size[0] / 200, y: -ego.size[1] / 200, width: 0.8, height: ego.size[1] / 100, class: "brake" });
   }
 
+  ringed() {
+    // The numbers of the bodies in rings.
+    return this.story.sought.map(([n]) => n);
+  }
+
+  ringClass(number, frame) {
+    return STATES[this.story.sought[number][1][frame]];
+  }
+
   addBody(body) {
-    const shape = add(this.world, "g", { transform: place(body.pose ?? body.poses[0]) });
+    const shape = add(this.world, "g", body.pose ? { transform: place(body.pose) } : {});
     const rect = box(shape, body.size, body.sought ? "sought" : body.reported ? "body" : "mute");
     add(rect, "title", {}, body.kind);
     this.bodies.set(body.n, { body, shape, rect });
@@ -115,8 +140,11 @@ class View {
     ];
     const parts = [...(about === null ? ["Nobody to meet"] : actor), tell(brake, "the car brakes", "the car never brakes")];
     if (contact !== null) parts.push(`${this.collision()} at ${(time[contact + 1] / 100).toFixed(1)} s`);
-    const otherwise = episode.differences.length ? ` Ends otherwise than in the results: ${episode.differences.join("; ")}.` : "";
-    return `${parts.join("; ")}.${otherwise}`;
+    return `${parts.join("; ")}.${this.otherwise(episode)}`;
+  }
+
+  otherwise({ differences }) {
+    return differences.length ? ` Ends otherwise than in the results: ${differences.join("; ")}.` : "";
   }
 
   draw(k, share) {
@@ -124,25 +152,29 @@ class View {
     k = Math.min(k, this.last);
     const { story } = this;
     const { behind, ahead, side } = this.window;
-    const frame = Math.min(k, this.last - 1);
+    const frame = this.frameAt(k);
     const pose = at(story.place, k, share);
     this.stage.setAttribute("viewBox", `${-behind} ${-side} ${behind + ahead} ${2 * side}`);
     this.world.setAttribute("transform", `rotate(${-degrees(pose[2])}) translate(${-pose[0] / 100} ${pose[1] / 100})`);
     this.ego.setAttribute("transform", place(pose));
-    for (const { body, shape } of this.bodies.values()) if (body.poses) shape.setAttribute("transform", place(at(body.poses, k, share)));
-    story.sought.forEach(([n], number) => {
+    for (const { body, shape } of this.bodies.values()) if (body.poses) this.move(shape, at(body.poses, k, share));
+    this.ringed().forEach((n, number) => {
       const { body } = this.bodies.get(n);
-      const [x, y] = body.poses ? at(body.poses, k, share) : body.pose;
-      this.rings[number].setAttribute("transform", `translate(${x / 100} ${-y / 100})`);
+      const pose = body.poses ? at(body.poses, k, share) : body.pose;
+      this.move(this.rings[number], pose && [pose[0], pose[1], 0]);
     });
     if (this.drawn !== k) this.drawMoment(k, frame);
     this.drawn = k;
     this.heads.forEach((head) => head.setAttribute("x", Math.min(k + share, this.last) - this.last / 500));
   }
 
+  move(shape, pose) {
+    shape.style.visibility = pose ? "visible" : "hidden";
+    if (pose) shape.setAttribute("transform", place(pose));
+  }
+
   drawMoment(k, frame) {
     const { story } = this;
-    const on = (name) => story[name][frame] === "1";
     const [x, y, yaw] = story.place[k];
     const [ahead, left] = story.ego.sensor;
     const [cos, sin] = [Math.cos(yaw / 1000), Math.sin(yaw / 1000)];
@@ -158,9 +190,13 @@ class View {
       add(box(shape, size, coasting ? "track coasting" : "track"), "title", {}, `track of a ${kind}`);
       add(this.tracks, "path", { d: `M${tx / 100} ${-ty / 100}l${vx / 100} ${-vy / 100}`, class: "track" });
     }
-    story.sought.forEach(([, states], number) => this.rings[number].setAttribute("class", `ring ${STATES[states[frame]]}`));
-    this.lights.style.visibility = on("brake") ? "visible" : "hidden";
-    this.now.textContent = this.sentence(k, frame, on);
+    this.rings.forEach((ring, number) => ring.setAttribute("class", `ring ${this.ringClass(number, frame)}`));
+    this.lights.style.visibility = this.on("brake", frame) ? "visible" : "hidden";
+    this.now.textContent = this.sentence(k, frame);
+  }
+
+  on(name, frame) {
+    return this.story[name][frame] === "1";
   }
 
   collision() {
@@ -168,7 +204,8 @@ class View {
     return at_front ? `the car hits the ${kind} with ${(speed / 100).toFixed(1)} m/s` : `the ${kind} hits the car`;
   }
 
-  sentence(k, frame, on) {
+  sentence(k, frame) {
+    const on = (name) => this.on(name, frame);
     const { about, time, speed, distance, contact } = this.story;
     const now = `${(time[k] / 100).toFixed(1)} s, ${(speed[k] / 100).toFixed(1)} m/s`;
     if (k === this.last) return `${now}${contact !== null ? `: ${this.collision()}` : ""}.`; // after the last keyframe

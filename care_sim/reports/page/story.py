@@ -1,0 +1,117 @@
+"""The numbers of a story that a page plays: whole ones, lengths in centimetres and angles in
+milliradians, so that an episode takes a few kilobytes. Both loops tell with them what fired and
+what the policy knew.
+"""
+
+import base64
+import json
+import zlib
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_sim.core.arrays import Floats, Mask
+from care_sim.core.belief import Belief
+from care_sim.core.frames import Frame
+from care_sim.core.grid import Cells
+from care_sim.core.grid_stack import Grid
+from care_sim.core.residual import explained
+from care_sim.core.rig import Rig
+from care_sim.core.types import CLASSES, ImageDetections
+
+SECTORS = 128
+"""Sectors in which fired cells are counted, from azimuth -pi on."""
+_DIGITS = "0123456789abcdefghijklmnopqrstuvwxyz"
+"""The digits that say how full a sector is, from none of its cells to all of them."""
+CENTI = 100
+MILLI = 1000
+
+
+def packed(story: dict[str, Any]) -> str:
+    """Plain data as deflated JSON in base64."""
+    return base64.b64encode(
+        zlib.compress(json.dumps(story, separators=(",", ":")).encode(), 9)
+    ).decode()
+
+
+@dataclass
+class Known:
+    """What a policy knew, moment by moment. `tracked` is the class and size of every track, once,
+    as they were last: the moments repeat only what moves.
+    """
+
+    tracked: dict[int, list[Any]] = field(default_factory=dict)
+
+    def at(self, belief: Belief, sensor: Frame, rig: Rig) -> dict[str, Any]:
+        """`tracks`, of each its id, place, velocity, and whether it was missed and is drawn from
+        its forecast, in the world, and `camera`, the lines of sight of the camera's boxes.
+        """
+        tracks = belief.tracks
+        places = sensor.boxes_to_world(tracks.boxes)
+        # Tracks move on the ground: their velocities have no vertical part.
+        moves = sensor.vectors_to_world(np.column_stack([tracks.velocities, np.zeros(len(tracks))]))
+        for track, label, box in zip(
+            tracks.ids.tolist(), tracks.classes.tolist(), places, strict=True
+        ):
+            self.tracked[track] = [CLASSES[label], *whole(box[3:5], CENTI)]
+        columns = [
+            tracks.ids[:, None],
+            whole_poses(places[:, [0, 1, 6]]),
+            whole_array(moves[:, :2], CENTI),
+        ]
+        known = explained(belief.detections, tracks, rig)
+        return {
+            "tracks": np.column_stack([*columns, tracks.misses > 0]).tolist(),
+            "camera": sightlines(belief.detections, known, rig),
+        }
+
+
+def fullness(fired: Cells, grid: Grid) -> str:
+    """How much of every sector fires, one digit per sector."""
+    # A cell that was fired several times is as full as one that was fired once.
+    once = np.unique(fired)
+    counts, cells = np.zeros((2, SECTORS), np.int64)
+    lidars = grid.lidars_of(once)
+    for number, head in enumerate(grid.heads):
+        own = head.grid
+        sectors = np.floor((own.azimuths + np.pi) / (2 * np.pi) * SECTORS).astype(np.int64)
+        # Cells are numbered row by row, so that the remainder is the column.
+        columns = once[lidars == number] % own.columns
+        counts += np.bincount(sectors[columns], minlength=SECTORS)
+        cells += np.bincount(sectors, minlength=SECTORS) * own.rows
+    cells = np.maximum(cells, 1)
+    return "".join(
+        _DIGITS[round(digit)] for digit in (counts / cells * (len(_DIGITS) - 1)).tolist()
+    )
+
+
+def sightlines(detections: ImageDetections, known: Mask, rig: Rig) -> list[list[int]]:
+    """The left and right azimuth of every camera box in the sensor frame, and 1 where a track
+    explains it.
+    """
+    lines = []
+    for number, (left, _, right, _) in enumerate(detections.boxes.tolist()):
+        camera = rig.cameras[int(detections.cameras[number])]
+        # The azimuths at mid-height. Since an old picture was taken the car has turned; in the
+        # sensor frame of now its boxes are turned the other way.
+        ends = camera.rays(np.array([[left, camera.height / 2], [right, camera.height / 2]]))
+        azimuths = np.arctan2(ends[:, 1], ends[:, 0]) - detections.yaw_changes[number]
+        lines.append([*whole(azimuths, MILLI), int(known[number])])
+    return lines
+
+
+def whole_poses(poses: Floats) -> NDArray[np.int64]:
+    """Places in centimetres and headings in milliradians, (n, 3)."""
+    return whole_array(poses * (CENTI, CENTI, MILLI), 1)
+
+
+def whole_array(values: Floats, scale: int) -> NDArray[np.int64]:
+    """Numbers of the scale as whole ones."""
+    return np.rint(values * scale).astype(np.int64)
+
+
+def whole(values: Any, scale: int) -> Any:
+    """The same as plain data, of a number one."""
+    return whole_array(np.asarray(values, float), scale).tolist()
