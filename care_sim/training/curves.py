@@ -4,6 +4,7 @@ Runs of a group differ by their seed alone.
 """
 
 import json
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -175,7 +176,8 @@ def scores_at(runs: Sequence[TrainingRun], steps: int) -> Floats:
 
 def recipe_name(config: Mapping[str, Any]) -> str:
     """The learner, its environments, whether episodes were drawn, and what was left out."""
-    envs = ", ".join(np.atleast_1d(config["env"]).tolist())
+    named = Counter(np.atleast_1d(config["env"]).tolist())
+    envs = ", ".join(f"{env} x{often}" if often > 1 else env for env, often in named.items())
     without = " ".join(config.get("without", ()))
     drawn = ", drawn" if config.get("drawn") else ""
     return f"{config['algorithm']}, {envs}{drawn}" + (f", without {without}" if without else "")

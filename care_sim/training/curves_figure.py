@@ -3,6 +3,7 @@ and in how many of the episodes how much.
 """
 
 from collections.abc import Mapping, Sequence
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,8 @@ from care_sim.training.episodes import LEARNER
 
 _LEVELS = 60
 """Points of a profile."""
+_LINE = 60
+"""Characters of a title that fit over a panel."""
 
 
 def curves_figure(groups: Sequence[Sequence[TrainingRun]]) -> Figure:
@@ -67,7 +70,7 @@ def _draw(axes: Axes, runs: Sequence[TrainingRun]) -> None:
 
 def _describe(axes: Axes, config: Mapping[str, Any], seeds: int) -> None:
     axes.set_title(
-        f"{recipe_name(config)}, {seeds} training seed{'s' * (seeds > 1)}",
+        fill(f"{recipe_name(config)}, {seeds} training seed{'s' * (seeds > 1)}", _LINE),
         loc="left",
         size=10,
     )
@@ -119,7 +122,7 @@ def _draw_profiles(axes: Axes, runs: Sequence[TrainingRun]) -> None:
             axes.fill_between(levels, low, high, color=colours[name], alpha=0.15, linewidth=0)
     axes.set_ylabel("share of episodes above")
     unit = "return" if len(runs[0].tasks) > 1 else runs[0].unit
-    axes.set_xlabel(f"{unit}, after {shared[-1] / 1000:g} thousand steps" if same else unit)
+    axes.set_xlabel(f"{unit}, after {shared[-1]:,} steps" if same else unit)
     axes.legend(frameon=False, fontsize=9)
     axes.spines[["top", "right"]].set_visible(False)
 

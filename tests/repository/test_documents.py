@@ -6,8 +6,6 @@ import json
 import os
 import re
 import shlex
-import subprocess
-import sys
 import tomllib
 from html.parser import HTMLParser
 from importlib.util import module_from_spec, spec_from_file_location
@@ -17,7 +15,6 @@ import numpy as np
 import pytest
 from pyarrow.parquet import read_schema
 
-import care_sim.wrappers
 from care_sim import cli
 from care_sim.base.errors import InvalidInput
 from care_sim.commands.entries import COMMANDS
@@ -26,7 +23,6 @@ from care_sim.core.types import CLASSES
 from care_sim.envs import IDS
 from care_sim.sources.street_films import street_film
 from care_sim.study.results_formats import RESULTS_FORMATS
-from care_sim.viewer.recording.entities import ENTITIES
 from tests.helpers.forked import LEARNING, LIBRARIES, Forked
 from tests.helpers.pages import PAGES, README, SITE, fenced, links, name_of
 from tests.helpers.places import ROOT
@@ -216,57 +212,6 @@ def test_a_page_of_environments_is_read_in_a_clone_and_says_what_docstrings_say(
     on_site = environment_pages.on_page_markdown(page.read_text())
     assert "<!--" not in on_site
     assert on_site.count(":::") == page.read_text().count(":::")
-
-
-def test_the_site_is_built_without_a_warning(tmp_path):
-    for library in ("material", "nbclient", "ipykernel"):
-        pytest.importorskip(library)
-    command = [
-        sys.executable,
-        "-m",
-        "mkdocs",
-        "build",
-        "-f",
-        ".mkdocs.yml",
-        "--site-dir",
-        str(tmp_path / "site"),
-    ]
-    quiet = os.environ | {"NO_MKDOCS_2_WARNING": "1", "PYTHONPATH": str(ROOT)}
-    done = subprocess.run(command, cwd=ROOT, env=quiet, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    assert "WARNING" not in done.stdout + done.stderr
-    page = (tmp_path / "site" / "environments" / "dense.html").read_text()
-    for part in (
-        "CARE-Dense-v0",
-        "Reward",
-        "Episode end",
-        "lidar_dropout",
-        "vehicles",
-        "encroachment_s",
-    ):
-        assert part in page
-    watch = (tmp_path / "site" / "watch.html").read_text()
-    assert [name for name in ENTITIES if f"<code>{name}</code>" not in watch] == []
-    wrappers = (tmp_path / "site" / "api" / "wrappers.html").read_text()
-    assert {*care_sim.wrappers.__all__} <= {*re.findall(r'<h2 id="[\w.]*\.(\w+)"', wrappers)}
-    for page in (tmp_path / "site").rglob("*.html"):
-        loaded = re.findall(
-            r"<(?:script|link|img)[^>]*(?:src|href)=\"?(https?:[^\s\">]+)", page.read_text()
-        )
-        assert loaded == [], f"{page.name} asks the network"
-    notebook_shows_what_came_out(tmp_path / "site")
-
-
-def notebook_shows_what_came_out(site):
-    text = (site / "quickstart.html").read_text()
-    found = [float(number) for number in re.findall(r"detects the person at ([\d.]+) m", text)]
-    assert len(found) == 3
-    assert found[1] > found[0], "CARE sees the person before history does"
-    pictures = re.findall(r'<img[^>]* src="(quickstart-\d+\.png)"', text)
-    assert len(pictures) == 2
-    assert all((site / picture).stat().st_size > 5000 for picture in pictures)
-    index = (site / "index.html").read_text()
-    assert 'href="quickstart.html"' in index
 
 
 def test_the_notebook_is_kept_without_outputs():

@@ -2,6 +2,7 @@
 
 import functools
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -11,23 +12,20 @@ from urllib.parse import unquote, urlsplit
 
 import pytest
 
+import care_sim.wrappers
+from care_sim.viewer.recording.entities import ENTITIES
 from tests.helpers.places import ROOT
 
 sync_api = pytest.importorskip(
     "playwright.sync_api", reason="the browser tests need the PyPI package playwright"
 )
 CHROMIUM = shutil.which("chromium")
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(
-        CHROMIUM is None, reason="the browser tests need Chromium: apt-get install chromium"
-    ),
-]
+pytestmark = pytest.mark.slow
 SWITCHES = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
 DESK = {"viewport": {"width": 1280, "height": 900}, "color_scheme": "dark"}
-PHONE = {"viewport": {"width": 390, "height": 844}, "color_scheme": "light"}
+PHONE = {"width": 390, "height": 844}
+TOO_WIDE = "document.documentElement.scrollWidth - document.documentElement.clientWidth"
 ABOUT = """() => ({
-  wide: document.documentElement.scrollWidth - document.documentElement.clientWidth,
   links: [...document.querySelectorAll('a[href]')].map(each => each.href),
   ids: [...document.querySelectorAll('[id]')].map(each => each.id),
   mute: [...document.images].filter(each => !each.alt || !each.naturalWidth).map(each => each.src),
@@ -40,14 +38,53 @@ class Quiet(SimpleHTTPRequestHandler):
 
 
 @pytest.fixture(scope="module")
-def site(tmp_path_factory):
-    """The folder of the built site; the notebook is not run, for its page has tests of its own."""
-    pytest.importorskip("material")
+def built(tmp_path_factory):
+    """The folder of the built site, with the notebook's outputs, and what the builder said."""
+    for library in ("material", "nbclient", "ipykernel"):
+        pytest.importorskip(library)
     folder = tmp_path_factory.mktemp("built") / "site"
-    command = [sys.executable, "-m", "mkdocs", "build", "-q", "-f", ".mkdocs.yml", "-d", folder]
+    command = [sys.executable, "-m", "mkdocs", "build", "-f", ".mkdocs.yml", "-d", str(folder)]
     quiet = os.environ | {"NO_MKDOCS_2_WARNING": "1", "PYTHONPATH": str(ROOT)}
-    subprocess.run(command, cwd=ROOT, env=quiet, check=True)
-    return folder
+    done = subprocess.run(command, cwd=ROOT, env=quiet, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return folder, done.stdout + done.stderr
+
+
+@pytest.fixture(scope="module")
+def site(built):
+    return built[0]
+
+
+def test_the_site_is_built_without_a_warning(built):
+    assert "WARNING" not in built[1]
+
+
+def test_the_site_tells_of_environments_recordings_and_wrappers(site):
+    page = (site / "environments" / "dense.html").read_text()
+    for part in (
+        "CARE-Dense-v0",
+        "Reward",
+        "Episode end",
+        "lidar_dropout",
+        "vehicles",
+        "encroachment_s",
+    ):
+        assert part in page
+    watch = (site / "watch.html").read_text()
+    assert [name for name in ENTITIES if f"<code>{name}</code>" not in watch] == []
+    wrappers = (site / "api" / "wrappers.html").read_text()
+    assert {*care_sim.wrappers.__all__} <= {*re.findall(r'<h2 id="[\w.]*\.(\w+)"', wrappers)}
+
+
+def test_the_notebook_shows_what_came_out(site):
+    text = (site / "quickstart.html").read_text()
+    found = [float(number) for number in re.findall(r"detects the person at ([\d.]+) m", text)]
+    assert len(found) == 3
+    assert found[1] > found[0], "CARE sees the person before history does"
+    pictures = re.findall(r'<img[^>]* src="(quickstart-\d+\.png)"', text)
+    assert len(pictures) == 2
+    assert all((site / picture).stat().st_size > 5000 for picture in pictures)
+    assert 'href="quickstart.html"' in (site / "index.html").read_text()
 
 
 @pytest.fixture(scope="module")
@@ -61,15 +98,20 @@ def address(site):
 
 @pytest.fixture(scope="module")
 def chromium():
+    if CHROMIUM is None:
+        pytest.skip("the browser tests need Chromium: apt-get install chromium")
     with sync_api.sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=SWITCHES)
         yield browser
         browser.close()
 
 
-def walked(chromium, site, address, look):
-    """What is said of every page by its path, and the troubles that the browser told."""
-    page, troubles = chromium.new_context(**look).new_page(), []
+@pytest.fixture(scope="module")
+def walked(chromium, site, address):
+    """What is said of every page by its path, by how much it is wider than a phone, and the
+    troubles that the browser told.
+    """
+    page, troubles = chromium.new_context(**DESK).new_page(), []
     page.on("console", lambda message: troubles.append(f"{page.url}: {message.text}"))
     page.on("pageerror", lambda error: troubles.append(f"{page.url}: {error}"))
     page.on(
@@ -85,30 +127,28 @@ def walked(chromium, site, address, look):
     )
     about = {}
     for path in sorted(each.relative_to(site).as_posix() for each in site.rglob("*.html")):
+        page.set_viewport_size(DESK["viewport"])
         page.goto(address + path)
         about[path] = page.evaluate(ABOUT)
+        page.set_viewport_size(PHONE)
+        about[path]["too wide"] = page.evaluate(TOO_WIDE)
     page.context.close()
     return about, troubles
 
 
-@pytest.fixture(scope="module")
-def at_a_desk(chromium, site, address):
-    return walked(chromium, site, address, DESK)
-
-
-def test_no_page_tells_of_an_error_and_none_asks_another_host(at_a_desk):
-    about, troubles = at_a_desk
+def test_no_page_tells_of_an_error_and_none_asks_another_host(walked):
+    about, troubles = walked
     assert len(about) > 80
     assert troubles == []
 
 
-def test_every_picture_is_there_and_says_what_it_shows(at_a_desk):
-    about, _ = at_a_desk
+def test_every_picture_is_there_and_says_what_it_shows(walked):
+    about, _ = walked
     assert {path: told["mute"] for path, told in about.items() if told["mute"]} == {}
 
 
-def test_every_link_within_the_site_leads_to_a_page_and_a_place_on_it(at_a_desk, site, address):
-    about, _ = at_a_desk
+def test_every_link_within_the_site_leads_to_a_page_and_a_place_on_it(walked, site, address):
+    about, _ = walked
     # The page of what is not found is shown under any address: it links from the root.
     links = {
         (path, link)
@@ -128,10 +168,9 @@ def test_every_link_within_the_site_leads_to_a_page_and_a_place_on_it(at_a_desk,
     assert sorted(dead) == []
 
 
-def test_no_page_is_wider_than_a_phone(chromium, site, address):
-    about, troubles = walked(chromium, site, address, PHONE)
-    assert {path: told["wide"] for path, told in about.items() if told["wide"] > 0} == {}
-    assert troubles == []
+def test_no_page_is_wider_than_a_phone(walked):
+    about, _ = walked
+    assert {path: told["too wide"] for path, told in about.items() if told["too wide"] > 0} == {}
 
 
 def test_the_search_finds_a_page(chromium, address):
@@ -144,7 +183,7 @@ def test_the_search_finds_a_page(chromium, address):
 
 
 def test_code_is_copied_with_a_button_and_the_palette_turns(chromium, address):
-    context = chromium.new_context(**PHONE | {"viewport": DESK["viewport"]})
+    context = chromium.new_context(**DESK | {"color_scheme": "light"})
     context.grant_permissions(["clipboard-read", "clipboard-write"])
     page = context.new_page()
     page.goto(address)
