@@ -1,6 +1,8 @@
 # make setup      create .venv and install what the benchmark needs
 # make reproduce  set up, run the paper's closed-loop study, print it beside the paper's figures
 # make test       set up with the development tools, run every test
+# make dist       build the sdist, and the wheel from it, in dist/
+# make test-installed   install that wheel in an environment of its own, run the sdist's tests with it
 # make test-speed   hold the ratios of speed to the published ones; nothing else may run meanwhile
 # make docs       build the documentation's site into build/site
 # make check      format, lint, types, tests
@@ -16,6 +18,7 @@ BIN := $(VENV)/bin
 PIP := python -m pip install --quiet --disable-pip-version-check --constraint
 INSTALL := $(BIN)/$(PIP) constraints.txt
 OFFICIAL := .venv-official
+INSTALLED := build/installed
 SPLIT := val
 VERSION := v1.0-trainval
 SECONDS := 600
@@ -39,11 +42,23 @@ ifneq ($(filter official,$(MAKECMDGOALS)),)
   endif
 endif
 
-.PHONY: setup reproduce test test-speed check docs lint torture official official-precision test-official clean
+# What would stop a set-up is told in one line, before anything is installed. Of PyBullet there is a wheel for
+# Python 3.11 alone: pip builds it for a later one.
+define python_is_fit
+  $(if $(filter yes,$(call asked,(3,11) <= sys.version_info)),,$(error PYTHON=$(PYTHON) must be a Python of at least \
+    3.11 that has venv (on Debian: apt-get install python3.11-venv); another one: make $(MAKECMDGOALS) PYTHON=NAME))
+  $(if $(or $(filter yes,$(call asked,sys.version_info < (3,12))),$(shell command -v $(CXX))),,$(error \
+    PYTHON=$(PYTHON) is later than 3.11, and pip has to build PyBullet for it: that needs a C++ compiler, of which \
+    there is none (on Debian: apt-get install g++); with Python 3.11 nothing is built))
+endef
+asked = $(shell { $(PYTHON) -c "import ensurepip, sys; print('yes' if $(1) else 'no')"; } 2>/dev/null)
+
+.PHONY: setup reproduce test test-installed test-speed dist check docs lint torture official official-precision test-official clean
 
 setup: $(VENV)/.installed
 
 $(BIN)/pip:
+	$(python_is_fit)
 	$(PYTHON) -m venv --clear $(VENV)
 
 $(VENV)/.installed: $(BIN)/pip pyproject.toml constraints.txt
@@ -61,6 +76,22 @@ reproduce: setup
 # other's list.
 test: $(VENV)/.developing
 	$(BIN)/python -m pytest --numprocesses 2 --dist worksteal
+
+# From nothing: setuptools would pack what its last lists of files name.
+dist: $(VENV)/.developing
+	rm -rf dist build/lib *.egg-info
+	$(BIN)/python -c "from setuptools import build_meta; build_meta.build_sdist('dist')" >/dev/null
+	$(BIN)/python -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir dist dist/*.tar.gz
+
+# Without its own care_sim the sdist's tests meet the installed one.
+test-installed: dist
+	rm -rf $(INSTALLED)
+	$(PYTHON) -m venv $(INSTALLED)/venv
+	$(INSTALLED)/venv/bin/$(PIP) constraints.txt "$$(echo dist/*.whl)[dev]"
+	mkdir $(INSTALLED)/sdist
+	tar xzf dist/*.tar.gz -C $(INSTALLED)/sdist --strip-components 1
+	rm -r $(INSTALLED)/sdist/care_sim
+	cd $(INSTALLED)/sdist && ../venv/bin/python -m pytest --numprocesses 2 --dist worksteal
 
 test-speed: $(VENV)/.developing
 	$(BIN)/python -m pytest -m speed

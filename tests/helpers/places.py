@@ -1,5 +1,7 @@
-"""Where the repository lies."""
+"""Where the repository lies, or the sdist that holds these tests."""
 
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
+PUBLISHED = ROOT / "results"
+"""In a clone alone."""

@@ -1,22 +1,64 @@
-"""`make official` checks what it is given before it installs anything."""
+"""`make` says in one line what stops a set-up, or what it lacks, before it installs anything."""
 
 import os
 import subprocess
+import sys
 
 import pytest
 
 from tests.helpers.places import ROOT
 
 
-def official(folder, *arguments):
-    """Without a Python to install with, and with no environment installed."""
-    command = ["make", "official", f"OFFICIAL={folder / 'environment'}", "PYTHON=false", *arguments]
+def made(*arguments, **variables):
     surroundings = {
         name: value for name, value in os.environ.items() if not name.startswith(("MAKE", "MFLAGS"))
     }
     return subprocess.run(
-        command, cwd=ROOT, env=surroundings, capture_output=True, text=True, check=False
+        ["make", *arguments],
+        cwd=ROOT,
+        env=surroundings | variables,
+        capture_output=True,
+        text=True,
+        check=False,
     )
+
+
+def official(folder, *arguments):
+    """Without a Python to install with, and with no environment installed."""
+    return made("official", f"OFFICIAL={folder / 'environment'}", "PYTHON=false", *arguments)
+
+
+def setup(folder, python, *arguments, version=(3, 11)):
+    """What would be done with a Python that says it is of this version."""
+    (folder / "sitecustomize.py").write_text(f"import sys; sys.version_info = {version}\n")
+    given = ("--dry-run", "setup", f"VENV={folder / 'environment'}", f"PYTHON={python}")
+    return made(*given, *arguments, PYTHONPATH=str(folder))
+
+
+def complaint(done):
+    """The one line that make ends with."""
+    assert (done.returncode, done.stdout) == (2, "")
+    (line,) = done.stderr.splitlines()
+    return line
+
+
+def test_a_python_that_does_not_fit_is_told(tmp_path):
+    missing = complaint(setup(tmp_path, "python3.11-of-nobody"))
+    assert "*** PYTHON=python3.11-of-nobody must be a Python of at least 3.11" in missing
+    assert missing.endswith("another one: make setup PYTHON=NAME.  Stop.")
+    assert " must be a Python of at least 3.11" in complaint(
+        setup(tmp_path, sys.executable, version=(3, 10))
+    )
+
+
+def test_a_later_python_needs_a_compiler_and_3_11_none(tmp_path):
+    none = "CXX=compiler-of-nobody"
+    assert "pip has to build PyBullet for it: that needs a C++ compiler" in complaint(
+        setup(tmp_path, sys.executable, none, version=(3, 12))
+    )
+    for version, compiler in {(3, 12): "CXX=sh", (3, 11): none}.items():
+        done = setup(tmp_path, sys.executable, compiler, version=version)
+        assert done.stdout.startswith(f"{sys.executable} -m venv --clear {tmp_path}")
 
 
 @pytest.fixture
@@ -48,9 +90,7 @@ def test_what_is_missing_is_said_in_one_line_before_anything_is_installed(tmp_pa
     }
     for arguments, message in wrong.items():
         done = official(tmp_path, *arguments)
-        assert (done.returncode, done.stdout) == (2, "")
-        (line,) = done.stderr.splitlines()
-        assert line.endswith(f"*** {message}.  Stop.")
+        assert complaint(done).endswith(f"*** {message}.  Stop.")
 
 
 def test_with_everything_there_the_environment_is_installed(tmp_path, given):

@@ -23,7 +23,7 @@ from care_sim.study.benchmark.worlds import (
     published_worlds,
 )
 from tests.helpers.made_results import made_result
-from tests.helpers.places import ROOT
+from tests.helpers.places import PUBLISHED, ROOT
 
 SEAL = "5" * 64
 
@@ -202,7 +202,7 @@ def test_a_result_is_of_the_code_of_its_policy(tmp_path):
 
 @pytest.mark.parametrize(
     "path",
-    sorted((ROOT / "results" / "leaderboard").glob("*.json")),
+    sorted((PUBLISHED / "leaderboard").glob("*.json")),
     ids=lambda path: path.stem,
 )
 def test_the_results_of_this_repository_can_be_read(path):

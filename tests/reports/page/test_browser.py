@@ -25,7 +25,6 @@ from care_sim.study.rows.reading import with_added_columns, with_tags
 from care_sim.study.scene_play import play_scene
 from tests.helpers import made_plays
 from tests.helpers.made_rows import CROWD, STUDY, row, rows
-from tests.helpers.places import ROOT
 
 sync_api = pytest.importorskip(
     "playwright.sync_api", reason="the browser tests need the PyPI package playwright"
@@ -398,10 +397,10 @@ class OneSeed(ThreadPoolExecutor):
 
 
 @pytest.mark.slow
-def test_the_page_of_the_papers_study_is_small_and_quick(opened, tmp_path):
+def test_the_page_of_the_papers_study_is_small_and_quick(opened, published, tmp_path):
     path = tmp_path / "report.html"
     played = OneSeed()
-    made = write_page(ROOT / "results" / "closed-loop-5", path, 400, 1, lambda _workers: played)
+    made = write_page(published / "closed-loop-5", path, 400, 1, lambda _workers: played)
     assert len(played.first) == 61
     assert made.watchable == len(made.rows) == 305
     assert path.stat().st_size < MOST_BYTES

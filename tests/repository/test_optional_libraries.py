@@ -1,0 +1,211 @@
+"""Libraries of extras are imported where they are used, and a missing one is told in a line that
+names an extra which brings it.
+"""
+
+import ast
+import json
+import re
+import subprocess
+import sys
+import tomllib
+
+import pytest
+
+from tests.helpers.places import ROOT
+from tests.repository.test_house import MODULES, imported
+
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+EXTRAS = PROJECT["optional-dependencies"]
+FOR_DEVELOPERS = {"all", "dev", "docs"}
+MODULE_OF = {
+    "mujoco_core": "mujoco",
+    "open3d_cpu": "open3d",
+    "pillow": "PIL",
+    "rerun_sdk": "rerun",
+    "vl_convert_python": "vl_convert",
+}
+"""Where a distribution's module has another name."""
+BESIDE = {"dask": {"distributed"}, "jinja2": {"markupsafe"}, "torchrl": {"tensordict"}}
+"""Modules that come with another."""
+OF_NO_EXTRA = {"envpool"}
+"""What `care-sim bench` measures where somebody has installed it."""
+NEED_LIBRARIES = (
+    "care_sim.measure.bench.answered_at_once",
+    "care_sim.reports.page.",
+    "care_sim.training.detector_",
+    "care_sim.training.networks",
+    "care_sim.training.vec_env",
+    "care_sim.viewer.recording.",
+)
+"""Modules that need a library as they are loaded: who uses them imports them in a function."""
+
+
+def distributions(extra):
+    """What an extra asks for, with what the extras that it names do."""
+    for wanted in EXTRAS[extra]:
+        named = re.fullmatch(r"care-sim\[(.*)\]", wanted)
+        if named:
+            for other in named[1].split(","):
+                yield from distributions(other)
+        else:
+            yield re.split(r"[\[>=<]", wanted)[0].replace("-", "_")
+
+
+def brought(extra):
+    """The modules that an extra brings."""
+    names = {MODULE_OF.get(name, name) for name in distributions(extra)}
+    return names.union(*(BESIDE.get(name, ()) for name in names))
+
+
+OPTIONAL = set().union(*map(brought, EXTRAS)) | OF_NO_EXTRA
+
+
+def named_by(node):
+    """The top modules that an import names."""
+    if isinstance(node, ast.ImportFrom):
+        return {(node.module or "").partition(".")[0]}
+    return {alias.name.partition(".")[0] for alias in node.names}
+
+
+def is_for_types(node):
+    return isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
+
+
+def at_loading(node):
+    """The imports that run when a module is loaded."""
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.Import | ast.ImportFrom):
+            yield child
+        elif not (
+            isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda)
+            or is_for_types(child)
+        ):
+            yield from at_loading(child)
+
+
+@pytest.fixture(scope="module")
+def trees():
+    return {module: ast.parse(path.read_text()) for module, path in MODULES.items()}
+
+
+def test_all_is_all_but_what_developers_need():
+    users = set(EXTRAS) - FOR_DEVELOPERS
+    assert brought("all") == set().union(*map(brought, users))
+    assert brought("all") < brought("dev")
+
+
+def test_every_library_is_one_that_the_project_asks_for(trees):
+    base = {re.split(r"[\[>=<]", wanted)[0].replace("-", "_") for wanted in PROJECT["dependencies"]}
+    known = {MODULE_OF.get(name, name) for name in base} | OPTIONAL | set(sys.stdlib_module_names)
+    asked = {
+        name
+        for tree in trees.values()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Import | ast.ImportFrom)
+        for name in named_by(node)
+    }
+    assert asked - known - {"care_sim"} == set()
+
+
+def test_only_modules_that_others_load_when_they_need_them_load_libraries_of_extras(trees):
+    imports = {module: [*at_loading(tree)] for module, tree in trees.items()}
+    needing = {
+        module for module, nodes in imports.items() if OPTIONAL & set().union(*map(named_by, nodes))
+    }
+    # Whoever loads one of them as it is loaded itself needs the library, too.
+    loads = {
+        module: {*imported(ast.Module(nodes, []))} | {module.rpartition(".")[0]}
+        for module, nodes in imports.items()
+    }
+    size = 0
+    while size < len(needing):
+        size = len(needing)
+        needing |= {module for module, others in loads.items() if others & needing}
+    assert "care_sim.viewer.recording.recording" in needing
+    assert {module for module in needing if not module.startswith(NEED_LIBRARIES)} == set()
+
+
+def test_a_message_names_an_extra_that_brings_the_library(trees):
+    told = 0
+    for tree in trees.values():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Call) and ast.unparse(node.func) == "_import":
+                module, _, extra = (getattr(argument, "value", None) for argument in node.args)
+                # In a loop over modules that is no text.
+                assert module is None or module in brought(extra)
+                told += 1
+            if isinstance(node, ast.Try):
+                told += bool(extras_in(node.handlers))
+                names = {
+                    name
+                    for inner in node.body
+                    if isinstance(inner, ast.Import | ast.ImportFrom)
+                    for name in named_by(inner)
+                }
+                for extra in extras_in(node.handlers):
+                    assert names & OPTIONAL <= brought(extra), ast.unparse(node)
+        assert extras_in([tree]) <= set(EXTRAS)
+    assert told > 8
+
+
+def extras_in(nodes):
+    """The extras that texts below these nodes name."""
+    return {
+        name
+        for top in nodes
+        for node in ast.walk(top)
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+        for name in re.findall(r"care-sim\[(\w+)\]", node.value)
+    }
+
+
+WITHOUT = """
+import json, sys
+class Nothing:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in OPTIONAL:
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+OPTIONAL, LINES = map(json.loads, sys.argv[1:])
+sys.meta_path.insert(0, Nothing())
+from care_sim.cli import main
+for line in LINES:
+    print("$", line, file=sys.stderr)
+    try:
+        main(line.split())
+    except SystemExit as end:
+        print("exit", end.code, file=sys.stderr)
+"""
+MISSED = {
+    "run dartout --policy farthest-points": "open3d",
+    "run dartout --detector pillars": "rl",
+    "run dartout --record film.rrd": "viewer",
+    "run dartout --video film.mp4": "video",
+    "enjoy ppo-dartout --view": "viewer",
+    "view film.rrd": "viewer",
+    "reproduce --cluster tcp://127.0.0.1:1": "cluster",
+    "train ppo": "rl",
+    "train ppo --tune 2": "tune",
+    "train recurrent-ppo": "rl",
+    "train detector --out weights.npz": "rl",
+    "train learned-sets --out weights.npz": "rl",
+    "report . -o page.html": "page",
+}
+
+
+@pytest.mark.slow
+def test_a_command_without_its_extra_says_so_in_a_line(tmp_path):
+    given = [json.dumps(sorted(OPTIONAL)), json.dumps([*MISSED])]
+    done = subprocess.run(
+        [sys.executable, "-c", WITHOUT, *given],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    told = done.stderr.split("$ ")[1:]
+    assert len(told) == len(MISSED)
+    for lines, extra in zip(told, MISSED.values(), strict=True):
+        command, *hints, line, end = lines.splitlines()
+        assert [hint for hint in hints if not hint.startswith("hyperparameters of ")] == [], command
+        assert f"pip install 'care-sim[{extra}]'" in line, command
+        assert end == "exit 2", command
