@@ -56,7 +56,7 @@ def paste_pictures(
         (20, "Cameras:" if row else "Front camera:", INK),
         (124, "explained by a track", EXPLAINED_COLOUR),
         (264, "new", UNEXPLAINED_COLOUR),
-        (304, "false (crossed)", FALSE_COLOUR),
+        (304, "false", FALSE_COLOUR),
     )
     for x, text, colour in words:
         draw.text((x, top + 8), text, colour, drawing.font(14))
