@@ -41,7 +41,7 @@ def learn(
     with one_thread(torch):
         torch.manual_seed(seed)
         arrays = _first_weights(torch, places)
-        _leave_out(torch, arrays, kept_weights(without))
+        _leave_out(torch, arrays, without)
         optimizer = torch.optim.Adam(arrays.values(), lr=LEARNING_RATE)
         schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, steps)
         rng = np.random.default_rng(seed)
@@ -92,13 +92,15 @@ def _first_weights(torch: Any, places: int) -> dict[str, Any]:
     return {name: array.requires_grad_() for name, array in arrays.items()}
 
 
-def _leave_out(torch: Any, arrays: dict[str, Any], kept: Arrays) -> None:
-    """What is not kept begins at 0, the map at its first value, and gets no gradient."""
-    for name, told in kept.items():
+def _leave_out(torch: Any, arrays: dict[str, Any], without: Collection[str]) -> None:
+    """What is not kept becomes 0 and gets no gradient; a map without places is one number."""
+    for name, told in kept_weights(without).items():
         mask = torch.from_numpy(told)
-        if name != "map":
-            arrays[name].data *= mask
+        arrays[name].data *= mask
         arrays[name].register_hook(mask.mul)
+    if "place" in without:
+        # All places begin alike and get the same gradient, so that they stay alike.
+        arrays["map"].register_hook(lambda gradient: gradient.sum().expand_as(gradient))
 
 
 def _losses(

@@ -1,6 +1,7 @@
 """The training of the sets: its labels are true, it learns, and it makes the same bytes again."""
 
 from contextlib import closing
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -81,18 +82,32 @@ def test_what_is_left_out_decides_nothing(without, tmp_path):
     assert (np.ptp(of_strips) < 1e-9) == ("place" in without)
 
 
-def test_constants_are_the_shares_of_each_kind():
-    """Without anything to tell items of a kind apart, what is learned are frequencies."""
-    constants = sets_network.learn([*drawn(0)], PLACES, 0, 300, ["attention", "inputs", "place"])
-    known = {name: np.asarray(array, np.float64) for name, array in constants.items()}
-    for kind, answer in ((0, len(STEPS)), (1, STEPS.index(6))):
-        inputs = np.zeros((1, len(ITEM_INPUTS)))
+def test_constants_are_the_shares_of_each_kind(tmp_path):
+    """Without anything to tell items of a kind apart, what is learned are frequencies; and that of
+    all strips, without their places.
+    """
+    # A strip with nothing stands for many, so that one in 250 finds something.
+    examples = [
+        replace(one, weights=np.where(one.found > 0, 1, 25).astype(np.float32)) for one in drawn(0)
+    ]
+    parts = ["attention", "inputs", "place"]
+    constants = sets_network.learn(examples, PLACES, 0, 600, parts)
+    save_weights(tmp_path / "w.npz", constants, Card("learned-sets", AngularGrid()))
+    network = SetNetwork(load_weights(tmp_path / "w.npz"), PLACES)
+    for kind in (0, 1):
+        inputs = np.zeros((1, len(ITEM_INPUTS)), np.float32)
         inputs[0, 0] = kind
-        units = np.maximum(inputs @ known["first"] + known["first_bias"], 0)
-        units = np.maximum(
-            np.hstack([units, 0 * units]) @ known["second"] + known["second_bias"], 0
-        )
-        assert (units @ known["out"] + known["out_bias"]).argmax() == answer
+        strips = np.zeros((1, len(STRIP_INPUTS)), np.float32)
+        (chances,) = network.chances(Items(None, 0, inputs, strips))
+        assert chances == pytest.approx(kind * (np.array(STEPS) >= 6), abs=0.05)
+    found, weights = (
+        np.concatenate([getattr(one, name) for one in examples]) for name in ("found", "weights")
+    )
+    share = np.average(found, weights=weights)
+    assert 3 * sets_network.RARE < share < 5 * sets_network.RARE
+    chances = network.strip_chances(Items(None, 0, inputs, strips), np.arange(PLACES))
+    assert chances == pytest.approx(np.full(PLACES, share), rel=0.3)
+    assert np.ptp(chances) == 0
 
 
 def test_without_faults_the_camera_has_none(monkeypatch):
