@@ -91,7 +91,7 @@ def test_constants_are_the_shares_of_each_kind(tmp_path):
         replace(one, weights=np.where(one.found > 0, 1, 25).astype(np.float32)) for one in drawn(0)
     ]
     parts = ["attention", "inputs", "place"]
-    constants = sets_network.learn(examples, PLACES, 0, 600, parts)
+    constants = sets_network.learn(examples, PLACES, 0, 1500, parts)
     save_weights(tmp_path / "w.npz", constants, Card("learned-sets", AngularGrid()))
     network = SetNetwork(load_weights(tmp_path / "w.npz"), PLACES)
     for kind in (0, 1):
