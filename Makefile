@@ -42,8 +42,8 @@ ifneq ($(filter official,$(MAKECMDGOALS)),)
   endif
 endif
 
-# What would stop a set-up is told in one line, before anything is installed. Of PyBullet there is a wheel for
-# Python 3.11 alone: pip builds it for a later one.
+# What would stop a set-up is told in one line, before anything is installed. Of PyBullet there are
+# wheels up to Python 3.11: pip builds it for a later one.
 define python_is_fit
   $(if $(filter yes,$(call asked,(3,11) <= sys.version_info)),,$(error PYTHON=$(PYTHON) must be a Python of at least \
     3.11 that has venv (on Debian: apt-get install python3.11-venv); another one: make $(MAKECMDGOALS) PYTHON=NAME))

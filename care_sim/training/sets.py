@@ -45,7 +45,7 @@ class TrainSets:
     """
 
     out: Path
-    """File to write."""
+    """File to write; from the end of the first round on it holds what is learned so far."""
     seed: int = bounded(0, 0, LARGEST_INTEGER)
     """Of the first weights and the order of the examples."""
     steps: int = bounded(3000, 1, LARGEST_INTEGER)

@@ -16,9 +16,6 @@ import care_sim.wrappers
 from care_sim.viewer.recording.entities import ENTITIES
 from tests.helpers.places import ROOT
 
-sync_api = pytest.importorskip(
-    "playwright.sync_api", reason="the browser tests need the PyPI package playwright"
-)
 CHROMIUM = shutil.which("chromium")
 pytestmark = pytest.mark.slow
 SWITCHES = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
@@ -100,6 +97,9 @@ def address(site):
 def chromium():
     if CHROMIUM is None:
         pytest.skip("the browser tests need Chromium: apt-get install chromium")
+    sync_api = pytest.importorskip(
+        "playwright.sync_api", reason="the browser tests need the PyPI package playwright"
+    )
     with sync_api.sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=SWITCHES)
         yield browser

@@ -1,4 +1,4 @@
-"""The figures of the fault study: what a measure does as every fault grows, one panel per fault."""
+"""The figures of the fault study: what a measure does as every fault grows."""
 
 import math
 import textwrap

@@ -13,7 +13,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 import care_sim
-from care_sim.base.errors import counted
+from care_sim.base.errors import InvalidInput, counted
 from care_sim.base.extras import vega_bundle
 from care_sim.base.files import HTML, replacing
 from care_sim.evaluation.recall import CENSORED_AT
@@ -160,11 +160,14 @@ def write_page(
     """Write the page of a folder of results, with at most so many episodes to watch, to `path`.
     `source` is where the scenes of recordings are found.
 
-    Raises InvalidInput where there are no results, and MissingExtra without the libraries.
+    Raises InvalidInput where there are no results and for a source of the closed loop, and
+    MissingExtra without the libraries.
     """
     rows, study, left_out = read_results(folder)
     # Opened before anything is played: a path that cannot be written is told at once.
     with replacing(path, HTML) as unfinished:
+        if source is not None and study.results is not PLAYS:
+            raise InvalidInput(f"--source is for plays of the open loop, and {folder} holds none")
         findings = Findings.of(study, rows)
         about = provenance_of(folder, rows, study.results, left_out)
         watched = episodes_to_watch(rows, most) if study.results in WATCHED else []

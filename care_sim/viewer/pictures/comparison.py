@@ -16,10 +16,9 @@ from care_sim.evaluation.metrics import outcome
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.records import Keyframe
 from care_sim.viewer.pictures import drawing
-from care_sim.viewer.pictures.camera_views import EXPLAINED_COLOUR
 from care_sim.viewer.pictures.drawing import BACKGROUND, FAINT_INK, INK, NO_RETURN_COLOUR
 from care_sim.viewer.pictures.furnished_world import add_car, furnished, photograph
-from care_sim.viewer.pictures.keyframe import BOXES_MEAN, BRAKING_COLOUR, mark_chase
+from care_sim.viewer.pictures.keyframe import BRAKING_COLOUR, mark_chase
 from care_sim.viewer.pictures.sought import DETECTED, HIT, IN_VIEW, contact_text
 
 _VIEW_SIZE = (512, 320)
@@ -67,8 +66,7 @@ def _chase_view(loop: ClosedLoop, frame: Keyframe) -> Image.Image:
     with furnished(loop.world) as scene:
         add_car(scene, loop.world, loop.rig.sensor_x_m, loop.guarded_m)
         view = photograph(scene, _CAMERA, loop.sensor)
-    labels = mark_chase(ImageDraw.Draw(view), _CAMERA, loop, frame)
-    labels.over((0, _VIEW_SIZE[1]), BOXES_MEAN, EXPLAINED_COLOUR, 11)
+    mark_chase(ImageDraw.Draw(view), _CAMERA, loop, frame, 11)
     return view
 
 

@@ -121,7 +121,6 @@ def _write_header(draw: ImageDraw.ImageDraw, loop: ClosedLoop, frame: Keyframe |
 
 def _annotate_chase(chase: Image.Image, loop: ClosedLoop, frame: Keyframe | None) -> None:
     labels = mark_chase(ImageDraw.Draw(chase), CHASE_CAMERA, loop, frame)
-    labels.over((0, CHASE_SIZE[1]), BOXES_MEAN, EXPLAINED_COLOUR)
     # Numbers stand beside the bars, 1.6 m to the left, on the ground.
     for metres in METRE_MARKS:
         bar = Frame.mounted(way_ahead(loop.world, loop.rig.sensor_x_m, metres), (0.0, 1.6, 0.0))
@@ -131,10 +130,14 @@ def _annotate_chase(chase: Image.Image, loop: ClosedLoop, frame: Keyframe | None
 
 
 def mark_chase(
-    draw: ImageDraw.ImageDraw, camera: PinholeCamera, loop: ClosedLoop, frame: Keyframe | None
+    draw: ImageDraw.ImageDraw,
+    camera: PinholeCamera,
+    loop: ClosedLoop,
+    frame: Keyframe | None,
+    words_size: int = 13,
 ) -> Labels:
-    """Tracks as wireframes with their classes, those that the last scan missed faint, and arrows at
-    whom the episode is about. Gives the labels, for more.
+    """Tracks as wireframes with their classes, those that the last scan missed faint, arrows at
+    whom the episode is about, and in a corner what the boxes mean. Gives the labels, for more.
     """
     tracks = loop.belief.tracks
     marks = [
@@ -146,6 +149,8 @@ def mark_chase(
         drawing.wireframe(draw, camera, box, colour, 1 if misses else 2)
     labels = Labels(draw)
     mark_sought(labels, camera, loop, frame)
+    # Before the tracks, whose names leave room for it.
+    labels.over((0, draw.im.size[1]), BOXES_MEAN, EXPLAINED_COLOUR, words_size)
     for box, name, _, colour in marks:
         if at := drawing.point_above(camera, box):
             labels.over(at, name, colour)

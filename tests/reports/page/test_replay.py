@@ -4,7 +4,7 @@ import base64
 import json
 import signal
 import zlib
-from concurrent.futures import Future
+from concurrent.futures import Future, ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -15,10 +15,12 @@ from care_sim.reports.page.episodes import Episode, episodes_to_watch, follow, p
 from care_sim.reports.page.played_rows import config_of
 from care_sim.reports.page.replay import replayed
 from care_sim.reports.page.story import SECTORS, fullness, packed, sightlines
+from care_sim.reports.report import read_results
 from care_sim.scenarios import SCENARIOS
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.episode_play import run_episode, trace
 from care_sim.study.executors import processes
+from care_sim.study.results_formats import VEHICLE
 from tests.helpers.lidars import STACK
 
 CONFIG = EpisodeConfig("dartout", "care", 0.1, seed=3)
@@ -58,6 +60,13 @@ def test_an_episode_of_every_world_is_played_again_as_it_was(scenario):
     assert Episode(row, watched).identical
     assert len(watched.story["rays"]) == 10
     json.dumps([watched.story, watched.bodies], allow_nan=False)
+
+
+def test_a_row_of_the_vehicle_study_is_played_again_as_it_was(published):
+    rows, study, _ = read_results(published / "vehicle")
+    assert study.results is VEHICLE
+    (again,) = played_again(rows[:1], 1, lambda _workers: ThreadPoolExecutor(1))
+    assert again.identical
 
 
 def test_there_is_a_moment_before_every_keyframe_and_one_after_the_last(replay, played):
