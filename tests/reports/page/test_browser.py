@@ -389,10 +389,10 @@ class OneSeed(ThreadPoolExecutor):
         super().__init__(1)
         self.first = {}
 
-    def submit(self, call, play, row):
+    def submit(self, call, play, row, source):
         cell = tuple(row.get(name) for name in PLAIN_FIELDS if name != "seed")
         if cell not in self.first:
-            self.first[cell] = super().submit(call, play, row)
+            self.first[cell] = super().submit(call, play, row, source)
         return self.first[cell]
 
 
