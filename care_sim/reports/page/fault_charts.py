@@ -1,7 +1,7 @@
 """The charts of the fault study: what a measure does as every fault grows, one panel per fault."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import product
 from typing import Any
 
@@ -12,6 +12,7 @@ from care_sim.reports.cells import StudyCells
 from care_sim.reports.figures.faults import (
     MEASURES,
     CurveMeasure,
+    Curves,
     fault_curves,
     flat_faults,
     flat_line,
@@ -45,14 +46,14 @@ def _chart(study: StudyCells, place: Place, measure: CurveMeasure) -> Chart:
     # Areas fall by equal factors from the first policy to the last, so that each mark lies visibly
     # within the one before.
     ratio = (_LEAST / _LARGEST) ** (1 / len(names))
+    curves = {fault.label: fault_curves(study, names, fault, place, measure) for fault in FAULTS}
+    flat = flat_faults(curves)
+    shown = {label: own for label, own in curves.items() if label not in flat}
     values = [
         value | {"area": round(_LARGEST * ratio**number, 1)}
         for number, policy in enumerate(names)
-        for value in _values(study, place, measure, policy)
+        for value in _values(study, shown, policy)
     ]
-    curves = {fault.label: fault_curves(study, names, fault, place, measure) for fault in FAULTS}
-    flat = flat_faults(curves)
-    values = [value for value in values if value["fault"] not in flat]
     chart = _panels(encoding, values)
     seeds = counted(len({row["seed"] for row in study.rows}), "seed")
     apart = "Marks of later policies are smaller, so that equal ones stay visible."
@@ -101,14 +102,13 @@ def _panels(encoding: Encoding, values: Sequence[dict[str, Any]]) -> Any:
     ).resolve_scale(x="independent")
 
 
-def _values(
-    study: StudyCells, place: Place, measure: CurveMeasure, policy: str
-) -> list[dict[str, Any]]:
-    """The points of a policy at every strength that was played."""
+def _values(study: StudyCells, curves: Mapping[str, Curves], policy: str) -> list[dict[str, Any]]:
+    """The points of a policy, at every strength that was played of the faults with curves."""
     found = [
-        (fault, level.label, measure.value(study.cell(level.key(place, policy))))
+        (fault, level.label, height)
         for fault in FAULTS
-        for level in fault.levels
+        if fault.label in curves
+        for level, height in zip(fault.levels, curves[fault.label][policy], strict=True)
     ]
     return [
         {
