@@ -106,6 +106,9 @@ GROUPS = {
         "report": CommandEntry(
             "report", "PrintReport", "Print a folder's tables and figures again, or make one page."
         ),
+        "merge": CommandEntry(
+            "merge", "Merge", "Put folders of one study in one, so that tables compare them."
+        ),
     },
     "What there is": {
         "policies": CommandEntry(

@@ -6,20 +6,15 @@ from collections.abc import Collection, Sequence
 from pathlib import Path
 
 from care_sim.base.errors import InvalidInput, counted
-from care_sim.core.conditions import DEFAULTS
-from care_sim.evaluation.sightings import ANNOTATED
 from care_sim.reports.studies import SWEEP
 from care_sim.reports.study import Study
 from care_sim.study.journal import Finished, Journal
-from care_sim.study.results_formats import RESULTS_FORMATS, is_parameter
+from care_sim.study.results_formats import RESULTS_FORMATS
+from care_sim.study.row_identity import USUAL, asked_with, identity, row_label
 from care_sim.study.rows.parquet import read_notes, read_rows
 from care_sim.study.run_config import Row, RunConfig
 
 WAYS_OUT = "give another --out, or --force to replace it"
-_USUAL = DEFAULTS | {"presence": ANNOTATED}
-"""Parameters of a row that does not name them: rows of older versions lack what was added since."""
-_LABEL_NAMES = ("scene", "scenario", "policy", "budget")
-_SEEDS = ("seed", "floor_seed")
 _MOST_TOLD = 3
 """Differing parameters that a refusal names, at the most."""
 
@@ -58,7 +53,7 @@ def check_results(folder: Path, configs: Sequence[RunConfig], study: Study) -> N
     if gone:
         raise InvalidInput(
             f"{folder} holds {here} of the study {there}; {len(gone)} of them, the first "
-            f"{_label(gone[0])}{_differing(gone[0], configs)}, would be gone from the study "
+            f"{row_label(gone[0])}{_differing(gone[0], configs)}, would be gone from the study "
             f"{study.name} that is asked for, {wanted}: {WAYS_OUT}"
         )
 
@@ -74,9 +69,9 @@ def lost(folder: Path, played: Sequence[RunConfig], study: Study) -> str:
         return ""
     return (
         f"the results in {folder} stay as they were: {len(gone)} of their "
-        f"{counted(len(rows), unit)}, the first {_label(gone[0])}, would be gone, since this time "
-        f"only {counted(len(played), unit)} did not fail; the journal keeps what was played: mend "
-        "what failed, or --force to replace them"
+        f"{counted(len(rows), unit)}, the first {row_label(gone[0])}, would be gone, since this "
+        f"time only {counted(len(played), unit)} did not fail; the journal keeps what was "
+        "played: mend what failed, or --force to replace them"
     )
 
 
@@ -101,7 +96,7 @@ def check_journal(
     if gone := _gone(journal.rows, configs):
         raise InvalidInput(
             f"{folder} holds the unfinished study {_joined(journal.studies)}, {rows}; {len(gone)} "
-            f"of them, the first {_label(gone[0])}{_differing(gone[0], configs)}, are not asked "
+            f"of them, the first {row_label(gone[0])}{_differing(gone[0], configs)}, are not asked "
             "for now: give the command that began it, another --out, or --force to play beside them"
         )
 
@@ -115,39 +110,20 @@ def _rows_and_gone(
 
 
 def _gone(rows: Sequence[Row], configs: Sequence[RunConfig]) -> list[Row]:
-    own = {_identity(config.row()) for config in configs}
-    return [row for row in rows if _identity(row) not in own]
-
-
-def _identity(row: Row) -> frozenset[tuple[str, object]]:
-    return frozenset(_asked(row).items())
-
-
-def _asked(row: Row) -> Row:
-    """The parameters of a row that differ from the defaults."""
-    # A row holds the digest of a file of camera detections. It counts only whether one was given,
-    # so that the same command may replace its own rows after the file has changed.
-    given = {name: value for name, value in row.items() if is_parameter(name) and value is not None}
-    if "camera_detections" in given:
-        given["camera_detections"] = True
-    return {name: value for name, value in given.items() if value != _USUAL.get(name)}
-
-
-def _label(row: Row) -> str:
-    main = [str(row[name]) for name in _LABEL_NAMES if row.get(name) is not None]
-    return " ".join([*main, *(f"{name} {row[name]}" for name in _SEEDS if row.get(name))])
+    own = {identity(config.row()) for config in configs}
+    return [row for row in rows if identity(row) not in own]
 
 
 def _differing(row: Row, configs: Sequence[RunConfig]) -> str:
     """In brackets, the parameters in which a row differs from the nearest task with the same label;
     empty where no task has that label.
     """
-    label = _label(row)
-    there = _asked(row)
+    label = row_label(row)
+    there = asked_with(row)
     found = []
     for asked in (config.row() for config in configs):
-        if _label(asked) == label:
-            now = _asked(asked)
+        if row_label(asked) == label:
+            now = asked_with(asked)
             names = [name for name in sorted({*there, *now}) if there.get(name) != now.get(name)]
             found.append([f"{name} {_told(name, there)}, now {_told(name, now)}" for name in names])
     nearest = min(found, key=len, default=[])
@@ -155,7 +131,7 @@ def _differing(row: Row, configs: Sequence[RunConfig]) -> str:
 
 
 def _told(name: str, asked: Row) -> str:
-    value = asked.get(name, _USUAL.get(name))
+    value = asked.get(name, USUAL.get(name))
     return "not given" if value is None else str(value)
 
 

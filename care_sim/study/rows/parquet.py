@@ -92,7 +92,7 @@ def read_rows(path: Path, schema: Schema | None = None) -> list[Row]:
     """Read rows back; with a schema, the columns that it knows. Raises InvalidInput for a file that
     is damaged, is empty, or does not have the schema.
     """
-    table = _read(path)
+    table = read_table(path)
     # The first fault is told.
     for fault in (schema or _ANY).faults(table):
         raise InvalidInput(f"{path} holds no rows of a study: {fault}")
@@ -109,7 +109,7 @@ def read_notes(path: Path) -> tuple[str | None, list[str]]:
     """The name of the study that wrote a file, None without one, and what it left out. Raises
     InvalidInput for a damaged file, or other notes.
     """
-    notes = _read(path).schema.metadata or {}
+    notes = read_table(path).schema.metadata or {}
     try:
         study = notes[STUDY_NOTE].decode() if STUDY_NOTE in notes else None
         left_out = parsed_json(notes.get(LEFT_OUT_NOTE, b"[]"))
@@ -122,7 +122,8 @@ def read_notes(path: Path) -> tuple[str | None, list[str]]:
     return study, left_out
 
 
-def _read(path: Path) -> pa.Table:
+def read_table(path: Path) -> pa.Table:
+    """The table of a file as it is. Raises InvalidInput where there is none, or a damaged one."""
     if not path.is_file():
         raise InvalidInput(f"no results at {path}; expected a folder that a study wrote")
     try:

@@ -150,16 +150,22 @@ _FullScans = dict[tuple[Setting, int], Row]
 
 
 def with_added_columns(rows: Sequence[Row]) -> list[Row]:
-    """The rows with three more columns.
+    """The rows with three more columns: `tags` of the policy, joined by '+', and those of
+    `with_regret`.
+    """
+    return with_regret(with_tags(rows))
 
-    `tags` of the policy, joined by '+'. `regret_m`: detection distance of the full scan of the same
-    world and seed minus that of this row, 0 at best, None where the full scan was not run and where
-    nobody is met.
+
+def with_regret(rows: Sequence[Row]) -> list[Row]:
+    """The rows with two more columns, made anew where they are there.
+
+    `regret_m`: detection distance of the full scan of the same world and seed minus that of this
+    row, 0 at best, None where the full scan was not run and where nobody is met.
     `censored`: the policy, or that full scan, never detected the actor, so that `regret_m` takes
     the most that its distance can have been and is a bound.
     """
     full = {(setting_of(row), row["seed"]): row for row in rows if row["policy"] == "full"}
-    return [{**row, **_regret(row, full)} for row in with_tags(rows)]
+    return [{**row, **_regret(row, full)} for row in rows]
 
 
 def with_tags(rows: Sequence[Row]) -> list[Row]:

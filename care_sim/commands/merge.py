@@ -1,0 +1,50 @@
+"""`care-sim merge`: folders of one study in one, so that their policies are compared in pairs."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from care_sim.base.errors import InvalidInput, report_problems
+from care_sim.commands.shared.study_command import DONE, console
+from care_sim.reports.merging import merged
+from care_sim.reports.report import print_report, where_it_lies
+
+
+@dataclass(frozen=True, kw_only=True)
+class Merge:
+    """Put folders of one study in one, so that tables compare them.
+
+    Put the rows of several folders of one study into a new folder, with tables and figures of them
+    all: what you played stands beside what was published, seed by seed. A task that two folders
+    hold is kept once, and must have come out alike.
+    """
+
+    folders: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER...")]
+    """The --out of earlier studies of one name, two at least."""
+    out: Path = Path("runs/merge")
+    """A folder that does not exist, or is empty."""
+
+    def __call__(self) -> int:
+        """Run it."""
+        if len(self.folders) < 2:
+            raise InvalidInput("merge wants two folders at least; report shows one")
+        if self.out.exists() and (not self.out.is_dir() or any(self.out.iterdir())):
+            raise InvalidInput(f"{self.out} is there already and not empty: give another --out")
+        whole = merged(self.folders)
+        whole.write(self.out)
+        print_report(whole.rows, console(), whole.study, whole.left_out, self.out)
+        print(*where_it_lies(self.out, whole.study, whole.rows), sep="\n")
+        if whole.twice:
+            unit = whole.study.results.unit
+            print(f"Alike in two of the folders, and kept once: {whole.twice:,} {unit}")
+        if not whole.shown_alike:
+            report_problems(
+                [
+                    f"{len(whole.codes)} versions of the code played the folders, which have no "
+                    "task in common: play one of the one folder in the other, too, to show that "
+                    "their worlds are alike"
+                ]
+            )
+        return DONE

@@ -1,0 +1,205 @@
+"""Several folders of one study as one: rows side by side, so that tables compare them pair by pair.
+
+What one person plays today then stands beside what was published, which need not be played again.
+Rows of one task that came out alike are one row. Where they came out differently, something else
+has changed than the policy, and nothing of the two folders may be compared.
+"""
+
+import json
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+
+from care_sim.base.errors import InvalidInput, counted
+from care_sim.base.files import write_text
+from care_sim.base.json_text import json_content
+from care_sim.reports.report import StudyReport, read_results
+from care_sim.reports.study import Study
+from care_sim.study.results_formats import EPISODES, PLAYS, VEHICLE
+from care_sim.study.row_identity import identity, row_label
+from care_sim.study.rows.parquet import (
+    check_columns,
+    read_rows,
+    read_table,
+    write_columns,
+    write_rows,
+)
+from care_sim.study.rows.reading import setting_of, with_regret
+from care_sim.study.run_config import Row
+
+_CONFIG = "config.json"
+_EVENTS = "events.parquet"
+_OF_THE_PLAYING = ("version", "digest", "wall_s", "peak_rss_mb")
+_OF_THE_FOLDER = ("tags", "regret_m", "censored", "differing_keyframes", "differing_cells")
+"""Columns that rows of one outcome may have differently: who played it and how fast, and what was
+worked out beside the other rows of its folder."""
+
+
+@dataclass(frozen=True)
+class Merged:
+    """Rows of several folders. `twice` is how many tasks more than one of them held, `same_films`
+    whether one scene of two folders had one film.
+    """
+
+    study: Study
+    rows: Sequence[Row]
+    events: Mapping[str, Any] | None
+    left_out: Sequence[str]
+    descriptions: Mapping[str, Any]
+    twice: int
+    same_films: bool
+
+    @property
+    def codes(self) -> list[str]:
+        """The hashes of the code that played them, as far as the folders tell, each once."""
+        return _values(self.descriptions, "versions").get("code", [])
+
+    @property
+    def shown_alike(self) -> bool:
+        """Whether something shows that all worlds are those of one code."""
+        return len(self.codes) < 2 or self.twice > 0 or self.same_films
+
+    def write(self, folder: Path) -> None:
+        """Write a folder of results as a study does, without a journal."""
+        report = StudyReport.of(self.rows, self.study, self.left_out)
+        kind = self.study.results
+        if self.events is not None:
+            write_columns(self.events, folder / _EVENTS)
+        write_rows(self.rows, folder / kind.file, self.study.name, self.left_out, self.study.schema)
+        write_text(folder / _CONFIG, json.dumps(self._description(), indent=1) + "\n")
+        report.write(folder)
+
+    def _description(self) -> dict[str, Any]:
+        of_all = {
+            name: {key: ", ".join(held) for key, held in _values(self.descriptions, name).items()}
+            for name in ("versions", "machine")
+        }
+        return {"study": self.study.name, **of_all, "failed": [], "merged": self.descriptions}
+
+
+def merged(folders: Sequence[Path]) -> Merged:
+    """What several folders hold together, in their order.
+
+    Raises InvalidInput as `read_results` does; for folders of different studies; and where one task
+    came out differently in two of them, or one scene has two films.
+    """
+    found = [(folder, *read_results(folder)) for folder in folders]
+    first, _, study, _ = found[0]
+    for folder, _, other, _ in found:
+        if other.name != study.name:
+            raise InvalidInput(
+                f"{first} holds the study {study.name} and {folder} the study {other.name}: only "
+                "folders of one study can be merged"
+            )
+    rows: list[Row] = []
+    events: list[pa.Table] = []
+    seen = _Seen()
+    for folder in folders:
+        # All columns, those too that no report reads.
+        own = read_rows(folder / study.results.file)
+        is_new = [seen.is_new(row, folder) for row in own]
+        rows += [row for row, new in zip(own, is_new, strict=True) if new]
+        if study.results is PLAYS:
+            events += _events(folder, own, is_new)
+    check_columns(rows)
+    return Merged(
+        study,
+        with_regret(rows) if study.results in (EPISODES, VEHICLE) else rows,
+        _columns(pa.concat_tables(events, promote_options="permissive")) if events else None,
+        [*dict.fromkeys(what for *_, left_out in found for what in left_out)],
+        _descriptions(folders),
+        seen.twice,
+        seen.same_films,
+    )
+
+
+class _Seen:
+    """The tasks and films of the folders so far."""
+
+    def __init__(self) -> None:
+        self.twice = 0
+        self.same_films = False
+        self._rows: dict[Hashable, tuple[Path, Row]] = {}
+        self._films: dict[Hashable, tuple[Path, str]] = {}
+
+    def is_new(self, row: Row, folder: Path) -> bool:
+        """Whether no row before had its task. Raises where one came out differently."""
+        if row.get("film_hash"):
+            self._check_film(row, folder)
+        before, other = self._rows.setdefault(identity(row), (folder, row))
+        if other is row:
+            return True
+        unlike = [name for name in other if _differs(name, other, row)]
+        if unlike:
+            raise InvalidInput(
+                f"{row_label(row)} came out differently in {before} and {folder} ({unlike[0]}: "
+                f"{other[unlike[0]]}, {row[unlike[0]]}): the code or a file has changed between "
+                "them; play one of them again"
+            )
+        self.twice += 1
+        return False
+
+    def _check_film(self, row: Row, folder: Path) -> None:
+        # How pulses return is a part of the film, and a condition.
+        place = setting_of(row), row["scene"]
+        before, film = self._films.setdefault(place, (folder, row["film_hash"]))
+        if film != row["film_hash"]:
+            raise InvalidInput(
+                f"{row['scene']} has another film in {folder} than in {before}: their plays cannot "
+                "be compared; play one of them again"
+            )
+        self.same_films |= before != folder
+
+
+def _differs(name: str, one: Row, other: Row) -> bool:
+    own = (*_OF_THE_PLAYING, *_OF_THE_FOLDER)
+    # A column that only one of them has was added between two versions.
+    return name in one and name in other and name not in own and one[name] != other[name]
+
+
+def _events(folder: Path, rows: Sequence[Row], kept: Sequence[bool]) -> list[pa.Table]:
+    """The events of the rows that are kept: a play has as many as `ttfds`, play after play."""
+    path = folder / _EVENTS
+    if not path.is_file():
+        return []
+    table = read_table(path)
+    of_rows = np.repeat(kept, [len(row["ttfds"]) for row in rows])
+    if len(of_rows) != table.num_rows:
+        raise InvalidInput(
+            f"{path} holds {counted(table.num_rows, 'event')}, its plays {len(of_rows)}: the two "
+            "files are not of one study"
+        )
+    return [table.filter(pa.array(of_rows))]
+
+
+def _columns(table: pa.Table) -> dict[str, Any]:
+    return {name: table[name].combine_chunks() for name in table.column_names}
+
+
+def _descriptions(folders: Sequence[Path]) -> dict[str, Any]:
+    """What every folder says of itself, by its name; nothing of a folder that says nothing."""
+    told: dict[str, Any] = {}
+    for folder in folders:
+        name = folder.resolve().name
+        # Two folders of one name in different places are told apart by their turn.
+        while name in told:
+            name += "'"
+        try:
+            told[name] = json_content(folder / _CONFIG)
+        except (OSError, ValueError):
+            told[name] = {}
+    return told
+
+
+def _values(descriptions: Mapping[str, Any], name: str) -> dict[str, list[str]]:
+    """By name the values that the folders tell, each once."""
+    found: dict[str, dict[str, None]] = {}
+    for each in descriptions.values():
+        told = each.get(name) if isinstance(each, dict) else None
+        for key, value in (told if isinstance(told, dict) else {}).items():
+            found.setdefault(key, {})[str(value)] = None
+    return {key: [*values] for key, values in found.items()}

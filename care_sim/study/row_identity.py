@@ -1,0 +1,34 @@
+"""What was asked for with a row: two rows of which the same was asked are of one task."""
+
+from collections.abc import Hashable
+
+from care_sim.core.conditions import DEFAULTS
+from care_sim.evaluation.sightings import ANNOTATED
+from care_sim.study.results_formats import is_parameter
+from care_sim.study.run_config import Row
+
+USUAL = DEFAULTS | {"presence": ANNOTATED}
+"""Parameters of a row that does not name them: rows of older versions lack what was added since."""
+_LABEL_NAMES = ("scene", "scenario", "policy", "budget")
+_SEEDS = ("seed", "floor_seed")
+
+
+def asked_with(row: Row) -> Row:
+    """The parameters of a row that differ from the defaults."""
+    # A row holds the digest of a file of camera detections. It counts only whether one was given,
+    # so that the same command may replace its own rows after the file has changed.
+    given = {name: value for name, value in row.items() if is_parameter(name) and value is not None}
+    if "camera_detections" in given:
+        given["camera_detections"] = True
+    return {name: value for name, value in given.items() if value != USUAL.get(name)}
+
+
+def identity(row: Row) -> Hashable:
+    """Equal for rows of one task, whatever code played it."""
+    return frozenset(asked_with(row).items())
+
+
+def row_label(row: Row) -> str:
+    """A short name for people: world, policy, budget, and seeds that are not 0."""
+    main = [str(row[name]) for name in _LABEL_NAMES if row.get(name) is not None]
+    return " ".join([*main, *(f"{name} {row[name]}" for name in _SEEDS if row.get(name))])

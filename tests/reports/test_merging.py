@@ -1,0 +1,134 @@
+"""Folders of one study in one: what is kept, what is compared, and what is refused."""
+
+import json
+
+import pyarrow.parquet as pq
+import pytest
+
+from care_sim.base.errors import InvalidInput
+from care_sim.cli import main
+from care_sim.reports.merging import merged
+from care_sim.reports.report import read_results
+from care_sim.sources.scenes import Streets
+from care_sim.study.play_config import play_grid
+from care_sim.study.results_formats import PLAYS
+from care_sim.study.rows.parquet import read_rows, write_columns, write_rows
+from care_sim.study.scene_play import play_scene
+from tests.helpers.made_rows import rows
+
+OURS = rows("care", [15.0, 16.0])
+FULL = rows("full", [17.0, 18.0])
+THEIRS = rows("history", [4.0, None])
+
+
+def folder(path, held, study="sweep", code="one"):
+    """A folder of results with these rows, played by some code."""
+    path.mkdir()
+    write_rows(held, path / "episodes.parquet", study)
+    (path / "config.json").write_text(json.dumps({"versions": {"code": code}}))
+    return path
+
+
+def merge(capsys, *arguments):
+    """Exit code, output and errors."""
+    with pytest.raises(SystemExit) as end:
+        main(["merge", *map(str, arguments)])
+    return end.value.code, *capsys.readouterr()
+
+
+def test_policies_of_two_folders_are_compared_and_regret_is_worked_out(tmp_path, capsys):
+    ours, theirs = folder(tmp_path / "ours", OURS), folder(tmp_path / "theirs", [*THEIRS, *FULL])
+    code, out, err = merge(capsys, ours, theirs, "--out", tmp_path / "both")
+    assert (code, err) == (0, "")
+    assert "dense: care minus each policy" in out
+    assert read_results(tmp_path / "both")[1].name == "sweep"
+    # The full scan of the other folder is the bound of both.
+    found = read_rows(tmp_path / "both" / "episodes.parquet")
+    assert [row["regret_m"] for row in found if row["policy"] == "care"] == [2.0, 2.0]
+    config = json.loads((tmp_path / "both" / "config.json").read_text())
+    assert [*config["merged"]] == ["ours", "theirs"]
+
+
+def test_a_task_of_both_folders_is_kept_once(tmp_path, capsys):
+    ours = folder(tmp_path / "ours", [*OURS, *FULL])
+    theirs = folder(tmp_path / "theirs", [*THEIRS, *FULL], code="another")
+    code, out, err = merge(capsys, ours, theirs, "--out", tmp_path / "both")
+    # The full scan in both shows that the worlds of two versions of the code are the same.
+    assert (code, err) == (0, "")
+    assert "Alike in two of the folders, and kept once: 2 episodes\n" in out
+    assert len(read_results(tmp_path / "both")[0]) == 6
+
+
+def test_two_versions_of_the_code_without_a_task_in_common_are_told(tmp_path, capsys):
+    ours = folder(tmp_path / "ours", OURS)
+    theirs = folder(tmp_path / "theirs", THEIRS, code="another")
+    code, _, err = merge(capsys, ours, theirs, "--out", tmp_path / "both")
+    assert code == 0
+    assert err.startswith("care-sim: 2 versions of the code played the folders")
+    assert err.count("\n") == 1
+
+
+def test_a_task_that_came_out_differently_is_refused(tmp_path):
+    ours = folder(tmp_path / "ours", [*OURS, *FULL])
+    theirs = folder(tmp_path / "theirs", rows("full", [17.0, 12.0]))
+    told = r"dense full 1\.0 seed 1 came out differently in .*detection_distance_m: 18\.0, 12\.0"
+    with pytest.raises(InvalidInput, match=told):
+        merged([ours, theirs])
+
+
+def test_folders_of_different_studies_are_refused(tmp_path):
+    ours = folder(tmp_path / "ours", OURS)
+    theirs = folder(tmp_path / "theirs", THEIRS, study="ablate")
+    with pytest.raises(InvalidInput, match=r"the study sweep and .*theirs the study ablate"):
+        merged([ours, theirs])
+
+
+def test_nothing_is_written_over(tmp_path, capsys):
+    ours, theirs = folder(tmp_path / "ours", OURS), folder(tmp_path / "theirs", THEIRS)
+    code, _, err = merge(capsys, ours, theirs, "--out", ours)
+    assert (code, err.endswith("is there already and not empty: give another --out\n")) == (2, True)
+    assert "two folders at least" in merge(capsys, ours)[2]
+    assert len(read_results(ours)[0]) == 2
+
+
+@pytest.fixture(scope="module")
+def played():
+    """Rows of one generated street under two policies and the full scan."""
+    configs = play_grid(Streets(), Streets().scenes()[:1], ["care", "history", "full"], [0.05])
+    return dict(zip(("care", "history", "full"), play_scene(configs), strict=True))
+
+
+def plays(path, held):
+    """A folder of the protocol with these rows."""
+    path.mkdir()
+    write_rows(PLAYS.kept_rows(held), path / PLAYS.file, "protocol")
+    for name, columns in PLAYS.further_files(held).items():
+        write_columns(columns, path / name)
+    return path
+
+
+def test_events_of_the_open_loop_go_with_their_plays(tmp_path, played):
+    ours = plays(tmp_path / "ours", [played["care"], played["full"]])
+    theirs = plays(tmp_path / "theirs", [played["full"], played["history"]])
+    whole = merged([ours, theirs])
+    assert (whole.twice, whole.same_films) == (1, True)
+    whole.write(tmp_path / "both")
+    held = pq.read_table(tmp_path / "both" / "events.parquet")
+    together = plays(tmp_path / "together", [played[n] for n in ("care", "full", "history")])
+    assert held.equals(pq.read_table(together / "events.parquet"))
+
+
+def test_another_film_of_a_scene_is_refused(tmp_path, played):
+    ours = plays(tmp_path / "ours", [played["care"]])
+    theirs = plays(tmp_path / "theirs", [played["history"] | {"film_hash": "another"}])
+    with pytest.raises(InvalidInput, match=r"street-0000-straight has another film in .*theirs"):
+        merged([ours, theirs])
+
+
+def test_events_of_another_study_are_told(tmp_path, played):
+    ours, theirs = plays(tmp_path / "ours", [played["care"]]), tmp_path / "theirs"
+    plays(theirs, [played["history"]])
+    table = pq.read_table(theirs / "events.parquet")
+    pq.write_table(table.slice(1), theirs / "events.parquet")
+    with pytest.raises(InvalidInput, match=r"the two files are not of one study"):
+        merged([ours, theirs])
