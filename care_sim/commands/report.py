@@ -12,7 +12,13 @@ from care_sim.base.errors import InvalidInput, counted, report_problems
 from care_sim.base.extras import check_page
 from care_sim.commands.shared.play_options import SourceOptions
 from care_sim.commands.shared.study_command import console
-from care_sim.reports.report import print_report, read_results, where_it_lies, write_report
+from care_sim.reports.report import (
+    print_minus,
+    print_report,
+    read_results,
+    where_it_lies,
+    write_report,
+)
 from care_sim.study.executors import CORES, MOST_WORKERS
 
 
@@ -30,6 +36,9 @@ class PrintReport(SourceOptions):
     """HTML file for the page, which needs no other file; the folder is left as it is (extra
     'page').
     """
+    minus: str | None = None
+    """Print this policy less each of the others, with intervals, in place of the tables; the folder
+    is left as it is. Of one with parameters the whole name in the tables."""
     episodes: int = bounded(40, 0, LARGEST_INTEGER)
     """At most this many episodes are played again for the page, seed by seed; 0 for none. They take
     as long as they did in the study."""
@@ -46,8 +55,15 @@ class PrintReport(SourceOptions):
         if self.source is not None and self.page is None:
             raise InvalidInput("--source has no meaning without --page: nothing is played again")
 
+        if self.minus is not None and self.page is not None:
+            raise InvalidInput("--minus has no meaning with --page: a page draws its own pairs")
+
     def __call__(self) -> int:
         """Run it."""
+        if self.minus is not None:
+            rows, study, _ = read_results(self.folder)
+            print_minus(rows, console(), study, self.minus)
+            return 0
         return self._print() if self.page is None else self._write(self.page)
 
     def _print(self) -> int:

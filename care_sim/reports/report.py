@@ -8,7 +8,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 from rich.console import Console
 
-from care_sim.base.errors import InvalidInput, printable
+from care_sim.base.errors import InvalidInput, printable, unknown
 from care_sim.base.files import write_text
 from care_sim.reports.captions import caption
 from care_sim.reports.figures.files import remove_others, save
@@ -18,7 +18,8 @@ from care_sim.reports.study import Study
 from care_sim.reports.table import brief, unmarked
 from care_sim.study.results_formats import results_format_in
 from care_sim.study.rows.parquet import read_notes, read_rows
-from care_sim.study.run_config import Row
+from care_sim.study.rows.reading import policy_of
+from care_sim.study.run_config import FULL, Row
 from care_sim.study.unfinished import UNFINISHED, how_far
 
 TABLES = "tables.md"
@@ -108,6 +109,31 @@ def print_report(
     console.print(brief([caption(study.caption, shown)], console.width, rest), markup=False)
     for sentence in _closing(rows, study, left_out):
         console.print(sentence, markup=False)
+
+
+def print_minus(rows: Sequence[Row], console: Console, study: Study, policy: str) -> None:
+    """Print one policy, named as in the tables, less each of the others. Raises InvalidInput for a
+    policy that the rows do not have, or that is alone in them, and for a study without such tables.
+    """
+    if study.minus is None:
+        able = ", ".join(each.name for each in STUDIES.values() if each.minus)
+        raise InvalidInput(
+            f"the study {study.name} has no tables of one policy minus each; those that have: "
+            f"{able}"
+        )
+    if policy not in (known := {policy_of(row) for row in rows}):
+        raise unknown("policy in these results", policy, known)
+    if policy == FULL:
+        raise InvalidInput(
+            f"{FULL} has a budget of its own, at which there is no other: give the policy that it "
+            "is to be compared with"
+        )
+    tables = study.minus(rows, policy)
+    if not tables:
+        raise InvalidInput(f"there is nothing that {policy} can be compared with in these results")
+    for table in tables:
+        console.print(table.rich(None))
+        console.print()
 
 
 def where_it_lies(folder: Path, study: Study, rows: Sequence[Row] = ()) -> list[str]:

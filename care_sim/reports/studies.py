@@ -33,6 +33,7 @@ from care_sim.reports.protocol import ablations as open_ablations
 from care_sim.reports.protocol import firing as open_firing
 from care_sim.reports.protocol import order as open_order
 from care_sim.reports.protocol.closing import protocol_closing
+from care_sim.reports.protocol.contrasts import protocol_minus
 from care_sim.reports.protocol.tables import protocol_tables
 from care_sim.reports.realism import episodes as realism
 from care_sim.reports.realism import plays as open_realism
@@ -44,7 +45,7 @@ from care_sim.reports.tables.firing import firing_tables
 from care_sim.reports.tables.ncap import ncap_tables
 from care_sim.reports.tables.order import order_tables
 from care_sim.reports.tables.r157 import r157_tables
-from care_sim.reports.tables.sweep import sweep_tables
+from care_sim.reports.tables.sweep import sweep_minus, sweep_tables
 from care_sim.reports.tables.validate import validation_tables
 from care_sim.reports.vehicle.tables import vehicle_tables
 from care_sim.study.designs.crowding import VEHICLES_COLUMN
@@ -83,6 +84,7 @@ _ALL = (
         sweep_figures,
         closings.sweep_closing,
         BUDGET_FIGURES,
+        minus=sweep_minus,
     ),
     Study(
         "paper",
@@ -91,6 +93,7 @@ _ALL = (
         sweep_figures,
         closings.paper_closing,
         BUDGET_FIGURES,
+        minus=sweep_minus,
     ),
     Study(
         "crowding",
@@ -232,6 +235,7 @@ _ALL = (
         PROTOCOL_FIGURES,
         captions.PROTOCOL_CAPTION,
         PLAYS,
+        minus=protocol_minus,
     ),
     Study(
         "mechanism",

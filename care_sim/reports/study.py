@@ -23,7 +23,7 @@ class Study:
     figures that the study can draw, as patterns in which {world} stands for a scenario or source,
     and a * for any text. `caption` says how to read its tables. `results` is what it plays.
     `columns` are further columns that its tables read: those that a row may leave empty may be
-    missing where all rows do.
+    missing where all rows do. `minus` makes tables of one policy less every other.
     """
 
     name: str
@@ -35,6 +35,7 @@ class Study:
     caption: tuple[captions.Remark, ...] = captions.EPISODES_CAPTION
     results: ResultsFormat = EPISODES
     columns: Mapping[str, Column] = field(default_factory=dict)
+    minus: Callable[[Sequence[Row], str], list[Table]] | None = None
 
     def figures_of(self, rows: Sequence[Row] = ()) -> list[str]:
         """The figures that it can draw of the built-in worlds and those of the rows, as patterns in

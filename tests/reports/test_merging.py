@@ -1,6 +1,7 @@
 """Folders of one study in one: what is kept, what is compared, and what is refused."""
 
 import json
+import re
 
 import pyarrow.parquet as pq
 import pytest
@@ -68,6 +69,36 @@ def test_two_versions_of_the_code_without_a_task_in_common_are_told(tmp_path, ca
     assert err.count("\n") == 1
 
 
+def report(capsys, *arguments):
+    """Exit code, output and errors."""
+    with pytest.raises(SystemExit) as end:
+        main(["report", *map(str, arguments)])
+    return end.value.code, *capsys.readouterr()
+
+
+def test_any_policy_can_be_held_against_the_others(tmp_path, capsys):
+    held = folder(tmp_path / "held", [*OURS, *THEIRS, *FULL])
+    before = sorted(held.iterdir())
+    code, out, err = report(capsys, held, "--minus", "care")
+    assert (code, err) == (0, "")
+    assert "dense: care minus each policy" in out
+    # 15 and 16 m less 17 and 18 m.
+    assert re.search(r"full +-2\.0 \[-2\.0,-2\.0\]", out)
+    assert sorted(held.iterdir()) == before
+
+
+def test_a_policy_that_was_not_played_has_no_differences(tmp_path, capsys):
+    held = folder(tmp_path / "held", OURS)
+    code, _, err = report(capsys, held, "--minus", "car")
+    assert (code, err.endswith("known: care; the nearest is care\n")) == (2, True)
+    assert "nothing that care can be compared with" in report(capsys, held, "--minus", "care")[2]
+    both = folder(tmp_path / "both", [*OURS, *FULL])
+    assert "full has a budget of its own" in report(capsys, both, "--minus", "full")[2]
+    ablated = folder(tmp_path / "ablated", [*OURS, *FULL], study="ablate")
+    assert "study ablate has no tables" in report(capsys, ablated, "--minus", "care")[2]
+    assert "no meaning with --page" in report(capsys, held, "--minus", "care", "-o", "x.html")[2]
+
+
 def test_a_task_that_came_out_differently_is_refused(tmp_path):
     ours = folder(tmp_path / "ours", [*OURS, *FULL])
     theirs = folder(tmp_path / "theirs", rows("full", [17.0, 12.0]))
@@ -107,7 +138,7 @@ def plays(path, held):
     return path
 
 
-def test_events_of_the_open_loop_go_with_their_plays(tmp_path, played):
+def test_events_of_the_open_loop_go_with_their_plays(tmp_path, played, capsys):
     ours = plays(tmp_path / "ours", [played["care"], played["full"]])
     theirs = plays(tmp_path / "theirs", [played["full"], played["history"]])
     whole = merged([ours, theirs])
@@ -115,6 +146,7 @@ def test_events_of_the_open_loop_go_with_their_plays(tmp_path, played):
     whole.write(tmp_path / "both")
     held = pq.read_table(tmp_path / "both" / "events.parquet")
     together = plays(tmp_path / "together", [played[n] for n in ("care", "full", "history")])
+    assert "history minus" in report(capsys, tmp_path / "both", "--minus", "history")[1]
     assert held.equals(pq.read_table(together / "events.parquet"))
 
 

@@ -2,7 +2,7 @@
 new idea adds to either.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from care_sim.base.errors import percent
@@ -17,13 +17,9 @@ from care_sim.reports.protocol.notes import (
     played,
 )
 from care_sim.reports.protocol.paper import claims_about
-from care_sim.reports.protocol.rows import HISTORY, SettingPlays
+from care_sim.reports.protocol.rows import HISTORY, SettingPlays, plays_by_setting
 from care_sim.reports.table import Table
-from care_sim.study.run_config import REFERENCE
-
-_TITLES = {REFERENCE: f"{REFERENCE} minus each policy", HISTORY: f"each policy minus {HISTORY}"}
-_HEADS = {REFERENCE: f"{REFERENCE} minus", HISTORY: f"minus {HISTORY}"}
-"""What stands above the names of the policies that the base is compared with."""
+from care_sim.study.run_config import REFERENCE, Row
 
 
 class _ContrastLine(NamedTuple):
@@ -44,20 +40,35 @@ def protocol_contrast_tables(plays: SettingPlays) -> list[Table]:
     # answer whether a few rich scenes drive the result, and go to the files alone.
     wanted = ((REFERENCE, False), (HISTORY, False), (REFERENCE, True))
     return [
-        _table(plays, base, equal_scenes) for base, equal_scenes in wanted if plays.other_than(base)
+        _table(plays, base, equal_scenes, base_first=base != HISTORY)
+        for base, equal_scenes in wanted
+        if plays.other_than(base)
     ]
 
 
-def _table(plays: SettingPlays, base: str, equal_scenes: bool) -> Table:
-    contrasts = list(_contrasts(plays, base, equal_scenes))
+def protocol_minus(rows: Sequence[Row], policy: str) -> list[Table]:
+    """One policy, named with its parameters, less every other, in every setting that has it."""
+    settings = [plays for plays in plays_by_setting(rows) if plays.other_than(policy)]
+    return [_table(plays, policy) for plays in settings]
+
+
+def _table(
+    plays: SettingPlays, base: str, equal_scenes: bool = False, base_first: bool = True
+) -> Table:
+    contrasts = list(_contrasts(plays, base, equal_scenes, base_first))
     said = claims_about(plays.setting)
     intervals = on_intervals(
         difference for contrast in contrasts for difference in contrast.differences
     )
+    title, head = (
+        (f"{base} minus each policy", f"{base} minus")
+        if base_first
+        else (f"each policy minus {base}", f"minus {base}")
+    )
     weights = ", equal scene weights" if equal_scenes else ""
     return Table(
-        f"{plays.setting.label}: {_TITLES[base]}{weights}",
-        (_HEADS[base], *map(percent, plays.budgets)),
+        f"{plays.setting.label}: {title}{weights}",
+        (head, *map(percent, plays.budgets)),
         tuple(_lines(plays, contrasts)),
         (
             f"{UNITS_OF_DIFFERENCES} {played(plays)}",
@@ -74,13 +85,15 @@ def _table(plays: SettingPlays, base: str, equal_scenes: bool) -> Table:
     )
 
 
-def _contrasts(plays: SettingPlays, base: str, equal_scenes: bool) -> Iterator[_ContrastLine]:
-    """CARE stands first in its pairs, history last."""
+def _contrasts(
+    plays: SettingPlays, base: str, equal_scenes: bool, base_first: bool
+) -> Iterator[_ContrastLine]:
+    """The base less each of the others, or each of the others less the base."""
     for ratio in RATIOS:
         for policy in plays.other_than(base):
-            # A positive difference speaks for the policy under test: for CARE against the others,
-            # for the others against history.
-            first, second = (base, policy) if base == REFERENCE else (policy, base)
+            # A positive difference speaks for the policy under test: for the base that stands
+            # first, for the others against history.
+            first, second = (base, policy) if base_first else (policy, base)
             pair = PolicyPair(first, second, ratio, equal_scenes=equal_scenes)
             yield _ContrastLine(
                 policy, pair, [pair.measured(plays, budget) for budget in plays.budgets]

@@ -64,6 +64,19 @@ def sweep_tables(rows: Sequence[Row]) -> list[Table]:
     return tables
 
 
+def sweep_minus(rows: Sequence[Row], policy: str) -> list[Table]:
+    """One policy, named with its parameters, less every other, in every setting that has it."""
+    cells = summarise(rows)
+    groups = grouped(rows)
+    tables = []
+    for setting in dict.fromkeys(cell.setting for cell in cells if cell.policy == policy):
+        own = [cell for cell in cells if cell.setting == setting]
+        tags = _tags(setting, own, groups)
+        if len(tags) > 1:
+            tables.append(_contrast_table(setting, policy, own, groups, tags))
+    return tables
+
+
 def levels_table(title: str, cells: Sequence[Cell]) -> Table:
     """Medians, counts and regret, one row per cell."""
     published = [_published(cell) for cell in cells]
@@ -83,14 +96,18 @@ def sweep_contrast_tables(setting: Setting, cells: Sequence[Cell], groups: Group
     """CARE minus every other policy, then the same of every learned one; none for a policy that ran
     alone.
     """
-    # The full scan of the same worlds may stand in another setting, of which it feels the same.
-    tags = {cell.policy: cell.tags for cell in cells} | (
-        {FULL: ()} if full_of(groups, setting) else {}
-    )
+    tags = _tags(setting, cells, groups)
     # A map that serves as a control is held against the others in the table of controls.
     learned = [name for name in tags if "learned" in tags[name] and "control" not in tags[name]]
     named = [policy for policy in (REFERENCE, *learned) if policy in tags and len(tags) > 1]
     return [_contrast_table(setting, policy, cells, groups, tags) for policy in named]
+
+
+def _tags(setting: Setting, cells: Sequence[Cell], groups: Groups) -> dict[str, tuple[str, ...]]:
+    """The policies of a setting with their tags, and the full scan."""
+    # The full scan of the same worlds may stand in another setting, of which it feels the same.
+    full: dict[str, tuple[str, ...]] = {FULL: ()} if full_of(groups, setting) else {}
+    return {cell.policy: cell.tags for cell in cells} | full
 
 
 def _contrast_table(
