@@ -354,7 +354,8 @@ def test_no_column_is_lost_on_paper(opened, tmp_path):
     html = path.read_text()
     wide = "".join(f"<td>[-{number}.6,-18.0]</td>" for number in range(20, 44))
     ems = least_ems(Table("", ("c",) * 24, (tuple(f"[-{n}.6,-18.0]" for n in range(20, 44)),)))
-    table = f'<table class="sortable" style="--ems: {ems}"><thead><tr></tr></thead><tbody><tr>{wide}</tr></tbody></table>'
+    rows_of_table = f"<thead><tr></tr></thead><tbody><tr>{wide}</tr></tbody>"
+    table = f'<table class="sortable" style="--ems: {ems}">{rows_of_table}</table>'
     path.write_text(html.replace("<footer>", f'<div class="scroll">{table}</div><footer>'))
     # A sheet of A4 on its longer side, less 1 cm at either.
     page = opened(path, viewport={"width": 1047, "height": 700})
