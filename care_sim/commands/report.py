@@ -54,6 +54,8 @@ class PrintReport(SourceOptions):
             raise InvalidInput(f"--{given[0].replace('_', '-')} has no meaning without --source")
         if self.source is not None and self.page is None:
             raise InvalidInput("--source has no meaning without --page: nothing is played again")
+        if self.source is not None and not self.episodes:
+            raise InvalidInput("--source has no meaning with --episodes 0: nothing is played again")
 
         if self.minus is not None and self.page is not None:
             raise InvalidInput("--minus has no meaning with --page: a page draws its own pairs")

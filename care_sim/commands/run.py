@@ -7,7 +7,6 @@ from typing import Annotated
 
 import tyro
 
-from care_sim.base.errors import InvalidInput
 from care_sim.commands.shared.one_scene import SceneOptions, is_source, scene_plays
 from care_sim.commands.shared.options import DEFAULT_OPTIONS, Options
 from care_sim.commands.shared.study_command import console
@@ -15,7 +14,8 @@ from care_sim.commands.shared.written_files import finish_files
 from care_sim.envs.wrappers.export_scans import ExportScans
 from care_sim.envs.wrappers.record_rerun import RecordRerun
 from care_sim.policies.base import Policy
-from care_sim.reports.episodes.clips import BrakePhoto, Clip, draw_scene
+from care_sim.reports.episodes.clips import Clip, draw_scene
+from care_sim.reports.episodes.photos import BrakePhoto, SightingPhoto
 from care_sim.reports.episodes.scene_timeline import print_scene_timeline
 from care_sim.reports.episodes.timeline import print_timeline
 from care_sim.study.episode_config import grid
@@ -30,7 +30,11 @@ class Watched(SceneOptions):
     seed: int = 0
     """Seed of scenario, camera faults, noise and floor."""
     picture: Path | None = None
-    """PNG file for a picture of the first keyframe at which the car brakes."""
+    """PNG file for a picture of the first keyframe at which the car brakes; of the open loop, of
+    the first at which somebody appears.
+    """
+    at: float | None = None
+    """Of --picture: the time that it shows, seconds from the start, instead of that moment."""
     video: Path | None = None
     """File for a clip of the episode: MP4 (extra 'video'), or animated GIF, WebP or PNG, by its
     ending.
@@ -68,7 +72,7 @@ class Run(Watched):
         (config,) = grid(*axes, **self.conditions.arguments([self.policy]))
         if config.budget != self.budget:
             print("full fires every cell, whatever the budget", file=sys.stderr)
-        photographer = BrakePhoto(self.picture)
+        photographer = BrakePhoto(self.picture, self.at)
         film = Clip(self.video)
         print_timeline(
             config,
@@ -81,20 +85,21 @@ class Run(Watched):
 
     def _play_scene(self) -> int:
         """The same of a scene of the open loop."""
-        for name in ("picture", "export"):
-            if getattr(self, name) is not None:
-                raise InvalidInput(
-                    f"--{name} has no meaning in the open loop, in which no car acts"
-                )
         given = self.conditions.arguments([self.policy])
         source = self.source(self.scenario, self.conditions.sensor)
         scene = self.scene_of(source, self.seed)
         (config,) = scene_plays(source, scene, [self.policy], self.budget, given)
         if config.budget != self.budget:
             print("full fires every cell, whatever the budget", file=sys.stderr)
+        photographer = SightingPhoto(self.picture, self.at)
         film = Clip(self.video, draw_scene)
-        played = trace_scene(config, config.film(), film.episode(self.policy), wrap=self._watched)
+
+        def wrap(env: GymEnv, policy: Policy) -> GymEnv:
+            return photographer.watching(self._watched(env, policy), policy)
+
+        played = trace_scene(config, config.film(), film.episode(self.policy), wrap=wrap)
         print_scene_timeline(config, played, console())
+        photographer.report()
         finish_files(self.record, film, self.video)
         return 0
 

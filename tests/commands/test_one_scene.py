@@ -12,6 +12,7 @@ from care_sim.sources.named import source_of
 from care_sim.sources.scenes import film_of
 from care_sim.study.play_config import play_grid
 from care_sim.study.scene_play import ScenePlayer
+from tests.helpers.av2_log import at, box, write
 from tests.helpers.short_streets import few_and_short
 
 
@@ -102,7 +103,9 @@ def test_a_source_of_a_single_street_has_no_other_seed(tmp_path, monkeypatch):
         ("run street --scene 3", "0149-bend, 150 in all; --seed 3 plays that of the seed"),
         ("run street --driver careful-human", "--driver has no meaning in the open loop"),
         ("run street --scenario-parameters x=1", "--scenario-parameters has no meaning in the"),
-        ("run street --export x", "--export has no meaning in the open loop"),
+        ("run street --at 3", "--at has no meaning without --picture"),
+        ("run dartout --at 3", "--at has no meaning without --picture"),
+        ("run street --picture x.png --at -1", "at must be a finite number >= 0, got -1"),
         ("run street --engine bullet", "engine cannot be changed in the open loop"),
         ("run argoverse2", "source must be argoverse2:FOLDER, nuscenes:FOLDER, or one of your own"),
         ("run argoverse2:nowhere", "source argoverse2:nowhere: nowhere is no folder"),
@@ -139,6 +142,53 @@ def test_policies_are_compared_on_one_film_and_filmed_side_by_side(played, drive
         assert pictures.size == (3 * 512 + 2 * 8, 646)
         # As long as the film: one picture a keyframe.
         assert pictures.n_frames == len(film_of(source, source.scenes()[0]).shots)
+
+
+def test_the_picture_is_of_the_first_keyframe_at_which_somebody_appears_or_of_a_time(
+    played, drive, tmp_path
+):
+    line = ("run", f"argoverse2:{drive}", "--budget", "0.05", "--picture")
+    pictures = {}
+    for name, options in (("first", ()), ("then", ("--at", 2.5)), ("before", ("--at", 2.1))):
+        file = tmp_path / "deep" / f"{name}.png"
+        code, _, err = played(*line, file, *options)
+        assert (code, err) == (0, "")
+        with Image.open(file) as picture:
+            assert picture.size == (960, 720)
+            pictures[name] = picture.tobytes()
+    # The person steps out at 2.5 s; what follows 2.1 s is that keyframe, too.
+    assert pictures["first"] == pictures["then"] == pictures["before"]
+    assert played(*line, tmp_path / "start.png", "--at", 0)[0] == 0
+    with Image.open(tmp_path / "start.png") as picture:
+        assert picture.tobytes() != pictures["first"]
+
+
+def test_of_a_moment_that_never_comes_there_is_no_picture_and_the_play_is_told(played, tmp_path):
+    # A car stands before one that stands.
+    standing = box("REGULAR_VEHICLE", (12.0, 0.0, 0.42), track="standing")
+    log = write(tmp_path / "log", [[standing]] * 10, [at(0.0)] * 10)
+    picture = tmp_path / "x.png"
+    line = ("run", f"argoverse2:{log}", "--policy", "full", "--picture", picture)
+    for options, told in (((), "nobody appeared"), (("--at", 2), "no keyframe at 2 s or later")):
+        code, out, err = played(*line, *options)
+        assert (code, err.splitlines()[-1]) == (0, f"{told}: no picture")
+        assert "found %                  100.0" in out
+    assert not picture.exists()
+
+
+def test_a_picture_of_an_episode_may_be_of_a_time_too(played, tmp_path):
+    line = ("run", "dartout", "--scenario-parameters", "duration_s=0.6", "--picture")
+    assert played(*line, tmp_path / "x.png", "--at", 0.3)[::2] == (0, "")
+    assert played(*line, tmp_path / "y.png", "--at", 9)[2].startswith("no keyframe at 9 s")
+    assert [path.name for path in tmp_path.iterdir()] == ["x.png"]
+
+
+def test_pictures_and_scans_leave_the_play_as_it_is(played, drive, tmp_path, open3d):
+    line = ("run", f"argoverse2:{drive}", "--budget", "0.05")
+    watched = (*line, "--picture", tmp_path / "x.png", "--export", tmp_path / "scans")
+    outs = [played(*one)[1].partition("wall_s")[0] for one in (line, watched)]
+    assert outs[0] == outs[1]
+    assert len([*(tmp_path / "scans").glob("*.pcd")]) == 10
 
 
 def test_one_that_fails_leaves_the_others(played, drive, install, tmp_path):

@@ -63,6 +63,22 @@ def test_a_page_takes_the_place_of_the_one_before(results, tmp_path, capsys):
         assert code == 0, err
 
 
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        ((), "--source has no meaning without --page: nothing is played again"),
+        (("-o", "x.html", "--episodes", 0), "--source has no meaning with --episodes 0: nothing"),
+    ],
+)
+def test_recordings_that_nobody_would_play_are_refused(
+    options, told, results, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    code, _, err = report(capsys, results, "--source", "argoverse2:nowhere", *options)
+    assert (code, err.count("\n"), told in err) == (2, 1, True)
+    assert not (tmp_path / "x.html").exists()
+
+
 def test_the_same_results_make_the_same_page(results, tmp_path, capsys):
     for name in ("one.html", "two.html"):
         report(capsys, results, "-o", tmp_path / name, "--episodes", 0)

@@ -20,21 +20,27 @@ from care_sim.base.files import replacing, why_unwritable, write_text
 from care_sim.core.actions import SHARES
 from care_sim.core.arrays import Floats
 from care_sim.core.grid import Cells
-from care_sim.core.types import CLASSES, Action
+from care_sim.core.types import CLASSES, Action, Tracks
+from care_sim.envs.closed_loop import ClosedLoopEnv
+from care_sim.envs.open_loop import OpenLoopEnv
 from care_sim.envs.wrappers.watching import Watching, numbered
 from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.loops.film_watcher import WatchedScene
+from care_sim.loops.open_loop import OpenLoop
+from care_sim.loops.records import Keyframe
 from care_sim.loops.watcher import WatchedKeyframe
 from care_sim.policies.base import Policy
 
 _UNITS_NOTE = (
     "Metres, seconds, radians. Boxes: centre x, y, z, length, width, height, yaw. World frame: x "
-    "along the road, y left, z up. Sensor frame, that of points and tracks: x forward, y left, "
-    "z up; sensor_in_world is its origin, then yaw, pitch and roll, turned about z, then y, then "
-    "x. Cells: row * columns + column; row 0 is the highest, column 0 begins at the azimuth "
-    "heading - field_of_view / 2, straight behind on a grid that goes all round, and the others "
-    "follow to the left; pitch raises the heading, roll lowers its right. Of several LiDARs rows "
-    "are numbered on from grid to grid, and places tell where each stands in the sensor frame, "
-    "which is that of the first. Ego and bodies are truth, in the world frame."
+    "along the road, y left, z up, in the open loop as its source has it. Sensor frame, that of "
+    "points and tracks: x forward, y left, z up; sensor_in_world is its origin, then yaw, pitch "
+    "and roll, turned about z, then y, then x. Cells: row * columns + column; row 0 is the "
+    "highest, column 0 begins at the azimuth heading - field_of_view / 2, straight behind on a "
+    "grid that goes all round, and the others follow to the left; pitch raises the heading, roll "
+    "lowers its right. Of several LiDARs rows are numbered on from grid to grid, and places tell "
+    "where each stands in the sensor frame, which is that of the first. Ego and bodies are truth, "
+    "in the world frame."
 )
 POINT_BYTES = 4 * 3 + 4 + 1
 """Bytes per point of a cloud: three coordinates, cell and share."""
@@ -52,17 +58,21 @@ class ExportScans(Watching):
       `shares` of `episode.json`).
     - `000.json`: `keyframe`, `time_s`, `sensor_in_world` (x, y, z, yaw, pitch, roll), `ego` (box),
       `bodies` (`name`, `class` or null, `box`), all in the world frame (x along the road, y left,
-      z up) and truth;
+      z up; in the open loop as its source has it) and truth;
       `tracks` (`id`, `class`, `box` of the forecast, `velocity` over ground) in the sensor frame;
-      `fired` cells, each as often as it was; `detected` (the first-sighting actor), `braking`,
-      `speed_mps`.
+      `fired` cells, each as often as it was. Of the closed loop `detected` (the first-sighting
+      actor), `braking`, `speed_mps`. In the open loop bodies are the annotated objects, each with
+      `found` by this keyframe, `scored` (within range) and `appearing` (its first sighting).
     - `episode.json`: `units`, `grid`, `classes`, `shares`, and `outcome`, null until the end.
+
+    A point lies on the middle ray of its cell, at the range that the policy was shown: of a
+    recording, whose points lie anywhere in their cells, the nearest of each.
 
     ### Arguments
     `path` of the folder, one for every environment of a vector; `policy`, the `care_sim.Policy`
     that acts, as for `RecordRerun`. Raises `care_sim.MissingExtra` without the extra `open3d`,
-    `care_sim.InvalidInput` for an environment that is no closed loop of CARE-Sim and for a folder
-    that holds scans already, OSError where nothing can be written.
+    `care_sim.InvalidInput` for an environment that is no loop of CARE-Sim and for a folder that
+    holds scans already, OSError where nothing can be written.
 
     ### Example
     ```python
@@ -73,6 +83,9 @@ class ExportScans(Watching):
         env.step(policy(observation))  # and so on, until terminated or truncated
     ```
     """
+
+    watches = "a loop"
+    kinds = (ClosedLoopEnv, OpenLoopEnv)
 
     def __init__(
         self,
@@ -85,7 +98,7 @@ class ExportScans(Watching):
         self._open3d: ModuleType = import_open3d()
         self._path = self._folder = Path(path)
 
-    def begin(self, loop: ClosedLoop, episode: int) -> None:
+    def begin(self, loop: ClosedLoop | OpenLoop, episode: int) -> None:
         """Make the folder."""
         self._folder = numbered(self._path, episode)
         if any(self._folder.glob("[0-9]*.pcd")):
@@ -93,7 +106,7 @@ class ExportScans(Watching):
         self._folder.mkdir(parents=True, exist_ok=True)
         self._describe(None)
 
-    def keep(self, watched: WatchedKeyframe) -> None:
+    def keep(self, watched: WatchedKeyframe | WatchedScene) -> None:
         """Write the two files of a keyframe."""
         stem = f"{watched.record.index:03d}"
         cells, points = watched.returned(self._inner.rig.grid)
@@ -131,34 +144,44 @@ class ExportScans(Watching):
                 raise OSError(errno.EIO, reason, str(file))
 
 
-def described(watched: WatchedKeyframe) -> dict[str, Any]:
+def described(watched: WatchedKeyframe | WatchedScene) -> dict[str, Any]:
     """What stood around a scan, as plain data; see `ExportScans`."""
-    situation = watched.situation
-    record = watched.record
+    situation, record = watched.situation, watched.record
+    assert record.fired is not None
     sensor = situation.sensor
-    tracks = situation.belief.tracks
-    classes = [None if label is None else CLASSES[label] for label in situation.labels]
-    columns = zip(tracks.ids, tracks.classes, tracks.boxes, tracks.velocities, strict=True)
-    return {
+    told = {
         "keyframe": record.index,
         "time_s": record.time_s,
         "sensor_in_world": [sensor.x, sensor.y, sensor.z, sensor.yaw, sensor.pitch, sensor.roll],
         "ego": situation.ego.tolist(),
-        "bodies": [
-            {"name": name, "class": label, "box": box.tolist()}
-            for name, label, box in zip(situation.names, classes, situation.bodies, strict=True)
-        ],
-        "tracks": [
-            {
-                "id": int(number),
-                "class": CLASSES[label],
-                "box": box.tolist(),
-                "velocity": velocity.tolist(),
-            }
-            for number, label, box, velocity in columns
-        ],
+        "bodies": _bodies(watched),
+        "tracks": _tracks(situation.belief.tracks),
         "fired": record.fired.tolist(),
-        "detected": record.detected,
-        "braking": record.braking,
-        "speed_mps": record.speed_mps,
     }
+    if isinstance(record, Keyframe):
+        told |= {name: getattr(record, name) for name in ("detected", "braking", "speed_mps")}
+    return told
+
+
+def _bodies(watched: WatchedKeyframe | WatchedScene) -> list[dict[str, Any]]:
+    situation, record = watched.situation, watched.record
+    classes = [None if label is None else CLASSES[label] for label in situation.labels]
+    told = zip(situation.names, classes, situation.bodies, strict=True)
+    bodies = [{"name": name, "class": kind, "box": box.tolist()} for name, kind, box in told]
+    if isinstance(record, Keyframe):
+        return bodies
+    states = {name: getattr(record, name).tolist() for name in ("found", "scored", "appearing")}
+    return [body | {name: states[name][row] for name in states} for row, body in enumerate(bodies)]
+
+
+def _tracks(tracks: Tracks) -> list[dict[str, Any]]:
+    columns = zip(tracks.ids, tracks.classes, tracks.boxes, tracks.velocities, strict=True)
+    return [
+        {
+            "id": int(number),
+            "class": CLASSES[label],
+            "box": box.tolist(),
+            "velocity": velocity.tolist(),
+        }
+        for number, label, box, velocity in columns
+    ]

@@ -1,8 +1,5 @@
-"""Episodes in pictures: a clip of one or of several side by side, and the moment at which the brake
-goes on.
-"""
+"""Episodes in pictures: a clip of one or of several side by side."""
 
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from itertools import zip_longest
 from pathlib import Path
@@ -10,7 +7,6 @@ from typing import Any
 
 from PIL import Image
 
-from care_sim.base.files import PNG, check_output, replacing
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.open_loop import OpenLoop
 from care_sim.loops.records import Keyframe
@@ -96,30 +92,3 @@ def _row(pictures: Sequence[Image.Image]) -> Image.Image:
     for number, picture in enumerate(pictures):
         canvas.paste(picture, (number * (width + _GAP), 0))
     return canvas
-
-
-class BrakePhoto:
-    """Watches an episode and writes one picture to `path`; without a path it does nothing.
-
-    Raises InvalidInput and OSError at once where no picture can be written:
-    `care_sim.base.files.check_output`.
-    """
-
-    def __init__(self, path: Path | None):
-        self._path = path
-        # Without a path there is nothing to do and nothing to tell at the end.
-        self._done = path is None
-        if path is not None:
-            check_output(path, PNG)
-
-    def __call__(self, loop: ClosedLoop, frame: Keyframe) -> None:
-        """Take the picture if this is the keyframe."""
-        if self._path is not None and not self._done and frame.braking:
-            with replacing(self._path, PNG) as unfinished:
-                Image.fromarray(draw_keyframe(loop, frame)).save(unfinished, "PNG")
-            self._done = True
-
-    def report(self) -> None:
-        """Tell on stderr that there was nothing to take a picture of."""
-        if not self._done:
-            print("the car never braked: no picture", file=sys.stderr)

@@ -27,7 +27,7 @@ from care_sim.reports.page.fault_charts import fault_charts
 from care_sim.reports.page.listing import episode_groups, replay_data
 from care_sim.reports.page.protocol_charts import protocol_charts
 from care_sim.reports.page.provenance import Provenance, provenance_of
-from care_sim.reports.page.tables import blocks
+from care_sim.reports.page.tables import blocks, least_ems
 from care_sim.reports.report import read_results
 from care_sim.reports.study import Study
 from care_sim.reports.table import Table
@@ -94,7 +94,7 @@ class Page:
                 specs=_embedded([chart.spec for chart in charts]),
                 # A page without charts needs no Vega.
                 vega=Markup(vega_bundle()) if charts else "",
-                tables=[(table, blocks(table)) for table in self.findings.tables],
+                tables=[(table, blocks(table), least_ems(table)) for table in self.findings.tables],
                 reading=self.findings.reading,
                 closing=self.findings.closing,
                 groups=episode_groups(self.rows, self.episodes) if self.listed else [],

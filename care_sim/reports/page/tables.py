@@ -11,6 +11,13 @@ from care_sim.reports.table import Bold, Table
 
 _NUMBER = re.compile(r"[≤≥~]?([+-]?\d+(?:\.\d+)?)(?=[ %*°]|$)")
 _SHARE = re.compile(r"(\d+)/(\d+)")
+_BREAK = re.compile(r"\s+|(?<=[a-z]-)")
+"""Where a browser may begin a new line."""
+_NARROW, _WIDE = frozenset(" .,:;!|'()[]-/ijl"), frozenset("mwMW%@±≠≤≥")
+_NARROW_EMS, _USUAL_EMS, _WIDE_EMS, _BOLD = 0.4, 0.65, 1.0, 1.1
+"""Widths of characters, of a wide font: DejaVu Sans has digits of 0.64 em, bold ones of 0.70."""
+_APART_EMS = 0.6
+"""Between two columns."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +59,27 @@ def blocks(table: Table) -> list[Block]:
             )
             parts[-1][1].append(Line(entries, attached=PAPER in row[:2] and bool(parts[-1][1])))
     return [Block(heading, tuple(lines)) for heading, lines in parts if heading or lines]
+
+
+def least_ems(table: Table) -> float:
+    """The width below which columns of the table would be cut, in heights of its letters: that of
+    the longest word of every column.
+    """
+    whole = [row for row in table.rows if len(row) == len(table.columns)]
+    columns = zip(map(Bold, table.columns), *whole, strict=True)
+    return sum(max(map(_longest_ems, column)) + _APART_EMS for column in columns)
+
+
+def _longest_ems(text: object) -> float:
+    weight = _BOLD if isinstance(text, Bold) else 1.0
+    return weight * max(map(_ems, _BREAK.split(str(text))))
+
+
+def _ems(word: str) -> float:
+    return sum(
+        _NARROW_EMS if sign in _NARROW else _WIDE_EMS if sign in _WIDE else _USUAL_EMS
+        for sign in word
+    )
 
 
 def sort_key(text: str) -> float | None:

@@ -46,13 +46,23 @@ def grid_picture(grid: Grid, ranges: NDArray[np.floating]) -> Image.Image:
     """The scan (E, n) of the grid, or of some of its columns, as the car sees it: its left is left.
     A pixel a cell.
     """
-    picture = np.full((*ranges.shape, 3), NOT_FIRED_COLOUR, np.uint8)
+    return cells_picture(scan_colours(grid, ranges))
+
+
+def cells_picture(colours: NDArray[np.uint8]) -> Image.Image:
+    """Cells with colours (E, n, 3) as the car sees them: its left is left. A pixel a cell."""
+    # Columns run counter-clockwise, so that the right comes first.
+    return Image.fromarray(np.ascontiguousarray(colours[:, ::-1]))
+
+
+def scan_colours(grid: Grid, ranges: NDArray[np.floating]) -> NDArray[np.uint8]:
+    """(E, n, 3) colours of the cells of a scan (E, n), by range."""
+    colours = np.full((*ranges.shape, 3), NOT_FIRED_COLOUR, np.uint8)
     fired = ranges > 0
     returned = fired & (ranges < grid.range_m)
-    picture[fired] = NO_RETURN_COLOUR
-    picture[returned] = range_colours(ranges[returned] / grid.range_m)
-    # Columns run counter-clockwise, so that the right comes first.
-    return Image.fromarray(np.ascontiguousarray(picture[:, ::-1]))
+    colours[fired] = NO_RETURN_COLOUR
+    colours[returned] = range_colours(ranges[returned] / grid.range_m)
+    return colours
 
 
 def fitted(picture: Image.Image, size: tuple[int, int]) -> Image.Image:

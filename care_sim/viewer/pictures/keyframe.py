@@ -163,6 +163,16 @@ def draw_grid(
     """The angular grid with a scan (E, A), with its left and top words `at` a pixel of a picture,
     its directions and a legend of its colours. Several LiDARs come one below the other.
     """
+    top = paste_cells(canvas, at, grid, drawing.scan_colours(grid, ranges))
+    _draw_legend(canvas, ImageDraw.Draw(canvas), at[0], top, grid.range_m)
+
+
+def paste_cells(
+    canvas: Image.Image, at: tuple[int, int], grid: Grid, colours: NDArray[np.uint8]
+) -> int:
+    """The same of cells in any colours (E, A, 3), without a legend. Gives the pixel row where that
+    may begin.
+    """
     left, top = at
     draw = ImageDraw.Draw(canvas)
     draw.text((left, top + 8), _grid_words(grid), INK, drawing.font(14))
@@ -172,14 +182,14 @@ def draw_grid(
     strip = max(1, (height - (count - 1) * _NAMES_HEIGHT) // count)
     for number, head in enumerate(grid.heads):
         first, last = head.rows
-        picture = drawing.grid_picture(grid, ranges[first : last + 1])
+        picture = drawing.cells_picture(colours[first : last + 1])
         upper = top + 44 + number * (strip + _NAMES_HEIGHT)
         canvas.paste(drawing.fitted(picture, (width, strip)), (left, upper))
         for share, name in directions(head.grid):
             anchor = {0.0: "la", 1.0: "ra"}.get(share, "ma")
             place = (left + share * width, upper + strip + 4)
             draw.text(place, name, FAINT_INK, drawing.font(13), anchor=anchor)
-    _draw_legend(canvas, draw, left, upper + strip + 26, grid.range_m)
+    return upper + strip + 26
 
 
 def _grid_words(grid: Grid) -> str:

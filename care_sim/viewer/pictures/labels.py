@@ -25,20 +25,22 @@ class Labels:
         self._taken: list[_Area] = []
 
     def over(self, at: tuple[float, float], text: str, colour: Colour, size: int = 13) -> None:
-        """Text centred over a point, on a dark plate, kept inside the picture."""
+        """Text centred over a point, on a dark plate, kept inside the picture; a text that the
+        picture cannot hold is left out.
+        """
         width, height = self._plate(text, size)
         canvas = self._draw.im.size
         x = min(max(at[0] - width / 2, 0), canvas[0] - width)
         y = min(max(at[1] - height - 2, 0), canvas[1] - height)
         area = self._moved_up((x, y, x + width, y + height))
-        if area is not None:
+        if area is not None and self._inside(area):
             self._write(area, text, colour, size)
 
     def beside(self, at: tuple[float, float], text: str, colour: Colour, size: int) -> None:
-        """Text that ends at a point, where there is room."""
+        """Text that ends at a point, where there is room inside the picture."""
         width, height = self._plate(text, size)
         area = at[0] - width, at[1] - height / 2, at[0], at[1] + height / 2
-        if not any(_overlap(area, other) for other in self._taken):
+        if self._inside(area) and not any(_overlap(area, other) for other in self._taken):
             self._write(area, text, colour, size)
 
     def arrow(self, tip: tuple[float, float], text: str, colour: Colour) -> None:
@@ -48,6 +50,10 @@ class Labels:
         self._draw.line((x, y - _SHAFT, x, y - 8), colour, 4)
         self._draw.polygon([(x - 9, y - 14), (x + 9, y - 14), (x, y)], colour)
         self._taken.append((x - 9, y - _SHAFT, x + 9, y))
+
+    def _inside(self, area: _Area) -> bool:
+        canvas = self._draw.im.size
+        return min(area) >= 0 and area[2] <= canvas[0] and area[3] <= canvas[1]
 
     def _plate(self, text: str, size: int) -> tuple[float, float]:
         left, top, right, bottom = self._draw.textbbox((0, 0), text, font(size))

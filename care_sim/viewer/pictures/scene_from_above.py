@@ -1,14 +1,13 @@
 """The picture of a keyframe of the open loop: the scene from above, and the angular grid."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from care_sim.core.arrays import Floats, Mask
+from care_sim.core.arrays import Floats
 from care_sim.core.boxes import box_corners
 from care_sim.core.firing.shots import shots_by_cell
+from care_sim.core.rig import Rig
 from care_sim.evaluation.sightings import RANGE_M
 from care_sim.loops.open_loop import OpenLoop
 from care_sim.loops.scene_records import SceneKeyframe
@@ -24,9 +23,9 @@ from care_sim.viewer.pictures.keyframe import (
 )
 from care_sim.world.bodies import CATALOGUE
 
-_TOP = 40
+MAP_TOP = 40
 MAP_SIZE = (PICTURE_WIDTH, 460)
-_BOTTOM = _TOP + MAP_SIZE[1]
+MAP_BOTTOM = MAP_TOP + MAP_SIZE[1]
 _PIXELS_PER_M = MAP_SIZE[1] / (2 * RANGE_M + 4)
 _RINGS = (10.0, 20.0, 30.0, 40.0, RANGE_M)
 """Radii of the range rings, metres."""
@@ -56,31 +55,30 @@ def draw_plan(loop: OpenLoop, keyframe: SceneKeyframe) -> NDArray[np.uint8]:
     angular grid with their ranges. The episode is left as it was.
     """
     canvas = Image.new("RGB", (PICTURE_WIDTH, PICTURE_HEIGHT), BACKGROUND)
-    canvas.paste(map_from_above(loop, keyframe), (0, _TOP))
-    _write_words(ImageDraw.Draw(canvas), loop, keyframe)
+    draw = ImageDraw.Draw(canvas)
+    canvas.paste(map_from_above(loop, keyframe), (0, MAP_TOP))
+    write_header(draw, loop.film.name, loop.rig, keyframe)
+    _write_legend(draw)
     draw_grid(canvas, (GRID_LEFT, PANELS_TOP), loop.rig.grid, ranges_of(loop, keyframe))
     return np.asarray(canvas)
 
 
 def map_from_above(loop: OpenLoop, keyframe: SceneKeyframe) -> Image.Image:
     """The part of the picture that shows the scene, `MAP_SIZE` pixels, the car in the middle."""
-    shot = loop.film.shots[keyframe.index]
-    colours = [
-        FOUND_COLOUR if one else MISSED_COLOUR if near else _OUT_OF_RANGE_COLOUR
-        for one, near in zip(keyframe.found, keyframe.scored, strict=True)
-    ]
+    picture = empty_map()
+    draw = ImageDraw.Draw(picture)
     points = _returned(loop, keyframe).points
-    return _map(shot.annotations.boxes, colours, keyframe.appearing, points)
+    draw.point(pixels(points[:, :2]).ravel().tolist(), RETURN_COLOUR)
+    draw_objects(draw, loop.film.shots[keyframe.index].annotations.boxes, keyframe)
+    return picture
 
 
-def _map(
-    boxes: Floats, colours: Sequence[drawing.Colour], appearing: Mask, points: Floats
-) -> Image.Image:
-    """Range rings, points (P, 3), the car and boxes (n, 7) with their colours."""
+def empty_map() -> Image.Image:
+    """The rings of range around the car."""
     picture = Image.new("RGB", MAP_SIZE, BACKGROUND)
     draw = ImageDraw.Draw(picture)
     for metres in _RINGS:
-        (left, top), (right, bottom) = _pixels(
+        (left, top), (right, bottom) = pixels(
             np.array([[-metres, metres], [metres, -metres]])
         ).tolist()
         draw.ellipse((left, top, right, bottom), outline=_RING_COLOUR)
@@ -91,17 +89,31 @@ def _map(
             drawing.font(11),
             anchor="rm",
         )
-    draw.point(_pixels(points[:, :2]).ravel().tolist(), RETURN_COLOUR)
-    _draw_box(draw, _CAR, INK, 2)
-    for box, colour, appears in zip(boxes, colours, appearing, strict=True):
-        _draw_box(draw, box, colour, 2)
-        if appears:
-            _draw_box(draw, box + _AROUND, colour, 1)
     return picture
 
 
-def _write_words(draw: ImageDraw.ImageDraw, loop: OpenLoop, keyframe: SceneKeyframe) -> None:
-    budget, counted = loop.rig.budget, loop.rig.hardware.counted
+def draw_objects(draw: ImageDraw.ImageDraw, boxes: Floats, keyframe: SceneKeyframe) -> None:
+    """The car, and the annotated boxes (n, 7) in the colours of `PLAN_LEGEND`; those that appear
+    have a double line.
+    """
+    draw_box(draw, _CAR, INK, 2)
+    for row, box in enumerate(boxes):
+        colour = found_colour(keyframe, row)
+        draw_box(draw, box, colour, 2)
+        if keyframe.appearing[row]:
+            draw_box(draw, box + _AROUND, colour, 1)
+
+
+def found_colour(keyframe: SceneKeyframe, row: int) -> drawing.Colour:
+    """That of an annotated object, by how it stands with it."""
+    if keyframe.found[row]:
+        return FOUND_COLOUR
+    return MISSED_COLOUR if keyframe.scored[row] else _OUT_OF_RANGE_COLOUR
+
+
+def write_header(draw: ImageDraw.ImageDraw, scene: str, rig: Rig, keyframe: SceneKeyframe) -> None:
+    """The line over the map: the time, how many were found, how many cells fired, the scene."""
+    budget, counted = rig.budget, rig.hardware.counted
     fired = (
         f"nothing fired yet, budget {budget} {counted}s"
         if keyframe.fired is None
@@ -113,29 +125,31 @@ def _write_words(draw: ImageDraw.ImageDraw, loop: OpenLoop, keyframe: SceneKeyfr
         (420, fired),
     ):
         draw.text((x, 8), text, INK, drawing.font(20))
-    draw.text(
-        (PICTURE_WIDTH - 12, 12), loop.film.name[:28], FAINT_INK, drawing.font(14), anchor="ra"
-    )
-    draw.text((20, _BOTTOM + 8), "From above, driving to the right:", INK, drawing.font(14))
+    draw.text((PICTURE_WIDTH - 12, 12), scene[:28], FAINT_INK, drawing.font(14), anchor="ra")
+
+
+def _write_legend(draw: ImageDraw.ImageDraw) -> None:
+    draw.text((20, MAP_BOTTOM + 8), "From above, driving to the right:", INK, drawing.font(14))
     for row, (text, colour) in enumerate(PLAN_LEGEND):
-        draw.text((20, _BOTTOM + 40 + 24 * row), text, colour, drawing.font(16))
+        draw.text((20, MAP_BOTTOM + 40 + 24 * row), text, colour, drawing.font(16))
     draw.text(
-        (20, _BOTTOM + 40 + 24 * len(PLAN_LEGEND)),
+        (20, MAP_BOTTOM + 40 + 24 * len(PLAN_LEGEND)),
         "dots: returns",
         RETURN_COLOUR,
         drawing.font(16),
     )
 
 
-def _draw_box(draw: ImageDraw.ImageDraw, box: Floats, colour: drawing.Colour, width: int) -> None:
+def draw_box(draw: ImageDraw.ImageDraw, box: Floats, colour: drawing.Colour, width: int) -> None:
+    """The outline of a box (7,) on the map."""
     corners = box_corners(box[None])[0, :4, :2]
-    draw.polygon(_pixels(corners).ravel().tolist(), outline=colour, width=width)
+    draw.polygon(pixels(corners).ravel().tolist(), outline=colour, width=width)
 
 
-def _pixels(places: Floats) -> Floats:
+def pixels(places: Floats) -> Floats:
     """(n, 2) map pixels of places (n, 2) in the sensor frame: ahead is right, left is up."""
-    pixels: Floats = np.array(MAP_SIZE) / 2 + places * [_PIXELS_PER_M, -_PIXELS_PER_M]
-    return pixels
+    on_map: Floats = np.array(MAP_SIZE) / 2 + places * [_PIXELS_PER_M, -_PIXELS_PER_M]
+    return on_map
 
 
 def _returned(loop: OpenLoop, keyframe: SceneKeyframe) -> Cloud:

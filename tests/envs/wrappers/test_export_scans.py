@@ -138,3 +138,51 @@ def test_scans_of_several_lidars_are_one_cloud_in_the_frame_of_the_first(open3d,
     assert on_body[high].all()
     # The corners stand lower than the roof, and all meet the same road.
     assert points[:, 2].min() == pytest.approx(-1.8, abs=0.01)
+
+
+def test_scans_of_the_open_loop_hold_who_was_found(open3d, drive, tmp_path):
+    env = gymnasium.make(
+        "CARE-Replay-v0", source=f"argoverse2:{drive}", budget=0.05, disable_env_checker=True
+    )
+    policy = care_sim.make_policy("care", env)
+    with ExportScans(env, tmp_path / "scans", policy) as env:
+        observation, _ = env.reset(seed=0)
+        ended = False
+        records, ranges = [], []
+        while not ended:
+            observation, _, _, ended, info = env.step(policy(observation))
+            records.append(env.unwrapped.last)
+            ranges.append(env.unwrapped.loop.last_ranges.ravel())
+        shots = env.unwrapped.loop.film.shots
+    assert beside(tmp_path / "scans", "episode")["outcome"] == info["outcome"]
+    grid = AngularGrid()
+    for record, shown, shot in zip(records, ranges, shots, strict=True):
+        text = beside(tmp_path / "scans", f"{record.index:03d}")
+        assert "braking" not in text
+        assert (text["time_s"], text["fired"]) == (shot.time_s, record.fired.tolist())
+        for state in ("found", "scored", "appearing"):
+            told = [body[state] for body in text["bodies"]]
+            assert told == getattr(record, state).tolist()
+        # The points are those of the cells that returned.
+        cloud = open3d.t.io.read_point_cloud(str(tmp_path / "scans" / f"{record.index:03d}.pcd"))
+        cells = cloud.point["cell"].numpy().ravel()
+        assert cells.tolist() == np.flatnonzero((shown > 0) & (shown < grid.range_m)).tolist()
+        np.testing.assert_allclose(
+            cloud.point["positions"].numpy(),
+            grid.points(cells, shown[cells].astype(float)),
+            rtol=1e-5,
+            atol=1e-4,
+        )
+        # Bodies stand where they are annotated.
+        x, y, z, yaw, pitch, roll = text["sensor_in_world"]
+        sensor = Frame(x, y, z, yaw, roll, pitch)
+        boxes = np.array([body["box"] for body in text["bodies"]])
+        local = sensor.boxes_to_local(boxes)
+        np.testing.assert_allclose(local, shot.annotations.boxes, atol=1e-6)
+    appearing = [
+        (body["name"].split()[0], body["found"])
+        for record in records
+        for body in beside(tmp_path / "scans", f"{record.index:03d}")["bodies"]
+        if body["appearing"]
+    ]
+    assert appearing == [("pedestrian", True)]

@@ -42,12 +42,13 @@ def test_a_missing_extra_is_named(wrapper, extra, tmp_path, monkeypatch):
 
 
 def test_what_is_not_watched_is_refused(watcher, tmp_path):
-    others = [make("CartPole-v1")]
-    if watcher is ExportScans:
-        others.append(make("CARE-Street-v0"))
-    for env in others:
-        with pytest.raises(care_sim.InvalidInput, match=r"watches .* loop of CARE-Sim"):
-            watcher(env, tmp_path / "out.rrd")
+    with pytest.raises(care_sim.InvalidInput, match=r"watches a loop of CARE-Sim"):
+        watcher(make("CartPole-v1"), tmp_path / "out.rrd")
+
+
+def test_who_watches_the_closed_loop_alone_refuses_the_open_one():
+    with pytest.raises(care_sim.InvalidInput, match="watches the closed loop of CARE-Sim"):
+        Kept(make("CARE-Street-v0"))
 
 
 def test_it_goes_around_and_under_wrappers_that_change_the_action(watcher, tmp_path):

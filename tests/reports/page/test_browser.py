@@ -15,6 +15,8 @@ from PIL import Image, ImageColor
 from care_sim.reports.figures.styles import styles
 from care_sim.reports.page.build import write_page
 from care_sim.reports.page.story import packed
+from care_sim.reports.page.tables import least_ems
+from care_sim.reports.table import Table
 from care_sim.sources.named import source_of
 from care_sim.study.designs import ablations, faults, order
 from care_sim.study.episode_config import PLAIN_FIELDS, grid
@@ -341,6 +343,34 @@ def test_everything_is_open_in_print(opened, played):
     assert not page.locator("#play").is_visible()
     page.evaluate("dispatchEvent(new Event('afterprint'))")
     assert closed.count() > 0
+
+
+def test_no_column_is_lost_on_paper(opened, tmp_path):
+    """A table wider than the sheet, and more seeds than fit in a row."""
+    configs = grid(["dartout"], ["history", "care"], [0.1], range(40))
+    many = [row(config, 9.0) for config in configs]
+    path = tmp_path / "many.html"
+    write_page(folder_of(many, tmp_path, "paper"), path, 0, 1)
+    html = path.read_text()
+    wide = "".join(f"<td>[-{number}.6,-18.0]</td>" for number in range(20, 44))
+    ems = least_ems(Table("", ("c",) * 24, (tuple(f"[-{n}.6,-18.0]" for n in range(20, 44)),)))
+    rows_of_table = f"<thead><tr></tr></thead><tbody><tr>{wide}</tr></tbody>"
+    table = f'<table class="sortable" style="--ems: {ems}">{rows_of_table}</table>'
+    path.write_text(html.replace("<footer>", f'<div class="scroll">{table}</div><footer>'))
+    # A sheet of A4 on its longer side, less 1 cm at either.
+    page = opened(path, viewport={"width": 1047, "height": 700})
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    page.emulate_media(media="print")
+    rights = page.evaluate(
+        "[...document.querySelectorAll('th, td')].map((cell) => cell.getBoundingClientRect().right)"
+    )
+    assert len(rights) > 120
+    assert max(rights) <= 1047
+    sizes = re.findall(
+        rb"/MediaBox \[0 0 ([\d.]+) ([\d.]+)\]", page.pdf(prefer_css_page_size=True, format="A4")
+    )
+    assert sizes
+    assert all(float(width) > float(height) for width, height in sizes)
 
 
 FAULTY = [row(config, 9.0) for config in faults.fault_study([0]) if config.scenario == "dartout"]
