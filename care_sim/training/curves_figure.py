@@ -20,7 +20,7 @@ from care_sim.training.episodes import LEARNER
 
 _LEVELS = 60
 """Points of a profile."""
-_LINE = 60
+_LINE = 50
 """Characters of a title that fit over a panel."""
 
 
@@ -76,7 +76,7 @@ def _describe(axes: Axes, config: Mapping[str, Any], seeds: int) -> None:
     )
     trained = ", ".join(percent(budget) for budget in config["budget"])
     thick = "their interquartile mean, 95% interval"
-    drawn = f"thin: each training seed, thick: {thick}\n" if seeds > 1 else ""
+    drawn = f"thin: each training seed\nthick: {thick}\n" if seeds > 1 else ""
     played = "all budgets" if config.get("drawn") else percent(config["budget"][0])
     axes.set_xlabel(
         f"environment steps, in thousands\n{drawn}trained at budget {trained}\n"
