@@ -126,14 +126,11 @@ def test_every_bounded_number_keeps_its_bounds(kind, name):
 def test_every_number_of_conditions_and_scenarios_has_bounds():
     for kind in (ClosedLoopConditions, *SCENARIOS.values()):
         for field in fields(kind):
-            is_number = isinstance(field.default, int | float) and not isinstance(
-                field.default, bool
+            is_number = field.type == float | None or (
+                isinstance(field.default, int | float) and not isinstance(field.default, bool)
             )
-            if "names" in field.metadata or field.default is None:
-                continue
-            assert bool(allowed(field)) == (
-                is_number or (isinstance(field.default, tuple) and bool(field.default))
-            )
+            is_range = isinstance(field.default, tuple) and bool(field.default)
+            assert ("bounds" in field.metadata) == (is_number or is_range), field.name
 
 
 @pytest.mark.parametrize("extreme", ["least", "most"])
