@@ -23,6 +23,8 @@ from typing import Any
 
 import docstring_parser
 
+from care_sim.base.bounds import allowed
+
 PAGES = Path(__file__).parent / "environments"
 _REGION = re.compile(r"<!-- site\n(?P<directive>::: (?P<path>\S+)\n.*?)-->\n.*?<!-- end -->", re.S)
 _SHARED = {"ClosedLoopEnv": "dartout.md", "OpenLoopEnv": "street.md"}
@@ -76,14 +78,17 @@ def _field_lines(one: Any) -> list[str]:
     params = docstring_parser.parse_from_object(one).params
     told = {each.arg_name: " ".join((each.description or "").split()) for each in params}
     own = [field for field in fields(one) if field.name in inspect.get_annotations(one)]
-    points = [
-        ": ".join(filter(None, [f"- `{field.name}{_default(field)}`", told.get(field.name)]))
-        for field in own
-    ]
+    points = [": ".join(filter(None, [_headed(field), told.get(field.name)])) for field in own]
     wrapped = textwrap.TextWrapper(
         _COLUMNS, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False
     )
     return [*map(wrapped.fill, points)]
+
+
+def _headed(field: Field[Any]) -> str:
+    """The name of a field, what it is unless given, and in brackets what it may be."""
+    values = allowed(field)
+    return f"- `{field.name}{_default(field)}`" + (f" ({values})" if values else "")
 
 
 def _default(field: Field[Any]) -> str:

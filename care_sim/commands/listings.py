@@ -16,15 +16,9 @@ from care_sim.perception.detectors import detector_lines
 from care_sim.policies.listing import policy_paragraphs
 from care_sim.scenarios import PLUGINS, SCENARIOS, scenario_class, scenario_names
 from care_sim.scenarios.base import Scenario
-from care_sim.scenarios.crossing import OCCLUDERS
-from care_sim.scenarios.mirroring import MIRRORED
-from care_sim.scenarios.ncap.scenario import DRAWN
-from care_sim.scenarios.ncap.table import TESTS
-from care_sim.scenarios.r157.grid import KINDS, SIDES
 from care_sim.sensors.setups import setup_lines
 from care_sim.sources.installed import SOURCES
 from care_sim.sources.recordings import Recordings
-from care_sim.streets.encounters import COMERS
 from care_sim.training.agents import shipped_agents
 
 
@@ -70,15 +64,6 @@ class Sensors:
         return 0
 
 
-_NAMED = {
-    "occluder": OCCLUDERS,
-    "mirrored": MIRRORED,
-    "kind": KINDS,
-    "side": SIDES,
-    "test": (*TESTS, DRAWN),
-    "who": COMERS,
-}
-"""The choices of the parameters of scenarios that are names."""
 _ZERO = {"speed_kph": "0 is drawn", "target_kph": "0 is the protocol's"}
 """What 0 stands for, of parameters in which it is no number."""
 
@@ -162,9 +147,8 @@ def _choices(scenario: type[Scenario], field: Field[Any]) -> str:
     """
     # Those of another package may be called the same and mean something else.
     ours = scenario in SCENARIOS.values()
-    named = f"of {', '.join(_NAMED[field.name])}" if ours and field.name in _NAMED else ""
     told = (
-        named or allowed(field),
+        allowed(field),
         _ZERO.get(field.name, "") if ours else "",
         "None is drawn" if field.default is None else "",
     )

@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from care_sim.base.bounds import bounded, check_fields
+from care_sim.base.bounds import bounded, check_fields, one_of
 from care_sim.base.checks import LARGEST_INTEGER, check_whole
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.times import LAST_BITS_S
 from care_sim.core.allocation import RESERVE_FRACTION
-from care_sim.core.cell_order import AS_DEMANDED
+from care_sim.core.cell_order import AS_DEMANDED, CELL_ORDERS
 from care_sim.core.driver_settings import DRIVER_SETTINGS, DriverSettings
 from care_sim.core.firing.listing import CELLS, most_shots, settled
 from care_sim.core.grid import AZIMUTH_MARGIN, ELEVATION_MARGIN
@@ -175,7 +175,7 @@ class Conditions(Sensing):
     """Columns by which hulls and wedges are dilated."""
     elevation_margin: int = bounded(ELEVATION_MARGIN, 0, MOST_ROWS)
     """Rows by which hulls and wedges are dilated."""
-    cell_order: str = AS_DEMANDED
+    cell_order: str = one_of(AS_DEMANDED, CELL_ORDERS)
     """In which order the cells of a set are taken: `as-demanded`, which for the paper's policies is
     row by row from the top, `rows-down`, `rows-up`, `columns`, `random`, `spread` or
     `core-spread`.

@@ -7,8 +7,7 @@ formulas lie in `care_sim.sensors`, each with its source; `docs/returns.md` show
 from dataclasses import dataclass, fields
 from typing import Any
 
-from care_sim.base.bounds import bounded, check_fields
-from care_sim.base.checks import check_known
+from care_sim.base.bounds import bounded, check_fields, one_of
 from care_sim.base.errors import InvalidInput
 
 STRONGEST, LAST, BOTH = "strongest", "last", "both"
@@ -50,7 +49,7 @@ class ReturnSettings:
     """Angle between opposite edges of a beam, milliradians (`care_sim.sensors.bundle`). A beam may
     then meet several bodies. At 0 it is one ray.
     """
-    lidar_returns: str = STRONGEST
+    lidar_returns: str = one_of(STRONGEST, RETURNS_KEPT)
     """Which echo a beam returns that has several: `strongest`, `last` or `both`
     (`care_sim.sensors.echoes`).
     """
@@ -75,10 +74,9 @@ class ReturnSettings:
         return bool(self.lidar_stated_range_m or self.lidar_divergence_mrad or self.lidar_sweep_s)
 
     def check_returns(self) -> None:
-        """Raise InvalidInput for a setting that has no meaning without another one, for a distance
-        too near to 0, and for returns that there are not.
+        """Raise InvalidInput for a setting that has no meaning without another one, and for a
+        distance too near to 0.
         """
-        check_known("lidar_returns", self.lidar_returns, RETURNS_KEPT)
         changed = [n for n, usual in RETURN_SETTINGS.items() if getattr(self, n) != usual]
         for name in ("lidar_stated_range_m", "visibility_m"):
             if 0 < getattr(self, name) < _LEAST_M:

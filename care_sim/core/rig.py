@@ -6,8 +6,8 @@ from functools import cached_property
 
 import numpy as np
 
-from care_sim.base.bounds import bounded, check_fields
-from care_sim.base.checks import check_known, check_whole
+from care_sim.base.bounds import bounded, check_fields, one_of
+from care_sim.base.checks import check_whole
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.allocation import RESERVE_FRACTION, budget_cells, stages_of
 from care_sim.core.arrays import Floats, Integers
@@ -63,7 +63,7 @@ class Rig:
     azimuth_margin: int = bounded(AZIMUTH_MARGIN, 0, MOST_COLUMNS)
     elevation_margin: int = bounded(ELEVATION_MARGIN, 0, MOST_ROWS)
     sensor_height_m: float = bounded(LIDAR_HEIGHT_M, 0, 100)
-    cell_order: str = AS_DEMANDED
+    cell_order: str = one_of(AS_DEMANDED, CELL_ORDERS)
     firing: str = CELLS
     sensor_x_m: float = bounded(LIDAR_X_M, -MOST_SHIFT_M, MOST_SHIFT_M)
     sensor_y_m: float = bounded(0.0, -MOST_SHIFT_M, MOST_SHIFT_M)
@@ -76,7 +76,6 @@ class Rig:
             raise InvalidInput(
                 f"grid must be an AngularGrid or a GridStack, got {shown(self.grid)}"
             )
-        check_known("cell_order", self.cell_order, CELL_ORDERS)
         object.__setattr__(self, "firing", settled(self.firing))
         if not isinstance(self.returns, FilmedReturns):
             raise InvalidInput(f"returns must be FilmedReturns, got {shown(self.returns)}")

@@ -62,6 +62,26 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     | `tracks` | (256, 13) | forecasts in the sensor frame, columns `Tracks.COLUMNS`; id -1 pads |
     | `ranges` | (E, A) | last scan in metres, 0 not fired, maximum range without a return |
 
+    | column of `detections` | meaning |
+    |---|---|
+    | `class` | place in `care_sim.core.types.CLASSES` |
+    | `confidence` | 0 to 1 |
+    | `left`, `top`, `right`, `bottom` | the box in its picture, pixels from the upper left corner |
+    | `camera` | which of the cameras, counted from 0 |
+    | `age` | of the picture, s |
+    | `yaw_change` | how far the car has turned since, rad |
+
+    | column of `tracks` | meaning |
+    |---|---|
+    | `id` | never given to a second object within an episode |
+    | `class` | place in `care_sim.core.types.CLASSES` |
+    | `x`, `y`, `z` | centre in the sensor frame (forward, left, up), m |
+    | `length`, `width`, `height` | m |
+    | `yaw` | of the length's direction from x towards y, rad |
+    | `vx`, `vy` | velocity over ground along the sensor's axes, m/s; 0 after one hit |
+    | `misses` | keyframes since it was last detected |
+    | `hits` | keyframes at which it was detected |
+
     `care_sim.core.observation_limits` says which rows are kept if there are more, and what becomes
     of numbers that no sensor can tell.
 

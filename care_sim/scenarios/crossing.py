@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from care_sim.base.bounds import bounded
-from care_sim.base.checks import check_known
+from care_sim.base.bounds import bounded, one_of
 from care_sim.base.errors import InvalidInput
 from care_sim.scenarios.base import (
     EGO_SPEED_BOUNDS_MPS,
@@ -45,7 +44,7 @@ class CrossingScenario(MirrorableScenario):
     the seed.
     """
 
-    occluder: str = "trailer"
+    occluder: str = one_of("trailer", OCCLUDERS)
     occluder_reported: bool = False
     ego_speed_mps: Range = bounded(USUAL_EGO_SPEED_MPS, *EGO_SPEED_BOUNDS_MPS)
     crossing_m: Range = bounded((37.0, 41.0), 5, 200)
@@ -69,7 +68,6 @@ class CrossingScenario(MirrorableScenario):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_known("occluder", self.occluder, OCCLUDERS)
         if self.occluder_reported and CATALOGUE[self.occluder].label is None:
             raise InvalidInput(
                 f"occluder_reported needs occluder='truck' or 'van', a {self.occluder} has no class"

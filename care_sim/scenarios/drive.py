@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from care_sim.base.bounds import bounded
-from care_sim.base.checks import check_flag, check_known
+from care_sim.base.bounds import bounded, one_of
+from care_sim.base.checks import check_flag
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats
 from care_sim.core.frames import Pose
@@ -57,11 +57,11 @@ class DriveScenario(Scenario):
     duration_s: float = bounded(LONGEST_EPISODE_S, 0.05, LONGEST_EPISODE_S)
     encounters: int = bounded(3, 0, 3)
     """The most that a drive holds; how many is drawn evenly from 0 on."""
-    side: str | None = None
-    """left or right: where all come from. Few cars and cyclists can come from the left: they would
+    side: str | None = one_of(None, SIDES)
+    """Where all come from. Few cars and cyclists can come from the left: they would
     be in sight for too long."""
-    who: str | None = None
-    """pedestrian, child, bicycle or car: who comes."""
+    who: str | None = one_of(None, COMERS)
+    """Who comes."""
     occluder_reported: bool | None = None
     """Whether perception reports what hides them. Cyclists and cars come from behind what it does
     not report, so that with True adults and children alone come."""
@@ -70,9 +70,6 @@ class DriveScenario(Scenario):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name, known in (("side", SIDES), ("who", COMERS)):
-            if getattr(self, name) is not None:
-                check_known(f"{name} of drive", getattr(self, name), known)
         if self.occluder_reported is not None:
             check_flag("occluder_reported of drive", self.occluder_reported)
         if self.occluder_reported and self.who is not None and self.who not in AT_KERB:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from care_sim.base.checks import check_known
+from care_sim.base.bounds import one_of
 from care_sim.core.frames import Pose
 from care_sim.scenarios.base import Scenario
 from care_sim.world.bodies import BodyKind
@@ -23,11 +23,7 @@ class MirrorableScenario(Scenario):
     every other draw of the seed.
     """
 
-    mirrored: str = "never"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_known("mirrored", self.mirrored, MIRRORED)
+    mirrored: str = one_of("never", MIRRORED)
 
     def empty_world(self, traffic: Traffic, ego_speed: float, rng: np.random.Generator) -> World:
         """The world to be filled, at time zero; `ego_speed` in m/s."""

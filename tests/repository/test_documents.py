@@ -19,7 +19,7 @@ from care_sim import cli
 from care_sim.base.errors import InvalidInput
 from care_sim.commands.entries import COMMANDS
 from care_sim.core.conditions import DEFAULTS
-from care_sim.core.types import CLASSES
+from care_sim.core.types import CLASSES, ImageDetections, Tracks
 from care_sim.envs import IDS
 from care_sim.sources.street_films import street_film
 from care_sim.study.results_formats import RESULTS_FORMATS
@@ -212,6 +212,30 @@ def test_a_page_of_environments_is_read_in_a_clone_and_says_what_docstrings_say(
     on_site = environment_pages.on_page_markdown(page.read_text())
     assert "<!--" not in on_site
     assert on_site.count(":::") == page.read_text().count(":::")
+
+
+def test_what_a_field_may_be_is_told_in_a_clone_and_on_the_site():
+    page = (ROOT / "docs" / "environments" / "r157.md").read_text()
+    assert "- `gap_m=None` (0.1 to 200): " in page
+    assert "- `side=None` (of left, right): " in page
+    dartout = (ROOT / "docs" / "environments" / "dartout.md").read_text()
+    assert "| `lidar_dropout` | 0.0 | 0 to 1 |" in dartout
+    assert "| `cell_order` | 'as-demanded' | as-demanded, rows-down, " in dartout
+    griffe = pytest.importorskip("griffe")
+    extensions = griffe.load_extensions(str(ROOT / "docs" / "dynamic_docstrings.py"))
+    scenario = griffe.load(
+        "care_sim.scenarios.r157.scenario.R157", search_paths=[ROOT], extensions=extensions
+    )
+    assert scenario["gap_m"].docstring.value.endswith("\n\nAllowed: 0.1 to 200.")
+    assert scenario["side"].docstring.value.endswith("\n\nAllowed: left, right.")
+
+
+def test_the_columns_of_an_observation_are_explained_in_their_order():
+    page = (ROOT / "docs" / "environments" / "dartout.md").read_text()
+    for key, table in (("detections", ImageDetections), ("tracks", Tracks)):
+        (columns,) = re.findall(rf"^\| column of `{key}` .*\n\|[-|]+\n((?:\|.*\n)+)", page, re.M)
+        told = re.findall(r"`(\w+)`", " ".join(row.split("|")[1] for row in columns.splitlines()))
+        assert told == [*table.COLUMNS]
 
 
 def test_the_notebook_is_kept_without_outputs():

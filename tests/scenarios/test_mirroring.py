@@ -69,5 +69,7 @@ def test_the_side_that_was_drawn_is_told(name):
 
 @every_scenario
 def test_another_word_is_refused(name):
-    with pytest.raises(InvalidInput, match="mirrored 'half'; known: always, drawn, never"):
+    with pytest.raises(
+        InvalidInput, match=f"mirrored of {name} 'half'; known: always, drawn, never"
+    ):
         make_scenario(name, mirrored="half")

@@ -209,7 +209,7 @@ def test_a_bend_turns_by_what_it_says(radius, clothoid, right):
         ({"test": "CPTAfs-50"}, "speed_kph of CPTAfs-50 must be one of 10, 15, 20"),
         ({"test": "CCFtap", "speed_kph": 30.0}, "speed_kph of CCFtap must be one of 10, 15, 20"),
         ({"speed_kph": 150.0}, r"speed_kph of ncap must lie in \[0, 140\]"),
-        ({"mirrored": "half"}, "unknown mirrored 'half'; known: always, drawn, never"),
+        ({"mirrored": "half"}, "unknown mirrored of ncap 'half'; known: always, drawn, never"),
         ({"test": "drawn"}, "speed_kph of ncap must be 0 where the test is drawn"),
         ({"speed_kph": 0, "target_kph": 20}, "target_kph of ncap must be 0 where speed_kph is"),
         ({"speed_kph": 0.5}, "speed_kph of ncap must be 0 or at least 1, got 0.5"),

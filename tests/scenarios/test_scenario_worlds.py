@@ -179,7 +179,11 @@ def test_an_unknown_parameter_is_refused_with_the_known_ones(name, parameter):
 @pytest.mark.parametrize(
     ("name", "parameters", "named"),
     [
-        ("dartout", {"occluder": "bush"}, r"occluder 'bush'; known: hoarding, trailer, truck, van"),
+        (
+            "dartout",
+            {"occluder": "bush"},
+            r"occluder of dartout 'bush'; known: hoarding, trailer, truck, van",
+        ),
         (
             "dense",
             {"vehicles": -1},

@@ -5,8 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from care_sim.base.bounds import bounded
-from care_sim.base.checks import check_known
+from care_sim.base.bounds import bounded, one_of
 from care_sim.base.errors import InvalidInput
 from care_sim.core.frames import Pose
 from care_sim.scenarios.base import LONGEST_EPISODE_S, NO_LIMIT_MPS, Scenario
@@ -60,7 +59,7 @@ class Ncap(Scenario):
     """
 
     duration_s: float = bounded(20.0, 0.05, LONGEST_EPISODE_S)
-    test: str = "CPNCO-50"
+    test: str = one_of("CPNCO-50", (*TESTS, DRAWN))
     """One of `care_sim.scenarios.ncap.table.TESTS`, or drawn."""
     speed_kph: float = bounded(40.0, 0, 140)
     """The ego's, km/h. 0 stands for a pair of the protocol's speeds that the seed draws. Tests in
@@ -68,7 +67,7 @@ class Ncap(Scenario):
     target_kph: float = bounded(0.0, 0, 140)
     """The target's, km/h. 0 stands for the protocol's at the ego's speed: the first where it has
     several, unless the pair is drawn."""
-    mirrored: str = "drawn"
+    mirrored: str = one_of("drawn", MIRRORED)
     """never, always, or half of the seeds: reflected at the ego's way, as in left-hand traffic."""
     occluder_reported: bool = True
     excess_kph: Range = bounded((0.0, 1.0), 0, 4)
@@ -83,8 +82,6 @@ class Ncap(Scenario):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_known("test of ncap", self.test, (*TESTS, DRAWN))
-        check_known("mirrored", self.mirrored, MIRRORED)
         for name in ("speed_kph", "target_kph"):
             if 0 < getattr(self, name) < 1:
                 raise InvalidInput(

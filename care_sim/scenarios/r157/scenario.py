@@ -4,8 +4,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from care_sim.base.bounds import bounded
-from care_sim.base.checks import check_known, check_number
+from care_sim.base.bounds import bounded, one_of
 from care_sim.base.errors import InvalidInput
 from care_sim.driving.human_model import HUMAN_MODEL
 from care_sim.scenarios.base import LONGEST_EPISODE_S, Scenario
@@ -28,13 +27,6 @@ from care_sim.world.lane_change import LaneChange
 from care_sim.world.traffic import Traffic
 from care_sim.world.world import World
 
-_BOUNDS = {
-    "ego_kph": (10.1, 130.0),
-    "relative_kph": (0.1, 120.0),
-    "gap_m": (0.1, 200.0),
-    "lateral_mps": (0.1, 5.0),
-}
-"""Of the numbers of a case: beyond the regulation's grid on both sides."""
 _ROAD_LIMIT_MPS = 130 * KPH
 """The lanes must have a limit; nobody on this road drives by it."""
 
@@ -46,35 +38,27 @@ class R157(Scenario):
 
     What is None is drawn by the seed: kind and side first, then among the preventable cases of the
     grid (`care_sim.scenarios.r157.grid`) that have the values that are given; among all of them
-    where none is preventable.
+    where none is preventable. What may be given is beyond the grid on both sides.
     """
 
     duration_s: float = bounded(10.0, 0.05, LONGEST_EPISODE_S)
-    ego_kph: float | None = None
+    ego_kph: float | None = bounded(None, 10.1, 130)
     """Speed of the ego, km/h."""
-    relative_kph: float | None = None
+    relative_kph: float | None = bounded(None, 0.1, 120)
     """By how much the other is slower, km/h."""
-    gap_m: float | None = None
+    gap_m: float | None = bounded(None, 0.1, 200)
     """From the ego's front to the other's rear when the lane change begins, if nobody brakes."""
-    lateral_mps: float | None = None
+    lateral_mps: float | None = bounded(None, 0.1, 5)
     """Lateral speed of the other, m/s."""
-    kind: str | None = None
-    """car, truck, van, bus or motorcycle."""
-    side: str | None = None
-    """left or right: where it comes from."""
+    kind: str | None = one_of(None, KINDS)
+    """What the other is."""
+    side: str | None = one_of(None, SIDES)
+    """Where it comes from."""
     lead_s: Range = bounded((1.0, 1.5), 0, 30)
     """Time before the lane change, in which tracks settle; the regulation leaves it open."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name, (least, most) in _BOUNDS.items():
-            value = getattr(self, name)
-            if value is not None:
-                check_number(f"{name} of r157", value, least, most)
-                object.__setattr__(self, name, float(value))
-        for name, known in (("kind", KINDS), ("side", SIDES)):
-            if getattr(self, name) is not None:
-                check_known(f"{name} of r157", getattr(self, name), known)
         if not self._cases(KINDS[0], SIDES[0]):
             raise InvalidInput(
                 "no cut-in of r157 has these speeds and this gap: the other must drive at least "
