@@ -11,13 +11,13 @@ from typing import Annotated
 import tyro
 
 from care_sim.base.bounds import bounded, check_fields
-from care_sim.base.errors import InvalidInput, MissingExtra, counted, report_problems
+from care_sim.base.errors import InvalidInput, MissingExtra, counted, report_problems, unknown
 from care_sim.base.files import check_output, write_text
 from care_sim.base.json_text import json_content
 from care_sim.commands.shared.study_command import DONE, FAILED, console
 from care_sim.reports.figures.files import check_figure, save
 from care_sim.reports.figures.leaderboard import LEADERBOARD_FIGURE, leaderboard_figure
-from care_sim.reports.leaderboard import leaderboard_table
+from care_sim.reports.leaderboard import CONTROL, leaderboard_table
 from care_sim.study.benchmark.made_by import is_of_this_code, own_code_of
 from care_sim.study.benchmark.player import Player, player_in
 from care_sim.study.benchmark.replay import Replay, replayed
@@ -44,6 +44,8 @@ class Leaderboard:
     """Folders with result files, or such files. Of two with one name and code the first counts."""
     quick: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """Compare on the tenth of the worlds that `benchmark --quick` plays: a trial."""
+    minus: str = CONTROL.name
+    """The entry over which the leads of all others are told, by its name in the table."""
     verify: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """Play a random tenth of the episodes of every result again, in place of a table. Their
     policies must be installed here."""
@@ -78,7 +80,11 @@ class Leaderboard:
         sets: dict[object, list[BenchmarkResult]] = {}
         for each in results:
             sets.setdefault((each.sealed, each.worlds), []).append(each)
-        tables = [leaderboard_table(own) for own in sets.values()]
+        known = {each.entry.name for each in results}
+        # The control may be missing: then nobody's lead is told.
+        if self.minus != CONTROL.name and self.minus not in known:
+            raise unknown("entry", self.minus, known)
+        tables = [leaderboard_table(own, self.minus) for own in sets.values()]
         page = self.out / f"{LEADERBOARD_FIGURE}.md"
         check_output(page)
         check_figure(self.out / LEADERBOARD_FIGURE)

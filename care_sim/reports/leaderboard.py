@@ -22,10 +22,8 @@ _SCORE = (
     "Euro NCAP tests, and first sightings found at once on streets, with a camera that errs as "
     "YOLOX was measured to. In brackets the 95% interval over worlds."
 )
-_MINUS = (
-    f"Minus {CONTROL.name}: points over the control {CONTROL.name}, a fixed map without a camera, "
-    "paired by world; bold where the interval excludes zero."
-)
+_MINUS = "Minus {}: points over {}, paired by world; bold where the interval excludes zero."
+_OF_CONTROL = f"the control {CONTROL.name}, a fixed map without a camera"
 _IDEAL = "Ideal camera: the score with a camera that reports whatever shows enough pixels."
 _UNRANKED = "No number: no policy that a car can have."
 _CODES = (
@@ -35,10 +33,12 @@ _CODES = (
 _TRIAL = "Only the tenth of the worlds that --quick plays: a trial, and no leaderboard."
 
 
-def leaderboard_table(results: Sequence[BenchmarkResult]) -> Table:
-    """A line for every result, the highest score first. All must be of the same worlds."""
+def leaderboard_table(results: Sequence[BenchmarkResult], minus: str = CONTROL.name) -> Table:
+    """A line for every result, the highest score first, with its lead over the entry `minus`, if
+    that is among them. All must be of the same worlds.
+    """
     ranked = sorted(results, key=lambda result: -result.score().mean)
-    control = next((each for each in results if each.entry == CONTROL), None)
+    control = next((each for each in ranked if each.entry.name == minus), None)
     # What no car can have stands where its score puts it, and takes no place.
     contenders = [each for each in ranked if not is_beyond(each)]
     numbers = {id(each): f"{number}" for number, each in enumerate(contenders, 1)}
@@ -48,8 +48,10 @@ def leaderboard_table(results: Sequence[BenchmarkResult]) -> Table:
         for each, name in zip(ranked, names, strict=True)
     )
     parts = results[0].parts
-    columns = ("", "policy", "score", f"minus {CONTROL.name}", *parts, "ideal camera")
-    return Table(title(results), columns, rows, notes_on(results), whole=("", "score"), names=2)
+    columns = ("", "policy", "score", f"minus {minus}", *parts, "ideal camera")
+    return Table(
+        title(results), columns, rows, notes_on(results, minus), whole=("", "score"), names=2
+    )
 
 
 def names_in(results: Sequence[BenchmarkResult]) -> list[str]:
@@ -77,15 +79,16 @@ def title(results: Sequence[BenchmarkResult]) -> str:
     return f"CARE-Sim benchmark {BENCHMARK_VERSION}: {counted(worlds, 'world')}, {of}"
 
 
-def notes_on(results: Sequence[BenchmarkResult]) -> tuple[str, ...]:
+def notes_on(results: Sequence[BenchmarkResult], minus: str = CONTROL.name) -> tuple[str, ...]:
     """What the columns and marks mean."""
+    lead = _MINUS.format(minus, _OF_CONTROL if minus == CONTROL.name else minus)
     beyond = (_UNRANKED,) if any(map(is_beyond, results)) else ()
     trial = (_TRIAL,) if results[0].quick else ()
     codes = {*map(code_of, results)}
     several = (_CODES.format(len(codes)),) if len(codes) > 1 else ()
     tags = tag_notes(each.tags for each in results)
     # What limits the numbers comes first: a terminal has room for three lines.
-    return (*trial, *several, _SCORE, _MINUS, _IDEAL, *beyond, *tags)
+    return (*trial, *several, _SCORE, lead, _IDEAL, *beyond, *tags)
 
 
 def is_beyond(result: BenchmarkResult) -> bool:
@@ -107,7 +110,7 @@ def _line(
 
 
 def _lead(result: BenchmarkResult, control: BenchmarkResult | None) -> str:
-    if control is None or result.entry == CONTROL:
+    if control is None or result is control:
         return ""
     lead = result.lead(control)
     text = f"{lead.mean:+z.1f} {bounds(lead, 1)}"

@@ -191,6 +191,16 @@ def test_of_two_results_of_one_name_the_first_counts(capsys, library, here):
     assert out.count("care ") == 1
 
 
+def test_leads_are_told_over_any_entry(capsys, library):
+    code, out, _ = run(capsys, "leaderboard", library, "--minus", "care")
+    assert code == 0
+    assert "minus care" in out
+    # 49.7 less 70.2.
+    assert re.search(r"place +49\.7 .*-20\.5 ", out)
+    told = run(capsys, "leaderboard", library, "--minus", "nobody")
+    assert (told[0], "unknown entry 'nobody'; known: care, place" in told[2]) == (2, True)
+
+
 def test_two_of_one_name_and_different_code_are_two_entries(capsys, here):
     for n, code in enumerate(("aaaaaaaaaaaa", "bbbbbbbbbbbb")):
         made = {"policy_code": code, "versions": {"code": code}}
