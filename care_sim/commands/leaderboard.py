@@ -17,7 +17,7 @@ from care_sim.base.json_text import json_content
 from care_sim.commands.shared.study_command import DONE, FAILED, console
 from care_sim.reports.figures.files import check_figure, save
 from care_sim.reports.figures.leaderboard import LEADERBOARD_FIGURE, leaderboard_figure
-from care_sim.reports.leaderboard import CONTROL, leaderboard_table
+from care_sim.reports.leaderboard import CONTROL, leaderboard_table, names_in
 from care_sim.study.benchmark.made_by import is_of_this_code, own_code_of
 from care_sim.study.benchmark.player import Player, player_in
 from care_sim.study.benchmark.replay import Replay, replayed
@@ -60,6 +60,8 @@ class Leaderboard:
         check_fields(self)
         if self.sealed and not self.verify:
             raise InvalidInput("sealed is the salt of results that are verified: give verify too")
+        if self.verify and self.minus != CONTROL.name:
+            raise InvalidInput("minus is for a table, which verify does not make")
 
     def __call__(self) -> int:
         """Run it."""
@@ -80,7 +82,7 @@ class Leaderboard:
         sets: dict[object, list[BenchmarkResult]] = {}
         for each in results:
             sets.setdefault((each.sealed, each.worlds), []).append(each)
-        known = {each.entry.name for each in results}
+        known = names_in(results)
         # The control may be missing: then nobody's lead is told.
         if self.minus != CONTROL.name and self.minus not in known:
             raise unknown("entry", self.minus, known)

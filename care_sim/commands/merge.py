@@ -1,5 +1,6 @@
 """`care-sim merge`: folders of one study in one, so that their policies are compared in pairs."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -8,7 +9,7 @@ import tyro
 
 from care_sim.base.errors import InvalidInput, report_problems
 from care_sim.commands.shared.study_command import DONE, console
-from care_sim.reports.merging import merged
+from care_sim.reports.merging import Merged, merged
 from care_sim.reports.report import print_report, where_it_lies
 
 
@@ -39,12 +40,19 @@ class Merge:
         if whole.twice:
             unit = whole.study.results.unit
             print(f"Alike in two of the folders, and kept once: {whole.twice:,} {unit}")
-        if not whole.shown_alike:
-            report_problems(
-                [
-                    f"{len(whole.codes)} versions of the code played the folders, which have no "
-                    "task in common: play one of the one folder in the other, too, to show that "
-                    "their worlds are alike"
-                ]
-            )
+        report_problems([*_doubts(whole)])
         return DONE
+
+
+def _doubts(whole: Merged) -> Iterator[str]:
+    """What whoever reads the tables should know."""
+    for folder in whole.apart:
+        yield (
+            f"nothing shows that the worlds of {folder} are those of the others: other code played "
+            "it, and it has no task in common with them; play full in both"
+        )
+    if whole.uneven:
+        yield (
+            "not all policies were played in the same worlds: levels are each one's own, "
+            "differences those of the worlds that two share"
+        )

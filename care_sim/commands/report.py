@@ -63,8 +63,9 @@ class PrintReport(SourceOptions):
     def __call__(self) -> int:
         """Run it."""
         if self.minus is not None:
-            rows, study, _ = read_results(self.folder)
+            rows, study, left_out = read_results(self.folder)
             print_minus(rows, console(), study, self.minus)
+            report_problems([f"left out: {what}" for what in left_out])
             return 0
         return self._print() if self.page is None else self._write(self.page)
 

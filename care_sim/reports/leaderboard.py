@@ -38,11 +38,11 @@ def leaderboard_table(results: Sequence[BenchmarkResult], minus: str = CONTROL.n
     that is among them. All must be of the same worlds.
     """
     ranked = sorted(results, key=lambda result: -result.score().mean)
-    control = next((each for each in ranked if each.entry.name == minus), None)
     # What no car can have stands where its score puts it, and takes no place.
     contenders = [each for each in ranked if not is_beyond(each)]
     numbers = {id(each): f"{number}" for number, each in enumerate(contenders, 1)}
     names = names_in(ranked)
+    control = next((each for each, name in zip(ranked, names, strict=True) if name == minus), None)
     rows = tuple(
         _line(each, name, numbers.get(id(each), ""), control)
         for each, name in zip(ranked, names, strict=True)

@@ -6,8 +6,9 @@ has changed than the policy, and nothing of the two folders may be compared.
 """
 
 import json
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -22,13 +23,12 @@ from care_sim.reports.study import Study
 from care_sim.study.results_formats import EPISODES, PLAYS, VEHICLE
 from care_sim.study.row_identity import identity, row_label
 from care_sim.study.rows.parquet import (
-    check_columns,
     read_rows,
     read_table,
     write_columns,
     write_rows,
 )
-from care_sim.study.rows.reading import setting_of, with_regret
+from care_sim.study.rows.reading import key_of, setting_of, with_regret
 from care_sim.study.run_config import Row
 
 _CONFIG = "config.json"
@@ -41,8 +41,9 @@ worked out beside the other rows of its folder."""
 
 @dataclass(frozen=True)
 class Merged:
-    """Rows of several folders. `twice` is how many tasks more than one of them held, `same_films`
-    whether one scene of two folders had one film.
+    """Rows of several folders. `twice` is how many tasks more than one of them held; `apart` are
+    folders of which nothing shows that their worlds are those of the first: neither the code that
+    played them, nor a task or a film in common.
     """
 
     study: Study
@@ -51,17 +52,17 @@ class Merged:
     left_out: Sequence[str]
     descriptions: Mapping[str, Any]
     twice: int
-    same_films: bool
+    apart: Sequence[Path]
 
     @property
-    def codes(self) -> list[str]:
-        """The hashes of the code that played them, as far as the folders tell, each once."""
-        return _values(self.descriptions, "versions").get("code", [])
-
-    @property
-    def shown_alike(self) -> bool:
-        """Whether something shows that all worlds are those of one code."""
-        return len(self.codes) < 2 or self.twice > 0 or self.same_films
+    def uneven(self) -> bool:
+        """Whether policies of one setting and budget were played in different worlds."""
+        worlds: dict[Hashable, dict[str, set[Hashable]]] = {}
+        for row in self.rows:
+            setting, policy, budget = key_of(row)
+            world = row.get("scene"), row.get("seed"), row.get("floor_seed")
+            worlds.setdefault((setting, budget), {}).setdefault(policy, set()).add(world)
+        return any(own != next(iter(of.values())) for of in worlds.values() for own in of.values())
 
     def write(self, folder: Path) -> None:
         """Write a folder of results as a study does, without a journal."""
@@ -98,22 +99,27 @@ def merged(folders: Sequence[Path]) -> Merged:
     rows: list[Row] = []
     events: list[pa.Table] = []
     seen = _Seen()
+    firsts = []
     for folder in folders:
         # All columns, those too that no report reads.
         own = read_rows(folder / study.results.file)
+        firsts.append(own[0])
         is_new = [seen.is_new(row, folder) for row in own]
         rows += [row for row, new in zip(own, is_new, strict=True) if new]
         if study.results is PLAYS:
             events += _events(folder, own, is_new)
-    check_columns(rows)
+    rows = _in_one_table(rows, firsts)
+    told = _descriptions(folders)
+    codes = dict(zip(folders, map(_codes, told.values()), strict=True))
     return Merged(
         study,
         with_regret(rows) if study.results in (EPISODES, VEHICLE) else rows,
-        _columns(pa.concat_tables(events, promote_options="permissive")) if events else None,
+        # Events of some plays alone would pass for those of all.
+        _events_of_all(events) if len(events) == len(folders) else None,
         [*dict.fromkeys(what for *_, left_out in found for what in left_out)],
-        _descriptions(folders),
+        told,
         seen.twice,
-        seen.same_films,
+        _apart(folders, codes, seen.shared),
     )
 
 
@@ -122,7 +128,8 @@ class _Seen:
 
     def __init__(self) -> None:
         self.twice = 0
-        self.same_films = False
+        self.shared: set[frozenset[Path]] = set()
+        """Pairs of folders that hold one task, or one film."""
         self._rows: dict[Hashable, tuple[Path, Row]] = {}
         self._films: dict[Hashable, tuple[Path, str]] = {}
 
@@ -141,6 +148,7 @@ class _Seen:
                 "them; play one of them again"
             )
         self.twice += 1
+        self.shared.add(frozenset((before, folder)))
         return False
 
     def _check_film(self, row: Row, folder: Path) -> None:
@@ -152,13 +160,55 @@ class _Seen:
                 f"{row['scene']} has another film in {folder} than in {before}: their plays cannot "
                 "be compared; play one of them again"
             )
-        self.same_films |= before != folder
+        self.shared.add(frozenset((before, folder)))
 
 
 def _differs(name: str, one: Row, other: Row) -> bool:
     own = (*_OF_THE_PLAYING, *_OF_THE_FOLDER)
     # A column that only one of them has was added between two versions.
-    return name in one and name in other and name not in own and one[name] != other[name]
+    if name not in one or name not in other or name in own:
+        return False
+    both = one[name], other[name]
+    # What is no number is equal to nothing, itself included.
+    return both[0] != both[1] and not all(value != value for value in both)
+
+
+def _in_one_table(rows: Sequence[Row], firsts: Sequence[Row]) -> list[Row]:
+    """The rows with the columns in one order; `firsts` have the columns of every folder. Raises
+    where one column cannot hold the values of all.
+    """
+    names = dict.fromkeys(name for first in firsts for name in first)
+    # Sums of a kind of strata are needed of every row, where one has them.
+    kinds = {name.partition("/")[0] for name in names if not all(name in one for one in firsts)}
+    kept = [name for name in names if "/" not in name or name.partition("/")[0] not in kinds]
+    made = [{name: row.get(name) for name in kept} for row in rows]
+    for name in kept:
+        try:
+            pa.array([row[name] for row in made])
+        except pa.ArrowException as error:
+            raise InvalidInput(
+                f"the column {name} has values of different types in the folders: they cannot be "
+                "one table"
+            ) from error
+    return made
+
+
+def _apart(
+    folders: Sequence[Path],
+    codes: Mapping[Path, Collection[str]],
+    shared: Collection[frozenset[Path]],
+) -> list[Path]:
+    """The folders that nothing links to the first, by way of others or not."""
+    of_one_code = {
+        frozenset(pair)
+        for pair in combinations(folders, 2)
+        if {*codes[pair[0]]} & {*codes[pair[1]]}
+    }
+    links = of_one_code.union(shared)
+    reached = {folders[0]}
+    while more := {each for link in links if link & reached for each in link} - reached:
+        reached |= more
+    return [folder for folder in folders if folder not in reached]
 
 
 def _events(folder: Path, rows: Sequence[Row], kept: Sequence[bool]) -> list[pa.Table]:
@@ -176,7 +226,14 @@ def _events(folder: Path, rows: Sequence[Row], kept: Sequence[bool]) -> list[pa.
     return [table.filter(pa.array(of_rows))]
 
 
-def _columns(table: pa.Table) -> dict[str, Any]:
+def _events_of_all(tables: Sequence[pa.Table]) -> dict[str, Any]:
+    try:
+        table = pa.concat_tables(tables, promote_options="permissive")
+    except pa.ArrowException as error:
+        raise InvalidInput(
+            f"the columns of {_EVENTS} have different types in the folders: they cannot be one "
+            "table"
+        ) from error
     return {name: table[name].combine_chunks() for name in table.column_names}
 
 
@@ -193,6 +250,18 @@ def _descriptions(folders: Sequence[Path]) -> dict[str, Any]:
         except (OSError, ValueError):
             told[name] = {}
     return told
+
+
+def _codes(description: Any) -> list[str]:
+    """The hashes of the code that played a folder, or those that were merged in it."""
+    if not isinstance(description, dict):
+        return []
+    parts = description.get("merged")
+    if isinstance(parts, dict):
+        return [code for part in parts.values() for code in _codes(part)]
+    versions = description.get("versions")
+    code = versions.get("code") if isinstance(versions, dict) else None
+    return [code] if isinstance(code, str) else []
 
 
 def _values(descriptions: Mapping[str, Any], name: str) -> dict[str, list[str]]:

@@ -208,6 +208,9 @@ def test_two_of_one_name_and_different_code_are_two_entries(capsys, here):
     code, out, _ = run(capsys, "leaderboard", ".")
     assert code == 0
     assert re.findall(r"mine:Mine (#\w+)", out) == ["#bbbbbbb", "#aaaaaaa"]
+    # A lead is told over the name that the table shows.
+    out = run(capsys, "leaderboard", ".", "--minus", "mine:Mine #aaaaaaa")[1]
+    assert re.search(r"mine:Mine #bbbbbbb.*\+100\.0", out)
     assert "Played by 2 versions of the code" in " ".join(out.split())
 
 
@@ -232,6 +235,7 @@ def test_two_of_one_name_and_different_code_are_two_entries(capsys, here):
         (["leaderboard", "."], "no result of care-sim benchmark in ."),
         (["leaderboard", "none"], "none cannot be read"),
         (["leaderboard", ".", "--sealed", "x"], "give verify too"),
+        (["leaderboard", ".", "--verify", "--minus", "care"], "minus is for a table"),
     ],
 )
 def test_what_cannot_be_done_is_told_in_one_line(capsys, here, words, told):

@@ -1,6 +1,7 @@
 """Folders of one study in one: what is kept, what is compared, and what is refused."""
 
 import json
+import math
 import re
 
 import pyarrow.parquet as pq
@@ -14,6 +15,7 @@ from care_sim.sources.scenes import Streets
 from care_sim.study.play_config import play_grid
 from care_sim.study.results_formats import PLAYS
 from care_sim.study.rows.parquet import read_rows, write_columns, write_rows
+from care_sim.study.rows.reading import policy_of
 from care_sim.study.scene_play import play_scene
 from tests.helpers.made_rows import rows
 
@@ -65,7 +67,7 @@ def test_two_versions_of_the_code_without_a_task_in_common_are_told(tmp_path, ca
     theirs = folder(tmp_path / "theirs", THEIRS, code="another")
     code, _, err = merge(capsys, ours, theirs, "--out", tmp_path / "both")
     assert code == 0
-    assert err.startswith("care-sim: 2 versions of the code played the folders")
+    assert f"nothing shows that the worlds of {theirs} are those of the others" in err
     assert err.count("\n") == 1
 
 
@@ -114,6 +116,39 @@ def test_folders_of_different_studies_are_refused(tmp_path):
         merged([ours, theirs])
 
 
+def test_a_folder_that_nothing_links_is_told_though_others_share_a_task(tmp_path):
+    ours = folder(tmp_path / "ours", [*OURS, *FULL])
+    theirs = folder(tmp_path / "theirs", [*THEIRS, *FULL], code="another")
+    third = folder(tmp_path / "third", rows("random", [9.0, 9.0]), code="a third")
+    unknown = folder(tmp_path / "unknown", rows("fan", [9.0, 9.0]))
+    (unknown / "config.json").unlink()
+    assert merged([ours, theirs, third, unknown]).apart == [third, unknown]
+    # What was merged is of the code of its parts.
+    merged([ours, theirs]).write(tmp_path / "both")
+    later = folder(tmp_path / "later", rows("random", [9.0, 9.0]), code="another")
+    assert merged([tmp_path / "both", later]).apart == []
+
+
+def test_policies_of_different_worlds_are_told(tmp_path, capsys):
+    ours = folder(tmp_path / "ours", OURS)
+    theirs = folder(tmp_path / "theirs", rows("history", [4.0, None, 5.0]))
+    err = merge(capsys, ours, theirs, "--out", tmp_path / "both")[2]
+    assert "not all policies were played in the same worlds" in err
+
+
+def test_columns_come_in_one_order_and_of_one_type(tmp_path):
+    one = [row | {"policy.b": 2, "policy.x": 1, "own": math.nan} for row in OURS]
+    other = [row | {"policy.x": 1, "policy.b": 2, "own": math.nan} for row in OURS]
+    later = [row | {"seed": 7} for row in other[:1]]
+    whole = merged([folder(tmp_path / "one", one), folder(tmp_path / "two", [*other, *later])])
+    # Equal rows are one, what is no number in them included, and their policy has one name.
+    assert (whole.twice, len(whole.rows)) == (2, 3)
+    assert {policy_of(row) for row in whole.rows} == {"care b=2 x=1"}
+    text = folder(tmp_path / "text", [row | {"own": "text"} for row in THEIRS])
+    with pytest.raises(InvalidInput, match="the column own has values of different types"):
+        merged([tmp_path / "one", text])
+
+
 def test_nothing_is_written_over(tmp_path, capsys):
     ours, theirs = folder(tmp_path / "ours", OURS), folder(tmp_path / "theirs", THEIRS)
     code, _, err = merge(capsys, ours, theirs, "--out", ours)
@@ -142,7 +177,7 @@ def test_events_of_the_open_loop_go_with_their_plays(tmp_path, played, capsys):
     ours = plays(tmp_path / "ours", [played["care"], played["full"]])
     theirs = plays(tmp_path / "theirs", [played["full"], played["history"]])
     whole = merged([ours, theirs])
-    assert (whole.twice, whole.same_films) == (1, True)
+    assert (whole.twice, whole.apart) == (1, [])
     whole.write(tmp_path / "both")
     held = pq.read_table(tmp_path / "both" / "events.parquet")
     together = plays(tmp_path / "together", [played[n] for n in ("care", "full", "history")])
@@ -155,6 +190,16 @@ def test_another_film_of_a_scene_is_refused(tmp_path, played):
     theirs = plays(tmp_path / "theirs", [played["history"] | {"film_hash": "another"}])
     with pytest.raises(InvalidInput, match=r"street-0000-straight has another film in .*theirs"):
         merged([ours, theirs])
+
+
+def test_what_not_all_folders_hold_of_a_play_is_left_out(tmp_path, played):
+    ours = plays(tmp_path / "ours", [played["care"]])
+    lacking = {n: v for n, v in played["history"].items() if not n.startswith("entry/emergence")}
+    theirs = plays(tmp_path / "theirs", [lacking])
+    (theirs / "events.parquet").unlink()
+    merged([ours, theirs]).write(tmp_path / "both")
+    assert not (tmp_path / "both" / "events.parquet").exists()
+    assert len(read_results(tmp_path / "both")[0]) == 2
 
 
 def test_events_of_another_study_are_told(tmp_path, played):
