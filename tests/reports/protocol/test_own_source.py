@@ -31,7 +31,7 @@ def _ablated():
 
 _ORDERED = [
     each
-    for order in ("ascending", "spread")
+    for order in ("rows-down", "spread")
     for each in study(_FOUND, scenes=2, seeds=(0,), cell_order=order)
 ]
 
