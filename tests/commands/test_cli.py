@@ -93,7 +93,10 @@ def test_a_host_that_calls_a_command_keeps_its_handlers_and_may_do_so_in_a_threa
         (["validate", "cutin", "--seeds", "1000", "1001"], ["seeds of a test", "1,000", "1001"]),
         (["validate", "cutin", "--training-seeds", "0"], ["training_seeds", ">= 1"]),
         (["validate", "cutin", "--factors", "mirrored"], ["NAME=VALUE", "'mirrored'"]),
-        (["validate", "cutin", "--factors", "mirrored=half"], ["mirrored of cutin 'half'", "drawn"]),
+        (
+            ["validate", "cutin", "--factors", "mirrored=half"],
+            ["mirrored of cutin 'half'", "drawn"],
+        ),
         (["reproduce", "--workers", "0"], ["workers", ">= 1"]),
         (["report", "nowhere"], ["nowhere"]),
     ],
