@@ -56,7 +56,6 @@ class PrintReport(SourceOptions):
             raise InvalidInput("--source has no meaning without --page: nothing is played again")
         if self.source is not None and not self.episodes:
             raise InvalidInput("--source has no meaning with --episodes 0: nothing is played again")
-
         if self.minus is not None and self.page is not None:
             raise InvalidInput("--minus has no meaning with --page: a page draws its own pairs")
 

@@ -85,8 +85,9 @@ class Merged:
 def merged(folders: Sequence[Path]) -> Merged:
     """What several folders hold together, in their order.
 
-    Raises InvalidInput as `read_results` does; for folders of different studies; and where one task
-    came out differently in two of them, or one scene has two films.
+    Raises InvalidInput as `read_results` does; for folders of different studies; where one task
+    came out differently in two of them, or one scene has two films; and for columns that cannot be
+    one, since their types differ.
     """
     found = [(folder, *read_results(folder)) for folder in folders]
     first, _, study, _ = found[0]

@@ -1,4 +1,4 @@
-"""The picture of a keyframe of the open loop that says why: the scene from above with what the
+"""The picture of a keyframe of the open loop for close looking: the scene from above with what the
 policy knew, and which share of the budget each cell came from.
 """
 
