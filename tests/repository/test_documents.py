@@ -22,6 +22,9 @@ from care_sim.core.conditions import DEFAULTS
 from care_sim.core.types import CLASSES, ImageDetections, Tracks
 from care_sim.envs import IDS
 from care_sim.sources.street_films import street_film
+from care_sim.study.benchmark.player import player_in
+from care_sim.study.benchmark.result_file import read_result
+from care_sim.study.benchmark.worlds import PARTS, published_worlds
 from care_sim.study.results_formats import RESULTS_FORMATS
 from tests.helpers.forked import LEARNING, LIBRARIES, Forked
 from tests.helpers.pages import PAGES, README, SITE, fenced, links, name_of
@@ -127,6 +130,25 @@ def test_a_detector_runs_on_a_sweep_in_one_file(tmp_path, monkeypatch, capsys):
     cars = np.sum(film.shots[0].annotations.classes == CLASSES.index("car"))
     assert 0.5 * cars < int(counts["car"]) < 1.5 * cars
     assert (tmp_path / "out.png").stat().st_size > 10_000
+
+
+def test_a_blind_camera_takes_nothing_from_who_asks_none(tmp_path):
+    example = loaded(ROOT / "docs" / "examples" / "blind_camera.py")
+    worlds = [next(world for world in published_worlds() if world.part == part) for part in PARTS]
+    told = [read_result(ROOT / f"results/leaderboard/{name}.json") for name in ("fan", "care")]
+    with player_in(tmp_path, 2) as player:
+        fan, care = example.blinded(told, worlds, player)
+
+    def hashes(result, camera):
+        kept = [row for row in result.rows if row.camera == camera]
+        return {row.part: row.hash for row in kept if (row.part, row.world) in played}
+
+    played = {(world.part, world.number) for world in worlds}
+    assert set(hashes(fan, "blind")) == set(PARTS)
+    assert hashes(fan, "blind") == hashes(told[0], "ideal")
+    for part, blind in hashes(care, "blind").items():
+        assert blind != hashes(told[1], "ideal")[part], part
+    assert [row.world for row in example.as_measured(fan).rows] == [w.number for w in worlds]
 
 
 def loaded(file):
