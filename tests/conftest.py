@@ -3,6 +3,7 @@ test.
 """
 
 import os
+import shutil
 import sys
 
 import numpy as np
@@ -38,6 +39,22 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 @pytest.fixture(scope="session")
 def grid():
     return AngularGrid()
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    """A browser without a screen, driven by Playwright."""
+    path = shutil.which("chromium")
+    if path is None:
+        pytest.skip("the browser tests need Chromium: apt-get install chromium")
+    sync_api = pytest.importorskip(
+        "playwright.sync_api", reason="the browser tests need the PyPI package playwright"
+    )
+    switches = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
+    with sync_api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=switches)
+        yield browser
+        browser.close()
 
 
 @pytest.fixture

@@ -25,8 +25,8 @@ from care_sim.core.return_settings import RETURN_SETTINGS, FilmedReturns, Return
 
 MIN_RETURNS = 3
 """Fired rays that must hit an object. The fewest that span a surface."""
-IDEAL_CAMERA = "ideal"
-"""The camera profile that reports whatever shows enough pixels."""
+IDEAL_CAMERA, YOLOX_CAMERA = CAMERA_PROFILES = "ideal", "yolox"
+"""The camera that reports whatever shows enough pixels, and the one that errs as measured."""
 CAMERA_CONFIDENCE = 0.25
 """The public confidence threshold of the paper's camera detector (Remark 2)."""
 MOST_FALSE_BOXES = 64
@@ -46,7 +46,7 @@ LONGEST_CORRELATION_S = 1e6
 class CameraFaults:
     """What the camera gets wrong."""
 
-    camera_profile: str = IDEAL_CAMERA
+    camera_profile: str = one_of(IDEAL_CAMERA, CAMERA_PROFILES)
     """The detector that the camera is like (`care_sim.sensors.camera_profiles`): `ideal`, or
     `yolox`, which misses, confuses and invents objects as measured. The faults below come on top.
     """

@@ -2,10 +2,9 @@
 
 from dataclasses import dataclass, fields
 
-from care_sim.base.bounds import bounded
+from care_sim.base.bounds import bounded, one_of
 
-FIXED = "fixed"
-CAREFUL_HUMAN = "careful-human"
+FIXED, CAREFUL_HUMAN = DRIVERS = "fixed", "careful-human"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -15,7 +14,7 @@ class DriverSettings:
     `careful-human` has the numbers of its regulation; of these it takes `comfort_mps2` alone.
     """
 
-    driver: str = FIXED
+    driver: str = one_of(FIXED, DRIVERS)
     """Who brakes: `fixed`, the controller of `care_sim.driving.braking`, or `careful-human`, the
     driver model of UN Regulation 157 (`care_sim.driving.careful_human`).
     """

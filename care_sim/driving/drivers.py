@@ -2,9 +2,8 @@
 
 from typing import Protocol
 
-from care_sim.base.checks import check_known
 from care_sim.base.errors import InvalidInput
-from care_sim.core.driver_settings import BRAKING_RULES, CAREFUL_HUMAN, FIXED, DriverSettings
+from care_sim.core.driver_settings import BRAKING_RULES, FIXED, DriverSettings
 from care_sim.core.types import Command, Ego, Tracks
 from care_sim.driving.braking import BrakingController
 from care_sim.driving.careful_human import CarefulHuman
@@ -24,12 +23,8 @@ class Driver(Protocol):
         ...
 
 
-DRIVERS = (FIXED, CAREFUL_HUMAN)
-
-
 def check_driver(settings: DriverSettings) -> None:
-    """Raise InvalidInput for an unknown driver, and for rules that the driver does not know."""
-    check_known("driver", settings.driver, DRIVERS)
+    """Raise InvalidInput for rules that the driver does not know."""
     usual = DriverSettings()
     for name in BRAKING_RULES if settings.driver != FIXED else ():
         if getattr(settings, name) != getattr(usual, name):

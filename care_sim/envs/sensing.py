@@ -27,7 +27,6 @@ from care_sim.core.rig import Rig
 from care_sim.core.types import Action
 from care_sim.envs.spaces import checked_scores, observation_space
 from care_sim.loops.truth import EpisodeTruth, Loop, Truth
-from care_sim.sensors.camera_profiles import check_camera_profile
 from care_sim.sensors.lidar_faults import check_dead_rows
 
 Observed = dict[str, NDArray[np.float32]]
@@ -66,7 +65,6 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
                 "cameras must be at least one, got none: observations tell of each what it sees"
             )
         check_dead_rows(grid, conditions.lidar_dead_rows)
-        check_camera_profile(conditions.camera_profile)
         if conditions.lidar_sweep_s > keyframe_s:
             raise InvalidInput(
                 f"lidar_sweep_s must be at most the {keyframe_s:g} s between keyframes, got "

@@ -12,9 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from care_sim.base.checks import check_known
 from care_sim.core.arrays import Floats, Integers
-from care_sim.core.conditions import IDEAL_CAMERA, CameraFaults
+from care_sim.core.conditions import IDEAL_CAMERA, YOLOX_CAMERA, CameraFaults
 from care_sim.core.types import CLASSES
 from care_sim.sensors.detector_recall import RecallTable
 
@@ -116,13 +115,8 @@ YOLOX = CameraProfile(
     ghost_time_s=0.14,
 )
 
-PROFILES: dict[str, CameraProfile | None] = {IDEAL_CAMERA: None, "yolox": YOLOX}
+PROFILES: dict[str, CameraProfile | None] = {IDEAL_CAMERA: None, YOLOX_CAMERA: YOLOX}
 """By name. The ideal camera reports whatever shows enough pixels."""
-
-
-def check_camera_profile(name: str) -> None:
-    """Raise InvalidInput for a name that is not a profile."""
-    check_known("camera_profile", name, PROFILES)
 
 
 def invents_boxes(faults: CameraFaults) -> bool:

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from care_sim.base.errors import InvalidInput
+from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.driver_settings import DriverSettings
 from care_sim.core.types import Ego, Tracks
 from care_sim.driving.braking import BrakingController
@@ -125,7 +126,7 @@ def test_drivers_by_name():
 )
 def test_unknown_drivers_and_rules_that_are_not_theirs_are_refused(settings, line):
     with pytest.raises(InvalidInput, match=line):
-        check_driver(DriverSettings(**settings))
+        check_driver(ClosedLoopConditions(**settings))
 
 
 def test_comfort_is_of_both_drivers():

@@ -3,7 +3,6 @@
 import base64
 import json
 import re
-import shutil
 import zlib
 from concurrent.futures import ThreadPoolExecutor
 from io import BytesIO
@@ -28,26 +27,9 @@ from care_sim.study.scene_play import play_scene
 from tests.helpers import made_plays
 from tests.helpers.made_rows import CROWD, STUDY, row, rows
 
-sync_api = pytest.importorskip(
-    "playwright.sync_api", reason="the browser tests need the PyPI package playwright"
-)
-CHROMIUM = shutil.which("chromium")
-pytestmark = pytest.mark.skipif(
-    CHROMIUM is None, reason="the browser tests need Chromium: apt-get install chromium"
-)
-
-SWITCHES = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
 MOST_BYTES, MOST_MS = 5e6, 2000
 DRAWN = "!document.querySelector('.plot:not([data-drawn])')"
 READY = f"{DRAWN} && !!document.querySelector('#views figure')"
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=SWITCHES)
-        yield browser
-        browser.close()
 
 
 @pytest.fixture
