@@ -1,9 +1,8 @@
 """A small network over a set of items, in NumPy: every item sees all others by attention."""
 
-from functools import cache
-
 import numpy as np
 
+from care_sim.core.arrays import Floats
 from care_sim.policies.learned.set_items import ITEM_INPUTS, STRIP_INPUTS, Items
 from care_sim.policies.learned.set_kernels import Numbers
 from care_sim.policies.learned.weights import Weights
@@ -44,7 +43,11 @@ class SetNetwork:
             "strip_bias": (strip_units,),
             "strip_out": (strip_units,),
         }
-        self._of = {name: weights.array(name, *shape) for name, shape in shapes.items()}
+        # In float64, and rounded at the end: what a processor or a library sums in another order
+        # differs in last bits, by which two cells of nearly one gain would change places.
+        self._of = {
+            name: weights.array(name, *shape).astype(np.float64) for name, shape in shapes.items()
+        }
 
     def chances(self, items: Items) -> Numbers:
         """(n, `STEPS`) that an object of each item has returned three times after so many cells."""
@@ -52,29 +55,24 @@ class SetNetwork:
         if not len(items.inputs):
             return np.zeros((0, len(STEPS)), np.float32)
         units = np.maximum(items.inputs @ of["first"] + of["first_bias"], 0)
-        scores = (units @ of["query"]) @ (units @ of["key"]).T / _root(of["query"].shape[1])
+        scores = (units @ of["query"]) @ (units @ of["key"]).T / np.sqrt(of["query"].shape[1])
         told = _softmax(scores) @ (units @ of["value"])
         both = np.hstack([units, told])
         units = np.maximum(both @ of["second"] + of["second_bias"], 0)
         shares = _softmax(units @ of["out"] + of["out_bias"])
         # The last share is that of items without such an object.
-        return np.cumsum(shares[:, :-1], axis=1, dtype=np.float32)
+        return np.cumsum(shares[:, :-1], axis=1).astype(np.float32)
 
     def strip_chances(self, items: Items, places: np.ndarray) -> Numbers:
         """(S,) that a strip finds an object of which no box and no track tells."""
         of = self._of
         units = np.maximum(items.strips @ of["strip"] + of["strip_bias"], 0)
         logits = units @ of["strip_out"] + of["map"][places]
-        chances: Numbers = 1 / (1 + np.exp(-np.clip(logits, -30, 30)))
-        return chances
+        chances: Floats = 1 / (1 + np.exp(-np.clip(logits, -30, 30)))
+        return chances.astype(np.float32)
 
 
-@cache
-def _root(width: int) -> np.float32:
-    return np.float32(np.sqrt(width))
-
-
-def _softmax(scores: Numbers) -> Numbers:
+def _softmax(scores: Floats) -> Floats:
     powers = np.exp(scores - scores.max(axis=1, keepdims=True))
-    shares: Numbers = powers / powers.sum(axis=1, keepdims=True)
+    shares: Floats = powers / powers.sum(axis=1, keepdims=True)
     return shares

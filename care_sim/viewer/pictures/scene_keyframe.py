@@ -102,9 +102,10 @@ def _outermost(rays: Floats) -> Floats:
     within half a turn.
     """
     flat = rays[:, :2] / np.linalg.norm(rays[:, :2], axis=1, keepdims=True)
-    # Against the first of them, so that it does not matter where a turn begins.
+    # Angles from the first of them, so that it does not matter where a turn begins.
     across = flat[0, 0] * flat[:, 1] - flat[0, 1] * flat[:, 0]
-    ends: Floats = flat[[np.argmax(across), np.argmin(across)]]
+    off = np.arctan2(across, flat @ flat[0])
+    ends: Floats = flat[[np.argmax(off), np.argmin(off)]]
     return ends
 
 

@@ -72,12 +72,34 @@ def test_chances_are_those_of_a_plain_network(drawn, encounter, environment):
             )
             last = np.maximum(both @ of["second"] + of["second_bias"], 0)
             expected = np.cumsum(softmax(last @ of["out"] + of["out_bias"]))[:-1]
-            np.testing.assert_allclose(told, expected, atol=1e-4)
+            np.testing.assert_allclose(told, expected, atol=1e-6)
             seen += 1
         units = np.maximum(items.strips @ of["strip"] + of["strip_bias"], 0)
         expected = 1 / (1 + np.exp(-(units @ of["strip_out"] + of["map"][reader.places])))
-        np.testing.assert_allclose(network.strip_chances(items, reader.places), expected, atol=1e-4)
+        np.testing.assert_allclose(network.strip_chances(items, reader.places), expected, atol=1e-6)
     assert seen > 5
+
+
+def test_the_order_of_a_sum_changes_no_chance(drawn, tmp_path, encounter, environment):
+    """Processors and libraries sum in orders of their own, as does a network whose units are named
+    in another order.
+    """
+    of, turned = load_weights(drawn).arrays, np.arange(5)[::-1]
+    columns = {name: of[name][..., turned] for name in ("first", "first_bias", "second_bias")}
+    rows = {name: of[name][turned] for name in ("query", "key", "out")}
+    both = np.concatenate([turned, 5 + turned])
+    crossed = {"value": of["value"][turned][:, turned], "second": of["second"][both][:, turned]}
+    strips = {name: of[name][..., ::-1] for name in ("strip", "strip_bias", "strip_out")}
+    save_weights(tmp_path / "turned.npz", of | columns | rows | crossed | strips, CARD)
+    network, other = (
+        SetNetwork(load_weights(tmp_path / f"{n}.npz"), PLACES) for n in ("drawn", "turned")
+    )
+    reader = ItemReader(environment.unwrapped.rig, 48)
+    for observation in encounter[::8]:
+        items = reader.of(Belief.from_observation(observation))
+        np.testing.assert_array_equal(other.chances(items), network.chances(items))
+        told = (each.strip_chances(items, reader.places) for each in (network, other))
+        np.testing.assert_array_equal(*told)
 
 
 def test_without_boxes_and_tracks_the_strips_alone_are_served(drawn, environment, belief_of):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from care_sim.core.actions import EXPLOITATION, FLOOR, RESERVE
@@ -98,6 +98,7 @@ def test_who_appears_is_named_at_that_keyframe_alone(drawn):
     st.lists(st.floats(-1.2, 1.2), min_size=1, max_size=9),
     st.floats(-0.9, 0.9),
 )
+@example(0.0, [1.125, 0.0, -1.0], 0.0)  # more than a quarter of a turn from the first
 def test_the_outermost_rays_hold_all_others_between_them(middle, offsets, rise):
     yaws = middle + np.array(offsets)
     rays = np.column_stack([np.cos(yaws), np.sin(yaws), np.full(len(yaws), rise)])
