@@ -151,6 +151,14 @@ def test_a_blind_camera_takes_nothing_from_who_asks_none(tmp_path):
     assert [row.world for row in example.as_measured(fan).rows] == [w.number for w in worlds]
 
 
+def test_what_training_seeds_tell_stands_in_its_page(capsys):
+    loaded(ROOT / "docs" / "examples" / "deal_seeds.py").main()
+    page = (ROOT / "results" / "learned-allocators.md").read_text()
+    tables = capsys.readouterr().out.strip().split("\n\n")
+    assert len(tables) == 2
+    assert all(table in page for table in tables)
+
+
 def loaded(file):
     """The module of a file that is in no package."""
     place = spec_from_file_location(file.stem, file)

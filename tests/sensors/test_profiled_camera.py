@@ -6,14 +6,14 @@ import pytest
 
 import care_sim
 from care_sim.base.errors import InvalidInput
-from care_sim.core.conditions import Sensing
+from care_sim.core.conditions import CAMERA_PROFILES, Sensing
 from care_sim.core.types import CLASSES, ImageDetections
 from care_sim.envs.open_loop import FilmEnv
 from care_sim.loops.film import Film
 from care_sim.sensors.annotated import NO_OBJECT, IdentifiedDetections
 from care_sim.sensors.box_pool import BoxPool
 from care_sim.sensors.camera import FRONT_CAMERA, CameraDetector
-from care_sim.sensors.camera_profiles import YOLOX
+from care_sim.sensors.camera_profiles import PROFILES, YOLOX
 from care_sim.sensors.detector_recall import UNHIDDEN, whole_boxes
 
 CAR, TRUCK, BICYCLE, PEDESTRIAN = (
@@ -132,6 +132,10 @@ def test_the_faults_come_on_top_and_leave_the_profile_as_it_is():
     alone, missing = boxes(), boxes(false_negative_rate=0.5)
     assert all(fewer <= all_ for fewer, all_ in zip(missing, alone, strict=True))
     assert sum(map(len, missing)) < sum(map(len, alone))
+
+
+def test_every_profile_that_is_told_is_there():
+    assert tuple(PROFILES) == CAMERA_PROFILES
 
 
 def test_an_unknown_profile_is_refused_by_name():
