@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from care_sim.base.errors import InvalidInput
 from care_sim.study.benchmark.player import Player, player_in
 from care_sim.study.benchmark.result import BenchmarkResult, ResultRow
 from care_sim.study.benchmark.result_file import read_result
@@ -55,7 +56,12 @@ def as_measured(blind: BenchmarkResult) -> BenchmarkResult:
 
 def main(files: Sequence[str]) -> None:
     """Play and print, in percent and points."""
-    seeing = [read_result(Path(file)) for file in files]
+    if not files:
+        raise SystemExit("give the result files of one entry or more")
+    try:
+        seeing = [read_result(Path(file)) for file in files]
+    except InvalidInput as error:
+        raise SystemExit(str(error)) from None
     with player_in(Path("runs/blind-camera"), WORKERS) as player:
         blind = blinded(seeing, published_worlds(), player)
     print("| | score | blind | the camera's | blind, minus the last | drives | tests | streets |")

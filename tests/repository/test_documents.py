@@ -151,6 +151,15 @@ def test_a_blind_camera_takes_nothing_from_who_asks_none(tmp_path):
     assert [row.world for row in example.as_measured(fan).rows] == [w.number for w in worlds]
 
 
+@pytest.mark.parametrize(
+    ("files", "line"),
+    [([], "give the result files"), ([ROOT / "nothing.json"], "nothing.json cannot be read")],
+)
+def test_without_result_files_the_blind_camera_says_so(files, line):
+    with pytest.raises(SystemExit, match=line):
+        loaded(ROOT / "docs" / "examples" / "blind_camera.py").main(files)
+
+
 def test_what_training_seeds_tell_stands_in_its_page(capsys):
     loaded(ROOT / "docs" / "examples" / "deal_seeds.py").main()
     page = (ROOT / "results" / "learned-allocators.md").read_text()
