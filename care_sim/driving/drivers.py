@@ -3,7 +3,7 @@
 from typing import Protocol
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.driver_settings import BRAKING_RULES, FIXED, DriverSettings
+from care_sim.core.driver_settings import BRAKING_RULES, CAREFUL_HUMAN, FIXED, DriverSettings
 from care_sim.core.types import Command, Ego, Tracks
 from care_sim.driving.braking import BrakingController
 from care_sim.driving.careful_human import CarefulHuman
@@ -21,6 +21,9 @@ class Driver(Protocol):
         ahead, and the ego's motion.
         """
         ...
+
+
+_KINDS = {FIXED: BrakingController, CAREFUL_HUMAN: CarefulHuman}
 
 
 def check_driver(settings: DriverSettings) -> None:
@@ -48,5 +51,4 @@ def make_driver(
     """The driver of an episode. `front_m` and `half_width_m` are the ego's extents seen from its
     sensor, metres; it cruises at `cruise_mps`.
     """
-    kind = BrakingController if settings.driver == FIXED else CarefulHuman
-    return kind(cruise_mps, front_m, half_width_m, keyframe_s, settings)
+    return _KINDS[settings.driver](cruise_mps, front_m, half_width_m, keyframe_s, settings)

@@ -34,9 +34,17 @@ def curves_figure(groups: Sequence[Sequence[TrainingRun]]) -> Figure:
     rows = 1 + any(run.episodes for runs in groups for run in runs)
     figure = Figure(figsize=(1.2 + 4.6 * len(groups), 3.9 * rows), layout="constrained")
     panels = figure.subplots(rows, len(groups), squeeze=False)
+    # Panels of one unit have one scale, so that heights compare; lines are named once it is fixed.
+    scales: dict[str, Axes] = {}
     for axes, runs in zip(panels[0], groups, strict=True):
+        unit = runs[0].unit
+        if unit in scales:
+            axes.sharey(scales[unit])
+        scales.setdefault(unit, axes)
         _draw(axes, runs)
-        axes.set_ylabel(runs[0].unit)
+        axes.set_ylabel(unit)
+    for axes, runs in zip(panels[0], groups, strict=True):
+        _name_lines(axes, runs)
     for axes, runs in zip(panels[1:].ravel(), groups, strict=rows > 1):
         _draw_profiles(axes, runs)
     return figure
@@ -44,10 +52,9 @@ def curves_figure(groups: Sequence[Sequence[TrainingRun]]) -> Figure:
 
 def _draw(axes: Axes, runs: Sequence[TrainingRun]) -> None:
     config = runs[0].config
-    marks = {name: _middle(scores) for name, scores in runs[0].marks.items()}
     learner = config["algorithm"]
-    colours = _colours((*marks, learner))
-    for name, height in marks.items():
+    colours = _colours((*runs[0].marks, learner))
+    for name, height in _heights(runs).items():
         axes.axhline(height, color=colours[name], linestyle="--", linewidth=1.1, zorder=1)
     for run in runs:
         axes.plot(
@@ -63,8 +70,6 @@ def _draw(axes: Axes, runs: Sequence[TrainingRun]) -> None:
     # Metres are never below 0; a score is where a learner falls behind `random`.
     if runs[0].closed_loop and len(runs[0].tasks) == 1:
         axes.set_ylim(bottom=0)
-    last = float(np.mean([_middle(run.scores[-1]) for run in runs]))
-    _name_lines(axes, marks | {learner: last}, colours)
     _describe(axes, config, len(runs))
 
 
@@ -132,23 +137,31 @@ def _middle(scores: Floats) -> float:
     return interquartile_mean(scores[None]).value
 
 
+def _heights(runs: Sequence[TrainingRun]) -> dict[str, float]:
+    """Where the lines of the rules lie."""
+    return {name: _middle(scores) for name, scores in runs[0].marks.items()}
+
+
 def _colours(names: Sequence[str]) -> dict[str, str]:
     drawn = styles((name, tags_of(name)) for name in names) | {"full": FULL_STYLE}
     return {name: style.colour for name, style in drawn.items()}
 
 
-def _name_lines(axes: Axes, heights: dict[str, float], colours: dict[str, str]) -> None:
+def _name_lines(axes: Axes, runs: Sequence[TrainingRun]) -> None:
     """Names right of the axes, moved apart where lines lie close."""
+    last = float(np.mean([_middle(run.scores[-1]) for run in runs]))
+    heights = _heights(runs) | {runs[0].config["algorithm"]: last}
+    colours = _colours([*heights])
     low, high = axes.get_ylim()
     # A line of text is about 5.5% of the axis high. From the lowest up, each name stands at least
     # that far above the one before.
     least = (high - low) * 0.055
-    last = -np.inf
+    place = -np.inf
     for name, height in sorted(heights.items(), key=lambda pair: pair[1]):
-        last = max(height, last + least)
+        place = max(height, place + least)
         axes.annotate(
             name,
-            (1.0, last),
+            (1.0, place),
             (6, 0),
             xycoords=axes.get_yaxis_transform(),
             textcoords="offset points",

@@ -3,10 +3,11 @@
 import sys
 import time
 from collections.abc import Callable
-from contextlib import nullcontext
+from contextlib import closing, nullcontext
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+import care_sim
 from care_sim.base.errors import InvalidInput, MissingExtra
 from care_sim.base.extras import import_torch
 from care_sim.envs.sensing import sensing
@@ -22,8 +23,20 @@ from care_sim.training.validation import acting, play, rule
 if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm
 
-RULES = {"random": None, "history": None, "care": None, "full": 1.0}
-"""The rules that the learner is compared with, and their budget where it is not the learner's."""
+RULES = {
+    "random": None,
+    "history": None,
+    "fan": None,
+    "place": None,
+    "all-camera": None,
+    "care": None,
+    "care-spread": None,
+    "full": 1.0,
+}
+"""The rules that the learner is compared with, and their budget where it is not the learner's:
+chance, the paper's, patterns that ask no camera, the best of ours that remembers nothing, and what
+can be reached.
+"""
 
 
 def train_agent(
@@ -48,7 +61,7 @@ def train_agent(
             else algorithms.make_learner(config, envs, sensing(env).rig.grid.goes_round)
         )
         folder.begin(model)
-        for name, score in folder.rules(partial(_rules, config)).items():
+        for name, score in folder.rules(partial(played_rules, config)).items():
             _say(f"{name}: {score}")
         _learn(config, folder, model, env, evaluated)
     finally:
@@ -74,13 +87,19 @@ def _resumed(config: AgentConfig, folder: Folder, envs: Any) -> "BaseAlgorithm":
     return model
 
 
-def _rules(config: AgentConfig) -> dict[str, list[Played]]:
-    """How the rules play the validation seeds."""
+def played_rules(config: AgentConfig) -> dict[str, list[Played]]:
+    """How the rules play the validation seeds. One that does not fit the learner's environment, as
+    a map of another grid, is left out, and said so.
+    """
     played = {}
     for name, budget in RULES.items():
-        env = plain(config, budget)
-        played[name] = play(env, rule(name, env), validation_episodes(config))
-        env.close()
+        with closing(plain(config, budget)) as env:
+            try:
+                care_sim.make_policy(name, env.unwrapped)
+            except InvalidInput as error:
+                _say(f"{name} does not fit and is not beside it: {error}")
+            else:
+                played[name] = play(env, rule(name, env), validation_episodes(config))
     return played
 
 

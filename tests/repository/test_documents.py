@@ -7,6 +7,7 @@ import os
 import re
 import shlex
 import tomllib
+from dataclasses import replace
 from html.parser import HTMLParser
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
@@ -24,6 +25,7 @@ from care_sim.envs import IDS
 from care_sim.sources.street_films import street_film
 from care_sim.study.benchmark.player import player_in
 from care_sim.study.benchmark.result_file import read_result
+from care_sim.study.benchmark.tasks import tasks_of
 from care_sim.study.benchmark.worlds import PARTS, published_worlds
 from care_sim.study.results_formats import RESULTS_FORMATS
 from tests.helpers.forked import LEARNING, LIBRARIES, Forked
@@ -148,7 +150,42 @@ def test_a_blind_camera_takes_nothing_from_who_asks_none(tmp_path):
     assert hashes(fan, "blind") == hashes(told[0], "ideal")
     for part, blind in hashes(care, "blind").items():
         assert blind != hashes(told[1], "ideal")[part], part
-    assert [row.world for row in example.as_measured(fan).rows] == [w.number for w in worlds]
+
+    # What was played is read back, and told as it is.
+    table = tmp_path / "plays.csv"
+    example.write_plays(table, [fan, care])
+    assert example.read_plays(table, told) == [fan, care]
+    own = [cut(one, played) for one in told]
+    score = own[1].score().mean
+    dark = care.score("blind")
+    cells = example.table(own[::-1], [care, fan])[2].split(" | ")
+    assert cells[:3] == ["| care", f"{score:.1f}", "{:.1f} [{:.1f}, {:.1f}]".format(*dark)]
+    assert cells[3].startswith(f"{score - dark.mean:.1f} [")
+    # The last is `fan`, over which the leads are told.
+    assert cells[4].startswith(f"{dark.mean - fan.score('blind').mean:.1f} [")
+    with pytest.raises(SystemExit, match="has no plays of place"):
+        example.read_plays(table, [read_result(ROOT / "results/leaderboard/place.json")])
+
+
+def cut(result, played):
+    """What an entry reached in some worlds."""
+    return replace(result, rows=tuple(r for r in result.rows if (r.part, r.world) in played))
+
+
+def test_the_blind_camera_misses_everything():
+    entry = read_result(ROOT / "results/leaderboard/care.json").entry
+    tasks = tasks_of(entry, published_worlds(), ["blind"])
+    assert len(tasks) == 240
+    assert {task.config.false_negative_rate for task in tasks} == {1.0}
+
+
+def test_what_a_blind_camera_leaves_stands_in_its_page(capsys):
+    page = (ROOT / "results" / "benchmark.md").read_text()
+    (names,) = re.findall(r"leaderboard/{([^}]*)}", page.replace("\\\n", ""))
+    files = [ROOT / f"results/leaderboard/{name}.json" for name in names.split(",")]
+    example = loaded(ROOT / "docs" / "examples" / "blind_camera.py")
+    example.main([ROOT / "results" / "blind-camera" / "plays.csv", *files])
+    assert capsys.readouterr().out in page
 
 
 @pytest.mark.parametrize(

@@ -90,6 +90,21 @@ def test_environments_weigh_alike_whatever_their_returns_are(tmp_path):
     assert own.get_ydata()[np.searchsorted(own.get_xdata(), -30)] == 0.75
 
 
+def test_panels_of_one_unit_have_one_scale(tmp_path):
+    recipes = (PpoConfig(**VARIED), PpoConfig(**VARIED, without=("tracks",)), PpoConfig())
+    low, high = (
+        varied(tmp_path / "0", recipes[0], [(-3, -3)]),
+        varied(tmp_path / "1", recipes[1], [(0.9, 0.9)]),
+    )
+    groups = grouped_runs(map(read_run, (low, high, folder(tmp_path / "2", recipes[2]))))
+    scores, others, metres = curves_figure(groups).axes[:3]
+    assert scores.get_ylim() == others.get_ylim() != metres.get_ylim()
+    assert scores.get_ylim()[0] < -3
+    places = [{text.get_text(): text.xy[1] for text in axes.texts} for axes in (scores, others)]
+    assert places[0]["care"] == places[1]["care"]
+    assert places[0]["ppo"] < places[0]["random"] < places[1]["ppo"] < places[1]["full"]
+
+
 def test_an_environment_that_tells_nothing_is_left_out(tmp_path):
     path = varied(tmp_path / "0", PpoConfig(**VARIED), [(0.4, 0.8)])
     rows = [

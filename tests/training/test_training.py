@@ -24,6 +24,7 @@ from care_sim.training.config import PpoConfig, SacConfig
 from care_sim.training.environments import plain, training
 from care_sim.training.episodes import read_episodes
 from care_sim.training.folder import Folder
+from care_sim.training.run import RULES, played_rules
 from care_sim.training.seeds import validation_seeds
 from care_sim.training.validation import ValidationScore, play, rule
 
@@ -98,21 +99,22 @@ def test_it_trains_keeps_and_goes_on(capsys, tmp_path):
     assert lines[0] == (
         "but, by options: steps 128, environments 2, rollout 32, batch 32, epochs 1, hidden 4"
     )
-    assert [line.partition(":")[0] for line in lines[1:8]] == [
-        "random", "history", "care", "full", "0 steps", "64 steps", "128 steps",
+    scored, lines = lines[1 : 4 + len(RULES)], lines[4 + len(RULES) :]
+    assert [line.partition(":")[0] for line in scored] == [
+        *RULES, "0 steps", "64 steps", "128 steps",
     ]  # fmt: skip
-    assert "environment steps per second inside ppo" in lines[8]
+    assert "environment steps per second inside ppo" in lines[0]
     steps, value = re.match(
-        r"best after (\d+) steps: return (\S+) on 2 validation episodes; random .*, full ", lines[9]
+        r"best after (\d+) steps: return (\S+) on 2 validation episodes; random .*, full ", lines[1]
     ).groups()
     curve = {
         row["steps"]: float(row["return"]) for row in csv.DictReader((out / "curve.csv").open())
     }
     assert max(curve, key=curve.get) == steps
     assert float(value) == pytest.approx(curve[steps], abs=0.005)
-    assert lines[10] == f"kept: the weights of that step, {out / 'weights.npz'}"
+    assert lines[2] == f"kept: the weights of that step, {out / 'weights.npz'}"
     assert load_weights(out / "weights.npz").card.steps == int(steps)
-    play, beside = (line.partition(": ")[2] for line in lines[11:])
+    play, beside = (line.partition(": ")[2] for line in lines[3:])
     assert play == f"care-sim enjoy {out}"
     # It goes as it is told, and learns of the parameters of the training.
     assert beside == (
@@ -136,12 +138,7 @@ def test_it_trains_keeps_and_goes_on(capsys, tmp_path):
     seconds = [float(row["seconds"]) for row in rows]
     assert seconds == sorted(seconds)
 
-    assert list(json.loads((out / "rules.json").read_text())) == [
-        "random",
-        "history",
-        "care",
-        "full",
-    ]
+    assert list(json.loads((out / "rules.json").read_text())) == list(RULES)
     weights = load_weights(out / "weights.npz")
     assert "out" not in weights.card.result["config"]
     best = max(float(row["return"]) for row in rows)
@@ -163,6 +160,15 @@ def test_it_trains_keeps_and_goes_on(capsys, tmp_path):
         code, _, complaint = care(capsys, *command, "--steps", "256", "--resume", *changed)
         assert (code, complaint.count("\n")) == (2, 1)
         assert message in complaint
+
+
+def test_a_rule_that_does_not_fit_is_told_and_left_out(capsys):
+    """A map is one of the default grid."""
+    given = ("sensor=os1-64", "duration_s=0.2")
+    config = PpoConfig(budget=(0.03,), episodes=1, env_parameters=given)
+    assert {*RULES} - {*played_rules(config)} == {"place"}
+    (line,) = capsys.readouterr().out.splitlines()
+    assert line.startswith("place does not fit and is not beside it: ")
 
 
 @pytest.mark.usefixtures("libraries")
@@ -210,7 +216,7 @@ def test_it_learns_in_drawn_episodes_and_goes_on(capsys, tmp_path):
 
     rows = read_episodes(out)
     played = Counter((row.policy, row.steps) for row in rows)
-    policies = [(rule, 0) for rule in ("random", "history", "care", "full")]
+    policies = [(rule, 0) for rule in RULES]
     assert played == dict.fromkeys(
         [*policies, ("learner", 0), ("learner", 64), ("learner", 128)], 6
     )

@@ -1,5 +1,6 @@
 """Which environments can be played as arrays."""
 
+from care_sim.core.conditions import IDEAL_CAMERA
 from care_sim.core.grid import AngularGrid
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.envs.scenarios import CutInEnv, DartoutEnv, DenseEnv, R157Env, ScenarioEnv
@@ -41,7 +42,7 @@ def why_separate(env: ClosedLoopEnv) -> str | None:
             or conditions.ego_position_sigma_m
             or conditions.ego_yaw_sigma_deg
         ),
-        "the camera": conditions.camera_profile != "ideal"
+        "the camera": conditions.camera_profile != IDEAL_CAMERA
         or bool(
             conditions.false_positive_rate
             or conditions.camera_latency_s

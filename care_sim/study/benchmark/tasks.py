@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.plugins import is_place
 from care_sim.core.cell_order import AS_DEMANDED
+from care_sim.core.conditions import YOLOX_CAMERA
 from care_sim.sources.scenes import Scene, Streets
 from care_sim.streets.street import street_name
 from care_sim.study.benchmark.worlds import DRIVES, STREETS, TESTS, World
@@ -20,7 +21,10 @@ BENCHMARK_BUDGET = 0.01
 """Share of the cells: 164 of 16,384. With 2 and 3% a map without a camera is nearly as good in the
 closed loop (`results/validate-drive`, `results/validate-ncap`)."""
 MEASURED, IDEAL = CAMERAS = ("measured", "ideal")
-_YOLOX = {"camera_profile": "yolox"}
+BLIND = "blind"
+"""A camera that misses everything and makes no false box: no part of the suite, it tells how much
+of a score is the camera's."""
+_YOLOX = {"camera_profile": YOLOX_CAMERA}
 _LATE = {"camera_latency_s": 0.12}
 """The paper's evidence is 0.11 to 0.14 s old on average."""
 _PACKAGED = re.compile(r"\w[\w.-]*")
@@ -93,6 +97,8 @@ def camera_conditions(part: str, camera: str) -> dict[str, Any]:
     """The camera as conditions. A film has a picture every 0.5 s and none that is 0.12 s old, so
     that on streets the measured camera is not late.
     """
+    if camera == BLIND:
+        return {"false_negative_rate": 1.0}
     if camera == IDEAL:
         return {}
     return _YOLOX if part == STREETS else _YOLOX | _LATE

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from care_sim.base.errors import InvalidInput
 from care_sim.base.seed_ranges import split_of
+from care_sim.core.conditions import YOLOX_CAMERA
 from care_sim.core.firing.listing import CELLS, HARDWARE, settled
 from care_sim.scenarios.ncap.table import TESTS
 from care_sim.sources.scenes import Scene, Source
@@ -19,7 +20,7 @@ from care_sim.study.run_config import FULL
 
 IDEAL = Variant("ideal")
 """The conditions of the headline tables, with which every other one is compared."""
-_YOLOX = {"camera_profile": "yolox"}
+_YOLOX = {"camera_profile": YOLOX_CAMERA}
 # The age is the mean of the paper's vehicle, 0.11 to 0.14 s. The closed loop has a picture of that
 # instant, a film none between its keyframes, 0.5 s apart: there the newest or the one before.
 LATE_CAMERA = Variant("yolox camera, 0.12 s late", _YOLOX | {"camera_latency_s": 0.12})
