@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from os import PathLike
 from pathlib import Path
 from typing import Any, TypeVar
-from zipfile import ZipInfo
+from zipfile import ZipInfo, is_zipfile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,6 +56,7 @@ def read_arrays(
     """
     check_path("a file of weights", path)
     try:
+        _check_archive(Path(path))
         with np.load(path, allow_pickle=False) as file:
             _check_contents(file.zip.infolist())
             entries = {name: file[name] for name in file.files}
@@ -72,6 +73,17 @@ def read_arrays(
         raise InvalidInput(
             f"weights {path}: no .npz of weights of {command}, or damaged ({reason})"
         ) from error
+
+
+def _check_archive(path: Path) -> None:
+    """Raise ValueError for what is there and no archive. NumPy would wait for a pipe, and take
+    anything else for an array or pickled objects.
+    """
+    if path.exists():
+        if not path.is_file():
+            raise ValueError("it is no file")
+        if not is_zipfile(path):
+            raise ValueError("it is no whole archive")
 
 
 def _check_contents(entries: list[ZipInfo]) -> None:

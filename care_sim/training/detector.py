@@ -31,6 +31,7 @@ from care_sim.study.executors import Processes, processes
 from care_sim.study.progress import Show, rounded_duration, shown_progress
 from care_sim.study.provenance import machine_line, package_versions
 from care_sim.study.runner import DIED
+from care_sim.training.closing import how_to_play
 from care_sim.training.detector_data import Example, play, within_plan
 from care_sim.training.detector_score import PLAIN, calibration_of, judged, scores_by_scan
 from care_sim.training.detector_targets import Targets, loss, targets_of
@@ -124,6 +125,8 @@ class TrainDetector:
         self._save(network, curve, self.steps, calibration, result)
         told = ", ".join(f"{name} {value:.3f}" for name, value in result.items())
         print(f"{self.out}: {told}; {time.perf_counter() - started:.0f} s")
+        file = f"file={self.out}"
+        print(how_to_play("run", "street", "--detector", "pillars", "--detector-parameters", file))
         return 0
 
     def _save(

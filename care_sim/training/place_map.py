@@ -21,6 +21,7 @@ from care_sim.sensors.setups import DEFAULT_SETUP, sensor_setup
 from care_sim.sources.street_films import street_film
 from care_sim.streets.street import CALIBRATION_SEEDS
 from care_sim.study.provenance import machine_line, package_versions
+from care_sim.training.closing import how_to_play
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,7 @@ class TrainPlace:
             found += first_returns(street_film(seed))
         save_weights(self.out, {"sightings": sighting_map(found, grid)}, _card(grid, len(found)))
         print(f"{self.out}: {len(found)} first sightings")
+        print(how_to_play("enjoy", self.out))
         return 0
 
 

@@ -28,6 +28,7 @@ from care_sim.policies.learned.weights import Card, save_weights
 from care_sim.sensors.setups import DEFAULT_SETUP, sensor_setup
 from care_sim.streets.street import CALIBRATION_SEEDS
 from care_sim.study.provenance import machine_line, package_versions
+from care_sim.training.closing import how_to_play
 from care_sim.training.scorer_data import OTHER_CELLS, SCORER_BUDGETS, Examples, balanced, examples
 
 HIDDEN_UNITS = 16
@@ -68,6 +69,7 @@ class TrainScorer:
         save_weights(self.out, arrays, _card(self, learned, losses))
         told = ", ".join(f"{name} {loss:.4f}" for name, loss in losses.items())
         print(f"{self.out}: loss {told}; {time.perf_counter() - started:.0f} s")
+        print(how_to_play("enjoy", self.out))
         return 0
 
 

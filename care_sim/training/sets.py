@@ -25,6 +25,7 @@ from care_sim.policies.learned.set_items import ItemReader
 from care_sim.policies.learned.weights import Card, save_weights
 from care_sim.sensors.setups import DEFAULT_SETUP, sensor_setup
 from care_sim.study.provenance import machine_line, package_versions
+from care_sim.training.closing import how_to_play
 from care_sim.training.set_ablations import Part
 from care_sim.training.sets_data import Example, play
 from care_sim.training.sets_network import learn, losses_of
@@ -91,6 +92,7 @@ class TrainSets:
         save_weights(self.out, arrays, _card(self, examples, ROUNDS, losses))
         told = ", ".join(f"{name} {loss:.4f}" for name, loss in losses.items())
         print(f"{self.out}: {told}; {time.perf_counter() - started:.0f} s")
+        print(how_to_play("enjoy", self.out))
         return 0
 
 

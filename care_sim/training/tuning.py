@@ -23,6 +23,7 @@ from typing import Any
 from care_sim.base.errors import InvalidInput, MissingExtra, one_line
 from care_sim.base.files import write_text
 from care_sim.training.config import AgentConfig
+from care_sim.training.environments import wrapped
 from care_sim.training.episodes import LEARNER, read_episodes, write_episodes
 from care_sim.training.folder import CONFIG, CURVE, RULES, read_curve
 from care_sim.training.hyperparameters import as_table, names_of, table_of
@@ -59,6 +60,8 @@ def tune(config: AgentConfig, trials: int, train: Train) -> Path:
     ask for, and where no trial could be completed; MissingExtra without Optuna.
     """
     optuna = _import_optuna()
+    # What no trial could play is told before there is a study.
+    wrapped(config).close()
     study = _opened(optuna, config)
     while len(_done(optuna, study)) < trials:
         trial = _begun(optuna, study) or study.ask()

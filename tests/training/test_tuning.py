@@ -184,6 +184,12 @@ def test_what_is_wrong_with_a_run_ends_the_study(config):
         tune(config, 3, train)
 
 
+def test_what_no_trial_could_play_leaves_no_study(config):
+    with pytest.raises(InvalidInput, match="budget"):
+        tune(replace(config, budget=(0.0,)), 1, Learner())
+    assert not config.out.exists()
+
+
 def test_a_learner_tries_what_it_has(tmp_path):
     assert [*spaces_of(SacConfig(out=tmp_path))] == ["learning_rate", "discount", "batch"]
 

@@ -1,10 +1,10 @@
 """What the end of a training tells: which step was kept, what it reached, and how it is played."""
 
-import shlex
 from collections.abc import Iterator
 
 from care_sim.commands.shared.agent_play import AgentPlay
 from care_sim.training.agents import Agent
+from care_sim.training.closing import how_to_play
 from care_sim.training.config import AgentConfig
 from care_sim.training.folder import CHECKPOINT, CURVE, RULES, WEIGHTS, read_curve, read_rules
 
@@ -25,5 +25,5 @@ def end_of_training(config: AgentConfig) -> Iterator[str]:
         yield f"kept: the learner of the last step, {out / CHECKPOINT}; --resume goes on with it"
         return
     yield f"kept: the weights of that step, {out / WEIGHTS}"
-    yield f"play it: {shlex.join(['care-sim', 'enjoy', str(out)])}"
+    yield how_to_play("enjoy", out)
     yield f"beside care: {AgentPlay(Agent.of_run(config, out / WEIGHTS)).study_line()}"

@@ -3,6 +3,7 @@ line.
 """
 
 import json
+import os
 import pickle
 from dataclasses import replace
 from pathlib import Path
@@ -263,6 +264,7 @@ def one_array(path: Path) -> None:
         lambda path: path.write_bytes(b""),
         lambda path: path.write_bytes(pickle.dumps(print)),
         lambda path: path.mkdir(),
+        os.mkfifo,
         one_array,
         pickled,
         without_card,
@@ -298,6 +300,21 @@ def test_anything_else_is_refused_in_one_line(tmp_path, spoil):
     ) as refusal:
         load_weights(path)
     assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "reason"),
+    [
+        (lambda path: path.write_text("hello"), "it is no whole archive"),
+        (one_array, "it is no whole archive"),
+        (cut, "it is no whole archive"),
+        (os.mkfifo, "it is no file"),
+    ],
+)
+def test_what_is_no_archive_is_called_so(tmp_path, spoil, reason):
+    spoil(tmp_path / "w.npz")
+    with pytest.raises(InvalidInput, match=rf"\({reason}\)$"):
+        load_weights(tmp_path / "w.npz")
 
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")
