@@ -1,5 +1,6 @@
 """The drivers by name."""
 
+from collections.abc import Callable
 from typing import Protocol
 
 from care_sim.base.errors import InvalidInput
@@ -23,7 +24,10 @@ class Driver(Protocol):
         ...
 
 
-_KINDS = {FIXED: BrakingController, CAREFUL_HUMAN: CarefulHuman}
+_KINDS: dict[str, Callable[..., Driver]] = {
+    FIXED: BrakingController,
+    CAREFUL_HUMAN: CarefulHuman,
+}
 
 
 def check_driver(settings: DriverSettings) -> None:
