@@ -8,6 +8,7 @@ import shlex
 import pytest
 
 from care_sim import cli
+from care_sim.study.benchmark.result_file import read_result
 from tests.helpers.pages import RESULTS, links
 from tests.helpers.places import ROOT
 
@@ -65,3 +66,30 @@ def test_a_page_asks_answers_and_says_what_does_not_hold(page):
 def test_the_index_and_the_site_lead_to_every_page(page):
     assert page.name in links(INDEX)
     assert f": results/{page.name}\n" in (ROOT / ".mkdocs.yml").read_text()
+
+
+ENTRIES = {
+    "history": "history",
+    "CARE": "care",
+    "map": "place",
+    "CARE, middle first": "care-core-spread",
+    "learned-sets": "learned-sets",
+    "care-sector": "care-sector",
+}
+"""The columns of the headline, and their files on the leaderboard."""
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/index.md"])
+def test_the_headline_is_the_score_of_the_suite(page):
+    scores = [read_result(FOLDER / f"leaderboard/{name}.json").score() for name in ENTRIES.values()]
+    head = f"| {' | '.join(ENTRIES)} |"
+    below = (ROOT / page).read_text().partition(head)[2]
+    assert below.splitlines()[2] == f"| {' | '.join(f'{score.mean:.0f}' for score in scores)} |"
+
+
+def test_every_entry_of_the_leaderboard_stands_on_its_page_as_it_scores():
+    page = (FOLDER / "benchmark.md").read_text()
+    entries = [read_result(file) for file in (FOLDER / "leaderboard").glob("*.json")]
+    assert len(entries) > 10
+    for score in (one.score() for one in entries if one.entry.policy != "full"):
+        assert "{:.1f} [{:.1f}, {:.1f}]".format(*score) in page
