@@ -134,6 +134,15 @@ def test_a_detector_runs_on_a_sweep_in_one_file(tmp_path, monkeypatch, capsys):
     assert (tmp_path / "out.png").stat().st_size > 10_000
 
 
+def test_other_ways_through_the_network_of_pillars_answer_alike():
+    pytest.importorskip("torch")
+    example = loaded(ROOT / "docs" / "examples" / "pillars_in_numpy.py")
+    told = {name: made[0] for name, (made, _) in example.answers_and_times(1).items()}
+    assert np.abs(told["PyTorch"]).max() > 1
+    np.testing.assert_allclose(told["NumPy"], told["PyTorch"], atol=1e-4)
+    np.testing.assert_allclose(told["numba"], told["PyTorch"], atol=1e-4)
+
+
 def test_a_blind_camera_takes_nothing_from_who_asks_none(tmp_path):
     example = loaded(ROOT / "docs" / "examples" / "blind_camera.py")
     worlds = [next(world for world in published_worlds() if world.part == part) for part in PARTS]
