@@ -153,12 +153,10 @@ def _name_lines(axes: Axes, runs: Sequence[TrainingRun]) -> None:
     heights = _heights(runs) | {runs[0].config["algorithm"]: last}
     colours = _colours([*heights])
     low, high = axes.get_ylim()
-    # A line of text is about 5.5% of the axis high. From the lowest up, each name stands at least
-    # that far above the one before.
-    least = (high - low) * 0.055
-    place = -np.inf
-    for name, height in sorted(heights.items(), key=lambda pair: pair[1]):
-        place = max(height, place + least)
+    ordered = sorted(heights, key=lambda name: heights[name])
+    # A line of text is about 5.5% of the axis high.
+    places = apart([heights[name] for name in ordered], (high - low) * 0.055, high)
+    for name, place in zip(ordered, places, strict=True):
         axes.annotate(
             name,
             (1.0, place),
@@ -170,3 +168,16 @@ def _name_lines(axes: Axes, runs: Sequence[TrainingRun]) -> None:
             color=colours[name],
             annotation_clip=False,
         )
+
+
+def apart(heights: Sequence[float], least: float, top: float) -> list[float]:
+    """Ascending heights, moved so that each stands at least `least` above the one before and none
+    above `top`.
+    """
+    places: list[float] = []
+    for height in heights:
+        places.append(max([height, *(below + least for below in places[-1:])]))
+    # What was moved up beyond the top moves down again, and takes those below it along.
+    for n in reversed(range(len(places))):
+        places[n] = min(places[n], places[n + 1] - least if n + 1 < len(places) else top)
+    return places

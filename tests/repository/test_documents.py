@@ -207,10 +207,10 @@ def test_without_result_files_the_blind_camera_says_so(files, line):
 
 
 def test_what_training_seeds_tell_stands_in_its_page(capsys):
-    loaded(ROOT / "docs" / "examples" / "deal_seeds.py").main()
-    page = (ROOT / "results" / "learned-allocators.md").read_text()
+    loaded(ROOT / "docs" / "examples" / "training_seeds.py").main()
+    page = (ROOT / "results" / "worlds-that-vary.md").read_text()
     tables = capsys.readouterr().out.strip().split("\n\n")
-    assert len(tables) == 2
+    assert len(tables) == 5
     assert all(table in page for table in tables)
 
 
