@@ -5,10 +5,16 @@ question, which begins with the answer.
 import re
 import shlex
 
+import numpy as np
 import pytest
 
 from care_sim import cli
+from care_sim.base.seed_ranges import TRAINING
+from care_sim.loops.seeds import EpisodeSeeds
+from care_sim.scenarios import make_scenario
 from care_sim.study.benchmark.result_file import read_result
+from care_sim.study.benchmark.worlds import TESTS, published_worlds
+from care_sim.training.sets import ROUNDS
 from tests.helpers.pages import RESULTS, links
 from tests.helpers.places import ROOT
 
@@ -66,6 +72,23 @@ def test_a_page_asks_answers_and_says_what_does_not_hold(page):
 def test_the_index_and_the_site_lead_to_every_page(page):
     assert page.name in links(INDEX)
     assert f": results/{page.name}\n" in (ROOT / ".mkdocs.yml").read_text()
+
+
+def test_how_many_tests_of_the_suite_are_of_a_kind_that_training_met():
+    """Tests and speeds are few; what else a seed draws differs."""
+    scenario = make_scenario("ncap", test="drawn", speed_kph=0)
+
+    def kind(seed):
+        drawn = scenario.drawn(np.random.default_rng(EpisodeSeeds.of(seed).scenario))
+        return drawn.test, drawn.speed_kph, drawn.target_kph
+
+    # The tests of both rounds of `care_sim.training.sets`.
+    count = sum(worlds["ncap"] for worlds in ROUNDS)
+    met = {kind(TRAINING + number) for number in range(count)}
+    kinds = [kind(world.seed) for world in published_worlds() if world.part == TESTS]
+    told = "the 120 have {} pairs of a test and speeds, and {} of the 120 have one that"
+    page = " ".join((FOLDER / "benchmark.md").read_text().split())
+    assert told.format(len({*kinds}), sum(one in met for one in kinds)) in page
 
 
 ENTRIES = {
