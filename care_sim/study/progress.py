@@ -10,6 +10,7 @@ from datetime import timedelta
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
+from care_sim.base.errors import report_problems
 from care_sim.study.executors import ExecutorFactory
 from care_sim.study.journal import Journal
 from care_sim.study.remaining_time import RemainingTime
@@ -76,6 +77,7 @@ class ProgressReporter(RunListener):
         self._workers = 0
         self._end = math.nan
         self._predicted_s = math.nan
+        self._any_failed = False
 
     def playing(self, workers: int) -> None:
         """Show what is left with so many workers."""
@@ -95,6 +97,13 @@ class ProgressReporter(RunListener):
         ):
             self._predicted_s = self._end - self._started
         self._tell()
+
+    def failed(self, failure: Failure) -> None:
+        """Tell the first failure at once: who made a mistake need not wait for all the others."""
+        if not self._any_failed and self._remaining.waiting:
+            with suppress(OSError):
+                report_problems([f"failed: {failure}; the others go on, Ctrl-C stops"])
+        self._any_failed = True
 
     def interrupted(self) -> None:
         """Say why it takes a moment."""

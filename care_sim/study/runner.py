@@ -49,6 +49,9 @@ class RunListener:
     def finished(self, config: RunConfig, row: Row | None) -> None:
         """A task has ended; None when it failed."""
 
+    def failed(self, failure: Failure) -> None:
+        """A task has ended without a row, and why; told after `finished`."""
+
     def interrupted(self) -> None:
         """Somebody wants to stop: what is played now is finished first."""
 
@@ -205,6 +208,7 @@ class _Run:
         for config in batch:
             self.failures.append(Failure(config, reason))
             self._listener.finished(config, None)
+            self._listener.failed(self.failures[-1])
 
     def _submit(self, executor: Executor, batch: Batch) -> Future[list[Row | str]]:
         """Hand a batch over.

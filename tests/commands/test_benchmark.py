@@ -128,9 +128,12 @@ def test_one_that_throws_is_named_and_the_other_has_its_file(capsys, here, monke
     assert [path.name for path in (here / "runs" / "benchmark").glob("*.json")] == [
         "history.quick.json"
     ]
-    (line,) = [line for line in err.splitlines() if "failed" in line]
-    assert "thrower:Throwing" in line
-    assert "RuntimeError: no idea (thrower.py, line 6)" in line
+    at_once, at_the_end = [line for line in err.splitlines() if "failed" in line]
+    assert at_once.endswith("; the others go on, Ctrl-C stops")
+    assert err.index(at_once) < err.index(" took ") < err.index(at_the_end)
+    for line in (at_once, at_the_end):
+        assert "thrower:Throwing" in line
+        assert "RuntimeError: no idea (thrower.py, line 6)" in line
     assert "Throwing" not in out
 
 

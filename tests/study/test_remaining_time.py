@@ -9,6 +9,7 @@ import pytest
 from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.progress import ProgressLines, ProgressReporter, rounded_duration
 from care_sim.study.remaining_time import RemainingTime
+from care_sim.study.runner import Failure
 
 POLICIES = ["history", "all-camera", "care", "care-sbf", "random", "full"]
 SEEDS = 20
@@ -165,6 +166,30 @@ def test_an_episode_that_fails_is_counted_and_takes_no_time():
     reporter.finished(configs[0], None)
     assert shown[-1] == (1, "0 s left")
     assert reporter.summary("episodes") == "3 episodes took 0:00:00"
+
+
+def test_the_first_failure_is_told_at_once_and_no_other_before_the_end(capsys):
+    configs = [EpisodeConfig("dartout", "care", seed=seed) for seed in range(3)]
+    reporter = ProgressReporter(RemainingTime(configs), lambda _done, _left: None, 3, Clock())
+    told = []
+    for config in configs:
+        reporter.finished(config, None)
+        reporter.failed(Failure(config, "RuntimeError: no idea (mine.py, line 6)"))
+        told.append(capsys.readouterr().err)
+    assert told == [
+        f"care-sim: failed: {configs[0].label}: RuntimeError: no idea (mine.py, line 6); the "
+        "others go on, Ctrl-C stops\n",
+        "",
+        "",
+    ]
+
+
+def test_of_a_single_task_there_are_no_others_that_go_on(capsys):
+    config = EpisodeConfig("dartout", "care")
+    reporter = ProgressReporter(RemainingTime([config]), lambda _done, _left: None, 1, Clock())
+    reporter.finished(config, None)
+    reporter.failed(Failure(config, "no idea"))
+    assert capsys.readouterr().err == ""
 
 
 @pytest.mark.parametrize(
