@@ -8,8 +8,8 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import care_sim
-from care_sim.base.errors import InvalidInput, MissingExtra
-from care_sim.base.extras import import_torch
+from care_sim.base.errors import InvalidInput
+from care_sim.base.extras import import_torch, missing_extra
 from care_sim.envs.sensing import sensing
 from care_sim.study.progress import ProgressLines, Show, progress_bar
 from care_sim.training import algorithms
@@ -203,9 +203,7 @@ def _check_tensorboard(config: AgentConfig) -> None:
         try:
             import tensorboard  # noqa: F401
         except ImportError as error:
-            raise MissingExtra(
-                f"--tensorboard needs the extra 'rl': pip install 'care-sim[rl]' ({error})"
-            ) from error
+            raise missing_extra("--tensorboard", "rl", error) from error
 
 
 def _say(line: str) -> None:
