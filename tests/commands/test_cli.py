@@ -142,10 +142,11 @@ def test_alone_it_shows_every_command_in_its_group_in_a_line_of_eighty_columns(c
         ("train ppo --learning 3", "perhaps --learning-rate"),
         (
             "run dense --policy kare",
-            "; the nearest is care; `care-sim policies` tells what",
+            "unknown policy 'kare'; the nearest is care; known: all-camera, ",
         ),
-        ("run dens", "the nearest is dense; `care-sim scenarios` tells what each is"),
-        ("polices", "the nearest is policies; `care-sim` tells what each is"),
+        ("run dens", "unknown scenario 'dens'; the nearest is dense; known: "),
+        ("run moon", "; `care-sim scenarios` tells what each is"),
+        ("polices", "unknown command 'polices'; the nearest is policies; known: "),
     ],
 )
 def test_who_is_lost_is_told_a_way_on(arguments, told, capsys):

@@ -276,7 +276,10 @@ def test_the_other_learners_by_name(capsys, tmp_path, name):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--env", "CARE-Moon-v0"], "unknown environment 'CARE-Moon-v0'; known: CARE-CutIn-v0"),
+        (
+            ["--env", "CARE-Moon-v0"],
+            "unknown environment 'CARE-Moon-v0'; the nearest is CARE-Dense-v0; known: ",
+        ),
         (["--azimuths", "24"], "azimuths must divide columns, got 24 and 64"),
         (["--azimuths", "3", "--columns", "3"], "azimuths must divide the 512 of the grid"),
         (["--budget", "2"], "budget must lie in (0, 1]"),
