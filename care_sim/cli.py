@@ -215,7 +215,7 @@ def parsed_command(arguments: Sequence[str]) -> Callable[[], int]:
     except InvalidInput as error:
         asked = commands.get(arguments[0]) if arguments else None
         options = option_helps(asked) if isinstance(asked, type) else {}
-        raise InvalidInput(f"{error}{ways_on(str(error), options)}") from None
+        raise InvalidInput(f"{error}{ways_on(str(error), options, named)}") from None
 
 
 def _overview() -> str:

@@ -42,15 +42,17 @@ class MissingExtra(ImportError):
     """An optional dependency that is not installed; the message names the extra to install."""
 
 
-def unknown(kind: str, name: object, known: Iterable[str]) -> InvalidInput:
-    """The error for a name that is not among the known ones: it tells them all, the nearest, and
-    the command that says what each is.
+def unknown(kind: str, name: object, known: Iterable[str], hint: str = "") -> InvalidInput:
+    """The error for a name that is not among the known ones: it tells a `hint` and the nearest
+    first, then all of them, and the command that says what each is.
     """
     names = sorted(known)
     told = [f"unknown {kind} {shown(name if isinstance(name, str) else shown(name))}"]
-    told.append(f"known: {_listed(names)}")
+    if hint:
+        told.append(hint)
     if isinstance(name, str) and (nearest := get_close_matches(name, names, 1)):
         told.append(f"the nearest is {nearest[0]}")
+    told.append(f"known: {_listed(names)}")
     if kind in _LISTINGS:
         told.append(f"`{_LISTINGS[kind]}` tells what each is")
     return InvalidInput("; ".join(told))

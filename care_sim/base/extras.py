@@ -17,15 +17,26 @@ OPEN3D_PACKAGES = "libusb-1.0-0 libegl1 libgl1 libx11-6 libudev1 libidn2-0"
 STANDARD_OUTPUT, STANDARD_ERROR = 1, 2
 
 
+def missing_extra(what: str, extra: str, error: ImportError | None = None) -> MissingExtra:
+    """The error for what a user knows as `what` and an `extra` would bring. CARE-Sim is on no
+    registry, so that extras come from its clone.
+    """
+    told = f"{what} needs the extra '{extra}': {install_command(extra)} in the clone"
+    return MissingExtra(f"{told} ({error})" if error else told)
+
+
+def install_command(extra: str) -> str:
+    """The documented command that brings an extra."""
+    return f"pip install -c constraints.txt -e '.[{extra}]'"
+
+
 def import_open3d() -> ModuleType:
     """Open3D. Raises MissingExtra with the extra, or the Debian packages, to install."""
     _load_libusb()
     try:
         import open3d
     except ModuleNotFoundError as error:
-        raise MissingExtra(
-            f"Open3D needs the extra 'open3d': pip install 'care-sim[open3d]' ({error})"
-        ) from error
+        raise missing_extra("Open3D", "open3d", error) from error
     except (ImportError, OSError) as error:
         raise MissingExtra(
             f"Open3D lacks a system library: apt-get install {OPEN3D_PACKAGES} ({error})"
@@ -84,9 +95,7 @@ def _import(module: str, name: str, extra: str) -> ModuleType:
     try:
         return import_module(module)
     except ImportError as error:
-        raise MissingExtra(
-            f"{name} needs the extra '{extra}': pip install 'care-sim[{extra}]' ({error})"
-        ) from error
+        raise missing_extra(name, extra, error) from error
 
 
 def _load_libusb() -> None:

@@ -16,10 +16,10 @@ import sys
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from dataclasses import MISSING, dataclass, fields
 from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from care_sim.base.checks import check_known
-from care_sim.base.errors import InvalidInput, error_line
+from care_sim.base.errors import InvalidInput, error_line, unknown
 
 Made = TypeVar("Made")
 _PLACE = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*(\.[^\W\d]\w*)*")
@@ -58,7 +58,17 @@ class Plugins(Generic[Made]):
             )
         # Installed packages are searched only for a name that is not built in.
         if not (isinstance(name, str) and (name in self.built_in or is_place(name))):
-            check_known(self.kind, name, self.names())
+            names = self.names()
+            if name not in names:
+                raise unknown(self.kind, name, names, self._in_a_file(name))
+
+    def _in_a_file(self, name: object) -> str:
+        """How to ask for what a file here holds, where a name is that of a file; else empty."""
+        stem = name.removesuffix(".py") if isinstance(name, str) else ""
+        place = f"{stem}:{stem.title().replace('_', '')}"
+        if not (is_place(place) and Path(f"{stem}.py").is_file()):
+            return ""
+        return f"a {self.kind} in a file is MODULE:CLASS, as {place}"
 
     def maker(self, name: str) -> Callable[..., Made]:
         """What makes the thing.

@@ -1,5 +1,6 @@
 """`care-sim leaderboard`: results of the benchmark in one table, or a tenth of them again."""
 
+import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -72,7 +73,7 @@ class Leaderboard:
             kept, trials = _of_whole(found, self.quick)
             problems += trials
             if not kept:
-                raise InvalidInput("; ".join(problems))
+                raise _all_bad(problems)
             self._show(kept)
         report_problems(problems)
         return FAILED if problems else DONE
@@ -95,6 +96,14 @@ class Leaderboard:
         write_text(page, _page([table.markdown() for table in tables]))
         for table in tables:
             console().print(table.rich(page))
+        # Sealed results have a control of their own, which nobody has published.
+        if self.minus == CONTROL.name and any(
+            self.minus not in names_in(own) for own in sets.values() if own[0].sealed is None
+        ):
+            print(
+                f"no {self.minus} among these files: add results/leaderboard for leads",
+                file=sys.stderr,
+            )
         print(f"Page: {page}")
 
     def _verified(self, results: dict[Path, BenchmarkResult]) -> list[str]:
@@ -114,7 +123,7 @@ class Leaderboard:
                 problems.append(f"{path} cannot be verified: {error}")
                 continue
             if replay.holds:
-                print(f"{path}: {_drawn(replay, result)} went again as it says")
+                print(f"{path}: {_drawn(replay, result)} came out again as the file says")
             problems += [f"{path}: {problem}" for problem in _told(replay, result)]
         return problems
 
@@ -162,8 +171,14 @@ def _read(places: Sequence[Path]) -> tuple[dict[Path, BenchmarkResult], list[str
             f"no result of care-sim benchmark in {', '.join(map(str, places))}: play one with "
             "care-sim benchmark --policy NAME"
         )
-        raise InvalidInput("; ".join(problems) or none)
+        raise _all_bad(problems or [none])
     return found, problems
+
+
+def _all_bad(problems: Sequence[str]) -> InvalidInput:
+    """The error where no file is of use: the last complaint, once all others are printed."""
+    report_problems(problems[:-1])
+    return InvalidInput(problems[-1])
 
 
 def _files(places: Sequence[Path]) -> Iterator[Path]:

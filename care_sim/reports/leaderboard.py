@@ -47,11 +47,10 @@ def leaderboard_table(results: Sequence[BenchmarkResult], minus: str = CONTROL.n
         _line(each, name, numbers.get(id(each), ""), control)
         for each, name in zip(ranked, names, strict=True)
     )
-    parts = results[0].parts
-    columns = ("", "policy", "score", f"minus {minus}", *parts, "ideal camera")
-    return Table(
-        title(results), columns, rows, notes_on(results, minus), whole=("", "score"), names=2
-    )
+    leads = () if control is None else (f"minus {minus}",)
+    columns = ("", "policy", "score", *leads, *results[0].parts, "ideal camera")
+    notes = notes_on(results, minus if leads else "")
+    return Table(title(results), columns, rows, notes, whole=("", "score"), names=2)
 
 
 def names_in(results: Sequence[BenchmarkResult]) -> list[str]:
@@ -79,16 +78,17 @@ def title(results: Sequence[BenchmarkResult]) -> str:
     return f"CARE-Sim benchmark {BENCHMARK_VERSION}: {counted(worlds, 'world')}, {of}"
 
 
-def notes_on(results: Sequence[BenchmarkResult], minus: str = CONTROL.name) -> tuple[str, ...]:
-    """What the columns and marks mean."""
-    lead = _MINUS.format(minus, _OF_CONTROL if minus == CONTROL.name else minus)
+def notes_on(results: Sequence[BenchmarkResult], minus: str) -> tuple[str, ...]:
+    """What the columns and marks mean; without `minus` there are no leads."""
+    over = _OF_CONTROL if minus == CONTROL.name else minus
+    leads = (_MINUS.format(minus, over),) if minus else ()
     beyond = (_UNRANKED,) if any(map(is_beyond, results)) else ()
     trial = (_TRIAL,) if results[0].quick else ()
     codes = {*map(code_of, results)}
     several = (_CODES.format(len(codes)),) if len(codes) > 1 else ()
     tags = tag_notes(each.tags for each in results)
     # What limits the numbers comes first: a terminal has room for three lines.
-    return (*trial, *several, _SCORE, lead, _IDEAL, *beyond, *tags)
+    return (*trial, *several, _SCORE, *leads, _IDEAL, *beyond, *tags)
 
 
 def is_beyond(result: BenchmarkResult) -> bool:
@@ -103,14 +103,14 @@ def _line(
         number,
         name,
         _with_ends(result.score()),
-        _lead(result, control),
+        *(() if control is None else (_lead(result, control),)),
         *(f"{result.part_score(part):.1f}" for part in result.parts),
         f"{result.score(IDEAL).mean:.1f}",
     )
 
 
-def _lead(result: BenchmarkResult, control: BenchmarkResult | None) -> str:
-    if control is None or result is control:
+def _lead(result: BenchmarkResult, control: BenchmarkResult) -> str:
+    if result is control:
         return ""
     lead = result.lead(control)
     text = f"{lead.mean:+z.1f} {bounds(lead, 1)}"

@@ -20,7 +20,8 @@ from multiprocessing import get_context
 from multiprocessing.context import BaseContext
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
-from care_sim.base.errors import InvalidInput, MissingExtra, one_line
+from care_sim.base.errors import InvalidInput, one_line
+from care_sim.base.extras import missing_extra
 from care_sim.base.processes import end_with_parent, starting
 
 if TYPE_CHECKING:
@@ -153,9 +154,7 @@ def _connect(address: str) -> "Client":
     try:
         from dask.distributed import Client
     except ImportError as error:
-        raise MissingExtra(
-            "a cluster needs the extra 'cluster': pip install 'care-sim[cluster]'"
-        ) from error
+        raise missing_extra("a cluster", "cluster", error) from error
     # They print tracebacks of the same trouble that is told in one line below.
     for logger in ("distributed", "distributed.client"):
         logging.getLogger(logger).setLevel(logging.CRITICAL)

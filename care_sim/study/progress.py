@@ -10,6 +10,7 @@ from datetime import timedelta
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
+from care_sim.base.errors import report_problems
 from care_sim.study.executors import ExecutorFactory
 from care_sim.study.journal import Journal
 from care_sim.study.remaining_time import RemainingTime
@@ -21,6 +22,10 @@ _EARLY = 0.05
 """Share of the tasks after which the prediction is noted, and after which a line is due."""
 _FIRST_LINE_S = 10.0
 _LINE_S = 60.0
+_PATIENCE = (
+    "the first take longer on a machine that has not played before: code is compiled there, once; "
+    "what is left is told when others have ended"
+)
 
 Show = Callable[[int, str], None]
 """Shows how many tasks are done and, in words, what is left."""
@@ -58,7 +63,11 @@ def shown_progress(total: int, unit: str) -> AbstractContextManager[Show]:
 
 
 class ProgressReporter(RunListener):
-    """Shows how far a run is, and how long the rest of it should take."""
+    """Shows how far a run is, and how long the rest of it should take.
+
+    What was begun before the first task had ended tells nothing of the rest, as the first round of
+    a training does not (`care_sim.training.pace`): it may have compiled what is not compiled yet.
+    """
 
     def __init__(
         self,
@@ -76,9 +85,19 @@ class ProgressReporter(RunListener):
         self._workers = 0
         self._end = math.nan
         self._predicted_s = math.nan
+        self._predicted_after = 0
+        self._any_failed = False
+        self._compiling: set[RunConfig] = set()
+        self._patience_asked = False
+
+    def begun(self, batch: Sequence[RunConfig]) -> None:
+        """Remember what is begun before anything has ended."""
+        if self._ended == 0:
+            self._compiling.update(batch)
 
     def playing(self, workers: int) -> None:
         """Show what is left with so many workers."""
+        self._ask_for_patience()
         if workers != self._workers:
             self._workers = workers
             self._predict()
@@ -86,15 +105,21 @@ class ProgressReporter(RunListener):
 
     def finished(self, config: RunConfig, row: Row | None) -> None:
         """Learn how long a task took."""
-        self._remaining.finished(config, row["wall_s"] if row else 0.0)
+        took_s = row["wall_s"] if row else 0.0
+        self._remaining.finished(config, None if config in self._compiling else took_s)
         self._predict()
         # One prediction is noted early and kept, so that the summary can say how good it was.
-        if (
-            math.isnan(self._predicted_s)
-            and self._new - self._remaining.waiting >= _EARLY * self._new
-        ):
+        if math.isnan(self._predicted_s) and self._new > self._ended >= _EARLY * self._new:
             self._predicted_s = self._end - self._started
+            self._predicted_after = self._ended
         self._tell()
+
+    def failed(self, failure: Failure) -> None:
+        """Tell the first failure at once: who made a mistake need not wait for all the others."""
+        if not self._any_failed and self._remaining.waiting:
+            with suppress(OSError):
+                report_problems([f"failed: {failure}; the others go on, Ctrl-C stops"])
+        self._any_failed = True
 
     def interrupted(self) -> None:
         """Say why it takes a moment."""
@@ -105,8 +130,23 @@ class ProgressReporter(RunListener):
         """How long it took, and how long it should have."""
         took = f"{self._new} {unit} took {_exact(self._clock() - self._started)}"
         # Of fewer tasks than twenty, one is more than the share after which a prediction counts.
-        many = self._new >= 1 / _EARLY
-        return f"{took}; {_exact(self._predicted_s)} predicted after {_EARLY:.0%}" if many else took
+        if self._new < 1 / _EARLY or math.isnan(self._predicted_s):
+            return took
+        share = self._predicted_after / self._new
+        return f"{took}; {_exact(self._predicted_s)} predicted after {share:.0%}"
+
+    @property
+    def _ended(self) -> int:
+        """Tasks that have ended in this run."""
+        return self._new - self._remaining.waiting
+
+    def _ask_for_patience(self) -> None:
+        """Say once why nothing has ended yet."""
+        # A terminal is told by `care_sim.base.compiled`, where something is compiled.
+        waits = self._ended == 0 and self._clock() - self._started >= _FIRST_LINE_S
+        if waits and not self._patience_asked and not sys.stderr.isatty():
+            self._patience_asked = True
+            print(_PATIENCE, file=sys.stderr, flush=True)
 
     def _predict(self) -> None:
         self._end = self._clock() + self._remaining.remaining_s(self._workers)

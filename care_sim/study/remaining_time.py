@@ -29,10 +29,13 @@ class RemainingTime:
         """Tasks that have not ended."""
         return self._waiting.total()
 
-    def finished(self, task: RunConfig, seconds: float) -> None:
-        """A task has ended after so many seconds; one that failed counts as 0."""
+    def finished(self, task: RunConfig, seconds: float | None) -> None:
+        """A task has ended after so many seconds; one that failed counts as 0, and None is no
+        measure of others.
+        """
         self._waiting[task.similarity_keys] -= 1
-        self._now.add(task.similarity_keys, seconds)
+        if seconds is not None:
+            self._now.add(task.similarity_keys, seconds)
 
     def remaining_s(self, workers: int) -> float:
         """Seconds until the last task ends with so many workers; NaN while nothing is known."""

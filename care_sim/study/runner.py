@@ -46,8 +46,14 @@ class RunListener:
     def playing(self, workers: int) -> None:
         """So many workers play now; told every few seconds at least."""
 
+    def begun(self, batch: Batch) -> None:
+        """A batch is handed to a worker."""
+
     def finished(self, config: RunConfig, row: Row | None) -> None:
         """A task has ended; None when it failed."""
+
+    def failed(self, failure: Failure) -> None:
+        """A task has ended without a row, and why; told after `finished`."""
 
     def interrupted(self) -> None:
         """Somebody wants to stop: what is played now is finished first."""
@@ -205,13 +211,15 @@ class _Run:
         for config in batch:
             self.failures.append(Failure(config, reason))
             self._listener.finished(config, None)
+            self._listener.failed(self.failures[-1])
 
     def _submit(self, executor: Executor, batch: Batch) -> Future[list[Row | str]]:
-        """Hand a batch over.
+        """Hand a batch over, and tell the listener.
 
         A fork server may not answer at once on a busy machine, or be killed while it starts a
         worker. It is asked again: another one takes its place.
         """
+        self._listener.begun(batch)
         for wait_s in (0.5, 2.0):
             try:
                 return executor.submit(self._play_batch, batch)

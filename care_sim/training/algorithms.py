@@ -6,7 +6,7 @@ Both libraries are imported when a learner is trained, since their extra 'rl' is
 import math
 from typing import TYPE_CHECKING, Any
 
-from care_sim.base.errors import MissingExtra
+from care_sim.base.extras import missing_extra
 from care_sim.policies.learned.grid_features import CHANNELS
 from care_sim.training.config import AgentConfig, OnPolicy, PpoConfig, RecurrentPpoConfig, SacConfig
 
@@ -26,9 +26,7 @@ def algorithm(name: str) -> Any:
             return RecurrentPPO
         from stable_baselines3 import PPO, SAC
     except ImportError as error:
-        raise MissingExtra(
-            f"{name} needs the extra 'rl': pip install 'care-sim[rl]' ({error})"
-        ) from error
+        raise missing_extra(name, "rl", error) from error
     return {"ppo": PPO, "sac": SAC}[name]
 
 

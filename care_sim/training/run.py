@@ -8,12 +8,12 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import care_sim
-from care_sim.base.errors import InvalidInput, MissingExtra
-from care_sim.base.extras import import_torch
+from care_sim.base.errors import InvalidInput, counted
+from care_sim.base.extras import import_torch, missing_extra
 from care_sim.envs.sensing import sensing
 from care_sim.study.progress import ProgressLines, Show, progress_bar
 from care_sim.training import algorithms
-from care_sim.training.config import AgentConfig
+from care_sim.training.config import AgentConfig, OnPolicy
 from care_sim.training.environments import plain, side_by_side, validation_episodes, wrapped
 from care_sim.training.episodes import Played
 from care_sim.training.folder import Folder
@@ -61,6 +61,10 @@ def train_agent(
             else algorithms.make_learner(config, envs, sensing(env).rig.grid.goes_round)
         )
         folder.begin(model)
+        # Whatever SAC does beyond its steps is fewer than it has environments.
+        whole = config.whole_rollouts(model.num_timesteps) if isinstance(config, OnPolicy) else ""
+        if whole:
+            _say(whole)
         for name, score in folder.rules(partial(played_rules, config)).items():
             _say(f"{name}: {score}")
         _learn(config, folder, model, env, evaluated)
@@ -91,6 +95,7 @@ def played_rules(config: AgentConfig) -> dict[str, list[Played]]:
     """How the rules play the validation seeds. One that does not fit the learner's environment, as
     a map of another grid, is left out, and said so.
     """
+    _say(f"playing the rules on {counted(config.episodes, 'validation episode')}")
     played = {}
     for name, budget in RULES.items():
         with closing(plain(config, budget)) as env:
@@ -203,9 +208,7 @@ def _check_tensorboard(config: AgentConfig) -> None:
         try:
             import tensorboard  # noqa: F401
         except ImportError as error:
-            raise MissingExtra(
-                f"--tensorboard needs the extra 'rl': pip install 'care-sim[rl]' ({error})"
-            ) from error
+            raise missing_extra("--tensorboard", "rl", error) from error
 
 
 def _say(line: str) -> None:

@@ -20,7 +20,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from care_sim.base.errors import InvalidInput, MissingExtra, one_line
+from care_sim.base.errors import InvalidInput, one_line
+from care_sim.base.extras import missing_extra
 from care_sim.base.files import write_text
 from care_sim.training.config import AgentConfig
 from care_sim.training.environments import wrapped
@@ -221,9 +222,7 @@ def _import_optuna() -> Any:
     try:
         import optuna
     except ImportError as error:
-        raise MissingExtra(
-            f"--tune needs the extra 'tune': pip install 'care-sim[tune]' ({error})"
-        ) from error
+        raise missing_extra("--tune", "tune", error) from error
     return optuna
 
 

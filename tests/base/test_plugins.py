@@ -57,6 +57,30 @@ def test_what_does_not_count_is_told_with_what_does(installed):
 
 
 @pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        ("mine", "; a thing in a file is MODULE:CLASS, as mine:Mine; known: usual"),
+        ("mine.py", "; a thing in a file is MODULE:CLASS, as mine:Mine; known: usual"),
+        ("my_own", "; a thing in a file is MODULE:CLASS, as my_own:MyOwn; known: usual"),
+        ("other", "; known: usual"),
+        ("a-b", "; known: usual"),
+        (("mine",), "; known: usual"),
+        ("usal", "; the nearest is usual; known: usual"),
+    ],
+)
+def test_an_unknown_name_is_told_with_the_file_that_is_meant_and_the_nearest_first(
+    name, told, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    for file in ("mine.py", "my_own.py", "a-b.py"):
+        (tmp_path / file).touch()
+    with pytest.raises(InvalidInput) as refused:
+        THINGS.check(name)
+    _, hints = str(refused.value).split(str(name), 1)
+    assert hints.lstrip("'\")") == told
+
+
+@pytest.mark.parametrize(
     ("name", "reason"),
     [
         ("number", "ahead:number is the number 3"),

@@ -103,7 +103,10 @@ def test_a_newcomer_gets_a_line(capsys, here, library, one_of_each, lot_of_a_tes
 
     # Verified it holds; with every row made up it does not.
     code, out, _ = run(capsys, "leaderboard", "--verify", file)
-    assert (code, "2 episodes of 6, drawn by lot, went again as it says" in out) == (0, True)
+    assert (code, "2 episodes of 6, drawn by lot, came out again as the file says" in out) == (
+        0,
+        True,
+    )
     result = read_result(file)
     # The others are verified, whatever one is.
     replace(result, tags=("learned",)).write(here / "a.json")
@@ -128,9 +131,12 @@ def test_one_that_throws_is_named_and_the_other_has_its_file(capsys, here, monke
     assert [path.name for path in (here / "runs" / "benchmark").glob("*.json")] == [
         "history.quick.json"
     ]
-    (line,) = [line for line in err.splitlines() if "failed" in line]
-    assert "thrower:Throwing" in line
-    assert "RuntimeError: no idea (thrower.py, line 6)" in line
+    at_once, at_the_end = [line for line in err.splitlines() if "failed" in line]
+    assert at_once.endswith("; the others go on, Ctrl-C stops")
+    assert err.index(at_once) < err.index(" took ") < err.index(at_the_end)
+    for line in (at_once, at_the_end):
+        assert "thrower:Throwing" in line
+        assert "RuntimeError: no idea (thrower.py, line 6)" in line
     assert "Throwing" not in out
 
 
@@ -199,6 +205,28 @@ def test_leads_are_told_over_any_entry(capsys, library):
     assert re.search(r"place +49\.7 .*-20\.5 ", out)
     told = run(capsys, "leaderboard", library, "--minus", "nobody")
     assert (told[0], "unknown entry 'nobody'; known: care, place" in told[2]) == (2, True)
+
+
+def test_where_the_control_is_missing_it_is_said_where_it_lies(capsys, library, here):
+    told = "no place among these files: add results/leaderboard for leads\n"
+    for words, lacks in ((["results/leaderboard/care.json"], True), ([library], False)):
+        code, out, err = run(capsys, "leaderboard", *words)
+        assert (code, err) == (0, told if lacks else "")
+        assert ("inus place" in out) != lacks
+
+
+def test_every_file_that_is_of_no_use_has_a_line(capsys, here):
+    for name in ("a", "b"):
+        (here / f"{name}.json").write_text("{")
+    told = "left out: {}.json is cut off or no JSON: "
+    code, out, err = run(capsys, "leaderboard", "a.json", "b.json", "c.json")
+    assert (code, out, err.count("\n")) == (2, "", 3)
+    for line, start in zip(
+        err.splitlines(),
+        (told.format("a"), told.format("b"), "left out: c.json cannot be read: No such file"),
+        strict=True,
+    ):
+        assert line.startswith(f"care-sim: {start}")
 
 
 def test_two_of_one_name_and_different_code_are_two_entries(capsys, here):

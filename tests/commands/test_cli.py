@@ -132,15 +132,21 @@ def test_alone_it_shows_every_command_in_its_group_in_a_line_of_eighty_columns(c
         ("run dense --weather x", "--visibility-m and --rain-mm-h tell of weather"),
         ("run dense --latency 2", "perhaps --camera-latency or --camera-latency-s"),
         ("run dense --bugdet 1", "perhaps --budget"),
+        (
+            "benchmark --budget 2",
+            "--budget, 2; the benchmark plays at 1% of the cells and has no --budget\n",
+        ),
+        ("benchmark --policy care --budgets 0.1", "plays at 1% of the cells and has no --budgets"),
         ("sweep --policy care", "perhaps --policies or --policy-parameters"),
         ("sweep --seed 3", "perhaps --seeds or --floor-seed"),
         ("train ppo --learning 3", "perhaps --learning-rate"),
         (
             "run dense --policy kare",
-            "; the nearest is care; `care-sim policies` tells what",
+            "unknown policy 'kare'; the nearest is care; known: all-camera, ",
         ),
-        ("run dens", "the nearest is dense; `care-sim scenarios` tells what each is"),
-        ("polices", "the nearest is policies; `care-sim` tells what each is"),
+        ("run dens", "unknown scenario 'dens'; the nearest is dense; known: "),
+        ("run moon", "; `care-sim scenarios` tells what each is"),
+        ("polices", "unknown command 'polices'; the nearest is policies; known: "),
     ],
 )
 def test_who_is_lost_is_told_a_way_on(arguments, told, capsys):
@@ -206,7 +212,7 @@ def test_what_stands_where_a_file_is_wanted_is_one_line_before_anything_is_compu
         ],
         results / EPISODES.file,
     )
-    for place in (table, tmp_path) if "video" not in command else (table,):
+    for place in (table, tmp_path) if not command.endswith(("video", "picture")) else (table,):
         code, out, err = run(capsys, *command.replace("NOTHING", str(results)).split(), place)
         assert (code, out, err.count("\n")) == (2, "", 1), err
         assert str(place) in err

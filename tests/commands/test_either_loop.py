@@ -52,7 +52,10 @@ def written(folder):
         ("realism --source streets --seeds 3", "--seeds has no meaning with --source"),
         ("realism --seeds 990 991", "got 990 of test and 1090 of calibration"),
         ("realism --tables dense-3 --source streets", "--tables has no meaning with --source"),
-        ("realism --tables dense", "unknown table 'dense'; known: cutin-10, dartout-10, dense-3"),
+        (
+            "realism --tables dense",
+            "unknown table 'dense'; the nearest is dense-5; known: cutin-10, dartout-10, ",
+        ),
         ("realism --tables", "--tables needs at least one value"),
         ("ablate --split val", "--split has no meaning without --source"),
         ("ablate --source streets --seeds 3", "--seeds has no meaning with --source"),

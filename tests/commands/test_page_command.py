@@ -138,4 +138,4 @@ def test_a_missing_library_names_the_extra(library, results, tmp_path, capsys, m
     monkeypatch.setitem(sys.modules, library, None)
     code, _, err = report(capsys, results, "-o", tmp_path / "report.html")
     assert (code, err.count("\n")) == (2, 1)
-    assert "needs the extra 'page': pip install 'care-sim[page]'" in err
+    assert "needs the extra 'page': pip install -c constraints.txt -e '.[page]'" in err

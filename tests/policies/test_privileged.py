@@ -227,7 +227,9 @@ def test_farthest_points_are_those_of_the_plain_algorithm(environment):
 
 def test_without_open3d_farthest_points_names_the_extra(environment, monkeypatch):
     monkeypatch.setitem(sys.modules, "open3d", None)
-    with pytest.raises(MissingExtra, match=r"extra 'open3d': pip install 'care-sim\[open3d\]'"):
+    with pytest.raises(
+        MissingExtra, match=r"extra 'open3d': pip install -c constraints.txt -e '\.\[open3d\]'"
+    ):
         care_sim.make_policy("farthest-points", environment)
 
 

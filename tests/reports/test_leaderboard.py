@@ -40,7 +40,14 @@ def test_each_is_held_against_the_control_where_that_was_played():
         assert float(lead.split()[0]) == pytest.approx(points, abs=0.05)
         assert isinstance(lead, Bold)
     assert line_of(table, "place")[3] == ""
-    assert line_of(leaderboard_table([GOOD]), "good")[3] == ""
+
+
+def test_without_the_control_there_are_no_leads_and_nothing_is_said_of_them():
+    for results, is_there in (([GOOD, LOW], False), ([GOOD, PLACE], True)):
+        table = leaderboard_table(results)
+        assert ("minus place" in table.columns) == is_there
+        assert any(note.startswith("Minus place") for note in table.notes) == is_there
+        assert {len(row) for row in table.rows} == {len(table.columns)}
 
 
 def test_equal_ones_are_told_apart_by_nothing():
@@ -52,8 +59,8 @@ def test_equal_ones_are_told_apart_by_nothing():
 
 def test_the_parts_stand_beside_the_score():
     line = line_of(leaderboard_table([GOOD]), "good")
-    assert line[4:6] == ("80.0", "80.0")
-    assert line[2].startswith(line[7])
+    assert line[3:5] == ("80.0", "80.0")
+    assert line[2].startswith(line[6])
 
 
 def test_a_trial_says_that_it_is_one():

@@ -11,6 +11,7 @@ import tomllib
 
 import pytest
 
+from care_sim.base.extras import install_command
 from tests.helpers.places import ROOT
 from tests.repository.test_house import MODULES, imported
 
@@ -149,14 +150,23 @@ def test_a_message_names_an_extra_that_brings_the_library(trees):
 
 
 def extras_in(nodes):
-    """The extras that texts below these nodes name."""
+    """The extras that errors below these nodes name, where that is no variable."""
     return {
-        name
+        node.args[1].value
         for top in nodes
         for node in ast.walk(top)
-        if isinstance(node, ast.Constant) and isinstance(node.value, str)
-        for name in re.findall(r"care-sim\[(\w+)\]", node.value)
+        if isinstance(node, ast.Call)
+        and ast.unparse(node.func) == "missing_extra"
+        and isinstance(node.args[1], ast.Constant)
     }
+
+
+def test_how_an_extra_is_installed_is_said_in_one_place_as_the_pages_say_it():
+    told = re.compile(r"care-sim\[|constraints\.txt")
+    telling = {module for module, path in MODULES.items() if told.search(path.read_text())}
+    assert telling == {"care_sim.base.extras"}
+    pages = "".join(page.read_text() for page in (ROOT / "docs").glob("*.md"))
+    assert install_command("video") in pages
 
 
 WITHOUT = """
@@ -207,5 +217,5 @@ def test_a_command_without_its_extra_says_so_in_a_line(tmp_path):
     for lines, extra in zip(told, MISSED.values(), strict=True):
         command, *hints, line, end = lines.splitlines()
         assert [hint for hint in hints if not hint.startswith("hyperparameters of ")] == [], command
-        assert f"pip install 'care-sim[{extra}]'" in line, command
+        assert f"pip install -c constraints.txt -e '.[{extra}]'" in line, command
         assert end == "exit 2", command

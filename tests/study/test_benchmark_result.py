@@ -115,17 +115,24 @@ def test_a_score_that_was_written_in_changes_nothing(file):
 @pytest.mark.parametrize(
     "spoil",
     [
-        lambda rows: rows[1:],
         lambda rows: rows[::-1],
         lambda rows: [*rows, rows[0]],
         lambda rows: [[*rows[0][:2], 3, *rows[0][3:]], *rows[1:]],
         lambda rows: [[*rows[0][:4], 2, rows[0][5]], *rows[1:]],
-        lambda rows: [row for row in rows if row[1] == "measured"],
     ],
 )
 def test_other_worlds_are_refused(file, spoil):
     rows = json.loads(file.read_text())["rows"]
     assert "holds other worlds than version 1" in refusal(changed(file, rows=spoil(rows)))
+
+
+@pytest.mark.parametrize("lost", [slice(0, 1), slice(5, 8), slice(0, None, 2)])
+def test_missing_rows_are_counted(file, lost):
+    rows = json.loads(file.read_text())["rows"]
+    missing, number = len(rows[lost]), len(rows)
+    del rows[lost]
+    told = f"{file} lacks {missing:,} of the {number:,} rows of version 1 of the benchmark: play it"
+    assert refusal(changed(file, rows=rows)).startswith(told)
 
 
 @pytest.mark.parametrize(
@@ -211,9 +218,11 @@ def test_the_results_of_this_repository_can_be_read(path):
 
 def test_what_is_no_result_is_named(tmp_path):
     path = tmp_path / "mine.json"
-    assert "cannot be read" in refusal(path)
-    path.write_text("{")
-    assert "cannot be read" in refusal(path)
+    assert refusal(path) == f"{path} cannot be read: No such file or directory"
+    path.write_text('{"rows": [')
+    assert refusal(path).startswith(f"{path} is cut off or no JSON: Expecting value: line 1")
+    path.write_text("[" * 300 + "]" * 300)
+    assert "cannot be read: it is nested deeper" in refusal(path)
     path.write_text("[1]")
     assert "holds no result of care-sim benchmark" in refusal(path)
 

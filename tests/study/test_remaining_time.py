@@ -9,6 +9,7 @@ import pytest
 from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.progress import ProgressLines, ProgressReporter, rounded_duration
 from care_sim.study.remaining_time import RemainingTime
+from care_sim.study.runner import Failure
 
 POLICIES = ["history", "all-camera", "care", "care-sbf", "random", "full"]
 SEEDS = 20
@@ -165,6 +166,85 @@ def test_an_episode_that_fails_is_counted_and_takes_no_time():
     reporter.finished(configs[0], None)
     assert shown[-1] == (1, "0 s left")
     assert reporter.summary("episodes") == "3 episodes took 0:00:00"
+
+
+def test_what_was_begun_before_the_first_had_ended_tells_nothing_of_the_rest():
+    """Here the first two compile for a minute."""
+    clock, shown = Clock(), []
+    configs = [EpisodeConfig("dartout", "care", seed=seed) for seed in range(40)]
+    reporter = ProgressReporter(
+        RemainingTime(configs), lambda done, left: shown.append((done, left)), 40, clock
+    )
+    reporter.playing(2)
+    for config in configs[:2]:
+        reporter.begun([config])
+    for number, config in enumerate(configs):
+        clock.now += 30.0 if number < 2 else 1.0
+        reporter.finished(config, {"wall_s": 60.0 if number < 2 else 2.0})
+        if following := configs[number + 2 : number + 3]:
+            reporter.begun(following)
+    assert shown[1:4] == [(1, ""), (2, ""), (3, "37 s left")]
+    assert shown[-1] == (40, "0 s left")
+    assert reporter.summary("episodes") == "40 episodes took 0:01:38; 0:01:38 predicted after 8%"
+
+
+def test_a_run_of_one_round_is_never_predicted():
+    configs = [EpisodeConfig("dartout", "care", seed=seed) for seed in range(20)]
+    reporter = ProgressReporter(RemainingTime(configs), lambda _done, _left: None, 20, Clock())
+    reporter.playing(2)
+    reporter.begun(configs)
+    for config in configs:
+        reporter.finished(config, {"wall_s": 2.0})
+    assert reporter.summary("episodes") == "20 episodes took 0:00:00"
+
+
+def test_that_the_first_take_longer_is_said_once_and_nothing_done_is_told_each_minute(capsys):
+    clock = Clock()
+    configs = [EpisodeConfig("dartout", "care", seed=seed) for seed in range(3)]
+    reporter = ProgressReporter(
+        RemainingTime(configs), ProgressLines(3, "episodes", clock), 3, clock
+    )
+    for now in range(0, 140, 2):
+        clock.now = float(now)
+        reporter.playing(2)
+    first, *lines = capsys.readouterr().err.splitlines()
+    assert first.startswith("the first take longer on a machine that has not played before")
+    assert lines == ["episodes 0/3"] * 3
+
+
+def test_who_sees_the_first_end_soon_is_not_asked_for_patience(capsys):
+    clock = Clock()
+    configs = [EpisodeConfig("dartout", "care", seed=seed) for seed in range(3)]
+    reporter = ProgressReporter(RemainingTime(configs), lambda _done, _left: None, 3, clock)
+    clock.now = 5.0
+    reporter.finished(configs[0], {"wall_s": 5.0})
+    clock.now = 50.0
+    reporter.playing(2)
+    assert capsys.readouterr().err == ""
+
+
+def test_the_first_failure_is_told_at_once_and_no_other_before_the_end(capsys):
+    configs = [EpisodeConfig("dartout", "care", seed=seed) for seed in range(3)]
+    reporter = ProgressReporter(RemainingTime(configs), lambda _done, _left: None, 3, Clock())
+    told = []
+    for config in configs:
+        reporter.finished(config, None)
+        reporter.failed(Failure(config, "RuntimeError: no idea (mine.py, line 6)"))
+        told.append(capsys.readouterr().err)
+    assert told == [
+        f"care-sim: failed: {configs[0].label}: RuntimeError: no idea (mine.py, line 6); the "
+        "others go on, Ctrl-C stops\n",
+        "",
+        "",
+    ]
+
+
+def test_of_a_single_task_there_are_no_others_that_go_on(capsys):
+    config = EpisodeConfig("dartout", "care")
+    reporter = ProgressReporter(RemainingTime([config]), lambda _done, _left: None, 1, Clock())
+    reporter.finished(config, None)
+    reporter.failed(Failure(config, "no idea"))
+    assert capsys.readouterr().err == ""
 
 
 @pytest.mark.parametrize(

@@ -192,6 +192,34 @@ def test_a_bad_policy_costs_only_its_own_episode(third_party, tmp_path):
     assert Counter(listener.ended) == Counter((config, config in kept) for config in configs)
 
 
+class Following(RunListener):
+    """Keeps what it is told, in its order."""
+
+    def __init__(self):
+        self.told = []
+
+    def finished(self, config, row):
+        self.told.append((config.seed, row is not None))
+
+    def failed(self, failure):
+        self.told.append(failure.reason)
+
+
+def test_a_failure_is_told_before_the_rest_is_played(tmp_path):
+    def refuse_the_first(batch):
+        return [
+            config.row() | {"digest": config.digest()} if config.seed else "no" for config in batch
+        ]
+
+    listener = Following()
+    with Journal(tmp_path / JOURNAL) as journal:
+        run_all(
+            short(["history"], seeds=range(3)), journal, 1, ThreadPoolExecutor, listener,
+            refuse_the_first, most=1,
+        )  # fmt: skip
+    assert listener.told == [(0, False), "no", (1, True), (2, True)]
+
+
 def test_a_worker_killed_in_mid_run_costs_a_retry(third_party, tmp_path):
     configs = short(["history", "killed-once", "care", "random"])
     listener = Counting()

@@ -15,6 +15,7 @@ import care_sim
 from care_sim.base.errors import InvalidInput, MissingExtra
 from care_sim.base.seed_ranges import TRAINING, VALIDATION
 from care_sim.cli import main, parsed_command
+from care_sim.commands.shared.end_of_training import end_of_training
 from care_sim.policies.learned.weights import load_weights
 from care_sim.policies.learned.wrapping import Wrapping
 from care_sim.scenarios import PLUGINS
@@ -99,7 +100,8 @@ def test_it_trains_keeps_and_goes_on(capsys, tmp_path):
     assert lines[0] == (
         "but, by options: steps 128, environments 2, rollout 32, batch 32, epochs 1, hidden 4"
     )
-    scored, lines = lines[1 : 4 + len(RULES)], lines[4 + len(RULES) :]
+    assert lines[1] == "playing the rules on 2 validation episodes"
+    scored, lines = lines[2 : 5 + len(RULES)], lines[5 + len(RULES) :]
     assert [line.partition(":")[0] for line in scored] == [
         *RULES, "0 steps", "64 steps", "128 steps",
     ]  # fmt: skip
@@ -112,6 +114,11 @@ def test_it_trains_keeps_and_goes_on(capsys, tmp_path):
     }
     assert max(curve, key=curve.get) == steps
     assert float(value) == pytest.approx(curve[steps], abs=0.005)
+    # So few steps may teach nothing.
+    random = json.loads((out / "rules.json").read_text())["random"]["mean_return"]
+    told = "not better than random: nothing was learned yet"
+    assert (lines[2] == told) == (curve[steps] <= random)
+    lines = [line for line in lines if line != told]
     assert lines[2] == f"kept: the weights of that step, {out / 'weights.npz'}"
     assert load_weights(out / "weights.npz").card.steps == int(steps)
     play, beside = (line.partition(": ")[2] for line in lines[3:])
@@ -167,7 +174,8 @@ def test_a_rule_that_does_not_fit_is_told_and_left_out(capsys):
     given = ("sensor=os1-64", "duration_s=0.2")
     config = PpoConfig(budget=(0.03,), episodes=1, env_parameters=given)
     assert {*RULES} - {*played_rules(config)} == {"place"}
-    (line,) = capsys.readouterr().out.splitlines()
+    first, line = capsys.readouterr().out.splitlines()
+    assert first == "playing the rules on 1 validation episode"
     assert line.startswith("place does not fit and is not beside it: ")
 
 
@@ -268,7 +276,10 @@ def test_the_other_learners_by_name(capsys, tmp_path, name):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--env", "CARE-Moon-v0"], "unknown environment 'CARE-Moon-v0'; known: CARE-CutIn-v0"),
+        (
+            ["--env", "CARE-Moon-v0"],
+            "unknown environment 'CARE-Moon-v0'; the nearest is CARE-Dense-v0; known: ",
+        ),
         (["--azimuths", "24"], "azimuths must divide columns, got 24 and 64"),
         (["--azimuths", "3", "--columns", "3"], "azimuths must divide the 512 of the grid"),
         (["--budget", "2"], "budget must lie in (0, 1]"),
@@ -326,6 +337,37 @@ def test_a_run_on_other_code_of_ones_own_scenario_is_not_gone_on_with(install, t
         with pytest.raises(InvalidInput, match=f"the code of {env} is another than when"):
             Folder(again)
     provenance._loaded.cache_clear()
+
+
+@pytest.mark.parametrize(
+    ("given", "begun", "told"),
+    [
+        ({"steps": 256}, 0, "steps 256: 1,024, a whole rollout of 8 x 128"),
+        ({"steps": 1024}, 0, ""),
+        # An evaluation waits for the end of a rollout.
+        ({"steps": 2048, "evaluate_every": 1500}, 0, ""),
+        (
+            {"steps": 3500, "evaluate_every": 1500, "rollout": 1000, "environments": 1},
+            0,
+            "steps 3,500: 4,000, whole rollouts of 1 x 1000",
+        ),
+        ({"steps": 2000}, 1024, "steps 2,000: 2,048, a whole rollout of 8 x 128"),
+        ({"steps": 1000}, 1024, ""),
+    ],
+)
+def test_steps_beyond_those_asked_are_told(given, begun, told):
+    assert PpoConfig(**given).whole_rollouts(begun) == told
+
+
+@pytest.mark.parametrize(("best", "is_told"), [(-3.0, True), (-2.5, True), (-2.4, False)])
+def test_who_is_not_better_than_chance_has_learned_nothing(tmp_path, best, is_told):
+    score = {"episodes": 20, "mean_return": -2.5, "distance_m": None}
+    (tmp_path / "rules.json").write_text(json.dumps({"random": score}))
+    rows = ["steps,seconds,return,distance_m", "0,0,-4.0,", f"256,1.0,{best},"]
+    (tmp_path / "curve.csv").write_text("\n".join(rows))
+    first, *others = end_of_training(PpoConfig(out=tmp_path))
+    assert f"return {best:.2f} on 20 validation episodes; random -2.50" in first
+    assert ("not better than random: nothing was learned yet" in others) == is_told
 
 
 def test_a_missing_library_is_named(monkeypatch):

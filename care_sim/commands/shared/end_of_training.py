@@ -8,18 +8,23 @@ from care_sim.training.closing import how_to_play
 from care_sim.training.config import AgentConfig
 from care_sim.training.folder import CHECKPOINT, CURVE, RULES, WEIGHTS, read_curve, read_rules
 
+CHANCE = "random"
+"""The rule that whoever has learned something is better than."""
+
 
 def end_of_training(config: AgentConfig) -> Iterator[str]:
     """The lines that end the training of a configuration, from what its folder holds."""
     out = config.out
     # The earliest of equals, whose weights are those that were kept.
     steps, _, best, _ = max(read_curve(out / CURVE), key=lambda row: row[2])
-    rules = read_rules(out / RULES).items()
-    beside = ", ".join(f"{name} {score['mean_return']:.2f}" for name, score in rules)
+    returns = {name: score["mean_return"] for name, score in read_rules(out / RULES).items()}
+    beside = ", ".join(f"{name} {value:.2f}" for name, value in returns.items())
     yield (
         f"best after {steps} steps: return {best:.2f} on {config.episodes} validation episodes; "
         f"{beside}"
     )
+    if CHANCE in returns and best <= returns[CHANCE]:
+        yield f"not better than {CHANCE}: nothing was learned yet"
     # Only the network of `ppo` has a twin outside of PyTorch.
     if not (out / WEIGHTS).exists():
         yield f"kept: the learner of the last step, {out / CHECKPOINT}; --resume goes on with it"

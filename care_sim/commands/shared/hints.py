@@ -19,17 +19,26 @@ _LEAST_WORD = 3
 """Letters of a word that is looked for in what options say of themselves."""
 
 
-def ways_on(complaint: str, options: Mapping[str, str]) -> str:
-    """What to write instead, where a complaint tells of options that are not among `options`, which
-    hold their help by name; else empty.
+_FIXED = {
+    ("benchmark", "budget"): "the benchmark plays at 1% of the cells and has no --budget",
+    ("benchmark", "budgets"): "the benchmark plays at 1% of the cells and has no --budgets",
+}
+"""What a command fixes, that others leave open, by its name and that of their option."""
+
+
+def ways_on(complaint: str, options: Mapping[str, str], command: str = "") -> str:
+    """What to write instead, where a complaint tells of options that are not among `options` of
+    the `command`, which hold their help by name; else empty.
     """
     if not complaint.startswith(UNRECOGNIZED):
         return ""
     lacking = dict.fromkeys(re.findall(r"--([\w-]+)", complaint))
-    return "".join(_way_on(name.replace("_", "-"), name, options) for name in lacking)
+    return "".join(_way_on(name.replace("_", "-"), name, options, command) for name in lacking)
 
 
-def _way_on(name: str, written: str, options: Mapping[str, str]) -> str:
+def _way_on(name: str, written: str, options: Mapping[str, str], command: str) -> str:
+    if fixed := _FIXED.get((command, name)):
+        return f"; {fixed}"
     if owners := [one for one in _MOST_OPTIONS if f"--{name}" in _options_of(one)]:
         told = " and ".join(f"care-sim {one}" for one in owners)
         return f"; --{written} is an option of {told}"

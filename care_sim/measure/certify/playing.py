@@ -8,7 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from care_sim.base.errors import MissingExtra
-from care_sim.base.extras import import_open3d
+from care_sim.base.extras import import_open3d, missing_extra
 from care_sim.measure.certify.design import (
     CLOSED,
     DRIVE,
@@ -40,7 +40,7 @@ def _need_stable_baselines3() -> None:
     """Raise MissingExtra where it is not installed."""
     # It is looked for and not imported, which would take seconds.
     if find_spec("stable_baselines3") is None:
-        raise MissingExtra("Stable-Baselines3 needs the extra 'rl': pip install 'care-sim[rl]'")
+        raise missing_extra("Stable-Baselines3", "rl")
 
 
 _NEEDS: tuple[tuple[Callable[[Drawn], bool], Callable[[], object]], ...] = (

@@ -7,7 +7,7 @@ from typing import Any
 
 from PIL import Image
 
-from care_sim.base.checks import check_number
+from care_sim.base.checks import check_known, check_number
 from care_sim.base.errors import InvalidInput
 from care_sim.base.files import PNG, check_output, replacing
 from care_sim.envs.open_loop import OpenLoopEnv
@@ -21,6 +21,8 @@ from care_sim.study.episode_play import GymEnv
 from care_sim.viewer.pictures.keyframe import draw_keyframe
 from care_sim.viewer.pictures.scene_keyframe import draw_scene_keyframe
 
+ENDINGS = (".png",)
+"""Of the file of a picture."""
 _ROUNDING_S = 1e-6
 """Times are sums of keyframes."""
 
@@ -30,8 +32,9 @@ class Photo:
 
     It shows the first keyframe that is `at` seconds or later, as its own clock tells; without `at`
     the first of the moment that the picture is about, whose absence is told as `otherwise`. Raises
-    InvalidInput for a time without a path and a negative one; InvalidInput and OSError at once
-    where no picture can be written: `care_sim.base.files.check_output`.
+    InvalidInput for a time without a path and a negative one, and for a file whose ending is none
+    of ENDINGS; InvalidInput and OSError at once where no picture can be written:
+    `care_sim.base.files.check_output`.
     """
 
     otherwise: str
@@ -46,6 +49,7 @@ class Photo:
             if path is None:
                 raise InvalidInput("--at has no meaning without --picture")
         if path is not None:
+            check_known("ending of a picture", path.suffix, ENDINGS)
             check_output(path, PNG)
 
     def report(self) -> None:

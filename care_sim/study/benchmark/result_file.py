@@ -1,5 +1,6 @@
 """The result file of an entry is read, and checked: what cannot be so is refused in one line."""
 
+import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
@@ -7,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from care_sim.base.checks import LARGEST_INTEGER
-from care_sim.base.errors import InvalidInput, shown
+from care_sim.base.errors import InvalidInput, counted, shown
 from care_sim.base.json_text import json_content
 from care_sim.policies import POLICIES, tags_of
 from care_sim.policies.base import TAGS
@@ -31,7 +32,11 @@ def read_result(path: Path) -> BenchmarkResult:
     """
     try:
         content = json_content(path, _MOST_BYTES)
-    except (OSError, ValueError) as error:
+    except json.JSONDecodeError as error:
+        raise InvalidInput(f"{path} is cut off or no JSON: {error}") from error
+    except OSError as error:
+        raise InvalidInput(f"{path} cannot be read: {error.strerror or error}") from error
+    except ValueError as error:
         raise InvalidInput(f"{path} cannot be read: {error}") from error
     if not is_result(content):
         raise InvalidInput(f"{path} holds no result of care-sim benchmark")
@@ -132,7 +137,14 @@ def _check_worlds(path: Path, result: BenchmarkResult) -> None:
     ]
     there = [(row.part, row.camera, row.world, row.reachable) for row in result.rows]
     if there != expected:
+        version = f"version {BENCHMARK_VERSION} of the benchmark"
+        missing = len({*expected} - {*there})
+        # A file that has lost rows holds no others.
+        wrong = (
+            f"lacks {missing:,} of the {counted(len(expected), 'row')} of {version}"
+            if missing and {*there} <= {*expected}
+            else f"holds other worlds than {version}"
+        )
         raise InvalidInput(
-            f"{path} holds other worlds than version {BENCHMARK_VERSION} of the benchmark: play it "
-            f"again with care-sim benchmark --policy {result.entry.policy}"
+            f"{path} {wrong}: play it again with care-sim benchmark --policy {result.entry.policy}"
         )

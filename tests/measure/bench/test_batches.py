@@ -78,7 +78,9 @@ def test_what_is_not_installed_is_left_out_in_one_line(monkeypatch):
         import_envpool()
     figures, (line,) = learning(TINY)
     assert figures == {}
-    assert line.startswith(f"{PPO}: ppo needs the extra 'rl': pip install 'care-sim[rl]'")
+    assert line.startswith(
+        f"{PPO}: ppo needs the extra 'rl': pip install -c constraints.txt -e '.[rl]'"
+    )
 
 
 def test_a_learner_that_is_answered_at_once_waits_for_one_step():

@@ -82,7 +82,8 @@ def test_a_peer_without_its_library_is_left_out_in_one_line(monkeypatch):
     assert {*CLOSED_LOOP, DRIVE, DRIVING} <= set(made)
     assert len(made) == len({*CLOSED_LOOP, DRIVE, DRIVING}) + len(ENGINES) - 1
     assert skipped.startswith(
-        f"{REACHING}: panda-gym needs the extra 'bench': pip install 'care-sim[bench]'"
+        f"{REACHING}: panda-gym needs the extra 'bench': pip install -c constraints.txt -e "
+        "'.[bench]'"
     )
 
 

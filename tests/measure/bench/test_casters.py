@@ -93,10 +93,11 @@ def test_a_peer_without_its_library_is_left_out_in_one_line(monkeypatch):
     assert set(figures["engines"]) == set(ENGINES)
     embree, mujoco = skipped
     assert embree.startswith(
-        "Embree (Open3D): Open3D needs the extra 'open3d': pip install 'care-sim[open3d]'"
+        "Embree (Open3D): Open3D needs the extra 'open3d': pip install -c constraints.txt -e "
+        "'.[open3d]'"
     )
     assert mujoco.startswith(
-        "MuJoCo: MuJoCo needs the extra 'bench': pip install 'care-sim[bench]'"
+        "MuJoCo: MuJoCo needs the extra 'bench': pip install -c constraints.txt -e '.[bench]'"
     )
 
 

@@ -87,7 +87,7 @@ OWN = {"sample_data_token": "t", "bbox_corners": [0, 0, 5, 5], "category_name": 
         (OWN | {"bbox_corners": [0, 0, 5, float("nan")]}, "no box of four numbers"),
         (
             OWN | {"category_name": "vehicle.carr"},
-            "unknown category 'vehicle.carr'; known: animal, ",
+            "unknown category 'vehicle.carr'; the nearest is vehicle.car; known: animal, ",
         ),
         (OWN | {"score": 87}, r"score must lie in \[0, 1\], got 87"),
         (OWN | {"score": "0.5"}, r"score must lie in \[0, 1\], got '0.5'"),

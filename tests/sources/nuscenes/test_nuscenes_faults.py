@@ -91,8 +91,8 @@ BREAKS = {
     ),
     "odd category": (
         dangling("name", "category", "vehicle.spaceship"),
-        "category.json: 'category-vehicle.car': unknown category 'vehicle.spaceship'; known: "
-        "animal, ",
+        "category.json: 'category-vehicle.car': unknown category 'vehicle.spaceship'; "
+        "the nearest is vehicle.ego; known: animal, ",
     ),
     "box of no sample": (
         dangling("sample_token", "sample_annotation"),
