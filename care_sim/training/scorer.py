@@ -1,4 +1,5 @@
-"""Train the learned scorer: `care-sim train learned-scorer` makes the shipped weights from nothing.
+"""Train the learned scorer: `care-sim train learned-scorer` makes the shipped weights from nothing,
+`--drawn` others, from worlds that differ.
 
 The paper names no network and no loss. Both are the plainest that do: one hidden layer of rectified
 units for every cell by itself, and the weighted logistic loss of `care_sim.training.scorer_data`,
@@ -9,7 +10,7 @@ the same machine makes the same bytes.
 
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.checks import LARGEST_INTEGER
 from care_sim.base.extras import import_torch
 from care_sim.base.files import ZIP, check_output
+from care_sim.base.seed_ranges import TRAINING, VALIDATION
 from care_sim.base.torch_threads import one_thread
 from care_sim.core.grid import AngularGrid
 from care_sim.policies.learned.weights import Card, save_weights
@@ -29,7 +31,20 @@ from care_sim.sensors.setups import DEFAULT_SETUP, sensor_setup
 from care_sim.streets.street import CALIBRATION_SEEDS
 from care_sim.study.provenance import machine_line, package_versions
 from care_sim.training.closing import how_to_play
-from care_sim.training.scorer_data import OTHER_CELLS, SCORER_BUDGETS, Examples, balanced, examples
+from care_sim.training.drawn_worlds import (
+    LEAST_BUDGET,
+    MOST_BUDGET,
+    SCENARIOS,
+    seeds_of_worlds,
+)
+from care_sim.training.scorer_data import (
+    OTHER_CELLS,
+    SCORER_BUDGETS,
+    Examples,
+    balanced,
+    drawn_examples,
+    examples,
+)
 
 HIDDEN_UNITS = 16
 """As many as score a keyframe within half a millisecond on one core."""
@@ -41,12 +56,16 @@ HELD_OUT = tuple(range(2000, 2004))
 """Streets that belong neither to the calibration nor to the evaluation. The card tells the loss on
 them.
 """
+DRAWN: Mapping[str, int] = {"drive": 48, "ncap": 144, "street": 8}
+"""Worlds of training seeds with `--drawn`: about 2,500 keyframes of each kind."""
+DRAWN_HELD_OUT: Mapping[str, int] = {"drive": 6, "ncap": 18, "street": 1}
+"""Worlds of validation seeds, for the loss that the card tells."""
 
 
 @dataclass(frozen=True)
 class TrainScorer:
-    """Train `learned-scorer` on the 20 calibration streets and write its weights; needs the extra
-    `rl`.
+    """Train `learned-scorer` on the 20 calibration streets, or in worlds that differ, and write its
+    weights; needs the extra `rl`.
     """
 
     out: Path
@@ -55,6 +74,9 @@ class TrainScorer:
     """Of the first weights and the order of the examples."""
     steps: int = bounded(4000, 1, LARGEST_INTEGER)
     """Batches that are learned from."""
+    drawn: bool = False
+    """Learn from drives, tests of Euro NCAP and streets of training seeds, with budgets and faults
+    of the camera drawn for every play, instead of from the calibration streets."""
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -64,9 +86,9 @@ class TrainScorer:
         import_torch()
         check_output(self.out, ZIP)
         started = time.perf_counter()
-        learned, held_out = (_gathered(name, seeds) for name, seeds in _STREETS.items())
-        arrays, losses = train_scorer(learned, held_out, self.seed, self.steps)
-        save_weights(self.out, arrays, _card(self, learned, losses))
+        data = _drawn() if self.drawn else _streets()
+        arrays, losses = train_scorer(data, self.seed, self.steps)
+        save_weights(self.out, arrays, _card(self, next(iter(data.values())), losses))
         told = ", ".join(f"{name} {loss:.4f}" for name, loss in losses.items())
         print(f"{self.out}: loss {told}; {time.perf_counter() - started:.0f} s")
         print(how_to_play("enjoy", self.out))
@@ -77,10 +99,13 @@ _STREETS = {"calibration": CALIBRATION_SEEDS, "held out": HELD_OUT}
 
 
 def train_scorer(
-    learned: Examples, held_out: Examples, seed: int, steps: int
+    data: Mapping[str, Examples], seed: int, steps: int
 ) -> tuple[Arrays, dict[str, float]]:
-    """The weights, and the loss on both sets of examples (log 2 = 0.69 without any knowledge)."""
+    """The weights that the first set of examples teaches, and the loss on every set (log 2 = 0.69
+    without any knowledge).
+    """
     torch = import_torch()
+    learned = next(iter(data.values()))
     with one_thread(torch):
         torch.manual_seed(seed)
         network = torch.nn.Sequential(
@@ -89,10 +114,7 @@ def train_scorer(
             torch.nn.Linear(HIDDEN_UNITS, 1, bias=False),
         )
         _descend(torch, network, learned, np.random.default_rng(seed), steps)
-        losses = {
-            name: _loss_of(torch, network, data)
-            for name, data in zip(_STREETS, (learned, held_out), strict=True)
-        }
+        losses = {name: _loss_of(torch, network, cells) for name, cells in data.items()}
     # PyTorch holds (units, inputs); the policy multiplies inputs (n, inputs) from the left.
     layer, bias, out = (parameter.detach().numpy() for parameter in network.parameters())
     return {"layer": layer.T, "bias": bias, "out": out[0]}, losses
@@ -140,6 +162,10 @@ def _loss_of(torch: Any, network: Any, data: Examples) -> float:
         return float(_loss(torch, network, data, np.arange(len(data))))
 
 
+def _streets() -> dict[str, Examples]:
+    return {name: _gathered(name, seeds) for name, seeds in _STREETS.items()}
+
+
 def _gathered(name: str, seeds: tuple[int, ...]) -> Examples:
     plays: list[Examples] = []
     for number, seed in enumerate(seeds, 1):
@@ -148,20 +174,57 @@ def _gathered(name: str, seeds: tuple[int, ...]) -> Examples:
     return balanced(plays)
 
 
+def _drawn() -> dict[str, Examples]:
+    return {
+        name: balanced(
+            part
+            for kind, seed in seeds_of_worlds(worlds, first)
+            for part in drawn_examples(kind, seed)
+        )
+        for name, (worlds, first) in _drawn_worlds().items()
+    }
+
+
+def _drawn_worlds() -> dict[str, tuple[Mapping[str, int], int]]:
+    return {"learned": (DRAWN, TRAINING), "held out": (DRAWN_HELD_OUT, VALIDATION)}
+
+
 def _card(made: TrainScorer, learned: Examples, losses: dict[str, float]) -> Card:
-    budgets = ", ".join(f"{budget:g}" for budget in SCORER_BUDGETS)
     positive = int(learned.positive.sum())
+    scenario, of, seeds = _told_of_drawn() if made.drawn else _told_of_streets()
     return Card(
         "learned-scorer",
         AngularGrid(),
         setup=sensor_setup(DEFAULT_SETUP).label,
-        scenario="CARE-Street-v0",
-        data=f"{len(learned)} cells, {positive} of them positive, of generated streets "
-        f"under history at {budgets} of "
-        f"the cells, with six cameras and with the front one; {OTHER_CELLS} others per keyframe",
-        seeds={name: list(seeds) for name, seeds in _STREETS.items()} | {"training": made.seed},
+        scenario=scenario,
+        data=f"{len(learned)} cells, {positive} of them positive, of {of}; "
+        f"{OTHER_CELLS} others per keyframe",
+        seeds=seeds | {"training": made.seed},
         steps=made.steps,
         machine=machine_line(),
         versions=package_versions("care-sim", "numpy", "torch"),
         result={f"loss {name}": round(loss, 5) for name, loss in losses.items()},
+    )
+
+
+def _told_of_streets() -> tuple[str, str, dict[str, Any]]:
+    budgets = ", ".join(f"{budget:g}" for budget in SCORER_BUDGETS)
+    return (
+        "CARE-Street-v0",
+        f"generated streets under history at {budgets} of the cells, with six cameras and with the "
+        "front one",
+        {name: list(seeds) for name, seeds in _STREETS.items()},
+    )
+
+
+def _told_of_drawn() -> tuple[str, str, dict[str, Any]]:
+    worlds = ", ".join(f"{count} of {kind}" for kind, count in DRAWN.items())
+    return (
+        SCENARIOS,
+        f"worlds {worlds} under history at {LEAST_BUDGET:g} to {MOST_BUDGET:g} of the cells, with "
+        "faults of the camera, streets with six cameras and with the front one",
+        {
+            name: [first, first + max(worlds.values()) - 1]
+            for name, (worlds, first) in _drawn_worlds().items()
+        },
     )

@@ -1,4 +1,4 @@
-"""What the learned scorer learns from: cells of the calibration's streets.
+"""What the learned scorer learns from: cells of the calibration's streets or of worlds that differ.
 
 Truth is used here, at training, and nowhere else.
 
@@ -10,6 +10,8 @@ decided before a result was seen:
 - The scenes are played by `history`, the policy whose reserve is learned, at budgets from the
   scarcest to the most generous that are studied, so that one file serves them all.
 - They are played with all cameras and with the front one alone: the closed loop has no other.
+- Worlds that differ are those of `care_sim.training.drawn_worlds`, and `history` plays them, too.
+  Nothing is mirrored: the inputs of a cell do not tell left from right.
 - First sightings count objects, not cells, so the cells of an object weigh 1 together, however many
   they are.
 - All positive cells are kept. Of the others, of which there are sixty times as many, about as many
@@ -29,11 +31,19 @@ from care_sim.core.conditions import MIN_RETURNS
 from care_sim.core.grid import Cells
 from care_sim.envs.open_loop import FilmEnv
 from care_sim.evaluation.sightings import RANGE_M
-from care_sim.loops.film import Film, Shot
+from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.open_loop import OpenLoop
 from care_sim.policies.learned.cell_inputs import CellInputs, Float32s
 from care_sim.policies.paper.history import History
 from care_sim.sources.street_films import street_film
+from care_sim.training.drawn_worlds import (
+    AnyEnv,
+    front_alone,
+    kept,
+    keyframes,
+    plays,
+    present,
+)
 
 SCORER_BUDGETS = (0.03, 0.10, 0.35)
 """The paper's scarcest closed loop, the budget that both loops share, and its most generous open
@@ -69,9 +79,16 @@ def examples(seeds: Iterable[int]) -> Iterator[Examples]:
             yield _joined([*_play(FilmEnv(shown, budget=budget), seed, rng)])
 
 
-def balanced(plays: Iterable[Examples]) -> Examples:
-    """All plays as one, positive and other examples of equal weight, 1 on average."""
-    together = _joined([*plays])
+def drawn_examples(kind: str, seed: int) -> Iterator[Examples]:
+    """The examples of the street, the drive or the test of a seed, one keyframe at a time."""
+    rng = np.random.default_rng([seed, len(kind)])
+    for env in plays(kind, seed, rng):
+        yield from _play(env, seed, rng, thinned=True)
+
+
+def balanced(parts: Iterable[Examples]) -> Examples:
+    """All parts as one, positive and other examples of equal weight, 1 on average."""
+    together = _joined([*parts])
     # In float64: millions of weights are summed. Each group then weighs half of the total.
     weights = together.weights.astype(np.float64)
     for group in (together.positive, ~together.positive):
@@ -79,44 +96,36 @@ def balanced(plays: Iterable[Examples]) -> Examples:
     return replace(together, weights=weights.astype(np.float32))
 
 
-def front_alone(film: Film) -> Film:
-    """The film as a car with its first camera alone would have it."""
-    return replace(film, cameras=film.cameras[:1], shots=tuple(map(_first_camera, film.shots)))
-
-
-def untracked_cells(loop: OpenLoop) -> tuple[Cells, Float32s]:
+def untracked_cells(loop: OpenLoop | ClosedLoop) -> tuple[Cells, Float32s]:
     """Cells (n,) of the coming keyframe that should fire, and what each weighs (n,). Truth.
 
     In the full scan they have a return from an object in range that has no track and can be
     detected.
     """
-    cloud = loop.shot.cloud.to_shots()
-    annotations = loop.shot.annotations
-    in_range = planar_ranges(annotations.boxes) <= RANGE_M
-    tracked = np.isin(annotations.objects, loop.true_objects(loop.belief.tracks))
-    wanted = np.isin(cloud.objects, annotations.objects[in_range & ~tracked])
+    objects, boxes, returning, behind = present(loop)
+    in_range = planar_ranges(boxes) <= RANGE_M
+    tracked = np.isin(objects, loop.true_objects(loop.belief.tracks))
+    wanted = np.isin(behind, objects[in_range & ~tracked])
     # Each cell once, for the object of its first return: those of a recorded sweep may share one.
-    cells, first = np.unique(cloud.cells[wanted], return_index=True)
+    cells, first = np.unique(returning[wanted], return_index=True)
     # `sizes` (objects,): how many of the cells an object has; `group` (cells,): a cell's place in
     # it. Fewer than MIN_RETURNS would not detect the object.
-    _, group, sizes = np.unique(
-        cloud.objects[wanted][first], return_inverse=True, return_counts=True
-    )
+    _, group, sizes = np.unique(behind[wanted][first], return_inverse=True, return_counts=True)
     enough = sizes[group] >= MIN_RETURNS
     return cells[enough], (1 / sizes[group[enough]]).astype(np.float32)
 
 
-def _play(env: FilmEnv, seed: int, rng: np.random.Generator) -> Iterator[Examples]:
-    policy = History(env.rig)
+def _play(
+    env: AnyEnv, seed: int, rng: np.random.Generator, thinned: bool = False
+) -> Iterator[Examples]:
     inputs = CellInputs(env.rig)
-    observation, _ = env.reset(seed=seed)
-    while not env.loop.over:
-        yield _keyframe(env.loop, Belief.from_observation(observation), inputs, rng)
-        observation, *_ = env.step(policy(observation))
+    for belief in keyframes(env, History(env.rig), seed):
+        if not thinned or kept(env, rng):
+            yield _keyframe(env.loop, belief, inputs, rng)
 
 
 def _keyframe(
-    loop: OpenLoop, belief: Belief, inputs: CellInputs, rng: np.random.Generator
+    loop: OpenLoop | ClosedLoop, belief: Belief, inputs: CellInputs, rng: np.random.Generator
 ) -> Examples:
     positive, shares = untracked_cells(loop)
     # Drawn from all cells and not from the others alone: a few of so many are positive.
@@ -129,18 +138,6 @@ def _keyframe(
         np.arange(len(cells)) < len(positive),
         weights,
     )
-
-
-def _first_camera(shot: Shot) -> Shot:
-    seen = shot.seen
-    rows = np.flatnonzero(seen.detections.cameras == 0)
-    columns = {
-        field.name: getattr(seen.detections, field.name)[rows] for field in fields(seen.detections)
-    }
-    front = replace(
-        seen, detections=replace(seen.detections, **columns), objects=seen.objects[rows]
-    )
-    return replace(shot, seen=front)
 
 
 def _joined(parts: list[Examples]) -> Examples:

@@ -26,6 +26,7 @@ from care_sim.policies.learned.weights import Card, save_weights
 from care_sim.sensors.setups import DEFAULT_SETUP, sensor_setup
 from care_sim.study.provenance import machine_line, package_versions
 from care_sim.training.closing import how_to_play
+from care_sim.training.drawn_worlds import SCENARIOS, seeds_of_worlds
 from care_sim.training.set_ablations import Part
 from care_sim.training.sets_data import Example, play
 from care_sim.training.sets_network import learn, losses_of
@@ -106,11 +107,8 @@ def gathered(
 ) -> list[Example]:
     """The keyframes of so many worlds of each kind, with seeds from the first on."""
     examples: list[Example] = []
-    for kind, count in worlds.items():
-        for number in range(count):
-            told = f"{kind} {number + 1} of {count}"
-            print(told, end="   \r", file=sys.stderr, flush=True)
-            examples += play(kind, first + number, own, faulty)
+    for kind, seed in seeds_of_worlds(worlds, first):
+        examples += play(kind, seed, own, faulty)
     return examples
 
 
@@ -129,7 +127,7 @@ def _card(
         LearnedSets.name,
         AngularGrid(),
         setup=sensor_setup(DEFAULT_SETUP).label,
-        scenario="CARE-Drive-v0, CARE-NCAP-v0 and CARE-Street-v0",
+        scenario=SCENARIOS,
         data=f"{items} boxes and tracks of {len(examples)} keyframes; worlds {played}"
         + (", the second time mostly by itself" if len(rounds) > 1 else "")
         + (f"; without {' and '.join(made.without)}" if made.without else ""),

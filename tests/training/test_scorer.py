@@ -1,13 +1,18 @@
 """The training of the learned scorer: it learns, and makes the same bytes again."""
 
+from contextlib import closing
+
 import numpy as np
 import pytest
 
+from care_sim.base.seed_ranges import TRAINING, VALIDATION
 from care_sim.cli import main
+from care_sim.envs.scenarios import DriveEnv
+from care_sim.policies import make_policy
 from care_sim.policies.learned.cell_inputs import RIG_INPUTS, SCAN_INPUTS
 from care_sim.policies.learned.weights import load_weights
 from care_sim.training import scorer
-from care_sim.training.scorer_data import Examples
+from care_sim.training.scorer_data import Examples, drawn_examples
 
 torch = pytest.importorskip("torch")
 INPUTS = SCAN_INPUTS + len(RIG_INPUTS)
@@ -21,9 +26,13 @@ def drawn(seed, count=3000):
     return Examples(inputs, positive, np.ones(count, np.float32))
 
 
+def examples():
+    return {"learned": drawn(0), "held out": drawn(1)}
+
+
 def test_it_learns_what_there_is_to_learn():
     """One label in ten is wrong: the loss cannot fall below 0.325, the entropy of that."""
-    arrays, losses = scorer.train_scorer(drawn(0), drawn(1), 0, 300)
+    arrays, losses = scorer.train_scorer(examples(), 0, 300)
     assert {name: array.shape for name, array in arrays.items()} == {
         "layer": (INPUTS, scorer.HIDDEN_UNITS),
         "bias": (scorer.HIDDEN_UNITS,),
@@ -49,12 +58,12 @@ def test_training_does_not_depend_on_the_threads_and_gives_them_back():
     made = []
     for threads in (1, 2):
         torch.set_num_threads(threads)
-        made.append(scorer.train_scorer(drawn(0), drawn(1), 0, 20)[0])
+        made.append(scorer.train_scorer(examples(), 0, 20)[0])
         assert torch.get_num_threads() == threads
     torch.set_num_threads(before)
     for name, array in made[0].items():
         assert np.array_equal(array, made[1][name])
-    other, _ = scorer.train_scorer(drawn(0), drawn(1), 1, 20)
+    other, _ = scorer.train_scorer(examples(), 1, 20)
     assert not np.array_equal(made[0]["layer"], other["layer"])
 
 
@@ -76,6 +85,37 @@ def test_the_command_writes_the_same_file_again_with_its_card(tmp_path, monkeypa
     assert card.versions["torch"] == torch.__version__
     assert set(card.result) == {"loss calibration", "loss held out"}
     assert f"{one}: loss calibration" in capsys.readouterr().out
+
+
+def test_worlds_that_differ_give_weights_that_play_and_a_card_that_says_so(tmp_path, monkeypatch):
+    """Real tests of Euro NCAP, two to learn from and one held out."""
+    played = []
+
+    def watched(kind, seed):
+        played.append((kind, seed))
+        return drawn_examples(kind, seed)
+
+    monkeypatch.setattr(scorer, "DRAWN", {"ncap": 2})
+    monkeypatch.setattr(scorer, "DRAWN_HELD_OUT", {"ncap": 1})
+    monkeypatch.setattr(scorer, "drawn_examples", watched)
+    path = tmp_path / "w.npz"
+    assert trained(path, monkeypatch, "--drawn", "--steps", "20") == 0
+    assert played == [("ncap", TRAINING), ("ncap", TRAINING + 1), ("ncap", VALIDATION)]
+    card = load_weights(path).card
+    assert card.scenario == "CARE-Drive-v0, CARE-NCAP-v0 and CARE-Street-v0"
+    assert "worlds 2 of ncap under history at 0.005 to 0.2 of the cells" in card.data
+    assert card.seeds == {
+        "learned": [TRAINING, TRAINING + 1],
+        "held out": [VALIDATION, VALIDATION],
+        "training": 0,
+    }
+    assert set(card.result) == {"loss learned", "loss held out"}
+    with closing(DriveEnv(budget=0.03)) as env:
+        observation, _ = env.reset(seed=VALIDATION)
+        own, usual = (
+            make_policy("learned-scorer", env, **told)(observation) for told in ({"path": path}, {})
+        )
+    assert not np.array_equal(own, usual)
 
 
 @pytest.mark.parametrize(

@@ -1,22 +1,26 @@
 """What the learned scorer learns from, on a street that belongs to no list."""
 
+from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from care_sim.envs.open_loop import FilmEnv
-from care_sim.policies.learned.cell_inputs import RIG_INPUTS, SCAN_INPUTS
+from care_sim.envs.scenarios import DriveEnv
+from care_sim.policies.learned.cell_inputs import RIG_INPUTS, SCAN_INPUTS, CellInputs
 from care_sim.sources.street_films import street_film
 from care_sim.streets.street import CALIBRATION_SEEDS, EVALUATION_SEEDS
+from care_sim.training import drawn_worlds
+from care_sim.training.drawn_worlds import front_alone
 from care_sim.training.scorer import HELD_OUT
 from care_sim.training.scorer_data import (
     OTHER_CELLS,
     SCORER_BUDGETS,
     Examples,
     balanced,
+    drawn_examples,
     examples,
-    front_alone,
     untracked_cells,
 )
 
@@ -93,6 +97,61 @@ def test_positive_and_other_examples_weigh_the_same_and_1_on_average():
     made = Examples(inputs, positive, np.array([0.2, 1, 1, 2], np.float32))
     weights = balanced([made, made]).weights
     assert weights == pytest.approx([2, 0.5, 0.5, 1] * 2)
+
+
+def test_in_a_drive_what_is_new_is_positive_until_it_has_a_track():
+    """Everybody who shows in enough cells for the first time; nobody whom a full scan found at the
+    keyframe before. Who was hidden since may have lost his track.
+    """
+    with closing(DriveEnv(budget=1.0, keyframe_s=0.5)) as env:
+        env.reset(seed=10_001)
+        found, last, news = set(), set(), 0
+        for number in range(24):
+            bodies = np.array([*env.loop.world.labels()])
+            boxes = env.loop.sensor.boxes_to_local(env.loop.world.boxes_of(bodies))
+            near = {*bodies[np.hypot(boxes[:, 0], boxes[:, 1]) <= 50].tolist()}
+            behind = env.loop.bodies_behind_cells()
+            shown = {body for body in bodies.tolist() if (behind == body).sum() >= 3}
+            cells, shares = untracked_cells(env.loop)
+            new = {*behind[cells].tolist()}
+            assert (shown & near) - found <= new <= (shown & near) - last
+            assert len(cells) == sum((behind == body).sum() for body in new)
+            assert shares.sum() == pytest.approx(len(new))
+            news += number > 0 and len(new)
+            last = shown
+            found |= shown
+            env.step(np.ones(env.rig.grid.shape, np.float32))
+    assert news
+
+
+def test_a_drawn_play_gives_the_same_examples_again_at_its_own_budget(monkeypatch):
+    told = []
+
+    def watched(rng, faulty):
+        told.append(conditions(rng, faulty))
+        return told[-1]
+
+    conditions = drawn_worlds._conditions
+    monkeypatch.setattr(drawn_worlds, "_conditions", watched)
+    once, again, other = ([*drawn_examples("ncap", seed)] for seed in (10_002, 10_002, 10_003))
+    assert once
+    for one, same in zip(once, again, strict=True):
+        assert np.array_equal(one.inputs, same.inputs)
+        assert np.array_equal(one.weights, same.weights)
+    assert told[0] == told[1] != told[2]
+    assert all(0.005 <= each["budget"] <= 0.2 for each in told)
+    for one in (*once, *other):
+        assert one.inputs.shape == (len(one), SCAN_INPUTS + len(RIG_INPUTS))
+        assert OTHER_CELLS * 0.9 < (~one.positive).sum() <= OTHER_CELLS
+
+
+def test_what_a_rig_tells_of_a_cell_does_not_tell_left_from_right():
+    """So no side has to be mirrored; but for two cells at the edge of a picture."""
+    for env in (DriveEnv(), FilmEnv(street_film(2000))):
+        inputs = CellInputs(env.rig).rig_inputs.reshape(*env.rig.grid.shape, -1)
+        differ = np.abs(inputs - inputs[:, ::-1]).max(axis=-1) > 1e-6
+        assert differ.sum() <= 2
+        env.close()
 
 
 @pytest.mark.slow

@@ -14,7 +14,7 @@ from care_sim.envs.scenarios import DriveEnv
 from care_sim.policies.learned.set_items import ITEM_INPUTS, STRIP_INPUTS, ItemReader, Items
 from care_sim.policies.learned.set_network import LEARNED_RETURNS, STEPS, SetNetwork
 from care_sim.policies.learned.weights import Card, load_weights, save_weights
-from care_sim.training import sets, sets_data, sets_network
+from care_sim.training import drawn_worlds, sets, sets_data, sets_network
 from care_sim.training.sets_data import Example
 
 torch = pytest.importorskip("torch")
@@ -111,9 +111,9 @@ def test_constants_are_the_shares_of_each_kind(tmp_path):
 
 
 def test_without_faults_the_camera_has_none(monkeypatch):
-    told = [sets_data._conditions(np.random.default_rng(seed), False) for seed in range(50)]
+    told = [drawn_worlds._conditions(np.random.default_rng(seed), False) for seed in range(50)]
     assert {name for one in told for name in one} == {"budget"}
-    faulty = [sets_data._conditions(np.random.default_rng(seed), True) for seed in range(50)]
+    faulty = [drawn_worlds._conditions(np.random.default_rng(seed), True) for seed in range(50)]
     assert [one["budget"] for one in told] == [one["budget"] for one in faulty]
     asked = []
     monkeypatch.setattr(sets, "play", lambda *which: asked.append(which[-1]) or [])
