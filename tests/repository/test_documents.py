@@ -143,6 +143,11 @@ def test_other_ways_through_the_network_of_pillars_answer_alike():
     np.testing.assert_allclose(told["numba"], told["PyTorch"], atol=1e-4)
 
 
+def test_by_the_proxy_the_car_brakes_for_somebody_in_view():
+    example = loaded(ROOT / "docs" / "examples" / "early_brakes.py")
+    assert -1 < example.early_s("CARE-Dartout-v0", "returns", 0) < 0
+
+
 def test_a_blind_camera_takes_nothing_from_who_asks_none(tmp_path):
     example = loaded(ROOT / "docs" / "examples" / "blind_camera.py")
     worlds = [next(world for world in published_worlds() if world.part == part) for part in PARTS]
