@@ -193,15 +193,6 @@ def test_the_blind_camera_misses_everything():
     assert {task.config.false_negative_rate for task in tasks} == {1.0}
 
 
-def test_what_a_blind_camera_leaves_stands_in_its_page(capsys):
-    page = (ROOT / "results" / "benchmark.md").read_text()
-    (names,) = re.findall(r"leaderboard/{([^}]*)}", page.replace("\\\n", ""))
-    files = [ROOT / f"results/leaderboard/{name}.json" for name in names.split(",")]
-    example = loaded(ROOT / "docs" / "examples" / "blind_camera.py")
-    example.main([ROOT / "results" / "blind-camera" / "plays.csv", *files])
-    assert capsys.readouterr().out in page
-
-
 @pytest.mark.parametrize(
     ("files", "line"),
     [([], "give the result files"), ([ROOT / "nothing.json"], "nothing.json cannot be read")],
