@@ -251,5 +251,5 @@ def test_a_file_that_is_none_is_named(tmp_path):
 
 def test_without_torch_one_line_names_the_extra(monkeypatch, tmp_path):
     monkeypatch.setitem(sys.modules, "torch", None)
-    with pytest.raises(MissingExtra, match=r"pip install 'care-sim\[rl\]'"):
+    with pytest.raises(MissingExtra, match=r"pip install -c constraints.txt -e '\.\[rl\]'"):
         make_detector("torchscript", HEIGHT, file=tmp_path / "any.pt")

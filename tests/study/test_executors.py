@@ -248,5 +248,5 @@ def test_without_dask_the_extra_is_named(monkeypatch):
         return real(name, *rest)
 
     monkeypatch.setattr(builtins, "__import__", without_dask)
-    with pytest.raises(MissingExtra, match=r"care-sim\[cluster\]"):
+    with pytest.raises(MissingExtra, match=r"\.\[cluster\]"):
         cluster("tcp://localhost:8786")

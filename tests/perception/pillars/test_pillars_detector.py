@@ -114,7 +114,7 @@ def test_a_score_beyond_its_bounds_is_refused(file, score):
 
 def test_without_pytorch_the_extra_is_named(file, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "torch", None)
-    with pytest.raises(MissingExtra, match=r"care-sim\[rl\]"):
+    with pytest.raises(MissingExtra, match=r"\.\[rl\]"):
         make_detector("pillars", HEIGHT, file=file)
 
 

@@ -70,7 +70,7 @@ def test_a_clip_that_cannot_be_written_is_refused_before_an_episode_is_played(
     ):
         Clip(tmp_path / "clip.avi")
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    with pytest.raises(MissingExtra, match=r"extra 'video': pip install 'care-sim\[video\]'"):
+    with pytest.raises(MissingExtra, match=r"extra 'video': pip install -c .* '\.\[video\]'"):
         Clip(tmp_path / "clip.mp4")
 
 
