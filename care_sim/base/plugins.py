@@ -59,7 +59,7 @@ class Plugins(Generic[Made]):
         # Installed packages are searched only for a name that is not built in.
         if not (isinstance(name, str) and (name in self.built_in or is_place(name))):
             names = self.names()
-            if name not in names:
+            if not (isinstance(name, str) and name in names):
                 raise unknown(self.kind, name, names, self._in_a_file(name))
 
     def _in_a_file(self, name: object) -> str:

@@ -80,13 +80,13 @@ def test_a_newcomer_gets_a_line(capsys, here, library, one_of_each, lot_of_a_tes
     assert code == 0
     assert re.search(r"^1 +corridor:Corridor +\d", out, re.M)
     assert "Result: runs/benchmark/corridor-Corridor.quick.json" in out
-    code, out, _ = run(capsys, *shlex.split(leaderboard)[1:], library)
+    code, out, _ = run(capsys, *shlex.split(leaderboard)[1:])
     assert code == 0
     assert {*re.findall(r"^\d +(\S+)", out, re.M)} == {"corridor:Corridor", "care", "place"}
     assert "Only the tenth of the worlds" in out
-    page = (here / "runs" / "leaderboard" / "leaderboard.md").read_text()
+    page = (here / "runs" / "trial" / "leaderboard.md").read_text()
     assert "corridor:Corridor" in page
-    assert (here / "runs" / "leaderboard" / "leaderboard.png").is_file()
+    assert (here / "runs" / "trial" / "leaderboard.png").is_file()
 
     # The same command finds all of it, and the file is the same.
     file = here / "runs" / "benchmark" / "corridor-Corridor.quick.json"
