@@ -37,8 +37,6 @@ _OUT = Path("runs/benchmark")
 class Benchmark:
     """Play the official suite: one score, and a result file.
 
-    Play the official suite and write a result file for every policy: one score and its parts.
-
     The suite is drives, Euro NCAP tests and streets at 1% of the cells. `care-sim leaderboard`
     makes the table.
     """

@@ -45,10 +45,7 @@ _COLUMNS = {
 
 @dataclass(frozen=True, kw_only=True)
 class Compare(SceneOptions):
-    """Play one seed under several policies, side by side.
-
-    Play the same seed under several policies and print their outcomes side by side.
-    """
+    """Play one seed under several policies, side by side."""
 
     scenario: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCENARIO")]
     """dartout, dense, cutin, ncap, r157, drive, that of an installed package, or MODULE:CLASS;

@@ -13,10 +13,7 @@ from care_sim.study.designs.faults import fault_study
 
 @dataclass(frozen=True, kw_only=True)
 class Faults(FixedStudy):
-    """Let every fault grow until the order of the policies changes.
-
-    Let every fault grow and find where the order of the policies changes.
-    """
+    """Let every fault grow until the order of the policies changes."""
 
     conditions: Annotated[SensingOptions, tyro.conf.arg(name="")] = DEFAULT_SENSING
     """Conditions that all episodes share, other than those that grow."""

@@ -28,15 +28,14 @@ from care_sim.study.benchmark.screening import screened_worlds
 from care_sim.study.benchmark.worlds import Salt, World
 from care_sim.study.executors import CORES, MOST_WORKERS
 
+_TABLES, _TRIALS = Path("runs/leaderboard"), Path("runs/leaderboard-quick")
+
 
 @dataclass(frozen=True, kw_only=True)
 class Leaderboard:
     """Put result files in one table, or verify them.
 
-    Make one table of results of `benchmark`, or verify them by playing a random tenth of their
-    episodes again.
-
-    Page and figure of the table go to `out`.
+    To verify one is to play a random tenth of its episodes again.
     """
 
     results: Annotated[
@@ -52,8 +51,9 @@ class Leaderboard:
     policies must be installed here."""
     sealed: Path | None = None
     """With --verify: the file with the salt of sealed results."""
-    out: Path = Path("runs/leaderboard")
-    """Folder for the page and the figure."""
+    out: Path | None = None
+    """Folder for the page and the figure; without it runs/leaderboard, and runs/leaderboard-quick
+    with --quick. A table that lies there is replaced, which is told."""
     workers: int = bounded(CORES, 1, MOST_WORKERS)
     """With --verify: processes that play at the same time."""
 
@@ -88,11 +88,13 @@ class Leaderboard:
         if self.minus != CONTROL.name and self.minus not in known:
             raise unknown("entry", self.minus, known)
         tables = [leaderboard_table(own, self.minus) for own in sets.values()]
-        page = self.out / f"{LEADERBOARD_FIGURE}.md"
+        folder = self.out or (_TRIALS if self.quick else _TABLES)
+        page = folder / f"{LEADERBOARD_FIGURE}.md"
         check_output(page)
-        check_figure(self.out / LEADERBOARD_FIGURE)
+        check_figure(folder / LEADERBOARD_FIGURE)
+        replaced = " (the earlier one is replaced)" if page.exists() else ""
         first = next(iter(sets.values()))
-        save(leaderboard_figure(first), self.out / LEADERBOARD_FIGURE)
+        save(leaderboard_figure(first), folder / LEADERBOARD_FIGURE)
         write_text(page, _page([table.markdown() for table in tables]))
         for table in tables:
             console().print(table.rich(page))
@@ -104,7 +106,7 @@ class Leaderboard:
                 f"no {self.minus} among these files: add results/leaderboard for leads",
                 file=sys.stderr,
             )
-        print(f"Page: {page}")
+        print(f"Page: {page}{replaced}")
 
     def _verified(self, results: dict[Path, BenchmarkResult]) -> list[str]:
         """Print how each result holds; a line for each that does not, or cannot be played."""

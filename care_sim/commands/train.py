@@ -116,9 +116,11 @@ class DrawCurves:
         groups = grouped_runs(map(read_run, self.folders))
         check_figure(self.out)
         table = curves_table(groups)
+        figure = self.out.with_suffix(".png")
+        replaced = " (the earlier one is replaced)" if figure.exists() else ""
         save(curves_figure(groups), self.out)
         console().print(table.rich())
-        print(self.out.with_suffix(".png"))
+        print(f"Figure: {figure}{replaced}")
         return 0
 
 

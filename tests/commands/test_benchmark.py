@@ -12,7 +12,7 @@ from care_sim.cli import main
 from care_sim.study.benchmark import worlds
 from care_sim.study.benchmark.result_file import read_result
 from care_sim.study.benchmark.tasks import Entry
-from care_sim.study.benchmark.worlds import published_worlds
+from care_sim.study.benchmark.worlds import PARTS, published_worlds
 from tests.helpers.made_results import made_result
 from tests.helpers.places import ROOT
 
@@ -24,7 +24,7 @@ TRANSCRIPT = [
     for _, text in BLOCKS
     if "python corridor.py" in text
     for line in text.splitlines()
-    if "--quick" in line
+    if line.startswith("care-sim ")
 ]
 LOT = next(
     n for n in range(99) if (r := Random(n)).sample(range(3), 1) == r.sample(range(3), 1) == [1]
@@ -46,9 +46,15 @@ def run(capsys, *words):
 
 
 @pytest.fixture
-def one_of_each(monkeypatch):
-    """A tenth as small as it can be: one drive, one test, one street."""
-    monkeypatch.setattr(worlds, "QUICK_SHARE", 120)
+def one_of_each(monkeypatch, tmp_path):
+    """A suite as small as it can be: one drive, one test, one street; so is its tenth."""
+    first = {part: next(w for w in published_worlds() if w.part == part) for part in PARTS}
+    text = json.dumps({part: [[w.seed, w.reachable]] for part, w in first.items()})
+    (tmp_path / "worlds.json").write_text(text)
+    monkeypatch.setattr(worlds, "_PUBLISHED", tmp_path / "worlds.json")
+    published_worlds.cache_clear()
+    yield
+    published_worlds.cache_clear()
 
 
 @pytest.fixture
@@ -72,10 +78,10 @@ def library(here):
     return folder
 
 
-def test_a_newcomer_gets_a_line(capsys, here, library, one_of_each, lot_of_a_test):
-    """The page's own policy and commands; its trial is cut to one world a part."""
+def test_a_newcomer_gets_a_line(capsys, here, one_of_each, library, lot_of_a_test):
+    """The page's own policy and commands; trial and whole are cut to one world a part."""
     (here / "corridor.py").write_text(POLICY)
-    benchmark, leaderboard = TRANSCRIPT
+    benchmark, leaderboard, whole, table = TRANSCRIPT
     code, out, _ = run(capsys, *shlex.split(benchmark)[1:])
     assert code == 0
     assert re.search(r"^1 +corridor:Corridor +\d", out, re.M)
@@ -84,9 +90,12 @@ def test_a_newcomer_gets_a_line(capsys, here, library, one_of_each, lot_of_a_tes
     assert code == 0
     assert {*re.findall(r"^\d +(\S+)", out, re.M)} == {"corridor:Corridor", "care", "place"}
     assert "Only the tenth of the worlds" in out
-    page = (here / "runs" / "trial" / "leaderboard.md").read_text()
-    assert "corridor:Corridor" in page
-    assert (here / "runs" / "trial" / "leaderboard.png").is_file()
+    trial = here / "runs" / "leaderboard-quick"
+    assert "corridor:Corridor" in (trial / "leaderboard.md").read_text()
+    assert (trial / "leaderboard.png").is_file()
+    assert "replaced" not in out
+    _, out, _ = run(capsys, *shlex.split(leaderboard)[1:])
+    assert f"Page: runs/{trial.name}/leaderboard.md (the earlier one is replaced)" in out
 
     # The same command finds all of it, and the file is the same.
     file = here / "runs" / "benchmark" / "corridor-Corridor.quick.json"
@@ -100,6 +109,16 @@ def test_a_newcomer_gets_a_line(capsys, here, library, one_of_each, lot_of_a_tes
     assert code == 1
     assert "Corridor" not in out
     assert "corridor-Corridor.quick.json is of --quick" in err
+
+    # The whole is one, and its table leaves that of the trial where it is.
+    before = (trial / "leaderboard.md").read_text()
+    code, out, _ = run(capsys, *shlex.split(whole)[1:])
+    assert code == 0
+    assert "Result: runs/benchmark/corridor-Corridor.json" in out
+    _, out, _ = run(capsys, *shlex.split(table)[1:])
+    assert {*re.findall(r"^\d +(\S+)", out, re.M)} == {"corridor:Corridor", "care", "place"}
+    assert "Page: runs/leaderboard/leaderboard.md" in out
+    assert (trial / "leaderboard.md").read_text() == before
 
     # Verified it holds; with every row made up it does not.
     code, out, _ = run(capsys, "leaderboard", "--verify", file)

@@ -5,6 +5,7 @@ import inspect
 import io
 import re
 import shutil
+import sys
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, Field, fields, is_dataclass
@@ -24,6 +25,7 @@ from tyro.constructors import (
 )
 
 from care_sim.base.errors import InvalidInput, shown, unknown
+from care_sim.commands.shared.help_text import Captured, grouped, wrapped
 from care_sim.commands.shared.own_defaults import settled_command
 
 UNRECOGNIZED = "Unrecognized options"
@@ -216,8 +218,9 @@ def chosen_command(
     # Sixty conditions, each of several lines, would hide the few options that a command is about.
     brief = _HELP_ALL not in arguments and not {*_HELPS}.isdisjoint(arguments)
     arguments = [_HELPS[1] if one == _HELP_ALL else one for one in arguments]
+    help_text = Captured(sys.stdout)
     try:
-        with contextlib.redirect_stderr(complaint):
+        with contextlib.redirect_stderr(complaint), contextlib.redirect_stdout(help_text):
             command: Callable[[], int] = tyro.extras.subcommand_cli_from_dict(
                 dict(commands),
                 prog=prog,
@@ -229,8 +232,8 @@ def chosen_command(
     except SystemExit as end:
         # Help ends with 0, and is what was asked for.
         if end.code in (0, None):
-            if brief:
-                _tell_conditions(commands.get(named))
+            print(wrapped(grouped(help_text.getvalue())), end="")
+            _tell_conditions(commands.get(named) if brief else None)
             raise
         if refusal := _refusal(end):
             raise refusal from None

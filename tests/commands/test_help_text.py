@@ -1,0 +1,88 @@
+"""Helps: as wide as the terminal, every option under what it is for."""
+
+import io
+from itertools import chain
+
+import pytest
+
+from care_sim.cli import main
+from care_sim.commands.entries import COMMANDS
+from care_sim.commands.shared.help_text import PURPOSES, Captured, grouped, wrapped
+
+LEARNERS = COMMANDS["train"].loaded()
+HELPS = [[name] for name in COMMANDS] + [["train", name] for name in LEARNERS]
+BOX = """\
+usage: care-sim sweep
+
+╭─ options ────────────╮
+│ -h, --help   show    │
+│ --seeds INT  so many │
+│              of them │
+│ -o PATH, --page PATH │
+│ --mine INT   unheard │
+╰──────────────────────╯
+"""
+PARTED = """\
+usage: care-sim sweep
+
+╭─ what is played ─────╮
+│ --seeds INT  so many │
+│              of them │
+╰──────────────────────╯
+╭─ what is written ────╮
+│ -o PATH, --page PATH │
+╰──────────────────────╯
+╭─ help ───────────────╮
+│ -h, --help   show    │
+╰──────────────────────╯
+╭─ options ────────────╮
+│ --mine INT   unheard │
+╰──────────────────────╯
+"""
+
+
+def help_of(capsys, words, asked):
+    with pytest.raises(SystemExit) as end:
+        main([*words, asked])
+    assert end.value.code == 0
+    return capsys.readouterr().out
+
+
+@pytest.mark.parametrize("words", HELPS, ids=" ".join)
+def test_a_help_fits_its_terminal_and_has_a_purpose_for_every_option(words, capsys, monkeypatch):
+    for columns in (80, 60):
+        monkeypatch.setenv("COLUMNS", str(columns))
+        lines = help_of(capsys, words, "--help-all").splitlines()
+        assert max(map(len, lines)) <= columns
+        assert not any(line.startswith("╭─ options ") for line in lines)
+
+
+def test_no_option_has_two_purposes_and_none_is_of_an_option_that_is_gone(capsys):
+    listed = [*chain.from_iterable(options.split(", ") for options in PURPOSES.values())]
+    assert len(set(listed)) == len(listed)
+    told = " ".join(help_of(capsys, words, "--help-all") for words in HELPS)
+    assert [option for option in listed if f"--{option}" not in told] == []
+
+
+def test_a_box_is_parted_by_purpose_and_what_is_not_known_comes_last():
+    assert grouped(BOX) == PARTED
+    assert grouped(BOX.replace("╭─", "--")) == BOX.replace("╭─", "--")
+
+
+def test_colours_and_frames_stay_as_they_were_drawn():
+    red, plain = "\x1b[31m", "\x1b[0m"
+    coloured = BOX.replace("│", f"{red}│{plain}").replace("╭", f"{red}╭{plain}")
+    expected = PARTED.replace("│", f"{red}│{plain}").replace("╭", f"{red}╭{plain}")
+    assert grouped(coloured) == expected
+
+
+def test_only_what_is_too_wide_is_wrapped(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "30")
+    assert wrapped(BOX) == BOX
+    long = "usage: care-sim train [-h] {ppo,sac,learned-sets}\n"
+    assert wrapped(long) == "usage: care-sim train [-h]\n       {ppo,sac,learned-sets}\n"
+
+
+def test_help_is_drawn_for_the_output_that_it_goes_to():
+    terminal = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
+    assert (Captured(terminal).encoding, Captured(terminal).isatty()) == ("ascii", False)
