@@ -1,7 +1,9 @@
-"""The sentences after the tables of the studies of the closed loop."""
+"""The sentences after the tables of the studies."""
 
 from collections.abc import Sequence
 
+from care_sim.reports.findings import protocol_findings, sweep_findings
+from care_sim.reports.protocol.closing import protocol_closing
 from care_sim.reports.tables import order, validate
 from care_sim.reports.tables.paper_statements import statements
 from care_sim.study.designs.faults import common_conditions
@@ -16,14 +18,28 @@ def collisions(rows: Sequence[Row]) -> str:
     return f"Collisions: {sum(row['collision'] for row in rows)} in {len(rows)} episodes."
 
 
-def sweep_closing(rows: Sequence[Row]) -> list[str]:
+def episodes_closing(rows: Sequence[Row]) -> list[str]:
     """Collisions alone."""
     return [collisions(rows)]
 
 
+def sweep_closing(rows: Sequence[Row]) -> list[str]:
+    """Who leads where, and collisions."""
+    return [*sweep_findings(rows), collisions(rows)]
+
+
 def paper_closing(rows: Sequence[Row]) -> list[str]:
-    """What the paper says, beside what was measured."""
-    return [f'{collisions(rows)} Paper: "{NO_COLLISION}"', *map(str, statements(rows))]
+    """Who leads where nothing fails, and what the paper says beside what was measured."""
+    return [
+        *sweep_findings(rows, conditions=False),
+        f'{collisions(rows)} Paper: "{NO_COLLISION}"',
+        *map(str, statements(rows)),
+    ]
+
+
+def first_sighting_closing(rows: Sequence[Row]) -> list[str]:
+    """Who leads where, the size of the study and the paper's gate."""
+    return [*protocol_findings(rows), *protocol_closing(rows)]
 
 
 def validation_closing(rows: Sequence[Row]) -> list[str]:

@@ -7,6 +7,12 @@ from matplotlib.figure import Figure
 
 from care_sim.base.errors import unknown
 from care_sim.reports import captions, closings
+from care_sim.reports.figures.ablations import (
+    ABLATION_FIGURE,
+    OPEN_ABLATION_FIGURE,
+    ablation_figures,
+    open_ablation_figures,
+)
 from care_sim.reports.figures.budget import BUDGET_FIGURES, sweep_figures
 from care_sim.reports.figures.crowding import CROWDING_FIGURE, crowding_figures
 from care_sim.reports.figures.faults import FAULT_FIGURES, fault_figures
@@ -100,7 +106,7 @@ _ALL = (
         "Crowding in the closed loop",
         crowding_tables,
         crowding_figures,
-        closings.sweep_closing,
+        closings.episodes_closing,
         (CROWDING_FIGURE,),
         columns={VEHICLES_COLUMN: COUNT},
     ),
@@ -109,7 +115,7 @@ _ALL = (
         "Cut-ins of UN Regulation 157",
         r157_tables,
         r157_figures,
-        closings.sweep_closing,
+        closings.episodes_closing,
         (R157_FIGURE,),
         captions.R157_CAPTION,
         columns=_CASE_COLUMNS,
@@ -118,9 +124,9 @@ _ALL = (
         "ablate",
         "Ablations of the closed loop",
         ablation_tables,
-        _no_figures,
-        closings.sweep_closing,
-        (),
+        ablation_figures,
+        closings.episodes_closing,
+        (ABLATION_FIGURE,),
     ),
     Study(
         "faults",
@@ -135,7 +141,7 @@ _ALL = (
         "The vehicle study",
         vehicle_tables,
         vehicle_figures,
-        closings.sweep_closing,
+        closings.episodes_closing,
         (VEHICLE_FIGURE,),
         captions.VEHICLE_CAPTION,
         VEHICLE,
@@ -164,7 +170,7 @@ _ALL = (
         "Hardware in the closed loop",
         firing_tables,
         firing_figures,
-        closings.sweep_closing,
+        closings.episodes_closing,
         (FIRING_FIGURE,),
     ),
     Study(
@@ -220,9 +226,9 @@ _ALL = (
         "ablate-open-loop",
         "Ablations of the open loop",
         open_ablations.ablation_tables,
-        _no_figures,
+        open_ablation_figures,
         open_ablations.ablation_closing,
-        (),
+        (OPEN_ABLATION_FIGURE,),
         captions.PROTOCOL_CAPTION,
         PLAYS,
     ),
@@ -231,7 +237,7 @@ _ALL = (
         "First sightings in the open loop",
         protocol_tables,
         protocol_figures,
-        protocol_closing,
+        closings.first_sighting_closing,
         PROTOCOL_FIGURES,
         captions.PROTOCOL_CAPTION,
         PLAYS,

@@ -12,6 +12,8 @@ LEADERBOARD_FIGURE = "leaderboard"
 _PARTS = {"drives": ("#D55E00", "v"), "tests": ("#E69F00", "s"), "streets": ("#0072B2", "^")}
 """From the palette of Okabe and Ito (2008), safe for the colour-blind."""
 _LINE_INCHES = 0.28
+_APART = 0.22
+"""By how much of a line the markers of two parts are moved apart, so that equal ones are seen."""
 
 
 def leaderboard_figure(results: Sequence[BenchmarkResult]) -> Figure:
@@ -20,10 +22,12 @@ def leaderboard_figure(results: Sequence[BenchmarkResult]) -> Figure:
     figure = Figure(figsize=(8.0, 1.4 + _LINE_INCHES * len(ranked)), layout="constrained")
     axes = figure.subplots()
     lines = range(len(ranked))
-    for part in results[0].parts:
+    middle = (len(results[0].parts) - 1) / 2
+    for number, part in enumerate(results[0].parts):
         colour, marker = _PARTS[part]
         shares = [result.part_score(part) for result in ranked]
-        axes.scatter(shares, lines, s=22, color=colour, marker=marker, label=part, zorder=3)
+        heights = [line + _APART * (middle - number) for line in lines]
+        axes.scatter(shares, heights, s=22, color=colour, marker=marker, label=part, zorder=3)
     scores = [result.score() for result in ranked]
     means = [score.mean for score in scores]
     ends = [

@@ -56,16 +56,16 @@ def ablation_tables(rows: Sequence[Row]) -> list[Table]:
     """One table per ablation: at every budget its levels less the usual one, then less each
     reference.
     """
-    study = _AblationPlays(rows)
+    study = AblationPlays(rows)
     return [study.table(ablation) for ablation in OPEN_ABLATIONS]
 
 
 def ablation_closing(rows: Sequence[Row]) -> list[str]:
     """Size of the study, the gate, and what the full scan finds."""
-    return [*protocol_closing(rows), *_AblationPlays(rows).ceiling()]
+    return [*protocol_closing(rows), *AblationPlays(rows).ceiling()]
 
 
-class _AblationPlays:
+class AblationPlays:
     """The plays of the study, the budgets, and the policies that were played beside its own."""
 
     def __init__(self, rows: Sequence[Row]):
