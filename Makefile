@@ -3,6 +3,7 @@
 # make test       set up with the development tools, run every test
 # make dist       build the sdist, and the wheel from it, in dist/
 # make test-installed   install that wheel in an environment of its own, run the sdist's tests with it
+# make test-extras   install that wheel with one extra after the other, each alone, and use it; EXTRAS="page video"
 # make test-speed   hold the ratios of speed to the published ones; nothing else may run meanwhile
 # make docs       build the documentation's site into build/site
 # make check      format, lint, types, tests
@@ -53,7 +54,7 @@ define python_is_fit
 endef
 asked = $(shell { $(PYTHON) -c "import ensurepip, sys; print('yes' if $(1) else 'no')"; } 2>/dev/null)
 
-.PHONY: setup reproduce test test-installed test-speed dist check docs lint torture official official-precision test-official clean
+.PHONY: setup reproduce test test-installed test-extras test-speed dist check docs lint torture official official-precision test-official clean
 
 setup: $(VENV)/.installed
 
@@ -92,6 +93,9 @@ test-installed: dist
 	tar xzf dist/*.tar.gz -C $(INSTALLED)/sdist --strip-components 1
 	rm -r $(INSTALLED)/sdist/care_sim
 	cd $(INSTALLED)/sdist && ../venv/bin/python -m pytest --numprocesses 2 --dist worksteal
+
+test-extras: dist
+	$(BIN)/python -m tests.extras_alone $$(echo dist/*.whl) constraints.txt $(EXTRAS)
 
 test-speed: $(VENV)/.developing
 	$(BIN)/python -m pytest -m speed

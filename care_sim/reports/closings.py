@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from care_sim.base.errors import counted
 from care_sim.reports.findings import protocol_findings, sweep_findings
 from care_sim.reports.protocol.closing import protocol_closing
 from care_sim.reports.tables import order, validate
@@ -15,7 +16,9 @@ from care_sim.study.run_config import FULL, Row
 
 def collisions(rows: Sequence[Row]) -> str:
     """Collisions over all rows."""
-    return f"Collisions: {sum(row['collision'] for row in rows)} in {len(rows)} episodes."
+    return (
+        f"Collisions: {sum(row['collision'] for row in rows)} in {counted(len(rows), 'episode')}."
+    )
 
 
 def episodes_closing(rows: Sequence[Row]) -> list[str]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from care_sim.base.errors import percent
+from care_sim.base.errors import counted, percent
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, Tallies, among, ratio_level
 from care_sim.reports.contrasts import AVOIDED, DETECTION, Measure, contrast, preventable
 from care_sim.reports.controls import is_control
@@ -138,7 +138,7 @@ def _episodes(
 
     def hit(policy: str) -> str:
         collisions = sum(row["collision"] for row in threatened[policy])
-        return f"in {collisions} of {len(threatened[policy])} episodes"
+        return f"in {collisions} of {counted(len(threatened[policy]), 'episode')}"
 
     if any(row["collision"] for rows in threatened.values() for row in rows):
         yield _contest(AVOIDED, threatened, tags, place, "collides least", hit)

@@ -10,7 +10,7 @@ from datetime import timedelta
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from care_sim.base.errors import report_problems
+from care_sim.base.errors import counted, report_problems
 from care_sim.study.executors import ExecutorFactory
 from care_sim.study.journal import Journal
 from care_sim.study.remaining_time import RemainingTime
@@ -44,14 +44,13 @@ def run_with_progress(
     """
     found = [(config, journal[config.key]["wall_s"]) for config in configs if config.key in journal]
     remaining = RemainingTime((config for config in configs if config.key not in journal), found)
-    unit = kind.unit
-    with shown_progress(len(configs), unit) as show:
+    with shown_progress(len(configs), kind.unit) as show:
         reporter = ProgressReporter(remaining, show, len(configs))
         failures = run_all(
             configs, journal, workers, make_executor, reporter, kind.play_batch, kind.most
         )
     if len(found) < len(configs):
-        print(reporter.summary(unit), file=sys.stderr)
+        print(reporter.summary(kind.task), file=sys.stderr)
     return failures
 
 
@@ -126,9 +125,9 @@ class ProgressReporter(RunListener):
         with suppress(OSError):  # the terminal may be what is gone
             print("interrupted: what is played now is finished first", file=sys.stderr, flush=True)
 
-    def summary(self, unit: str) -> str:
-        """How long it took, and how long it should have."""
-        took = f"{self._new} {unit} took {_exact(self._clock() - self._started)}"
+    def summary(self, task: str) -> str:
+        """How long the tasks took, and how long they should have."""
+        took = f"{counted(self._new, task)} took {_exact(self._clock() - self._started)}"
         # Of fewer tasks than twenty, one is more than the share after which a prediction counts.
         if self._new < 1 / _EARLY or math.isnan(self._predicted_s):
             return took

@@ -54,8 +54,8 @@ class ResultsFormat:
     `file` holds the rows that are kept, in columns of the `schema`.
     """
 
-    unit: str
-    """What its tasks are called."""
+    task: str
+    """What one of its tasks is called."""
     play_batch: PlayBatch
     """Plays a batch of tasks."""
     most: int | None
@@ -70,6 +70,11 @@ class ResultsFormat:
     """Configurations as plain data."""
     further_files: Callable[[Sequence[Row]], dict[str, dict[str, Any]]] = lambda _rows: {}
     """Columns by file name, made of the rows as they were played."""
+
+    @property
+    def unit(self) -> str:
+        """What its tasks are called."""
+        return f"{self.task}s"
 
 
 _BY_WRITER = {
@@ -161,7 +166,7 @@ _VEHICLE = Schema(
     },
 )
 EPISODES = ResultsFormat(
-    unit="episodes",
+    task="episode",
     play_batch=play_episodes,
     most=MOST_TOGETHER,
     kept_rows=with_added_columns,
@@ -170,7 +175,7 @@ EPISODES = ResultsFormat(
     listed=listed_episodes,
 )
 VEHICLE = ResultsFormat(
-    unit="watched episodes",
+    task="watched episode",
     play_batch=play_vehicle,
     most=1,
     kept_rows=with_added_columns,
@@ -179,7 +184,7 @@ VEHICLE = ResultsFormat(
     listed=listed_episodes,
 )
 PLAYS = ResultsFormat(
-    unit="plays",
+    task="play",
     play_batch=play_scene,
     most=None,
     # The events have a file of their own, one row per event and play.
@@ -190,7 +195,7 @@ PLAYS = ResultsFormat(
     further_files=lambda rows: {"events.parquet": event_columns(rows)},
 )
 MECHANISM = ResultsFormat(
-    unit="accounted plays",
+    task="accounted play",
     play_batch=play_mechanism,
     most=None,
     kept_rows=with_tags,

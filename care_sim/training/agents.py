@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from care_sim.base.checks import check_path, is_number
-from care_sim.base.errors import InvalidInput, shown
+from care_sim.base.errors import InvalidInput, counted, shown
 from care_sim.policies import BUILT_IN
 from care_sim.policies.learned.weights import Card, load_weights, shipped_weights
 from care_sim.study.parameters import Parameters
@@ -152,7 +152,7 @@ def _validation(result: Mapping[str, Any]) -> str:
     """The figure that told the kept weights from others; empty where none did."""
     scored = result.get("validation")
     if isinstance(scored, dict):
-        return f"return {scored['mean_return']:.2f}, {scored['episodes']} episodes"
+        return f"return {scored['mean_return']:.2f}, {counted(scored['episodes'], 'episode')}"
     held_out = [f"{name} {loss:.3f}" for name, loss in result.items() if "held out" in name]
     return ", ".join(held_out)
 

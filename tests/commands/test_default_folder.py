@@ -40,7 +40,7 @@ def played(here, folder):
 
 def test_a_study_goes_on_in_its_folder_and_another_beside_it(here, sweep):
     out, err = sweep("--scenarios dartout --seeds 1")
-    assert err.startswith("Results go to runs/sweep: 1 episodes\n")
+    assert err.startswith("Results go to runs/sweep: 1 episode\n")
     assert "Results are in runs/sweep\nTables: runs/sweep/tables.md\n" in out
     assert out.endswith("Page: care-sim report runs/sweep -o runs/sweep/report.html\n")
 

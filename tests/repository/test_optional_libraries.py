@@ -12,6 +12,7 @@ import tomllib
 import pytest
 
 from care_sim.base.extras import install_command
+from tests.extras_alone import USES
 from tests.helpers.places import ROOT
 from tests.repository.test_house import MODULES, imported
 
@@ -219,3 +220,7 @@ def test_a_command_without_its_extra_says_so_in_a_line(tmp_path):
         assert [hint for hint in hints if not hint.startswith("hyperparameters of ")] == [], command
         assert f"pip install -c constraints.txt -e '.[{extra}]'" in line, command
         assert end == "exit 2", command
+
+
+def test_every_extra_is_tried_alone():
+    assert {*USES} == {*EXTRAS} - FOR_DEVELOPERS

@@ -153,7 +153,7 @@ def test_the_reporter_counts_down_and_says_how_good_it_was():
     reporter.playing(2)
     assert shown[:3] == [(10, "no worker is connected"), (10, ""), (11, "39 s left")]
     assert shown[-1] == (50, "0 s left")
-    assert reporter.summary("episodes") == "40 episodes took 0:00:40; 0:00:40 predicted after 5%"
+    assert reporter.summary("episode") == "40 episodes took 0:00:40; 0:00:40 predicted after 5%"
 
 
 def test_an_episode_that_fails_is_counted_and_takes_no_time():
@@ -165,7 +165,7 @@ def test_an_episode_that_fails_is_counted_and_takes_no_time():
     reporter.playing(1)
     reporter.finished(configs[0], None)
     assert shown[-1] == (1, "0 s left")
-    assert reporter.summary("episodes") == "3 episodes took 0:00:00"
+    assert reporter.summary("episode") == "3 episodes took 0:00:00"
 
 
 def test_what_was_begun_before_the_first_had_ended_tells_nothing_of_the_rest():
@@ -185,7 +185,7 @@ def test_what_was_begun_before_the_first_had_ended_tells_nothing_of_the_rest():
             reporter.begun(following)
     assert shown[1:4] == [(1, ""), (2, ""), (3, "37 s left")]
     assert shown[-1] == (40, "0 s left")
-    assert reporter.summary("episodes") == "40 episodes took 0:01:38; 0:01:38 predicted after 8%"
+    assert reporter.summary("episode") == "40 episodes took 0:01:38; 0:01:38 predicted after 8%"
 
 
 def test_a_run_of_one_round_is_never_predicted():
@@ -195,7 +195,7 @@ def test_a_run_of_one_round_is_never_predicted():
     reporter.begun(configs)
     for config in configs:
         reporter.finished(config, {"wall_s": 2.0})
-    assert reporter.summary("episodes") == "20 episodes took 0:00:00"
+    assert reporter.summary("episode") == "20 episodes took 0:00:00"
 
 
 def test_that_the_first_take_longer_is_said_once_and_nothing_done_is_told_each_minute(capsys):

@@ -58,7 +58,11 @@ def run_study(
     _check(folder, configs, study, force)
     with _journal(folder, study) as journal:
         _check(folder, configs, study, force, journal)
-        print(f"Results go to {folder}: {len(configs)} {kind.unit}", file=sys.stderr, flush=True)
+        print(
+            f"Results go to {folder}: {counted(len(configs), kind.task)}",
+            file=sys.stderr,
+            flush=True,
+        )
         others = _say_what_is_found(configs, journal, folder, kind.unit)
         Unfinished(study.name, kind.unit, len(configs), others, command).write(folder)
 

@@ -1,0 +1,85 @@
+"""Install the wheel with one extra after the other, each in an environment of its own, and do what
+the extra is for: `make test-extras`, or `make test-extras EXTRAS="page video"`.
+"""
+
+import subprocess
+import sys
+import tempfile
+import venv
+from pathlib import Path
+
+SHORT = "--scenario-parameters duration_s=0.5"
+SCHEDULER = """
+from distributed import LocalCluster
+from care_sim.cli import main
+
+if __name__ == "__main__":
+    with LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster:
+        main(["sweep", "--scenarios", "cutin", "--seeds", "1", "--cluster",
+              cluster.scheduler_address])
+"""
+VECTOR = """
+import gymnasium as gym
+import care_sim
+from care_sim.wrappers import VectorGridObservation, VectorSectorReserve
+from torchrl.envs import GymWrapper
+
+made = gym.make_vec("CARE-Dense-v0", num_envs=2, autoreset_mode="Disabled", duration_s=0.5)
+print(GymWrapper(VectorGridObservation(VectorSectorReserve(made))).rollout(3).shape)
+"""
+USES = {
+    "open3d": [f"care-sim run dense --policy farthest-points {SHORT} --export scans"],
+    "rl": [
+        f"care-sim run dense --detector pillars {SHORT}",
+        "care-sim train ppo --env CARE-CutIn-v0 --steps 1024 --episodes 1 --out ppo",
+    ],
+    "tune": [
+        "care-sim train ppo --env CARE-CutIn-v0 --steps 1024 --episodes 1 --tune 1 --out tune"
+    ],
+    "torchrl": ["python vector.py"],
+    "viewer": [f"care-sim run dense {SHORT} --record a.rrd"],
+    "page": [
+        "care-sim sweep --scenarios cutin --seeds 1 --out study",
+        "care-sim report study -o page.html",
+    ],
+    "bench": ["care-sim bench --seconds 0.01 --repeats 1 --samples 3 --resets 3 --seeds 0"],
+    "video": [f"care-sim run dense {SHORT} --video a.mp4"],
+    "cluster": ["python cluster.py"],
+}
+"""What each extra is for, as commands; what they write lies in an empty folder."""
+
+
+def fails(extra: str, wheel: Path, constraints: Path) -> str:
+    """What went wrong with an extra, in the words of the command; empty where all is well."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "cluster.py").write_text(SCHEDULER)
+        (folder / "vector.py").write_text(VECTOR)
+        venv.create(folder / "venv", with_pip=True)
+        install = f"python -m pip install --quiet --constraint {constraints} {wheel}[{extra}]"
+        for command in (install, *USES[extra]):
+            program, *words = command.split()
+            done = subprocess.run(
+                [folder / "venv" / "bin" / program, *words],
+                cwd=folder,
+                capture_output=True,
+                text=True,
+                check=False,
+            )
+            if done.returncode != 0:
+                return f"{command}\n{done.stdout[-1000:]}{done.stderr[-2000:]}"
+    return ""
+
+
+def main(wheel: str, constraints: str, *extras: str) -> int:
+    """A line for every extra; 1 where one fails."""
+    failed = False
+    for extra in extras or USES:
+        problem = fails(extra, Path(wheel).resolve(), Path(constraints).resolve())
+        print(f"{extra}: {problem or 'works alone'}", flush=True)
+        failed |= bool(problem)
+    return int(failed)
+
+
+if __name__ == "__main__":
+    sys.exit(main(*sys.argv[1:]))
