@@ -56,9 +56,9 @@ def fails(extra: str, wheel: Path, constraints: Path) -> str:
         (folder / "cluster.py").write_text(SCHEDULER)
         (folder / "vector.py").write_text(VECTOR)
         venv.create(folder / "venv", with_pip=True)
-        install = f"python -m pip install --quiet --constraint {constraints} {wheel}[{extra}]"
-        for command in (install, *USES[extra]):
-            program, *words = command.split()
+        install = ["python", "-m", "pip", "install", "--quiet", "--constraint", f"{constraints}"]
+        for command in ([*install, f"{wheel}[{extra}]"], *map(str.split, USES[extra])):
+            program, *words = command
             done = subprocess.run(
                 [folder / "venv" / "bin" / program, *words],
                 cwd=folder,
@@ -67,12 +67,15 @@ def fails(extra: str, wheel: Path, constraints: Path) -> str:
                 check=False,
             )
             if done.returncode != 0:
-                return f"{command}\n{done.stdout[-1000:]}{done.stderr[-2000:]}"
+                return f"{' '.join(command)}\n{done.stdout[-1000:]}{done.stderr[-2000:]}"
     return ""
 
 
 def main(wheel: str, constraints: str, *extras: str) -> int:
     """A line for every extra; 1 where one fails."""
+    if unknown := {*extras} - {*USES}:
+        print(f"no extra {', '.join(sorted(unknown))}; those that are tried: {', '.join(USES)}")
+        return 2
     failed = False
     for extra in extras or USES:
         problem = fails(extra, Path(wheel).resolve(), Path(constraints).resolve())

@@ -48,6 +48,11 @@ def replacing(path: Path, kind: bytes = b"") -> Iterator[Path]:
         yield unfinished
 
 
+def told_if_replaced(path: Path) -> str:
+    """The path as it is told when it is about to be written, and whether something lies there."""
+    return f"{path} (the earlier one is replaced)" if path.exists() else str(path)
+
+
 def check_output(path: Path, kind: bytes = b"") -> None:
     """Raise InvalidInput for a `path` that nothing can be written to, that this process is writing
     already, or that holds a file which does not begin like one of `kind`. Raise OSError where

@@ -13,7 +13,7 @@ import tyro
 
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.errors import InvalidInput, MissingExtra, counted, report_problems, unknown
-from care_sim.base.files import check_output, write_text
+from care_sim.base.files import check_output, told_if_replaced, write_text
 from care_sim.base.json_text import json_content
 from care_sim.commands.shared.study_command import DONE, FAILED, console
 from care_sim.reports.figures.files import check_figure, save
@@ -92,7 +92,7 @@ class Leaderboard:
         page = folder / f"{LEADERBOARD_FIGURE}.md"
         check_output(page)
         check_figure(folder / LEADERBOARD_FIGURE)
-        replaced = " (the earlier one is replaced)" if page.exists() else ""
+        told = told_if_replaced(page)
         first = next(iter(sets.values()))
         save(leaderboard_figure(first), folder / LEADERBOARD_FIGURE)
         write_text(page, _page([table.markdown() for table in tables]))
@@ -106,7 +106,7 @@ class Leaderboard:
                 f"no {self.minus} among these files: add results/leaderboard for leads",
                 file=sys.stderr,
             )
-        print(f"Page: {page}{replaced}")
+        print(f"Page: {told}")
 
     def _verified(self, results: dict[Path, BenchmarkResult]) -> list[str]:
         """Print how each result holds; a line for each that does not, or cannot be played."""

@@ -14,7 +14,10 @@ from care_sim.study.episode_config import grid
 
 @dataclass(frozen=True, kw_only=True)
 class Sweep(EpisodeStudy):
-    """Play every combination of scenarios, policies, budgets, faults."""
+    """Play every combination of scenarios, policies, budgets, faults.
+
+    Each is played on every seed.
+    """
 
     scenarios: tuple[str, ...] = ("dartout", "dense", "cutin")
     """Names of `care-sim scenarios`, or MODULE:CLASS; `all` stands for all that have a name."""

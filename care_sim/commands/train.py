@@ -11,6 +11,7 @@ import tyro
 
 from care_sim.base.bounds import bounded
 from care_sim.base.errors import InvalidInput
+from care_sim.base.files import told_if_replaced
 from care_sim.commands.shared.end_of_training import end_of_training
 from care_sim.commands.shared.study_command import console
 from care_sim.reports.figures.files import check_figure, save
@@ -116,11 +117,10 @@ class DrawCurves:
         groups = grouped_runs(map(read_run, self.folders))
         check_figure(self.out)
         table = curves_table(groups)
-        figure = self.out.with_suffix(".png")
-        replaced = " (the earlier one is replaced)" if figure.exists() else ""
+        told = told_if_replaced(self.out.with_suffix(".png"))
         save(curves_figure(groups), self.out)
         console().print(table.rich())
-        print(f"Figure: {figure}{replaced}")
+        print(f"Figure: {told}")
         return 0
 
 

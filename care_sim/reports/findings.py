@@ -1,183 +1,225 @@
-"""What a study showed, in plain words: at every budget which policy leads, and whether the best
-control does as well.
+"""What a study showed, in plain words: at every budget who leads, and whether a control does as
+well.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from care_sim.base.errors import counted, percent
-from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, Tallies, among, ratio_level
-from care_sim.reports.contrasts import AVOIDED, DETECTION, Measure, contrast, preventable
+from care_sim.evaluation.censoring import FEWEST_PAIRS
+from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, among, ratio_level
+from care_sim.reports.contrasts import (
+    AVOIDED,
+    DETECTION,
+    GATE_POINTS,
+    Measure,
+    contrast,
+    preventable,
+)
 from care_sim.reports.controls import is_control
 from care_sim.reports.formatting import MARKS, ShownDifference, interval
-from care_sim.reports.protocol.differences import PolicyPair
+from care_sim.reports.protocol.differences import MeasuredDifference, PolicyPair
+from care_sim.reports.protocol.notes import on_intervals
 from care_sim.reports.protocol.rows import SettingPlays, plays_by_setting
 from care_sim.study.rows.reading import Groups, full_of, grouped, policy_of, tags_of_row
 from care_sim.study.rows.settings import Setting
 from care_sim.study.run_config import FULL, Row
 
 _HINDSIGHT = (
-    "First and best control are chosen at each budget by the very results that are compared."
+    "Who is first, and the best control, are chosen at each budget by the very results that are "
+    "compared, which favours whoever is chosen; the number of comparisons is not corrected for."
 )
 _MOST_NAMED = 3
-"""So many policies that cannot be told from the first are named; of more, how many they are."""
+"""So many policies are named in a row; of more, how many they are."""
+_Tags = Mapping[str, tuple[str, ...]]
+
+
+class _Verb(NamedTuple):
+    """What the first of a contest does, or the first of several, or all alike."""
+
+    one: str
+    several: str
+    all: str
+
+
+_DETECT = _Verb("detects farthest", "detect farthest", "detect equally far")
+_COLLIDE = _Verb("collides least", "collide least", "collide equally often")
+_FIND = _Verb(
+    "finds most first sightings at once",
+    "find most first sightings at once",
+    "find equally many first sightings at once",
+)
 
 
 @dataclass(frozen=True)
 class _Contest:
-    """Policies at one budget in one setting: `levels` are their means, the highest the best, over
-    what all of them have played; `told` says one in words, `difference` holds two against each
-    other.
+    """The policies that a car can have, controls too, at one budget in one setting, over what all
+    of them have played.
+
+    `levels` are means, the highest the best; `told` says one in words. `difference` holds two
+    against each other, and counts from `gate` on.
     """
 
     place: str
-    leads: str
+    verb: _Verb
     unit: str
-    tags: Mapping[str, tuple[str, ...]]
+    gate: float
+    tags: _Tags
     levels: Mapping[str, float]
     told: Callable[[str], str]
     difference: Callable[[str, str], ShownDifference | None]
 
-    def finding(self) -> Iterator[str]:
-        """A sentence on the first of the policies that a car can have; none where it is alone."""
-        rivals = [policy for policy in self.levels if not is_control(self.tags[policy])]
-        controls = [policy for policy in self.levels if policy not in rivals]
-        contenders = [policy for policy in rivals if {*MARKS}.isdisjoint(self.tags[policy])]
-        if not contenders or len(contenders) + len(controls) < 2:
+    def findings(self) -> Iterator[str]:
+        """One sentence, or none where there is nobody to compare."""
+        others = [policy for policy in self.levels if not is_control(self.tags[policy])]
+        controls = [policy for policy in self.levels if policy not in others]
+        if not others or len(self.levels) < 2:
             return
-        first = max(contenders, key=self.levels.__getitem__)
-        others = [policy for policy in contenders if policy != first]
-        yield "".join(
-            [
-                f"{self.place}: {first} {self.leads}, {self.told(first)}",
-                self._beside(first, others),
-                self._over(first, max(controls, key=self.levels.__getitem__)) if controls else "",
-                ".",
-            ]
-        )
+        first = max(self.levels, key=self.levels.__getitem__)
+        over = {policy: self.difference(first, policy) for policy in self.levels if policy != first}
+        tied = [first, *(policy for policy, each in over.items() if _is_nothing(each))]
+        if len(tied) == len(self.levels):
+            with_controls = ", controls included" if controls else ""
+            yield (
+                f"{self.place}: all {len(tied)} policies {self.verb.all}, "
+                f"{self.told(first)}{with_controls}."
+            )
+            return
+        alike = [p for p, each in over.items() if p not in tied and not _is_ahead(each)]
+        leads = self.verb.one if len(tied) == 1 else self.verb.several
+        parts = [f"{self.place}: {_names(tied)} {leads}, {self.told(first)}"]
+        if alike:
+            them = "it" if len(tied) == 1 else "them"
+            parts.append(f"{_names(alike)} cannot be told from {them}")
+        if controls:
+            best, control = (max(own, key=self.levels.__getitem__) for own in (others, controls))
+            parts.append(self._beside_control(best, control))
+        yield f"{'; '.join(parts)}."
 
-    def _beside(self, first: str, others: Sequence[str]) -> str:
-        """Who cannot be told from the first."""
-        alike = [policy for policy in others if not self._sign(first, policy)]
-        if not alike:
-            return "" if not others else ", ahead of every other policy"
-        if len(alike) > _MOST_NAMED:
-            return f"; {len(alike)} others cannot be told from it"
-        return f"; {', '.join(alike)} cannot be told from it"
-
-    def _over(self, first: str, control: str) -> str:
-        """What the first has over the best control, which is chosen in hindsight."""
-        difference = self.difference(first, control)
-        if difference is None:
-            return ""
-        sign = self._sign(first, control)
-        words = {1: "it beats", 0: "it cannot be told from", -1: "it is beaten by"}[sign]
-        return f"; {words} the best control, {control} ({interval(difference)} {self.unit})"
-
-    def _sign(self, ours: str, theirs: str) -> int:
-        difference = self.difference(ours, theirs)
+    def _beside_control(self, best: str, control: str) -> str:
+        """How the best of the others stands to the best control."""
+        difference = self.difference(best, control)
+        if _is_nothing(difference):
+            return f"the best control, {control}, does exactly as well as {best}"
+        measured = f"({interval(difference)}, {self.unit})" if difference else "(nothing shared)"
         if difference is None or not difference.excludes_zero:
-            return 0
-        return 1 if difference.mean > 0 else -1
+            return f"{best} and the best control, {control}, cannot be told apart {measured}"
+        little = ", by less than the gate" if abs(difference.mean) < self.gate else ""
+        if difference.mean > 0:
+            return f"{best} is ahead of the best control, {control}{little} {measured}"
+        return f"the best control, {control}, is ahead of {best}{little} {measured}"
 
 
 def sweep_findings(rows: Sequence[Row], conditions: bool = True) -> list[str]:
     """Who detects farthest in every setting at every budget, and who collides least where a full
-    scan would not; without `conditions` in the plain settings alone.
+    scan would not; without `conditions` in the plain settings alone. Nothing of fewer than
+    `FEWEST_PAIRS` seeds that all policies share.
     """
     groups = grouped(rows)
     tags = {policy_of(row): tags_of_row(row) for row in rows}
-    places = dict.fromkeys(
-        (setting, budget) for setting, policy, budget in groups if policy != FULL
-    )
+    budgets: dict[Setting, set[float]] = {}
+    for setting, policy, budget in groups:
+        if policy != FULL:
+            budgets.setdefault(setting, set()).add(budget)
     return _with_hindsight(
         sentence
-        for setting, budget in places
+        for setting, own in budgets.items()
         if conditions or not setting.conditions
+        for budget in sorted(own)
         for contest in _episodes(groups, tags, setting, budget)
-        for sentence in contest.finding()
+        for sentence in contest.findings()
     )
 
 
 def protocol_findings(rows: Sequence[Row]) -> list[str]:
     """Who finds most first sightings at once in every setting at every budget."""
-    return _with_hindsight(
+    shown: list[MeasuredDifference] = []
+    found = _with_hindsight(
         sentence
         for plays in plays_by_setting(rows)
         for budget in plays.budgets
-        for sentence in _plays(plays, budget).finding()
+        for sentence in _plays(plays, budget, shown).findings()
     )
+    return [*found, *on_intervals(shown)]
 
 
-def _with_hindsight(sentences: Iterable[str]) -> list[str]:
-    found = [*sentences]
-    return [*found, _HINDSIGHT] if found else []
-
-
-def _episodes(
-    groups: Groups, tags: Mapping[str, tuple[str, ...]], setting: Setting, budget: float
-) -> Iterator[_Contest]:
+def _episodes(groups: Groups, tags: _Tags, setting: Setting, budget: float) -> Iterator[_Contest]:
     """The contests of a setting at a budget: first detections, and collisions if there are any."""
-    own = {
+    played = {
         policy: rows
         for (of, policy, at), rows in groups.items()
-        if (of, at) == (setting, budget) and policy != FULL
+        if (of, at) == (setting, budget) and _is_real(policy, tags)
     }
+    if not played:
+        return
+    # A policy that lacks a hard seed would lead by that.
+    shared = set.intersection(*({row["seed"] for row in rows} for rows in played.values()))
+    if len(shared) < FEWEST_PAIRS:
+        return
+    own = {p: [row for row in rows if row["seed"] in shared] for p, rows in played.items()}
     place = f"{setting.label}, {percent(budget)}"
-
-    def metres(policy: str) -> str:
-        return f"{_mean(DETECTION, own[policy]):.1f} m on average"
-
-    yield _contest(DETECTION, own, tags, place, "detects farthest", metres)
-    threatened = {
-        policy: preventable(full, rows) if (full := full_of(groups, setting)) else rows
-        for policy, rows in own.items()
-    }
-
-    def hit(policy: str) -> str:
-        collisions = sum(row["collision"] for row in threatened[policy])
-        return f"in {collisions} of {counted(len(threatened[policy]), 'episode')}"
-
+    if any(row["detection_distance_m"] is not None for rows in own.values() for row in rows):
+        yield _contest(DETECTION, _DETECT, own, tags, place, _metres)
+    full = full_of(groups, setting)
+    threatened = {p: preventable(full, rows) if full else rows for p, rows in own.items()}
+    spared = " that the full scan ends unhurt" if full else ""
     if any(row["collision"] for rows in threatened.values() for row in rows):
-        yield _contest(AVOIDED, threatened, tags, place, "collides least", hit)
+        yield _contest(
+            AVOIDED, _COLLIDE, threatened, tags, place, lambda rows: f"{_hit(rows)}{spared}"
+        )
 
 
 def _contest(
     measure: Measure,
+    verb: _Verb,
     own: Mapping[str, Sequence[Row]],
-    tags: Mapping[str, tuple[str, ...]],
+    tags: _Tags,
     place: str,
-    leads: str,
-    told: Callable[[str], str],
+    told: Callable[[Sequence[Row]], str],
 ) -> _Contest:
-    # A policy that lacks a hard seed would lead by that.
-    shared = set.intersection(*({row["seed"] for row in rows} for rows in own.values()))
-    means = {
-        policy: _mean(measure, [row for row in rows if row["seed"] in shared])
-        for policy, rows in own.items()
-    }
     return _Contest(
         place,
-        leads,
+        verb,
         measure.unit,
+        measure.gate,
         tags,
-        {policy: mean for policy, mean in means.items() if not np.isnan(mean)},
-        told,
+        {
+            policy: mean
+            for policy, rows in own.items()
+            if (mean := _mean(measure, rows)) is not None
+        },
+        lambda policy: told(own[policy]),
         lambda ours, theirs: contrast(measure, own[ours], own[theirs]),
     )
 
 
-def _mean(measure: Measure, rows: Sequence[Row]) -> float:
-    """The mean of a measure, an actor never detected counted as in differences; nan of nothing."""
+def _mean(measure: Measure, rows: Sequence[Row]) -> float | None:
+    """The mean of a measure, an actor never detected counted as in differences; None of nothing."""
     readings = [reading.value for row in rows if (reading := measure.read(row)) is not None]
-    return float(np.mean(readings)) if readings else float("nan")
+    return float(np.mean(readings)) if readings else None
 
 
-def _plays(plays: SettingPlays, budget: float) -> _Contest:
-    tallies: dict[str, Tallies] = {
-        policy: own for policy in plays.policies if (own := plays.tallies(policy, budget))
+def _metres(rows: Sequence[Row]) -> str:
+    readings = [reading for row in rows if (reading := DETECTION.read(row)) is not None]
+    mean = f"{_mean(DETECTION, rows):.1f} m on average"
+    never = sum(reading.censored for reading in readings)
+    # An actor that is never detected has been no nearer than what is counted for it.
+    return f"at most {mean} ({never} of {len(readings)} never)" if never else mean
+
+
+def _hit(rows: Sequence[Row]) -> str:
+    return f"in {sum(row['collision'] for row in rows)} of {counted(len(rows), 'episode')}"
+
+
+def _plays(plays: SettingPlays, budget: float, shown: list[MeasuredDifference]) -> _Contest:
+    """The contest of first sightings; what is compared is added to what is `shown`."""
+    tallies = {
+        policy: own
+        for policy in plays.policies
+        if _is_real(policy, plays.tags) and (own := plays.tallies(policy, budget))
     }
     shared = set.intersection(*map(set, tallies.values())) if tallies else set()
     levels = {
@@ -185,12 +227,47 @@ def _plays(plays: SettingPlays, budget: float) -> _Contest:
         for policy, own in tallies.items()
     }
     known = {policy: level for policy, level in levels.items() if level is not None}
+
+    def difference(ours: str, theirs: str) -> MeasuredDifference | None:
+        measured = PolicyPair(ours, theirs, FIRST_SIGHTING).measured(plays, budget)
+        shown.extend([measured] if measured else [])
+        return measured
+
     return _Contest(
         f"{plays.setting.label}, {percent(budget)}",
-        "finds most first sightings at once",
+        _FIND,
         "points",
+        GATE_POINTS,
         plays.tags,
         known,
         lambda policy: f"{known[policy]:.1f}%",
-        lambda ours, theirs: PolicyPair(ours, theirs, FIRST_SIGHTING).measured(plays, budget),
+        difference,
     )
+
+
+def _is_real(policy: str, tags: _Tags) -> bool:
+    """Whether a car can have the policy at a budget."""
+    return policy != FULL and {*MARKS}.isdisjoint(tags[policy])
+
+
+def _is_nothing(difference: ShownDifference | None) -> bool:
+    """Whether two are the same in everything that was played."""
+    return (
+        difference is not None and difference.interval is not None and not any(difference.interval)
+    )
+
+
+def _is_ahead(difference: ShownDifference | None) -> bool:
+    """Whether the first is surely above the other."""
+    return difference is not None and difference.excludes_zero and difference.mean > 0
+
+
+def _names(policies: Sequence[str]) -> str:
+    if len(policies) > _MOST_NAMED:
+        return f"{', '.join(policies[:_MOST_NAMED])} and {len(policies) - _MOST_NAMED} more"
+    return " and ".join(filter(None, [", ".join(policies[:-1]), policies[-1]]))
+
+
+def _with_hindsight(sentences: Iterable[str]) -> list[str]:
+    found = [*sentences]
+    return [*found, _HINDSIGHT] if found else []

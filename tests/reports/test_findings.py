@@ -7,55 +7,94 @@ from tests.helpers import made_plays
 from tests.helpers.made_rows import row
 
 SEEDS = range(6)
+WAVERING = (15.0, 17.0, 16.0, 16.0, 15.5, 16.5)
 
 
-def episodes(distances, scenario="dense", budget=0.03, **more):
-    """Rows of every seed by policy: a distance, or one a seed."""
+def episodes(distances, seeds=SEEDS, **more):
+    """Rows of every seed by policy: a distance, or one a seed; None is never."""
     return [
         row(
-            EpisodeConfig(scenario, policy, 1.0 if policy == "full" else budget, seed),
+            EpisodeConfig("dense", policy, 1.0 if policy == "full" else 0.03, seed),
             given[seed] if isinstance(given, tuple) else given,
             tags="+".join(tags_of(policy)),
             **more.get(policy, {}),
         )
         for policy, given in distances.items()
-        for seed in SEEDS
+        for seed in seeds
     ]
 
 
-def test_the_first_of_the_policies_stands_beside_the_best_control():
+def told(distances, **more):
+    """The first sentence."""
+    return sweep_findings(episodes(distances, **more))[0]
+
+
+def test_the_first_stands_beside_the_best_control():
     rows = episodes({"care": 16.0, "history": 8.0, "fan": 12.0, "rows": 11.0, "full": 17.0})
     first, hindsight = sweep_findings(rows)
     assert first == (
-        "dense, 3%: care detects farthest, 16.0 m on average, ahead of every other policy; it "
-        "beats the best control, fan (+4.0* [4.0,4.0] m)."
+        "dense, 3%: care detects farthest, 16.0 m on average; care is ahead of the best control, "
+        "fan (+4.0* [4.0,4.0], m)."
     )
     assert "by the very results" in hindsight
 
 
-def test_a_tie_and_a_control_that_is_ahead_are_told():
-    wavering = (15.0, 17.0, 16.0, 16.0, 15.5, 16.5)
-    tied, _ = sweep_findings(episodes({"care": 16.0, "history": wavering, "fan": 16.0}))
-    assert "; history cannot be told from it" in tied
-    assert "it cannot be told from the best control, fan (+0.0 [0.0,0.0] m)" in tied
-    beaten, _ = sweep_findings(episodes({"care": 10.0, "fan": 16.0}))
-    assert "it is beaten by the best control, fan (-6.0* [-6.0,-6.0] m)" in beaten
+def test_a_control_that_is_ahead_leads():
+    assert told({"care": 10.0, "history": 8.0, "fan": 16.0}) == (
+        "dense, 3%: fan detects farthest, 16.0 m on average; the best control, fan, is ahead of "
+        "care (-6.0* [-6.0,-6.0], m)."
+    )
 
 
-def test_what_no_car_can_have_leads_nothing_and_one_alone_is_no_contest():
-    rows = episodes({"history-oracle": 20.0, "care": 16.0, "history": 8.0})
-    first, _ = sweep_findings(rows)
-    assert first.startswith("dense, 3%: care detects farthest")
+def test_ties_are_no_lead():
+    assert told({"care": 16.0, "history": 8.0, "fan": 16.0}) == (
+        "dense, 3%: care and fan detect farthest, 16.0 m on average; the best control, fan, does "
+        "exactly as well as care."
+    )
+    assert told({"care": 16.0, "history": 16.0, "fan": 16.0}) == (
+        "dense, 3%: all 3 policies detect equally far, 16.0 m on average, controls included."
+    )
+    assert told({"care": 16.1, "history": WAVERING, "random": 3.0}) == (
+        "dense, 3%: care detects farthest, 16.1 m on average; history cannot be told from it."
+    )
+    assert "care and the best control, fan, cannot be told apart (+0.1 [-0.4,0.6], m)" in told(
+        {"care": 16.1, "fan": WAVERING}
+    )
+
+
+def test_a_difference_below_the_gate_is_called_so():
+    assert "ahead of the best control, fan, by less than the gate (+1.0 [1.0,1.0], m)" in told(
+        {"care": 16.0, "fan": 15.0}
+    )
+
+
+def test_what_no_car_can_have_is_in_no_contest_and_one_alone_is_none():
+    assert told({"history-oracle": 20.0, "care": 16.0, "history": 8.0}) == (
+        "dense, 3%: care detects farthest, 16.0 m on average."
+    )
     assert sweep_findings(episodes({"history-oracle": 20.0, "care": 16.0, "full": 17.0})) == []
     assert sweep_findings(episodes({"fan": 16.0, "rows": 15.0, "full": 17.0})) == []
+    assert sweep_findings(episodes({"care": 16.0, "history": 8.0}, seeds=range(4))) == []
 
 
 def test_a_seed_that_a_policy_lacks_counts_for_nobody():
     rows = episodes({"care": (2.0, 16.0, 16.0, 16.0, 16.0, 16.0), "history": 15.0})
     # Care is behind by the mean of all seeds, and ahead on those that both have.
     without = [one for one in rows if (one["policy"], one["seed"]) != ("history", 0)]
-    assert sweep_findings(without)[0].startswith("dense, 3%: care detects farthest")
-    assert sweep_findings(rows)[0].startswith("dense, 3%: history detects farthest")
+    assert sweep_findings(without)[0].startswith(
+        "dense, 3%: care detects farthest, 16.0 m on average"
+    )
+    assert sweep_findings(rows)[0].startswith(
+        "dense, 3%: history detects farthest, 15.0 m on average"
+    )
+
+
+def test_who_is_never_detected_is_told_and_nobody_leads_where_all_are():
+    sometimes = (16.0, 16.0, 16.0, 16.0, 16.0, None)
+    assert "care detects farthest, at most 13.8 m on average (1 of 6 never)" in told(
+        {"care": sometimes, "history": 4.0}
+    )
+    assert sweep_findings(episodes({"care": None, "history": None})) == []
 
 
 def test_collisions_that_a_full_scan_prevents_are_told():
@@ -63,10 +102,12 @@ def test_collisions_that_a_full_scan_prevents_are_told():
     rows = episodes({"care": 16.0, "history": 8.0, "full": 17.0}, **hit)
     _, collisions, _ = sweep_findings(rows)
     assert collisions == (
-        "dense, 3%: care collides least, in 0 of 6 episodes, ahead of every other policy."
+        "dense, 3%: care collides least, in 0 of 6 episodes that the full scan ends unhurt."
     )
+    without = [one for one in rows if one["policy"] != "full"]
+    assert sweep_findings(without)[1] == "dense, 3%: care collides least, in 0 of 6 episodes."
     doomed = episodes({"care": 16.0, "history": 8.0, "full": 17.0}, **hit, full={"collision": True})
-    assert not any("collides" in sentence for sentence in sweep_findings(doomed))
+    assert not any("collide" in sentence for sentence in sweep_findings(doomed))
 
 
 def test_the_open_loop_tells_who_finds_most_at_once():
@@ -77,6 +118,6 @@ def test_the_open_loop_tells_who_finds_most_at_once():
     )
     first, _ = protocol_findings(plays)
     assert first.startswith(
-        "generated streets, detector returns, 10%: care finds most first sightings at once, 60.0%, "
-        "ahead of every other policy; it beats the best control, rows (+15.0 ["
+        "generated streets, detector returns, 10%: care finds most first sightings at once, 60.0%; "
+        "care is ahead of the best control, rows (+15.0 ["
     )

@@ -74,3 +74,7 @@ def test_the_figure_shows_every_result_the_best_on_top():
     assert [text.get_text() for text in axes.get_yticklabels()] == ["low", "good", "full"]
     bars = axes.containers[0].lines[0]
     assert bars.get_xdata() == pytest.approx([each.score().mean for each in (LOW, GOOD, FULL)])
+    # Of equal shares none hides another.
+    marks = [bars.get_xydata(), *(shown.get_offsets() for shown in axes.collections[:3])]
+    heights = {round(float(points[2][1]), 6) for points in marks}
+    assert len(heights) == len(marks)

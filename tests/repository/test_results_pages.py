@@ -11,6 +11,7 @@ import pytest
 from care_sim import cli
 from care_sim.base.seed_ranges import TRAINING
 from care_sim.loops.seeds import EpisodeSeeds
+from care_sim.policies import BUILT_IN
 from care_sim.scenarios import make_scenario
 from care_sim.study.benchmark.result_file import read_result
 from care_sim.study.benchmark.worlds import TESTS, published_worlds
@@ -116,3 +117,13 @@ def test_every_entry_of_the_leaderboard_stands_on_its_page_as_it_scores():
     assert len(entries) > 10
     for score in (one.score() for one in entries if one.entry.policy != "full"):
         assert "{:.1f} [{:.1f}, {:.1f}]".format(*score) in page
+
+
+def test_every_policy_is_on_the_leaderboard_or_its_page_says_why_not():
+    section = (FOLDER / "benchmark.md").read_text().partition("\n## Who has no entry\n")[2]
+    reasons = re.findall(r"^- ([^:]+):", section.partition("\n## ")[0], re.M)
+    without = {name for reason in reasons for name in re.findall(r"`([\w-]+)`", reason)}
+    entries = [read_result(file) for file in (FOLDER / "leaderboard").glob("*.json")]
+    entered = {one.entry.policy for one in entries}
+    assert not without & entered
+    assert without | entered == {*BUILT_IN}

@@ -228,6 +228,7 @@ def test_the_command_draws_both_forms(folders, tmp_path, capsys):
     assert end.value.code == 0
     said = capsys.readouterr().out
     assert said.strip().endswith("curves.png")
+    assert "Figure: " in said
     assert "Training runs" in said
     assert all(
         (tmp_path / "figures" / f"curves{ending}").stat().st_size > 1000

@@ -42,9 +42,9 @@ def check_results(folder: Path, configs: Sequence[RunConfig], study: Study) -> N
     # A file that names no study was written by a version that had sweeps alone.
     there = read_notes(path)[0] or SWEEP.name
     rows, gone = _rows_and_gone(path, configs, study)
-    unit = study.results.unit.removesuffix("s")
-    here = counted(len(rows), unit)
-    wanted = counted(len(configs), unit)
+    task = study.results.task
+    here = counted(len(rows), task)
+    wanted = counted(len(configs), task)
     if there != study.name:
         raise InvalidInput(
             f"{folder} holds the study {there}, {here}, which the study {study.name}, {wanted}, "
@@ -64,13 +64,13 @@ def lost(folder: Path, played: Sequence[RunConfig], study: Study) -> str:
     """
     path = folder / study.results.file
     rows, gone = _rows_and_gone(path, played, study) if path.is_file() else ([], [])
-    unit = study.results.unit.removesuffix("s")
+    task = study.results.task
     if not gone:
         return ""
     return (
         f"the results in {folder} stay as they were: {len(gone)} of their "
-        f"{counted(len(rows), unit)}, the first {row_label(gone[0])}, would be gone, since this "
-        f"time only {counted(len(played), unit)} did not fail; the journal keeps what was "
+        f"{counted(len(rows), task)}, the first {row_label(gone[0])}, would be gone, since this "
+        f"time only {counted(len(played), task)} did not fail; the journal keeps what was "
         "played: mend what failed, or --force to replace them"
     )
 

@@ -59,13 +59,16 @@ _PURPOSE_OF = {
 }
 _OTHERS = "options"
 """The heading of tyro's box, and of what `PURPOSES` does not name."""
-_COLOURS = re.compile(r"\x1b\[[0-9;]*m")
-_ENTRY = re.compile(r"│ (?:-\w.*?, )?--([a-z0-9-]+)")
+_ENTRY = re.compile(r"│ (?:-\w.*?, )?--(?:no-)?([a-z0-9-]+)")
 _TOP, _BOTTOM = f"╭─ {_OTHERS} ─", "╰"
+_NARROWEST = 40
+"""Columns of a terminal below which names of options are cut, and headings would be."""
 
 
 class Captured(io.StringIO):
-    """What a help prints, in the characters and colours that the real output takes."""
+    """What a help prints, in the characters of the real output and without colours, so that a
+    letter of it is a column.
+    """
 
     def __init__(self, output: TextIO) -> None:
         super().__init__()
@@ -76,42 +79,31 @@ class Captured(io.StringIO):
         """Without UTF-8 no frames are drawn."""
         return self._output.encoding
 
-    def isatty(self) -> bool:
-        """Only a terminal shows colours."""
-        return self._output.isatty()
-
 
 def grouped(text: str) -> str:
     """A help with its box of options parted into one box per purpose, in the order of `PURPOSES`.
-    A help that is drawn without a frame stays as it is.
+    A help without a frame, or for a narrow terminal, stays as it is.
     """
     lines = text.splitlines()
-    bare = [_COLOURS.sub("", line) for line in lines]
-    first = next((n for n, line in enumerate(bare) if line.startswith(_TOP)), None)
-    if first is None:
+    first = next((n for n, line in enumerate(lines) if line.startswith(_TOP)), None)
+    if first is None or shutil.get_terminal_size().columns < _NARROWEST:
         return text
-    last = next(n for n in range(first, len(bare)) if bare[n].startswith(_BOTTOM))
+    last = next(n for n in range(first, len(lines)) if lines[n].startswith(_BOTTOM))
     boxes: dict[str, list[str]] = {purpose: [] for purpose in (*PURPOSES, _OTHERS)}
     purpose = _OTHERS
-    for line, plain in zip(lines[first + 1 : last], bare[first + 1 : last], strict=True):
+    for line in lines[first + 1 : last]:
         # The lines of an option's help follow that of its name.
-        if named := _ENTRY.match(plain):
+        if named := _ENTRY.match(line):
             purpose = _PURPOSE_OF.get(named[1], _OTHERS)
         boxes[purpose].append(line)
+    width = len(lines[first])
     drawn = [
         line
         for purpose, own in boxes.items()
         if own
-        for line in (_titled(lines[first], purpose), *own, lines[last])
+        for line in (f"╭─ {purpose} ".ljust(width - 1, "─") + "╮", *own, lines[last])
     ]
     return "\n".join([*lines[:first], *drawn, *lines[last + 1 :], ""])
-
-
-def _titled(top: str, purpose: str) -> str:
-    """The upper edge of the box of options, with another heading."""
-    before, after = top.split(f"{_OTHERS} ", 1)
-    width = after.count("─") + len(_OTHERS) - len(purpose)
-    return f"{before}{purpose} {re.sub('─+', '─' * width, after, count=1)}"
 
 
 def wrapped(text: str) -> str:
@@ -121,7 +113,7 @@ def wrapped(text: str) -> str:
     columns = shutil.get_terminal_size().columns
     return "".join(
         textwrap.fill(line, columns, subsequent_indent=_indent(line), break_on_hyphens=False) + "\n"
-        if len(_COLOURS.sub("", line)) > columns
+        if len(line) > columns
         else line + "\n"
         for line in text.splitlines()
     )
@@ -129,4 +121,4 @@ def wrapped(text: str) -> str:
 
 def _indent(line: str) -> str:
     """That of the lines after the first: what a usage lists stands below its command."""
-    return " " * 7 if _COLOURS.sub("", line).startswith("usage: ") else ""
+    return " " * 7 if line.startswith("usage: ") else ""

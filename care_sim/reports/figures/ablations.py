@@ -30,8 +30,9 @@ _LINE_INCHES = 0.19
 _PANEL_INCHES = 1.9
 _NAMES_INCHES = 3.2
 """Room for what is varied, on the left."""
+_MARKS = "blue: told from zero, as in the tables; open: a bound, for some are never detected"
 _DIFFERENT, _ALIKE = "#0072B2", "0.6"
-"""Colours of a difference whose interval excludes zero, and of any other."""
+"""Colours of a difference that is told from zero, and of any other."""
 
 
 class _Line(NamedTuple):
@@ -127,7 +128,7 @@ def _figure(
     for label, line in zip(panels[0].get_yticklabels(), lines, strict=True):
         if not line.differences:
             label.set_fontweight("bold")
-    figure.supxlabel(f"{unit}; blue: the 95% interval excludes zero", fontsize=9)
+    figure.supxlabel(f"{unit}\n{_MARKS}", fontsize=9)
     return figure
 
 
@@ -141,7 +142,11 @@ def _draw(axes: Axes, lines: Sequence[_Line], panel: int) -> None:
         colour = _DIFFERENT if difference.excludes_zero else _ALIKE
         if (ends := difference.interval) is not None:
             axes.plot([ends.low, ends.high], [height, height], color=colour, linewidth=1.5)
-        axes.plot([difference.mean], [height], "o", color=colour, markersize=4)
+        # A difference to an actor that was never detected is a bound.
+        inside = "white" if difference.bound else colour
+        axes.plot(
+            [difference.mean], [height], "o", color=colour, markerfacecolor=inside, markersize=4
+        )
     axes.tick_params(axis="x", labelsize=8)
     axes.tick_params(axis="y", length=0)
     bare_axes(axes, "0.93", "both")

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.transforms import ScaledTranslation
 
-from care_sim.base.errors import percent
+from care_sim.base.errors import counted, percent
 from care_sim.reports.cells import Cell, summarise
 from care_sim.reports.figures.styles import (
     APART,
@@ -69,8 +69,9 @@ def budget_figure(cells: Sequence[Cell]) -> Figure:
     axes.set_xticks(budgets, [percent(budget) for budget in budgets])
     axes.minorticks_off()
     counts = sorted({cell.episodes for cell in cells})
-    seeds = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
-    axes.set_title(f"{cells[0].setting.world}: {seeds} seeds a point", loc="left", fontsize=10)
+    most = counted(counts[-1], "seed")
+    seeds = most if len(counts) == 1 else f"{counts[0]} to {most}"
+    axes.set_title(f"{cells[0].setting.world}: {seeds} a point", loc="left", fontsize=10)
     notes = ["budget (share of cells fired)", APART, *tag_notes(tags for _, tags in policies)]
     axes.set_xlabel("\n".join(notes))
     axes.set_ylabel("first detection (m, median and quartiles)")

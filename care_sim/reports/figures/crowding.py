@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from care_sim.base.errors import percent
+from care_sim.base.errors import counted, percent
 from care_sim.reports.contrasts import GATE_M
 from care_sim.reports.formatting import mean
 from care_sim.reports.table import Bold
@@ -81,9 +81,9 @@ def _finish(axes: Axes, crowd: Crowd) -> None:
     axes.set_yticks(range(len(crowd.counts)), [str(n) for n in crowd.counts])
     axes.set_xlabel("budget (share of cells fired)")
     axes.set_ylabel("standing vehicles")
-    seeds = len({row["seed"] for row in crowd.study.rows})
+    seeds = counted(len({row["seed"] for row in crowd.study.rows}), "seed")
     title = (
-        f"dense, {seeds} seeds. Bold: interval without zero; asterisk: and at least {GATE_M} m\n"
+        f"dense, {seeds}. Bold: interval without zero; asterisk: and at least {GATE_M} m\n"
         "frame: all-camera collapsed; ≤: at most, where it never detected somebody; ~: where both "
         "did not"
     )

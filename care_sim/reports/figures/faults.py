@@ -10,6 +10,7 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from care_sim.base.errors import counted
 from care_sim.reports.cells import Cell, StudyCells
 from care_sim.reports.figures.styles import FULL_STYLE, Style, bare_axes, styles
 from care_sim.reports.tables.faults import policies_of
@@ -151,9 +152,9 @@ class _FaultPanels:
             told = textwrap.fill(flat_line(flat), _LINE)
             figure.supxlabel(told, x=0.01, ha="left", fontsize=9)
         figure.supylabel(measure.label, fontsize=10)
-        seeds = len({row["seed"] for row in self.study.rows})
+        seeds = counted(len({row["seed"] for row in self.study.rows}), "seed")
         notes = "; ".join(["open, at the bottom: not detected", *self.study.notes(self.drawn)])
-        figure.suptitle(f"{place}, {seeds} seeds ({notes})", x=0.01, ha="left", fontsize=10)
+        figure.suptitle(f"{place}, {seeds} ({notes})", x=0.01, ha="left", fontsize=10)
         return figure
 
     def _panel(self, axes: Axes, fault: Fault, curves: Curves) -> None:

@@ -12,8 +12,8 @@ LEADERBOARD_FIGURE = "leaderboard"
 _PARTS = {"drives": ("#D55E00", "v"), "tests": ("#E69F00", "s"), "streets": ("#0072B2", "^")}
 """From the palette of Okabe and Ito (2008), safe for the colour-blind."""
 _LINE_INCHES = 0.28
-_APART = 0.22
-"""By how much of a line the markers of two parts are moved apart, so that equal ones are seen."""
+_APART = 0.18
+"""By how much of a line the marks of a result are moved apart, so that equal ones are seen."""
 
 
 def leaderboard_figure(results: Sequence[BenchmarkResult]) -> Figure:
@@ -22,11 +22,12 @@ def leaderboard_figure(results: Sequence[BenchmarkResult]) -> Figure:
     figure = Figure(figsize=(8.0, 1.4 + _LINE_INCHES * len(ranked)), layout="constrained")
     axes = figure.subplots()
     lines = range(len(ranked))
-    middle = (len(results[0].parts) - 1) / 2
-    for number, part in enumerate(results[0].parts):
+    # The score stands lowest, the parts above it.
+    lowest = -_APART * len(results[0].parts) / 2
+    for number, part in enumerate(results[0].parts, 1):
         colour, marker = _PARTS[part]
         shares = [result.part_score(part) for result in ranked]
-        heights = [line + _APART * (middle - number) for line in lines]
+        heights = [line + lowest + _APART * number for line in lines]
         axes.scatter(shares, heights, s=22, color=colour, marker=marker, label=part, zorder=3)
     scores = [result.score() for result in ranked]
     means = [score.mean for score in scores]
@@ -35,7 +36,13 @@ def leaderboard_figure(results: Sequence[BenchmarkResult]) -> Figure:
         [max(score.high - score.mean, 0.0) for score in scores],
     ]
     axes.errorbar(
-        means, lines, xerr=ends, fmt="o", color="black", capsize=3, label="score, 95% interval"
+        means,
+        [line + lowest for line in lines],
+        xerr=ends,
+        fmt="o",
+        color="black",
+        capsize=3,
+        label="score, 95% interval",
     )
     axes.set_yticks(lines, names_in(ranked))
     axes.set_xlim(-2, 102)

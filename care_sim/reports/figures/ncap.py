@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 
-from care_sim.base.errors import percent
+from care_sim.base.errors import counted, percent
 from care_sim.core.arrays import Floats
 from care_sim.evaluation.ncap_score import BEST_SCORE
 from care_sim.reports.ncap import Contender, NcapRows
@@ -45,8 +45,8 @@ def ncap_figure(rows: Sequence[Row]) -> Figure:
     for axes in panels[-1]:
         axes.tick_params(axis="x", labelrotation=90)
         axes.set_xlabel("test speed (km/h)", fontsize=7)
-    seeds = len({row["seed"] for row in rows})
-    title = f"mean score of {seeds} seeds; pale: no test at this speed"
+    seeds = counted(len({row["seed"] for row in rows}), "seed")
+    title = f"mean score of {seeds}; pale: no test at this speed"
     figure.suptitle(title, x=0.01, ha="left", fontsize=8)
     note = "reported, unreported: whether perception knows the cars that hide the target"
     figure.supxlabel(note, fontsize=7)

@@ -23,17 +23,23 @@ EPISODES = [row(config, distance(config)) for config in ablation_study(range(5))
 
 
 def drawn(axes):
-    """Mean, ends of the interval and colour of every level, by its label."""
-    names = [label.get_text() for label in axes.figure.axes[0].get_yticklabels()]
-    shown = {}
-    for line in axes.lines:
-        height = line.get_ydata()[0]
-        if line.get_marker() == "o":
-            shown[names.index(names[height]), names[height]] = (
-                float(line.get_xdata()[0]),
-                to_hex(line.get_color()),
-            )
-    return {name: point for (_, name), point in shown.items()}
+    """Mean, colour and filling of every level, by what is varied and its label."""
+    varied, shown = "", {}
+    labels = [label.get_text() for label in axes.figure.axes[0].get_yticklabels()]
+    points = {
+        line.get_ydata()[0]: (
+            float(line.get_xdata()[0]),
+            to_hex(line.get_color()),
+            line.get_markerfacecolor() != "white",
+        )
+        for line in axes.lines
+        if line.get_marker() == "o"
+    }
+    for height, label in enumerate(labels):
+        varied = label.partition(": ")[2] if label.startswith("care") else varied
+        if height in points:
+            shown[varied, label] = points[height]
+    return shown
 
 
 def test_a_level_stands_by_its_difference_to_the_usual_one():
@@ -42,8 +48,8 @@ def test_a_level_stands_by_its_difference_to_the_usual_one():
     assert titles == ["dartout, 3%", "dartout, 10%", "dense, 2%", "dense, 3%"]
     dartout, _, dense, _ = map(drawn, figure.axes)
     grey, blue = to_hex("0.6"), "#0072b2"
-    assert dense["0.15"] == (-2.0, blue)
-    assert dartout["0.15"] == (0.0, grey)
+    assert dense["reserve fraction rho", "0.15"] == (-2.0, blue, True)
+    assert dartout["reserve fraction rho", "0.15"] == (0.0, grey, True)
     names = [label.get_text() for label in figure.axes[0].get_yticklabels()]
     late = names.index("care: age of the camera's detections, keyframes") + 1
     (interval,) = (
@@ -54,6 +60,18 @@ def test_a_level_stands_by_its_difference_to_the_usual_one():
     assert -1.5 < interval[0] < -0.6 < interval[1] < 0.0
     assert "0.3" not in names, "the usual level is compared with nothing"
     assert "5 seeds" in figure.get_supxlabel()
+
+
+def test_a_bound_is_drawn_open():
+    """A level that never detects has no distance, only one that it was not above."""
+    never = [
+        row(one, None if one.reserve_fraction == 0.15 else 16.0) for one in ablation_study(range(5))
+    ]
+    (figure,) = ablation_figures(never).values()
+    shown = drawn(figure.axes[0])
+    assert not shown["reserve fraction rho", "0.15"][2]
+    assert shown["reserve fraction rho", "0.5"][2]
+    assert "open: a bound" in figure.get_supxlabel()
 
 
 def test_what_was_not_played_has_no_line_and_nothing_no_figure():
@@ -78,5 +96,6 @@ def test_a_panel_a_budget_and_measure_shows_points_of_recall():
     (figure,) = open_ablation_figures(plays).values()
     titles = [axes.get_title(loc="left") for axes in figure.axes]
     assert titles == ["first sightings, 10%", "all below 20 m, 10%"]
-    assert drawn(figure.axes[0])["1"][0] == pytest.approx(-15.0)
-    assert drawn(figure.axes[1]).get("1", (0.0,))[0] == 0.0
+    level = "age of the camera's detections, keyframes", "1"
+    assert drawn(figure.axes[0])[level][0] == pytest.approx(-15.0)
+    assert drawn(figure.axes[1])[level][0] == pytest.approx(0.0)
