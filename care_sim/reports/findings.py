@@ -32,7 +32,7 @@ _HINDSIGHT = (
     "Who is first, and the best control, are chosen at each budget by the very results that are "
     "compared, which favours whoever is chosen; the number of comparisons is not corrected for."
 )
-_MOST_NAMED = 3
+_MOST_NAMED = 4
 """So many policies are named in a row; of more, how many they are."""
 _Tags = Mapping[str, tuple[str, ...]]
 
@@ -106,7 +106,8 @@ class _Contest:
             return f"the best control, {control}, does exactly as well as {best}"
         measured = f"({interval(difference)}, {self.unit})" if difference else "(nothing shared)"
         if difference is None or not difference.excludes_zero:
-            return f"{best} and the best control, {control}, cannot be told apart {measured}"
+            why = ", for some are never detected" if difference and difference.bound else ""
+            return f"{best} and the best control, {control}, cannot be told apart{why} {measured}"
         little = ", by less than the gate" if abs(difference.mean) < self.gate else ""
         if difference.mean > 0:
             return f"{best} is ahead of the best control, {control}{little} {measured}"
