@@ -13,7 +13,7 @@ from care_sim.training.environments import side_by_side
 
 RECIPE = PpoConfig(budget=(0.03, 0.05, 0.1, 0.2, 0.35))
 """How the shipped `ppo-dense` was trained."""
-PPO = f"PPO of Stable-Baselines3, {RECIPE.environments} worlds of {RECIPE.env}"
+PPO = f"PPO of Stable-Baselines3, {RECIPE.environments} worlds of {', '.join(RECIPE.env)}"
 ANSWERED_AT_ONCE = f"{PPO}, answered at once"
 """The same learner when it waits for no environment: none lets it be faster."""
 
