@@ -42,7 +42,8 @@ def paper_closing(rows: Sequence[Row]) -> list[str]:
 
 def first_sighting_closing(rows: Sequence[Row]) -> list[str]:
     """Who leads where, the size of the study and the paper's gate."""
-    return [*protocol_findings(rows), *protocol_closing(rows)]
+    # Both may say what an interval over events is.
+    return [*dict.fromkeys([*protocol_findings(rows), *protocol_closing(rows)])]
 
 
 def validation_closing(rows: Sequence[Row]) -> list[str]:

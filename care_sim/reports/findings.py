@@ -19,7 +19,7 @@ from care_sim.reports.contrasts import (
     contrast,
     preventable,
 )
-from care_sim.reports.controls import is_control
+from care_sim.reports.controls import best_control, is_control
 from care_sim.reports.formatting import MARKS, ShownDifference, interval
 from care_sim.reports.protocol.differences import MeasuredDifference, PolicyPair
 from care_sim.reports.protocol.notes import on_intervals
@@ -94,8 +94,8 @@ class _Contest:
         if alike:
             them = "it" if len(tied) == 1 else "them"
             parts.append(f"{_names(alike)} cannot be told from {them}")
-        if controls:
-            best, control = (max(own, key=self.levels.__getitem__) for own in (others, controls))
+        if control := best_control({policy: self.levels[policy] for policy in controls}):
+            best = max(others, key=self.levels.__getitem__)
             parts.append(self._beside_control(best, control))
         yield f"{'; '.join(parts)}."
 
@@ -104,7 +104,7 @@ class _Contest:
         difference = self.difference(best, control)
         if _is_nothing(difference):
             return f"the best control, {control}, does exactly as well as {best}"
-        measured = f"({interval(difference)}, {self.unit})" if difference else "(nothing shared)"
+        measured = f"({interval(difference)}, {self.unit})"
         if difference is None or not difference.excludes_zero:
             why = ", for some are never detected" if difference and difference.bound else ""
             return f"{best} and the best control, {control}, cannot be told apart{why} {measured}"
@@ -252,10 +252,10 @@ def _is_real(policy: str, tags: _Tags) -> bool:
 
 
 def _is_nothing(difference: ShownDifference | None) -> bool:
-    """Whether two are the same in everything that was played."""
-    return (
-        difference is not None and difference.interval is not None and not any(difference.interval)
-    )
+    """Whether two are the same in everything that was played; not known of the never detected."""
+    if difference is None or difference.interval is None:
+        return False
+    return not any(difference.interval) and not difference.bound
 
 
 def _is_ahead(difference: ShownDifference | None) -> bool:

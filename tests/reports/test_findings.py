@@ -95,6 +95,8 @@ def test_who_is_never_detected_is_told_and_nobody_leads_where_all_are():
         {"care": sometimes, "history": 4.0}
     )
     assert sweep_findings(episodes({"care": None, "history": None})) == []
+    # Who missed the same actor has not been shown to be as good.
+    assert "exactly" not in told({"care": sometimes, "fan": sometimes, "history": 4.0})
 
 
 def test_collisions_that_a_full_scan_prevents_are_told():
