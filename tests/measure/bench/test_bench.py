@@ -152,10 +152,10 @@ def test_bad_input_is_named(wrong, named):
 
 @pytest.mark.speed
 def test_no_ratio_has_fallen_behind_the_published_ones():
-    """Ratios of medians within one run, so that the machine's speed does not matter. Another
-    processor may cost one side half, and what else runs on it more for a while: behind is what is
-    in each of three runs. Two processes, or threads, need two free cores, which a test does not
-    have: of the worlds on two threads stand those on one, by the core.
+    """Ratios of medians within one run, so that the machine's speed does not matter. A third is
+    what sharing it with others may cost one side, for a while: behind is what is in each of three
+    runs. Two processes, or threads, need two free cores, which a test does not have: of the worlds
+    on two threads stand those on one, by the core.
     """
     published = json.loads(PUBLISHED.read_text())["ratios"]
     compared = set(published) - BY_THE_CLOCK
@@ -168,7 +168,7 @@ def test_no_ratio_has_fallen_behind_the_published_ones():
         behind = {
             name: (ratios[name], published[name])
             for name in compared
-            if ratios[name] < published[name] / 2
+            if ratios[name] < published[name] * 2 / 3
         }
         compared = set(behind)
         if not behind:
