@@ -27,9 +27,19 @@ from care_sim.study.scene_play import play_scene
 from tests.helpers import made_plays
 from tests.helpers.made_rows import CROWD, STUDY, row, rows
 
-MOST_BYTES, MOST_MS = 5e6, 2000
+MOST_BYTES = 5e6
 DRAWN = "!document.querySelector('.plot:not([data-drawn])')"
 READY = f"{DRAWN} && !!document.querySelector('#views figure')"
+
+# How fast the browser is here: the milliseconds in which it parses three times 7 MB of JSON.
+PARSING = """(() => {
+  const text = JSON.stringify(Array.from({ length: 200000 }, (_, n) => ({ n, at: [1.5, 2.5, n] })));
+  const begun = performance.now();
+  for (let time = 0; time < 3; time++) JSON.parse(text);
+  return performance.now() - begun;
+})()"""
+# The page takes 4 to 5 of these on two cores, where one is 0.3 s.
+MOST_PARSINGS = 10
 
 
 @pytest.fixture
@@ -79,10 +89,9 @@ def played(tmp_path_factory):
     return written(tmp_path_factory.mktemp("played"), rows, "sweep", most=5), rows
 
 
-def test_a_page_opens_at_once_and_says_what_was_played(opened, played):
+def test_a_page_says_what_was_played(opened, played):
     path, _ = played
     page = opened(path, READY)
-    assert page.evaluate("performance.now()") < MOST_MS
     text = page.inner_text("body")
     assert "Sweep of the closed loop" in text
     assert "4 of 5 are the same as in the results" in text
@@ -408,15 +417,28 @@ class OneSeed(ThreadPoolExecutor):
         return self.first[cell]
 
 
-@pytest.mark.slow
-def test_the_page_of_the_papers_study_is_small_and_quick(opened, published, tmp_path):
-    path = tmp_path / "report.html"
+def page_of_the_papers_study(published, path):
     played = OneSeed()
     made = write_page(published / "closed-loop-5", path, 400, 1, lambda _workers: played)
     assert len(played.first) == 61
+    return made
+
+
+@pytest.mark.slow
+def test_the_page_of_the_papers_study_is_small(published, tmp_path):
+    path = tmp_path / "report.html"
+    made = page_of_the_papers_study(published, path)
     assert made.watchable == len(made.rows) == 305
     assert path.stat().st_size < MOST_BYTES
-    assert any(opened(path, READY).evaluate("performance.now()") < MOST_MS for _ in range(3))
+
+
+@pytest.mark.speed
+def test_the_page_of_the_papers_study_opens_at_once(opened, published, tmp_path):
+    path = tmp_path / "report.html"
+    page_of_the_papers_study(published, path)
+    pages = [opened(path, READY) for _ in range(3)]
+    opening = min(page.evaluate("performance.now()") for page in pages)
+    assert opening < MOST_PARSINGS * min(page.evaluate(PARSING) for page in pages)
 
 
 def contrast(one, other):
