@@ -14,11 +14,13 @@ from rich.console import Console
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.checks import LARGEST_INTEGER
 from care_sim.base.files import JSON, replacing
+from care_sim.measure.parity.figure import parity_figure
 from care_sim.measure.parity.keyframes import keyframes
 from care_sim.measure.parity.outcomes import outcomes
 from care_sim.measure.parity.random_scenes import random_scenes
 from care_sim.measure.parity.tables import parity_tables
 from care_sim.measure.parity.tally import REFERENCE_NAMES
+from care_sim.reports.figures.files import check_figure, save
 from care_sim.scenarios import PAPER_SCENARIOS
 from care_sim.study.progress import ProgressLines, progress_bar
 from care_sim.study.provenance import machine, versions
@@ -41,14 +43,19 @@ class ParityConfig:
     seed: int = bounded(0, 0, LARGEST_INTEGER)
     """Seed of the random scenes."""
     out: Path | None = None
-    """File for the figures as JSON."""
+    """File for the figures as JSON; the picture of them stands beside it as PNG and SVG."""
 
     def __post_init__(self) -> None:
         check_fields(self)
 
 
 def run_parity(config: ParityConfig) -> int:
-    """Compare, print the tables, write JSON; 0 where the engines agree as `agree` says, else 1."""
+    """Compare, print the tables, write JSON and picture; 0 where the engines agree as `agree` says,
+    else 1.
+    """
+    # Files that cannot be written are refused before anything is compared.
+    if config.out is not None:
+        check_figure(config.out)
     with nullcontext() if config.out is None else replacing(config.out, JSON) as unfinished:
         report = parity_report(config)
         console = Console(highlight=False)
@@ -56,6 +63,8 @@ def run_parity(config: ParityConfig) -> int:
             console.print(table.rich())
         if unfinished is not None:
             unfinished.write_text(json.dumps(report, indent=2) + "\n")
+    if config.out is not None and report["scans"]:
+        save(parity_figure(report), config.out)
     return 0 if agree(report) else 1
 
 

@@ -4,7 +4,7 @@ numbers stand.
 
 from collections.abc import Collection, Iterable, Iterator
 
-from care_sim.base.errors import percent
+from care_sim.base.errors import counted, percent
 from care_sim.evaluation.censoring import FEWEST_PAIRS
 from care_sim.evaluation.recall import Tally
 from care_sim.evaluation.sightings import ANNOTATED, VISIBLE
@@ -40,8 +40,8 @@ def played(plays: SettingPlays) -> str:
         len(plays.seeds(policy, budget)) for policy in plays.policies for budget in plays.budgets
     }
     return (
-        f"{_several(len(plays.scenes), 'scene')}, {total.events:,.0f} events, {total.frames:,.0f} "
-        f"object frames; {_several(max(seeds, default=0), 'floor seed')}, averaged per "
+        f"{counted(len(plays.scenes), 'scene')}, {total.events:,.0f} events, {total.frames:,.0f} "
+        f"object frames; {counted(max(seeds, default=0), 'floor seed')}, averaged per "
         f"scene.{by_both_counts(plays.scenes.values())}"
     )
 
@@ -60,7 +60,7 @@ def by_both_counts(scenes: Collection[Row]) -> str:
             f"start, which presence {ANNOTATED} does not count."
         )
     return (
-        f" {_several(emerging, 'object')} hidden within range at scene start "
+        f" {counted(emerging, 'object')} hidden within range at scene start "
         f"{'is' if emerging == 1 else 'are'} no event; presence {VISIBLE} counts them too, "
         f"{counts(scenes).events + emerging:,.0f} in all."
     )
@@ -96,7 +96,7 @@ def left_out(plays: SettingPlays) -> tuple[str, ...]:
     if not missing:
         return ()
     return (
-        f"Left out where a play is missing, of {_several(len(plays.scenes), 'scene')}: "
+        f"Left out where a play is missing, of {counted(len(plays.scenes), 'scene')}: "
         f"{'; '.join(missing)}.",
     )
 
@@ -118,7 +118,3 @@ def _missing(plays: SettingPlays) -> Iterator[str]:
             yield f"{policy} {', '.join(listed)}"
     if plays.full and (count := len(plays.scenes) - len(plays.tallies(FULL, 1.0))):
         yield f"{FULL} {count}"
-
-
-def _several(count: int, noun: str) -> str:
-    return f"{count:,} {noun}{'' if count == 1 else 's'}"
