@@ -19,7 +19,12 @@ from care_sim.commands.shared.study_command import DONE, FAILED, console
 from care_sim.reports.figures.files import check_figure, save
 from care_sim.reports.figures.leaderboard import LEADERBOARD_FIGURE, leaderboard_figure
 from care_sim.reports.leaderboard import CONTROL, leaderboard_table, names_in
-from care_sim.study.benchmark.made_by import is_of_this_code, own_code_of
+from care_sim.study.benchmark.made_by import (
+    is_of_this_code,
+    is_of_this_processor,
+    own_code_of,
+    processor_of,
+)
 from care_sim.study.benchmark.player import Player, player_in
 from care_sim.study.benchmark.replay import Replay, replayed
 from care_sim.study.benchmark.result import BenchmarkResult
@@ -126,6 +131,8 @@ class Leaderboard:
                 continue
             if replay.holds:
                 print(f"{path}: {_drawn(replay, result)} came out again as the file says")
+                if replay.detours:
+                    print(f"  {_detours(replay, result)}")
             problems += [f"{path}: {problem}" for problem in _told(replay, result)]
         return problems
 
@@ -148,6 +155,14 @@ def _told(replay: Replay, result: BenchmarkResult) -> list[str]:
         for row in replay.differing[:1]
     ]
     return [*replay.false, *differing, *map(str, replay.failures[:1])]
+
+
+def _detours(replay: Replay, result: BenchmarkResult) -> str:
+    """What is no fault of a result that holds, and why it may be."""
+    made = "by other code" if not is_of_this_code(result) else ""
+    if not is_of_this_processor(result):
+        made += f" on {processor_of(result) or 'a processor that it does not name'}"
+    return f"{replay.detours} of them fired other cells and reached as much; played {made.strip()}"
 
 
 def _drawn(replay: Replay, result: BenchmarkResult) -> str:

@@ -7,7 +7,7 @@ from care_sim.base.errors import counted
 from care_sim.evaluation.bootstrap import Interval
 from care_sim.reports.formatting import MARKS, bounds, marked, tag_notes
 from care_sim.reports.table import Bold, Table, TableRow
-from care_sim.study.benchmark.made_by import code_of
+from care_sim.study.benchmark.made_by import code_of, processor_of
 from care_sim.study.benchmark.result import BenchmarkResult
 from care_sim.study.benchmark.tasks import CAMERAS, IDEAL, Entry
 from care_sim.study.benchmark.worlds import BENCHMARK_VERSION
@@ -26,10 +26,7 @@ _MINUS = "Minus {}: points over {}, paired by world; bold where the interval exc
 _OF_CONTROL = f"the control {CONTROL.name}, a fixed map without a camera"
 _IDEAL = "Ideal camera: the score with a camera that reports whatever shows enough pixels."
 _UNRANKED = "No number: no policy that a car can have."
-_CODES = (
-    "Played by {} versions of the code: care-sim leaderboard --verify says whether rows come out "
-    "the same here."
-)
+_MAKERS = "Played {}: care-sim leaderboard --verify says whether rows come out the same here."
 _TRIAL = "Only the tenth of the worlds that --quick plays: a trial, and no leaderboard."
 
 
@@ -84,8 +81,10 @@ def notes_on(results: Sequence[BenchmarkResult], minus: str) -> tuple[str, ...]:
     leads = (_MINUS.format(minus, over),) if minus else ()
     beyond = (_UNRANKED,) if any(map(is_beyond, results)) else ()
     trial = (_TRIAL,) if results[0].quick else ()
-    codes = {*map(code_of, results)}
-    several = (_CODES.format(len(codes)),) if len(codes) > 1 else ()
+    codes, processors = {*map(code_of, results)}, {*map(processor_of, results)}
+    made = [f"by {len(codes)} versions of the code"] if len(codes) > 1 else []
+    made += [f"on {len(processors)} kinds of processor"] if len(processors) > 1 else []
+    several = (_MAKERS.format(" ".join(made)),) if made else ()
     tags = tag_notes(each.tags for each in results)
     # What limits the numbers comes first: a terminal has room for three lines.
     return (*trial, *several, _SCORE, *leads, _IDEAL, *beyond, *tags)

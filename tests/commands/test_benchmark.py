@@ -134,7 +134,19 @@ def test_a_newcomer_gets_a_line(capsys, here, one_of_each, library, lot_of_a_tes
     assert (code, f"{file.name}: 2 episodes" in out) == (1, True)
     assert "a.json: it says that the policy is learned, and it is causal" in err
     assert "b.json cannot be verified: policy absent:Mine cannot be loaded" in err
-    replace(result, rows=tuple(row._replace(hash="0" * 16) for row in result.rows)).write(file)
+    otherwise = replace(result, rows=tuple(row._replace(hash="0" * 16) for row in result.rows))
+    otherwise.write(file)
+    code, _, err = run(capsys, "leaderboard", "--verify", file)
+    assert (code, "2 did not go as it says, the first world" in err) == (1, True)
+
+    # On another processor as much may be reached on another way; what was reached is the same.
+    elsewhere = result.made_by | {"machine": {"processor": "Abacus"}}
+    replace(otherwise, made_by=elsewhere).write(file)
+    code, out, _ = run(capsys, "leaderboard", "--verify", file)
+    assert code == 0
+    assert "2 of them fired other cells and reached as much; played on Abacus" in out
+    forged = [row._replace(reached=row.reachable - row.reached) for row in result.rows]
+    replace(result, rows=tuple(forged), made_by=elsewhere).write(file)
     code, _, err = run(capsys, "leaderboard", "--verify", file)
     assert (code, "2 did not go as it says, the first world" in err) == (1, True)
 
@@ -258,7 +270,12 @@ def test_two_of_one_name_and_different_code_are_two_entries(capsys, here):
     # A lead is told over the name that the table shows.
     out = run(capsys, "leaderboard", ".", "--minus", "mine:Mine #aaaaaaa")[1]
     assert re.search(r"mine:Mine #bbbbbbb.*\+100\.0", out)
-    assert "Played by 2 versions of the code" in " ".join(out.split())
+    assert "Played by 2 versions of the code: care-sim" in " ".join(out.split())
+    for n, processor in enumerate(("one", "other")):
+        made = {"policy_code": f"{n}", "machine": {"processor": processor}}
+        made_result("mine:Mine", n, made_by=made).write(here / f"{n}.json")
+    out = run(capsys, "leaderboard", ".")[1]
+    assert "Played on 2 kinds of processor: care-sim" in " ".join(out.split())
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from care_sim.base.seed_ranges import TRAINING
 from care_sim.loops.seeds import EpisodeSeeds
 from care_sim.policies import BUILT_IN
 from care_sim.scenarios import make_scenario
+from care_sim.study.benchmark.made_by import processor_of
 from care_sim.study.benchmark.result_file import read_result
 from care_sim.study.benchmark.worlds import TESTS, published_worlds
 from care_sim.training.sets import ROUNDS
@@ -117,6 +118,19 @@ def test_every_entry_of_the_leaderboard_stands_on_its_page_as_it_scores():
     assert len(entries) > 10
     for score in (one.score() for one in entries if one.entry.policy != "full"):
         assert "{:.1f} [{:.1f}, {:.1f}]".format(*score) in page
+
+
+@pytest.mark.parametrize("page", ["docs/benchmark.md", "results/trust.md"])
+def test_on_another_processor_as_much_is_reached_by_other_cells(page):
+    names = "care-units", "care-sightlines"
+    files = [read_result(FOLDER / f"leaderboard/{name}.json") for name in names]
+    assert len({*map(processor_of, files)}) == 2
+    one, other = ({row[:3]: row for row in file.rows} for file in files)
+    assert all(one[place].reached == other[place].reached for place in one)
+    others = sum(one[place].hash != other[place].hash for place in one)
+    text = " ".join((ROOT / page).read_text().split())
+    assert f"{others} of" in text
+    assert f"{len(one)} rows differ in hash, and none in what was reached" in text
 
 
 def test_every_policy_is_on_the_leaderboard_or_its_page_says_why_not():

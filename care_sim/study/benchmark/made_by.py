@@ -19,6 +19,12 @@ def code_of(result: BenchmarkResult) -> str:
     return str(told.get("code", "")) if isinstance(told, dict) else ""
 
 
+def processor_of(result: BenchmarkResult) -> str:
+    """The processor that a result names; empty where it names none."""
+    told = result.made_by.get("machine")
+    return str(told.get("processor", "")) if isinstance(told, dict) else ""
+
+
 def own_code_of(result: BenchmarkResult) -> str:
     """The hashes of the policy's code and files that a result names, as one text."""
     told = result.made_by
@@ -31,6 +37,11 @@ def is_of_this_code(result: BenchmarkResult) -> bool:
     return code_of(result) == code_digest() and all(
         result.made_by.get(name) == value for name, value in here.items()
     )
+
+
+def is_of_this_processor(result: BenchmarkResult) -> bool:
+    """Whether a result was made by a processor of the kind that is here."""
+    return processor_of(result) == machine()["processor"]
 
 
 def _own_code(entry: Entry) -> dict[str, Any]:

@@ -6,6 +6,7 @@ from random import Random
 
 from care_sim.base.errors import InvalidInput
 from care_sim.policies import tags_of
+from care_sim.study.benchmark.made_by import is_of_this_code, is_of_this_processor
 from care_sim.study.benchmark.player import Player
 from care_sim.study.benchmark.result import BenchmarkResult, ResultRow
 from care_sim.study.benchmark.tasks import IDEAL, MEASURED, Task, tasks_of
@@ -19,12 +20,14 @@ for who makes rows up makes up those. How sure it is: `docs/benchmark.md`."""
 
 @dataclass(frozen=True)
 class Replay:
-    """The number of rows that were played again, those of them that went otherwise, what failed,
-    and what else the file says falsely.
+    """The number of rows that were played again, those of them that went otherwise, how many
+    reached as much on another way where that is no fault, what failed, and what else the file says
+    falsely.
     """
 
     played: int
     differing: tuple[ResultRow, ...]
+    detours: int
     failures: tuple[Failure, ...]
     false: tuple[str, ...]
 
@@ -43,20 +46,28 @@ def replayed(
 ) -> Replay:
     """Play a random tenth of a result again; `worlds` are those that the salt draws.
 
+    A row goes otherwise where another number is reached. By the code and the kind of processor that
+    made the result it goes otherwise also where the episode has another hash: others may round the
+    last bit of a direction otherwise, and fire other cells.
+
     Raises InvalidInput for a sealed one without its salt, and where its policy cannot be made.
     """
     check_salt(result, salt)
     tasks = {row: _task(result, row, salt) for row in _drawn(result, rng)}
     false = [*_false_tags(result), *(_false_worlds(result, worlds) if salt else ())]
     rows = player.rows([task.config for task in tasks.values()])
-    found = [
-        ResultRow.of(task, row) if row else None
-        for task, row in zip(tasks.values(), rows, strict=True)
-    ]
+    others = {
+        told: again
+        for (told, task), row in zip(tasks.items(), rows, strict=True)
+        if row and (again := ResultRow.of(task, row)) != told
+    }
+    # Who makes up a score must make up what was reached.
+    alike = is_of_this_code(result) and is_of_this_processor(result)
     differing = tuple(
-        told for told, again in zip(tasks, found, strict=True) if again and again != told
+        told for told, again in others.items() if alike or again.reached != told.reached
     )
-    return Replay(len(tasks), differing, tuple(player.failures), tuple(false))
+    detours = len(others) - len(differing)
+    return Replay(len(tasks), differing, detours, tuple(player.failures), tuple(false))
 
 
 def check_salt(result: BenchmarkResult, salt: Salt | None) -> None:
