@@ -18,7 +18,7 @@ from care_sim.base.json_text import json_content
 from care_sim.commands.shared.study_command import DONE, FAILED, console
 from care_sim.reports.figures.files import check_figure, save
 from care_sim.reports.figures.leaderboard import LEADERBOARD_FIGURE, leaderboard_figure
-from care_sim.reports.leaderboard import CONTROL, leaderboard_table, names_in
+from care_sim.reports.leaderboard import CONTROL, leaderboard_table, leads_table, names_in
 from care_sim.study.benchmark.made_by import (
     is_of_this_code,
     is_of_this_processor,
@@ -100,7 +100,9 @@ class Leaderboard:
         told = told_if_replaced(page)
         first = next(iter(sets.values()))
         save(leaderboard_figure(first), folder / LEADERBOARD_FIGURE)
-        write_text(page, _page([table.markdown() for table in tables]))
+        by_part = [leads_table(own, self.minus) for own in sets.values()]
+        shown = [*tables, *(table for table in by_part if table)]
+        write_text(page, _page([table.markdown() for table in shown]))
         for table in tables:
             console().print(table.rich(page))
         # Sealed results have a control of their own, which nobody has published.

@@ -89,11 +89,15 @@ class _Contest:
             )
             return
         alike = [p for p, each in over.items() if p not in tied and not _is_ahead(each)]
+        close = [p for p, each in over.items() if _is_ahead(each) and self._is_little(each)]
         leads = self.verb.one if len(tied) == 1 else self.verb.several
         parts = [f"{self.place}: {_names(tied)} {leads}, {self.told(first)}"]
         if alike:
             them = "it" if len(tied) == 1 else "them"
             parts.append(f"{_names(alike)} cannot be told from {them}")
+        if close:
+            verb = "is" if len(close) == 1 else "are"
+            parts.append(f"{_names(close)} {verb} behind by less than the gate")
         if control := best_control({policy: self.levels[policy] for policy in controls}):
             best = max(others, key=self.levels.__getitem__)
             parts.append(self._beside_control(best, control))
@@ -108,10 +112,14 @@ class _Contest:
         if difference is None or not difference.excludes_zero:
             why = ", for some are never detected" if difference and difference.bound else ""
             return f"{best} and the best control, {control}, cannot be told apart{why} {measured}"
-        little = ", by less than the gate" if abs(difference.mean) < self.gate else ""
+        little = ", by less than the gate" if self._is_little(difference) else ""
         if difference.mean > 0:
             return f"{best} is ahead of the best control, {control}{little} {measured}"
         return f"the best control, {control}, is ahead of {best}{little} {measured}"
+
+    def _is_little(self, difference: ShownDifference | None) -> bool:
+        """Whether a difference is surely below the gate: not where a bound alone is known of it."""
+        return difference is not None and not difference.bound and abs(difference.mean) < self.gate
 
 
 def sweep_findings(rows: Sequence[Row], conditions: bool = True) -> list[str]:
@@ -120,29 +128,35 @@ def sweep_findings(rows: Sequence[Row], conditions: bool = True) -> list[str]:
     `FEWEST_PAIRS` seeds that all policies share.
     """
     groups = grouped(rows)
-    tags = {policy_of(row): tags_of_row(row) for row in rows}
+    tags = _tags_of(rows)
     budgets: dict[Setting, set[float]] = {}
     for setting, policy, budget in groups:
         if policy != FULL:
             budgets.setdefault(setting, set()).add(budget)
-    return _with_hindsight(
-        sentence
-        for setting, own in budgets.items()
-        if conditions or not setting.conditions
-        for budget in sorted(own)
-        for contest in _episodes(groups, tags, setting, budget)
-        for sentence in contest.findings()
+    return _with_remarks(
+        tags,
+        (
+            sentence
+            for setting, own in budgets.items()
+            if conditions or not setting.conditions
+            for budget in sorted(own)
+            for contest in _episodes(groups, tags, setting, budget)
+            for sentence in contest.findings()
+        ),
     )
 
 
 def protocol_findings(rows: Sequence[Row]) -> list[str]:
     """Who finds most first sightings at once in every setting at every budget."""
     shown: list[MeasuredDifference] = []
-    found = _with_hindsight(
-        sentence
-        for plays in plays_by_setting(rows)
-        for budget in plays.budgets
-        for sentence in _plays(plays, budget, shown).findings()
+    found = _with_remarks(
+        _tags_of(rows),
+        (
+            sentence
+            for plays in plays_by_setting(rows)
+            for budget in plays.budgets
+            for sentence in _plays(plays, budget, shown).findings()
+        ),
     )
     return [*found, *on_intervals(shown)]
 
@@ -162,9 +176,13 @@ def _episodes(groups: Groups, tags: _Tags, setting: Setting, budget: float) -> I
         return
     own = {p: [row for row in rows if row["seed"] in shared] for p, rows in played.items()}
     place = f"{setting.label}, {percent(budget)}"
-    if any(row["detection_distance_m"] is not None for rows in own.values() for row in rows):
-        yield _contest(DETECTION, _DETECT, own, tags, place, _metres)
     full = full_of(groups, setting)
+    seen = _mean(DETECTION, [row for row in full or () if row["seed"] in shared])
+    of_full = "" if seen is None else f", the full scan {seen:.1f} m"
+    if any(row["detection_distance_m"] is not None for rows in own.values() for row in rows):
+        yield _contest(
+            DETECTION, _DETECT, own, tags, place, lambda rows: f"{_metres(rows)}{of_full}"
+        )
     threatened = {p: preventable(full, rows) if full else rows for p, rows in own.items()}
     spared = " that the full scan ends unhurt" if full else ""
     if any(row["collision"] for rows in threatened.values() for row in rows):
@@ -205,10 +223,10 @@ def _mean(measure: Measure, rows: Sequence[Row]) -> float | None:
 
 def _metres(rows: Sequence[Row]) -> str:
     readings = [reading for row in rows if (reading := DETECTION.read(row)) is not None]
-    mean = f"{_mean(DETECTION, rows):.1f} m on average"
+    mean = f"{_mean(DETECTION, rows):.1f} m on average over {counted(len(readings), 'episode')}"
     never = sum(reading.censored for reading in readings)
     # An actor that is never detected has been no nearer than what is counted for it.
-    return f"at most {mean} ({never} of {len(readings)} never)" if never else mean
+    return f"at most {mean} ({never} never)" if never else mean
 
 
 def _hit(rows: Sequence[Row]) -> str:
@@ -228,6 +246,8 @@ def _plays(plays: SettingPlays, budget: float, shown: list[MeasuredDifference]) 
         for policy, own in tallies.items()
     }
     known = {policy: level for policy, level in levels.items() if level is not None}
+    full = ratio_level(FIRST_SIGHTING, among(plays.tallies(FULL, 1.0), shared)).by_event
+    of_full = "" if full is None else f", the full scan {full:.1f}%"
 
     def difference(ours: str, theirs: str) -> MeasuredDifference | None:
         measured = PolicyPair(ours, theirs, FIRST_SIGHTING).measured(plays, budget)
@@ -241,7 +261,7 @@ def _plays(plays: SettingPlays, budget: float, shown: list[MeasuredDifference]) 
         GATE_POINTS,
         plays.tags,
         known,
-        lambda policy: f"{known[policy]:.1f}%",
+        lambda policy: f"{known[policy]:.1f}%{of_full}",
         difference,
     )
 
@@ -269,6 +289,15 @@ def _names(policies: Sequence[str]) -> str:
     return " and ".join(filter(None, [", ".join(policies[:-1]), policies[-1]]))
 
 
-def _with_hindsight(sentences: Iterable[str]) -> list[str]:
+def _tags_of(rows: Iterable[Row]) -> _Tags:
+    """The tags of every policy that was played."""
+    return {policy_of(row): tags_of_row(row) for row in rows}
+
+
+def _with_remarks(tags: _Tags, sentences: Iterable[str]) -> list[str]:
+    """The sentences, and among whom they choose; nothing without any."""
     found = [*sentences]
-    return [*found, _HINDSIGHT] if found else []
+    real = [policy for policy in tags if _is_real(policy, tags)]
+    lacking = "" if any(is_control(tags[policy]) for policy in real) else ", no control among them"
+    played = f"Compared are the {len(real)} policies played here{lacking}."
+    return [*found, played, _HINDSIGHT] if found else []

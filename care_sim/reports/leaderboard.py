@@ -27,6 +27,14 @@ _OF_CONTROL = f"the control {CONTROL.name}, a fixed map without a camera"
 _IDEAL = "Ideal camera: the score with a camera that reports whatever shows enough pixels."
 _UNRANKED = "No number: no policy that a car can have."
 _MAKERS = "Played {}: care-sim leaderboard --verify says whether rows come out the same here."
+_LEADS_BY_PART = (
+    "Points, paired by world; bold where the interval excludes zero. The score weighs its parts "
+    "alike, which is a convention: who is ahead in one part and behind in another leads by it."
+)
+_IN_HINDSIGHT = (
+    "Who is first is chosen by the very results that are compared, which favours the first; the "
+    "number of comparisons is not corrected for."
+)
 _TRIAL = "Only the tenth of the worlds that --quick plays: a trial, and no leaderboard."
 
 
@@ -48,6 +56,30 @@ def leaderboard_table(results: Sequence[BenchmarkResult], minus: str = CONTROL.n
     columns = ("", "policy", "score", *leads, *results[0].parts, "ideal camera")
     notes = notes_on(results, minus if leads else "")
     return Table(title(results), columns, rows, notes, whole=("", "score"), names=2)
+
+
+def leads_table(results: Sequence[BenchmarkResult], minus: str) -> Table | None:
+    """The leads over the entry `minus` part by part, and with the ideal camera, of every other
+    entry, in the order of their scores; None where that entry is not among them.
+    """
+    ranked = sorted(results, key=lambda result: -result.score().mean)
+    names = names_in(ranked)
+    control = next((each for each, name in zip(ranked, names, strict=True) if name == minus), None)
+    if control is None:
+        return None
+    parts = control.parts
+    rows = tuple(
+        (
+            name,
+            *(_shown(each.lead(control, parts=[part])) for part in parts),
+            _shown(each.lead(control, IDEAL)),
+        )
+        for each, name in zip(ranked, names, strict=True)
+        if each is not control
+    )
+    notes = (_LEADS_BY_PART, _IN_HINDSIGHT)
+    columns = ("policy", *parts, "score, ideal camera")
+    return Table(f"{title(results)}: minus {minus}, part by part", columns, rows, notes)
 
 
 def names_in(results: Sequence[BenchmarkResult]) -> list[str]:
@@ -111,7 +143,10 @@ def _line(
 def _lead(result: BenchmarkResult, control: BenchmarkResult) -> str:
     if result is control:
         return ""
-    lead = result.lead(control)
+    return _shown(result.lead(control))
+
+
+def _shown(lead: Interval) -> str:
     text = f"{lead.mean:+z.1f} {bounds(lead, 1)}"
     return Bold(text) if lead.low > 0 or lead.high < 0 else text
 

@@ -31,31 +31,34 @@ def told(distances, **more):
 
 def test_the_first_stands_beside_the_best_control():
     rows = episodes({"care": 16.0, "history": 8.0, "fan": 12.0, "rows": 11.0, "full": 17.0})
-    first, hindsight = sweep_findings(rows)
+    first, played, hindsight = sweep_findings(rows)
     assert first == (
-        "dense, 3%: care detects farthest, 16.0 m on average; care is ahead of the best control, "
-        "fan (+4.0* [4.0,4.0], m)."
+        "dense, 3%: care detects farthest, 16.0 m on average over 6 episodes, the full scan "
+        "17.0 m; care is ahead of the best control, fan (+4.0* [4.0,4.0], m)."
     )
+    assert played == "Compared are the 4 policies played here."
     assert "by the very results" in hindsight
 
 
 def test_a_control_that_is_ahead_leads():
     assert told({"care": 10.0, "history": 8.0, "fan": 16.0}) == (
-        "dense, 3%: fan detects farthest, 16.0 m on average; the best control, fan, is ahead of "
-        "care (-6.0* [-6.0,-6.0], m)."
+        "dense, 3%: fan detects farthest, 16.0 m on average over 6 episodes; the best control, "
+        "fan, is ahead of care (-6.0* [-6.0,-6.0], m)."
     )
 
 
 def test_ties_are_no_lead():
     assert told({"care": 16.0, "history": 8.0, "fan": 16.0}) == (
-        "dense, 3%: care and fan detect farthest, 16.0 m on average; the best control, fan, does "
-        "exactly as well as care."
+        "dense, 3%: care and fan detect farthest, 16.0 m on average over 6 episodes; the best "
+        "control, fan, does exactly as well as care."
     )
     assert told({"care": 16.0, "history": 16.0, "fan": 16.0}) == (
-        "dense, 3%: all 3 policies detect equally far, 16.0 m on average, controls included."
+        "dense, 3%: all 3 policies detect equally far, 16.0 m on average over 6 episodes, controls "
+        "included."
     )
     assert told({"care": 16.1, "history": WAVERING, "random": 3.0}) == (
-        "dense, 3%: care detects farthest, 16.1 m on average; history cannot be told from it."
+        "dense, 3%: care detects farthest, 16.1 m on average over 6 episodes; history cannot be "
+        "told from it."
     )
     assert "care and the best control, fan, cannot be told apart (+0.1 [-0.4,0.6], m)" in told(
         {"care": 16.1, "fan": WAVERING}
@@ -68,9 +71,21 @@ def test_a_difference_below_the_gate_is_called_so():
     )
 
 
+def test_who_is_behind_by_less_than_the_gate_is_told():
+    assert told({"care": 16.0, "care-spread": 15.0, "all-camera": 14.0, "history": 8.0}) == (
+        "dense, 3%: care detects farthest, 16.0 m on average over 6 episodes; care-spread and "
+        "all-camera are behind by less than the gate."
+    )
+
+
+def test_that_no_control_was_played_is_told():
+    rows = episodes({"history-oracle": 20.0, "care": 16.0, "history": 8.0, "full": 17.0})
+    assert "Compared are the 2 policies played here, no control among them." in sweep_findings(rows)
+
+
 def test_what_no_car_can_have_is_in_no_contest_and_one_alone_is_none():
     assert told({"history-oracle": 20.0, "care": 16.0, "history": 8.0}) == (
-        "dense, 3%: care detects farthest, 16.0 m on average."
+        "dense, 3%: care detects farthest, 16.0 m on average over 6 episodes."
     )
     assert sweep_findings(episodes({"history-oracle": 20.0, "care": 16.0, "full": 17.0})) == []
     assert sweep_findings(episodes({"fan": 16.0, "rows": 15.0, "full": 17.0})) == []
@@ -82,16 +97,16 @@ def test_a_seed_that_a_policy_lacks_counts_for_nobody():
     # Care is behind by the mean of all seeds, and ahead on those that both have.
     without = [one for one in rows if (one["policy"], one["seed"]) != ("history", 0)]
     assert sweep_findings(without)[0].startswith(
-        "dense, 3%: care detects farthest, 16.0 m on average"
+        "dense, 3%: care detects farthest, 16.0 m on average over 5 episodes"
     )
     assert sweep_findings(rows)[0].startswith(
-        "dense, 3%: history detects farthest, 15.0 m on average"
+        "dense, 3%: history detects farthest, 15.0 m on average over 6 episodes"
     )
 
 
 def test_who_is_never_detected_is_told_and_nobody_leads_where_all_are():
     sometimes = (16.0, 16.0, 16.0, 16.0, 16.0, None)
-    assert "care detects farthest, at most 13.8 m on average (1 of 6 never)" in told(
+    assert "care detects farthest, at most 13.8 m on average over 6 episodes (1 never)" in told(
         {"care": sometimes, "history": 4.0}
     )
     assert sweep_findings(episodes({"care": None, "history": None})) == []
@@ -102,7 +117,7 @@ def test_who_is_never_detected_is_told_and_nobody_leads_where_all_are():
 def test_collisions_that_a_full_scan_prevents_are_told():
     hit = {"history": {"collision": True}}
     rows = episodes({"care": 16.0, "history": 8.0, "full": 17.0}, **hit)
-    _, collisions, _ = sweep_findings(rows)
+    _, collisions, *_ = sweep_findings(rows)
     assert collisions == (
         "dense, 3%: care collides least, in 0 of 6 episodes that the full scan ends unhurt."
     )
@@ -118,8 +133,8 @@ def test_the_open_loop_tells_who_finds_most_at_once():
         seeds=(0,),
         budgets=(0.1,),
     )
-    first, _ = protocol_findings(plays)
+    first, *_ = protocol_findings(plays)
     assert first.startswith(
-        "generated streets, detector returns, 10%: care finds most first sightings at once, 60.0%; "
-        "care is ahead of the best control, rows (+15.0 ["
+        "generated streets, detector returns, 10%: care finds most first sightings at once, 60.0%, "
+        "the full scan 75.0%; care is ahead of the best control, rows (+15.0 ["
     )

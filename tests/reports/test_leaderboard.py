@@ -1,10 +1,13 @@
 """The leaderboard: its order, who takes no place, what is compared."""
 
+from dataclasses import replace
+
 import pytest
 
 from care_sim.reports.figures.leaderboard import leaderboard_figure
-from care_sim.reports.leaderboard import leaderboard_table
+from care_sim.reports.leaderboard import leaderboard_table, leads_table
 from care_sim.reports.table import Bold
+from care_sim.study.benchmark.tasks import Entry
 from tests.helpers.made_results import made_result
 
 FULL = made_result("full", share=1)
@@ -61,6 +64,23 @@ def test_the_parts_stand_beside_the_score():
     line = line_of(leaderboard_table([GOOD]), "good")
     assert line[3:5] == ("80.0", "80.0")
     assert line[2].startswith(line[6])
+
+
+def test_a_lead_in_one_part_alone_stands_under_that_part():
+    lost = tuple(
+        row._replace(reached=0) if (row.part, row.camera) == ("tests", "measured") else row
+        for row in GOOD.rows
+    )
+    elsewhere = replace(GOOD, entry=Entry("elsewhere"), rows=lost)
+    table = leads_table([GOOD, elsewhere, LOW], "good")
+    assert table.columns == ("policy", "drives", "tests", "streets", "score, ideal camera")
+    line = next(row for row in table.rows if row[0] == "elsewhere")
+    assert line[1::2] == ("+0.0 [0.0,0.0]", "+0.0 [0.0,0.0]")
+    assert line[2].startswith("-80.0 [")
+    assert [isinstance(cell, Bold) for cell in line] == [False, False, True, False, False]
+    assert line[4] == "+0.0 [0.0,0.0]"
+    assert {row[0] for row in table.rows} == {"elsewhere", "low"}
+    assert leads_table([GOOD, LOW], "place") is None
 
 
 def test_a_trial_says_that_it_is_one():

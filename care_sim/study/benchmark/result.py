@@ -6,7 +6,7 @@ people.
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple, Self
@@ -83,11 +83,15 @@ class BenchmarkResult:
             ]
         )
 
-    def lead(self, other: "BenchmarkResult", camera: str = MEASURED) -> Interval:
-        """Its score less that of another in the same worlds, in points, paired by world."""
+    def lead(
+        self, other: "BenchmarkResult", camera: str = MEASURED, parts: Sequence[str] = ()
+    ) -> Interval:
+        """Its score less that of another in the same worlds, in points, paired by world; of some
+        `parts` alone, if any are given.
+        """
         pairs = [
             list(zip(self.of_part(part, camera), other.of_part(part, camera), strict=True))
-            for part in self.parts
+            for part in parts or self.parts
         ]
         return mean_of_ratios(
             [
