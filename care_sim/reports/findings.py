@@ -32,6 +32,7 @@ _HINDSIGHT = (
     "Who is first, and the best control, are chosen at each budget by the very results that are "
     "compared, which favours whoever is chosen; the number of comparisons is not corrected for."
 )
+_TOO_FEW = f"Who leads is told from {FEWEST_PAIRS} seeds on."
 _MOST_NAMED = 4
 """So many policies are named in a row; of more, how many they are."""
 _Tags = Mapping[str, tuple[str, ...]]
@@ -101,6 +102,11 @@ class _Contest:
         if control := best_control({policy: self.levels[policy] for policy in controls}):
             best = max(others, key=self.levels.__getitem__)
             parts.append(self._beside_control(best, control))
+        elif behind := [p for p in others if p not in (*tied, *alike, *close)]:
+            second = max(behind, key=self.levels.__getitem__)
+            ahead = "it is ahead" if len(tied) == 1 else "they are ahead"
+            measured = f"({interval(over[second])}, {self.unit})"
+            parts.append(f"{ahead} of the next, {second} {measured}")
         yield f"{'; '.join(parts)}."
 
     def _beside_control(self, best: str, control: str) -> str:
@@ -133,7 +139,7 @@ def sweep_findings(rows: Sequence[Row], conditions: bool = True) -> list[str]:
     for setting, policy, budget in groups:
         if policy != FULL:
             budgets.setdefault(setting, set()).add(budget)
-    return _with_remarks(
+    found = _with_remarks(
         tags,
         (
             sentence
@@ -144,6 +150,10 @@ def sweep_findings(rows: Sequence[Row], conditions: bool = True) -> list[str]:
             for sentence in contest.findings()
         ),
     )
+    real = [row for row in rows if _is_real(policy_of(row), tags)]
+    several = len({policy_of(row) for row in real}) > 1
+    few = several and len({row["seed"] for row in real}) < FEWEST_PAIRS
+    return found or ([_TOO_FEW] if few else [])
 
 
 def protocol_findings(rows: Sequence[Row]) -> list[str]:

@@ -26,7 +26,7 @@ _MINUS = "Minus {}: points over {}, paired by world; bold where the interval exc
 _OF_CONTROL = f"the control {CONTROL.name}, a fixed map without a camera"
 _IDEAL = "Ideal camera: the score with a camera that reports whatever shows enough pixels."
 _UNRANKED = "No number: no policy that a car can have."
-_MAKERS = "Played {}: care-sim leaderboard --verify says whether rows come out the same here."
+_AS_TOLD = "As the files say{}: care-sim leaderboard --verify plays a tenth of a file again."
 _LEADS_BY_PART = (
     "Points, paired by world; bold where the interval excludes zero. The score weighs its parts "
     "alike, which is a convention: who is ahead in one part and behind in another leads by it."
@@ -35,7 +35,10 @@ _IN_HINDSIGHT = (
     "Who is first is chosen by the very results that are compared, which favours the first; the "
     "number of comparisons is not corrected for."
 )
-_TRIAL = "Only the tenth of the worlds that --quick plays: a trial, and no leaderboard."
+_TRIAL = (
+    "Only the tenth of the worlds that --quick plays: a trial, and no leaderboard. So few worlds "
+    "may all end alike by chance, and then the interval has no width."
+)
 
 
 def leaderboard_table(results: Sequence[BenchmarkResult], minus: str = CONTROL.name) -> Table:
@@ -116,10 +119,10 @@ def notes_on(results: Sequence[BenchmarkResult], minus: str) -> tuple[str, ...]:
     codes, processors = {*map(code_of, results)}, {*map(processor_of, results)}
     made = [f"by {len(codes)} versions of the code"] if len(codes) > 1 else []
     made += [f"on {len(processors)} kinds of processor"] if len(processors) > 1 else []
-    several = (_MAKERS.format(" ".join(made)),) if made else ()
+    told = _AS_TOLD.format(f", played {' '.join(made)}" if made else "")
     tags = tag_notes(each.tags for each in results)
     # What limits the numbers comes first: a terminal has room for three lines.
-    return (*trial, *several, _SCORE, *leads, _IDEAL, *beyond, *tags)
+    return (*trial, told, _SCORE, *leads, _IDEAL, *beyond, *tags)
 
 
 def is_beyond(result: BenchmarkResult) -> bool:

@@ -140,6 +140,7 @@ def where_it_lies(folder: Path, study: Study, rows: Sequence[Row] = ()) -> list[
     """The lines that end a study: its folder, tables, figures of its rows, and how to make its
     page.
     """
+    report = shlex.join(["care-sim", "report", str(folder)])
     names = study.figures_of(rows)
     figures = sorted({path.name for name in names for path in folder.glob(f"{name}.png")})
     return [
@@ -147,7 +148,8 @@ def where_it_lies(folder: Path, study: Study, rows: Sequence[Row] = ()) -> list[
         f"Tables: {folder / TABLES}",
         *([f"Figures: {', '.join(figures)}"] if figures else []),
         *([f"Not all of it: {how_far(folder)}"] if (folder / UNFINISHED).is_file() else []),
-        f"Page: {shlex.join(['care-sim', 'report', str(folder), '-o', str(folder / PAGE)])}",
+        *([f"One policy minus each other: {report} --minus POLICY"] if study.minus else []),
+        f"To make its page: {report} -o {shlex.quote(str(folder / PAGE))}",
     ]
 
 

@@ -58,7 +58,7 @@ def test_ties_are_no_lead():
     )
     assert told({"care": 16.1, "history": WAVERING, "random": 3.0}) == (
         "dense, 3%: care detects farthest, 16.1 m on average over 6 episodes; history cannot be "
-        "told from it."
+        "told from it; it is ahead of the next, random (+13.1* [13.1,13.1], m)."
     )
     assert "care and the best control, fan, cannot be told apart (+0.1 [-0.4,0.6], m)" in told(
         {"care": 16.1, "fan": WAVERING}
@@ -74,7 +74,8 @@ def test_a_difference_below_the_gate_is_called_so():
 def test_who_is_behind_by_less_than_the_gate_is_told():
     assert told({"care": 16.0, "care-spread": 15.0, "all-camera": 14.0, "history": 8.0}) == (
         "dense, 3%: care detects farthest, 16.0 m on average over 6 episodes; care-spread and "
-        "all-camera are behind by less than the gate."
+        "all-camera are behind by less than the gate; it is ahead of the next, history (+8.0* "
+        "[8.0,8.0], m)."
     )
 
 
@@ -85,11 +86,14 @@ def test_that_no_control_was_played_is_told():
 
 def test_what_no_car_can_have_is_in_no_contest_and_one_alone_is_none():
     assert told({"history-oracle": 20.0, "care": 16.0, "history": 8.0}) == (
-        "dense, 3%: care detects farthest, 16.0 m on average over 6 episodes."
+        "dense, 3%: care detects farthest, 16.0 m on average over 6 episodes; it is ahead of the "
+        "next, history (+8.0* [8.0,8.0], m)."
     )
     assert sweep_findings(episodes({"history-oracle": 20.0, "care": 16.0, "full": 17.0})) == []
     assert sweep_findings(episodes({"fan": 16.0, "rows": 15.0, "full": 17.0})) == []
-    assert sweep_findings(episodes({"care": 16.0, "history": 8.0}, seeds=range(4))) == []
+    few = sweep_findings(episodes({"care": 16.0, "history": 8.0}, seeds=range(4)))
+    assert few == ["Who leads is told from 5 seeds on."]
+    assert sweep_findings(episodes({"care": 16.0, "full": 18.0}, seeds=range(4))) == []
 
 
 def test_a_seed_that_a_policy_lacks_counts_for_nobody():
@@ -119,10 +123,13 @@ def test_collisions_that_a_full_scan_prevents_are_told():
     rows = episodes({"care": 16.0, "history": 8.0, "full": 17.0}, **hit)
     _, collisions, *_ = sweep_findings(rows)
     assert collisions == (
-        "dense, 3%: care collides least, in 0 of 6 episodes that the full scan ends unhurt."
+        "dense, 3%: care collides least, in 0 of 6 episodes that the full scan ends unhurt; it is "
+        "ahead of the next, history (+100* [100,100], points)."
     )
     without = [one for one in rows if one["policy"] != "full"]
-    assert sweep_findings(without)[1] == "dense, 3%: care collides least, in 0 of 6 episodes."
+    assert sweep_findings(without)[1].startswith(
+        "dense, 3%: care collides least, in 0 of 6 episodes; it is ahead"
+    )
     doomed = episodes({"care": 16.0, "history": 8.0, "full": 17.0}, **hit, full={"collision": True})
     assert not any("collide" in sentence for sentence in sweep_findings(doomed))
 

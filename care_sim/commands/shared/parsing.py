@@ -54,7 +54,16 @@ def _real(text: str) -> float:
     try:
         return float(text)
     except ValueError:
-        raise ValueError(f"must be a number, got {shown(text)}") from None
+        raise ValueError(f"must be a number, got {shown(text)}{_as_share(text)}") from None
+
+
+def _as_share(text: str) -> str:
+    """What to write for a text in percent; nothing for another."""
+    try:
+        share = float(text.removesuffix("%")) / 100
+    except ValueError:
+        return ""
+    return f": write {share:g}"
 
 
 def _whole_or_none(text: str) -> int | None:

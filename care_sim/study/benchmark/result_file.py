@@ -44,12 +44,15 @@ def read_result(path: Path) -> BenchmarkResult:
     try:
         result = _result(content)
     except (KeyError, TypeError, ValueError, OverflowError) as error:
-        raise InvalidInput(
-            f"{path} is damaged: {type(error).__name__} {shown(str(error))}"
-        ) from error
+        raise InvalidInput(f"{path} is damaged: {_reason(error)}") from error
     _check_tags(path, result)
     _check_worlds(path, result)
     return result
+
+
+def _reason(error: Exception) -> str:
+    """Why a file cannot be read, for people: of a KeyError the text is a name alone."""
+    return f"{shown(error.args[0])} is missing" if isinstance(error, KeyError) else f"{error}"
 
 
 def is_result(content: object) -> bool:
@@ -145,6 +148,8 @@ def _check_worlds(path: Path, result: BenchmarkResult) -> None:
             if missing and {*there} <= {*expected}
             else f"holds other worlds than {version}"
         )
+        trial = " --quick" if result.quick else ""
         raise InvalidInput(
-            f"{path} {wrong}: play it again with care-sim benchmark --policy {result.entry.policy}"
+            f"{path} {wrong}: play it again with care-sim benchmark{trial} --policy "
+            f"{result.entry.policy}"
         )
