@@ -135,6 +135,14 @@ def test_missing_rows_are_counted(file, lost):
     assert refusal(changed(file, rows=rows)).startswith(told)
 
 
+def test_a_trial_is_played_again_as_a_trial(tmp_path):
+    path = tmp_path / "mine.quick.json"
+    made_result().cut_to_tenth().write(path)
+    rows = json.loads(path.read_text())["rows"]
+    told = "play it again with care-sim benchmark --quick --policy mine"
+    assert refusal(changed(path, rows=rows[1:])).endswith(told)
+
+
 @pytest.mark.parametrize(
     "values",
     [
@@ -160,6 +168,15 @@ def test_missing_rows_are_counted(file, lost):
 def test_a_damaged_file_is_named(file, values):
     told = refusal(changed(file, **values))
     assert told.startswith(f"{file} is damaged: ")
+    assert "Error" not in told
+    assert "\n" not in told
+
+
+def test_what_a_damaged_file_lacks_is_named(file):
+    content = json.loads(file.read_text())
+    del content["policy"]
+    file.write_text(json.dumps(content))
+    assert refusal(file) == f"{file} is damaged: 'policy' is missing"
 
 
 @pytest.mark.parametrize("n", [2, 3, 4])

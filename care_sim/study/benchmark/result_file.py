@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from care_sim.base.checks import LARGEST_INTEGER
-from care_sim.base.errors import InvalidInput, counted, shown
+from care_sim.base.errors import InvalidInput, counted, printable, shown
 from care_sim.base.json_text import json_content
 from care_sim.policies import POLICIES, tags_of
 from care_sim.policies.base import TAGS
@@ -52,7 +52,8 @@ def read_result(path: Path) -> BenchmarkResult:
 
 def _reason(error: Exception) -> str:
     """Why a file cannot be read, for people: of a KeyError the text is a name alone."""
-    return f"{shown(error.args[0])} is missing" if isinstance(error, KeyError) else f"{error}"
+    missing = isinstance(error, KeyError)
+    return f"{shown(error.args[0])} is missing" if missing else printable(str(error))
 
 
 def is_result(content: object) -> bool:
