@@ -87,10 +87,20 @@ def test_how_many_tests_of_the_suite_are_of_a_kind_that_training_met():
     # The tests of both rounds of `care_sim.training.sets`.
     count = sum(worlds["ncap"] for worlds in ROUNDS)
     met = {kind(TRAINING + number) for number in range(count)}
-    kinds = [kind(world.seed) for world in published_worlds() if world.part == TESTS]
+    kinds = {w.number: kind(w.seed) for w in published_worlds() if w.part == TESTS}
     told = "the 120 have {} pairs of a test and speeds, and {} of the 120 have one that"
     page = " ".join((FOLDER / "benchmark.md").read_text().split())
-    assert told.format(len({*kinds}), sum(one in met for one in kinds)) in page
+    known = {number for number, one in kinds.items() if one in met}
+    assert told.format(len({*kinds.values()}), len(known)) in page
+
+    def avoided(name):
+        rows = read_result(FOLDER / f"leaderboard/{name}.json").of_part(TESTS, "measured")
+        return [sum(r.reached for r in rows if (r.world in known) == met) for met in (True, False)]
+
+    told = "It avoids {} of the {}, and {} of the other {}."
+    counts = zip(avoided("learned-sets"), (len(known), len(kinds) - len(known)), strict=True)
+    assert told.format(*(number for pair in counts for number in pair)) in page
+    assert "`care-sightlines` avoids {} and {}.".format(*avoided("care-sightlines")) in page
 
 
 ENTRIES = {
