@@ -19,12 +19,7 @@ from care_sim.commands.shared.study_command import DONE, FAILED, console
 from care_sim.reports.figures.files import check_figure, save
 from care_sim.reports.figures.leaderboard import LEADERBOARD_FIGURE, leaderboard_figure
 from care_sim.reports.leaderboard import CONTROL, leaderboard_table, leads_table, names_in
-from care_sim.study.benchmark.made_by import (
-    is_of_this_code,
-    is_of_this_processor,
-    own_code_of,
-    processor_of,
-)
+from care_sim.study.benchmark.made_by import elsewhere, own_code_of
 from care_sim.study.benchmark.player import Player, player_in
 from care_sim.study.benchmark.replay import Replay, replayed
 from care_sim.study.benchmark.result import BenchmarkResult
@@ -133,8 +128,11 @@ class Leaderboard:
                 continue
             if replay.holds:
                 print(f"{path}: {_drawn(replay, result)} came out again as the file says")
-                if replay.detours:
-                    print(f"  {_detours(replay, result)}")
+            if replay.detours:
+                print(
+                    f"{path}: {replay.detours} of them reached as much with another hash; played "
+                    f"{elsewhere(result)}"
+                )
             problems += [f"{path}: {problem}" for problem in _told(replay, result)]
         return problems
 
@@ -150,21 +148,13 @@ class Leaderboard:
 
 def _told(replay: Replay, result: BenchmarkResult) -> list[str]:
     """A line for each kind of thing in which a result does not hold."""
-    other = "" if is_of_this_code(result) else "; it was played by other code than is here"
+    other = f"; played {made}" if (made := elsewhere(result)) else ""
     differing = [
         f"of {_drawn(replay, result)} {len(replay.differing)} did not go as it says, the first "
         f"world {row.world} of the {row.part} with the {row.camera} camera{other}"
         for row in replay.differing[:1]
     ]
     return [*replay.false, *differing, *map(str, replay.failures[:1])]
-
-
-def _detours(replay: Replay, result: BenchmarkResult) -> str:
-    """What is no fault of a result that holds, and why it may be."""
-    made = "by other code" if not is_of_this_code(result) else ""
-    if not is_of_this_processor(result):
-        made += f" on {processor_of(result) or 'a processor that it does not name'}"
-    return f"{replay.detours} of them fired other cells and reached as much; played {made.strip()}"
 
 
 def _drawn(replay: Replay, result: BenchmarkResult) -> str:

@@ -29,7 +29,7 @@ _UNRANKED = "No number: no policy that a car can have."
 _AS_TOLD = "As the files say{}: care-sim leaderboard --verify plays a tenth of a file again."
 _LEADS_BY_PART = (
     "Points, paired by world; bold where the interval excludes zero. The score weighs its parts "
-    "alike, which is a convention: who is ahead in one part and behind in another leads by it."
+    "alike, a convention on which it hangs who leads of two that are ahead in one part each."
 )
 _IN_HINDSIGHT = (
     "Who is first is chosen by the very results that are compared, which favours the first; the "
@@ -45,16 +45,11 @@ def leaderboard_table(results: Sequence[BenchmarkResult], minus: str = CONTROL.n
     """A line for every result, the highest score first, with its lead over the entry `minus`, if
     that is among them. All must be of the same worlds.
     """
-    ranked = sorted(results, key=lambda result: -result.score().mean)
+    ranked, control = _ranked(results, minus)
     # What no car can have stands where its score puts it, and takes no place.
-    contenders = [each for each in ranked if not is_beyond(each)]
+    contenders = [each for _, each in ranked if not is_beyond(each)]
     numbers = {id(each): f"{number}" for number, each in enumerate(contenders, 1)}
-    names = names_in(ranked)
-    control = next((each for each, name in zip(ranked, names, strict=True) if name == minus), None)
-    rows = tuple(
-        _line(each, name, numbers.get(id(each), ""), control)
-        for each, name in zip(ranked, names, strict=True)
-    )
+    rows = tuple(_line(each, name, numbers.get(id(each), ""), control) for name, each in ranked)
     leads = () if control is None else (f"minus {minus}",)
     columns = ("", "policy", "score", *leads, *results[0].parts, "ideal camera")
     notes = notes_on(results, minus if leads else "")
@@ -63,26 +58,33 @@ def leaderboard_table(results: Sequence[BenchmarkResult], minus: str = CONTROL.n
 
 def leads_table(results: Sequence[BenchmarkResult], minus: str) -> Table | None:
     """The leads over the entry `minus` part by part, and with the ideal camera, of every other
-    entry, in the order of their scores; None where that entry is not among them.
+    entry, in the order of their scores; None without that entry, or without another.
     """
-    ranked = sorted(results, key=lambda result: -result.score().mean)
-    names = names_in(ranked)
-    control = next((each for each, name in zip(ranked, names, strict=True) if name == minus), None)
-    if control is None:
+    ranked, control = _ranked(results, minus)
+    if control is None or len(ranked) == 1:
         return None
-    parts = control.parts
     rows = tuple(
         (
             name,
-            *(_shown(each.lead(control, parts=[part])) for part in parts),
+            *(_shown(each.lead(control, part=part)) for part in control.parts),
             _shown(each.lead(control, IDEAL)),
         )
-        for each, name in zip(ranked, names, strict=True)
+        for name, each in ranked
         if each is not control
     )
-    notes = (_LEADS_BY_PART, _IN_HINDSIGHT)
-    columns = ("policy", *parts, "score, ideal camera")
-    return Table(f"{title(results)}: minus {minus}, part by part", columns, rows, notes)
+    trial = (_TRIAL,) if control.quick else ()
+    columns = ("policy", *control.parts, "score, ideal camera")
+    title_of_leads = f"{title(results)}: minus {minus}, part by part"
+    return Table(title_of_leads, columns, rows, (*trial, _LEADS_BY_PART, _IN_HINDSIGHT))
+
+
+def _ranked(
+    results: Sequence[BenchmarkResult], minus: str
+) -> tuple[list[tuple[str, BenchmarkResult]], BenchmarkResult | None]:
+    """Names and results, the highest score first, and the one named `minus` if it is there."""
+    in_order = sorted(results, key=lambda result: -result.score().mean)
+    named = [*zip(names_in(in_order), in_order, strict=True)]
+    return named, next((each for name, each in named if name == minus), None)
 
 
 def names_in(results: Sequence[BenchmarkResult]) -> list[str]:
@@ -116,7 +118,8 @@ def notes_on(results: Sequence[BenchmarkResult], minus: str) -> tuple[str, ...]:
     leads = (_MINUS.format(minus, over),) if minus else ()
     beyond = (_UNRANKED,) if any(map(is_beyond, results)) else ()
     trial = (_TRIAL,) if results[0].quick else ()
-    codes, processors = {*map(code_of, results)}, {*map(processor_of, results)}
+    codes = {*filter(None, map(code_of, results))}
+    processors = {*filter(None, map(processor_of, results))}
     made = [f"by {len(codes)} versions of the code"] if len(codes) > 1 else []
     made += [f"on {len(processors)} kinds of processor"] if len(processors) > 1 else []
     told = _AS_TOLD.format(f", played {' '.join(made)}" if made else "")

@@ -400,7 +400,8 @@ def test_the_list_of_commands_says_what_each_command_says_of_itself():
         ("bench --seconds x", "--seconds: must be a number, got 'x'"),
         ("sweep --seeds 1 a", "--seeds: must be a whole number, got 'a'"),
         ("sweep --budgets 0.1 x", "--budgets: must be a number, got 'x'"),
-        ("sweep --budgets 10%", "--budgets: must be a number, got '10%': write 0.1"),
+        ("sweep --budgets 10%", "--budgets: must be a number, got '10%': write 0.1 for 10%"),
+        ("sweep --budgets 150%", "--budgets: must be a number, got '150%'"),
     ],
 )
 def test_what_is_no_number_is_told_in_plain_words(arguments, message, capsys):

@@ -1,7 +1,8 @@
 """What a study showed, in words."""
 
 from care_sim.policies import tags_of
-from care_sim.reports.findings import protocol_findings, sweep_findings
+from care_sim.reports.findings.closed_loop import sweep_findings
+from care_sim.reports.findings.open_loop import protocol_findings
 from care_sim.study.episode_config import EpisodeConfig
 from tests.helpers import made_plays
 from tests.helpers.made_rows import row
@@ -57,8 +58,8 @@ def test_ties_are_no_lead():
         "included."
     )
     assert told({"care": 16.1, "history": WAVERING, "random": 3.0}) == (
-        "dense, 3%: care detects farthest, 16.1 m on average over 6 episodes; history cannot be "
-        "told from it; it is ahead of the next, random (+13.1* [13.1,13.1], m)."
+        "dense, 3%: care detects farthest, 16.1 m on average over 6 episodes, ahead of random "
+        "(+13.1* [13.1,13.1], m); history cannot be told from it."
     )
     assert "care and the best control, fan, cannot be told apart (+0.1 [-0.4,0.6], m)" in told(
         {"care": 16.1, "fan": WAVERING}
@@ -66,17 +67,25 @@ def test_ties_are_no_lead():
 
 
 def test_a_difference_below_the_gate_is_called_so():
-    assert "ahead of the best control, fan, by less than the gate (+1.0 [1.0,1.0], m)" in told(
-        {"care": 16.0, "fan": 15.0}
+    assert (
+        "ahead of the best control, fan, by less than the gate of 2.5 m (+1.0 [1.0,1.0], m)"
+        in told({"care": 16.0, "fan": 15.0})
     )
 
 
 def test_who_is_behind_by_less_than_the_gate_is_told():
     assert told({"care": 16.0, "care-spread": 15.0, "all-camera": 14.0, "history": 8.0}) == (
-        "dense, 3%: care detects farthest, 16.0 m on average over 6 episodes; care-spread and "
-        "all-camera are behind by less than the gate; it is ahead of the next, history (+8.0* "
-        "[8.0,8.0], m)."
+        "dense, 3%: care detects farthest, 16.0 m on average over 6 episodes, ahead of history "
+        "(+8.0* [8.0,8.0], m); care-spread and all-camera are behind by less than the gate of "
+        "2.5 m."
     )
+
+
+def test_the_full_scan_is_told_over_the_same_episodes_or_not_at_all():
+    rows = episodes({"care": 16.0, "history": 8.0})
+    never = episodes({"full": (17.0, 17.0, 17.0, 17.0, 17.0, None)})
+    assert ", the full scan at most 14.7 m, ahead" in sweep_findings([*rows, *never])[0]
+    assert "the full scan" not in sweep_findings([*rows, *never[:5]])[0]
 
 
 def test_that_no_control_was_played_is_told():
@@ -86,14 +95,22 @@ def test_that_no_control_was_played_is_told():
 
 def test_what_no_car_can_have_is_in_no_contest_and_one_alone_is_none():
     assert told({"history-oracle": 20.0, "care": 16.0, "history": 8.0}) == (
-        "dense, 3%: care detects farthest, 16.0 m on average over 6 episodes; it is ahead of the "
-        "next, history (+8.0* [8.0,8.0], m)."
+        "dense, 3%: care detects farthest, 16.0 m on average over 6 episodes, ahead of history "
+        "(+8.0* [8.0,8.0], m)."
     )
     assert sweep_findings(episodes({"history-oracle": 20.0, "care": 16.0, "full": 17.0})) == []
     assert sweep_findings(episodes({"fan": 16.0, "rows": 15.0, "full": 17.0})) == []
     few = sweep_findings(episodes({"care": 16.0, "history": 8.0}, seeds=range(4)))
-    assert few == ["Who leads is told from 5 seeds on."]
-    assert sweep_findings(episodes({"care": 16.0, "full": 18.0}, seeds=range(4))) == []
+    assert len(few) == 1
+    assert few[0].startswith("Who leads is told of 5 seeds and more that all policies share")
+    for nobody in ({"care": 16.0, "full": 18.0}, {"fan": 16.0, "rows": 15.0}):
+        assert sweep_findings(episodes(nobody, seeds=range(4))) == []
+    # Six seeds of each, of which four are shared.
+    rows = [
+        *episodes({"care": 16.0}, seeds=range(6)),
+        *episodes({"history": 8.0}, seeds=range(2, 8)),
+    ]
+    assert sweep_findings(rows) == few
 
 
 def test_a_seed_that_a_policy_lacks_counts_for_nobody():
@@ -123,12 +140,12 @@ def test_collisions_that_a_full_scan_prevents_are_told():
     rows = episodes({"care": 16.0, "history": 8.0, "full": 17.0}, **hit)
     _, collisions, *_ = sweep_findings(rows)
     assert collisions == (
-        "dense, 3%: care collides least, in 0 of 6 episodes that the full scan ends unhurt; it is "
-        "ahead of the next, history (+100* [100,100], points)."
+        "dense, 3%: care collides least, in 0 of 6 episodes that the full scan ends unhurt, "
+        "ahead of history (+100* [100,100], points)."
     )
     without = [one for one in rows if one["policy"] != "full"]
     assert sweep_findings(without)[1].startswith(
-        "dense, 3%: care collides least, in 0 of 6 episodes; it is ahead"
+        "dense, 3%: care collides least, in 0 of 6 episodes, ahead of history"
     )
     doomed = episodes({"care": 16.0, "history": 8.0, "full": 17.0}, **hit, full={"collision": True})
     assert not any("collide" in sentence for sentence in sweep_findings(doomed))

@@ -81,6 +81,9 @@ def test_a_lead_in_one_part_alone_stands_under_that_part():
     assert line[4] == "+0.0 [0.0,0.0]"
     assert {row[0] for row in table.rows} == {"elsewhere", "low"}
     assert leads_table([GOOD, LOW], "place") is None
+    assert leads_table([GOOD], "good") is None
+    trial = leads_table([GOOD.cut_to_tenth(), LOW.cut_to_tenth()], "good")
+    assert trial.notes[0].startswith("Only the tenth of the worlds")
 
 
 def test_a_trial_says_that_it_is_one():

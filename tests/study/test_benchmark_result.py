@@ -155,6 +155,8 @@ def test_a_trial_is_played_again_as_a_trial(tmp_path):
         {"rows": [["drives", "measured", 201, 0.5, 1, "h"]]},
         {"rows": [["drives", "measured", 201, 0, 0, "h"]]},
         {"made_by": None},
+        {"made_by": [1]},
+        {"rows": [[{}, [], 1, 0, 1, "h"]]},
         {"rows": [["drives", "measured", 201, 2, 1, "h"]]},
         {"policy": "# care"},
         {"policy": "<b>care</b>"},
@@ -168,8 +170,7 @@ def test_a_trial_is_played_again_as_a_trial(tmp_path):
 def test_a_damaged_file_is_named(file, values):
     told = refusal(changed(file, **values))
     assert told.startswith(f"{file} is damaged: ")
-    assert "Error" not in told
-    assert "\n" not in told
+    assert not any(word in told for word in ("Error", "object", "argument", "\n"))
 
 
 def test_what_a_damaged_file_lacks_is_named(file):

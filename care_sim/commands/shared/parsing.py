@@ -58,12 +58,12 @@ def _real(text: str) -> float:
 
 
 def _as_share(text: str) -> str:
-    """What to write for a text in percent; nothing for another."""
+    """How a share in percent is written; nothing for another text."""
     try:
         share = float(text.removesuffix("%")) / 100
     except ValueError:
         return ""
-    return f": write {share:g}"
+    return f": write {share:g} for {text}" if 0 < share <= 1 else ""
 
 
 def _whole_or_none(text: str) -> int | None:

@@ -5,7 +5,6 @@ from pathlib import Path
 
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.checks import LARGEST_INTEGER, check_known
-from care_sim.base.errors import InvalidInput
 from care_sim.scenarios import PAPER_SCENARIOS
 from care_sim.study.episode_config import EpisodeConfig
 
@@ -48,10 +47,6 @@ class BenchConfig:
         check_fields(self)
         # Taken apart is the keyframe of a car that drives straight ahead.
         check_known("scenario", self.scenario, PAPER_SCENARIOS)
-        if self.out is not None and self.out.suffix in (".png", ".svg"):
-            raise InvalidInput(
-                f"out must be a file for JSON, got {self.out}; the figure is drawn beside it"
-            )
 
     @property
     def episode(self) -> EpisodeConfig:

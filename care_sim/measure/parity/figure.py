@@ -16,15 +16,16 @@ _KEYFRAMES = "keyframes of the scenarios"
 
 def parity_figure(report: dict[str, Any]) -> Figure:
     """Rays in a million to which `fast` answers otherwise than either reference, a panel for random
-    scenes and one for the keyframes of all scenarios, as far as they were compared.
+    scenes and one for the keyframes of all scenarios; one of them must have been compared. Kinds
+    that no ray meets have no marker.
     """
     random = {name: own for name, own in report["scans"].items() if name.startswith("random")}
     played = [own for name, own in report["scans"].items() if name not in random]
     panels = {name: [own] for name, own in random.items()}
     panels |= {_KEYFRAMES: played} if played else {}
     figure = Figure(figsize=(9.2, 3.4), layout="constrained")
-    row = figure.subplots(1, max(len(panels), 1), squeeze=False, sharex=True, sharey=True)[0]
-    for axes, (title, scans) in zip(row, panels.items(), strict=False):
+    row = figure.subplots(1, len(panels), squeeze=False, sharex=True, sharey=True)[0]
+    for axes, (title, scans) in zip(row, panels.items(), strict=True):
         axes.set_title(f"{title}: {sum(own['scans'] for own in scans):,} scans", loc="left")
         _draw(axes, scans)
     row[0].set_yticks(range(len(GROUPS)), GROUPS)
@@ -37,8 +38,9 @@ def parity_figure(report: dict[str, Any]) -> Figure:
 
 def _draw(axes: Axes, scans: list[dict[str, Any]]) -> None:
     """A marker a reference at every kind of body that any ray meets."""
-    # Counts span five powers of ten, and none is a result too.
-    axes.set_xscale("symlog", linthresh=1.0)
+    # Shares span seven powers of ten, and none is a result too: one ray of all that are cast stands
+    # apart from it.
+    axes.set_xscale("symlog", linthresh=0.01)
     for reference, (colour, marker) in _STYLES.items():
         heights = dict[int, float]()
         for place, group in enumerate(GROUPS):

@@ -43,14 +43,14 @@ class ParityConfig:
     seed: int = bounded(0, 0, LARGEST_INTEGER)
     """Seed of the random scenes."""
     out: Path | None = None
-    """File for the figures as JSON; the picture of them stands beside it as PNG and SVG."""
+    """File for the counts as JSON; their figure is written beside it as PNG and SVG."""
 
     def __post_init__(self) -> None:
         check_fields(self)
 
 
 def run_parity(config: ParityConfig) -> int:
-    """Compare, print the tables, write JSON and picture; 0 where the engines agree as `agree` says,
+    """Compare, print the tables, write JSON and figure; 0 where the engines agree as `agree` says,
     else 1.
     """
     # Files that cannot be written are refused before anything is compared.

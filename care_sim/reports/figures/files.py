@@ -9,7 +9,7 @@ from matplotlib.axis import Tick
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from care_sim.base.errors import printable
+from care_sim.base.errors import InvalidInput, printable
 from care_sim.base.files import PNG, SVG, check_output, replacing
 
 _FORMATS = (".png", ".svg")
@@ -41,7 +41,13 @@ def save(figure: Figure, stem: Path) -> None:
 
 
 def check_figure(stem: Path) -> None:
-    """Raise what `care_sim.base.files.check_output` does where `save` could not write a figure."""
+    """Raise what `care_sim.base.files.check_output` does where `save` could not write a figure, and
+    InvalidInput where the figure would replace the file that it stands beside.
+    """
+    if stem.suffix in _FORMATS:
+        raise InvalidInput(
+            f"out must be a file for JSON, got {stem}; the figure is drawn beside it"
+        )
     check_output(stem.with_suffix(".png"), PNG)
     check_output(stem.with_suffix(".svg"), SVG)
 

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from care_sim.base.errors import printable
 from care_sim.study.benchmark.result import BenchmarkResult
 from care_sim.study.benchmark.tasks import Entry
 from care_sim.study.provenance import code_digest, machine, policy_digest, versions
@@ -20,9 +21,24 @@ def code_of(result: BenchmarkResult) -> str:
 
 
 def processor_of(result: BenchmarkResult) -> str:
-    """The processor that a result names; empty where it names none."""
+    """The processor that a result names, on one line; empty where it names none."""
     told = result.made_by.get("machine")
-    return str(told.get("processor", "")) if isinstance(told, dict) else ""
+    named = told.get("processor") if isinstance(told, dict) else None
+    return printable(named) if isinstance(named, str) else ""
+
+
+def is_made_alike(result: BenchmarkResult) -> bool:
+    """Whether all that a result names as its maker is here: code, policy, libraries and machine."""
+    return result.made_by == made_by(result.entry)
+
+
+def elsewhere(result: BenchmarkResult) -> str:
+    """What made a result where that is not what is here, in words; empty where all is."""
+    if is_made_alike(result):
+        return ""
+    by = "other libraries or another system" if is_of_this_code(result) else "other code"
+    on = processor_of(result)
+    return f"by {by} than here{f', on {on}' if on and on != machine()['processor'] else ''}"
 
 
 def own_code_of(result: BenchmarkResult) -> str:
@@ -37,11 +53,6 @@ def is_of_this_code(result: BenchmarkResult) -> bool:
     return code_of(result) == code_digest() and all(
         result.made_by.get(name) == value for name, value in here.items()
     )
-
-
-def is_of_this_processor(result: BenchmarkResult) -> bool:
-    """Whether a result was made by a processor of the kind that is here."""
-    return processor_of(result) == machine()["processor"]
 
 
 def _own_code(entry: Entry) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from random import Random
 
 from care_sim.base.errors import InvalidInput
 from care_sim.policies import tags_of
-from care_sim.study.benchmark.made_by import is_of_this_code, is_of_this_processor
+from care_sim.study.benchmark.made_by import is_made_alike
 from care_sim.study.benchmark.player import Player
 from care_sim.study.benchmark.result import BenchmarkResult, ResultRow
 from care_sim.study.benchmark.tasks import IDEAL, MEASURED, Task, tasks_of
@@ -21,8 +21,8 @@ for who makes rows up makes up those. How sure it is: `docs/benchmark.md`."""
 @dataclass(frozen=True)
 class Replay:
     """The number of rows that were played again, those of them that went otherwise, how many
-    reached as much on another way where that is no fault, what failed, and what else the file says
-    falsely.
+    reached as much with another hash where that is no fault, what failed, and what else the file
+    says falsely.
     """
 
     played: int
@@ -46,9 +46,9 @@ def replayed(
 ) -> Replay:
     """Play a random tenth of a result again; `worlds` are those that the salt draws.
 
-    A row goes otherwise where another number is reached. By the code and the kind of processor that
-    made the result it goes otherwise also where the episode has another hash: others may round the
-    last bit of a direction otherwise, and fire other cells.
+    A row goes otherwise where another number is reached. By the very code, libraries and machine
+    that the file names it goes otherwise also where the episode has another hash: others may round
+    the last bit of a direction otherwise, and fire other cells.
 
     Raises InvalidInput for a sealed one without its salt, and where its policy cannot be made.
     """
@@ -61,8 +61,9 @@ def replayed(
         for (told, task), row in zip(tasks.items(), rows, strict=True)
         if row and (again := ResultRow.of(task, row)) != told
     }
-    # Who makes up a score must make up what was reached.
-    alike = is_of_this_code(result) and is_of_this_processor(result)
+    # Who makes up a score must make up what was reached. What made the file is its own word: who
+    # names another maker goes without the check of hashes, and not without this.
+    alike = is_made_alike(result)
     differing = tuple(
         told for told, again in others.items() if alike or again.reached != told.reached
     )

@@ -6,7 +6,7 @@ people.
 """
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple, Self
@@ -84,14 +84,14 @@ class BenchmarkResult:
         )
 
     def lead(
-        self, other: "BenchmarkResult", camera: str = MEASURED, parts: Sequence[str] = ()
+        self, other: "BenchmarkResult", camera: str = MEASURED, part: str | None = None
     ) -> Interval:
-        """Its score less that of another in the same worlds, in points, paired by world; of some
-        `parts` alone, if any are given.
+        """Its score less that of another in the same worlds, in points, paired by world; of one
+        `part` alone where it is given.
         """
         pairs = [
-            list(zip(self.of_part(part, camera), other.of_part(part, camera), strict=True))
-            for part in parts or self.parts
+            list(zip(self.of_part(one, camera), other.of_part(one, camera), strict=True))
+            for one in ([part] if part else self.parts)
         ]
         return mean_of_ratios(
             [

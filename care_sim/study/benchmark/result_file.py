@@ -2,7 +2,7 @@
 
 import json
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -51,9 +51,12 @@ def read_result(path: Path) -> BenchmarkResult:
 
 
 def _reason(error: Exception) -> str:
-    """Why a file cannot be read, for people: of a KeyError the text is a name alone."""
-    missing = isinstance(error, KeyError)
-    return f"{shown(error.args[0])} is missing" if missing else printable(str(error))
+    """Why a file cannot be read, for people: what Python says of a type is for nobody else."""
+    if isinstance(error, KeyError):
+        return f"{shown(error.args[0])} is missing"
+    if isinstance(error, ValueError):
+        return printable(str(error))
+    return "it holds values of another kind than a result does"
 
 
 def is_result(content: object) -> bool:
@@ -78,10 +81,12 @@ def _result(content: Mapping[str, Any]) -> BenchmarkResult:
     given = with_tuples({"given": content["parameters"]})["given"]
     texts = content["policy"], content["cell_order"], content.get("label", "")
     if not all(isinstance(text, str) for text in texts):
-        raise TypeError("policy, cell_order and label must be texts")
+        raise ValueError("policy, cell_order and label must be texts")
     policy, order, label = texts
     entry = Entry(policy, tuple((str(name), value) for name, value in given), order, label)
     entry.check()
+    if not isinstance(content["made_by"], dict):
+        raise ValueError("made_by must be a table of names and values")
     return BenchmarkResult(
         entry,
         tuple(map(str, content["tags"])),
@@ -92,8 +97,12 @@ def _result(content: Mapping[str, Any]) -> BenchmarkResult:
     )
 
 
-def _row(values: Sequence[Any]) -> ResultRow:
+def _row(values: Any) -> ResultRow:
+    if not (isinstance(values, list) and len(values) == len(ResultRow._fields)):
+        raise ValueError(f"a row must be a list of {', '.join(ResultRow._fields)}")
     row = ResultRow(*values)
+    if not (isinstance(row.part, str) and isinstance(row.camera, str)):
+        raise ValueError(f"a row must name its part and its camera, got {shown(values)}")
     counts = row.world, row.reached, row.reachable
     if not all(type(count) is int and 0 <= count <= LARGEST_INTEGER for count in counts):
         raise ValueError(f"a row must hold whole numbers, got {shown(values)}")

@@ -11,14 +11,12 @@ from care_sim.core.grid import AngularGrid
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.measure.parity import outcomes as parity_outcomes
 from care_sim.measure.parity.answers import Millimetres, decided_by_a_micrometre
-from care_sim.measure.parity.figure import parity_figure
 from care_sim.measure.parity.keyframes import KeyframeAgreement, PictureAgreement, compare_episode
 from care_sim.measure.parity.outcomes import Outcomes
 from care_sim.measure.parity.run import agree, unexplained
 from care_sim.measure.parity.scenes import SCENE_GRIDS, draw_bodies, draw_scene
-from care_sim.measure.parity.tally import GROUPS, REFERENCE_NAMES, AgreementCounts, ray_groups
+from care_sim.measure.parity.tally import GROUPS, AgreementCounts, ray_groups
 from care_sim.measure.parity.verdicts import GRAZING, SAME, TOLERANCE, UNEXPLAINED, Engines, compare
-from care_sim.reports.figures.files import save
 from care_sim.scenarios import PAPER_SCENARIOS, SCENARIOS
 from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.sensors.engines import ENGINES
@@ -166,41 +164,6 @@ def test_the_command_prints_and_writes(tmp_path, capsys):
     }
 
 
-def scans_of(references, scans):
-    """Rays that meet upright boxes, and how many of them are the same, against each reference."""
-    counts = {
-        reference: {group: {"rays": 0, "same": 0} for group in GROUPS}
-        | {"boxes, upright": {"rays": rays, "same": same}}
-        for reference, (rays, same) in references.items()
-    }
-    return {"scans": scans, "references": counts}
-
-
-def test_the_figure_shows_the_share_of_rays_that_differ_scenarios_in_one_panel():
-    one, other = ((1000, 1000), (1000, 999)), ((3000, 2997), (3000, 3000))
-    report = {
-        "scans": {
-            "random scenes": scans_of(dict(zip(REFERENCE_NAMES, one, strict=True)), 7),
-            "dartout": scans_of(dict(zip(REFERENCE_NAMES, one, strict=True)), 2),
-            "dense": scans_of(dict(zip(REFERENCE_NAMES, other, strict=True)), 3),
-        }
-    }
-    panels = parity_figure(report).axes
-    assert [axes.get_title(loc="left") for axes in panels] == [
-        "random scenes: 7 scans",
-        "keyframes of the scenarios: 5 scans",
-    ]
-    shown = [[line.get_xydata().tolist() for line in axes.lines] for axes in panels]
-    place = GROUPS.index("boxes, upright")
-    assert shown == [[[[0.0, place]], [[1000.0, place]]], [[[750.0, place]], [[250.0, place]]]]
-
-
-def test_the_published_figure_is_that_of_the_published_counts(published, tmp_path):
-    report = json.loads((published / "parity.json").read_text())
-    save(parity_figure(report), tmp_path / "parity.json")
-    assert (tmp_path / "parity.svg").read_text() == (published / "parity.svg").read_text()
-
-
 def test_a_number_below_zero_is_refused(capsys):
     with pytest.raises(SystemExit) as end:
         main(["parity", "--scenes", "-1"])
@@ -317,3 +280,12 @@ def test_a_folder_is_no_file_for_the_figures(tmp_path, capsys):
         main(["parity", "--scenes", "0", "--episodes", "0", "--out", str(tmp_path)])
     assert ended.value.code == 2
     assert "is a folder, a file is wanted" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", ["parity --scenes 0 --episodes 0", "bench"])
+def test_the_figure_takes_the_place_of_no_counts(tmp_path, capsys, command):
+    with pytest.raises(SystemExit) as ended:
+        main([*command.split(), "--out", str(tmp_path / "counts.png")])
+    assert ended.value.code == 2
+    assert "out must be a file for JSON, got" in capsys.readouterr().err
+    assert not any(tmp_path.iterdir())

@@ -2,6 +2,7 @@
 
 import pytest
 
+from care_sim.reports.closings import paper_closing
 from care_sim.reports.tables.paper_statements import statements
 from care_sim.study.designs.paper import paper_study
 from tests.helpers.made_rows import as_in_the_paper
@@ -27,6 +28,12 @@ def differing(rows):
 
 def changed(where, **values):
     return [row | values if where.items() <= row.items() else row for row in STUDY]
+
+
+def test_it_is_said_that_what_stands_beside_the_paper_are_medians():
+    told = paper_closing(STUDY)
+    assert "distances as medians in metres" in told[-13]
+    assert not any("medians" in line for line in paper_closing(STUDY[:10]))
 
 
 def test_the_papers_own_figures_agree_with_every_statement():
