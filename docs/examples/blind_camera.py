@@ -68,15 +68,20 @@ def as_measured(blind: BenchmarkResult) -> BenchmarkResult:
 
 
 def table(seeing: Sequence[BenchmarkResult], blind: Sequence[BenchmarkResult]) -> list[str]:
-    """The lines of a table, in percent and points; leads are over the last."""
+    """The lines of a table, in percent and points; leads are over the last, bold where the interval
+    excludes zero.
+    """
     unseeing = [as_measured(result) for result in blind]
     lines = [
         "| | score | blind | the camera's | blind, minus the last | drives | tests | streets |",
         "|---|---|---|---|---|---|---|---|",
     ]
     for own, dark in zip(seeing, unseeing, strict=True):
-        intervals = [dark.score(), own.lead(dark), dark.lead(unseeing[-1])]
+        lead = dark.lead(unseeing[-1])
+        intervals = [dark.score(), own.lead(dark), lead]
         told = ["{:.1f} [{:.1f}, {:.1f}]".format(*interval) for interval in intervals]
+        if lead.low > 0 or lead.high < 0:
+            told[-1] = f"**{told[-1]}**"
         parts = [f"{dark.part_score(part):.1f}" for part in PARTS]
         cells = [own.entry.name, f"{own.score().mean:.1f}", *told, *parts]
         lines.append(f"| {' | '.join(cells)} |")

@@ -148,6 +148,10 @@ def test_by_the_proxy_the_car_brakes_for_somebody_in_view():
     assert -1 < example.early_s("CARE-Dartout-v0", "returns", 0) < 0
 
 
+BLIND = re.compile(r"blind_camera\.py results/leaderboard/\{([^}]+)\}\.json")
+"""The files of which a page says that they were played with a blind camera."""
+
+
 def test_a_blind_camera_takes_nothing_from_who_asks_none(tmp_path):
     example = loaded(ROOT / "docs" / "examples" / "blind_camera.py")
     worlds = [next(world for world in published_worlds() if world.part == part) for part in PARTS]
@@ -176,9 +180,20 @@ def test_a_blind_camera_takes_nothing_from_who_asks_none(tmp_path):
     assert cells[:3] == ["| care", f"{score:.1f}", "{:.1f} [{:.1f}, {:.1f}]".format(*dark)]
     assert cells[3].startswith(f"{score - dark.mean:.1f} [")
     # The last is `fan`, over which the leads are told.
-    assert cells[4].startswith(f"{dark.mean - fan.score('blind').mean:.1f} [")
+    assert cells[4].strip("*").startswith(f"{dark.mean - fan.score('blind').mean:.1f} [")
     with pytest.raises(SystemExit, match="has no plays of place"):
         example.read_plays(table, [read_result(ROOT / "results/leaderboard/place.json")])
+
+
+def test_the_published_plays_with_a_blind_camera_make_the_table_of_their_page(capsys):
+    page = (ROOT / "results" / "benchmark.md").read_text()
+    plays = ROOT / "results" / "leaderboard" / "blind-camera.csv"
+    files = BLIND.findall(page)[0].replace("\\\n", "").split(",")
+    paths = [str(ROOT / f"results/leaderboard/{name}.json") for name in files]
+    loaded(ROOT / "docs" / "examples" / "blind_camera.py").main([str(plays), *paths])
+    table = capsys.readouterr().out.replace("blind, minus the last", "blind, minus `place`")
+    assert table.count("\n") == 2 + len(files)
+    assert table in page
 
 
 def cut(result, played):
