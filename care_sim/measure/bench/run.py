@@ -25,7 +25,7 @@ from care_sim.measure.bench.steps import makers, speed
 from care_sim.measure.bench.tables import bench_tables
 from care_sim.measure.bench.targets import targets
 from care_sim.measure.bench.workers import study, vectorised, worker_memory
-from care_sim.reports.figures.files import check_figure, save
+from care_sim.reports.figures.files import check_beside, save
 from care_sim.study.provenance import machine, versions
 
 Rounds = dict[str, list[float]]
@@ -38,7 +38,7 @@ def run_bench(config: BenchConfig) -> int:
     """Measure, print the tables, write JSON and figure; 0 whether or not the targets are met."""
     # Files that cannot be written are refused before anything is measured.
     if config.out is not None:
-        check_figure(config.out)
+        check_beside(config.out)
     with nullcontext() if config.out is None else replacing(config.out, JSON) as unfinished:
         report = bench_report(config, partial(print, "measuring", file=sys.stderr))
         console = Console(highlight=False)

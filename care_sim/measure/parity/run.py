@@ -20,7 +20,7 @@ from care_sim.measure.parity.outcomes import outcomes
 from care_sim.measure.parity.random_scenes import random_scenes
 from care_sim.measure.parity.tables import parity_tables
 from care_sim.measure.parity.tally import REFERENCE_NAMES
-from care_sim.reports.figures.files import check_figure, save
+from care_sim.reports.figures.files import check_beside, save
 from care_sim.scenarios import PAPER_SCENARIOS
 from care_sim.study.progress import ProgressLines, progress_bar
 from care_sim.study.provenance import machine, versions
@@ -55,7 +55,7 @@ def run_parity(config: ParityConfig) -> int:
     """
     # Files that cannot be written are refused before anything is compared.
     if config.out is not None:
-        check_figure(config.out)
+        check_beside(config.out)
     with nullcontext() if config.out is None else replacing(config.out, JSON) as unfinished:
         report = parity_report(config)
         console = Console(highlight=False)

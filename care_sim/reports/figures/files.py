@@ -41,15 +41,18 @@ def save(figure: Figure, stem: Path) -> None:
 
 
 def check_figure(stem: Path) -> None:
-    """Raise what `care_sim.base.files.check_output` does where `save` could not write a figure, and
-    InvalidInput where the figure would replace the file that it stands beside.
-    """
-    if stem.suffix in _FORMATS:
-        raise InvalidInput(
-            f"out must be a file for JSON, got {stem}; the figure is drawn beside it"
-        )
+    """Raise what `care_sim.base.files.check_output` does where `save` could not write a figure."""
     check_output(stem.with_suffix(".png"), PNG)
     check_output(stem.with_suffix(".svg"), SVG)
+
+
+def check_beside(out: Path) -> None:
+    """Raise what `check_figure` does, and InvalidInput where the figure that is drawn beside a file
+    for JSON would take its place.
+    """
+    if out.suffix in _FORMATS:
+        raise InvalidInput(f"out must be a file for JSON, got {out}; the figure is drawn beside it")
+    check_figure(out)
 
 
 def remove_others(folder: Path, names: Iterable[str], kept: Container[str]) -> None:
