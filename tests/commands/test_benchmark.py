@@ -8,12 +8,11 @@ from random import Random
 
 import pytest
 
-from care_sim.cli import main
 from care_sim.study.benchmark import worlds
 from care_sim.study.benchmark.result_file import read_result
 from care_sim.study.benchmark.tasks import Entry
 from care_sim.study.benchmark.worlds import PARTS, published_worlds
-from tests.helpers.made_results import made_result
+from tests.helpers.commands import run
 from tests.helpers.places import ROOT
 
 PAGE = (ROOT / "docs" / "benchmark.md").read_text()
@@ -39,12 +38,6 @@ class Throwing(care_sim.Policy):
 """
 
 
-def run(capsys, *words):
-    with pytest.raises(SystemExit) as end:
-        main([*map(str, words)])
-    return end.value.code, *capsys.readouterr()
-
-
 @pytest.fixture
 def one_of_each(monkeypatch, tmp_path):
     """A suite as small as it can be: one drive, one test, one street; so is its tenth."""
@@ -61,21 +54,6 @@ def one_of_each(monkeypatch, tmp_path):
 def lot_of_a_test(monkeypatch):
     """Both lots fall on the test, which takes less time than a street or a drive."""
     monkeypatch.setattr("care_sim.commands.leaderboard.SystemRandom", lambda: Random(LOT))
-
-
-@pytest.fixture
-def here(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
-@pytest.fixture
-def library(here):
-    """What the repository's own policies reached."""
-    folder = here / "results" / "leaderboard"
-    for policy, share in (("place", 0.5), ("care", 0.7)):
-        made_result(policy, share).write(folder / f"{policy}.json")
-    return folder
 
 
 def test_a_newcomer_gets_a_line(capsys, here, one_of_each, library, lot_of_a_test):
@@ -212,76 +190,6 @@ def test_a_sealed_set_is_played_and_verified_by_its_salt_alone(capsys, here, mon
     code, out, err = run(capsys, "leaderboard", "sealed")
     assert (code, out.count("CARE-Sim benchmark 1:")) == (1, 2)
     assert "other.json has a table of its own" in err
-
-
-def test_a_file_of_another_version_is_left_out_and_the_others_are_shown(capsys, library):
-    text = (library / "care.json").read_text()
-    (library / "care.json").write_text(
-        text.replace('"care_sim_benchmark": 1', '"care_sim_benchmark": 0')
-    )
-    code, out, err = run(capsys, "leaderboard", library)
-    assert code == 1
-    assert re.search(r"^1 +place", out, re.M)
-    assert "is of version 0 of the benchmark" in err
-    assert "care-sim benchmark --policy care" in err
-
-
-def test_of_two_results_of_one_name_the_first_counts(capsys, library, here):
-    made_result("care", 0.1).write(here / "mine.json")
-    code, out, err = run(capsys, "leaderboard", library, "mine.json")
-    assert code == 1
-    assert f"left out: mine.json, since {library / 'care.json'} has its name and its code" in err
-    assert out.count("care ") == 1
-
-
-def test_leads_are_told_over_any_entry(capsys, library):
-    code, out, _ = run(capsys, "leaderboard", library, "--minus", "care")
-    assert code == 0
-    assert "minus care" in out
-    # 49.7 less 70.2.
-    assert re.search(r"place +49\.7 .*-20\.5 ", out)
-    told = run(capsys, "leaderboard", library, "--minus", "nobody")
-    assert (told[0], "unknown entry 'nobody'; known: care, place" in told[2]) == (2, True)
-
-
-def test_where_the_control_is_missing_it_is_said_where_it_lies(capsys, library, here):
-    told = "no place among these files: add results/leaderboard for leads\n"
-    for words, lacks in ((["results/leaderboard/care.json"], True), ([library], False)):
-        code, out, err = run(capsys, "leaderboard", *words)
-        assert (code, err) == (0, told if lacks else "")
-        assert ("inus place" in out) != lacks
-
-
-def test_every_file_that_is_of_no_use_has_a_line(capsys, here):
-    for name in ("a", "b"):
-        (here / f"{name}.json").write_text("{")
-    told = "left out: {}.json is cut off or no JSON: "
-    code, out, err = run(capsys, "leaderboard", "a.json", "b.json", "c.json")
-    assert (code, out, err.count("\n")) == (2, "", 3)
-    for line, start in zip(
-        err.splitlines(),
-        (told.format("a"), told.format("b"), "left out: c.json cannot be read: No such file"),
-        strict=True,
-    ):
-        assert line.startswith(f"care-sim: {start}")
-
-
-def test_two_of_one_name_and_different_code_are_two_entries(capsys, here):
-    for n, code in enumerate(("aaaaaaaaaaaa", "bbbbbbbbbbbb")):
-        made = {"policy_code": code, "versions": {"code": code}}
-        made_result("mine:Mine", n, made_by=made).write(here / f"{n}.json")
-    code, out, _ = run(capsys, "leaderboard", ".")
-    assert code == 0
-    assert re.findall(r"mine:Mine (#\w+)", out) == ["#bbbbbbb", "#aaaaaaa"]
-    # A lead is told over the name that the table shows.
-    out = run(capsys, "leaderboard", ".", "--minus", "mine:Mine #aaaaaaa")[1]
-    assert re.search(r"mine:Mine #bbbbbbb.*\+100\.0", out)
-    assert "As the files say, played by 2 versions of the code: care-sim" in " ".join(out.split())
-    for n, processor in enumerate(("one", "other")):
-        made = {"policy_code": f"{n}", "machine": {"processor": processor}}
-        made_result("mine:Mine", n, made_by=made).write(here / f"{n}.json")
-    out = run(capsys, "leaderboard", ".")[1]
-    assert "As the files say, played on 2 kinds of processor: care-sim" in " ".join(out.split())
 
 
 @pytest.mark.parametrize(
