@@ -130,8 +130,8 @@ class Leaderboard:
                 print(f"{path}: {_drawn(replay, result)} came out again as the file says")
             if replay.detours:
                 print(
-                    f"{path}: {replay.detours} of them reached as much with another hash; played "
-                    f"{elsewhere(result)}"
+                    f"{path}: of {_drawn(replay, result)} {replay.detours} reached as much with "
+                    f"another hash; played {elsewhere(result)}"
                 )
             problems += [f"{path}: {problem}" for problem in _told(replay, result)]
         return problems

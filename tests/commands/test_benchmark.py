@@ -126,7 +126,7 @@ def test_a_newcomer_gets_a_line(capsys, here, one_of_each, library, lot_of_a_tes
         replace(otherwise, made_by=elsewhere).write(file)
         code, out, _ = run(capsys, "leaderboard", "--verify", file)
         assert code == 0
-        assert f"2 of them reached as much with another hash; played {told}" in out
+        assert f"drawn by lot, 2 reached as much with another hash; played {told}" in out
         assert "\x1b" not in out
     forged = [row._replace(reached=row.reachable - row.reached) for row in result.rows]
     replace(result, rows=tuple(forged), made_by=elsewhere).write(file)

@@ -62,7 +62,10 @@ class Contest:
         control = best_control({policy: self.levels[policy] for policy in controls})
         # Beside a control that difference is the one to know.
         behind = [p for p in over if p not in (*tied, *alike, *close)] if control is None else []
-        ahead = self._ahead_of(max(behind, key=self.levels.__getitem__), over) if behind else ""
+        ahead = ""
+        if behind:
+            second = max(behind, key=self.levels.__getitem__)
+            ahead = f", ahead of {second} ({interval(over[second])}, {self.unit})"
         parts = [f"{self.place}: {_names(tied)} {leads}, {self.told(first)}{ahead}"]
         if alike:
             them = "it" if len(tied) == 1 else "them"
@@ -74,9 +77,6 @@ class Contest:
             best = max(others, key=self.levels.__getitem__)
             parts.append(self._beside_control(best, control))
         yield f"{'; '.join(parts)}."
-
-    def _ahead_of(self, second: str, over: Mapping[str, ShownDifference | None]) -> str:
-        return f", ahead of {second} ({interval(over[second])}, {self.unit})"
 
     def _beside_control(self, best: str, control: str) -> str:
         """How the best of the others stands to the best control."""

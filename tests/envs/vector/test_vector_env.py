@@ -197,7 +197,7 @@ def test_a_fork_plays_on(vector):
     process.join()
 
 
-def wait_for(holds, seconds=60.0):
+def wait_for(holds, seconds=5.0):
     end = time.monotonic() + seconds
     while not holds() and time.monotonic() < end:
         time.sleep(0.01)

@@ -38,8 +38,8 @@ PARSING = """(() => {
   for (let time = 0; time < 3; time++) JSON.parse(text);
   return performance.now() - begun;
 })()"""
-# The page takes 4 to 5 of these on two cores, where one is 0.3 s.
-MOST_PARSINGS = 10
+# A page takes 3 to 4 of these on two cores, where one is 0.3 s: seven are 2 s there.
+MOST_PARSINGS = 7
 
 
 @pytest.fixture
@@ -433,15 +433,18 @@ def test_the_page_of_the_papers_study_is_small(published, tmp_path):
 
 
 @pytest.mark.speed
-def test_the_page_of_the_papers_study_opens_at_once(opened, published, tmp_path):
+def test_a_small_page_and_that_of_the_papers_study_open_at_once(
+    opened, played, published, tmp_path
+):
     path = tmp_path / "report.html"
     page_of_the_papers_study(published, path)
-    shares = []
-    for _ in range(3):
-        page = opened(path, READY)
-        taken = page.evaluate("performance.now()")
-        shares.append(taken / page.evaluate(PARSING))
-    assert min(shares) < MOST_PARSINGS
+    for each in (played[0], path):
+        shares = []
+        for _ in range(3):
+            page = opened(each, READY)
+            taken = page.evaluate("performance.now()")
+            shares.append(taken / page.evaluate(PARSING))
+        assert min(shares) < MOST_PARSINGS, shares
 
 
 def contrast(one, other):
