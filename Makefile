@@ -25,6 +25,8 @@ VERSION := v1.0-trainval
 SECONDS := 600
 SEED := 0
 OUT = $(basename $(RESULTS))-official
+# The tests start hundreds of processes, each of which would compile the package anew.
+unexport PYTHONDONTWRITEBYTECODE
 
 ifneq ($(filter official-precision,$(MAKECMDGOALS)),)
   ifneq ($(shell test -f "$(FOLDER)/official/truth.json" || echo no),)

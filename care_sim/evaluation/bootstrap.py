@@ -29,6 +29,10 @@ Sums = tuple[ArrayLike, ArrayLike]
 """Numerators and denominators (n,) of a group of scenes, scene by scene."""
 
 
+_Columns = tuple[tuple[tuple[float, ...], tuple[float, ...]], ...]
+"""The sums of groups, as what can be remembered by."""
+
+
 class Interval(NamedTuple):
     """A mean difference and the ends of its confidence interval, in the unit of the samples."""
 
@@ -87,12 +91,7 @@ def ratio_of_sums(
     # few. A scene is drawn as a whole, with its numerator and its denominator, since what happens
     # within one is not independent.
     groups = [_sums(*sums) for sums in ([group] if less is None else [group, less])]
-    return _resampled_ratio(
-        tuple((tuple(a.tolist()), tuple(b.tolist())) for a, b in groups),
-        confidence,
-        resamples,
-        seed,
-    )
+    return _resampled_ratio(_columns(groups), confidence, resamples, seed)
 
 
 def mean_of_ratios(
@@ -110,15 +109,21 @@ def mean_of_ratios(
     """
     if not groups:
         raise InvalidInput("a mean of ratios must be of at least one group")
-    sums = [_sums(*group) for group in groups]
-    value = float(np.mean([_ratio(a.sum(), b.sum()) for a, b in sums]))
-    if all(_have_one_ratio(*group) for group in sums):
+    return _resampled_mean(_columns([_sums(*sums) for sums in groups]), confidence, resamples, seed)
+
+
+@lru_cache(maxsize=10_000)
+def _resampled_mean(columns: _Columns, confidence: float, resamples: int, seed: int) -> Interval:
+    """The interval of a mean of ratios; remembered: a result is ranked, told and drawn by it."""
+    groups = _arrays(columns)
+    value = float(np.mean([_ratio(a.sum(), b.sum()) for a, b in groups]))
+    if all(_have_one_ratio(*group) for group in groups):
         return Interval(value, value, value)
     rng = np.random.default_rng(seed)
-    drawn = [rng.integers(0, len(each), (resamples, len(each))) for each, _ in sums]
+    drawn = [rng.integers(0, len(each), (resamples, len(each))) for each, _ in groups]
     ratios = [
         _ratio(a[rows].sum(axis=-1), b[rows].sum(axis=-1))
-        for (a, b), rows in zip(sums, drawn, strict=True)
+        for (a, b), rows in zip(groups, drawn, strict=True)
     ]
     # A resample in which a group has a denominator of 0 has no mean, and is ignored.
     outside = (1 - confidence) / 2
@@ -128,15 +133,13 @@ def mean_of_ratios(
 
 @lru_cache(maxsize=10_000)
 def _resampled_ratio(
-    columns: tuple[tuple[tuple[float, ...], tuple[float, ...]], ...],
+    columns: _Columns,
     confidence: float,
     resamples: int,
     seed: int,
 ) -> Interval:
     """The interval of a ratio of sums, or of a difference of two; remembered as that of a mean."""
-    groups = [
-        (np.array(numerators), np.array(denominators)) for numerators, denominators in columns
-    ]
+    groups = _arrays(columns)
     value = float(_difference_of_ratios(groups, [np.arange(len(each)) for each, _ in groups]))
 
     # Where all scenes of a group have one ratio, every resample of it has that ratio, too.
@@ -182,6 +185,14 @@ def _have_one_ratio(numerators: Floats, denominators: Floats) -> bool:
 def _are_equal(values: Floats, like: Floats) -> bool:
     """Whether all values are one number but for the last bits of numbers as large as `like`."""
     return bool(np.ptp(values) <= 1e-12 * max(1.0, float(np.abs(like).max())))
+
+
+def _columns(groups: Sequence[tuple[Floats, Floats]]) -> _Columns:
+    return tuple((tuple(a.tolist()), tuple(b.tolist())) for a, b in groups)
+
+
+def _arrays(columns: _Columns) -> list[tuple[Floats, Floats]]:
+    return [(np.array(numerators), np.array(denominators)) for numerators, denominators in columns]
 
 
 def _sums(numerators: ArrayLike, denominators: ArrayLike) -> tuple[Floats, Floats]:

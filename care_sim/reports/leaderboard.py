@@ -45,23 +45,24 @@ def leaderboard_table(results: Sequence[BenchmarkResult], minus: str = CONTROL.n
     """A line for every result, the highest score first, with its lead over the entry `minus`, if
     that is among them. All must be of the same worlds.
     """
-    ranked, control = _ranked(results, minus)
+    named, control = _named(results, minus)
     # What no car can have stands where its score puts it, and takes no place.
-    contenders = [each for _, each in ranked if not is_beyond(each)]
+    contenders = [each for _, each in named if not is_beyond(each)]
     numbers = {id(each): f"{number}" for number, each in enumerate(contenders, 1)}
-    rows = tuple(_line(each, name, numbers.get(id(each), ""), control) for name, each in ranked)
+    rows = tuple(_line(each, name, numbers.get(id(each), ""), control) for name, each in named)
     leads = () if control is None else (f"minus {minus}",)
-    columns = ("", "policy", "score", *leads, *results[0].parts, "ideal camera")
+    # The leads are the widest: at 80 characters all but they stand side by side.
+    columns = ("", "policy", "score", *results[0].parts, "ideal camera", *leads)
     notes = notes_on(results, minus if leads else "")
-    return Table(title(results), columns, rows, notes, whole=("", "score"), names=2)
+    return Table(title(results), columns, rows, notes, whole=("", "score", "ideal camera"), names=2)
 
 
 def leads_table(results: Sequence[BenchmarkResult], minus: str) -> Table | None:
     """The leads over the entry `minus` part by part, and with the ideal camera, of every other
     entry, in the order of their scores; None without that entry, or without another.
     """
-    ranked, control = _ranked(results, minus)
-    if control is None or len(ranked) == 1:
+    named, control = _named(results, minus)
+    if control is None or len(named) == 1:
         return None
     rows = tuple(
         (
@@ -69,7 +70,7 @@ def leads_table(results: Sequence[BenchmarkResult], minus: str) -> Table | None:
             *(_shown(each.lead(control, part=part)) for part in control.parts),
             _shown(each.lead(control, IDEAL)),
         )
-        for name, each in ranked
+        for name, each in named
         if each is not control
     )
     trial = (_TRIAL,) if control.quick else ()
@@ -78,13 +79,18 @@ def leads_table(results: Sequence[BenchmarkResult], minus: str) -> Table | None:
     return Table(title_of_leads, columns, rows, (*trial, _LEADS_BY_PART, _IN_HINDSIGHT))
 
 
-def _ranked(
+def _named(
     results: Sequence[BenchmarkResult], minus: str
 ) -> tuple[list[tuple[str, BenchmarkResult]], BenchmarkResult | None]:
     """Names and results, the highest score first, and the one named `minus` if it is there."""
-    in_order = sorted(results, key=lambda result: -result.score().mean)
+    in_order = ranked(results)
     named = [*zip(names_in(in_order), in_order, strict=True)]
     return named, next((each for name, each in named if name == minus), None)
+
+
+def ranked(results: Sequence[BenchmarkResult]) -> list[BenchmarkResult]:
+    """The highest score first; of equal ones that which was given first."""
+    return sorted(results, key=lambda result: -result.score().mean)
 
 
 def names_in(results: Sequence[BenchmarkResult]) -> list[str]:
@@ -140,9 +146,9 @@ def _line(
         number,
         name,
         _with_ends(result.score()),
-        *(() if control is None else (_lead(result, control),)),
         *(f"{result.part_score(part):.1f}" for part in result.parts),
         f"{result.score(IDEAL).mean:.1f}",
+        *(() if control is None else (_lead(result, control),)),
     )
 
 

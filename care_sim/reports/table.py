@@ -5,7 +5,7 @@ in LaTeX.
 import re
 import textwrap
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rich.cells import cell_len
@@ -83,6 +83,12 @@ class Table:
             )
             + "\n"
         )
+
+    def without_empty_columns(self) -> "Table":
+        """The same without the columns in which nothing stands."""
+        filled = [n for n in range(len(self.columns)) if any(self.entries(n))]
+        rows = tuple(row if len(row) == 1 else tuple(row[n] for n in filled) for row in self.rows)
+        return replace(self, columns=tuple(self.columns[n] for n in filled), rows=rows)
 
     def entries(self, column: int) -> list[str]:
         """What stands in a column; headings of rows span them all."""

@@ -1,8 +1,10 @@
 """The leaderboard: its order, who takes no place, what is compared."""
 
 from dataclasses import replace
+from io import StringIO
 
 import pytest
+from rich.console import Console
 
 from care_sim.reports.figures.leaderboard import leaderboard_figure
 from care_sim.reports.leaderboard import leaderboard_table, leads_table
@@ -38,11 +40,11 @@ def test_the_highest_score_comes_first_and_what_no_car_can_have_takes_no_place()
 def test_each_is_held_against_the_control_where_that_was_played():
     table = leaderboard_table([GOOD, PLACE, LOW])
     for result in (GOOD, LOW):
-        lead = line_of(table, result.entry.name)[3]
+        lead = line_of(table, result.entry.name)[-1]
         points = result.score().mean - PLACE.score().mean
         assert float(lead.split()[0]) == pytest.approx(points, abs=0.05)
         assert isinstance(lead, Bold)
-    assert line_of(table, "place")[3] == ""
+    assert line_of(table, "place")[-1] == ""
 
 
 def test_without_the_control_there_are_no_leads_and_nothing_is_said_of_them():
@@ -55,7 +57,7 @@ def test_without_the_control_there_are_no_leads_and_nothing_is_said_of_them():
 
 def test_equal_ones_are_told_apart_by_nothing():
     same = made_result("same", share=0.4)
-    lead = line_of(leaderboard_table([PLACE, same]), "same")[3]
+    lead = line_of(leaderboard_table([PLACE, same]), "same")[-1]
     assert lead == "+0.0 [0.0,0.0]"
     assert not isinstance(lead, Bold)
 
@@ -86,9 +88,26 @@ def test_a_lead_in_one_part_alone_stands_under_that_part():
     assert trial.notes[0].startswith("Only the tenth of the worlds")
 
 
+def test_on_a_terminal_of_80_characters_all_but_the_leads_stand_side_by_side():
+    long = replace(GOOD, entry=Entry("learned-scorer core-spread"))
+    console = Console(width=80, record=True, file=StringIO())
+    console.print(leaderboard_table([long, PLACE, FULL]).rich())
+    first, leads, *_ = console.export_text().split("\n\n")
+    assert "100.0 [100.0,100.0] 100.0  100.0 100.0   100.0" in first
+    assert [line.split()[-2:] for line in leads.splitlines()[:1]] == [["minus", "place"]]
+
+
 def test_a_trial_says_that_it_is_one():
     (first, *_) = leaderboard_table([GOOD.cut_to_tenth()]).notes
     assert first.startswith("Only the tenth of the worlds that --quick plays")
+
+
+def test_equal_scores_stand_in_one_order_in_table_and_figure():
+    equal = [replace(GOOD, entry=Entry(name)) for name in ("b", "a", "c")]
+    names = [row[1] for row in leaderboard_table(equal).rows]
+    (axes,) = leaderboard_figure(equal).axes
+    assert names == ["b", "a", "c"]
+    assert [text.get_text() for text in axes.get_yticklabels()] == names[::-1]
 
 
 def test_the_figure_shows_every_result_the_best_on_top():

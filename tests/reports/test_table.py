@@ -146,6 +146,14 @@ def test_a_terminal_leaves_out_what_says_nothing():
     assert "3%" not in terminal(Table("t", ("a", "3%"), (("x", "y"),), files_only=("3%",)))
 
 
+def test_columns_in_which_nothing_stands_can_be_left_out():
+    table = TABLE.without_empty_columns()
+    assert table.columns == ("policy", "3%")
+    assert table.rows == (("First, m",), ("x_y", "+5.0* [4.0,6.0]"), ("z†", "≤-1.0 [-2.0,0.0]"))
+    assert isinstance(table.rows[1][1], Bold)
+    assert (table.notes, table.quotes) == (TABLE.notes, TABLE.quotes)
+
+
 @pytest.mark.parametrize(
     ("text", "written"),
     [

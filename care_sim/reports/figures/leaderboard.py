@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from matplotlib.figure import Figure
 
 from care_sim.reports.figures.styles import bare_axes
-from care_sim.reports.leaderboard import names_in
+from care_sim.reports.leaderboard import names_in, ranked
 from care_sim.study.benchmark.result import BenchmarkResult
 
 LEADERBOARD_FIGURE = "leaderboard"
@@ -18,18 +18,19 @@ _APART = 0.18
 
 def leaderboard_figure(results: Sequence[BenchmarkResult]) -> Figure:
     """A line for every result, the highest score on top."""
-    ranked = sorted(results, key=lambda result: result.score().mean)
-    figure = Figure(figsize=(8.0, 1.4 + _LINE_INCHES * len(ranked)), layout="constrained")
+    # Lines are counted from below.
+    upwards = ranked(results)[::-1]
+    figure = Figure(figsize=(8.0, 1.4 + _LINE_INCHES * len(upwards)), layout="constrained")
     axes = figure.subplots()
-    lines = range(len(ranked))
+    lines = range(len(upwards))
     # The score stands lowest, the parts above it.
     lowest = -_APART * len(results[0].parts) / 2
     for number, part in enumerate(results[0].parts, 1):
         colour, marker = _PARTS[part]
-        shares = [result.part_score(part) for result in ranked]
+        shares = [result.part_score(part) for result in upwards]
         heights = [line + lowest + _APART * number for line in lines]
         axes.scatter(shares, heights, s=22, color=colour, marker=marker, label=part, zorder=3)
-    scores = [result.score() for result in ranked]
+    scores = [result.score() for result in upwards]
     means = [score.mean for score in scores]
     ends = [
         [max(score.mean - score.low, 0.0) for score in scores],
@@ -44,7 +45,7 @@ def leaderboard_figure(results: Sequence[BenchmarkResult]) -> Figure:
         capsize=3,
         label="score, 95% interval",
     )
-    axes.set_yticks(lines, names_in(ranked))
+    axes.set_yticks(lines, names_in(upwards))
     axes.set_xlim(-2, 102)
     axes.set_xlabel("% of what a full scan reaches")
     bare_axes(axes, "0.93", "both")

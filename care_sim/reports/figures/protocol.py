@@ -11,6 +11,7 @@ from matplotlib.lines import Line2D
 
 from care_sim.base.errors import percent
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, Ratio
+from care_sim.reports.figures.apart import MOVED_APART, move_apart
 from care_sim.reports.figures.controls import control_figure
 from care_sim.reports.figures.styles import (
     APART,
@@ -68,14 +69,16 @@ def pareto_figure(plays: SettingPlays) -> Figure:
     for axes in left_over:
         axes.set_axis_off()
     drawn = styles(plays.tags.items())
+    markers = []
     for axes, budget in zip(panels, plays.budgets, strict=True):
         points = {
             policy: point for policy in plays.policies if (point := recalls(plays, policy, budget))
         }
-        _draw_recalls(axes, points, drawn, plays)
+        markers.append(_draw_recalls(axes, points, drawn, plays))
         axes.set_title(f"budget {percent(budget)}", loc="left", fontsize=10)
     figure.supylabel("first-sighting recall (%)", fontsize=10)
     _name_markers(figure, [*panels], plays)
+    move_apart(figure, [*zip(panels, markers, strict=True)])
     return figure
 
 
@@ -106,7 +109,9 @@ def recalls(plays: SettingPlays, policy: str, budget: float) -> Point | None:
 
 def _draw_recalls(
     axes: Axes, points: Mapping[str, Point], drawn: Mapping[str, Style], plays: SettingPlays
-) -> None:
+) -> list[Line2D]:
+    """Draw them, and return the markers."""
+    markers = []
     for policy, (overall, first) in points.items():
         look = drawn[policy]
         (marker,) = axes.plot(
@@ -117,11 +122,13 @@ def _draw_recalls(
             marker.set(markersize=5, zorder=5)
         else:
             marker.set(markersize=9, markerfacecolor="none", markeredgewidth=1.5, zorder=4)
+        markers.append(marker)
     axes.margins(0.1)
     _staircase(
         axes, {policy: point for policy, point in points.items() if not _marks(plays.tags[policy])}
     )
     bare_axes(axes, "0.94", "both")
+    return markers
 
 
 def _marks(tags: tuple[str, ...]) -> bool:
@@ -151,7 +158,7 @@ def _name_markers(figure: Figure, panels: Sequence[Axes], plays: SettingPlays) -
         else []
     )
     line = "grey line: Pareto frontier of the policies that a car can have"
-    notes = ["overall recall (%)", line, *reached, *tag_notes(plays.tags.values())]
+    notes = ["overall recall (%)", line, MOVED_APART, *reached, *tag_notes(plays.tags.values())]
     figure.supxlabel("\n".join(notes), fontsize=9)
     name_outside(figure, panels)
 

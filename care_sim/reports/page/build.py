@@ -85,6 +85,7 @@ class Page:
     def html(self) -> str:
         """The page as one file."""
         charts = self.findings.charts
+        tables = [table.without_empty_columns() for table in self.findings.tables]
         return str(
             _template().render(
                 page=self,
@@ -94,7 +95,7 @@ class Page:
                 specs=_embedded([chart.spec for chart in charts]),
                 # A page without charts needs no Vega.
                 vega=Markup(vega_bundle()) if charts else "",
-                tables=[(table, blocks(table), least_ems(table)) for table in self.findings.tables],
+                tables=[(table, blocks(table), least_ems(table)) for table in tables],
                 reading=self.findings.reading,
                 closing=self.findings.closing,
                 groups=episode_groups(self.rows, self.episodes) if self.listed else [],

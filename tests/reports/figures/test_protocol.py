@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 
+from care_sim.reports.figures.apart import MOVED_APART
 from care_sim.reports.figures.files import save
 from care_sim.reports.figures.protocol import frontier, protocol_figures
 from care_sim.reports.figures.styles import styles
@@ -117,6 +119,37 @@ def test_the_levels_say_that_policies_are_moved_apart():
     said = "policies are drawn a little apart sideways, so that equal points stay visible"
     assert said in figure.get_supxlabel().splitlines()
     assert said not in alone.get_supxlabel()
+
+
+def test_markers_at_one_place_are_all_seen():
+    policies = [*FOUND, "all-camera", "care-sbf", "care-spread", "place", "rows", "uncertainty"]
+    figure = protocol_figures(study(dict.fromkeys(policies, (5, 5)), budgets=(0.1,)))[
+        "pareto-streets"
+    ]
+    (axes,) = figure.axes
+    markers = [line for line in axes.lines if line.get_marker() != "None"]
+    assert len(markers) == len(policies) - 1
+    assert {(*line.get_xdata(), *line.get_ydata()) for line in markers} == {(50.0, 25.0)}
+    assert MOVED_APART in figure.get_supxlabel().splitlines()
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    for line in (*axes.lines, *axes.texts):
+        line.set_visible(False)
+    canvas.draw()
+    ground = canvas.copy_from_bbox(figure.bbox)
+
+    def picture(shown):
+        canvas.restore_region(ground)
+        for marker in sorted(shown, key=lambda marker: marker.zorder):
+            marker.set_visible(True)
+            axes.draw_artist(marker)
+        return np.array(canvas.buffer_rgba(), dtype=int)
+
+    for marker in markers:
+        alone = np.any(picture([marker]) != picture([]), axis=-1).sum()
+        others = [other for other in markers if other is not marker]
+        seen = np.any(picture(markers) != picture(others), axis=-1).sum()
+        assert seen > 0.3 * alone > 0, marker.get_label()
 
 
 POINTS = st.dictionaries(

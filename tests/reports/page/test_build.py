@@ -1,5 +1,6 @@
 """What a page is made of, and in which order."""
 
+import re
 from html import unescape
 
 import pytest
@@ -53,3 +54,16 @@ def test_the_page_tells_how_to_read_its_tables_as_the_report_does(tmp_path):
     page = unescape((tmp_path / "report.html").read_text())
     reading, *_ = StudyReport.of(STUDY).texts["tables.md"].splitlines()
     assert f"<p>{reading}</p>" in page
+
+
+def test_a_page_has_no_empty_columns_and_says_where_the_number_of_a_policy_comes_from(tmp_path):
+    write_rows(STUDY, tmp_path / "episodes.parquet")
+    write_page(tmp_path, tmp_path / "report.html", 0, 1)
+    page = (tmp_path / "report.html").read_text()
+    tables = re.findall(r'<table class="sortable".*?</table>', page, re.DOTALL)
+    assert tables
+    for table in tables:
+        lines = re.findall(r"<tr(?: class=\"attached\")?>(.*?)</tr>", table, re.DOTALL)[1:]
+        columns = zip(*(re.findall(r"<td.*?>(.*?)</td>", line) for line in lines), strict=True)
+        assert all(any(column) for column in columns)
+    assert "<code>care-sim benchmark --policy NAME</code>" in page
