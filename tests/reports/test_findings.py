@@ -151,6 +151,31 @@ def test_collisions_that_a_full_scan_prevents_are_told():
     assert not any("collide" in sentence for sentence in sweep_findings(doomed))
 
 
+def test_over_several_budgets_the_best_is_held_against_the_best_control_first():
+    found = {
+        0.01: (16.0, 15.0),
+        0.03: (16.0, 12.0),
+        0.05: (16.0, 20.0),
+        0.1: (16.0, 16.0),
+        0.2: (16.1, WAVERING),
+    }
+    rows = [
+        one | {"budget": budget}
+        for budget, (care, place) in found.items()
+        for one in episodes({"care": care, "history": 8.0, "place": place})
+    ]
+    first, second, *_ = sweep_findings(rows)
+    assert first == (
+        "dense, first detections: the best of the others is ahead of the best control at 3%; it "
+        "is ahead of the best control by less than the gate at 1%; it does exactly as well as the "
+        "best control at 10%; it cannot be told from the best control at 20%; it is behind the "
+        "best control at 5%."
+    )
+    assert second.startswith("dense, 1%: care detects farthest")
+    without = [one for one in rows if one["policy"] != "place"]
+    assert sweep_findings(without)[0].startswith("dense, 1%: care detects farthest")
+
+
 def test_the_open_loop_tells_who_finds_most_at_once():
     plays = made_plays.study(
         {"care": (12, 6), "history": (4, 6), "rows": (9, 6), "full": (15, 9)},

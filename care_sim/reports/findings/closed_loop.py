@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
-from care_sim.base.errors import counted, percent
+from care_sim.base.errors import counted
 from care_sim.evaluation.censoring import FEWEST_PAIRS
 from care_sim.reports.contrasts import AVOIDED, DETECTION, Measure, contrast, preventable
 from care_sim.reports.controls import is_control
@@ -13,8 +13,8 @@ from care_sim.study.rows.reading import Groups, full_of, grouped, policy_of, tag
 from care_sim.study.rows.settings import Setting
 from care_sim.study.run_config import FULL, Row
 
-_DETECT = Verb("detects farthest", "detect farthest", "detect equally far")
-_COLLIDE = Verb("collides least", "collide least", "collide equally often")
+_DETECT = Verb("first detections", "detects farthest", "detect farthest", "detect equally far")
+_COLLIDE = Verb("collisions", "collides least", "collide least", "collide equally often")
 _TOO_FEW = (
     f"Who leads is told of {FEWEST_PAIRS} seeds and more that all policies share, and not of fewer."
 )
@@ -42,8 +42,7 @@ def sweep_findings(rows: Sequence[Row], conditions: bool = True) -> list[str]:
                 # A policy that lacks a hard seed would lead by that.
                 own = {policy: _of(shared, own) for policy, own in played.items()}
                 full = _of(shared, full_of(groups, setting) or ())
-                place = f"{setting.label}, {percent(budget)}"
-                contests += _contests(place, own, full, tags)
+                contests += _contests(setting.label, budget, own, full, tags)
             elif len(played) > 1 and not all(is_control(tags[policy]) for policy in played):
                 too_few = True
     return told(contests) or ([_TOO_FEW] if too_few else [])
@@ -69,7 +68,11 @@ def _of(seeds: set[int], rows: Sequence[Row]) -> list[Row]:
 
 
 def _contests(
-    place: str, own: Mapping[str, Sequence[Row]], full: Sequence[Row], tags: Tags
+    setting: str,
+    budget: float,
+    own: Mapping[str, Sequence[Row]],
+    full: Sequence[Row],
+    tags: Tags,
 ) -> Iterator[Contest]:
     """The contests over the same seeds: first detections, and collisions if there are any."""
     if any(row["detection_distance_m"] is not None for rows in own.values() for row in rows):
@@ -77,13 +80,19 @@ def _contests(
         beside = {*map(len, own.values())} == {len(full)} and _mean(DETECTION, full) is not None
         of_full = f", the full scan {_far(full)}" if beside else ""
         yield _contest(
-            DETECTION, _DETECT, own, tags, place, lambda rows: f"{_metres(rows)}{of_full}"
+            DETECTION, _DETECT, own, tags, setting, budget, lambda rows: f"{_metres(rows)}{of_full}"
         )
     spared = " that the full scan ends unhurt" if full else ""
     threatened = {p: preventable(full, rows) if full else rows for p, rows in own.items()}
     if any(row["collision"] for rows in threatened.values() for row in rows):
         yield _contest(
-            AVOIDED, _COLLIDE, threatened, tags, place, lambda rows: f"{_hit(rows)}{spared}"
+            AVOIDED,
+            _COLLIDE,
+            threatened,
+            tags,
+            setting,
+            budget,
+            lambda rows: f"{_hit(rows)}{spared}",
         )
 
 
@@ -92,12 +101,14 @@ def _contest(
     verb: Verb,
     own: Mapping[str, Sequence[Row]],
     tags: Tags,
-    place: str,
+    setting: str,
+    budget: float,
     in_words: Callable[[Sequence[Row]], str],
 ) -> Contest:
     means = {policy: _mean(measure, rows) for policy, rows in own.items()}
     return Contest(
-        place,
+        setting,
+        budget,
         verb,
         measure.unit,
         measure.gate,

@@ -1,9 +1,13 @@
-"""The policies that a car can have at one budget in one setting, and what is said of them."""
+"""The policies that a car can have at one budget in one setting, and what is said of them; of all
+budgets of a setting, how the best of them stands to the best control.
+"""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
+from care_sim.base.errors import percent
 from care_sim.reports.controls import best_control, is_control
 from care_sim.reports.formatting import MARKS, ShownDifference, interval
 from care_sim.study.run_config import FULL
@@ -14,9 +18,20 @@ _MOST_NAMED = 4
 """So many policies are named in a row; of more, how many they are."""
 
 
-class Verb(NamedTuple):
-    """What the first of a contest does, or the first of several, or all alike."""
+_STANDINGS = {
+    "ahead": "is ahead of the best control",
+    "alike": "does exactly as well as the best control",
+    "untold": "cannot be told from the best control",
+    "behind": "is behind the best control",
+}
 
+
+class Verb(NamedTuple):
+    """What is compared, and what the first of a contest does, or the first of several, or all
+    alike.
+    """
+
+    what: str
     one: str
     several: str
     all: str
@@ -31,7 +46,8 @@ class Contest:
     against each other, and counts from `gate` on, both in `unit`.
     """
 
-    place: str
+    setting: str
+    budget: float
     verb: Verb
     unit: str
     gate: float
@@ -40,17 +56,56 @@ class Contest:
     told: Callable[[str], str]
     difference: Callable[[str, str], ShownDifference | None]
 
+    @property
+    def place(self) -> str:
+        """Setting and budget in words."""
+        return f"{self.setting}, {percent(self.budget)}"
+
+    @property
+    def best(self) -> str | None:
+        """The best that is no control."""
+        others = [policy for policy in self.levels if not is_control(self.tags[policy])]
+        return max(others, key=self.levels.__getitem__, default=None)
+
+    @property
+    def control(self) -> str | None:
+        """The best control."""
+        return best_control({p: at for p, at in self.levels.items() if is_control(self.tags[p])})
+
+    @cached_property
+    def lead(self) -> ShownDifference | None:
+        """That of the best over the best control, where there are both and it is known."""
+        if self.best is None or self.control is None:
+            return None
+        return self.difference(self.best, self.control)
+
+    @property
+    def standing(self) -> str | None:
+        """The key in `_STANDINGS` of how the best stands to the best control; None without both."""
+        if self.best is None or self.control is None:
+            return None
+        difference = self.lead
+        if _is_nothing(difference):
+            return "alike"
+        if difference is None or not difference.excludes_zero:
+            return "untold"
+        return "ahead" if difference.mean > 0 else "behind"
+
+    @property
+    def is_close(self) -> bool:
+        """Whether the best is ahead of the best control, or behind it, by less than the gate."""
+        return self.standing in ("ahead", "behind") and self._is_little(self.lead)
+
     def findings(self) -> Iterator[str]:
         """One sentence, or none where there is nobody to compare."""
-        others = [policy for policy in self.levels if not is_control(self.tags[policy])]
-        controls = [policy for policy in self.levels if policy not in others]
-        if not others or len(self.levels) < 2:
+        best, control = self.best, self.control
+        if best is None or len(self.levels) < 2:
             return
         first = max(self.levels, key=self.levels.__getitem__)
         over = {policy: self.difference(first, policy) for policy in self.levels if policy != first}
         tied = [first, *(policy for policy, each in over.items() if _is_nothing(each))]
         if len(tied) == len(self.levels):
-            with_controls = ", controls included" if controls else ""
+            with_controls = ", controls included" if control else ""
             yield (
                 f"{self.place}: all {len(tied)} policies {self.verb.all}, "
                 f"{self.told(first)}{with_controls}."
@@ -59,7 +114,6 @@ class Contest:
         alike = [p for p, each in over.items() if p not in tied and not _is_ahead(each)]
         close = [p for p, each in over.items() if _is_ahead(each) and self._is_little(each)]
         leads = self.verb.one if len(tied) == 1 else self.verb.several
-        control = best_control({policy: self.levels[policy] for policy in controls})
         # Beside a control that difference is the one to know.
         behind = [p for p in over if p not in (*tied, *alike, *close)] if control is None else []
         ahead = ""
@@ -74,21 +128,20 @@ class Contest:
             verb = "is" if len(close) == 1 else "are"
             parts.append(f"{_names(close)} {verb} behind{self._by_little()}")
         if control is not None:
-            best = max(others, key=self.levels.__getitem__)
             parts.append(self._beside_control(best, control))
         yield f"{'; '.join(parts)}."
 
     def _beside_control(self, best: str, control: str) -> str:
         """How the best of the others stands to the best control."""
-        difference = self.difference(best, control)
-        if _is_nothing(difference):
+        difference = self.lead
+        if self.standing == "alike":
             return f"the best control, {control}, does exactly as well as {best}"
         measured = f"({interval(difference)}, {self.unit})"
-        if difference is None or not difference.excludes_zero:
+        if self.standing == "untold":
             why = ", for some are never detected" if difference and difference.bound else ""
             return f"{best} and the best control, {control}, cannot be told apart{why} {measured}"
-        little = f",{self._by_little()}" if self._is_little(difference) else ""
-        if difference.mean > 0:
+        little = f",{self._by_little()}" if self.is_close else ""
+        if self.standing == "ahead":
             return f"{best} is ahead of the best control, {control}{little} {measured}"
         return f"the best control, {control}, is ahead of {best}{little} {measured}"
 
@@ -106,7 +159,10 @@ def is_real(policy: str, tags: Tags) -> bool:
 
 
 def told(contests: Iterable[Contest]) -> list[str]:
-    """What is said of all of them, and among whom they choose; nothing where nothing is said."""
+    """What is said of all of them, setting by setting and then one by one, and among whom they
+    choose; nothing where nothing is said.
+    """
+    contests = [*contests]
     said = [(contest, sentence) for contest in contests for sentence in contest.findings()]
     if not said:
         return []
@@ -114,12 +170,33 @@ def told(contests: Iterable[Contest]) -> list[str]:
     controls = any(map(is_control, tags.values()))
     chosen = "Who is first, and the best control, are" if controls else "Who is first is"
     return [
+        *_standings(contests),
         *(sentence for _, sentence in said),
         f"Compared are the {len(tags)} policies played here"
         f"{'' if controls else ', no control among them'}.",
         f"{chosen} chosen at each budget by the very results that are compared, which favours "
         "whoever is chosen; the number of comparisons is not corrected for.",
     ]
+
+
+def _standings(contests: Iterable[Contest]) -> Iterator[str]:
+    """How the best of every setting stands to the best control over the budgets, of which there are
+    at least two.
+    """
+    settings: dict[tuple[str, Verb], dict[tuple[str, bool], list[str]]] = {}
+    for contest in contests:
+        if (standing := contest.standing) is not None:
+            own = settings.setdefault((contest.setting, contest.verb), {})
+            own.setdefault((standing, contest.is_close), []).append(percent(contest.budget))
+    for (setting, verb), own in settings.items():
+        if sum(map(len, own.values())) > 1:
+            parts = [
+                f"{words}{' by less than the gate' if close else ''} at {', '.join(budgets)}"
+                for standing, words in _STANDINGS.items()
+                for close in (False, True)
+                if (budgets := own.get((standing, close)))
+            ]
+            yield f"{setting}, {verb.what}: the best of the others {'; it '.join(parts)}."
 
 
 def _is_nothing(difference: ShownDifference | None) -> bool:

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 
-from care_sim.base.errors import percent
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, among, ratio_level
 from care_sim.reports.contrasts import GATE_POINTS
 from care_sim.reports.findings.contest import Contest, Verb, is_real, told
@@ -12,6 +11,7 @@ from care_sim.reports.protocol.rows import SettingPlays, plays_by_setting
 from care_sim.study.run_config import FULL, Row
 
 _FIND = Verb(
+    "first sightings",
     "finds most first sightings at once",
     "find most first sightings at once",
     "find equally many first sightings at once",
@@ -53,7 +53,8 @@ def _contest(plays: SettingPlays, budget: float, shown: list[MeasuredDifference]
         return measured
 
     return Contest(
-        f"{plays.setting.label}, {percent(budget)}",
+        plays.setting.label,
+        budget,
         _FIND,
         "points",
         GATE_POINTS,
