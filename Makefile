@@ -25,7 +25,7 @@ VERSION := v1.0-trainval
 SECONDS := 600
 SEED := 0
 OUT = $(basename $(RESULTS))-official
-# The tests start hundreds of processes, each of which would compile the package anew.
+# Each process would compile the package anew, and the tests start hundreds.
 unexport PYTHONDONTWRITEBYTECODE
 
 ifneq ($(filter official-precision,$(MAKECMDGOALS)),)

@@ -29,8 +29,8 @@ Sums = tuple[ArrayLike, ArrayLike]
 """Numerators and denominators (n,) of a group of scenes, scene by scene."""
 
 
-_Columns = tuple[tuple[tuple[float, ...], tuple[float, ...]], ...]
-"""The sums of groups, as what can be remembered by."""
+_Hashable = tuple[tuple[tuple[float, ...], tuple[float, ...]], ...]
+"""The sums of groups as tuples, by which a result is remembered."""
 
 
 class Interval(NamedTuple):
@@ -91,7 +91,7 @@ def ratio_of_sums(
     # few. A scene is drawn as a whole, with its numerator and its denominator, since what happens
     # within one is not independent.
     groups = [_sums(*sums) for sums in ([group] if less is None else [group, less])]
-    return _resampled_ratio(_columns(groups), confidence, resamples, seed)
+    return _resampled_ratio(_hashable(groups), confidence, resamples, seed)
 
 
 def mean_of_ratios(
@@ -109,11 +109,15 @@ def mean_of_ratios(
     """
     if not groups:
         raise InvalidInput("a mean of ratios must be of at least one group")
-    return _resampled_mean(_columns([_sums(*sums) for sums in groups]), confidence, resamples, seed)
+    return _resampled_mean_of_ratios(
+        _hashable([_sums(*sums) for sums in groups]), confidence, resamples, seed
+    )
 
 
 @lru_cache(maxsize=10_000)
-def _resampled_mean(columns: _Columns, confidence: float, resamples: int, seed: int) -> Interval:
+def _resampled_mean_of_ratios(
+    columns: _Hashable, confidence: float, resamples: int, seed: int
+) -> Interval:
     """The interval of a mean of ratios; remembered: a result is ranked, told and drawn by it."""
     groups = _arrays(columns)
     value = float(np.mean([_ratio(a.sum(), b.sum()) for a, b in groups]))
@@ -133,7 +137,7 @@ def _resampled_mean(columns: _Columns, confidence: float, resamples: int, seed: 
 
 @lru_cache(maxsize=10_000)
 def _resampled_ratio(
-    columns: _Columns,
+    columns: _Hashable,
     confidence: float,
     resamples: int,
     seed: int,
@@ -187,11 +191,11 @@ def _are_equal(values: Floats, like: Floats) -> bool:
     return bool(np.ptp(values) <= 1e-12 * max(1.0, float(np.abs(like).max())))
 
 
-def _columns(groups: Sequence[tuple[Floats, Floats]]) -> _Columns:
+def _hashable(groups: Sequence[tuple[Floats, Floats]]) -> _Hashable:
     return tuple((tuple(a.tolist()), tuple(b.tolist())) for a, b in groups)
 
 
-def _arrays(columns: _Columns) -> list[tuple[Floats, Floats]]:
+def _arrays(columns: _Hashable) -> list[tuple[Floats, Floats]]:
     return [(np.array(numerators), np.array(denominators)) for numerators, denominators in columns]
 
 

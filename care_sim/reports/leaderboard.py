@@ -54,7 +54,7 @@ def leaderboard_table(results: Sequence[BenchmarkResult], minus: str = CONTROL.n
     # The leads are the widest: at 80 characters all but they stand side by side.
     columns = ("", "policy", "score", *results[0].parts, "ideal camera", *leads)
     notes = notes_on(results, minus if leads else "")
-    return Table(title(results), columns, rows, notes, whole=("", "score", "ideal camera"), names=2)
+    return Table(title(results), columns, rows, notes, whole=("", "score"), names=2)
 
 
 def leads_table(results: Sequence[BenchmarkResult], minus: str) -> Table | None:

@@ -85,8 +85,8 @@ class Table:
         )
 
     def without_empty_columns(self) -> "Table":
-        """The same without the columns in which nothing stands."""
-        filled = [n for n in range(len(self.columns)) if any(self.entries(n))]
+        """The same without the columns in which nothing stands; those of names stay."""
+        filled = [n for n in range(len(self.columns)) if n < self.names or any(self.entries(n))]
         rows = tuple(row if len(row) == 1 else tuple(row[n] for n in filled) for row in self.rows)
         return replace(self, columns=tuple(self.columns[n] for n in filled), rows=rows)
 

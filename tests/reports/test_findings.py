@@ -164,16 +164,31 @@ def test_over_several_budgets_the_best_is_held_against_the_best_control_first():
         for budget, (care, place) in found.items()
         for one in episodes({"care": care, "history": 8.0, "place": place})
     ]
-    first, second, *_ = sweep_findings(rows)
+    first, second, *_, hindsight = sweep_findings(rows)
     assert first == (
-        "dense, first detections: the best of the others is ahead of the best control at 3%; it "
-        "is ahead of the best control by less than the gate at 1%; it does exactly as well as the "
-        "best control at 10%; it cannot be told from the best control at 20%; it is behind the "
-        "best control at 5%."
+        "dense, first detections: beside the best control of each budget, the best other policy is "
+        "ahead at 3%; ahead, not shown to reach the gate of 2.5 m, at 1%; exactly as good at 10%; "
+        "not to be told apart at 20%; behind at 5%."
     )
+    assert hindsight.startswith("Who is first, the best control, and the best other policy are")
     assert second.startswith("dense, 1%: care detects farthest")
     without = [one for one in rows if one["policy"] != "place"]
     assert sweep_findings(without)[0].startswith("dense, 1%: care detects farthest")
+
+
+def test_a_bound_on_a_lead_reaches_the_gate_only_where_the_worst_case_does():
+    def rows(care, place):
+        return [
+            one | {"budget": budget}
+            for budget in (0.03, 0.1)
+            for one in episodes({"care": care, "place": place}, seeds=range(30))
+        ]
+
+    missed = (None, *(16.0,) * 29)
+    short, far = sweep_findings(rows(missed, 14.0)), sweep_findings(rows(missed, 4.0))
+    assert "is ahead of the best control, place (≤+1.6 [0.7,2.0], m)" in short[1]
+    assert "is ahead, not shown to reach the gate of 2.5 m, at 3%, 10%." in short[0]
+    assert "is ahead at 3%, 10%." in far[0]
 
 
 def test_the_open_loop_tells_who_finds_most_at_once():

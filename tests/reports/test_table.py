@@ -152,6 +152,9 @@ def test_columns_in_which_nothing_stands_can_be_left_out():
     assert table.rows == (("First, m",), ("x_y", "+5.0* [4.0,6.0]"), ("z†", "≤-1.0 [-2.0,0.0]"))
     assert isinstance(table.rows[1][1], Bold)
     assert (table.notes, table.quotes) == (TABLE.notes, TABLE.quotes)
+    # Without a second column every row would read as a heading.
+    nothing = Table("t", ("", "policy", "3%"), (("", "x", ""),), names=2).without_empty_columns()
+    assert nothing.columns == ("", "policy")
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,8 @@
 """Files of figures: written as PNG and SVG, removed when another study takes their folder."""
 
 import warnings
-from collections.abc import Container, Iterable
+from collections.abc import Container, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from matplotlib import rc_context
@@ -16,19 +17,8 @@ _FORMATS = (".png", ".svg")
 
 
 def save(figure: Figure, stem: Path) -> None:
-    """Write a figure as PNG and SVG, with its texts as they are.
-
-    A $ in a name begins no formula, control codes are shown as escapes, and what the font has no
-    sign for is drawn as a box.
-    """
-    # Labels of ticks are Matplotlib's own, and powers of ten among them are formulas.
-    of_ticks = {id(label) for tick in figure.findobj(Tick) for label in tick.findobj(Text)}
-    for text in figure.findobj(Text):
-        if id(text) not in of_ticks:
-            text.set_parse_math(False)
-            text.set_text("\n".join(map(printable, text.get_text().split("\n"))))
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", r"Glyph .* missing from font")
+    """Write a figure as PNG and SVG, with its texts as they are."""
+    with texts_as_they_are(figure):
         with replacing(stem.with_suffix(".png")) as unfinished:
             figure.savefig(unfinished, dpi=200)
         # Ids within an SVG are random without a salt, and it holds the date. Neither may make a new
@@ -38,6 +28,22 @@ def save(figure: Figure, stem: Path) -> None:
             replacing(stem.with_suffix(".svg")) as unfinished,
         ):
             figure.savefig(unfinished, metadata={"Date": None})
+
+
+@contextmanager
+def texts_as_they_are(figure: Figure) -> Iterator[None]:
+    """Within it the figure can be drawn with any texts: a $ in a name begins no formula, control
+    codes are shown as escapes, and what the font has no sign for is drawn as a box.
+    """
+    # Labels of ticks are Matplotlib's own, and powers of ten among them are formulas.
+    of_ticks = {id(label) for tick in figure.findobj(Tick) for label in tick.findobj(Text)}
+    for text in figure.findobj(Text):
+        if id(text) not in of_ticks:
+            text.set_parse_math(False)
+            text.set_text("\n".join(map(printable, text.get_text().split("\n"))))
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", r"Glyph .* missing from font")
+        yield
 
 
 def check_figure(stem: Path) -> None:

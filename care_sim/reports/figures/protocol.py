@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 
 from care_sim.base.errors import percent
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, Ratio
-from care_sim.reports.figures.apart import MOVED_APART, move_apart
+from care_sim.reports.figures.apart import BESIDE_PLACES, move_apart
 from care_sim.reports.figures.controls import control_figure
 from care_sim.reports.figures.styles import (
     APART,
@@ -60,7 +60,7 @@ def pareto_figure(plays: SettingPlays) -> Figure:
     """Markers of all policies, and in grey the Pareto frontier of those that a car can have.
 
     What lies below and left of the staircase is beaten in one recall and not better in the other.
-    Open markers show what lies under them; that of CARE is filled.
+    Markers are open, that of CARE is filled; those that would hide each other are moved apart.
     """
     lines = math.ceil(len(plays.budgets) / _PANELS_A_LINE)
     figure = Figure(figsize=(8.4, 1.2 + 2.4 * lines), layout="constrained")
@@ -117,7 +117,7 @@ def _draw_recalls(
         (marker,) = axes.plot(
             overall, first, look.marker, color=look.colour, label=marked(policy, plays.tags[policy])
         )
-        # CARE is small and filled, so that it is seen within an open marker at the same place.
+        # CARE is small and filled, so that it is seen within an open marker that is near.
         if policy == REFERENCE:
             marker.set(markersize=5, zorder=5)
         else:
@@ -158,7 +158,8 @@ def _name_markers(figure: Figure, panels: Sequence[Axes], plays: SettingPlays) -
         else []
     )
     line = "grey line: Pareto frontier of the policies that a car can have"
-    notes = ["overall recall (%)", line, MOVED_APART, *reached, *tag_notes(plays.tags.values())]
+    apart = [BESIDE_PLACES] if len(plays.policies) > 1 else []
+    notes = ["overall recall (%)", line, *apart, *reached, *tag_notes(plays.tags.values())]
     figure.supxlabel("\n".join(notes), fontsize=9)
     name_outside(figure, panels)
 

@@ -8,13 +8,13 @@ from care_sim.base.errors import counted
 from care_sim.evaluation.censoring import FEWEST_PAIRS
 from care_sim.reports.contrasts import AVOIDED, DETECTION, Measure, contrast, preventable
 from care_sim.reports.controls import is_control
-from care_sim.reports.findings.contest import Contest, Tags, Verb, is_real, told
+from care_sim.reports.findings.contest import Contest, Subject, Tags, is_real, told
 from care_sim.study.rows.reading import Groups, full_of, grouped, policy_of, tags_of_row
 from care_sim.study.rows.settings import Setting
 from care_sim.study.run_config import FULL, Row
 
-_DETECT = Verb("first detections", "detects farthest", "detect farthest", "detect equally far")
-_COLLIDE = Verb("collisions", "collides least", "collide least", "collide equally often")
+_DETECT = Subject("first detections", "detects farthest", "detect farthest", "detect equally far")
+_COLLIDE = Subject("collisions", "collides least", "collide least", "collide equally often")
 _TOO_FEW = (
     f"Who leads is told of {FEWEST_PAIRS} seeds and more that all policies share, and not of fewer."
 )
@@ -98,7 +98,7 @@ def _contests(
 
 def _contest(
     measure: Measure,
-    verb: Verb,
+    subject: Subject,
     own: Mapping[str, Sequence[Row]],
     tags: Tags,
     setting: str,
@@ -109,7 +109,7 @@ def _contest(
     return Contest(
         setting,
         budget,
-        verb,
+        subject,
         measure.unit,
         measure.gate,
         tags,

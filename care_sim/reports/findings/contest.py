@@ -19,19 +19,18 @@ _MOST_NAMED = 4
 
 
 _STANDINGS = {
-    "ahead": "is ahead of the best control",
-    "alike": "does exactly as well as the best control",
-    "untold": "cannot be told from the best control",
-    "behind": "is behind the best control",
+    "ahead": "ahead",
+    "alike": "exactly as good",
+    "untold": "not to be told apart",
+    "behind": "behind",
 }
+"""How the best other policy may stand to the best control, in the order in which it is told."""
 
 
-class Verb(NamedTuple):
-    """What is compared, and what the first of a contest does, or the first of several, or all
-    alike.
-    """
+class Subject(NamedTuple):
+    """What is compared, and the verb for it of the first, or the first of several, or all alike."""
 
-    what: str
+    name: str
     one: str
     several: str
     all: str
@@ -48,7 +47,7 @@ class Contest:
 
     setting: str
     budget: float
-    verb: Verb
+    subject: Subject
     unit: str
     gate: float
     tags: Tags
@@ -74,7 +73,7 @@ class Contest:
 
     @cached_property
     def lead(self) -> ShownDifference | None:
-        """That of the best over the best control, where there are both and it is known."""
+        """What the best is over the best control, where both are there and it is known."""
         if self.best is None or self.control is None:
             return None
         return self.difference(self.best, self.control)
@@ -92,9 +91,15 @@ class Contest:
         return "ahead" if difference.mean > 0 else "behind"
 
     @property
-    def is_close(self) -> bool:
-        """Whether the best is ahead of the best control, or behind it, by less than the gate."""
-        return self.standing in ("ahead", "behind") and self._is_little(self.lead)
+    def falls_short(self) -> bool:
+        """Whether the best is ahead of the best control, or behind it, and has not been shown to be
+        so by the gate.
+        """
+        if self.lead is None or self.standing not in ("ahead", "behind"):
+            return False
+        # Of a bound the asterisk alone says that the gate is reached, whatever was missed.
+        reached = not self.lead.bound and abs(self.lead.mean) >= self.gate
+        return not (reached or self.lead.asterisk)
 
     def findings(self) -> Iterator[str]:
         """One sentence, or none where there is nobody to compare."""
@@ -107,13 +112,13 @@ class Contest:
         if len(tied) == len(self.levels):
             with_controls = ", controls included" if control else ""
             yield (
-                f"{self.place}: all {len(tied)} policies {self.verb.all}, "
+                f"{self.place}: all {len(tied)} policies {self.subject.all}, "
                 f"{self.told(first)}{with_controls}."
             )
             return
         alike = [p for p, each in over.items() if p not in tied and not _is_ahead(each)]
         close = [p for p, each in over.items() if _is_ahead(each) and self._is_little(each)]
-        leads = self.verb.one if len(tied) == 1 else self.verb.several
+        leads = self.subject.one if len(tied) == 1 else self.subject.several
         # Beside a control that difference is the one to know.
         behind = [p for p in over if p not in (*tied, *alike, *close)] if control is None else []
         ahead = ""
@@ -140,7 +145,7 @@ class Contest:
         if self.standing == "untold":
             why = ", for some are never detected" if difference and difference.bound else ""
             return f"{best} and the best control, {control}, cannot be told apart{why} {measured}"
-        little = f",{self._by_little()}" if self.is_close else ""
+        little = f",{self._by_little()}" if self._is_little(difference) else ""
         if self.standing == "ahead":
             return f"{best} is ahead of the best control, {control}{little} {measured}"
         return f"the best control, {control}, is ahead of {best}{little} {measured}"
@@ -168,7 +173,8 @@ def told(contests: Iterable[Contest]) -> list[str]:
         return []
     tags = {policy: contest.tags[policy] for contest, _ in said for policy in contest.levels}
     controls = any(map(is_control, tags.values()))
-    chosen = "Who is first, and the best control, are" if controls else "Who is first is"
+    who = "Who is first, the best control, and the best other policy are"
+    chosen = who if controls else "Who is first is"
     return [
         *_standings(contests),
         *(sentence for _, sentence in said),
@@ -180,23 +186,37 @@ def told(contests: Iterable[Contest]) -> list[str]:
 
 
 def _standings(contests: Iterable[Contest]) -> Iterator[str]:
-    """How the best of every setting stands to the best control over the budgets, of which there are
-    at least two.
+    """How in every setting the best that is no control stands to the best control, over the budgets
+    at which both were compared; of one budget its own sentence tells it.
     """
-    settings: dict[tuple[str, Verb], dict[tuple[str, bool], list[str]]] = {}
+    settings: dict[tuple[str, Subject], list[Contest]] = {}
     for contest in contests:
-        if (standing := contest.standing) is not None:
-            own = settings.setdefault((contest.setting, contest.verb), {})
-            own.setdefault((standing, contest.is_close), []).append(percent(contest.budget))
-    for (setting, verb), own in settings.items():
-        if sum(map(len, own.values())) > 1:
+        if contest.standing is not None:
+            settings.setdefault((contest.setting, contest.subject), []).append(contest)
+    for (setting, subject), own in settings.items():
+        if len(own) > 1:
             parts = [
-                f"{words}{' by less than the gate' if close else ''} at {', '.join(budgets)}"
+                f"{words}{short} at {budgets}"
                 for standing, words in _STANDINGS.items()
-                for close in (False, True)
-                if (budgets := own.get((standing, close)))
+                for short in (
+                    "",
+                    f", not shown to reach the gate of {own[0].gate:g} {own[0].unit},",
+                )
+                if (budgets := _budgets(own, standing, bool(short)))
             ]
-            yield f"{setting}, {verb.what}: the best of the others {'; it '.join(parts)}."
+            yield (
+                f"{setting}, {subject.name}: beside the best control of each budget, the best "
+                f"other policy is {'; '.join(parts)}."
+            )
+
+
+def _budgets(contests: Iterable[Contest], standing: str, short: bool) -> str:
+    """At which budgets it stands so."""
+    return ", ".join(
+        percent(each.budget)
+        for each in contests
+        if (each.standing, each.falls_short) == (standing, short)
+    )
 
 
 def _is_nothing(difference: ShownDifference | None) -> bool:

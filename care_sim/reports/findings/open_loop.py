@@ -4,13 +4,13 @@ from collections.abc import Sequence
 
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, among, ratio_level
 from care_sim.reports.contrasts import GATE_POINTS
-from care_sim.reports.findings.contest import Contest, Verb, is_real, told
+from care_sim.reports.findings.contest import Contest, Subject, is_real, told
 from care_sim.reports.protocol.differences import MeasuredDifference, PolicyPair
 from care_sim.reports.protocol.notes import on_intervals
 from care_sim.reports.protocol.rows import SettingPlays, plays_by_setting
 from care_sim.study.run_config import FULL, Row
 
-_FIND = Verb(
+_FIND = Subject(
     "first sightings",
     "finds most first sightings at once",
     "find most first sightings at once",

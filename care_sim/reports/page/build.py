@@ -62,7 +62,7 @@ class Findings:
     def of(cls, study: Study, rows: Sequence[Row]) -> "Findings":
         """Charts, tables and sentences."""
         charts = CHARTS.get(study.name, _no_charts)(rows)
-        tables = study.tables(rows)
+        tables = [table.without_empty_columns() for table in study.tables(rows)]
         return cls(charts, tables, caption(study.caption, tables), study.closing(rows))
 
 
@@ -85,7 +85,6 @@ class Page:
     def html(self) -> str:
         """The page as one file."""
         charts = self.findings.charts
-        tables = [table.without_empty_columns() for table in self.findings.tables]
         return str(
             _template().render(
                 page=self,
@@ -95,7 +94,7 @@ class Page:
                 specs=_embedded([chart.spec for chart in charts]),
                 # A page without charts needs no Vega.
                 vega=Markup(vega_bundle()) if charts else "",
-                tables=[(table, blocks(table), least_ems(table)) for table in tables],
+                tables=[(table, blocks(table), least_ems(table)) for table in self.findings.tables],
                 reading=self.findings.reading,
                 closing=self.findings.closing,
                 groups=episode_groups(self.rows, self.episodes) if self.listed else [],

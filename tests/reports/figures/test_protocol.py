@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 
-from care_sim.reports.figures.apart import MOVED_APART
+from care_sim.reports.figures.apart import BESIDE_PLACES
 from care_sim.reports.figures.files import save
 from care_sim.reports.figures.protocol import frontier, protocol_figures
 from care_sim.reports.figures.styles import styles
@@ -121,19 +121,49 @@ def test_the_levels_say_that_policies_are_moved_apart():
     assert said not in alone.get_supxlabel()
 
 
-def test_markers_at_one_place_are_all_seen():
-    policies = [*FOUND, "all-camera", "care-sbf", "care-spread", "place", "rows", "uncertainty"]
-    figure = protocol_figures(study(dict.fromkeys(policies, (5, 5)), budgets=(0.1,)))[
-        "pareto-streets"
-    ]
+PILE = [*FOUND, "all-camera", "care-sbf", "care-spread", "place", "rows", "uncertainty"]
+
+
+def a_pile():
+    """A figure with all policies at one place, its panel, and their markers."""
+    figures = protocol_figures(study(dict.fromkeys(PILE, (5, 5)), budgets=(0.1,)))
+    figure = figures["pareto-streets"]
     (axes,) = figure.axes
-    markers = [line for line in axes.lines if line.get_marker() != "None"]
-    assert len(markers) == len(policies) - 1
+    return figure, axes, [line for line in axes.lines if line.get_marker() != "None"]
+
+
+@pytest.mark.parametrize("dpi", [72, 200])
+def test_a_line_leads_from_every_marker_that_was_moved_to_a_dot_at_its_place(dpi):
+    figure, axes, markers = a_pile()
+    figure.set_dpi(dpi)
+    figure.draw_without_rendering()
+    points = 72 / dpi
+
+    def on_paper(transform, at):
+        return transform.transform(at) * points
+
+    middles = np.array([on_paper(m.get_transform(), m.get_xydata()[0]) for m in markers])
+    apart = np.hypot(*(middles[:, None] - middles[None]).transpose(2, 0, 1))
+    assert apart[~np.eye(len(markers), dtype=bool)].min() > 5.9
+    place = on_paper(axes.transData, (50.0, 25.0))
+    moved = [middle - place for middle in middles if not np.allclose(middle, place)]
+    assert len(moved) >= len(markers) - 1
+    assert [tuple(text.xy) for text in axes.texts] == [(50.0, 25.0)] * len(moved)
+    assert np.allclose([text.xyann for text in axes.texts], moved)
+    (dots,) = axes.collections
+    assert np.allclose(dots.get_offsets(), (50.0, 25.0))
+
+
+def test_markers_at_one_place_are_all_seen():
+    figure, axes, markers = a_pile()
+    assert len(markers) == len(PILE) - 1
     assert {(*line.get_xdata(), *line.get_ydata()) for line in markers} == {(50.0, 25.0)}
-    assert MOVED_APART in figure.get_supxlabel().splitlines()
+    assert BESIDE_PLACES in figure.get_supxlabel().splitlines()
+    alone = protocol_figures(study({"care": (6, 5)}))["pareto-streets"]
+    assert BESIDE_PLACES not in alone.get_supxlabel()
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
-    for line in (*axes.lines, *axes.texts):
+    for line in (*axes.lines, *axes.texts, *axes.collections):
         line.set_visible(False)
     canvas.draw()
     ground = canvas.copy_from_bbox(figure.bbox)
