@@ -17,6 +17,7 @@ import uuid
 from contextlib import suppress
 from pathlib import Path
 
+from tests.helpers.descendants import listen_to_interrupts
 from tests.helpers.places import ROOT
 from tests.torture.case import Fault
 
@@ -89,7 +90,7 @@ class Command:
         self.arguments, self.mark = [str(argument) for argument in arguments], new_mark()
 
         def limited():
-            signal.signal(signal.SIGINT, signal.default_int_handler)
+            listen_to_interrupts()
             if file_bytes is not None:
                 resource.setrlimit(resource.RLIMIT_FSIZE, (file_bytes, file_bytes))
 
