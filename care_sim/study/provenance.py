@@ -91,11 +91,15 @@ def _entry_digest(entry: EntryPoint) -> str | None:
         for name, file in files.items()
     ]
     further = files_named_by(entry) | files_named_in(files.values())
-    named = [(name, file_digest(path)) for name, path in further.items()]
-    # A folder with too many files to read: nothing can be promised about it.
-    if any(digest is None for _, digest in named):
-        return None
-    return combined_digest([*sorted(shipped), *(f"{name} {digest}" for name, digest in named)])
+    named = []
+    for name, path in further.items():
+        digest = file_digest(path)
+        # A folder with too many files to read: nothing can be promised about it, and looking at the
+        # others would take as long for each.
+        if digest is None:
+            return None
+        named.append(f"{name} {digest}")
+    return combined_digest([*sorted(shipped), *named])
 
 
 @cache

@@ -76,8 +76,14 @@ def test_a_folder_that_is_given_is_that_one_or_none(here, sweep):
     assert "give another --out, or --force to replace it" in err
 
 
-def test_a_world_and_a_source_have_folders_of_their_own(monkeypatch, capsys):
+def test_a_world_and_a_source_have_folders_of_their_own(monkeypatch, capsys, tmp_path):
     from care_sim.commands.shared import study_command
+
+    (tmp_path / "own_worlds").mkdir()
+    (tmp_path / "own_worlds" / "street.py").write_text(
+        "from care_sim.scenarios.dense import Dense\n\n\nclass Street(Dense):\n    pass\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
 
     def named(*arguments):
         raise InterruptedError(arguments[1].name)
@@ -85,8 +91,8 @@ def test_a_world_and_a_source_have_folders_of_their_own(monkeypatch, capsys):
     for line, name in (
         ("validate dense --seeds 1 --training-seeds 1 --budgets 0.1", "validate-dense"),
         (
-            "validate care_sim.scenarios.dense:Dense --seeds 1 --training-seeds 1 --budgets 0.1",
-            "validate-care_sim.scenarios.dense",
+            "validate own_worlds.street:Street --seeds 1 --training-seeds 1 --budgets 0.1",
+            "validate-own_worlds.street",
         ),
         ("protocol --scenes 1 --policies history --budgets 0.1", "protocol-streets"),
         ("mechanism --scenes 1", "mechanism-streets"),
