@@ -1,6 +1,7 @@
 """The site in a browser: every page of it, wide and dark as on a desk and narrow as on a phone."""
 
 import functools
+import json
 import os
 import re
 import subprocess
@@ -109,6 +110,10 @@ def walked(chromium, site, address):
             or troubles.append(f"{page.url} asks {asked.url}")
         ),
     )
+    # Every page would index the site for its search, which takes half of the time here. It has a
+    # test of its own.
+    index = json.loads((site / "search" / "search_index.json").read_text()) | {"docs": []}
+    page.route("**/search_index.json", lambda route: route.fulfill(json=index))
     about = {}
     for path in sorted(each.relative_to(site).as_posix() for each in site.rglob("*.html")):
         page.set_viewport_size(DESK["viewport"])
