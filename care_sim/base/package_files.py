@@ -20,6 +20,7 @@ from care_sim.base.digests import files_below, real_path
 _OF_INSTALLERS = (".dist-info", ".egg-info")
 _SCRIPTS = (["bin"], ["Scripts"])
 _SITES = {"site-packages", "dist-packages"}
+_THIS = __name__.partition(".")[0]
 
 
 class SourceNames(NamedTuple):
@@ -40,7 +41,9 @@ def shipped_files(entry: EntryPoint) -> dict[str, Path] | None:
 
     # A worklist of packages and modules: code of the project may import more of the project, which
     # is then looked into as well, each once.
-    known = [first]
+    # This package has a hash of its own, which stands beside that of every other code: a module in
+    # the root of its clone has it in its project, and is no part of it.
+    known = [first, _THIS]
     waiting = [first]
     while waiting:
         top = waiting.pop(0)

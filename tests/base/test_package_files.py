@@ -4,6 +4,7 @@ forms of either.
 
 import json
 import sys
+from importlib.metadata import EntryPoint
 from pathlib import Path
 from uuid import uuid4
 
@@ -11,6 +12,7 @@ import pytest
 
 from care_sim.base import named_files
 from care_sim.base.digests import files_below
+from care_sim.base.package_files import shipped_files
 from care_sim.study import provenance
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.episode_play import run_episode
@@ -20,6 +22,7 @@ from care_sim.study.run_config import files_in
 HEAD = """
 import os
 from functools import cache, partial
+from importlib.metadata import EntryPoint
 from pathlib import Path
 from types import SimpleNamespace
 from care_sim.policies.paper.history import History
@@ -103,6 +106,14 @@ def test_every_file_of_the_distribution_counts(form, lay):
     """The file that changes is the last one."""
     files, listed = SHIPPED[form]
     assert changes(lay(files, listed) / [*files][-1])
+
+
+def test_code_in_the_root_of_the_clone_does_not_come_with_this_package():
+    """Where a newcomer writes a policy: beside `care_sim`, which every policy imports."""
+    entry = EntryPoint("mine", "tests.helpers.misbehaving:Thing", "care_sim.policies")
+    names = {*shipped_files(entry)}
+    assert "tests/helpers/misbehaving.py" in names
+    assert not {name for name in names if name.startswith("care_sim/")}
 
 
 def test_path_files_and_other_distributions_do_not_count(lay):
