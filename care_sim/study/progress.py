@@ -152,7 +152,9 @@ class ProgressReporter(RunListener):
 
     def _tell(self) -> None:
         left_s = max(self._end - self._clock(), 0.0)
-        left = "" if math.isnan(self._end) else f"{rounded_duration(left_s)} left"
+        # A prediction that has run out says nothing of what still plays.
+        known = not math.isnan(self._end) and (left_s > 0 or self._remaining.waiting == 0)
+        left = f"{rounded_duration(left_s)} left" if known else ""
         waits = self._workers == 0 and self._remaining.waiting > 0
         self._show(
             self._total - self._remaining.waiting, "no worker is connected" if waits else left

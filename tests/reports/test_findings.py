@@ -35,7 +35,7 @@ def test_the_first_stands_beside_the_best_control():
     first, played, hindsight = sweep_findings(rows)
     assert first == (
         "dense, 3%: care detects farthest, 16.0 m on average over 6 episodes, the full scan "
-        "17.0 m; care is ahead of the best control, fan (+4.0* [4.0,4.0], m)."
+        "17.0 m; care is ahead of the best control, fan (+4.0* [4.0,4.0] m)."
     )
     assert played == "Compared are the 4 policies played here."
     assert "by the very results" in hindsight
@@ -44,7 +44,7 @@ def test_the_first_stands_beside_the_best_control():
 def test_a_control_that_is_ahead_leads():
     assert told({"care": 10.0, "history": 8.0, "fan": 16.0}) == (
         "dense, 3%: fan detects farthest, 16.0 m on average over 6 episodes; the best control, "
-        "fan, is ahead of care (-6.0* [-6.0,-6.0], m)."
+        "fan, is ahead of care (-6.0* [-6.0,-6.0] m)."
     )
 
 
@@ -59,16 +59,16 @@ def test_ties_are_no_lead():
     )
     assert told({"care": 16.1, "history": WAVERING, "random": 3.0}) == (
         "dense, 3%: care detects farthest, 16.1 m on average over 6 episodes, ahead of random "
-        "(+13.1* [13.1,13.1], m); history cannot be told from it."
+        "(+13.1* [13.1,13.1] m); history cannot be told from it."
     )
-    assert "care and the best control, fan, cannot be told apart (+0.1 [-0.4,0.6], m)" in told(
+    assert "care and the best control, fan, cannot be told apart (+0.1 [-0.4,0.6] m)" in told(
         {"care": 16.1, "fan": WAVERING}
     )
 
 
 def test_a_difference_below_the_gate_is_called_so():
     assert (
-        "ahead of the best control, fan, by less than the gate of 2.5 m (+1.0 [1.0,1.0], m)"
+        "ahead of the best control, fan, by less than the gate of 2.5 m (+1.0 [1.0,1.0] m)"
         in told({"care": 16.0, "fan": 15.0})
     )
 
@@ -76,7 +76,7 @@ def test_a_difference_below_the_gate_is_called_so():
 def test_who_is_behind_by_less_than_the_gate_is_told():
     assert told({"care": 16.0, "care-spread": 15.0, "all-camera": 14.0, "history": 8.0}) == (
         "dense, 3%: care detects farthest, 16.0 m on average over 6 episodes, ahead of history "
-        "(+8.0* [8.0,8.0], m); care-spread and all-camera are behind by less than the gate of "
+        "(+8.0* [8.0,8.0] m); care-spread and all-camera are behind by less than the gate of "
         "2.5 m."
     )
 
@@ -90,13 +90,16 @@ def test_the_full_scan_is_told_over_the_same_episodes_or_not_at_all():
 
 def test_that_no_control_was_played_is_told():
     rows = episodes({"history-oracle": 20.0, "care": 16.0, "history": 8.0, "full": 17.0})
-    assert "Compared are the 2 policies played here, no control among them." in sweep_findings(rows)
+    assert (
+        "Compared are the 2 policies played here, no control among them: name fan or place, too."
+        in sweep_findings(rows)
+    )
 
 
 def test_what_no_car_can_have_is_in_no_contest_and_one_alone_is_none():
     assert told({"history-oracle": 20.0, "care": 16.0, "history": 8.0}) == (
         "dense, 3%: care detects farthest, 16.0 m on average over 6 episodes, ahead of history "
-        "(+8.0* [8.0,8.0], m)."
+        "(+8.0* [8.0,8.0] m)."
     )
     assert sweep_findings(episodes({"history-oracle": 20.0, "care": 16.0, "full": 17.0})) == []
     assert sweep_findings(episodes({"fan": 16.0, "rows": 15.0, "full": 17.0})) == []
@@ -141,7 +144,7 @@ def test_collisions_that_a_full_scan_prevents_are_told():
     _, collisions, *_ = sweep_findings(rows)
     assert collisions == (
         "dense, 3%: care collides least, in 0 of 6 episodes that the full scan ends unhurt, "
-        "ahead of history (+100* [100,100], points)."
+        "ahead of history (+100* [100,100] points)."
     )
     without = [one for one in rows if one["policy"] != "full"]
     assert sweep_findings(without)[1].startswith(
@@ -166,9 +169,9 @@ def test_over_several_budgets_the_best_is_held_against_the_best_control_first():
     ]
     first, second, *_, hindsight = sweep_findings(rows)
     assert first == (
-        "dense, first detections: beside the best control of each budget, the best other policy is "
-        "ahead at 3%; ahead, not shown to reach the gate of 2.5 m, at 1%; exactly as good at 10%; "
-        "not to be told apart at 20%; behind at 5%."
+        "dense, first detections: compared with the best control of each budget (place), the best "
+        "other policy (care) is ahead at 3%; ahead, not shown to reach the gate of 2.5 m, at 1%; "
+        "the same in every world at 10%; not to be told apart at 20%; behind at 5%."
     )
     assert hindsight.startswith("Who is first, the best control, and the best other policy are")
     assert second.startswith("dense, 1%: care detects farthest")
@@ -186,7 +189,7 @@ def test_a_bound_on_a_lead_reaches_the_gate_only_where_the_worst_case_does():
 
     missed = (None, *(16.0,) * 29)
     short, far = sweep_findings(rows(missed, 14.0)), sweep_findings(rows(missed, 4.0))
-    assert "is ahead of the best control, place (≤+1.6 [0.7,2.0], m)" in short[1]
+    assert "is ahead of the best control, place (≤+1.6 [0.7,2.0] m)" in short[1]
     assert "is ahead, not shown to reach the gate of 2.5 m, at 3%, 10%." in short[0]
     assert "is ahead at 3%, 10%." in far[0]
 

@@ -12,8 +12,8 @@ from care_sim.core.arrays import Floats
 from care_sim.reports.figures.files import texts_as_they_are
 
 BESIDE_PLACES = (
-    "markers that would hide each other stand beside their places, which are the dots at the ends "
-    "of thin lines"
+    "markers that would hide each other stand beside their places, which are the small black dots "
+    "at the ends of thin lines"
 )
 _LEAST_POINTS = 6.0
 """Between the middles of two markers: two thirds of the width of one, so that each is seen. Twelve

@@ -20,7 +20,7 @@ _MOST_NAMED = 4
 
 _STANDINGS = {
     "ahead": "ahead",
-    "alike": "exactly as good",
+    "alike": "the same in every world",
     "untold": "not to be told apart",
     "behind": "behind",
 }
@@ -124,7 +124,7 @@ class Contest:
         ahead = ""
         if behind:
             second = max(behind, key=self.levels.__getitem__)
-            ahead = f", ahead of {second} ({interval(over[second])}, {self.unit})"
+            ahead = f", ahead of {second} ({interval(over[second])} {self.unit})"
         parts = [f"{self.place}: {_names(tied)} {leads}, {self.told(first)}{ahead}"]
         if alike:
             them = "it" if len(tied) == 1 else "them"
@@ -141,7 +141,7 @@ class Contest:
         difference = self.lead
         if self.standing == "alike":
             return f"the best control, {control}, does exactly as well as {best}"
-        measured = f"({interval(difference)}, {self.unit})"
+        measured = f"({interval(difference)} {self.unit})"
         if self.standing == "untold":
             why = ", for some are never detected" if difference and difference.bound else ""
             return f"{best} and the best control, {control}, cannot be told apart{why} {measured}"
@@ -179,7 +179,7 @@ def told(contests: Iterable[Contest]) -> list[str]:
         *_standings(contests),
         *(sentence for _, sentence in said),
         f"Compared are the {len(tags)} policies played here"
-        f"{'' if controls else ', no control among them'}.",
+        f"{'' if controls else ', no control among them: name fan or place, too'}.",
         f"{chosen} chosen at each budget by the very results that are compared, which favours "
         "whoever is chosen; the number of comparisons is not corrected for.",
     ]
@@ -204,9 +204,11 @@ def _standings(contests: Iterable[Contest]) -> Iterator[str]:
                 )
                 if (budgets := _budgets(own, standing, bool(short)))
             ]
+            controls = _names([*dict.fromkeys(each.control for each in own if each.control)])
+            best = _names([*dict.fromkeys(each.best for each in own if each.best)])
             yield (
-                f"{setting}, {subject.name}: beside the best control of each budget, the best "
-                f"other policy is {'; '.join(parts)}."
+                f"{setting}, {subject.name}: compared with the best control of each budget "
+                f"({controls}), the best other policy ({best}) is {'; '.join(parts)}."
             )
 
 
