@@ -30,9 +30,12 @@ def official(folder, *arguments):
 
 def setup(folder, python, *arguments, version=(3, 11)):
     """What would be done with a Python that says it is of this version."""
-    (folder / "sitecustomize.py").write_text(f"import sys; sys.version_info = {version}\n")
+    # A folder each: bytecode kept of a file is taken for that of one as long, a moment later.
+    says = folder / f"says-{version}"
+    says.mkdir(exist_ok=True)
+    (says / "sitecustomize.py").write_text(f"import sys; sys.version_info = {version}\n")
     given = ("--dry-run", "setup", f"VENV={folder / 'environment'}", f"PYTHON={python}")
-    return made(*given, *arguments, PYTHONPATH=str(folder))
+    return made(*given, *arguments, PYTHONPATH=str(says))
 
 
 def complaint(done):
