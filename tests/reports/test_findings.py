@@ -170,7 +170,7 @@ def test_over_several_budgets_the_best_is_held_against_the_best_control_first():
     first, second, *_, hindsight = sweep_findings(rows)
     assert first == (
         "dense, first detections: compared with the best control of each budget (place), the best "
-        "other policy (care) is ahead at 3%; ahead, not shown to reach the gate of 2.5 m, at 1%; "
+        "other policy (care): ahead at 3%; ahead, not shown to reach the gate of 2.5 m, at 1%; "
         "the same in every world at 10%; not to be told apart at 20%; behind at 5%."
     )
     assert hindsight.startswith("Who is first, the best control, and the best other policy are")
@@ -190,8 +190,8 @@ def test_a_bound_on_a_lead_reaches_the_gate_only_where_the_worst_case_does():
     missed = (None, *(16.0,) * 29)
     short, far = sweep_findings(rows(missed, 14.0)), sweep_findings(rows(missed, 4.0))
     assert "is ahead of the best control, place (≤+1.6 [0.7,2.0] m)" in short[1]
-    assert "is ahead, not shown to reach the gate of 2.5 m, at 3%, 10%." in short[0]
-    assert "is ahead at 3%, 10%." in far[0]
+    assert ": ahead, not shown to reach the gate of 2.5 m, at 3%, 10%." in short[0]
+    assert ": ahead at 3%, 10%." in far[0]
 
 
 def test_the_open_loop_tells_who_finds_most_at_once():

@@ -208,7 +208,7 @@ def _standings(contests: Iterable[Contest]) -> Iterator[str]:
             best = _names([*dict.fromkeys(each.best for each in own if each.best)])
             yield (
                 f"{setting}, {subject.name}: compared with the best control of each budget "
-                f"({controls}), the best other policy ({best}) is {'; '.join(parts)}."
+                f"({controls}), the best other policy ({best}): {'; '.join(parts)}."
             )
 
 
