@@ -310,6 +310,32 @@ def test_a_page_fits_a_phone_and_reads_in_any_light(scheme, opened, played):
     assert contrast(quiet, paper) > 4.5
 
 
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_chart_follows_the_page_into_the_dark_and_back_onto_paper(scheme, opened, played):
+    page = opened(played[0], READY, color_scheme=scheme)
+    plot = page.locator(".plot[data-drawn]").first
+
+    def look():
+        return plot.evaluate(
+            """each => ({
+              card: getComputedStyle(each).backgroundColor,
+              text: getComputedStyle(each.querySelector("text")).fill,
+              paper: getComputedStyle(document.body).backgroundColor,
+              edge: getComputedStyle(each.querySelector(".mark-line path")).filter,
+            })"""
+        )
+
+    shown = look()
+    assert shown["card"] == "rgba(0, 0, 0, 0)"
+    assert contrast(shown["text"], shown["paper"]) > 7
+    # Dark colours keep their name, and are seen by a pale edge.
+    assert (shown["edge"] != "none") == (scheme == "dark")
+    page.emulate_media(media="print", color_scheme=scheme)
+    printed = look()
+    assert printed["paper"] == "rgb(255, 255, 255)"
+    assert contrast(printed["text"], printed["paper"]) > 7
+
+
 def test_a_colour_names_the_same_policy_in_light_and_dark(opened, played):
     drawn = styles([("history", ("causal",)), ("care", ("causal",))])
     colours = {policy: style.colour for policy, style in drawn.items()}

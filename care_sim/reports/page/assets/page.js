@@ -52,9 +52,9 @@ async function draw(plot, specs) {
   const config = {
     background: null,
     font: "system-ui, sans-serif",
-    axis: { labelFontSize: 11, titleFontSize: 12, titleFontWeight: "normal", gridColor: "#e4e7ea", labelColor: "#333", titleColor: "#333" },
-    header: { labelFontSize: 12, labelColor: "#222", labelFontWeight: "bold" },
-    legend: { orient: "bottom", columns: Math.max(1, Math.min(5, Math.floor(width / 150))), labelFontSize: 12, labelLimit: 200, symbolSize: 80, symbolStrokeWidth: 2, labelColor: "#222", titleColor: "#333" },
+    axis: { labelFontSize: 11, titleFontSize: 12, titleFontWeight: "normal" },
+    header: { labelFontSize: 12, labelFontWeight: "bold" },
+    legend: { orient: "bottom", columns: Math.max(1, Math.min(5, Math.floor(width / 150))), labelFontSize: 12, labelLimit: 200, symbolSize: 80, symbolStrokeWidth: 2 },
     view: { stroke: null },
   };
   const theme = matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light";
