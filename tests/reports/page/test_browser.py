@@ -322,6 +322,7 @@ def test_a_chart_follows_the_page_into_the_dark_and_back_onto_paper(scheme, open
               text: getComputedStyle(each.querySelector("text")).fill,
               paper: getComputedStyle(document.body).backgroundColor,
               edge: getComputedStyle(each.querySelector(".mark-line path")).filter,
+              grid: getComputedStyle(each.querySelector(".role-axis-grid line")).filter,
             })"""
         )
 
@@ -330,6 +331,7 @@ def test_a_chart_follows_the_page_into_the_dark_and_back_onto_paper(scheme, open
     assert contrast(shown["text"], shown["paper"]) > 7
     # Dark colours keep their name, and are seen by a pale edge.
     assert (shown["edge"] != "none") == (scheme == "dark")
+    assert shown["grid"] == "none"
     page.emulate_media(media="print", color_scheme=scheme)
     printed = look()
     assert printed["paper"] == "rgb(255, 255, 255)"
