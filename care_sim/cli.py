@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 import care_sim
 from care_sim.base import interrupts
 from care_sim.base.errors import (
+    LONGEST,
     InvalidInput,
     MissingExtra,
     error_line,
@@ -42,8 +43,6 @@ Benchmark for adaptive LiDAR sensing: a policy decides which cells fire."""
 _WAYS_ON = """care-sim COMMAND --help tells its options, --help-all the conditions, too.
 care-sim --version tells the version.
 Begin with: care-sim run dartout"""
-_LONGEST = 2000
-"""Characters of a complaint, at the most."""
 _NARROWEST = 20
 """Columns of a terminal for which help is laid out, at the least."""
 
@@ -90,7 +89,10 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
             interrupts.raise_them()
         _settle_output()
         sys.exit(_finished(arguments))
-    except (KeyboardInterrupt, Exception) as error:
+    except SystemExit:
+        raise
+    # Foreign code may raise anything.
+    except BaseException as error:
         if not _is_interrupt(error):
             _end_with(error, trace=_DEBUG in given or bool(os.environ.get("CARE_SIM_DEBUG")))
         if alone:
@@ -136,9 +138,9 @@ def _end_with(error: BaseException, trace: bool) -> NoReturn:
         _complain(f"{error.filename}: {error.strerror}" if error.filename else str(error))
     if trace:
         raise error
-    told = f"unexpected {type(error).__name__}: {error}"
     _complain(
-        f"{told}; please report it, with the trace that {_DEBUG} (or CARE_SIM_DEBUG=1) shows",
+        f"unexpected {error_line(error)}; please report it, with the trace that {_DEBUG} "
+        "(or CARE_SIM_DEBUG=1) shows",
         _UNEXPECTED,
     )
 
@@ -255,5 +257,5 @@ def _described(about: str) -> Callable[..., Any]:
 
 def _complain(message: str, code: int = _BAD_INPUT) -> NoReturn:
     with contextlib.suppress(OSError):  # the terminal may be what is gone
-        print(f"care-sim: {shortened(one_line(message), _LONGEST)}", file=sys.stderr)
+        print(f"care-sim: {shortened(one_line(message), LONGEST)}", file=sys.stderr)
     sys.exit(code)

@@ -6,12 +6,16 @@ import sys
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 
-from care_sim.base.foreign_code import foreign_place, is_raised_by_foreign
+from care_sim.base.foreign_code import foreign_place, is_raised_by_foreign, raised_place
 
 _QUOTED = 120
 """Characters of a value that a message quotes."""
 _MOST_NAMES = 80
 """Known names that a message lists; of more it tells the first, the last and how many."""
+LONGEST = 2000
+"""Characters of a complaint, at the most."""
+_SAID = 300
+"""Characters that a message quotes of an error."""
 _LISTINGS = {
     "command": "care-sim",
     "policy": "care-sim policies",
@@ -71,11 +75,29 @@ def report_problems(problems: Sequence[str]) -> None:
 
 
 def error_line(error: BaseException) -> str:
-    """The type of an error and what it says, on one line; of an error in foreign code with its file
-    and line.
+    """Return the type of an error and the start of its text on one line, with file and line of the
+    foreign code that raised it.
     """
-    told = one_line(f"{type(error).__name__}: {error}").removesuffix(":")
+    told = one_line(f"{type(error).__name__}: {_text(error)}").removesuffix(":")
     return told + foreign_place(error)
+
+
+def failure_line(error: BaseException) -> str:
+    """Return on one line why a play failed: the text of bad input, else the error with file and
+    line.
+    """
+    if isinstance(error, InvalidInput):
+        return shortened(one_line(_text(error, LONGEST)), LONGEST)
+    return error_line(error) + ("" if foreign_place(error) else raised_place(error))
+
+
+def _text(error: BaseException, most: int = _SAID) -> str:
+    """The first `most` characters of what an error says."""
+    try:
+        text = str(error)
+    except Exception:  # An error of foreign code may fail in its own `__str__`.
+        return "its text cannot be read"
+    return text if len(text) <= most else f"{text[:most]}..."
 
 
 def is_own_fault(error: BaseException) -> bool:

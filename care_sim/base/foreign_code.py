@@ -33,6 +33,12 @@ def foreign_place(error: BaseException) -> str:
     return places[-1] if places else ""
 
 
+def raised_place(error: BaseException) -> str:
+    """File and line that raised an error, in brackets after a space; empty where there is none."""
+    places = [(frame.f_code.co_filename, line) for frame, line in walk_tb(error.__traceback__)]
+    return f" ({Path(places[-1][0]).name}, line {places[-1][1]})" if places else ""
+
+
 def is_raised_by_foreign(error: BaseException) -> bool:
     """Whether foreign code raised an error itself, not what it called."""
     frames = [frame for frame, _ in walk_tb(error.__traceback__)]

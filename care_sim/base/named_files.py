@@ -52,7 +52,9 @@ def files_named_by(entry: EntryPoint) -> dict[str, Path]:
     """
     try:
         entry.load()
-    except (Exception, SystemExit):
+    except KeyboardInterrupt:
+        raise
+    except BaseException:
         return {}
     # A file counts wherever a name of it is found. A folder counts as all files below it, so only
     # one that is meant as such.

@@ -123,8 +123,10 @@ class Plugins(Generic[Made]):
             _look_here()
         try:
             made = entry.load()
-        # Foreign code may fail in any way; some leaves by `sys.exit`.
-        except (Exception, SystemExit) as error:
+        except KeyboardInterrupt:
+            raise
+        # Foreign code may raise anything; some leaves by `sys.exit`.
+        except BaseException as error:
             raise InvalidInput(f"{error_line(error)}{_found_in(entry, error)}") from error
         # The first fault is told; the others may follow from it.
         for fault in self.faults(made):

@@ -97,10 +97,10 @@ def _point_detector(
 ) -> PointDetector:
     try:
         detector: PointDetector = make(**parameters)
-    except (InvalidInput, MissingExtra):
+    except (KeyboardInterrupt, InvalidInput, MissingExtra):
         raise
-    # Foreign code may fail in any way; some leaves by `sys.exit`.
-    except (Exception, SystemExit) as error:
+    # Foreign code may raise anything; some leaves by `sys.exit`.
+    except BaseException as error:
         raise BrokenDetector(
             f"detector {name} refuses {shown(parameters)}: {error_line(error)}"
         ) from error

@@ -65,9 +65,9 @@ class PointsOnly:
             points = np.column_stack([points, times])
         try:
             found = self._detector.detect(points, self._sensor_height_m)
-        except MissingExtra:
+        except (KeyboardInterrupt, MissingExtra):
             raise
-        except (Exception, SystemExit) as error:
+        except BaseException as error:
             raise BrokenDetector(
                 f"detector {self._name} fails on {len(cloud)} points: {error_line(error)}"
             ) from error

@@ -72,9 +72,9 @@ def make_scenario(scenario: str | type[Scenario], /, **parameters: object) -> Sc
         check_known(f"parameter of {name}", parameter, known)
     try:
         return kind(**parameters)  # type: ignore[arg-type]
-    except InvalidInput:
+    except (KeyboardInterrupt, InvalidInput):
         raise
-    # Foreign code may fail in any way; some leaves by `sys.exit`.
-    except (Exception, SystemExit) as error:
+    # Foreign code may raise anything; some leaves by `sys.exit`.
+    except BaseException as error:
         refused = shown(parameters) if parameters else "to start"
         raise BrokenScenario(f"scenario {name} refuses {refused}: {error_line(error)}") from error

@@ -61,8 +61,10 @@ class Scenario(ABC):
             if (place := foreign_place(error)) and not is_raised_by_foreign(error):
                 raise BrokenScenario(f"{own} cannot be built: {error}{place}") from error
             raise
-        # Foreign code may fail in any way; some leaves by `sys.exit`.
-        except (Exception, SystemExit) as error:
+        except KeyboardInterrupt:
+            raise
+        # Foreign code may raise anything; some leaves by `sys.exit`.
+        except BaseException as error:
             raise BrokenScenario(f"{own} cannot be built: {error_line(error)}") from error
         if not isinstance(world, World):
             raise BrokenScenario(f"{own}: build must return a World, got {type(world).__name__}")

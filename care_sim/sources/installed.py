@@ -119,12 +119,12 @@ class Installed:
         """Errors become one line that names the source."""
         try:
             yield
-        except MissingExtra:
+        except (KeyboardInterrupt, MissingExtra):
             raise
         except InvalidInput as error:
             raise InvalidInput(f"source {self.name}: {error}") from error
-        # Foreign code may fail in any way; some leaves by `sys.exit`.
-        except (Exception, SystemExit) as error:
+        # Foreign code may raise anything; some leaves by `sys.exit`.
+        except BaseException as error:
             # What ours stumbles over was made by its class.
             kind: Any = SOURCES.maker(self.name)
             place = "" if foreign_place(error) else class_place(kind)

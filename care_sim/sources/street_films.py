@@ -108,7 +108,7 @@ class _StreetBodies:
         self._sizes = np.array([CATALOGUE[kind].size for kind in street.kinds]).reshape(-1, 3)
         labels = [CATALOGUE[kind].label for kind in street.kinds]
         self._classes = np.array(
-            [_NO_CLASS if label is None else CLASSES.index(label) for label in labels]
+            [_NO_CLASS if label is None else CLASSES.index(label) for label in labels], np.int64
         )
         self._bodies: dict[int, int] = {}
 

@@ -6,7 +6,6 @@ import sys
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from traceback import extract_tb
 from typing import Any, NamedTuple, TypeVar, cast
 
 import gymnasium
@@ -14,8 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import care_sim
-from care_sim.base.errors import InvalidInput, error_line, one_line
-from care_sim.base.foreign_code import foreign_place
+from care_sim.base.errors import failure_line
 from care_sim.base.portable_hash import portable_bytes
 from care_sim.core.arrays import Floats
 from care_sim.envs.closed_loop import ClosedLoopEnv
@@ -37,11 +35,11 @@ def result_or_reason(play: Callable[..., _Result], *arguments: object) -> _Resul
     """
     try:
         return play(*arguments)
-    except InvalidInput as error:
-        return one_line(str(error))
+    except KeyboardInterrupt:
+        raise
     # A policy that calls sys.exit ends its episode, not the worker.
-    except (Exception, SystemExit) as error:
-        return error_line(error) + ("" if foreign_place(error) else _place(error))
+    except BaseException as error:
+        return failure_line(error)
 
 
 def run_episode(config: EpisodeConfig) -> Row:
@@ -143,12 +141,6 @@ def _boxes(loop: ClosedLoop) -> Floats:
     """(n, 7) of the ego and then every actor."""
     world = loop.world
     return world.boxes_of(np.array([world.ego_body, *(actor.body for actor in world.actors)]))
-
-
-def _place(error: BaseException) -> str:
-    """File and line where it was raised."""
-    frames = extract_tb(error.__traceback__)
-    return f" ({Path(frames[-1].filename).name}, line {frames[-1].lineno})" if frames else ""
 
 
 def peak_rss_mb() -> float:

@@ -7,6 +7,7 @@ from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future
 from dataclasses import dataclass
 from typing import Any
 
+from care_sim.base.errors import error_line
 from care_sim.study.episodes_together import MOST_TOGETHER, play_episodes
 from care_sim.study.executors import ClusterLost, ExecutorFactory, parallel_batches, processes
 from care_sim.study.journal import Journal
@@ -193,7 +194,7 @@ class _Run:
             for config, ending in zip(batch, future.result(), strict=True):
                 self._record(config, ending)
         else:
-            self._fail(batch, " ".join(f"{type(error).__name__}: {error}".split()))
+            self._fail(batch, f"a worker could not play it: {error_line(error)}")
         return True
 
     def _record(self, config: RunConfig, ending: Row | str) -> None:

@@ -1,7 +1,7 @@
 """An installed package whose policies do not behave."""
 
 THIRD_PARTY = """
-import os, signal
+import os, signal, threading, time
 from pathlib import Path
 import numpy as np
 from care_sim.core.types import Demand
@@ -77,6 +77,41 @@ class DrawsInCommon(History):
 
     def demand(self, belief):
         return Demand(layers=[[self.drawn]])
+
+def unpicklable():
+    class Own(BaseException):
+        pass
+    return Own("its own")
+
+class RaisesItsOwn(History):
+    def demand(self, belief):
+        raise unpicklable()
+
+class Unreadable(Exception):
+    def __str__(self):
+        raise RuntimeError("no words")
+
+class RaisesWithoutText(History):
+    def demand(self, belief):
+        raise Unreadable
+
+class RaisesAtLength(History):
+    def demand(self, belief):
+        raise RuntimeError("x" * 1_000_000)
+
+class FailsAtStart(History):
+    def __init__(self, rig):
+        raise unpicklable()
+
+class StartsThread(History):
+    def reset(self):
+        threading.Thread(target=time.sleep, args=[600]).start()
+
+class Forks(History):
+    def reset(self):
+        if os.fork() == 0:
+            time.sleep(600)
+            os._exit(0)
 """
 ENTRY_POINTS = """
 [care_sim.policies]
@@ -90,4 +125,10 @@ dies-in-the-brake = misbehaving:DiesInTheBrake
 narrow = misbehaving:Narrow
 keeps = misbehaving:Keeps
 draws-in-common = misbehaving:DrawsInCommon
+raises-its-own = misbehaving:RaisesItsOwn
+raises-without-text = misbehaving:RaisesWithoutText
+raises-at-length = misbehaving:RaisesAtLength
+fails-at-start = misbehaving:FailsAtStart
+starts-thread = misbehaving:StartsThread
+forks = misbehaving:Forks
 """

@@ -11,7 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from care_sim.base.errors import InvalidInput
+from care_sim.base.errors import BrokenPolicy, InvalidInput
 from care_sim.commands.shared.run_study import run_study
 from care_sim.loops.records import Outcome
 from care_sim.study.episode_config import EpisodeConfig, grid
@@ -190,6 +190,23 @@ def test_a_bad_policy_costs_only_its_own_episode(third_party, tmp_path):
     )
     assert {config.policy for config in kept} == {"history", "care", "random"}
     assert Counter(listener.ended) == Counter((config, config in kept) for config in configs)
+
+
+def test_every_error_of_a_policy_is_one_short_line_with_its_place(third_party, tmp_path):
+    configs = short(["raises-its-own", "raises-without-text", "raises-at-length"])
+    with Journal(tmp_path / JOURNAL) as journal:
+        failures = run_all(configs, journal, 2)
+    lines = {failure.config.policy: failure.reason for failure in failures}
+    assert lines == {
+        "raises-its-own": "Own: its own (misbehaving.py, line 86)",
+        "raises-without-text": "Unreadable: its text cannot be read (misbehaving.py, line 94)",
+        "raises-at-length": f"RuntimeError: {'x' * 300}... (misbehaving.py, line 98)",
+    }
+
+
+def test_a_policy_that_raises_its_own_error_at_start_is_left_out(third_party):
+    with pytest.raises(BrokenPolicy, match="fails-at-start refuses to start: Own: its own"):
+        short(["fails-at-start"])
 
 
 class Following(RunListener):
