@@ -18,7 +18,8 @@ from care_sim.sensors.annotated import NO_OBJECT
 class Truth(Protocol):
     """The truth about the coming keyframe, as a privileged policy may ask for it.
 
-    `make_policy` hands it to subclasses of `PrivilegedPolicy` and to nobody else.
+    `make_policy` hands it to subclasses of `PrivilegedPolicy` and to nobody else. `Policy.told`
+    leads to public settings alone.
     """
 
     def boxes(self, tracks: Tracks) -> Floats:

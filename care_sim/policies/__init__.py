@@ -2,7 +2,7 @@
 (`care_sim.policies.makers`).
 """
 
-from collections.abc import Mapping, Sequence
+from dataclasses import is_dataclass, replace
 from functools import partial
 from importlib.metadata import EntryPoint
 from typing import Any, TypeAlias, overload
@@ -10,7 +10,7 @@ from typing import Any, TypeAlias, overload
 import gymnasium
 import gymnasium.vector
 
-from care_sim.base.errors import BrokenPolicy, InvalidInput, MissingExtra, error_line, shown
+from care_sim.base.errors import BrokenPolicy, InvalidInput, shown
 from care_sim.base.plugins import Plugins
 from care_sim.base.vectors import attribute_of_each, shared_attribute
 from care_sim.policies.base import Policy
@@ -29,7 +29,9 @@ from care_sim.policies.makers import (
     PolicyMaker,
     check_parameters,
     is_privileged,
+    made,
     policy_faults,
+    tags_of_maker,
 )
 from care_sim.policies.own.care_sector import CareSector
 from care_sim.policies.own.care_sightlines import CareSightlines
@@ -139,10 +141,9 @@ def check_policy(name: str) -> None:
 def tags_of(name: str) -> tuple[str, ...]:
     """What the policy is, of `care_sim.policies.base.TAGS`; empty for one that cannot be loaded."""
     try:
-        tags: tuple[str, ...] = getattr(maker(name), "tags", Policy.tags)
+        return tags_of_maker(maker(name))
     except InvalidInput:
         return ()
-    return tags
 
 
 def is_pattern(name: str) -> bool:
@@ -187,31 +188,12 @@ def make_policy(name: str, env: _AnyEnv, /, **parameters: object) -> Policy | Ve
                 "no vector of them"
             )
         truth = _of_environment(name, env, "truth")
-    for parameter, attribute in getattr(make, "told", Policy.told).items():
-        parameters.setdefault(parameter, _told(env, attribute))
-    makers = [partial(_made, name, make, [rig, *truth], parameters) for rig in rigs]
+    for parameter, setting in getattr(make, "told", Policy.told).items():
+        parameters.setdefault(parameter, _told(env, setting))
+    makers = [partial(made, name, make, [rig, *truth], parameters) for rig in rigs]
     if isinstance(env, gymnasium.vector.VectorEnv):
         return policy_of_rigs(makers, rigs)
     return makers[0]()
-
-
-def _made(
-    name: str, make: PolicyMaker, given: Sequence[object], parameters: Mapping[str, object]
-) -> Policy:
-    """What `make` makes. Raises BrokenPolicy for what is no policy."""
-    # Whatever else somebody's code raises is a fault of the policy and named as such.
-    try:
-        policy = make(*given, **parameters)
-    except (InvalidInput, MissingExtra):
-        raise
-    except Exception as error:
-        raise BrokenPolicy(
-            f"policy {name} refuses {shown(parameters) if parameters else 'to start'}: "
-            f"{error_line(error)}"
-        ) from error
-    if not isinstance(policy, Policy):
-        raise BrokenPolicy(f"policy {name} is no Policy but of type {type(policy).__name__}")
-    return policy
 
 
 def maker(name: str) -> PolicyMaker:
@@ -241,11 +223,14 @@ def _of_environment(name: str, env: _AnyEnv, attribute: str) -> list[Any]:
         ) from error
 
 
-def _told(env: _AnyEnv, attribute: str) -> object:
-    """What the environment itself says, None where it says nothing."""
+def _told(env: _AnyEnv, setting: str) -> object:
+    """A setting of the environment, None where the environment has no such setting."""
     if not isinstance(env, gymnasium.vector.VectorEnv):
-        return getattr(env.unwrapped, attribute, None)
-    try:
-        return shared_attribute(env, attribute)
-    except AttributeError:
-        return None
+        value = getattr(env.unwrapped, setting, None)
+    else:
+        try:
+            value = shared_attribute(env, setting)
+        except AttributeError:
+            return None
+    # A scenario of somebody else may keep more than its fields, such as a world that it built.
+    return replace(value) if is_dataclass(value) and not isinstance(value, type) else value

@@ -26,6 +26,10 @@ TAGS = ("causal", "privileged", "non-causal", "learned", "generator", "control")
 "non-causal": it chooses from a full scan. "learned": it has trained weights. "generator": it plays
 by the generator of the scenes. "control": it is no contender, and `all` leaves it out.
 """
+TOLD = ("min_returns", "scenario")
+"""The settings of an environment that `Policy.told` may name. They are public, and none of them
+leads to the running episode.
+"""
 
 
 class Policy(ABC):
@@ -34,10 +38,10 @@ class Policy(ABC):
 
     `rig` is what is fixed about the sensing task: grid, cameras, budget, reserve fraction,
     keyframe. `tags` are some of `TAGS`, `source` is the citation in one line. `told` maps
-    parameters to the attributes of the environment that `make_policy` fills them from, unless they
-    are given. Two flags leave the demand as it is whatever `cell_order` the rig has: `keeps_order`
-    of a policy that asks `Rig.listed` for its hulls and wedges itself, and `is_pattern` of one that
-    asks for neither and fires the same under every order.
+    parameters to the settings in `TOLD` that `make_policy` fills them from, unless they are given.
+    Two flags leave the demand as it is whatever `cell_order` the rig has: `keeps_order` of a policy
+    that asks `Rig.listed` for its hulls and wedges itself, and `is_pattern` of one that asks for
+    neither and fires the same under every order.
     `demanded` is what `demand` last answered a call with, in the order in which it was served, for
     those who watch.
     """
@@ -147,10 +151,15 @@ class PrivilegedPolicy(Policy):
 
     def __init_subclass__(cls, **options: object) -> None:
         super().__init_subclass__(**options)
-        # A subclass of somebody else may claim to be causal; with truth in hand it is not.
-        honest = tuple(tag for tag in cls.tags if tag != "causal")
-        cls.tags = honest if {"privileged", "non-causal"} & {*honest} else ("privileged", *honest)
+        cls.tags = honest_tags(cls.tags)
 
     def __init__(self, rig: Rig, truth: Truth):
         super().__init__(rig)
         self.truth = truth
+
+
+def honest_tags(tags: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the tags of a privileged policy: never causal, always privileged or non-causal."""
+    # A subclass of somebody else may claim to be causal; with truth in hand it is not.
+    honest = tuple(tag for tag in tags if tag != "causal")
+    return honest if {"privileged", "non-causal"} & {*honest} else ("privileged", *honest)

@@ -5,13 +5,13 @@ and what is wrong with an entry of the group `care_sim.policies` that makes no p
 """
 
 import inspect
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, TypeAlias
 
 from care_sim.base.checks import check_known
-from care_sim.base.errors import InvalidInput
+from care_sim.base.errors import BrokenPolicy, InvalidInput, MissingExtra, error_line, shown
 from care_sim.base.plugins import class_faults
-from care_sim.policies.base import TAGS, Policy, PrivilegedPolicy
+from care_sim.policies.base import TAGS, TOLD, Policy, PrivilegedPolicy, honest_tags
 
 PolicyMaker: TypeAlias = Callable[..., Policy]
 """A policy class, or another callable that takes a rig and parameters."""
@@ -45,6 +45,31 @@ def check_parameters(name: str, make: PolicyMaker, parameters: Mapping[str, obje
         check_known(f"parameter of policy {name}", parameter, known)
 
 
+def made(
+    name: str, make: PolicyMaker, given: Sequence[object], parameters: Mapping[str, object]
+) -> Policy:
+    """What `make` makes. Raises BrokenPolicy for what is no policy."""
+    # Whatever else somebody's code raises is a fault of the policy and named as such.
+    try:
+        policy = make(*given, **parameters)
+    except (KeyboardInterrupt, InvalidInput, MissingExtra):
+        raise
+    except BaseException as error:
+        raise BrokenPolicy(
+            f"policy {name} refuses {shown(parameters) if parameters else 'to start'}: "
+            f"{error_line(error)}"
+        ) from error
+    if not isinstance(policy, Policy):
+        raise BrokenPolicy(f"policy {name} is no Policy but of type {type(policy).__name__}")
+    return policy
+
+
+def tags_of_maker(make: PolicyMaker) -> tuple[str, ...]:
+    """What a policy is. Code that changes the tags of a privileged class later changes nothing."""
+    tags: tuple[str, ...] = getattr(make, "tags", Policy.tags)
+    return honest_tags(tags) if is_privileged(make) else tags
+
+
 def _given(make: PolicyMaker) -> int:
     """How many arguments come from the environment: rig, and truth for a privileged one."""
     return 2 if is_privileged(make) else 1
@@ -65,3 +90,9 @@ def policy_faults(made: Any) -> Iterator[str]:
         yield f"has tags {tags!r}; allowed is a tuple of {', '.join(TAGS)}"
     if not isinstance(source, str):
         yield f"has the source {source!r}; allowed is one line of text"
+    told = getattr(made, "told", {})
+    if not (isinstance(told, Mapping) and all(setting in TOLD for setting in told.values())):
+        yield (
+            f"has told {shown(told)}; allowed is a mapping of parameters to {' or '.join(TOLD)}; "
+            "a policy that needs the truth derives from care_sim.PrivilegedPolicy"
+        )

@@ -4,6 +4,7 @@ reaches it.
 
 import itertools
 import sys
+from typing import ClassVar
 
 import gymnasium
 import numpy as np
@@ -112,6 +113,35 @@ def test_mixed_with_an_ordinary_policy_it_stays_privileged():
         pass
 
     assert Mixed.tags == ("privileged",)
+
+
+class Cloaked(BUILT_IN["history-oracle"]):
+    """A policy that changes its tags when nobody looks."""
+
+
+Cloaked.tags = ("causal",)
+
+
+def test_tags_that_change_later_do_not_hide_that_truth_is_handed_over():
+    assert tags_of(f"{__name__}:Cloaked") == ("privileged",)
+
+
+class Listening(BUILT_IN["history"]):
+    """A policy that keeps the scenario."""
+
+    told: ClassVar = {"scenario": "scenario"}
+
+    def __init__(self, rig, scenario=None):
+        super().__init__(rig)
+        self.scenario = scenario
+
+
+def test_a_policy_is_told_the_fields_of_a_scenario_and_nothing_that_it_keeps(environment):
+    scenario = environment.unwrapped.scenario
+    object.__setattr__(scenario, "kept", environment)
+    told = care_sim.make_policy(f"{__name__}:Listening", environment).scenario
+    assert told == scenario
+    assert not hasattr(told, "kept")
 
 
 def test_truth_is_no_parameter(environment):

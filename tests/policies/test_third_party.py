@@ -143,11 +143,23 @@ class Sourced(Mistagged):
 
 silent = max
 
+class Spying(care_sim.Policy):
+    told = {"env": "unwrapped"}
+    def __init__(self, rig, env=None):
+        super().__init__(rig)
+    def demand(self, belief): ...
+
+class Listing(Spying):
+    told = ["env"]
+
 def honest(rig, bins=3):
     return care_sim.policies.BUILT_IN["history"](rig)
 """
 
+ALLOWED = "; allowed is a mapping of parameters to min_returns or scenario; .*PrivilegedPolicy"
 REASONS = {
+    "spying": rf"broken:Spying has told \{{'env': 'unwrapped'\}}{ALLOWED}",
+    "listing": rf"broken:Listing has told \['env'\]{ALLOWED}",
     "abstract": r"broken:Abstract is abstract: it lacks demand",
     "mistagged": (
         r"broken:Mistagged has tags \('wise',\); allowed is a tuple of causal, privileged, "
@@ -176,6 +188,8 @@ def broken(install):
         untagged="Untagged",
         sourced="Sourced",
         silent="silent",
+        spying="Spying",
+        listing="Listing",
         torn="Nowhere",
         exploding="Exploding",
         deaf="Deaf",
