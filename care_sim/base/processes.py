@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from multiprocessing import resource_tracker
+from multiprocessing.util import Finalize
 from typing import TypeVar
 
 from care_sim.base.interrupts import SIGNALS, held_back
@@ -61,6 +62,20 @@ def following(make: Callable[[], _T]) -> _T:
     return make()
 
 
+def lead_group() -> None:
+    """Put this process into a group of its own, with the processes that it starts from now on."""
+    os.setpgid(0, 0)
+
+
+def end_group_with_work() -> None:
+    """End this process and its group as soon as its work is done, whatever threads and processes
+    were started meanwhile.
+    """
+    lead_group()
+    # multiprocessing waits for threads and child processes after these finalizers.
+    Finalize(None, _end_group, exitpriority=0)
+
+
 def end_with_starter(starter: int) -> None:
     """End this process, which the process `starter` started, as soon as that is gone."""
     threading.Thread(
@@ -78,4 +93,11 @@ def _end_without(starter: int) -> None:
 
 def _end_after(parent: "multiprocessing.process.BaseProcess") -> None:
     parent.join()
+    _end_group()
+
+
+def _end_group() -> None:
+    """End this process, and its group if it leads one."""
+    if os.getpgrp() == os.getpid():
+        os.killpg(0, signal.SIGKILL)
     os._exit(1)

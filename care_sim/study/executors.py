@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 from care_sim.base.errors import InvalidInput, one_line
 from care_sim.base.extras import missing_extra
-from care_sim.base.processes import end_with_parent, starting
+from care_sim.base.processes import end_group_with_work, end_with_parent, starting
 
 if TYPE_CHECKING:
     from dask.distributed import Client
@@ -80,11 +80,13 @@ def parallel_batches(executor: Executor, workers: int) -> int:
 
 
 class Processes(ProcessPoolExecutor):
-    """A pool of processes that leave interrupts to this one and end with it."""
+    """A pool of processes that leave interrupts to this one and end with it, or after their last
+    task, whatever threads and processes a policy has started.
+    """
 
     def __init__(self, workers: int, context: BaseContext):
         with starting():
-            super().__init__(workers, context, end_with_parent)
+            super().__init__(workers, context, _begin)
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
         """Hand a call over."""
@@ -95,6 +97,12 @@ class Processes(ProcessPoolExecutor):
         """End the processes in the middle of what they play, for work of which no part is kept."""
         for process in list(self._processes.values()):
             process.kill()
+
+
+def _begin() -> None:
+    """Prepare a worker process."""
+    end_with_parent()
+    end_group_with_work()
 
 
 class ClusterExecutor(Executor):

@@ -7,6 +7,8 @@ import os
 import signal
 import sys
 
+import pytest
+
 from care_sim.study.journal import JOURNAL
 from tests.helpers.descendants import Marked, until
 
@@ -64,6 +66,19 @@ def test_whatever_ends_a_study_leaves_no_process_and_the_same_command_goes_on(tm
             assert "Traceback" not in complaint
     digests = [json.loads(line)["digest"] for line in kept]
     assert len(set(digests)) == len(digests)
+
+
+@pytest.mark.parametrize("policy", ["starts-thread", "forks"])
+def test_a_study_ends_whatever_a_policy_has_started(policy, third_party, tmp_path, monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", str(third_party))
+    options = ["--policies", policy, "--budgets", "0.1", "--seeds", "2", "--workers", "2"]
+    short = ["--scenarios", "dartout", "--scenario-parameters", "duration_s=0.3"]
+    out = tmp_path / "out"
+    with Marked([*COMMAND, "sweep", *options, *short, "--out", str(out)]) as started:
+        assert until(lambda: started.process.poll() is not None, 60)
+        assert started.all_end_within(10)
+        assert started.process.returncode == 0
+    assert (out / "tables.md").is_file()
 
 
 def test_the_fork_server_and_its_workers_do_not_hear_the_terminal_while_they_start():
