@@ -232,6 +232,22 @@ def test_a_policy_that_the_workers_lack_fails_and_one_that_kills_them_does_too(
         assert len(journal) == 2
 
 
+def break_down(_batch):
+    raise RuntimeError("y" * 1000)
+
+
+def test_an_error_of_a_cluster_names_the_worker(tmp_path):
+    distributed = pytest.importorskip("dask.distributed")
+    with (
+        distributed.LocalCluster(1, threads_per_worker=1, processes=False, protocol="tcp") as here,
+        Journal(tmp_path / JOURNAL) as journal,
+    ):
+        address = here.scheduler_address
+        (failure,) = run_all(CONFIGS[:1], journal, 1, cluster(address), play_batch=break_down)
+    said = f"a worker could not play it: RuntimeError: {'y' * 300}... (test_executors.py, line "
+    assert failure.reason.startswith(said)
+
+
 def test_nobody_at_the_address_is_one_line():
     pytest.importorskip("dask.distributed")
     with pytest.raises(InvalidInput, match="no dask scheduler answers at nonsense"):
