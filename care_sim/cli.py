@@ -155,9 +155,13 @@ def _settle_output() -> None:
             setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115 (as long as the process)
         elif isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
-    # For a terminal of very few columns tyro never comes to the end of its help.
-    if shutil.get_terminal_size().columns < _NARROWEST:
-        os.environ["COLUMNS"] = str(_NARROWEST)
+    # tyro never ends its help for a terminal of very few columns. rich fails where COLUMNS or LINES
+    # is 0 or no number, and `shutil` passes over such values.
+    size = shutil.get_terminal_size()
+    if "COLUMNS" in os.environ or size.columns < _NARROWEST:
+        os.environ["COLUMNS"] = str(max(size.columns, _NARROWEST))
+    if "LINES" in os.environ:
+        os.environ["LINES"] = str(size.lines)
 
 
 def _leave_output() -> None:

@@ -26,6 +26,7 @@ from care_sim.study.episode_play import run_episode
 from care_sim.study.parameters import parameters
 from care_sim.study.results_formats import EPISODES
 from care_sim.study.rows.parquet import read_rows, write_rows
+from tests.helpers.made_rows import STUDY
 
 SHORT = ["--scenario-parameters", "duration_s=0.3"]
 
@@ -731,6 +732,24 @@ def test_output_that_goes_nowhere_ends_quietly(shell, code, complaint):
         ["bash", "-c", command], capture_output=True, text=True, timeout=120, check=False
     )
     assert (ended.returncode, ended.stderr) == (code, complaint)
+
+
+@pytest.mark.parametrize(
+    ("shell", "code"),
+    [
+        ("{} | true; exit ${{PIPESTATUS[0]}}", 141),
+        ("COLUMNS=0 {} | grep -q 'care minus each policy'", 0),
+        ("COLUMNS=² LINES=² {} | grep -q 'care minus each policy'", 0),
+    ],
+)
+def test_tables_are_printed_into_closed_pipes_and_at_odd_widths(shell, code, tmp_path):
+    write_rows(STUDY, tmp_path / EPISODES.file)
+    program = f"{sys.executable} -c 'from care_sim.cli import main; main()'"
+    command = shell.format(f"{program} report {tmp_path} --minus care")
+    ended = subprocess.run(
+        ["bash", "-c", command], capture_output=True, text=True, timeout=120, check=False
+    )
+    assert (ended.returncode, ended.stderr) == (code, "")
 
 
 def test_help_of_an_option_breaks_only_where_the_terminal_does(capsys, monkeypatch):

@@ -7,6 +7,7 @@ from pathlib import Path
 from rich.console import Console
 
 from care_sim.base.bounds import bounded, check_fields
+from care_sim.base.console import TableConsole
 from care_sim.base.errors import report_problems
 from care_sim.commands.shared.command_line import command_line
 from care_sim.commands.shared.default_folder import free_folder
@@ -80,4 +81,4 @@ class StudyCommand:
 
 def console() -> Console:
     """Where tables are printed: as wide as the terminal, and 80 columns where there is none."""
-    return Console(highlight=False)
+    return TableConsole()

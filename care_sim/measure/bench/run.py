@@ -10,8 +10,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
 
+from care_sim.base.console import TableConsole
 from care_sim.base.files import JSON, replacing
 from care_sim.measure.bench.batches import batch_memory, batches
 from care_sim.measure.bench.choices import choices
@@ -41,7 +41,7 @@ def run_bench(config: BenchConfig) -> int:
         check_beside(config.out)
     with nullcontext() if config.out is None else replacing(config.out, JSON) as unfinished:
         report = bench_report(config, partial(print, "measuring", file=sys.stderr))
-        console = Console(highlight=False)
+        console = TableConsole()
         for table in bench_tables(report):
             console.print(table.rich())
         if unfinished is not None:

@@ -9,10 +9,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
-from rich.console import Console
 
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.checks import LARGEST_INTEGER
+from care_sim.base.console import TableConsole
 from care_sim.base.files import JSON, replacing
 from care_sim.measure.parity.figure import parity_figure
 from care_sim.measure.parity.keyframes import keyframes
@@ -58,7 +58,7 @@ def run_parity(config: ParityConfig) -> int:
         check_beside(config.out)
     with nullcontext() if config.out is None else replacing(config.out, JSON) as unfinished:
         report = parity_report(config)
-        console = Console(highlight=False)
+        console = TableConsole()
         for table in parity_tables(report):
             console.print(table.rich())
         if unfinished is not None:
