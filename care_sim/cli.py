@@ -88,6 +88,8 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         if alone:
             interrupts.raise_them()
         _settle_output()
+        # An unknown backend would end the import of Matplotlib. No figure here needs a backend.
+        os.environ.pop("MPLBACKEND", None)
         sys.exit(_finished(arguments))
     except SystemExit:
         raise

@@ -13,4 +13,5 @@ class TableConsole(Console):
         """Raise the BrokenPipeError that rich has caught. Rich exits with 1 here, and
         `care_sim.cli` has an exit code for output that nobody reads.
         """
-        raise  # noqa: PLE0704 (rich calls this function while it handles the error)
+        # Rich calls this method while it handles the error.
+        raise

@@ -11,7 +11,7 @@ from rich.console import Console
 from care_sim.base.errors import InvalidInput, printable, unknown
 from care_sim.base.files import write_text
 from care_sim.reports.captions import caption
-from care_sim.reports.figures.files import remove_others, save
+from care_sim.reports.figures.files import default_style, remove_others, save
 from care_sim.reports.latex import PREAMBLE, latex, paragraph
 from care_sim.reports.studies import STUDIES, SWEEP, study_of
 from care_sim.reports.study import Study
@@ -60,6 +60,8 @@ class StudyReport:
     ) -> "StudyReport":
         """The report of a study that lacks what is `left_out`."""
         tables = study.tables(rows)
+        with default_style():
+            figures = study.figures(rows)
         closing = _closing(rows, study, left_out)
         reading = caption(study.caption, tables)
         pages = [f"{reading}\n", *(table.markdown() for table in tables)]
@@ -67,7 +69,7 @@ class StudyReport:
             sentences = "".join(f"- {unmarked(sentence)}\n" for sentence in closing)
             pages.append(f"## Statements\n\n{sentences}")
         texts = [PREAMBLE, paragraph(reading), *map(latex, tables), *map(paragraph, closing)]
-        return cls({TABLES: "\n".join(pages), "tables.tex": "\n".join(texts)}, study.figures(rows))
+        return cls({TABLES: "\n".join(pages), "tables.tex": "\n".join(texts)}, figures)
 
     def write(self, folder: Path) -> None:
         """Write tables and figures into a folder; then figures of an earlier study are removed."""

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from care_sim.base.errors import percent
 from care_sim.core.arrays import Floats
 from care_sim.policies import tags_of
+from care_sim.reports.figures.files import default_style
 from care_sim.reports.figures.styles import FULL_STYLE, styles
 from care_sim.training.aggregates import interquartile_mean, performance_profile
 from care_sim.training.curves import TrainingRun, recipe_name, scores_at, shared_steps
@@ -24,6 +25,7 @@ _LINE = 50
 """Characters of a title that fit over a panel."""
 
 
+@default_style()
 def curves_figure(groups: Sequence[Sequence[TrainingRun]]) -> Figure:
     """A panel per recipe.
 

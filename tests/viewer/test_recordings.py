@@ -18,6 +18,7 @@ from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.episode_play import run_episode, trace
 from care_sim.viewer.recording import entities
 from care_sim.viewer.recording.layout import blueprint
+from care_sim.viewer.recording.recording import Recording
 from tests.helpers.lidars import CORNERS
 
 CONFIG = EpisodeConfig("dense", "care", 0.05, 1, false_negative_rate=0.2, false_positive_rate=0.3)
@@ -34,6 +35,14 @@ def episode(tmp_path_factory, read):
         wrap=lambda env, policy: RecordRerun(env, path, policy),
     )
     return row, keyframes, after, read(path), path
+
+
+def test_settings_of_rerun_switch_no_recording_off(tmp_path, monkeypatch, capfd):
+    monkeypatch.setenv("RERUN", "off")
+    with Recording(tmp_path / "out.rrd", ["care"]):
+        pass
+    assert (tmp_path / "out.rrd").stat().st_size > 1000
+    assert capfd.readouterr().err == ""
 
 
 def test_recording_changes_nothing(episode):

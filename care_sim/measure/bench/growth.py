@@ -19,6 +19,7 @@ from care_sim.measure.bench.ratios import BenchReport
 from care_sim.measure.bench.scanning.casters import casters
 from care_sim.measure.bench.scanning.moving_bodies import moving_bodies
 from care_sim.measure.bench.scanning.scans import SCAN_BODIES, drawn_cells, laps
+from care_sim.reports.figures.files import default_style
 
 GROWTH_BUDGETS = (0.01, 0.03, 0.1, 0.3, 1.0)
 GROWTH_COUNTS = (1, 3, 10, 30, 100, 300)
@@ -96,6 +97,7 @@ def _curves(values: Sequence[float], labels: list[str], points: list[Times]) -> 
     return {"values": list(values), "labels": labels, "ms": ms}
 
 
+@default_style()
 def growth_figure(report: BenchReport) -> Figure:
     """One panel per axis and one line per engine; both scales are logarithmic."""
     figure = Figure(figsize=(10.0, 3.4), layout="constrained")

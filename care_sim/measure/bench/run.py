@@ -10,7 +10,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-
 from care_sim.base.console import TableConsole
 from care_sim.base.files import JSON, replacing
 from care_sim.measure.bench.batches import batch_memory, batches

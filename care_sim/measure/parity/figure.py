@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 
 from care_sim.measure.parity.tally import GROUPS, REFERENCE_NAMES
 from care_sim.measure.parity.verdicts import SAME, VERDICTS
+from care_sim.reports.figures.files import default_style
 from care_sim.reports.figures.styles import bare_axes
 
 _STYLES = dict(zip(REFERENCE_NAMES, (("#0072B2", "o"), ("#D55E00", "D")), strict=True))
@@ -14,6 +15,7 @@ _STYLES = dict(zip(REFERENCE_NAMES, (("#0072B2", "o"), ("#D55E00", "D")), strict
 _KEYFRAMES = "keyframes of the scenarios"
 
 
+@default_style()
 def parity_figure(report: dict[str, Any]) -> Figure:
     """Rays in a million to which `fast` answers otherwise than either reference, a panel for random
     scenes and one for the keyframes of all scenarios; one of them must have been compared. Kinds

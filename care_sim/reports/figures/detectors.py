@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 
 from care_sim.evaluation.detector_quality import SceneBoxes, counts, curve, reliability
 from care_sim.reports.detectors import has_scores
+from care_sim.reports.figures.files import default_style
 from care_sim.reports.figures.styles import bare_axes
 
 DETECTORS_FIGURE = "detectors"
@@ -17,6 +18,7 @@ _FEWEST = 20
 """Boxes in a tenth of scores, for its share to be drawn."""
 
 
+@default_style()
 def detectors_figure(boxes: Mapping[str, Sequence[SceneBoxes]]) -> Figure:
     """A line for every detector with scores, a point for every other."""
     figure = Figure(figsize=(9.2, 4.2), layout="constrained")

@@ -5,7 +5,7 @@ from collections.abc import Container, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from matplotlib import rc_context
+from matplotlib import rc_context, rcdefaults
 from matplotlib.axis import Tick
 from matplotlib.figure import Figure
 from matplotlib.text import Text
@@ -16,9 +16,19 @@ from care_sim.base.files import PNG, SVG, check_output, replacing
 _FORMATS = (".png", ".svg")
 
 
+@contextmanager
+def default_style() -> Iterator[None]:
+    """Draw with Matplotlib's own defaults, whatever the user's settings are. Every function that
+    makes a figure runs within it.
+    """
+    with rc_context():
+        rcdefaults()
+        yield
+
+
 def save(figure: Figure, stem: Path) -> None:
     """Write a figure as PNG and SVG, with its texts as they are."""
-    with texts_as_they_are(figure):
+    with default_style(), texts_as_they_are(figure):
         with replacing(stem.with_suffix(".png")) as unfinished:
             figure.savefig(unfinished, dpi=200)
         # Ids within an SVG are random without a salt, and it holds the date. Neither may make a new

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 
+from care_sim.reports.figures.files import default_style
 from care_sim.reports.figures.styles import bare_axes
 from care_sim.reports.leaderboard import names_in, ranked
 from care_sim.study.benchmark.result import BenchmarkResult
@@ -16,6 +17,7 @@ _APART = 0.18
 """By how much of a line the marks of a result are moved apart, so that equal ones are seen."""
 
 
+@default_style()
 def leaderboard_figure(results: Sequence[BenchmarkResult]) -> Figure:
     """A line for every result, the highest score on top."""
     # Lines are counted from below.

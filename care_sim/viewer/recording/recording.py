@@ -1,7 +1,8 @@
 """A file that the Rerun viewer plays: episodes in lanes, side by side."""
 
-from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager, ExitStack
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,16 @@ from care_sim.viewer.recording.picture_log import PictureLog, empty_photo, photo
 from care_sim.viewer.recording.space_log import SpaceLog
 
 
+@contextmanager
+def _without_settings() -> Iterator[None]:
+    """Hide the environment's settings of Rerun, which may switch a recording off."""
+    hidden = {name: os.environ.pop(name) for name in [*os.environ] if name.startswith("RERUN")}
+    try:
+        yield
+    finally:
+        os.environ.update(hidden)
+
+
 class Recording(AbstractContextManager["Recording"]):
     """Writes `path` when it is closed; `lanes` are the names of the episodes that will be in it,
     all of the closed loop, or of the `open_loop`.
@@ -49,11 +60,12 @@ class Recording(AbstractContextManager["Recording"]):
         self._lanes = tuple(lanes)
         self._file = ExitStack()
         self._unfinished = self._file.enter_context(replacing(path, RERUN))
-        self._stream = rr.RecordingStream("care-sim")
-        # Rerun's own writer is a thread. A full disk ends it, and whatever waits for it then waits
-        # for ever: so the recording is held in memory, and written here.
-        self._memory = self._stream.memory_recording()
-        self._stream.send_blueprint(blueprint(self._lanes, open_loop), make_active=False)
+        with _without_settings():
+            self._stream = rr.RecordingStream("care-sim")
+            # Rerun's own writer is a thread. A full disk ends it, and whatever waits for it then
+            # waits for ever: so the recording is held in memory, and written here.
+            self._memory = self._stream.memory_recording()
+            self._stream.send_blueprint(blueprint(self._lanes, open_loop), make_active=False)
         self._file.callback(self._write)
         self._stream.send_recording_name(path.stem)
         told = about(SCENE_ENTITIES if open_loop else ENTITIES)

@@ -1,3 +1,7 @@
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -7,6 +11,8 @@ from care_sim.reports.figures.budget import sweep_figures
 from care_sim.reports.figures.crowding import crowding_figures
 from care_sim.reports.figures.files import remove_others, save
 from care_sim.reports.figures.styles import styles
+from care_sim.study.results_formats import EPISODES
+from care_sim.study.rows.parquet import write_rows
 from tests.helpers.made_rows import CROWD, STUDY, rows
 
 OWN = ("care-spread", "care-priority")
@@ -29,6 +35,20 @@ def test_figures_are_written_the_same_every_time(draw, study, name, tmp_path):
     drawing = (tmp_path / f"{name}.svg").read_text()
     save(draw(study)[name], tmp_path / name)
     assert (tmp_path / f"{name}.svg").read_text() == drawing
+
+
+def test_settings_of_the_user_change_no_figure(tmp_path):
+    for name in ("plain", "styled"):
+        write_rows(SWEEP, tmp_path / name / EPISODES.file)
+    (tmp_path / "matplotlibrc").write_text("text.usetex: True\nlines.linewidth: 9\n")
+    program = [sys.executable, "-c", "from care_sim.cli import main; main()"]
+    settings = {"MATPLOTLIBRC": str(tmp_path), "MPLBACKEND": "none"}
+    subprocess.run([*program, "report", tmp_path / "plain"], check=True, timeout=120)
+    styled = [*program, "report", tmp_path / "styled"]
+    subprocess.run(styled, check=True, timeout=120, env=os.environ | settings)
+    for suffix in (".png", ".svg"):
+        plain = (tmp_path / "plain" / "dense-budget").with_suffix(suffix)
+        assert (tmp_path / "styled" / plain.name).read_bytes() == plain.read_bytes()
 
 
 def test_one_budget_makes_no_curve():
