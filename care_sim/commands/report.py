@@ -11,13 +11,13 @@ from care_sim.base.checks import LARGEST_INTEGER
 from care_sim.base.errors import InvalidInput, counted, report_problems
 from care_sim.base.extras import check_page
 from care_sim.commands.shared.play_options import SourceOptions
-from care_sim.commands.shared.study_command import console
+from care_sim.commands.shared.study_command import FAILED, console
 from care_sim.reports.report import (
+    StudyReport,
     print_minus,
     print_report,
     read_results,
     where_it_lies,
-    write_report,
 )
 from care_sim.study.executors import CORES, MOST_WORKERS
 
@@ -70,7 +70,13 @@ class PrintReport(SourceOptions):
 
     def _print(self) -> int:
         rows, study, left_out = read_results(self.folder)
-        write_report(rows, self.folder, study, left_out)
+        report = StudyReport.of(rows, study, left_out)
+        try:
+            report.write(self.folder)
+        except (OSError, InvalidInput) as error:
+            print_report(rows, console(), study, left_out)
+            report_problems([f"tables and figures in {self.folder} are not written anew: {error}"])
+            return FAILED
         print_report(rows, console(), study, left_out, self.folder)
         print(*where_it_lies(self.folder, study, rows), sep="\n")
         return 0

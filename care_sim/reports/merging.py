@@ -17,26 +17,21 @@ import pyarrow as pa
 
 from care_sim.base.errors import InvalidInput, counted
 from care_sim.base.files import write_text
-from care_sim.base.json_text import json_content
-from care_sim.reports.report import StudyReport, read_results
+from care_sim.reports.report import CONFIG, StudyReport, described, read_results
 from care_sim.reports.study import Study
 from care_sim.study.results_formats import EPISODES, PLAYS, VEHICLE
-from care_sim.study.row_identity import identity, row_label
+from care_sim.study.row_checks import RowChecks
 from care_sim.study.rows.parquet import (
+    read_notes,
     read_rows,
     read_table,
     write_columns,
     write_rows,
 )
-from care_sim.study.rows.reading import key_of, setting_of, with_regret
+from care_sim.study.rows.reading import key_of, with_regret
 from care_sim.study.run_config import Row
 
-_CONFIG = "config.json"
 _EVENTS = "events.parquet"
-_OF_THE_PLAYING = ("version", "digest", "wall_s", "peak_rss_mb")
-_OF_THE_FOLDER = ("tags", "regret_m", "censored", "differing_keyframes", "differing_cells")
-"""Columns that rows of one outcome may have differently: who played it and how fast, and what was
-worked out beside the other rows of its folder."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +66,7 @@ class Merged:
         if self.events is not None:
             write_columns(self.events, folder / _EVENTS)
         write_rows(self.rows, folder / kind.file, self.study.name, self.left_out, self.study.schema)
-        write_text(folder / _CONFIG, json.dumps(self._description(), indent=1) + "\n")
+        write_text(folder / CONFIG, json.dumps(self._description(), indent=1) + "\n")
         report.write(folder)
 
     def _description(self) -> dict[str, Any]:
@@ -89,9 +84,9 @@ def merged(folders: Sequence[Path]) -> Merged:
     came out differently in two of them, or one scene has two films; and for columns that cannot be
     one, since their types differ.
     """
-    found = [(folder, *read_results(folder)) for folder in folders]
-    first, _, study, _ = found[0]
-    for folder, _, other, _ in found:
+    studies = [read_results(folder)[1] for folder in folders]
+    first, study = folders[0], studies[0]
+    for folder, other in zip(folders, studies, strict=True):
         if other.name != study.name:
             raise InvalidInput(
                 f"{first} holds the study {study.name} and {folder} the study {other.name}: only "
@@ -99,12 +94,14 @@ def merged(folders: Sequence[Path]) -> Merged:
             )
     rows: list[Row] = []
     events: list[pa.Table] = []
-    seen = _Seen()
+    seen = RowChecks()
     firsts = []
+    noted = []
     for folder in folders:
         # All columns, those too that no report reads.
         own = read_rows(folder / study.results.file)
         firsts.append(own[0])
+        noted += read_notes(folder / study.results.file)[1]
         is_new = [seen.is_new(row, folder) for row in own]
         rows += [row for row, new in zip(own, is_new, strict=True) if new]
         if study.results is PLAYS:
@@ -117,61 +114,11 @@ def merged(folders: Sequence[Path]) -> Merged:
         with_regret(rows) if study.results in (EPISODES, VEHICLE) else rows,
         # Events of some plays alone would pass for those of all.
         _events_of_all(events) if len(events) == len(folders) else None,
-        [*dict.fromkeys(what for *_, left_out in found for what in left_out)],
+        [*dict.fromkeys([*noted, *seen.doubts([*rows[0]], study.schema, {"merged": told})])],
         told,
         seen.twice,
         _apart(folders, codes, seen.shared),
     )
-
-
-class _Seen:
-    """The tasks and films of the folders so far."""
-
-    def __init__(self) -> None:
-        self.twice = 0
-        self.shared: set[frozenset[Path]] = set()
-        """Pairs of folders that hold one task, or one film."""
-        self._rows: dict[Hashable, tuple[Path, Row]] = {}
-        self._films: dict[Hashable, tuple[Path, str]] = {}
-
-    def is_new(self, row: Row, folder: Path) -> bool:
-        """Whether no row before had its task. Raises where one came out differently."""
-        if row.get("film_hash"):
-            self._check_film(row, folder)
-        before, other = self._rows.setdefault(identity(row), (folder, row))
-        if other is row:
-            return True
-        unlike = [name for name in other if _differs(name, other, row)]
-        if unlike:
-            raise InvalidInput(
-                f"{row_label(row)} came out differently in {before} and {folder} ({unlike[0]}: "
-                f"{other[unlike[0]]}, {row[unlike[0]]}): the code or a file has changed between "
-                "them; play one of them again"
-            )
-        self.twice += 1
-        self.shared.add(frozenset((before, folder)))
-        return False
-
-    def _check_film(self, row: Row, folder: Path) -> None:
-        # How pulses return is a part of the film, and a condition.
-        place = setting_of(row), row["scene"]
-        before, film = self._films.setdefault(place, (folder, row["film_hash"]))
-        if film != row["film_hash"]:
-            raise InvalidInput(
-                f"{row['scene']} has another film in {folder} than in {before}: their plays cannot "
-                "be compared; play one of them again"
-            )
-        self.shared.add(frozenset((before, folder)))
-
-
-def _differs(name: str, one: Row, other: Row) -> bool:
-    own = (*_OF_THE_PLAYING, *_OF_THE_FOLDER)
-    # A column that only one of them has was added between two versions.
-    if name not in one or name not in other or name in own:
-        return False
-    both = one[name], other[name]
-    # What is no number is equal to nothing, itself included.
-    return both[0] != both[1] and not all(value != value for value in both)
 
 
 def _in_one_table(rows: Sequence[Row], firsts: Sequence[Row]) -> list[Row]:
@@ -246,10 +193,7 @@ def _descriptions(folders: Sequence[Path]) -> dict[str, Any]:
         # Two folders of one name in different places are told apart by their turn.
         while name in told:
             name += "'"
-        try:
-            told[name] = json_content(folder / _CONFIG)
-        except (OSError, ValueError):
-            told[name] = {}
+        told[name] = described(folder)
     return told
 
 

@@ -4,12 +4,14 @@ import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from matplotlib.figure import Figure
 from rich.console import Console
 
-from care_sim.base.errors import InvalidInput, printable, unknown
+from care_sim.base.errors import InvalidInput, counted, printable, unknown
 from care_sim.base.files import write_text
+from care_sim.base.json_text import json_content
 from care_sim.reports.captions import caption
 from care_sim.reports.figures.files import default_style, remove_others, save
 from care_sim.reports.latex import PREAMBLE, latex, paragraph
@@ -17,21 +19,23 @@ from care_sim.reports.studies import STUDIES, SWEEP, study_of
 from care_sim.reports.study import Study
 from care_sim.reports.table import brief, unmarked
 from care_sim.study.results_formats import results_format_in
-from care_sim.study.rows.parquet import read_notes, read_rows
+from care_sim.study.row_checks import RowChecks
+from care_sim.study.rows.parquet import read_notes, read_rows, read_table
 from care_sim.study.rows.reading import policy_of
 from care_sim.study.run_config import FULL, Row
 from care_sim.study.unfinished import UNFINISHED, how_far
 
 TABLES = "tables.md"
 """Name of the file in a folder of results that holds all tables and how to read them."""
+CONFIG = "config.json"
 PAGE = "report.html"
 """Name of a page where none is given."""
 
 
 def read_results(folder: Path) -> tuple[list[Row], Study, list[str]]:
-    """The rows in a folder of results, their study, and what is missing of it.
+    """The rows in a folder of results, each once, their study, and what is missing of it.
 
-    Raises InvalidInput where there are no rows of a study.
+    Raises InvalidInput where there are no rows of a study, and where two rows of one task differ.
     """
     kind = results_format_in(folder)
     # Rows are written when a study ends. A journal without them is of a study that was stopped.
@@ -44,7 +48,19 @@ def read_results(folder: Path) -> tuple[list[Row], Study, list[str]]:
         raise InvalidInput(
             f"{path} holds no rows of the study {study.name}, which are in {study.results.file}"
         )
-    return read_rows(path, study.schema), study, read_notes(path)[1]
+    checks = RowChecks()
+    rows = [row for row in read_rows(path, study.schema) if checks.is_new(row, folder)]
+    twice = [f"{counted(checks.twice, 'row')} written twice"] if checks.twice else []
+    doubts = checks.doubts(read_table(path).column_names, study.schema, described(folder))
+    return rows, study, [*dict.fromkeys([*read_notes(path)[1], *twice, *doubts])]
+
+
+def described(folder: Path) -> Any:
+    """What `config.json` says of the folder; nothing where it cannot be read."""
+    try:
+        return json_content(folder / CONFIG)
+    except (OSError, ValueError):
+        return {}
 
 
 @dataclass(frozen=True)

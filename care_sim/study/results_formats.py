@@ -3,11 +3,12 @@ loop, and plays of it whose rays are accounted for; how each is played and how i
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
 from care_sim.core.conditions import COLUMNS_WHERE_CHANGED, OF_BOTH_LOOPS
+from care_sim.loops.records import DriveOutcome
 from care_sim.study.episode_config import PLAIN_FIELDS, listed_episodes
 from care_sim.study.episodes_together import MOST_TOGETHER, play_episodes
 from care_sim.study.mechanism_play import (
@@ -144,6 +145,7 @@ _PLAYS = Schema(
     },
     _BY_WRITER | _OF_SOME_PLAYS | {"emerging": as_optional(COUNT), "released": as_optional(SUM)},
     SUMS,
+    {"sighted": "events", "found": "frames", "events": "frames"},
 )
 _MECHANISM = Schema(
     _ANY_PLAY
@@ -163,6 +165,14 @@ _VEHICLE = Schema(
         **_EPISODES.further,
         "progress": as_optional(SUM),
         "needless_braking": as_optional(COUNT),
+    },
+    parts={
+        "turned_boxes": "boxes",
+        "dark_keyframes": "keyframes",
+        "dark_alike": "dark_keyframes",
+        "standing_keyframes": "keyframes",
+        "forecasts_in_eq4": "forecasts",
+        "forecasts_in_margin": "forecasts",
     },
 )
 EPISODES = ResultsFormat(
@@ -204,6 +214,11 @@ MECHANISM = ResultsFormat(
     listed=listed_plays,
 )
 RESULTS_FORMATS = (EPISODES, VEHICLE, PLAYS, MECHANISM)
+UNREAD = frozenset(
+    {"keyframes", "wall_s", "peak_rss_mb", "regret_m", "censored"}
+    | {field.name for field in fields(DriveOutcome)}
+)
+"""Columns that this version writes and no report reads."""
 _PARAMETERS = frozenset(
     {
         *PLAIN_FIELDS,

@@ -1,6 +1,6 @@
 """What was asked for with a row: two rows of which the same was asked are of one task."""
 
-from collections.abc import Hashable
+from typing import Any
 
 from care_sim.core.conditions import DEFAULTS
 from care_sim.evaluation.sightings import ANNOTATED
@@ -9,6 +9,8 @@ from care_sim.study.run_config import Row
 
 USUAL = DEFAULTS | {"presence": ANNOTATED}
 """Parameters of a row that does not name them: rows of older versions lack what was added since."""
+Task = frozenset[tuple[str, Any]]
+"""The parameters of a task that are not the default, by name."""
 _LABEL_NAMES = ("scene", "scenario", "policy", "budget")
 _SEEDS = ("seed", "floor_seed")
 
@@ -23,7 +25,7 @@ def asked_with(row: Row) -> Row:
     return {name: value for name, value in given.items() if value != USUAL.get(name)}
 
 
-def identity(row: Row) -> Hashable:
+def identity(row: Row) -> Task:
     """Equal for rows of one task, whatever code played it."""
     return frozenset(asked_with(row).items())
 

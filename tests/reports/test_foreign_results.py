@@ -110,6 +110,13 @@ def complaint(folder):
             "column differing_cells must hold whole numbers from 0",
         ),
         ("protocol", "tags", 1, "column tags must hold text"),
+        ("protocol", "sighted", 1000, "column sighted must be at most events in every row"),
+        (
+            "protocol",
+            "entry/ring/found",
+            1000,
+            "column entry/ring/found must be at most entry/ring/frames in every row",
+        ),
     ],
 )
 def test_a_column_of_another_type_or_range_is_named(tmp_path, name, column, value, fault):
@@ -117,6 +124,28 @@ def test_a_column_of_another_type_or_range_is_named(tmp_path, name, column, valu
     with pytest.raises(InvalidInput) as refused:
         shown(tmp_path)
     assert fault in str(refused.value)
+
+
+def test_no_flipped_bit_changes_rows_in_silence(tmp_path):
+    table("sweep", tmp_path)
+    path = tmp_path / "episodes.parquet"
+    sound = path.read_bytes()
+    rows, study, _ = read_results(tmp_path)
+    draws = random.Random(1)
+    for _ in range(200):
+        content = bytearray(sound)
+        content[draws.randrange(len(content))] ^= 1 << draws.randrange(8)
+        path.write_bytes(content)
+        try:
+            found, of, left_out = read_results(tmp_path)
+        except InvalidInput:
+            continue
+        assert left_out or (found, of) == (rows, study)
+
+
+def test_files_without_checksums_are_read(tmp_path):
+    put(table("sweep", tmp_path), "sweep", tmp_path)
+    assert len(read_results(tmp_path)[0]) == len(STUDY)
 
 
 def test_a_parameter_of_a_structure_is_named(tmp_path):

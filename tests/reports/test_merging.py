@@ -3,6 +3,7 @@
 import json
 import math
 import re
+from unittest.mock import Mock
 
 import pyarrow.parquet as pq
 import pytest
@@ -10,7 +11,7 @@ import pytest
 from care_sim.base.errors import InvalidInput
 from care_sim.cli import main
 from care_sim.reports.merging import merged
-from care_sim.reports.report import read_results
+from care_sim.reports.report import StudyReport, read_results
 from care_sim.sources.scenes import Streets
 from care_sim.study.play_config import play_grid
 from care_sim.study.results_formats import PLAYS
@@ -87,6 +88,16 @@ def test_any_policy_can_be_held_against_the_others(tmp_path, capsys):
     # 15 and 16 m less 17 and 18 m.
     assert re.search(r"full +-2\.0 \[-2\.0,-2\.0\]", out)
     assert sorted(held.iterdir()) == before
+
+
+def test_tables_are_printed_where_nothing_can_be_written(tmp_path, capsys, monkeypatch):
+    held = folder(tmp_path / "held", [*OURS, *FULL])
+    error = PermissionError(13, "Permission denied", str(held / "tables.md"))
+    monkeypatch.setattr(StudyReport, "write", Mock(side_effect=error))
+    code, out, err = report(capsys, held)
+    assert "dense: care minus each policy" in out
+    assert f"care-sim: tables and figures in {held} are not written anew: " in err
+    assert (code, err.count("\n")) == (1, 1)
 
 
 def test_a_policy_that_was_not_played_has_no_differences(tmp_path, capsys):

@@ -56,7 +56,8 @@ def write_columns(
         for name, column in arrays.items()
     }
     with replacing(path) as unfinished:
-        pq.write_table(pa.table(typed).replace_schema_metadata(notes), unfinished)
+        table = pa.table(typed).replace_schema_metadata(notes)
+        pq.write_table(table, unfinished, write_page_checksum=True)
 
 
 def check_columns(rows: Iterable[Row]) -> None:
@@ -96,7 +97,7 @@ def read_rows(path: Path, schema: Schema | None = None) -> list[Row]:
     # The first fault is told.
     for fault in (schema or _ANY).faults(table):
         raise InvalidInput(f"{path} holds no rows of a study: {fault}")
-    known = table.select(schema.known(table)) if schema else table
+    known = table.select(schema.known(table.column_names)) if schema else table
     try:
         return [with_tuples(row) for row in known.to_pylist()]
     except (pa.ArrowException, ValueError, OverflowError) as error:
@@ -127,7 +128,8 @@ def read_table(path: Path) -> pa.Table:
     if not path.is_file():
         raise InvalidInput(f"no results at {path}; expected a folder that a study wrote")
     try:
-        table = pq.read_table(path)
+        # Files of older versions have no checksums, and are read without them.
+        table = pq.read_table(path, page_checksum_verification=True)
         # Damaged offsets are found here, not as a crash when values are read.
         table.validate(full=True)
         table.column_names  # noqa: B018 (names of broken characters show only now)

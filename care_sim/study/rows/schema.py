@@ -3,7 +3,7 @@ when a file is opened.
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import pyarrow as pa
@@ -139,12 +139,14 @@ class Schema:
 
     Those that are `needed`; `further` ones that are checked where they are; `sums`, which come
     again for every stratum as KIND/STRATUM/NAME, all of them or none. Columns of parameters are
-    known too. All others are not read.
+    known too. All others are not read. A number in a column of `parts` is at most the number in
+    the column that it names, in every stratum too.
     """
 
     needed: Mapping[str, Column] = field(default_factory=dict)
     further: Mapping[str, Column] = field(default_factory=dict)
     sums: tuple[str, ...] = ()
+    parts: Mapping[str, str] = field(default_factory=dict)
 
     def faults(self, table: pa.Table) -> Iterator[str]:
         """What is wrong with a table, if anything."""
@@ -154,16 +156,26 @@ class Schema:
         elif not table.num_rows:
             yield "it is empty"
         else:
-            for name in self.known(table):
+            for name in self.known(names):
                 yield from (
                     f"its column {name} {fault}" for fault in self.column(name).faults(table[name])
                 )
+            yield from self._exceeding(table)
 
-    def known(self, table: pa.Table) -> list[str]:
+    def known(self, names: Sequence[str]) -> list[str]:
         """The columns that are read."""
-        strata = self._strata(table.column_names)
-        known = {*self.needed, *self.further, *strata}
-        return [name for name in table.column_names if name in known or name.startswith(PARAMETERS)]
+        known = {*self.needed, *self.further, *self._strata(names)}
+        return [name for name in names if name in known or name.startswith(PARAMETERS)]
+
+    def _exceeding(self, table: pa.Table) -> Iterator[str]:
+        for name in table.column_names:
+            stratum, slash, last = name.rpartition("/")
+            whole = f"{stratum}{slash}{self.parts.get(last)}"
+            if (
+                whole in table.column_names
+                and pc.any(pc.greater(table[name], table[whole])).as_py()
+            ):
+                yield f"its column {name} must be at most {whole} in every row"
 
     @property
     def lenient(self) -> "Schema":
@@ -176,7 +188,7 @@ class Schema:
             return {**self.further, **self.needed}.get(name, PARAMETER)
         return {**self.further, **self.needed}.get(name, TALLY)
 
-    def _strata(self, names: list[str]) -> set[str]:
+    def _strata(self, names: Sequence[str]) -> set[str]:
         """All columns of the strata of which one is there."""
         parts = (name.split("/") for name in names)
         strata = {
