@@ -17,15 +17,12 @@ LEAST_POSES = 3
 
 
 def motions(times_s: Floats, poses: Sequence[Frame]) -> list[Ego]:
-    """The car's motion at every pose, from it and those before: speed along its heading, yaw rate,
-    acceleration.
+    """Return the car's motion at every pose: speed along its heading, yaw rate, acceleration.
 
-    Parabolas are fitted to places and headings of the last SPAN_S. `times_s` (n,) ascend strictly.
-    The first two poses have too little of a past: theirs are the parabolas through the first three.
-    A single pose has no motion.
+    Each motion is fitted to its pose and to earlier ones, never to later ones. Parabolas are fitted
+    to places and headings of the last SPAN_S. `times_s` (n,) ascend strictly. The second pose has a
+    speed and a yaw rate, but no acceleration. The first pose has no past, so its motion is zero.
     """
-    if len(poses) < 2:
-        return [Ego() for _ in poses]
     # Headings that jump by a whole turn would be read as a spin.
     yaws = np.unwrap([pose.yaw for pose in poses])
     places = np.array([[pose.x, pose.y, yaw] for pose, yaw in zip(poses, yaws, strict=True)])
@@ -33,17 +30,19 @@ def motions(times_s: Floats, poses: Sequence[Frame]) -> list[Ego]:
 
 
 def _motion(times_s: Floats, places: Floats, now: int) -> Ego:
-    """The motion at row `now` of `places` (n, 3: x, y, heading)."""
+    """Return the motion at row `now` of `places` (n, 3: x, y, heading)."""
+    if now == 0:
+        return Ego()
     # The span, 1% longer so that a pose at its very end counts whatever the clock's rounding; at
-    # least LEAST_POSES, from the beginning of the drive if there are no earlier ones.
+    # least LEAST_POSES, where there are so many.
     first = min(
         int(np.searchsorted(times_s, times_s[now] - 1.01 * SPAN_S)), max(now + 1 - LEAST_POSES, 0)
     )
-    window = slice(first, max(now + 1, LEAST_POSES))
+    window = slice(first, now + 1)
     # Relative to now: the coefficients of the parabola are then place, rate and half the change of
     # the rate at this very moment.
     times = times_s[window] - times_s[now]
-    degree = min(len(times_s), LEAST_POSES) - 1
+    degree = min(len(times), LEAST_POSES) - 1
     rates = np.polynomial.polynomial.polyfit(times, places[window] - places[now], degree)
     heading = np.array([np.cos(places[now, 2]), np.sin(places[now, 2])])
     acceleration = 2 * rates[2, :2] @ heading if degree == 2 else 0.0

@@ -35,7 +35,7 @@ from care_sim.sources.argoverse2.tables import (
     table,
 )
 from care_sim.sources.boxes_as_bodies import AnnotatedBody, annotations_of, sense
-from care_sim.sources.car_motion import motions
+from care_sim.sources.car_motion import SPAN_S, motions
 
 UP_LIDAR = (1.35, 0.0, 1.64)
 """Metres in the car's frame: `up_lidar` in the calibration of the Sensor Dataset guide."""
@@ -80,10 +80,13 @@ def argoverse2_film(log: Path, grid: AngularGrid | None = None) -> Film:
             f"{pose_file}: no pose for the timestamp {without_pose[0]} of {boxes_file.name}"
         )
     keyframes = _keyframes(sweeps, poses["timestamp_ns"])
-    # The car's motion is fitted to all annotated moments, the film is made of the keyframes.
-    moments = np.union1d(sweeps, keyframes)
-    cars = _car_frames(poses, moments)
-    times = (moments - moments[0]) / NANOSECONDS
+    # The car's motion is fitted to all annotated moments, the film is made of the keyframes. An
+    # earlier pose gives the first keyframe a past.
+    before = poses["timestamp_ns"][poses["timestamp_ns"] < sweeps[0]]
+    before = before[before >= sweeps[0] - round(SPAN_S * NANOSECONDS)][:1]
+    moments = np.union1d(np.concatenate([before, sweeps]), keyframes)
+    cars = _car_frames(poses, moments, origin=keyframes[0])
+    times = (moments - keyframes[0]) / NANOSECONDS
     egos = motions(times, cars)
     grid = grid or AngularGrid()
     shots = []
@@ -135,16 +138,18 @@ def _nearest(stamps: Integers, moments: Integers) -> Integers:
     return np.where(moments - before <= after - moments, before, after)
 
 
-def _car_frames(poses: Columns, moments: Integers) -> list[Frame]:
-    """The car's frame at every moment, each of which has a pose. The world is the city's, moved to
-    the first.
+def _car_frames(poses: Columns, moments: Integers, origin: int) -> list[Frame]:
+    """Return the car's frame at every moment. Each moment has a pose. The world is the city's,
+    moved to the car's place at the moment `origin`.
     """
-    # City coordinates lie kilometres from their origin; those of a film begin at its first place.
+    # City coordinates lie kilometres from their origin, so a film's begin at its first place.
     rows = np.searchsorted(poses["timestamp_ns"], moments)
-    places = table(poses, PLACE)[rows]
+    places = table(poses, PLACE)
+    start = places[np.searchsorted(poses["timestamp_ns"], origin)]
     turns = Rotation.from_quat(table(poses, TURN)[rows])
     return [
-        Frame.turned_by(turn, place) for turn, place in zip(turns, places - places[0], strict=True)
+        Frame.turned_by(turn, place)
+        for turn, place in zip(turns, places[rows] - start, strict=True)
     ]
 
 

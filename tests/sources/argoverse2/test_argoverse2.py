@@ -229,3 +229,11 @@ def test_every_category_of_the_taxonomy_has_its_place():
         "the 30 of the guide, and the second name of one of them"
     )
     assert set(ARGOVERSE2_CATEGORIES.values()) == {*CLASSES, None}
+
+
+def test_the_first_keyframe_knows_the_motion_of_the_poses_before_it(tmp_path):
+    """At 5 m/s: the poses are recorded from 0.2 s before the first annotated sweep."""
+    log = write(tmp_path, [[], [], *[[CAR_AHEAD]] * 11], [at(x=sweep * 0.5) for sweep in range(13)])
+    first, *_ = argoverse2_film(log).shots
+    assert first.ego.speed == pytest.approx(5.0)
+    assert (first.time_s, first.sensor.x) == (0.0, UP_LIDAR[0])
