@@ -7,9 +7,13 @@ from functools import lru_cache
 from itertools import islice
 from pathlib import Path
 
+from care_sim.base.errors import InvalidInput
+
 MOST_FILES = 10_000
 """A folder with more files is not read: hashing so many takes a second."""
 
+Stamp = tuple[int, ...]
+"""Numbers of a file that differ after the file is written."""
 _OF_THE_SYSTEM = tuple(
     map(Path, ("/proc", "/sys", "/dev/fd", "/dev/stdin", "/dev/stdout", "/dev/stderr"))
 )
@@ -20,7 +24,10 @@ def file_digest(path: Path) -> str | None:
     """Hash of the content of a file, or of the files below a folder and their names; empty where
     there is neither, None of a folder with more than `MOST_FILES`.
     """
-    found = [path] if path.is_file() else [*islice(files_below(path), MOST_FILES + 1)]
+    # `os.path` takes every text for a path: a table of a recording may hold any.
+    if not os.path.exists(path):
+        return ""
+    found = [path] if os.path.isfile(path) else [*islice(files_below(path), MOST_FILES + 1)]
     if len(found) > MOST_FILES:
         return None
     # Compiled Python is left out: the interpreter writes it while a policy plays.
@@ -33,8 +40,17 @@ def file_digest(path: Path) -> str | None:
 
 
 def data_digest(paths: Iterable[Path]) -> str:
-    """Hash of the content of several files."""
-    return combined_digest(str(file_digest(path)) for path in paths)
+    """Hash the content of several files and folders.
+
+    Raises InvalidInput for a folder with more than `MOST_FILES` files.
+    """
+    digests = []
+    for path in paths:
+        digest = file_digest(path)
+        if digest is None:
+            raise InvalidInput(f"{path}: a folder may hold {MOST_FILES:,} files, or name the files")
+        digests.append(digest)
+    return combined_digest(digests)
 
 
 def combined_digest(digests: Iterable[str]) -> str:
@@ -44,13 +60,22 @@ def combined_digest(digests: Iterable[str]) -> str:
 
 def content_digest(path: Path) -> str:
     """Hash of a file as it is now."""
-    stat = path.stat()
+    return _hashed(path, file_stamp(path))
+
+
+def file_stamp(path: Path) -> Stamp:
+    """Return the stamp of a file, without reading the file. Empty where there is no file."""
+    try:
+        stat = path.stat()
+    except OSError:
+        return ()
     # A file that is written anew keeps neither of its times; the last one no program can set back.
-    return _hashed(path, stat.st_ino, stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns)
+    return stat.st_ino, stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns
 
 
-@lru_cache(maxsize=10_000)
-def _hashed(path: Path, *_identity: int) -> str:
+# As many as the sweeps of a large split. An entry takes some 300 bytes.
+@lru_cache(maxsize=100_000)
+def _hashed(path: Path, _stamp: Stamp) -> str:
     """Hash of a file that has not changed since it was last hashed."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()[:16]

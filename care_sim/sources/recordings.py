@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import ClassVar
 
 from care_sim.base.checks import check_known, check_path, check_whole
+from care_sim.base.digests import Stamp, file_stamp
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.loops.film import Film
 from care_sim.sources.argoverse2 import films as argoverse2
@@ -38,11 +39,11 @@ class Recordings(ABC):
     def film(self, scene: str) -> Film:
         """The film of a scene by name."""
 
-    @abstractmethod
     def files(self, scene: str) -> list[Path]:
-        """The files that say what is in a scene, missing ones included. The sweeps of nuScenes are
-        not among them.
+        """Return all files and folders that `film` reads, missing ones included: a play is played
+        again after one of them has changed. By default that is the whole folder.
         """
+        return [self.folder]
 
 
 @dataclass(frozen=True)
@@ -103,8 +104,15 @@ class NuScenes(Recordings):
         )
 
     def files(self, scene: str) -> list[Path]:
-        """All tables that are read."""
-        return [_database(self.folder, self.version).path(table) for table in FIELDS]
+        """All tables that are read, and the sweeps of the scene."""
+        return [*_tables(self.folder, self.version), *self._sweep_files(scene)]
+
+    def _sweep_files(self, scene: str) -> tuple[Path, ...]:
+        """Return no file where the tables are damaged. `film` then refuses the scene."""
+        try:
+            return _sweep_files(_database(self.folder, self.version), scene, self.sweeps)
+        except InvalidInput:
+            return ()
 
     def _rows(self) -> dict[str, JsonRow]:
         return {
@@ -152,12 +160,32 @@ def recordings_in(
     return kind(Path(folder), **given)
 
 
-# Tables and detections are large and the same for all scenes: the last ones stay read.
-@lru_cache(maxsize=1)
+# Tables and detections are large and the same for all scenes: the last ones stay read, until one
+# of their files changes.
 def _database(root: Path, version: str | None) -> Database:
+    return _read_database(root, version, tuple(map(file_stamp, _tables(root, version))))
+
+
+def _tables(root: Path, version: str | None) -> list[Path]:
+    database = Database(root, version)
+    return [database.path(table) for table in FIELDS]
+
+
+@lru_cache(maxsize=1)
+def _read_database(root: Path, version: str | None, _stamps: tuple[Stamp, ...]) -> Database:
     return Database(root, version)
 
 
-@lru_cache(maxsize=1)
+@lru_cache(maxsize=1000)
+def _sweep_files(database: Database, scene: str, sweeps: int) -> tuple[Path, ...]:
+    rows = {row["name"]: row for row in database.rows("scene").values()}
+    return tuple(films.sweep_files(database, rows[scene], sweeps)) if scene in rows else ()
+
+
 def _detections(path: Path) -> DetectionFile:
+    return _read_detections(path, file_stamp(path))
+
+
+@lru_cache(maxsize=1)
+def _read_detections(path: Path, _stamp: Stamp) -> DetectionFile:
     return DetectionFile(path)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pyarrow as pa
 
+from care_sim.base.digests import file_stamp
 from care_sim.base.errors import InvalidInput
 from care_sim.base.files import check_output, replacing
 
@@ -43,10 +44,8 @@ def _places(file: Path) -> Iterator[Path]:
 
 def _stamp(form: str, sources: Iterable[Path]) -> str:
     """Tells the sources as they are now from the same at another time."""
-    stats = [source.stat() for source in sources if source.is_file()]
-    # A file that is written anew keeps neither of its times; the last one no program can set back.
-    times = [(stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns) for stat in stats]
-    return hashlib.sha256(repr((form, times)).encode()).hexdigest()
+    stamps = [file_stamp(source)[1:] for source in sources if source.is_file()]
+    return hashlib.sha256(repr((form, stamps)).encode()).hexdigest()
 
 
 def _kept(place: Path, stamp: str, make: Callable[[], pa.Table]) -> pa.Table | None:

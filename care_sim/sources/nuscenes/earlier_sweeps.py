@@ -30,24 +30,25 @@ def with_earlier_sweeps(
 
     Raises InvalidInput where there are none in the whole scene, and as `read_points` does.
     """
-    between = _between(database, samples)
+    between = earlier(database, samples, most)
     if len(samples) > 1 and not any(between):
         path = database.path("sample_data")
         raise InvalidInput(
             f"{path}: no {LIDAR} between {samples[0]['token']!r} and "
             f"{samples[-1]['token']!r}: a film of it has one sweep a keyframe"
         )
-    earlier = ([], *(rows[-most:] for rows in between))
     return tuple(
         replace(
             shot, sweeps=tuple(_sweep(database, row, sample, shot, lidar, grid) for row in rows)
         )
-        for shot, sample, rows in zip(shots, samples, earlier, strict=True)
+        for shot, sample, rows in zip(shots, samples, ([], *between), strict=True)
     )
 
 
-def _between(database: Database, samples: Sequence[JsonRow]) -> list[list[JsonRow]]:
-    """The recordings of the LiDAR between each two samples, in order of time."""
+def earlier(database: Database, samples: Sequence[JsonRow], most: int) -> list[list[JsonRow]]:
+    """Return the last recordings of the LiDAR between each two samples, at most so many, in order
+    of time.
+    """
     # By their times: which of two samples a sweep is filed under does not matter.
     rows = [row for sample in samples for row in database.recordings(sample["token"])]
     sweeps = sorted(
@@ -55,7 +56,7 @@ def _between(database: Database, samples: Sequence[JsonRow]) -> list[list[JsonRo
     )
     taken = [row["timestamp"] for row in sweeps]
     edges = np.searchsorted(taken, [sample["timestamp"] for sample in samples])
-    return [sweeps[start:end] for start, end in pairwise(edges.tolist())]
+    return [sweeps[start:end][-most:] for start, end in pairwise(edges.tolist())]
 
 
 def _sweep(

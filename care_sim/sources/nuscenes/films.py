@@ -7,7 +7,9 @@ motion is that of the keyframes' poses. The cameras' pictures are taken within 5
 the way that the car drives meanwhile is neglected.
 """
 
+import os
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -27,7 +29,7 @@ from care_sim.sources.nuscenes.cameras import (
 )
 from care_sim.sources.nuscenes.categories import UnknownCategory, class_of
 from care_sim.sources.nuscenes.detections import DetectionFile
-from care_sim.sources.nuscenes.earlier_sweeps import with_earlier_sweeps
+from care_sim.sources.nuscenes.earlier_sweeps import earlier, with_earlier_sweeps
 from care_sim.sources.nuscenes.mounts import camera_of, frame_of, lidar_mount
 from care_sim.sources.nuscenes.sweeps import read_points, recorded_cloud
 from care_sim.sources.nuscenes.table_files import JsonRow
@@ -83,6 +85,20 @@ def nuscenes_film(
         grid,
         detected=detections is not None,
     )
+
+
+def sweep_files(database: Database, scene: JsonRow, sweeps: int = 1) -> list[Path]:
+    """Return the files of the LiDAR that the film of a scene is made of.
+
+    Raises InvalidInput for tables that do not name them.
+    """
+    samples = database.samples(scene)
+    rows = [_recordings(database, sample)[LIDAR] for sample in samples]
+    if sweeps > 1:
+        rows += [row for between in earlier(database, samples, sweeps - 1) for row in between]
+    files = [database.root / row["filename"] for row in rows]
+    # A damaged row may name a folder, which no film reads.
+    return [file for file in files if not os.path.isdir(file)]
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """Recorded LiDAR sweeps as clouds of the angular grid."""
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +29,7 @@ def read_points(path: Path) -> Floats:
     Raises InvalidInput for a file that is missing, truncated or larger than `MOST_SWEEP_BYTES`, and
     for a place that is not finite.
     """
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise InvalidInput(f"{path}: no such file")
     if path.stat().st_size > MOST_SWEEP_BYTES:
         raise InvalidInput(
