@@ -27,7 +27,7 @@ from care_sim.study.benchmark.worlds import (
     published_worlds,
     quick_tenth,
 )
-from care_sim.study.executors import CORES, MOST_WORKERS, processes
+from care_sim.study.executors import MOST_WORKERS, WORKERS, processes
 from care_sim.study.run_config import parameters_for
 
 _OUT = Path("runs/benchmark")
@@ -58,7 +58,7 @@ class Benchmark:
     journal in the folder holds their seeds; the result files do not."""
     out: Path = _OUT
     """Folder of the result files; what is finished stays there, and the same command goes on."""
-    workers: int = bounded(CORES, 1, MOST_WORKERS)
+    workers: int = bounded(WORKERS, 1, MOST_WORKERS)
     """Processes that play at the same time."""
 
     def __post_init__(self) -> None:

@@ -24,7 +24,7 @@ from care_sim.reports.figures.detectors import DETECTORS_FIGURE, detectors_figur
 from care_sim.reports.figures.files import check_figure, save
 from care_sim.sources.scenes import Scene, chosen_scenes
 from care_sim.study.episode_play import result_or_reason
-from care_sim.study.executors import CORES, MOST_WORKERS, processes
+from care_sim.study.executors import MOST_WORKERS, WORKERS, processes
 from care_sim.study.judging import JudgedScene, Samples, judge_scene
 from care_sim.study.parameters import Parameters, parameters
 from care_sim.study.play_config import PlayConfig, play_grid
@@ -62,7 +62,7 @@ class Judge(PlayOptions):
     """`care-sim policies` lists them. `full` fires every cell."""
     budget: float = 1.0
     """Share of the cells that may fire at a keyframe, above 0 and at most 1."""
-    workers: int = bounded(CORES, 1, MOST_WORKERS)
+    workers: int = bounded(WORKERS, 1, MOST_WORKERS)
     """Processes that play at the same time."""
     out: Path = Path("runs/judge")
     """Folder of tables, figure and numbers."""

@@ -26,7 +26,7 @@ from care_sim.study.benchmark.result import BenchmarkResult
 from care_sim.study.benchmark.result_file import is_result, read_result
 from care_sim.study.benchmark.screening import screened_worlds
 from care_sim.study.benchmark.worlds import Salt, World
-from care_sim.study.executors import CORES, MOST_WORKERS
+from care_sim.study.executors import MOST_WORKERS, WORKERS
 
 _TABLES, _TRIALS = Path("runs/leaderboard"), Path("runs/leaderboard-quick")
 
@@ -54,7 +54,7 @@ class Leaderboard:
     out: Path | None = None
     """Folder for the page and the figure; without it runs/leaderboard, and runs/leaderboard-quick
     with --quick. A table that lies there is replaced, which is told."""
-    workers: int = bounded(CORES, 1, MOST_WORKERS)
+    workers: int = bounded(WORKERS, 1, MOST_WORKERS)
     """With --verify: processes that play at the same time."""
 
     def __post_init__(self) -> None:

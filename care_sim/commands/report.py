@@ -19,7 +19,7 @@ from care_sim.reports.report import (
     read_results,
     where_it_lies,
 )
-from care_sim.study.executors import CORES, MOST_WORKERS
+from care_sim.study.executors import MOST_WORKERS, WORKERS
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +42,7 @@ class PrintReport(SourceOptions):
     episodes: int = bounded(40, 0, LARGEST_INTEGER)
     """At most this many episodes are played again for the page, seed by seed; 0 for none. They take
     as long as they did in the study."""
-    workers: int = bounded(CORES, 1, MOST_WORKERS)
+    workers: int = bounded(WORKERS, 1, MOST_WORKERS)
     """Processes that play them."""
     source: str | None = None
     """Where the recordings lie that a study of the open loop played, for its page:

@@ -5,7 +5,6 @@ What becomes of the tasks of a worker that dies is decided in `care_sim.study.ru
 
 import asyncio
 import logging
-import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import (
     BrokenExecutor,
@@ -20,6 +19,7 @@ from multiprocessing import get_context
 from multiprocessing.context import BaseContext
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
+from care_sim.base.cores import CORES
 from care_sim.base.errors import InvalidInput, one_line
 from care_sim.base.extras import missing_extra
 from care_sim.base.processes import end_group_with_work, end_with_parent, starting
@@ -35,7 +35,7 @@ ExecutorFactory = Callable[[int], Executor]
 
 MOST_WORKERS = 1024
 """Most worker processes; each takes about 100 MB."""
-CORES = min(os.cpu_count() or 1, MOST_WORKERS)
+WORKERS = min(CORES, MOST_WORKERS)
 """Workers unless another number is asked for."""
 _ANSWER_TIMEOUT_S = 10.0
 """How long a scheduler may take to answer."""

@@ -1,6 +1,5 @@
 """Where results come from: the code, the libraries and the machine that made them."""
 
-import os
 import platform
 from functools import cache
 from importlib import metadata
@@ -9,6 +8,7 @@ from pathlib import Path
 from uuid import uuid4
 
 import care_sim
+from care_sim.base.cores import CORES
 from care_sim.base.digests import combined_digest, content_digest, file_digest
 from care_sim.base.named_files import files_named_by, files_named_in, paths_in
 from care_sim.base.package_files import shipped_files
@@ -140,7 +140,7 @@ def machine() -> dict[str, str | int]:
     return {
         "system": f"{platform.system()} {platform.release()}",
         "processor": _processor(),
-        "cores": os.cpu_count() or 1,
+        "cores": CORES,
     }
 
 

@@ -15,7 +15,7 @@ from care_sim.commands.shared.run_study import run_study, summary
 from care_sim.reports.report import print_report, read_results, where_it_lies
 from care_sim.reports.studies import STUDIES
 from care_sim.study import executors
-from care_sim.study.executors import CORES, MOST_WORKERS
+from care_sim.study.executors import MOST_WORKERS, WORKERS
 from care_sim.study.run_config import RunConfig
 
 DONE = 0
@@ -26,7 +26,7 @@ FAILED = 1
 class StudyCommand:
     """Options of every command that plays a study."""
 
-    workers: int = bounded(CORES, 1, MOST_WORKERS)
+    workers: int = bounded(WORKERS, 1, MOST_WORKERS)
     """Processes that play at the same time on this machine; a cluster plays as many tasks as it has
     threads.
     """

@@ -1,6 +1,5 @@
 """The vector environments of the closed loop: thin Gymnasium adapters around `Worlds`."""
 
-import os
 from collections.abc import Sequence
 from functools import partial
 from typing import Any, ClassVar
@@ -12,6 +11,7 @@ from gymnasium.vector.utils import batch_space, create_empty_array
 from numpy.typing import NDArray
 
 from care_sim.base.checks import as_array, check_flag, check_whole
+from care_sim.base.cores import CORES
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.vectors import shared_attribute
 from care_sim.core.arrays import Floats, Mask
@@ -34,7 +34,6 @@ from care_sim.scenarios.base import Scenario
 
 MOST_WORLDS = 2**16
 MOST_THREADS = 1024
-CORES = os.cpu_count() or 1
 
 
 class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
@@ -63,7 +62,7 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         **arguments: Any,
     ):
         check_whole("num_envs", num_envs, 1, MOST_WORLDS)
-        threads = CORES if threads is None else threads
+        threads = min(CORES, MOST_THREADS) if threads is None else threads
         check_whole("threads", threads, 1, MOST_THREADS)
         check_flag("copy", copy)
         if arguments.get("render_mode") is not None:

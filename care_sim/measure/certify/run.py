@@ -1,6 +1,5 @@
 """`care-sim certify`: play the list, compare it with what is published, report."""
 
-import os
 import sys
 from collections.abc import Sequence
 from contextlib import nullcontext
@@ -16,7 +15,7 @@ from care_sim.measure.certify.design import CERTIFIED_EPISODES, drawn
 from care_sim.measure.certify.playing import Trails, playable_here, trails_of
 from care_sim.measure.certify.published import combined, read, write
 from care_sim.measure.certify.verdict import verdict_of
-from care_sim.study.executors import MOST_WORKERS
+from care_sim.study.executors import MOST_WORKERS, WORKERS
 from care_sim.study.progress import ProgressLines, progress_bar
 
 _ALL_EPISODES = 10_000
@@ -32,7 +31,7 @@ class CertifyConfig:
     """All 10,000 episodes, not only the first 3,050."""
     episode: int | None = None
     """This episode alone, by its number in the list."""
-    workers: int = bounded(os.cpu_count() or 1, 1, MOST_WORKERS)
+    workers: int = bounded(WORKERS, 1, MOST_WORKERS)
     """Processes that play at the same time."""
     write: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """For maintainers, with all: make what is played now the published list."""
