@@ -34,6 +34,8 @@ from care_sim.scenarios.base import Scenario
 
 MOST_WORLDS = 2**16
 MOST_THREADS = 1024
+MOST_STEPS = 2**31 - 1
+_SINGLE = 'pass vectorization_mode="sync" to gymnasium.make_vec (docs/vectors.md)'
 
 
 class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
@@ -41,7 +43,8 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
 
     World i, begun with a seed, is the single environment begun with it, to the last bit, whatever
     the other worlds do and however many threads there are. All keyword arguments of the single
-    environment are taken but `render_mode`. The `budget` and whatever the camera gets wrong
+    environment are taken but `render_mode`. Episodes are truncated after `max_episode_steps`, as
+    Gymnasium's `TimeLimit` does. The `budget` and whatever the camera gets wrong
     (`care_sim.envs.vector.arguments.OF_EACH_WORLD`) may be lists of a value for each world.
 
     Observations, rewards and infos are those that `gymnasium.vector.SyncVectorEnv` gives, in all
@@ -59,6 +62,7 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         threads: int | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         copy: bool = True,
+        max_episode_steps: int | None = None,
         **arguments: Any,
     ):
         check_whole("num_envs", num_envs, 1, MOST_WORLDS)
@@ -66,7 +70,10 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         check_whole("threads", threads, 1, MOST_THREADS)
         check_flag("copy", copy)
         if arguments.get("render_mode") is not None:
-            raise InvalidInput("render_mode is of the single environment; many draw no pictures")
+            raise InvalidInput(f"many worlds draw no pictures: leave render_mode out, or {_SINGLE}")
+        if max_episode_steps is not None:
+            check_whole("max_episode_steps", max_episode_steps, 1, MOST_STEPS)
+        self._most_steps = max_episode_steps or MOST_STEPS
         self.num_envs = num_envs
         self.autoreset_mode = _autoreset(autoreset_mode)
         self.metadata = {**self.single.metadata, "autoreset_mode": self.autoreset_mode}
@@ -89,6 +96,7 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         self._shares = [slice(*ends[k : k + 2]) for k in range(count)]
         self._worlds = [self._made(share, makers) for share in self._shares]
         self._threads = Threads(count)
+        self._steps = np.zeros(num_envs, np.int64)
         self._over = np.zeros(num_envs, np.bool_)
         self._begun = np.zeros(num_envs, np.bool_)
 
@@ -119,6 +127,22 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         another one that a single environment has before its first episode.
         """
         return tuple(getattr(model, name) for model in self._models)
+
+    def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
+        """An attribute of each world (W,), as `get_attr` gives it. Raises InvalidInput for a
+        method: no world has an environment of its own.
+        """
+        values = self.get_attr(name)
+        if args or kwargs or any(map(callable, values)):
+            raise InvalidInput(f"call reads attributes of many worlds; for a method {_SINGLE}")
+        return values
+
+    def set_attr(self, name: str, values: Any) -> None:
+        """Raise InvalidInput: what is fixed about the worlds stays so."""
+        raise InvalidInput(
+            f"many worlds keep their {shown(name)}: make the vector anew with the value, or "
+            f"{_SINGLE}"
+        )
 
     def reset(
         self,
@@ -154,6 +178,8 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
             )
         scores = checked_scores(as_array("actions", actions), self.action_space.shape or ())
         stepped = self._played(scores, ~begins)
+        self._steps += ~begins
+        stepped.truncated[:] |= ~begins & (self._steps >= self._most_steps)
         infos = self._infos(stepped, ~begins)
         over = stepped.terminated | stepped.truncated
 
@@ -176,10 +202,7 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
 
     def render(self) -> None:
         """Raise InvalidInput: many worlds draw no pictures."""
-        raise InvalidInput(
-            "many worlds draw no pictures: play the world's seed in the single environment, made "
-            'with render_mode="rgb_array"'
-        )
+        raise InvalidInput(f"many worlds draw no pictures: {_SINGLE}, with a render_mode")
 
     def close_extras(self, **_: Any) -> None:
         """Free the worlds and end the threads."""
@@ -236,6 +259,7 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
             for world, info in (worlds.begin(own) if own else {}).items():
                 infos = self._add_info(infos, info, share.start + world)
         self._over[who] = False
+        self._steps[who] = 0
         self._begun[who] = True
         return infos
 

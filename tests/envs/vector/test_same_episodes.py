@@ -59,6 +59,13 @@ def test_every_world_in_every_mode(name, mode):
     assert played_alike(name, worlds=3, steps=steps, mode=mode, threads=2) is None
 
 
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("arguments", [{}, {"lidar_dropout": 0.2}], ids=["arrays", "separate"])
+def test_episodes_end_after_the_most_steps(mode, arguments):
+    arguments = arguments | {"max_episode_steps": 5}
+    assert played_alike("CARE-CutIn-v0", worlds=2, steps=14, mode=mode, **arguments) is None
+
+
 @pytest.mark.parametrize("conditions", CONDITIONS.values(), ids=CONDITIONS)
 def test_conditions(conditions):
     arguments = {"budget": 0.03} | conditions

@@ -76,6 +76,8 @@ def test_seeds_count_up_or_are_told_one_by_one(vector):
         ({"autoreset_mode": "Sometimes"}, "NextStep, SameStep, Disabled"),
         ({"copy": 1}, "copy"),
         ({"render_mode": "rgb_array"}, "render_mode"),
+        ({"max_episode_steps": 0}, "max_episode_steps"),
+        ({"max_episode_steps": 2.5}, "max_episode_steps"),
         ({"budget": 2.0}, "budget"),
         ({"vehicels": 2}, "vehicels"),
         ({"budget": [0.1, 0.2, 0.3]}, "budget must be one value, or .* each of 2 worlds, got"),
@@ -93,11 +95,25 @@ def test_wrong_arguments_are_named(wrong, message):
         native(NAME, arguments.pop("num_envs"), **arguments)
 
 
-def test_a_picture_of_many_is_refused_in_one_line_that_tells_the_way(vector):
-    with pytest.raises(
-        InvalidInput, match=r'^[^\n]*single environment, made with render_mode="rgb'
-    ):
-        vector.render()
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda vector: vector.render(),
+        lambda vector: vector.set_attr("budget", 0.2),
+        lambda vector: vector.call("reset"),
+        lambda vector: vector.call("rig", 1),
+        lambda _vector: native(NAME, 2, render_mode="rgb_array"),
+    ],
+)
+def test_refusals_name_the_alternative(vector, ask):
+    with pytest.raises(InvalidInput, match=r'^[^\n]*vectorization_mode="sync"[^\n]*$'):
+        ask(vector)
+
+
+def test_call_reads_an_attribute_of_every_world():
+    env = native(NAME, 2, budget=[0.01, 0.1])
+    assert [rig.budget for rig in env.call("rig")] == [164, 1638]
+    env.close()
 
 
 @pytest.mark.parametrize("take", [copy.deepcopy, copy.copy, pickle.dumps])
