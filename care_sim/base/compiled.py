@@ -13,7 +13,7 @@ from functools import cache
 from types import ModuleType
 from typing import Any, TypeVar
 
-from numba import njit
+from numba import config, njit
 from numba.core import event
 
 _F = TypeVar("_F", bound=Callable[..., Any])
@@ -24,12 +24,15 @@ def compiled(*, brief: bool = False, **options: Any) -> Callable[[_F], _F]:
     other threads of Python may run, too, unless it is `brief`.
 
     The code is kept beside the file, or in the user's cache folder, or where NUMBA_CACHE_DIR says.
-    Where none of these can be written, every process compiles anew.
+    Where none of these can be written, every process compiles anew. With NUMBA_DISABLE_JIT=1
+    functions stay Python, for debuggers and measures of coverage.
     """
     # Whoever lets another thread in has to wait until that one lets it in again.
     nogil = not brief
 
     def make(function: _F) -> Any:
+        if config.DISABLE_JIT:
+            return function
         try:
             kernel = njit(cache=True, nogil=nogil, **options)(function)
         except RuntimeError:  # nowhere to keep it

@@ -1,11 +1,4 @@
-"""Which seeds are for what, disjoint by construction.
-
-| seeds | for |
-|---|---|
-| 0 to 999 | test: of streets 0 to 149 are for evaluation; from 200 on `care-sim benchmark` |
-| 1,000 to 1,999 | calibration: what is set before the evaluation; of streets 1,000 to 1,019 |
-| 2,000 to 9,999 | validation: the learning curve, and which weights are kept |
-| 10,000 and up | training |
+"""Which seeds are for what, disjoint by construction: the table is in docs/environments/index.md.
 
 No training episode can have a seed below 10,000, whatever `--seed` is, and nothing is chosen by a
 seed below 1,000 but `care-sector` and `place-hulls`, which were first tried on the streets 0 to 19.

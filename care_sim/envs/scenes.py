@@ -18,9 +18,9 @@ class StreetEnv(OpenLoopEnv):
     """`CARE-Street-v0`: a generated urban street, 40 keyframes at 2 Hz, six cameras around the car.
 
     The seed of `reset` draws the street (`care_sim.streets`) and everything else that is
-    random. Seeds 0 to 149 are the evaluation's: train on others. `learned-scorer` and `place`
-    learned from the calibration's, 1000 to 1019. With a `secret` all streets are others, and none
-    of them is in the published tables. `sensor` says LiDAR and cameras, as in the closed loop.
+    random. `care_sim.base.seed_ranges` says which seeds are for what. With a `secret` all streets
+    are others, and none of them is in the published tables. `sensor` says LiDAR and cameras, as in
+    the closed loop.
     """
 
     __doc__ = f"{__doc__}\n    {OpenLoopEnv.__doc__}"

@@ -18,6 +18,7 @@ from pyarrow.parquet import read_schema
 
 from care_sim import cli
 from care_sim.base.errors import InvalidInput
+from care_sim.base.seed_ranges import SPLITS
 from care_sim.commands.entries import COMMANDS
 from care_sim.core.conditions import DEFAULTS
 from care_sim.core.types import CLASSES, ImageDetections, Tracks
@@ -308,6 +309,16 @@ def test_a_page_of_environments_is_read_in_a_clone_and_says_what_docstrings_say(
     on_site = environment_pages.on_page_markdown(page.read_text())
     assert "<!--" not in on_site
     assert on_site.count(":::") == page.read_text().count(":::")
+
+
+def test_one_page_says_which_seeds_are_for_what():
+    page = ROOT / "docs" / "environments" / "index.md"
+    rows = re.findall(r"^\| `(\w+)` \| ([\d,]+) (?:to ([\d,]+)|and up) \|", page.read_text(), re.M)
+    told = {name: [end and int(end.replace(",", "")) for end in ends] for name, *ends in rows}
+    ends = {name: [seeds[0], seeds[-1]] for name, seeds in SPLITS.items()}
+    assert told == ends | {"train": [SPLITS["train"][0], ""]}
+    ranges = re.compile(r"\b(0 to 999|1,?000 to 1,?999|[12],?000 to 9,?999)\b")
+    assert [other for other in PAGES if ranges.search(other.read_text())] == [page]
 
 
 def test_what_a_field_may_be_is_told_in_a_clone_and_on_the_site():
