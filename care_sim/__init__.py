@@ -38,8 +38,18 @@ __all__ = [
     "SensorSetup",
     "Tracks",
     "allocate",
+    "film_of_boxes",
     "make_policy",
     "policy_names",
 ]
 
 register_all()
+
+
+def __getattr__(name: str) -> object:
+    """Load the simulator only for who makes films."""
+    if name == "film_of_boxes":
+        from care_sim.sources.box_films import film_of_boxes
+
+        return film_of_boxes
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -8,7 +8,8 @@ import numpy as np
 
 from care_sim.core.arrays import Floats
 from care_sim.core.frames import Frame
-from care_sim.core.grid import AngularGrid
+from care_sim.core.grid_stack import Grid
+from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import CLASSES
 from care_sim.sensors.annotated import Annotations, Cloud, IdentifiedDetections
 from care_sim.sensors.surround import SURROUND_CAMERAS, full_sweep, numbers_of, surround_detections
@@ -46,9 +47,13 @@ class AnnotatedBody:
 
 
 def sense(
-    annotated: Sequence[AnnotatedBody], sensor: Frame, height_m: float, grid: AngularGrid
+    annotated: Sequence[AnnotatedBody],
+    sensor: Frame,
+    height_m: float,
+    grid: Grid,
+    cameras: tuple[PinholeCamera, ...] = SURROUND_CAMERAS,
 ) -> tuple[Annotations, IdentifiedDetections, Cloud]:
-    """What a LiDAR in the frame `sensor` and the cameras around it see of `annotated`, every cell
+    """Return what LiDARs in the frame `sensor` and its `cameras` see of `annotated`, every cell
     fired.
 
     The road is a plane `height_m` below the sensor, parallel to the car. It hides nothing, because
@@ -61,7 +66,7 @@ def sense(
         bodies = {id(one): _add(world, one, sensor) for one in annotated}
         numbers = {bodies[id(one)]: one.number for one in reported}
         labels = {bodies[id(one)]: CLASSES.index(str(one.label)) for one in reported}
-        seen = surround_detections(world, SURROUND_CAMERAS, sensor, labels, annotations.boxes)
+        seen = surround_detections(world, cameras, sensor, labels, annotations.boxes)
         swept = full_sweep(world, grid, sensor, _table([one.bounds for one in annotated]), height_m)
     identified = IdentifiedDetections(seen.detections, numbers_of(seen.objects, numbers))
     return (

@@ -97,10 +97,7 @@ class Installed:
         scenes = self.scenes()
         with self._blamed(f"makes no film of {scene.name}"):
             check_known("scene", scene.name, [each.name for each in scenes])
-            film = self._made().film(scene, returns)
-            if not isinstance(film, Film):
-                raise InvalidInput(f"film must return a Film, got {type(film).__name__}")
-        return film
+            return self._made().film(scene, returns)
 
     def check_returns(self, returns: FilmedReturns) -> None:
         """Recordings hold what returned, generated streets are filmed."""

@@ -33,7 +33,7 @@ UNIT = (0.9, 1.1)
 """The length of a quaternion that was rounded."""
 
 
-def check_span(path: Path, seconds: float) -> None:
+def check_span(path: Path | str, seconds: float) -> None:
     """Raise InvalidInput for a drive longer than `LONGEST_S`."""
     if seconds > LONGEST_S:
         raise InvalidInput(

@@ -14,7 +14,7 @@ from care_sim.base.digests import Stamp, file_stamp
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.loops.film import Film
 from care_sim.sources.argoverse2 import films as argoverse2
-from care_sim.sources.argoverse2.tables import ANNOTATION_FILES, POSE_FILE
+from care_sim.sources.argoverse2.tables import POSE_FILE, annotation_file
 from care_sim.sources.nuscenes import films, splits
 from care_sim.sources.nuscenes.detections import DetectionFile
 from care_sim.sources.nuscenes.table_files import FIELDS, JsonRow
@@ -54,20 +54,24 @@ class Argoverse2(Recordings):
 
     def scenes(self) -> list[str]:
         """The names of the log folders."""
-        return [log.name for log in argoverse2.logs(self.folder)]
+        return list(self._logs())
 
     def film(self, scene: str) -> Film:
         """See `care_sim.sources.argoverse2.films.argoverse2_film`."""
-        logs = {log.name: log for log in argoverse2.logs(self.folder)}
+        logs = self._logs()
         check_known(f"log in {self.folder}", scene, logs)
         return argoverse2.argoverse2_film(logs[scene])
 
     def files(self, scene: str) -> list[Path]:
         """Poses and annotations."""
-        # The folder may itself be the log.
-        own = self.folder / scene
-        log = own if own.is_dir() else self.folder
-        return [log / POSE_FILE, *sorted(log.glob(ANNOTATION_FILES))]
+        log = self._logs().get(scene, self.folder / scene)
+        try:
+            return [log / POSE_FILE, annotation_file(log)]
+        except InvalidInput:  # `film` refuses the scene
+            return [log / POSE_FILE]
+
+    def _logs(self) -> dict[str, Path]:
+        return {log.name: log for log in argoverse2.logs(self.folder)}
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from care_sim.core.return_settings import RAYS, FilmedReturns, changed_settings
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.loops.film import Film
 from care_sim.sensors.setups import DEFAULT_SETUP, sensor_columns, sensor_setup
+from care_sim.sources.film_checks import check_film
 from care_sim.sources.recordings import NuScenes, Recordings
 from care_sim.sources.street_films import check_filmed, record
 from care_sim.streets.street import (
@@ -100,7 +101,9 @@ class Generated(ABC):
         street = self.street(scene.seed)
         if not isinstance(street, Street):
             raise InvalidInput(f"street must return a Street, got {type(street).__name__}")
-        return record(replace(street, name=scene.name), sensor_setup(self.sensor), returns)
+        film = record(replace(street, name=scene.name), sensor_setup(self.sensor), returns)
+        check_film(film)
+        return film
 
     def check_returns(self, returns: FilmedReturns) -> None:
         """A street is filmed with all but one; see `care_sim.sources.street_films`."""
@@ -152,7 +155,9 @@ class Recorded:
     def film(self, scene: Scene, returns: FilmedReturns = RAYS) -> Film:
         """The recorded scene of the name."""
         self.check_returns(returns)
-        return self.recordings.film(scene.name)
+        film = self.recordings.film(scene.name)
+        check_film(film, recorded=True)
+        return film
 
     def check_returns(self, returns: FilmedReturns) -> None:
         """The switches of returns need the surfaces that pulses meet, which nobody recorded."""

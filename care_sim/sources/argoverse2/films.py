@@ -10,6 +10,7 @@ out: nobody saw those objects there. Those of the first keyframe are in `Film.hi
 objects were present. Static surroundings are not annotated, so only what is annotated occludes.
 """
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -56,6 +57,8 @@ def logs(folder: Path) -> list[Path]:
 
     Raises InvalidInput where there is none.
     """
+    # Absolute, since a log is called by its folder: `.` has no name.
+    folder = Path(os.path.abspath(folder))
     found = [path for path in (folder, *sorted(folder.glob("*"))) if _is_log(path)]
     if not found:
         raise InvalidInput(
@@ -70,6 +73,7 @@ def argoverse2_film(log: Path, grid: AngularGrid | None = None) -> Film:
     Raises InvalidInput for a file that is missing, truncated or incomplete, a timestamp without a
     pose, an unknown category, an object annotated twice at once.
     """
+    log = Path(os.path.abspath(log))
     boxes_file = annotation_file(log)
     pose_file = log / POSE_FILE
     sweeps, boxes = read_boxes(boxes_file)

@@ -58,7 +58,10 @@ RECORDING_CAR = "EGO_VEHICLE"
 """The category of the recording car itself, which is no object of its own film."""
 
 POSE_FILE = "city_SE3_egovehicle.feather"
+PLAIN_ANNOTATIONS = "annotations.feather"
 ANNOTATION_FILES = "annotations*.feather"
+LEAST_SWEEP_NS = 10**7
+"""No LiDAR turns faster. Sweeps of 10 Hz in microseconds would seem to be 0.1 ms apart."""
 PLACE = ("tx_m", "ty_m", "tz_m")
 TURN = ("qx", "qy", "qz", "qw")
 SIZE = ("length_m", "width_m", "height_m")
@@ -79,10 +82,17 @@ _BOX_RANGES = {
 
 
 def annotation_file(log: Path) -> Path:
-    """The file of the annotations of a log. Raises InvalidInput where there is none."""
-    found = sorted(log.glob(ANNOTATION_FILES))
+    """Return the file of the annotations of a log: the plain name, or the only other one.
+
+    Raises InvalidInput where there is none, or several that are not called by the plain name.
+    """
+    plain = log / PLAIN_ANNOTATIONS
+    found = [plain] if plain.exists() else sorted(log.glob(ANNOTATION_FILES))
     if not found:
         raise InvalidInput(f"{log / ANNOTATION_FILES}: no such file")
+    if len(found) > 1:
+        names = ", ".join(path.name for path in found)
+        raise InvalidInput(f"{log}: {names}: call the right one {PLAIN_ANNOTATIONS}")
     return found[0]
 
 
@@ -101,6 +111,12 @@ def read_boxes(path: Path) -> tuple[Integers, Columns]:
     if not kept.any():
         raise InvalidInput(f"{path}: no annotations")
     check_span(path, (sweeps[-1] - sweeps[0]) * 1e-9)
+    least_ns = np.diff(sweeps).min(initial=LEAST_SWEEP_NS)
+    if least_ns < LEAST_SWEEP_NS:
+        raise InvalidInput(
+            f"{path}: two sweeps {least_ns * 1e-6:g} ms apart: timestamp_ns must be nanoseconds, "
+            f"and sweeps at least {LEAST_SWEEP_NS * 1e-6:g} ms apart"
+        )
     for category in np.unique(boxes["category"]).tolist():
         if category not in ARGOVERSE2_CATEGORIES:
             raise InvalidInput(f"{path}: {unknown('category', category, ARGOVERSE2_CATEGORIES)}")

@@ -1,0 +1,141 @@
+"""Checks of a film, whoever made it: what is wrong is named with the scene, the time and the
+object.
+"""
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from care_sim.base.errors import InvalidInput, report_problems, shown
+from care_sim.core.arrays import Floats, Integers
+from care_sim.core.frames import Frame
+from care_sim.core.types import CLASSES
+from care_sim.loops.film import Film, Shot
+from care_sim.sensors.annotated import Annotations
+from care_sim.sources.plausible import SIZES_M
+
+LEAST_KEYFRAMES = 3
+"""Fewer tell neither an acceleration nor a first sighting that a track follows."""
+FULL_TURN = 2 * np.pi + 1e-6
+MOVES_M = 5.0
+"""The car must move so far in the life of an object, or nothing is known of the object's frame."""
+STILL_M = (0.3, 1.0)
+"""What stands moves at most a twentieth of the car's way, within these bounds: labels err."""
+MOST_ASTRAY = 0.3
+"""Share of the objects that a real drive may have of those which stand in another frame alone: cars
+in a convoy, for example. 17 drives of KITTI, two of nuScenes, two of Argoverse 2 and one of Boreas
+stay below it.
+"""
+_FRAMES = {
+    "move along with the car": "boxes of a Film are in the frame of its LiDAR at that keyframe, "
+    "not in the world's",
+    "move against the car": "poses of film_of_boxes are in the world's frame, not in the car's",
+}
+
+
+def check_film(film: Any, recorded: bool = False) -> None:
+    """Raise InvalidInput for what is no film, or holds what no scene can hold. A film of what was
+    `recorded` must annotate something.
+
+    Print a line where most boxes seem to be given in another frame.
+    """
+    if not isinstance(film, Film):
+        raise InvalidInput(f"film must return a Film, got {type(film).__name__}")
+    if len(film.shots) < LEAST_KEYFRAMES:
+        raise InvalidInput(
+            f"{film.name}: a film needs at least {LEAST_KEYFRAMES} keyframes, this one has "
+            f"{len(film.shots)}"
+        )
+    times = np.array([shot.time_s for shot in film.shots], dtype=float)
+    if not (np.isfinite(times).all() and (np.diff(times) > 0).all()):
+        raise InvalidInput(f"{film.name}: times must ascend, got {shown(times.tolist())}")
+    for shot in film.shots:
+        _check_shot(film, shot)
+    if recorded and not any(len(shot.annotations) for shot in film.shots):
+        raise InvalidInput(f"{film.name}: no {', no '.join(CLASSES)} in any of its keyframes")
+    tell_other_frame(film.name, [(shot.sensor, shot.annotations) for shot in film.shots])
+
+
+def tell_other_frame(name: str, seen: Sequence[tuple[Frame, Annotations]]) -> None:
+    """Print a line where most boxes seem to be given in another frame. `seen` are the frame of the
+    LiDAR and the annotations in it, per keyframe.
+    """
+    if told := _other_frame(seen):
+        _report_once(f"{name}: its boxes {told}: {_FRAMES[told]}")
+
+
+@lru_cache(maxsize=1000)
+def _report_once(line: str) -> None:
+    report_problems([line])
+
+
+def _check_shot(film: Film, shot: Shot) -> None:
+    place = f"{film.name} at {shot.time_s:g} s"
+    own = [shot.sensor.x, shot.sensor.y, shot.sensor.z]
+    turns = [shot.sensor.yaw, shot.sensor.pitch, shot.sensor.roll]
+    ego = [shot.ego.speed, shot.ego.yaw_rate, shot.ego.acceleration]
+    if not np.isfinite([*own, *turns, *ego]).all():
+        raise InvalidInput(f"{place}: the pose or the motion of the car is not finite")
+    if np.abs(turns).max() > FULL_TURN:
+        raise InvalidInput(
+            f"{place}: the car is turned by {max(turns, key=abs):g}, must be radians"
+        )
+    objects, boxes = shot.annotations.objects, shot.annotations.boxes
+    if not len(objects) == len(shot.annotations.classes) == len(boxes):
+        raise InvalidInput(f"{place}: objects, classes and boxes must be equally many")
+    if not len(objects):
+        return
+    _check_boxes(place, objects, boxes, shot.sensor.yaw)
+    if len(np.unique(objects)) < len(objects):
+        raise InvalidInput(f"{place}: an object is annotated twice")
+    if not np.isin(shot.annotations.classes, range(len(CLASSES))).all():
+        raise InvalidInput(f"{place}: classes must be numbers from 0 to {len(CLASSES) - 1}")
+
+
+def _check_boxes(place: str, objects: Integers, boxes: Floats, yaw: float) -> None:
+    if boxes.shape[1:] != (7,):
+        raise InvalidInput(f"{place}: boxes must be (n, 7), got {boxes.shape}")
+    sizes, turns = boxes[:, 3:6], boxes[:, 6]
+    least, most = SIZES_M
+    sized = ((sizes >= least) & (sizes <= most)).all(axis=1)
+    # A source may take the difference of two headings, each of which is within a turn.
+    in_radians = np.minimum(np.abs(turns), np.abs(turns + yaw)) <= FULL_TURN
+    for fits, told in (
+        (np.isfinite(boxes).all(axis=1), "a place, size or yaw that is not finite"),
+        (sized, f"a size outside {least:g} to {most:g} m"),
+        (in_radians, "a yaw beyond a full turn (radians)"),
+    ):
+        if not fits.all():
+            row = int(fits.argmin())
+            got = shown(boxes[row].tolist())
+            raise InvalidInput(f"{place}: object {objects[row]} has {told}, got {got}")
+
+
+def _other_frame(seen: Sequence[tuple[Frame, Annotations]]) -> str:
+    """Return how the boxes move if nothing stands as told, and much would in another frame; else
+    nothing. Each object counts once, by its first and its last box.
+    """
+    objects = np.concatenate([annotations.objects for _, annotations in seen])
+    numbers = np.repeat(np.arange(len(seen)), [len(annotations) for _, annotations in seen])
+    first = np.unique(objects, return_index=True)[1]
+    last = len(objects) - 1 - np.unique(objects[::-1], return_index=True)[1]
+    cars = np.array([sensor.origin for sensor, _ in seen])
+    way = np.linalg.norm(cars[numbers[last]] - cars[numbers[first]], axis=1)
+    counts = way >= MOVES_M
+    if counts.sum() < 2:
+        return ""
+    told = [annotations.boxes for _, annotations in seen]
+    world = [sensor.boxes_to_world(annotations.boxes) for sensor, annotations in seen]
+    twice = [sensor.boxes_to_world(boxes) for (sensor, _), boxes in zip(seen, world, strict=True)]
+
+    def standing(tables: list[Floats]) -> float:
+        places = np.concatenate(tables)[:, :3]
+        moved = np.linalg.norm(places[last] - places[first], axis=1)
+        return float(np.mean((moved <= np.clip(way / 20, *STILL_M))[counts]))
+
+    if standing(world) > 0.1:
+        return ""
+    others = zip(_FRAMES, (told, twice), strict=True)
+    return next((name for name, boxes in others if standing(boxes) > MOST_ASTRAY), "")
