@@ -169,7 +169,7 @@ def test_the_picture_is_of_the_first_keyframe_at_which_somebody_appears_or_of_a_
 def test_of_a_moment_that_never_comes_there_is_no_picture_and_the_play_is_told(played, tmp_path):
     # A car stands before one that stands.
     standing = box("REGULAR_VEHICLE", (12.0, 0.0, 0.42), track="standing")
-    log = write(tmp_path / "log", [[standing]] * 10, [at(0.0)] * 10)
+    log = write(tmp_path / "log", [[standing]] * 11, [at(0.0)] * 11)
     picture = tmp_path / "x.png"
     line = ("run", f"argoverse2:{log}", "--policy", "full", "--picture", picture)
     for options, told in (((), "nobody appeared"), (("--at", 2), "no keyframe at 2 s or later")):

@@ -150,7 +150,9 @@ def test_the_presence_is_part_of_the_digest_and_a_column_where_it_is_not_the_rul
     van = box("BOX_TRUCK", (20.0, -4.0, 0.9), (6.0, 2.2, 2.6), track="van")
     person = box("PEDESTRIAN", (14.0, 3.0, 0.6), (0.6, 0.7, 1.8), track="p", points=0)
     write(
-        tmp_path / "a", [[van, person]] * 5 + [[van, person | {"num_interior_pts": 4}]], [at()] * 6
+        tmp_path / "a",
+        [[van, person]] * 5 + [[van, person | {"num_interior_pts": 4}]] * 6,
+        [at()] * 11,
     )
     source = source_of(f"argoverse2:{tmp_path}")
     rule, sight = (
@@ -166,7 +168,7 @@ def test_the_presence_is_part_of_the_digest_and_a_column_where_it_is_not_the_rul
     assert (
         (by_rule["frames"], by_rule["found"])
         == (by_sight["frames"], by_sight["found"])
-        == (3.0, 3.0)
+        == (5.0, 5.0)
     )
     assert [plays_by_setting([row])[0].setting.label for row in (by_rule, by_sight)] == [
         "Argoverse 2, detector returns",
@@ -333,7 +335,7 @@ def test_a_number_of_scenes_that_there_is_not_is_one_short_line(text):
 
 def test_a_scene_without_an_event_has_a_row_too(tmp_path):
     far = box("REGULAR_VEHICLE", (70.0, 0.0, 0.42))
-    write(tmp_path / "empty", [[far]] * 10, [at()] * 10)
+    write(tmp_path / "empty", [[far]] * 15, [at()] * 15)
     (row,) = attempted(small(source_of(f"argoverse2:{tmp_path}"), ["care"], scenes=("empty",)))
     assert Tally(*(row[name] for name in plays.SUMS)) == Tally()
     assert row["ttfds"] == ()
