@@ -4,6 +4,7 @@ import os
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from care_sim.base.errors import InvalidInput
@@ -16,6 +17,15 @@ VALUES_PER_POINT = 5
 """float32 x, y, z, intensity and ring."""
 MOST_SWEEP_BYTES = 2**28
 """Bytes of a file: 13 million points, some hundred times a sweep of any LiDAR."""
+RINGS = 256
+"""More than any LiDAR has. nuScenes' has 32."""
+REACH_M = 500.0
+"""Farther than any LiDAR reaches. nuScenes' reaches 100 m."""
+_OTHERS = {
+    4: "x, y, z and intensity (KITTI)",
+    6: "x, y, z, intensity, elongation and another (Waymo)",
+}
+"""What files with another number of values per point hold."""
 OWN_CAR_M = 1.0
 """Points nearer than this lie on the recording car (the radius within which the devkit drops them
 from sweeps).
@@ -26,8 +36,8 @@ def read_points(path: Path) -> Floats:
     """(n, 3) points of a `.pcd.bin` file in the sensor frame: x forward, y left. In the file x is
     right, y forward.
 
-    Raises InvalidInput for a file that is missing, truncated or larger than `MOST_SWEEP_BYTES`, and
-    for a place that is not finite.
+    Raises InvalidInput for a file that is missing, truncated or larger than `MOST_SWEEP_BYTES`, for
+    a place that is not finite, and for a file of another form.
     """
     if not os.path.isfile(path):
         raise InvalidInput(f"{path}: no such file")
@@ -42,15 +52,37 @@ def read_points(path: Path) -> Floats:
     if values.size % (4 * VALUES_PER_POINT) or not values.size:
         raise InvalidInput(
             f"{path}: {values.size} bytes are no whole number of points of {4 * VALUES_PER_POINT} "
-            "bytes"
+            f"bytes{_other_form(values)}"
         )
-    places = values.view("<f4").reshape(-1, VALUES_PER_POINT)[:, :3]
+    rows = values.view("<f4").reshape(-1, VALUES_PER_POINT)
+    places, rings = rows[:, :3], rows[:, 4]
     # Before they are cast: the cast warns of a signalling NaN.
     finite = np.isfinite(places).all(axis=1)
     if not finite.all():
-        raise InvalidInput(f"{path}: point {finite.argmin()} has a place that is not finite")
+        point = f"point {finite.argmin()} has a place that is not finite"
+        raise InvalidInput(f"{path}: {point}{_other_form(values)}")
+    with np.errstate(invalid="ignore"):
+        whole = (rings >= 0) & (rings < RINGS) & (rings == np.rint(rings))
+    if not (whole.all() and (np.abs(places) <= REACH_M).all()):
+        raise InvalidInput(
+            f"{path}: must hold float32 x, y, z within {REACH_M:g} m, intensity, and a whole ring "
+            f"from 0 to {RINGS - 1} per point{_other_form(values)}"
+        )
     points = places.astype(float)
     return np.column_stack([points[:, 1], -points[:, 0], points[:, 2]])
+
+
+def _other_form(content: NDArray[np.uint8]) -> str:
+    """Return which other form the content of a file seems to have, to end a complaint."""
+    for count, names in _OTHERS.items():
+        if content.size and content.size % (4 * count) == 0:
+            rows = content.view("<f4").reshape(-1, count)
+            # What stands beside the places is never negative; places are, on one side.
+            with np.errstate(invalid="ignore"):
+                fits = (np.abs(rows[:, :3]) <= REACH_M).all() and (rows[:, 3:5] >= 0).all()
+            if fits:
+                return f"; it looks like {count} values per point: {names}"
+    return ""
 
 
 def recorded_cloud(
