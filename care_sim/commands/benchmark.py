@@ -10,17 +10,19 @@ from typing import Annotated
 import tyro
 
 from care_sim.base.bounds import bounded, check_fields
-from care_sim.base.errors import InvalidInput, report_problems
+from care_sim.base.errors import BrokenPolicy, InvalidInput, report_problems
 from care_sim.base.files import JSON, check_output
 from care_sim.commands.shared.run_study import summary
 from care_sim.commands.shared.selection import check_values, playable, policy_parameters
 from care_sim.commands.shared.study_command import DONE, FAILED, console
 from care_sim.core.cell_order import AS_DEMANDED
+from care_sim.policies import tags_of
+from care_sim.policies.isolation import isolated_policies
 from care_sim.reports.leaderboard import leaderboard_table
 from care_sim.study.benchmark.play import played
 from care_sim.study.benchmark.player import player_in
 from care_sim.study.benchmark.screening import screened_worlds
-from care_sim.study.benchmark.tasks import Entry, tasks_of
+from care_sim.study.benchmark.tasks import Entry, Task, tasks_of
 from care_sim.study.benchmark.worlds import (
     Salt,
     World,
@@ -64,6 +66,7 @@ class Benchmark:
     def __post_init__(self) -> None:
         check_fields(self)
 
+    @isolated_policies()
     def __call__(self) -> int:
         """Run it."""
         check_values(self, "policy")
@@ -103,7 +106,7 @@ class Benchmark:
 
         # One world of every part is enough to see whether a policy can be made.
         tried = [*{world.part: world for world in published_worlds()}.values()]
-        policies, left_out = playable(self.policy, lambda name: tasks_of(entry(name), tried))
+        policies, left_out = playable(self.policy, lambda name: _tasks(entry(name), tried))
         if not policies:
             raise InvalidInput("none of the policies can be played")
         entries = [entry(name) for name in policies]
@@ -117,3 +120,10 @@ class Benchmark:
         kind = ".quick" if self.quick else ".sealed" if self.sealed else ""
         name = re.sub(r"[^\w.=-]+", "-", entry.full_name)
         return self.out / f"{name}{kind}.json"
+
+
+def _tasks(entry: Entry, worlds: Sequence[World]) -> list[Task]:
+    """The tasks of an entry. Raises BrokenPolicy for one that knows the truth."""
+    if {"privileged", "non-causal"} & {*tags_of(entry.policy)}:
+        raise BrokenPolicy(f"policy {entry.policy} knows the truth, and the benchmark plays none")
+    return tasks_of(entry, worlds)

@@ -19,6 +19,7 @@ from care_sim.commands.shared.selection import check_values
 from care_sim.commands.shared.study_command import DONE, FAILED, console
 from care_sim.evaluation.detector_quality import Counts, SceneBoxes, counts, curve, reliability
 from care_sim.perception.detectors import CLUSTER, PILLARS, PROXY, check_detector
+from care_sim.policies.isolation import isolated_policies
 from care_sim.reports.detectors import Judged, detector_tables
 from care_sim.reports.figures.detectors import DETECTORS_FIGURE, detectors_figure
 from care_sim.reports.figures.files import check_figure, save
@@ -82,6 +83,7 @@ class Judge(PlayOptions):
             if not 0 <= score <= 1:
                 raise InvalidInput(f"least_scores must be from 0 to 1, got {score:g}")
 
+    @isolated_policies()
     def __call__(self) -> int:
         """Run it."""
         scenes = self._scenes()

@@ -16,6 +16,7 @@ from care_sim.base.errors import InvalidInput, MissingExtra, counted, report_pro
 from care_sim.base.files import check_output, told_if_replaced, write_text
 from care_sim.base.json_text import json_content
 from care_sim.commands.shared.study_command import DONE, FAILED, console
+from care_sim.policies.isolation import isolated_policies
 from care_sim.reports.figures.files import check_figure, save
 from care_sim.reports.figures.leaderboard import LEADERBOARD_FIGURE, leaderboard_figure
 from care_sim.reports.leaderboard import CONTROL, leaderboard_table, leads_table, names_in
@@ -110,6 +111,7 @@ class Leaderboard:
             )
         print(f"Page: {told}")
 
+    @isolated_policies()
     def _verified(self, results: dict[Path, BenchmarkResult]) -> list[str]:
         """Print how each result holds; a line for each that does not, or cannot be played."""
         salt = Salt.read(self.sealed) if self.sealed else None

@@ -22,6 +22,7 @@ from care_sim.policies.controls.place_hulls import PlaceHulls
 from care_sim.policies.controls.rows import Rows
 from care_sim.policies.controls.stride import Stride
 from care_sim.policies.controls.sweep import Sweep
+from care_sim.policies.isolation import IsolatedMaker, are_isolated
 from care_sim.policies.learned.learned_scorer import LearnedScorer
 from care_sim.policies.learned.learned_sets import LearnedSets
 from care_sim.policies.learned.ppo import PpoDartoutPolicy, PpoPolicy
@@ -197,7 +198,11 @@ def make_policy(name: str, env: _AnyEnv, /, **parameters: object) -> Policy | Ve
 
 
 def maker(name: str) -> PolicyMaker:
-    """What makes the policy. Raises InvalidInput with the reason for one that cannot be loaded."""
+    """What makes the policy, in a process of its own where policies of others are isolated. Raises
+    InvalidInput with the reason for one that cannot be loaded.
+    """
+    if are_isolated() and name not in BUILT_IN:
+        return IsolatedMaker(name, maker)
     return POLICIES.maker(name)
 
 

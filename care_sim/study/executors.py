@@ -23,6 +23,7 @@ from care_sim.base.cores import CORES
 from care_sim.base.errors import InvalidInput, one_line
 from care_sim.base.extras import missing_extra
 from care_sim.base.processes import end_group_with_work, end_with_parent, starting
+from care_sim.policies.isolation import are_isolated, isolate_policies
 
 if TYPE_CHECKING:
     from dask.distributed import Client
@@ -86,7 +87,7 @@ class Processes(ProcessPoolExecutor):
 
     def __init__(self, workers: int, context: BaseContext):
         with starting():
-            super().__init__(workers, context, _begin)
+            super().__init__(workers, context, _begin, (are_isolated(),))
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
         """Hand a call over."""
@@ -99,10 +100,12 @@ class Processes(ProcessPoolExecutor):
             process.kill()
 
 
-def _begin() -> None:
-    """Prepare a worker process."""
+def _begin(isolates: bool) -> None:
+    """Prepare a worker process, which `isolates` the policies of others as its starter does."""
     end_with_parent()
     end_group_with_work()
+    if isolates:
+        isolate_policies()
 
 
 class ClusterExecutor(Executor):

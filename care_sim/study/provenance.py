@@ -1,5 +1,6 @@
 """Where results come from: the code, the libraries and the machine that made them."""
 
+import json
 import platform
 from functools import cache
 from importlib import metadata
@@ -14,6 +15,7 @@ from care_sim.base.named_files import files_named_by, files_named_in, paths_in
 from care_sim.base.package_files import shipped_files
 from care_sim.perception.detectors import DETECTORS
 from care_sim.policies import POLICIES
+from care_sim.policies.isolation import are_isolated, policy_process
 from care_sim.scenarios import PLUGINS as SCENARIO_PLUGINS
 from care_sim.sources.installed import SOURCES, Installed
 from care_sim.sources.scenes import Source
@@ -54,7 +56,14 @@ def policy_digest(policy: str) -> str | None:
     package, and those that its defaults, constants and code name (`care_sim.base.named_files`).
     Empty for a built-in policy, None where there are no files to read.
     """
-    return "" if policy in POLICIES.built_in else _entry_digest(POLICIES.entry(policy))
+    if policy in POLICIES.built_in:
+        return ""
+    if not are_isolated():
+        return _entry_digest(POLICIES.entry(policy))
+    # The hash is made of loaded code, and that of others is loaded in its process alone.
+    process = policy_process(policy)
+    digest: str | None = process.read(json.loads, process.ask(policy_digest, policy))
+    return digest
 
 
 def detector_digest(detector: str) -> str | None:

@@ -3,6 +3,7 @@
 import json
 import re
 import shlex
+import sys
 from dataclasses import replace
 from random import Random
 
@@ -35,6 +36,20 @@ import care_sim
 class Throwing(care_sim.Policy):
     def demand(self, belief):
         raise RuntimeError("no idea")
+"""
+
+SPY = """
+import gc, gymnasium, care_sim
+
+class Spy(care_sim.Policy):
+    def demand(self, belief):
+        if any(isinstance(each, gymnasium.Env) for each in gc.get_objects()):
+            raise RuntimeError("here is the environment")
+        return care_sim.Demand()
+
+class Oracle(care_sim.PrivilegedPolicy):
+    def demand(self, belief):
+        return care_sim.Demand()
 """
 
 
@@ -155,6 +170,21 @@ def test_one_that_throws_is_named_and_the_other_has_its_file(capsys, here, monke
     assert "Throwing" not in out
 
 
+def test_a_policy_of_others_cannot_reach_the_environment(capsys, here, monkeypatch):
+    test = next(world for world in published_worlds() if world.part == "tests")
+    monkeypatch.setattr("care_sim.commands.benchmark.quick_tenth", lambda _worlds: [test])
+    (here / "spy.py").write_text(SPY)
+    code, out, err = run(
+        capsys, "benchmark", "--policy", "spy:Spy", "spy:Oracle", "--quick", "--workers", 1
+    )
+    assert (code, "spy" in sys.modules) == (1, False)
+    assert "Result: runs/benchmark/spy-Spy.quick.json" in out
+    told = [line for line in err.splitlines() if line.startswith("care-sim: ")]
+    assert {*told} == {
+        "care-sim: left out: policy spy:Oracle knows the truth, and the benchmark plays none"
+    }
+
+
 def test_a_sealed_set_is_played_and_verified_by_its_salt_alone(capsys, here, monkeypatch):
     for command in ("benchmark", "leaderboard"):
         monkeypatch.setattr(
@@ -199,6 +229,7 @@ def test_a_sealed_set_is_played_and_verified_by_its_salt_alone(capsys, here, mon
         (["benchmark", "--policy", "nobody"], "unknown policy 'nobody'"),
         (["benchmark", "--policy", "absent:Mine"], "No module named 'absent'"),
         (["benchmark", "--policy", "math:pi"], "is no Policy"),
+        (["benchmark", "--policy", "history-oracle"], "knows the truth"),
         (["benchmark", "--policy", "care", "--cell-order", "best"], "cell_order"),
         (
             ["benchmark", "--policy", "care", "--sealed", "none.txt", "--out", "s"],

@@ -101,3 +101,28 @@ def test_bad_options_are_refused_before_anything_is_played(
     assert complaint in error
     assert error.count("\n") == 1
     assert not (tmp_path / "runs").exists()
+
+
+SPY = """
+import gc, gymnasium
+from care_sim.policies.paper.care import Care
+
+class Spy(Care):
+    def demand(self, belief):
+        if any(isinstance(each, gymnasium.Env) for each in gc.get_objects()):
+            raise RuntimeError("here is the environment")
+        return super().demand(belief)
+"""
+
+
+def test_a_policy_of_others_cannot_reach_the_environment(drive, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "spy_of_judge.py").write_text(SPY)
+    options = ("--source", f"argoverse2:{drive}", "--workers", "1", "--detectors", "cluster")
+    counts = []
+    for policy in ("care", "spy_of_judge:Spy"):
+        out = tmp_path / policy.partition(":")[0]
+        assert run(*options, "--policy", policy, "--budget", "0.1", "--out", str(out)) == 0
+        told = json.loads((out / "judge.json").read_text())
+        counts.append(told["detectors"]["cluster"]["from score"])
+    assert counts[0] == counts[1]
