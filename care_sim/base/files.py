@@ -37,9 +37,9 @@ _being_written: set[Path] = set()
 
 @contextmanager
 def replacing(path: Path, kind: bytes = b"") -> Iterator[Path]:
-    """A file to write to, with the same ending, which takes the place of `path` in one move at the
-    end: readers see the old file or the new one. A link stays a link to it. What cannot be
-    replaced, such as a device or a pipe, is written into.
+    """Yield a file to write to, with the same ending, which takes the place of `path` in one move
+    at the end: readers see the old file or the new one. The file replaces a link at `path`: nothing
+    is written through a link. A stream, such as a device or a pipe, is written into.
 
     Raises what `check_output` does, before anything is computed; an error of writing names `path`.
     """
@@ -60,18 +60,25 @@ def check_output(path: Path, kind: bytes = b"") -> None:
     """
     # What stands there decides first. Then a file is made beside it and removed again, which tells
     # at once what the system would not allow at the end.
-    _resolved(path)
     if _is_stream(path):
         return
     if path.is_dir():
         raise InvalidInput(f"{path} is a folder, a file is wanted")
-    if path.exists() and not path.is_file():
-        raise InvalidInput(f"{path} is a block device or a socket: name a file")
-    if path.exists():
+    if path.exists() and not path.is_symlink():
+        if not path.is_file():
+            raise InvalidInput(f"{path} is a block device or a socket: name a file")
         _check_old(path, kind)
     with _moved_to(path, keep=False):
         pass
     _clear_away_before(path)
+
+
+def check_no_link(path: Path) -> None:
+    """Raise InvalidInput where a file that grows, or a folder inside an output folder, is a link:
+    its target may lie anywhere.
+    """
+    if path.is_symlink():
+        raise InvalidInput(f"{path} is a link, and links are not followed here: remove it first")
 
 
 def write_text(path: Path, text: str) -> None:
@@ -96,11 +103,11 @@ def _check_old(path: Path, kind: bytes) -> None:
 
 @contextmanager
 def _moved_to(path: Path, keep: bool = True) -> Iterator[Path]:
-    """A file beside what `path` is or links to, with its rights, which is moved there or, if not
+    """Yield a file beside `path`, with the rights of the old file, which is moved there or, if not
     kept, removed.
     """
     # Two writers of one file would each lose what the other wrote, and share the name beside it.
-    place = _resolved(path)
+    place = _place(path)
     if place in _being_written:
         raise InvalidInput(
             f"{path} is being written already: close what writes it, or name another file"
@@ -109,12 +116,14 @@ def _moved_to(path: Path, keep: bool = True) -> Iterator[Path]:
     _being_written.add(place)
     try:
         place.parent.mkdir(parents=True, exist_ok=True)
-        unfinished.touch()
+        # Whoever may write to the folder can guess the name: a link there must not be followed.
+        unfinished.unlink(missing_ok=True)
+        unfinished.open("x").close()
         yield unfinished
 
         # An error before this line leaves the old file as it is.
         if keep:
-            if place.exists():
+            if place.is_file() and not place.is_symlink():
                 shutil.copymode(place, unfinished)
             unfinished.replace(place)
     except OSError as error:
@@ -138,8 +147,8 @@ def why_unwritable(path: Path) -> str | None:
 
 @contextmanager
 def _written_into(path: Path) -> Iterator[Path]:
-    """A file elsewhere whose content goes into the stream `path`."""
-    with TemporaryDirectory(prefix="care-sim-") as folder:
+    """Yield a file elsewhere whose content goes into the stream `path`."""
+    with _opened(path) as handle, TemporaryDirectory(prefix="care-sim-") as folder:
         unfinished = Path(folder) / path.name
         unfinished.touch()
         yield unfinished
@@ -147,16 +156,37 @@ def _written_into(path: Path) -> Iterator[Path]:
         # What was printed before must come before, where the stream is the output of this process.
         sys.stdout.flush()
         try:
-            with unfinished.open("rb") as content, path.open("ab") as target:
+            with (
+                unfinished.open("rb") as content,
+                os.fdopen(handle, "ab", closefd=False) as target,
+            ):
                 shutil.copyfileobj(content, target)
         except OSError as error:
             raise OSError(error.errno, error.strerror, str(path)) from error
 
 
+@contextmanager
+def _opened(path: Path) -> Iterator[int]:
+    """Yield the open descriptor of a stream. Raises InvalidInput for a pipe without a reader: a
+    plain open would wait for ever.
+    """
+    try:
+        handle = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_NONBLOCK)
+    except OSError as error:
+        if error.errno == errno.ENXIO and path.is_fifo():
+            raise InvalidInput(f"nobody reads the pipe {path}: start its reader first") from error
+        raise
+    os.set_blocking(handle, True)
+    try:
+        yield handle
+    finally:
+        os.close(handle)
+
+
 def _clear_away_before(path: Path) -> None:
     """Remove what writers of the file have left beside it that were killed on this host."""
     # The name tells host and process: on a shared file system another host's may still be at work.
-    place = _resolved(path)
+    place = _place(path)
     ours = re.compile(rf"\.{_host()}\.(\d{{1,9}})\.{re.escape(_end_of_name(place))}")
     for name in os.listdir(place.parent):
         left = ours.fullmatch(name)
@@ -186,7 +216,12 @@ def _end_of_name(place: Path) -> str:
 
 
 def _is_stream(path: Path) -> bool:
-    """Whether `path` is a character device, a pipe or what this process prints to, be it a file."""
+    """Whether `path` is a character device, a pipe or what this process prints to, be it a file.
+    Only the system's own links, such as /dev/stdout, lead to a stream.
+    """
+    systems = (Path("/dev"), Path("/proc/self/fd").resolve())
+    if path.is_symlink() and path.parent.resolve() not in systems:
+        return False
     try:
         there = path.stat()
     except OSError:
@@ -204,11 +239,14 @@ def _printed_to() -> Iterator[os.stat_result]:
             continue
 
 
-def _resolved(path: Path) -> Path:
+def _place(path: Path) -> Path:
+    """The path with every link resolved but the last name, which is replaced if it is a link."""
     try:
-        return path.resolve()
+        return path.parent.resolve() / path.name
     except RuntimeError as error:
-        raise InvalidInput(f"{path} is a link that leads back to itself: name a file") from error
+        raise InvalidInput(
+            f"{path.parent} is a link that leads back to itself: name a folder"
+        ) from error
 
 
 def _named(error: OSError, path: Path, unfinished: Path) -> OSError:

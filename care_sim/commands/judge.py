@@ -13,7 +13,7 @@ import tyro
 
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.errors import InvalidInput, report_problems
-from care_sim.base.files import JSON, check_output, write_text
+from care_sim.base.files import JSON, check_no_link, check_output, write_text
 from care_sim.commands.shared.play_options import PlayOptions
 from care_sim.commands.shared.selection import check_values
 from care_sim.commands.shared.study_command import DONE, FAILED, console
@@ -93,6 +93,7 @@ class Judge(PlayOptions):
                 f"{self.out} holds what was judged before: give another --out, or --force to "
                 "replace it"
             )
+        check_no_link(self.out / _OFFICIAL)
         check_output(self.out / _FIGURES, JSON)
         check_output(self.out / _TABLES)
         check_figure(self.out / DETECTORS_FIGURE)

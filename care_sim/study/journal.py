@@ -12,6 +12,7 @@ from types import TracebackType
 from typing import NamedTuple, Self
 
 from care_sim.base.errors import InvalidInput
+from care_sim.base.files import check_no_link
 from care_sim.base.json_text import check_file_size, parsed_json
 from care_sim.study.rows.parquet import with_tuples
 from care_sim.study.run_config import Row
@@ -49,6 +50,7 @@ class Journal:
     def __init__(self, path: Path, study: str = "sweep"):
         self._study = study
         path.parent.mkdir(parents=True, exist_ok=True)
+        check_no_link(path)
         if path.exists():
             _check_journal(path)
         self._file = path.open("a+", encoding="utf-8", errors="replace")
@@ -127,6 +129,8 @@ def read_journal(path: Path) -> Finished:
 
 def is_written(path: Path) -> bool:
     """Whether a process that runs now adds lines to the journal."""
+    if not path.is_file():
+        return False
     try:
         with path.open(encoding="utf-8") as file:
             fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)

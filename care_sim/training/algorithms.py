@@ -13,6 +13,9 @@ from care_sim.training.config import AgentConfig, OnPolicy, PpoConfig, Recurrent
 if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm
 
+TENSORBOARD = "tensorboard"
+"""Folder of the logs for TensorBoard, in that of the run."""
+
 
 def algorithm(name: str) -> Any:
     """The class of a learner, a `BaseAlgorithm`.
@@ -33,7 +36,7 @@ def algorithm(name: str) -> Any:
 def make_learner(config: AgentConfig, envs: Any, goes_round: bool = True) -> "BaseAlgorithm":
     """A learner that has learned nothing yet; `goes_round` says whether the grid does."""
     policy, options = _settings(config, goes_round)
-    log = str(config.out / "tensorboard") if config.tensorboard else None
+    log = str(config.out / TENSORBOARD) if config.tensorboard else None
     learner: BaseAlgorithm = algorithm(config.algorithm)(
         policy=policy,
         env=envs,

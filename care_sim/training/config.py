@@ -82,7 +82,8 @@ class AgentConfig:
     out: Path = Path("runs/train")
     """Folder of configuration, weights, checkpoint and learning curve."""
     resume: bool = False
-    """Continue from the checkpoint in `out`."""
+    """Continue from the checkpoint in `out`. Loading a checkpoint runs code from it: resume your
+    own runs only."""
     tensorboard: bool = False
     """Write a log for TensorBoard into the folder: `tensorboard --logdir FOLDER` shows it."""
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import care_sim
 from care_sim.base.errors import InvalidInput, counted
 from care_sim.base.extras import import_torch, missing_extra
+from care_sim.base.files import check_no_link
 from care_sim.envs.sensing import sensing
 from care_sim.study.progress import ProgressLines, Show, progress_bar
 from care_sim.training import algorithms
@@ -75,6 +76,10 @@ def train_agent(
 
 
 def _resumed(config: AgentConfig, folder: Folder, envs: Any) -> "BaseAlgorithm":
+    _say(
+        f"resuming from {folder.checkpoint}: loading a checkpoint runs code from it, so resume "
+        "your own runs only"
+    )
     model: BaseAlgorithm = algorithms.algorithm(config.algorithm).load(
         folder.checkpoint, env=envs, device="cpu"
     )
@@ -204,6 +209,8 @@ class Stopwatch:
 
 
 def _check_tensorboard(config: AgentConfig) -> None:
+    # A resumed learner writes its log without the option, too.
+    check_no_link(config.out / algorithms.TENSORBOARD)
     if config.tensorboard:
         try:
             import tensorboard  # noqa: F401

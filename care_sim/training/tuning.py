@@ -22,7 +22,7 @@ from typing import Any
 
 from care_sim.base.errors import InvalidInput, one_line
 from care_sim.base.extras import missing_extra
-from care_sim.base.files import write_text
+from care_sim.base.files import check_no_link, write_text
 from care_sim.training.config import AgentConfig
 from care_sim.training.environments import wrapped
 from care_sim.training.episodes import LEARNER, read_episodes, write_episodes
@@ -97,6 +97,7 @@ def _opened(optuna: Any, config: AgentConfig) -> Any:
     if config.resume and not path.exists():
         raise InvalidInput(f"{config.out} holds no study to be resumed: no {STUDY}")
     config.out.mkdir(parents=True, exist_ok=True)
+    check_no_link(path)
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     journal = optuna.storages.journal
     storage = journal.JournalStorage(journal.JournalFileBackend(str(path)))
@@ -152,6 +153,8 @@ def _played(optuna: Any, trial: Any, config: AgentConfig, train: Train) -> tuple
     """How a trial ends, and its best return where it is complete."""
     states = optuna.trial.TrialState
     folder = config.out / TRIALS / f"{trial.number:03d}"
+    check_no_link(folder.parent)
+    check_no_link(folder)
     _take_rules(config.out / TRIALS / "000", folder)
     try:
         if not _is_done(folder / CURVE, config):

@@ -7,7 +7,6 @@ import socket
 import stat
 import subprocess
 import sys
-import threading
 from pathlib import Path
 
 import pytest
@@ -74,17 +73,40 @@ def test_a_folder_is_refused(tmp_path):
         pass
 
 
-def test_a_link_stays_and_what_it_leads_to_is_replaced(tmp_path):
+@pytest.mark.parametrize("target", ["far/theirs", "far/nowhere", "/dev/null", "out.csv"])
+def test_a_link_is_replaced_and_its_target_stays(target, tmp_path):
     (tmp_path / "far").mkdir()
-    (tmp_path / "link.csv").symlink_to("far/table.csv")
-    for text in ("made", "replaced"):
-        write_text(tmp_path / "link.csv", text)
-        assert (tmp_path / "link.csv").is_symlink()
-        assert (tmp_path / "far" / "table.csv").read_text() == text
-    assert [path.name for path in (tmp_path / "far").iterdir()] == ["table.csv"]
+    (tmp_path / "far" / "theirs").write_text("theirs")
+    (tmp_path / "out.csv").symlink_to(target)
+    write_text(tmp_path / "out.csv", "ours")
+    assert not (tmp_path / "out.csv").is_symlink()
+    assert (tmp_path / "out.csv").read_text() == "ours"
+    assert [path.name for path in (tmp_path / "far").iterdir()] == ["theirs"]
+    assert (tmp_path / "far" / "theirs").read_text() == "theirs"
+
+
+def test_a_link_under_the_name_of_the_unfinished_file_is_not_followed(tmp_path):
+    with replacing(tmp_path / "table.csv") as unfinished:
+        name = unfinished.name
+    (tmp_path / name).symlink_to("theirs")
+    write_text(tmp_path / "table.csv", "ours")
+    assert [path.name for path in tmp_path.iterdir()] == ["table.csv"]
+
+
+def test_a_link_to_a_folder_is_a_folder(tmp_path):
+    (tmp_path / "far").mkdir()
+    (tmp_path / "out").symlink_to("far")
+    write_text(tmp_path / "out" / "table.csv", "ours")
+    assert (tmp_path / "far" / "table.csv").read_text() == "ours"
     (tmp_path / "round").symlink_to("round")
-    with pytest.raises(InvalidInput, match="leads back to itself"):
-        check_output(tmp_path / "round")
+    with pytest.raises((InvalidInput, OSError), match=r"round"):
+        check_output(tmp_path / "round" / "table.csv")
+
+
+def test_a_pipe_without_a_reader_is_refused(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(InvalidInput, match=r"nobody reads the pipe .*/pipe: start"):
+        write_text(tmp_path / "pipe", "x")
 
 
 def test_the_rights_of_a_file_stay(tmp_path):
@@ -97,21 +119,17 @@ def test_the_rights_of_a_file_stay(tmp_path):
 def test_a_terminal_and_a_pipe_are_written_into(tmp_path):
     ours, theirs = os.openpty()
     os.set_blocking(ours, False)
-    (tmp_path / "link").symlink_to(os.ttyname(theirs))
-    write_text(tmp_path / "link", "to a device")
+    write_text(Path(os.ttyname(theirs)), "to a device")
     assert os.read(ours, 100) == b"to a device"
     assert stat.S_ISCHR(os.stat(os.ttyname(theirs)).st_mode)
     os.close(ours)
     os.close(theirs)
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
-    heard = []
-    reader = threading.Thread(target=lambda: heard.append(pipe.read_text()), daemon=True)
-    reader.start()
-    with replacing(pipe, JSON) as unfinished:
-        unfinished.write_text("into a pipe")
-    reader.join(10)
-    assert heard == ["into a pipe"]
+    with open(os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)) as reader:
+        with replacing(pipe, JSON) as unfinished:
+            unfinished.write_text("into a pipe")
+        assert reader.read() == "into a pipe"
     assert pipe.is_fifo()
     assert not [path for path in tmp_path.iterdir() if path.name.startswith(".")]
 

@@ -49,6 +49,14 @@ def test_a_file_system_without_locks_will_do(tmp_path, monkeypatch):
         assert "a" in journal
 
 
+def test_a_journal_that_is_a_link_is_refused_and_its_target_stays(tmp_path):
+    (tmp_path / "theirs").write_text("theirs")
+    (tmp_path / "journal.jsonl").symlink_to("theirs")
+    with pytest.raises(InvalidInput, match=r"journal\.jsonl is a link, .*: remove it first"):
+        Journal(tmp_path / "journal.jsonl")
+    assert (tmp_path / "theirs").read_text() == "theirs"
+
+
 ROW = {
     "digest": "a",
     "seed": 3,

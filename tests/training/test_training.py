@@ -139,6 +139,7 @@ def test_it_trains_keeps_and_goes_on(capsys, tmp_path):
 
     assert care(capsys, *command)[0] == 2
     code, said, _ = care(capsys, *command, "--steps", "192", "--resume")
+    assert "checkpoint.zip: loading a checkpoint runs code from it, so resume your own" in said
     assert code == 0
     rows = list(csv.DictReader((out / "curve.csv").open()))
     assert [int(row["steps"]) for row in rows] == [0, 64, 128, 192]
