@@ -5,12 +5,12 @@ it is gone.
 import multiprocessing
 import os
 import signal
+import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from multiprocessing import resource_tracker
-from multiprocessing.util import Finalize
+from multiprocessing import resource_tracker, util
 from typing import TypeVar
 
 from care_sim.base.interrupts import SIGNALS, held_back
@@ -23,12 +23,18 @@ LOOK_S = 1.0
 UNHEARD = {number for number in SIGNALS if number != signal.SIGTERM}
 """What a terminal sends to all processes in it. SIGTERM is how a pool ends a worker."""
 
+_LONGEST_FOLDER = 75
+"""Bytes of the folder for temporary files: the address of a socket inside one of its folders holds
+107 in all.
+"""
+
 
 @contextmanager
 def starting() -> Iterator[None]:
     """Processes started meanwhile, and theirs, never hear the terminal's interrupts; this one hears
     them afterwards, when nothing is half started.
     """
+    _shorten_socket_folder()
     with held_back():
         # Blocked signals stay blocked over fork and exec: a new process is deaf before it runs a
         # line.
@@ -40,6 +46,18 @@ def starting() -> Iterator[None]:
             yield
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _shorten_socket_folder() -> None:
+    """Make the folder for the sockets of multiprocessing in /tmp where TMPDIR is too long for one;
+    the processes that this one starts use the same folder.
+    """
+    if len(os.fsencode(tempfile.gettempdir())) > _LONGEST_FOLDER:
+        usual, tempfile.tempdir = tempfile.tempdir, "/tmp"
+        try:
+            util.get_temp_dir()
+        finally:
+            tempfile.tempdir = usual
 
 
 def end_with_parent() -> None:
@@ -73,7 +91,7 @@ def end_group_with_work() -> None:
     """
     lead_group()
     # multiprocessing waits for threads and child processes after these finalizers.
-    Finalize(None, _end_group, exitpriority=0)
+    util.Finalize(None, _end_group, exitpriority=0)
 
 
 def end_with_starter(starter: int) -> None:
