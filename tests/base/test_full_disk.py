@@ -1,9 +1,10 @@
-"""Every writer where a file cannot grow: an error that names the file, what was there stays,
-nothing torn is left.
+"""Every writer where a name is not UTF-8, and where a file cannot grow: an error that names the
+file, what was there stays, nothing torn is left.
 
 A limit on the size of files stands for the full disk: it needs no rights.
 """
 
+import os
 import resource
 from contextlib import contextmanager
 
@@ -16,7 +17,7 @@ from care_sim.base.errors import MissingExtra
 from care_sim.core.grid import AngularGrid
 from care_sim.policies.learned import weights
 from care_sim.reports.figures.files import save
-from care_sim.study.rows.parquet import write_rows
+from care_sim.study.rows.parquet import read_rows, write_rows
 from care_sim.viewer.pictures.clip_files import write_clip
 
 RNG = np.random.default_rng(0)
@@ -75,7 +76,7 @@ def no_file_larger_than(size):
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
-@pytest.mark.parametrize(
+every_writer = pytest.mark.parametrize(
     ("write", "name"),
     [
         (mp4, "a.mp4"),
@@ -89,6 +90,22 @@ def no_file_larger_than(size):
         (figure, "a.png"),
     ],
 )
+
+
+@every_writer
+def test_a_name_that_is_not_utf_8_is_written(write, name, tmp_path):
+    folder = tmp_path / os.fsdecode(b"z\xfc")
+    file = folder / (name if write is scans else os.fsdecode(b"\xfc") + name)
+    try:
+        write(file)
+    except MissingExtra as missing:
+        pytest.skip(str(missing))
+    assert file.stat().st_size > 5_000
+    if write is rows:
+        assert len(read_rows(file)) == 5_000
+
+
+@every_writer
 def test_a_file_that_does_not_fit_is_named_and_nothing_of_it_is_left(write, name, tmp_path):
     try:
         write(tmp_path / "whole" / name)

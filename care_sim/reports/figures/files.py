@@ -34,7 +34,7 @@ def save(figure: Figure, stem: Path) -> None:
         # Ids within an SVG are random without a salt, and it holds the date. Neither may make a new
         # file of the same figure.
         with (
-            rc_context({"svg.hashsalt": stem.name}),
+            rc_context({"svg.hashsalt": printable(stem.name)}),
             replacing(stem.with_suffix(".svg")) as unfinished,
         ):
             figure.savefig(unfinished, metadata={"Date": None})

@@ -25,7 +25,8 @@ def read_columns(
     in it, or has an empty or infinite value, or one beyond its range.
     """
     try:
-        table = feather.read_table(path)
+        with path.open("rb") as file:
+            table = feather.read_table(file)
         table.validate(full=True)
         # Names that are no UTF-8 show only when they are read.
         names = table.column_names

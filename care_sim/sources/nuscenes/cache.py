@@ -80,7 +80,8 @@ def _mapped(place: Path, stamp: str) -> pa.Table | None:
     """The table of the file, which stays on the disk until it is read; None of another one."""
     try:
         table = pa.ipc.open_file(pa.memory_map(os.fspath(place))).read_all()
-    except (OSError, pa.ArrowException):
+    # Arrow maps no file whose name is not UTF-8.
+    except (OSError, UnicodeError, pa.ArrowException):
         return None
     return table if (table.schema.metadata or {}).get(_STAMP) == stamp.encode() else None
 

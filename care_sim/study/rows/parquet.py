@@ -55,9 +55,10 @@ def write_columns(
         name: column.cast(schema.column(name).type) if column.type == pa.null() else column
         for name, column in arrays.items()
     }
-    with replacing(path) as unfinished:
-        table = pa.table(typed).replace_schema_metadata(notes)
-        pq.write_table(table, unfinished, write_page_checksum=True)
+    # Arrow opens no file whose name is not UTF-8, so it gets files that are open.
+    table = pa.table(typed).replace_schema_metadata(notes)
+    with replacing(path) as unfinished, unfinished.open("wb") as file:
+        pq.write_table(table, file, write_page_checksum=True)
 
 
 def check_columns(rows: Iterable[Row]) -> None:
@@ -129,7 +130,8 @@ def read_table(path: Path) -> pa.Table:
         raise InvalidInput(f"no results at {path}; expected a folder that a study wrote")
     try:
         # Files of older versions have no checksums, and are read without them.
-        table = pq.read_table(path, page_checksum_verification=True)
+        with path.open("rb") as file:
+            table = pq.read_table(file, page_checksum_verification=True)
         # Damaged offsets are found here, not as a crash when values are read.
         table.validate(full=True)
         table.column_names  # noqa: B018 (names of broken characters show only now)

@@ -8,7 +8,7 @@ from typing import Any
 
 import rerun as rr
 
-from care_sim.base.errors import InvalidInput, unknown
+from care_sim.base.errors import InvalidInput, printable, unknown
 from care_sim.base.files import RERUN, replacing
 from care_sim.core.rig import Rig
 from care_sim.loops.closed_loop import ClosedLoop
@@ -67,7 +67,7 @@ class Recording(AbstractContextManager["Recording"]):
             self._memory = self._stream.memory_recording()
             self._stream.send_blueprint(blueprint(self._lanes, open_loop), make_active=False)
         self._file.callback(self._write)
-        self._stream.send_recording_name(path.stem)
+        self._stream.send_recording_name(printable(path.stem))
         told = about(SCENE_ENTITIES if open_loop else ENTITIES)
         self._stream.log(
             ABOUT_ENTITY, rr.TextDocument(told, media_type=rr.MediaType.MARKDOWN), static=True
