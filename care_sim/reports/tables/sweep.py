@@ -57,7 +57,7 @@ def sweep_tables(rows: Sequence[Row]) -> list[Table]:
     for setting in dict.fromkeys(cell.setting for cell in cells):
         own = [cell for cell in cells if cell.setting == setting]
         tables += [
-            levels_table(setting.label, own),
+            levels_table(setting, own, groups),
             *sweep_contrast_tables(setting, own, groups),
             *control_tables(setting, own, groups),
         ]
@@ -77,19 +77,25 @@ def sweep_minus(rows: Sequence[Row], policy: str) -> list[Table]:
     return tables
 
 
-def levels_table(title: str, cells: Sequence[Cell]) -> Table:
+def levels_table(setting: Setting, cells: Sequence[Cell], groups: Groups) -> Table:
     """Medians, counts and regret, one row per cell."""
     published = [_published(cell) for cell in cells]
     sentences = dict.fromkeys(f'Paper: "{result.sentence}"' for result in published if result)
     lines = (_line(cell, result) for cell, result in zip(cells, published, strict=True))
-    # A table of full scans alone lacks no regret.
-    regretted = any(cell.regret for cell in cells) or all(cell.policy == FULL for cell in cells)
-    missing = [] if regretted else ["Regret: full not run."]
-    notes = [*tag_notes(cell.tags for cell in cells), *missing, *_nobody_notes(cells)]
+    missing = [] if full_of(groups, setting) else ["Regret: full not run."]
+    notes = [*tag_notes(cell.tags for cell in cells), *missing, *_nobody_notes(setting, cells)]
     # A terminal has no room for columns of zeros.
     counted = {"never": [cell.never for cell in cells], "collisions": [c.collisions for c in cells]}
     hidden = (*_FILES_ONLY, *(column for column, counts in counted.items() if not any(counts)))
-    return Table(title, SWEEP_COLUMNS, tuple(lines), tuple(notes), tuple(sentences), hidden, _WHOLE)
+    return Table(
+        setting.label,
+        SWEEP_COLUMNS,
+        tuple(lines),
+        tuple(notes),
+        tuple(sentences),
+        hidden,
+        _WHOLE,
+    )
 
 
 def sweep_contrast_tables(setting: Setting, cells: Sequence[Cell], groups: Groups) -> list[Table]:
@@ -204,15 +210,17 @@ def _paper(result: PublishedResult) -> str:
     return f"{result.detection_m:g}{braked}"
 
 
-def _nobody_notes(cells: Sequence[Cell]) -> list[str]:
+def _nobody_notes(setting: Setting, cells: Sequence[Cell]) -> list[str]:
     """How many episodes first detections leave out, where there are any."""
     left_out = sorted({(cell.episodes - cell.met, cell.episodes) for cell in cells})
     named = [f"{count} of {all_of}" for count, all_of in left_out if count]
     if not named:
         return []
+    # Rows of other worlds lack the actor for reasons of their own.
+    why = ", since the drive meets nobody" if setting.world == "drive" else ""
     return [
-        f"{', '.join(named)} episodes have no first-sighting actor, since the drive meets nobody: "
-        "first detection, never and regret leave them out."
+        f"{', '.join(named)} episodes have no first-sighting actor{why}: first detection, never "
+        "and regret leave them out."
     ]
 
 

@@ -93,6 +93,23 @@ def test_the_full_scan_alone_has_nothing_to_regret():
     assert table.notes == ("Regret: full not run.",)
 
 
+def test_a_full_scan_that_was_run_is_not_said_to_be_missing():
+    """On other seeds than the policy, so that there is no regret."""
+    history, full = ([one for one in STUDY if one["policy"] == p] for p in ("history", "full"))
+    table, *_ = sweep_tables([*history[:2], *full[2:]])
+    assert table.notes == ()
+
+
+@pytest.mark.parametrize(("scenario", "why"), [("dartout", ""), ("drive", ", since the drive")])
+def test_a_drive_alone_meets_nobody(scenario, why):
+    nobody = {"detection_distance_m": None, "undetected_to_m": None}
+    met, row = rows("full", [9.0, 9.0], scenario=scenario)
+    table, *_ = sweep_tables([met, row | nobody])
+    (note,) = table.notes
+    assert note.startswith(f"1 of 2 episodes have no first-sighting actor{why}")
+    assert ("drive" in note) == (scenario == "drive")
+
+
 def test_what_is_learned_is_compared_with_every_policy_too():
     learned = rows(
         "learned-scorer", [14.0, 15.0, 16.0, 17.0, 18.0], changes={"tags": "causal+learned"}
