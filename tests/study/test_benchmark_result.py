@@ -173,6 +173,14 @@ def test_a_damaged_file_is_named(file, values):
     assert not any(word in told for word in ("Error", "object", "argument", "\n"))
 
 
+def test_a_parameter_that_a_built_in_policy_lacks_is_refused(file):
+    """What another policy has is that policy's own word."""
+    assert read_result(changed(file, parameters=[["speed", 2]])).entry.parameters
+    assert refusal(changed(file, policy="care")).startswith(
+        f"{file}: unknown parameter of policy care 'speed'"
+    )
+
+
 def test_what_a_damaged_file_lacks_is_named(file):
     content = json.loads(file.read_text())
     del content["policy"]
@@ -209,10 +217,10 @@ def test_an_entry_shows_the_name_of_a_file_and_not_where_it_lies():
 def test_a_result_is_of_the_files_that_its_parameters_name(tmp_path):
     weights = tmp_path / "w.txt"
     weights.write_text("1")
-    entry = Entry("care", (("weights", str(weights)),))
-    result = replace(made_result("care"), entry=entry, made_by=made_by(entry))
-    result.write(tmp_path / "care.json")
-    assert is_of_this_code(read_result(tmp_path / "care.json"))
+    entry = Entry("learned-sets", (("path", str(weights)),))
+    result = replace(made_result("learned-sets"), entry=entry, made_by=made_by(entry))
+    result.write(tmp_path / "mine.json")
+    assert is_of_this_code(read_result(tmp_path / "mine.json"))
     weights.write_text("2")
     assert not is_of_this_code(result)
     assert own_code_of(replace(result, made_by=made_by(entry))) != own_code_of(result)

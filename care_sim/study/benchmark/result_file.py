@@ -10,8 +10,9 @@ from typing import Any
 from care_sim.base.checks import LARGEST_INTEGER
 from care_sim.base.errors import InvalidInput, counted, printable, shown
 from care_sim.base.json_text import json_content
-from care_sim.policies import POLICIES, tags_of
+from care_sim.policies import POLICIES, maker, tags_of
 from care_sim.policies.base import TAGS
+from care_sim.policies.makers import check_parameters
 from care_sim.study.benchmark.result import RESULT_MARK, BenchmarkResult, ResultRow
 from care_sim.study.benchmark.tasks import CAMERAS, Entry
 from care_sim.study.benchmark.worlds import (
@@ -45,7 +46,7 @@ def read_result(path: Path) -> BenchmarkResult:
         result = _result(content)
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise InvalidInput(f"{path} is damaged: {_reason(error)}") from error
-    _check_tags(path, result)
+    _check_policy(path, result)
     _check_worlds(path, result)
     return result
 
@@ -113,15 +114,23 @@ def _row(values: Any) -> ResultRow:
     return row
 
 
-def _check_tags(path: Path, result: BenchmarkResult) -> None:
-    """Raise InvalidInput for tags that there are not, or that a built-in policy has not."""
+def _check_policy(path: Path, result: BenchmarkResult) -> None:
+    """Raise InvalidInput for unknown tags, and for tags and parameters that a built-in policy does
+    not have.
+    """
     policy, tags = result.entry.policy, result.tags
     if unknown := {*tags} - {*TAGS}:
         raise InvalidInput(f"{path} has unknown tags {shown(sorted(unknown))}; known: {TAGS}")
-    if policy in POLICIES.built_in and {*tags} != {*tags_of(policy)}:
+    if policy not in POLICIES.built_in:
+        return
+    if {*tags} != {*tags_of(policy)}:
         raise InvalidInput(
             f"{path} says that {policy} is {shown(tags)}, and it is {tags_of(policy)}"
         )
+    try:
+        check_parameters(policy, maker(policy), dict(result.entry.parameters))
+    except InvalidInput as error:
+        raise InvalidInput(f"{path}: {error}") from error
 
 
 def _check_worlds(path: Path, result: BenchmarkResult) -> None:
