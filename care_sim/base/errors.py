@@ -150,6 +150,11 @@ def printable(text: str) -> str:
     )
 
 
+def printable_lines(text: str) -> str:
+    """The same of a text of several lines."""
+    return "\n".join(map(printable, text.split("\n")))
+
+
 def percent(budget: float) -> str:
     """A budget as people read it."""
     return f"{100 * budget:.3g}%"

@@ -10,7 +10,7 @@ from matplotlib.axis import Tick
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from care_sim.base.errors import InvalidInput, printable
+from care_sim.base.errors import InvalidInput, printable_lines
 from care_sim.base.files import PNG, SVG, check_output, replacing
 
 _FORMATS = (".png", ".svg")
@@ -50,7 +50,7 @@ def texts_as_they_are(figure: Figure) -> Iterator[None]:
     for text in figure.findobj(Text):
         if id(text) not in of_ticks:
             text.set_parse_math(False)
-            text.set_text("\n".join(map(printable, text.get_text().split("\n"))))
+            text.set_text(printable_lines(text.get_text()))
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", r"Glyph .* missing from font")
         yield

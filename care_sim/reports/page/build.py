@@ -13,7 +13,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 import care_sim
-from care_sim.base.errors import InvalidInput, counted
+from care_sim.base.errors import InvalidInput, counted, printable_lines
 from care_sim.base.extras import vega_bundle
 from care_sim.base.files import HTML, replacing
 from care_sim.evaluation.recall import CENSORED_AT
@@ -180,8 +180,7 @@ def write_page(
             )
         episodes = played_again(watched, workers, make_executor, source)
         page = Page(folder.resolve().name, study, rows, findings, about, episodes)
-        # Lone surrogates, which names of files may hold, are written as escapes.
-        unfinished.write_text(page.html(), encoding="utf-8", errors="backslashreplace")
+        unfinished.write_text(page.html(), encoding="utf-8")
     return page
 
 
@@ -196,6 +195,7 @@ def _template() -> Any:
         loader=loader,
         autoescape=True,
         undefined=StrictUndefined,
+        finalize=_printable,
         trim_blocks=True,
         lstrip_blocks=True,
     )
@@ -215,5 +215,24 @@ def _embedded(data: Any) -> Markup:
     """Plain data for a script element, whose end no text in it can be."""
     return Markup(
         # "</script>" in a text would end the element.
-        json.dumps(data, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c")
+        json.dumps(_printable(data), separators=(",", ":"), ensure_ascii=False).replace(
+            "<", "\\u003c"
+        )
     )
+
+
+def _printable(data: Any) -> Any:
+    """Plain data or a value of the template; its texts may hold anybody's names, whose control
+    codes and directions are shown as escapes.
+    """
+    match data:
+        # The page's own files.
+        case Markup():
+            return data
+        case str():
+            return printable_lines(data)
+        case dict():
+            return {_printable(name): _printable(value) for name, value in data.items()}
+        case list() | tuple():
+            return [*map(_printable, data)]
+    return data

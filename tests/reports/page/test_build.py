@@ -56,6 +56,22 @@ def test_the_page_tells_how_to_read_its_tables_as_the_report_does(tmp_path):
     assert f"<p>{reading}</p>" in page
 
 
+def test_directions_and_control_codes_in_names_are_shown_as_escapes(tmp_path):
+    turned = [row | {"policy": "mine\u202e\x1b"} for row in STUDY if row["policy"] == "history"]
+    folder = tmp_path / "runs\u2066"
+    folder.mkdir()
+    another = rows("care", [9.0], budget=0.1)
+    write_rows([*STUDY, *turned, *another], folder / "episodes.parquet")
+    write_page(folder, tmp_path / "report.html", 0, 1)
+    page = (tmp_path / "report.html").read_text()
+    assert not {"\u202e", "\u2066", "\x1b"} & {*page}
+    assert "\\u001b" not in page
+    # In the tables and the list of episodes, then in the charts, and in the page's own heading.
+    assert "mine\\u202e\\x1b" in page
+    assert "mine\\\\u202e\\\\x1b" in page
+    assert "<b>runs\\u2066</b>" in page
+
+
 def test_a_page_leaves_out_empty_columns_and_what_is_said_of_them(tmp_path):
     def page_of(rows):
         write_rows(rows, tmp_path / "episodes.parquet")
