@@ -87,13 +87,11 @@ class Forgetting:
         low = streaks > 0
 
         # The margin shrinks with the streak, but never below what the uncertainty of the position
-        # needs (Eq. 4), and never beyond that of a full hull. Of several LiDARs the one that needs
-        # the most decides.
+        # needs (Eq. 4).
         margin = self._rig.azimuth_margin
         decayed = np.ceil(margin - self.rules.decay_per_keyframe * streaks)
-        sigma = self.rules.position_sigma_m
-        needed = np.max([_needed(sigma, tracks.boxes, head) for head in self._rig.grid.heads], 0)
-        shrunk = np.clip(np.maximum(decayed, needed), 0, margin)
+        needed = uncertainty_margin(self.rules.position_sigma_m, tracks.boxes, self._rig)
+        shrunk = np.maximum(decayed, needed)
         return np.where(low, shrunk, margin).astype(np.int64), low
 
     def _low_criticality(self, tracks: Tracks, ego: Ego) -> Mask:
@@ -109,19 +107,19 @@ class Forgetting:
         return harmless & (ranges > self.rules.guard_distance(ego.speed))
 
 
-def _needed(position_sigma_m: float, boxes: Floats, head: Head) -> Floats:
-    """(n,) columns of one LiDAR that Eq. 4 needs for boxes (n, 7)."""
-    ranges = planar_ranges(head.boxes(boxes))
-    return uncertainty_columns(position_sigma_m, ranges, head.grid.column_width)
-
-
-def uncertainty_columns(position_sigma_m: float, ranges: Floats, column_width: float) -> Floats:
-    """m_unc of Eq. 4: (n,) whole columns of `column_width` radians for tracks at `ranges` (n,)
-    metres whose positions are uncertain by `position_sigma_m`.
+def uncertainty_margin(position_sigma_m: float, boxes: Floats, rig: Rig) -> Floats:
+    """m_unc of Eq. 4: (n,) whole columns for boxes (n, 7) whose positions are uncertain by
+    `position_sigma_m`, at most the margin of a full hull. Of several LiDARs the one that needs the
+    most decides.
     """
+    needed = np.max([_columns(position_sigma_m, boxes, head) for head in rig.grid.heads], 0)
+    return np.asarray(np.minimum(needed, rig.azimuth_margin))
+
+
+def _columns(position_sigma_m: float, boxes: Floats, head: Head) -> Floats:
     # The angle of a short arc is its length over its range, which must not be 0.
-    angle = position_sigma_m / np.maximum(ranges, 1e-9)
-    columns: Floats = np.ceil(angle / column_width)
+    angle = position_sigma_m / np.maximum(planar_ranges(head.boxes(boxes)), 1e-9)
+    columns: Floats = np.ceil(angle / head.grid.column_width)
     return columns
 
 

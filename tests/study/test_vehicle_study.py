@@ -152,6 +152,12 @@ def test_an_exact_pose_forecasts_what_stands_exactly_and_jumps_do_not(dark):
     assert jumps["forecasts"] > 0
 
 
+def test_the_margin_of_eq_4_holds_no_more_than_a_full_hull():
+    """As in the policy, which never widens a hull."""
+    drift = vehicle_row(replace(DENSE_CARE, ego_position_sigma_m=0.4, ego_pose_correlation_s=10.0))
+    assert 0 < drift["forecasts_in_eq4"] <= drift["forecasts_in_margin"] < drift["forecasts"]
+
+
 def test_the_guard_of_a_standing_car_is_four_metres():
     """The paper's k_safe s_0; a car whose brake comes on for nearly anything soon stands."""
     row = vehicle_row(replace(DENSE_CARE, policy="full", budget=1.0, brake_side_margin_m=5.0))

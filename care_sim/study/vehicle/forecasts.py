@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from care_sim.core.forgetting import VEHICLE_SIGMA_M, uncertainty_columns
+from care_sim.core.forgetting import VEHICLE_SIGMA_M, uncertainty_margin
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.study.run_config import Row
 
@@ -25,7 +25,7 @@ class Forecasts:
         azimuths, wanted = (np.arctan2(boxes[:, 1], boxes[:, 0]) for boxes in (tracks.boxes, true))
         away = np.abs((azimuths - wanted + np.pi) % (2 * np.pi) - np.pi)
         columns = away / loop.rig.grid.column_width
-        margin = uncertainty_columns(VEHICLE_SIGMA_M, tracks.ranges, loop.rig.grid.column_width)
+        margin = uncertainty_margin(VEHICLE_SIGMA_M, tracks.boxes, loop.rig)
         self._held += [
             int((columns <= margin).sum()),
             int((columns <= loop.rig.azimuth_margin).sum()),
