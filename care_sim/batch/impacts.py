@@ -11,7 +11,7 @@ from care_sim.world.approach import Impact
 from care_sim.world.bodies import BodyKind
 from care_sim.world.body_tables import bodies_near
 from care_sim.world.clearance_judge import CONTACT_REACH_M, ClearanceJudge
-from care_sim.world.world import World
+from care_sim.world.world import WORLD_STEP_S, World
 
 
 class Impacts:
@@ -36,8 +36,12 @@ class Impacts:
         for world in np.flatnonzero(counts).tolist():
             for body in near[world, : counts[world]].tolist():
                 if self._touches(state, world, body):
+                    # The velocity is that of `World.velocities_of`.
+                    boxes, before = bodies.boxes[world], bodies.before[world]
+                    velocity = (boxes[body, :2] - before[body, :2]) / WORLD_STEP_S
+                    kind, ego = self._kinds[world][body].name, int(egos.bodies[world])
                     speed_mps = float(egos.speeds[world])
-                    yield world, Impact.on(body, bodies.boxes[world], egos.bodies[world], speed_mps)
+                    yield world, Impact.on(body, kind, boxes, ego, speed_mps, velocity)
                     break
 
     def _touches(self, state: BatchState, world: int, body: int) -> bool:

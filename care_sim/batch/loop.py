@@ -23,6 +23,7 @@ from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.rig import Rig
 from care_sim.loops.episode import Episode
 from care_sim.loops.record_columns import Records
+from care_sim.world.approach import Impact
 from care_sim.world.bullet import NO_BODY
 
 
@@ -37,6 +38,8 @@ class BatchLoop:
 
     fired: Fired
     """What was fired at the last keyframe."""
+    impacts: Mapping[int, Impact]
+    """The first impact after the last keyframe, by world."""
 
     def __init__(
         self,
@@ -101,6 +104,7 @@ class BatchLoop:
 
         # The command holds until the next keyframe; then the cameras look and forecasts are due.
         passages = self._motion.advance(state, accelerations, self._rig.keyframe_s, self._exact)
+        self.impacts = passages.impacts
         state.keyframes[who] += 1
         self._tracking.predict(state)
         self._scanning.image(fired, returns, self._observed["ranges"], who)
@@ -116,6 +120,8 @@ class BatchLoop:
             passages.nearest_m,
             passages.clearance_m,
             np.where(passages.hit, passages.impact_speed_mps, np.nan),
+            # The proxy, the only detector here, reports bodies alone.
+            np.zeros(state.worlds, np.bool_),
         )
 
     def detectable(self, who: Mask) -> Mask:

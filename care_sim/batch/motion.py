@@ -129,8 +129,7 @@ class Motion:
             np.full(worlds, np.inf),
             np.zeros(worlds, np.bool_),
             np.zeros(worlds),
-            np.full(worlds, NO_BODY),
-            np.zeros(worlds, np.bool_),
+            {},
         )
         targeted = state.live & (state.egos.targets != NO_BODY)
         count = whole_steps(duration_s)
@@ -190,8 +189,7 @@ class Motion:
         for world, impact in self._impacts.now(state, state.live & ~passages.hit):
             passages.hit[world] = True
             passages.impact_speed_mps[world] = impact.speed_mps
-            passages.body[world] = impact.body
-            passages.ahead[world] = impact.at_front
+            passages.impacts[world] = impact
 
 
 def _source(actor: Actor) -> object:

@@ -12,6 +12,7 @@ import numpy as np
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.belief import MAX_TRACKS
 from care_sim.core.types import Tracks
+from care_sim.world.approach import Impact
 
 _BODIES, _PARTS, _CORNERS = 32, 128, 1024
 """Rows with which tables begin; they grow with what comes."""
@@ -108,16 +109,15 @@ class Fired(NamedTuple):
 class Passages(NamedTuple):
     """What happened while the worlds moved on to the next keyframe; (W,) each, columns as in
     `care_sim.world.approach.ClosestApproach`: `nearest_m`, `clearance_m`; whether there was an
-    impact, `hit`, and of the first one the ego's speed `impact_speed_mps`, the `body`, and whether
-    it lay `ahead`.
+    impact, `hit`, and the ego's speed `impact_speed_mps` at the first one. `impacts` holds these
+    first impacts by world.
     """
 
     nearest_m: Floats
     clearance_m: Floats
     hit: Mask
     impact_speed_mps: Floats
-    body: Integers
-    ahead: Mask
+    impacts: dict[int, Impact]
 
 
 class BatchState:

@@ -26,6 +26,7 @@ from care_sim.reports.table import Table
 from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.episode_play import GymEnv, result_or_reason, trace
 from care_sim.study.play_config import PlayConfig
+from care_sim.study.rows.reading import stops_for_nothing
 from care_sim.study.run_config import Row
 from care_sim.study.scene_trace import trace_scene
 from care_sim.viewer.pictures.comparison import draw_panel
@@ -41,6 +42,12 @@ _COLUMNS = {
     "impact_speed_mps": "impact m/s",
     "rays_fired": "rays fired",
 }
+_OF_COLLISIONS = {
+    "hit_kind": "hit",
+    "hit_at_front": "at its front",
+    "closing_speed_mps": "closing m/s",
+}
+_OF_STOPS_FOR_NOTHING = {"braked_before_view": "braked for nothing"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,7 +161,9 @@ def _outcome_table(played: Sequence[tuple[AnyConfig, Row]]) -> Table:
     if isinstance(config, PlayConfig):
         title, told, written = config.scene.name, LABELS, outcome_text
     else:
-        title, told = f"{config.scenario} seed {config.seed}", _COLUMNS
+        title, told = f"{config.scenario} seed {config.seed}", {**_COLUMNS}
+        told |= _OF_COLLISIONS if any(row["collision"] for _, row in played) else {}
+        told |= _OF_STOPS_FOR_NOTHING if any(stops_for_nothing(row) for _, row in played) else {}
         written = _text_of
     lines = [
         (config.policy, f"{config.budget:.4g}", *(written(row, name) for name in told))

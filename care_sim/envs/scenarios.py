@@ -124,8 +124,7 @@ class ScenarioEnv(ClosedLoopEnv):
 
 def _of_drive(env: ClosedLoopEnv) -> DriveOutcome:
     world = env.loop.world
-    kinds = {actor.body: actor.kind.name for actor in world.actors}
-    return drive_outcome(env.keyframes, world.meetings, kinds, world.along_m / world.goal_m)
+    return drive_outcome(env.keyframes, world.meetings, world.along_m / world.goal_m)
 
 
 def _check_counts(environment: str) -> None:

@@ -1,6 +1,6 @@
 """The result of a drive, as a pure function of its keyframes and of what it was to meet."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 
 from care_sim.evaluation.metrics import outcome
@@ -9,19 +9,12 @@ from care_sim.world.crosser import Meeting
 
 
 def drive_outcome(
-    keyframes: Sequence[Keyframe],
-    meetings: Sequence[Meeting],
-    kinds: Mapping[int, str],
-    progress: float,
+    keyframes: Sequence[Keyframe], meetings: Sequence[Meeting], progress: float
 ) -> DriveOutcome:
-    """The result of a drive with `meetings`, after a share `progress` of its way. `kinds` names the
-    kind of every body that can be hit.
-    """
+    """The result of a drive with `meetings`, after a share `progress` of its way."""
     impact = keyframes[-1].impact
     return DriveOutcome(
         **asdict(outcome(keyframes)),
-        hit_kind=kinds[impact.body] if impact else None,
-        hit_at_front=impact.at_front if impact else None,
         hit_standing=impact.speed_mps == 0.0 if impact else None,
         needless_braking=sum(record.needless for record in keyframes),
         progress=min(max(progress, 0.0), 1.0),

@@ -105,6 +105,11 @@ class ClosedLoop:
         )
         # The outcome of a drive alone tells of it, and it asks the truth about every body.
         self._needless = NeedlessBraking(front_m, self.guarded_m / 2, conditions) if plan else None
+        # The proxy reports bodies alone. Another detector may make one up.
+        self._unfounded = (
+            NeedlessBraking(front_m, self.guarded_m / 2, conditions) if detector else None
+        )
+        self._has_met = False
         self.index = 0
         self.told = {}
         self._look(np.zeros(rig.grid.shape, np.float32))
@@ -131,6 +136,7 @@ class ClosedLoop:
         needless = self._needless is not None and self._needless.judge(
             world, middle, command.braking
         )
+        unfounded = self._is_unfounded(middle, command, in_view, behind)
         sights = self._sights(found)
 
         # The command holds until the next keyframe; then the camera looks and forecasts are due.
@@ -156,6 +162,7 @@ class ClosedLoop:
             impact=passage.impact,
             sights=sights,
             needless=needless,
+            unfounded=unfounded,
         )
 
     def true_boxes(self, tracks: Tracks) -> Floats:
@@ -224,6 +231,20 @@ class ClosedLoop:
         if self._cruising is None:
             return command
         return self._cruising.eased(command, ahead, ego.speed, self.world.along_m)
+
+    def _is_unfounded(
+        self, middle: Frame, command: Command, in_view: bool, behind: Integers
+    ) -> bool:
+        """Whether the brake is on for what the detector made up; `behind` are the bodies behind its
+        detections.
+        """
+        if self._unfounded is None:
+            return False
+        target = self.world.first_sighting
+        if in_view or (target is not None and target.body in behind):
+            self._has_met = True
+        unseen = None if self._has_met or target is None else target.body
+        return self._unfounded.judge(self.world, middle, command.braking, unseen)
 
     def _tracks_ahead(self, middle: Frame) -> Tracks:
         """The tracks as the controller takes them: along the way that the car is to go."""

@@ -3,6 +3,9 @@
 A keyframe with the brake on is needless if no body, reported or not, lies in the strip ahead that
 the controller guards, nor would enter it within the controller's horizon if it kept its velocity.
 The time for which the controller waits until it lets go does not count.
+
+A brake for what a detector made up is unfounded: it is needless, and the first-sighting actor is
+no reason for it while neither the camera has shown that actor nor a detection has held its returns.
 """
 
 import numpy as np
@@ -26,16 +29,18 @@ class NeedlessBraking:
         self._rules = rules
         self._needed_s = -np.inf
 
-    def judge(self, world: World, sensor: Frame, braking: bool) -> bool:
-        """Whether the brake is on for nothing; to be asked at every keyframe."""
+    def judge(self, world: World, sensor: Frame, braking: bool, unseen: int | None = None) -> bool:
+        """Whether the brake is on for nothing; to be asked at every keyframe. The body `unseen`
+        gives no reason to brake.
+        """
         if not braking:
             return False
-        if self._is_needed(world, sensor):
+        if self._is_needed(world, sensor, unseen):
             self._needed_s = world.time
         return world.time - self._needed_s > self._rules.brake_release_s + LAST_BITS_S
 
-    def _is_needed(self, world: World, sensor: Frame) -> bool:
-        bodies = np.array([actor.body for actor in world.actors], np.int64)
+    def _is_needed(self, world: World, sensor: Frame, unseen: int | None) -> bool:
+        bodies = np.array([a.body for a in world.actors if a.body != unseen], np.int64)
         count = np.zeros(len(bodies), np.int64)
         true = Tracks(
             bodies,

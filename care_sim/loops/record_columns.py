@@ -25,6 +25,7 @@ class Records(NamedTuple):
     nearest_m: Floats
     clearance_m: Floats
     impact_speed_mps: Floats
+    unfounded: Mask
 
     @classmethod
     def of(cls, keyframes: Sequence[Keyframe]) -> "Records":
@@ -38,6 +39,6 @@ class Records(NamedTuple):
 def kind_of(column: str) -> type:
     """What the numbers of a column are."""
     kinds: dict[str, type] = {"fired": np.int64} | dict.fromkeys(
-        ("in_view", "detected", "braking"), np.bool_
+        ("in_view", "detected", "braking", "unfounded"), np.bool_
     )
     return kinds.get(column, np.float64)

@@ -48,7 +48,7 @@ class Keyframe:
     clearance_m: float
     """Least distance between their hulls until the next keyframe, below 0 where they overlap."""
     impact_speed_mps: float | None
-    """The car's speed at its first contact with any body until the next keyframe, else None."""
+    """The car's own speed at its first contact with any body until the next keyframe, else None."""
     impact: Impact | None = None
     """That contact."""
     sights: tuple[Sight, ...] = ()
@@ -56,6 +56,10 @@ class Keyframe:
     needless: bool = False
     """Whether the brake was on with nothing to brake for; see `care_sim.loops.needless`. Judged in
     drives alone.
+    """
+    unfounded: bool = False
+    """Whether the brake was on for what a detector made up; see `care_sim.loops.needless`. Always
+    False with the paper's proxy, which reports bodies alone.
     """
 
 
@@ -87,9 +91,20 @@ class Outcome:
     collision: bool
     """Whether the car touched any body."""
     impact_speed_mps: float | None
-    """The car's speed at its first contact with any body, None without a collision."""
+    """The car's own speed at its first contact with any body, None without a collision."""
     rays_fired: int
     """Shots fired in all; of all hardware but `energy` these are cells."""
+    braked_before_view: bool
+    """Whether the brake was on for what the detector made up (`Keyframe.unfounded`) before the
+    camera first had the actor in view, or at any keyframe if it never had. Such a stop is needless,
+    and what the car avoids by it is no merit.
+    """
+    closing_speed_mps: float | None
+    """The magnitude of the difference of the two velocities at that contact."""
+    hit_kind: str | None
+    """The kind of the body that the car touched, None without a collision."""
+    hit_at_front: bool | None
+    """Whether the car ran into it. Else it ran into the car."""
 
 
 @dataclass(frozen=True)
@@ -129,10 +144,6 @@ class DriveOutcome(Outcome):
     encounter that is a conflict, of the first encounter where none is, and None without any.
     """
 
-    hit_kind: str | None
-    """The kind of the body that the car touched, None without a collision."""
-    hit_at_front: bool | None
-    """Whether the car ran into it. Else it ran into the car."""
     hit_standing: bool | None
     """Whether the car stood."""
     needless_braking: int

@@ -10,7 +10,7 @@ from care_sim.reports.tables import order, validate
 from care_sim.reports.tables.paper_statements import statements
 from care_sim.study.designs.faults import common_conditions
 from care_sim.study.designs.paper import NO_COLLISION
-from care_sim.study.rows.reading import setting_of
+from care_sim.study.rows.reading import setting_of, stops_for_nothing
 from care_sim.study.rows.settings import Setting
 from care_sim.study.run_config import FULL, Row
 
@@ -19,11 +19,23 @@ _BESIDE_PAPER = (
     "results/paper-closed-loop.md:"
 )
 
+_NEEDLESS = (
+    "with a brake for nothing before the actor was in view: they count as not detected and not "
+    "avoided."
+)
+
 
 def collisions(rows: Sequence[Row]) -> str:
-    """Collisions over all rows."""
+    """Collisions over all rows. Names those in which a body ran into the car, and the stops for
+    nothing, where there are any.
+    """
+    hit_by = sum(row.get("hit_at_front") is False for row in rows)
+    needless = sum(map(stops_for_nothing, rows))
     return (
-        f"Collisions: {sum(row['collision'] for row in rows)} in {counted(len(rows), 'episode')}."
+        f"Collisions: {sum(row['collision'] for row in rows)} in {counted(len(rows), 'episode')}"
+        + (f"; in {hit_by} of them another body ran into the car" if hit_by else "")
+        + "."
+        + (f" {counted(needless, 'episode')} {_NEEDLESS}" if needless else "")
     )
 
 

@@ -11,12 +11,12 @@ from care_sim.evaluation.censoring import Reading, difference
 from care_sim.evaluation.collision_outcomes import CollisionOutcome, collision_outcome
 from care_sim.reports.contrasts import GATE_POINTS, Contrast, Measure
 from care_sim.reports.controls import best_control, is_control
-from care_sim.study.rows.reading import policy_of, tags_of_row
+from care_sim.study.rows.reading import is_avoided, policy_of, stops_for_nothing, tags_of_row
 from care_sim.study.run_config import FULL, Row
 
 
 def _avoided(row: Row) -> Reading:
-    return Reading(100.0 * (not row["collision"]))
+    return Reading(100.0 * is_avoided(row))
 
 
 AVOIDANCE = Measure("Avoided", "points", 0, GATE_POINTS, _avoided)
@@ -45,10 +45,13 @@ class CollisionRows:
         return [*self._cell(policy, budget).values()]
 
     def outcomes(self, rows: Sequence[Row]) -> Counter[CollisionOutcome]:
-        """How many of the rows there are of each outcome."""
-        return Counter(
-            collision_outcome(row["impact_speed_mps"], self._approach_mps(row)) for row in rows
-        )
+        """How many of the rows there are of each outcome. A stop for nothing counts as a hit."""
+        return Counter(self._outcome(row) for row in rows)
+
+    def _outcome(self, row: Row) -> CollisionOutcome:
+        if stops_for_nothing(row):
+            return CollisionOutcome.HIT
+        return collision_outcome(row["impact_speed_mps"], self._approach_mps(row))
 
     def difference(self, ours: str, theirs: str, budget: float) -> Contrast | None:
         """Points by which one policy avoids more than another, on the worlds that both have."""
@@ -73,7 +76,7 @@ class CollisionRows:
             return None
         return best_control(
             {
-                policy: float(np.mean([not cell[world]["collision"] for world in shared]))
+                policy: float(np.mean([is_avoided(cell[world]) for world in shared]))
                 for policy, cell in cells.items()
             }
         )

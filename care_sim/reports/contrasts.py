@@ -14,7 +14,7 @@ import numpy as np
 
 from care_sim.evaluation.bootstrap import Interval
 from care_sim.evaluation.censoring import Difference, Reading, difference
-from care_sim.study.rows.reading import detection
+from care_sim.study.rows.reading import detection, is_avoided
 from care_sim.study.run_config import Row
 
 GATE_M = 2.5
@@ -54,7 +54,7 @@ AVOIDED = Measure(
     "points",
     0,
     GATE_COLLISION_POINTS,
-    lambda row: Reading(100.0 * (not row["collision"])),
+    lambda row: Reading(100.0 * is_avoided(row)),
 )
 
 
@@ -139,8 +139,8 @@ def contrast_of_cases(
 
 
 def preventable(full: Sequence[Row], rows: Sequence[Row]) -> list[Row]:
-    """The rows of the seeds on which the full scan collides with nobody."""
-    spared = {row["seed"] for row in full if not row["collision"]}
+    """The rows of the seeds on which the full scan avoids the collision."""
+    spared = {row["seed"] for row in full if is_avoided(row)}
     return [row for row in rows if row["seed"] in spared]
 
 

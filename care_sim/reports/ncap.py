@@ -23,7 +23,7 @@ from care_sim.study.designs.ncap import (
     TARGET_COLUMN,
     TEST_COLUMN,
 )
-from care_sim.study.rows.reading import policy_of, tags_of_row
+from care_sim.study.rows.reading import policy_of, stops_for_nothing, tags_of_row
 from care_sim.study.run_config import FULL, Row
 
 READINGS = {True: "reported", False: "unreported"}
@@ -59,12 +59,15 @@ Contender = tuple[str, float]
 def impact_of(row: Row) -> tuple[float | None, float]:
     """The speed of a row's impact (None without one), and that of a car that does not brake, m/s.
 
-    On a target that goes ahead at an even speed it is the speed of closing, else the ego's own.
+    On a target that goes ahead at an even speed it is the speed of closing, else the ego's own. A
+    stop for nothing counts as a car that does not brake.
     """
     check_known("test", row[TEST_COLUMN], TESTS)
     ahead = isinstance(TESTS[row[TEST_COLUMN]].way, Ahead)
     lead = row[TARGET_COLUMN] / 3.6 if ahead else 0.0
     reference = row[SPEED_COLUMN] / 3.6 - lead
+    if stops_for_nothing(row):
+        return reference, reference
     impact = row["impact_speed_mps"]
     return (None if impact is None else impact - lead), reference
 

@@ -146,6 +146,26 @@ class WorldPlays:
         return f"{self.setting.label}: does not discriminate, because {because}."
 
     @property
+    def ran_into(self) -> str:
+        """On how many test seeds a body runs into the car of the full scan; empty where none does.
+
+        Such a world cannot be won by seeing more.
+        """
+        full = {row["seed"]: row for row in self.test_rows if row["policy"] == FULL}
+        hit = [row for row in full.values() if row.get("hit_at_front") is False]
+        if not hit:
+            return ""
+        kinds = ", ".join(sorted({row["hit_kind"] for row in hit}))
+        # Older files lack the column.
+        speeds = [row["closing_speed_mps"] for row in hit if row.get("closing_speed_mps")]
+        fastest = f", closing at up to {max(speeds):.1f} m/s" if speeds else ""
+        return (
+            f"{self.setting.label}: on {len(hit)} of {counted(len(full), 'test seed')} a body "
+            f"({kinds}) runs into the car of the full scan{fastest}. Seeing more does not avoid "
+            "that."
+        )
+
+    @property
     def _test_seeds(self) -> int:
         return len({row["seed"] for row in self.test_rows})
 

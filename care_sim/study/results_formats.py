@@ -93,7 +93,14 @@ they do not know was at its default.
 """
 _OF_EPISODES = (
     _BY_WRITER
-    | {"detector": as_optional(TEXT), "keyframe_s": as_optional(SUM)}
+    | {
+        "detector": as_optional(TEXT),
+        "keyframe_s": as_optional(SUM),
+        "braked_before_view": as_optional(FLAG),
+        "closing_speed_mps": as_optional(SUM),
+        "hit_kind": as_optional(TEXT),
+        "hit_at_front": as_optional(FLAG),
+    }
     | {name: CONDITION_COLUMNS[name] for name in COLUMNS_WHERE_CHANGED}
 )
 """Those of every study of the closed loop."""

@@ -1,5 +1,6 @@
 """How close the ego came to others, and how it hit them."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -17,22 +18,34 @@ world step at 36 km/h.
 
 @dataclass(frozen=True)
 class Impact:
-    """The ego's first contact with a `body`, at its own speed `speed_mps`.
+    """The ego's first contact with a `body` of some `kind`, at the ego's own speed `speed_mps`.
 
     `at_front` says whether that body lay ahead of the ego: the ego ran into it. Else it ran into
-    the ego, from the side or from behind.
+    the ego, from the side or from behind. `closing_mps` is the magnitude of the difference of the
+    two velocities.
     """
 
     body: int
     speed_mps: float
     at_front: bool
+    kind: str
+    closing_mps: float
 
     @classmethod
-    def on(cls, body: int, boxes: Floats, ego: int, speed_mps: float) -> "Impact":
-        """That of the body `ego` on another one; `boxes` (m, 7) are those of all bodies by id."""
+    def on(
+        cls, body: int, kind: str, boxes: Floats, ego: int, speed_mps: float, velocity: Floats
+    ) -> "Impact":
+        """That of the body `ego` on another one, which moves at `velocity` (2,); `boxes` (m, 7) are
+        those of all bodies by id.
+        """
         own = boxes[ego]
         x, y, heading = own[[0, 1, 6]].tolist()
-        return cls(body, speed_mps, lies_ahead(boxes[body], (x, y, heading), float(own[3])))
+        vx, vy = velocity.tolist()
+        closing_mps = math.hypot(
+            speed_mps * math.cos(heading) - vx, speed_mps * math.sin(heading) - vy
+        )
+        at_front = lies_ahead(boxes[body], (x, y, heading), float(own[3]))
+        return cls(body, speed_mps, at_front, kind, closing_mps)
 
 
 @dataclass(frozen=True)

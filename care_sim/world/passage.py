@@ -1,9 +1,10 @@
 """What happens to the ego while its world moves on from one keyframe to the next."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from care_sim.core.arrays import Floats, Integers
 from care_sim.world.approach import ClosestApproach, Impact
 from care_sim.world.bodies import BodyKind
 from care_sim.world.body_tables import Footprints
@@ -17,7 +18,8 @@ class Passage:
     any other. It looks after every world step: between two keyframes the car may hit something and
     be past it, or come closest to it.
 
-    `footprints` and `bullet` say where all bodies are, `kinds` what they are.
+    `footprints` and `bullet` say where all bodies are, `kinds` what they are, and `velocities_of`
+    gives the (n, 2) velocities of bodies (n,).
     """
 
     def __init__(
@@ -27,11 +29,13 @@ class Passage:
         kinds: Mapping[int, BodyKind],
         ego: int,
         target: int | None,
+        velocities_of: Callable[[Integers], Floats],
     ):
         self._footprints = footprints
         self._bullet = bullet
         self._kinds = kinds
         self._ego = ego
+        self._velocities_of = velocities_of
         self._judge = judge_here()
         self._impact: Impact | None = None
         self._nearest_m = np.inf
@@ -61,6 +65,9 @@ class Passage:
         own = self._kinds[self._ego]
         for body in self._footprints.near(self._ego, CONTACT_REACH_M).tolist():
             poses = self._bullet.primitives.poses[[self._ego, body]]
-            if self._judge.touch((own, self._kinds[body]), poses):
-                return Impact.on(body, self._footprints.boxes, self._ego, speed_mps)
+            kind = self._kinds[body]
+            if self._judge.touch((own, kind), poses):
+                (velocity,) = self._velocities_of(np.array([body]))
+                boxes = self._footprints.boxes
+                return Impact.on(body, kind.name, boxes, self._ego, speed_mps, velocity)
         return None

@@ -214,7 +214,9 @@ class World:
         actor at its beginning.
         """
         target = None if self.first_sighting is None else self.first_sighting.body
-        passage = Passage(self._footprints, self.bullet, self._kinds, self.ego_body, target)
+        passage = Passage(
+            self._footprints, self.bullet, self._kinds, self.ego_body, target, self.velocities_of
+        )
         for _ in range(whole_steps(duration)):
             self.step(acceleration)
             passage.look(self.ego.speed)

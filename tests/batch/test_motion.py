@@ -87,8 +87,7 @@ def assert_passage(passages, world, passage):
     assert passages.hit[world] == (passage.impact is not None)
     if passage.impact is not None:
         assert passages.impact_speed_mps[world] == passage.impact.speed_mps
-        assert passages.body[world] == passage.impact.body
-        assert passages.ahead[world] == passage.impact.at_front
+    assert passages.impacts.get(world) == passage.impact
 
 
 @pytest.mark.parametrize(("name", "physics"), SCENARIOS)

@@ -114,6 +114,10 @@ def test_an_episode_stays_inside_its_spaces_and_ends(name):
         "collision",
         "impact_speed_mps",
         "rays_fired",
+        "braked_before_view",
+        "closing_speed_mps",
+        "hit_kind",
+        "hit_at_front",
     }
     env.close()
 

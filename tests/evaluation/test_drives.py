@@ -47,7 +47,7 @@ FRAMES = [
 
 
 def test_each_encounter_has_its_first_view_and_detection():
-    result = drive_outcome(FRAMES, MEETINGS, KINDS, 0.4)
+    result = drive_outcome(FRAMES, MEETINGS, 0.4)
     first, second = result.encounters
     assert (first.view_keyframe, first.detection_keyframe, first.detection_distance_m) == (
         1,
@@ -63,7 +63,7 @@ def test_each_encounter_has_its_first_view_and_detection():
 
 
 def test_a_drive_without_a_collision():
-    result = drive_outcome(FRAMES, MEETINGS, KINDS, 1.02)
+    result = drive_outcome(FRAMES, MEETINGS, 1.02)
     assert (result.collision, result.hit_kind, result.hit_at_front, result.hit_standing) == (
         False,
         None,
@@ -76,19 +76,24 @@ def test_a_drive_without_a_collision():
 
 @pytest.mark.parametrize("body", [4, 6])
 def test_a_collision_says_who_and_how(body):
-    last = keyframe(4, [(2.0, True, True), (66.0, False, False)], Impact(body, 3.0, True))
-    result = drive_outcome([*FRAMES, last], MEETINGS, KINDS, 0.5)
+    last = keyframe(
+        4, [(2.0, True, True), (66.0, False, False)], Impact(body, 3.0, True, KINDS[body], 3.5)
+    )
+    result = drive_outcome([*FRAMES, last], MEETINGS, 0.5)
     assert (result.hit_kind, result.hit_at_front, result.hit_standing) == (KINDS[body], True, False)
     assert [one.hit for one in result.encounters] == [body == 4, False]
     assert (result.collision, result.impact_speed_mps) == (True, 3.0)
+    assert result.closing_speed_mps == 3.5
 
 
 def test_a_standing_car_that_is_run_into():
-    last = keyframe(4, [(2.0, True, True), (66.0, False, False)], Impact(4, 0.0, False))
-    result = drive_outcome([*FRAMES, last], MEETINGS, KINDS, 0.5)
+    last = keyframe(
+        4, [(2.0, True, True), (66.0, False, False)], Impact(4, 0.0, False, "child", 2.0)
+    )
+    result = drive_outcome([*FRAMES, last], MEETINGS, 0.5)
     assert (result.hit_at_front, result.hit_standing) == (False, True)
 
 
 def test_a_drive_may_meet_nobody():
     frames = [keyframe(0, [])]
-    assert drive_outcome(frames, [], KINDS, 0.1).encounters == ()
+    assert drive_outcome(frames, [], 0.1).encounters == ()

@@ -4,6 +4,9 @@ import pytest
 from care_sim.evaluation.metrics import outcome
 from care_sim.loops.records import Keyframe, Outcome
 
+NO_IMPACT = (False, None, None, None)
+"""No brake for nothing, and no contact."""
+
 
 def keyframe(index=0, **changes):
     quiet = {
@@ -38,12 +41,12 @@ def test_an_episode_worked_by_hand():
         ),
         keyframe(4, in_view=True, nearest_m=6.0, clearance_m=4.0),
     ]
-    assert outcome(episode) == Outcome(14.4, None, True, 5.5, 3.25, False, None, 407)
+    assert outcome(episode) == Outcome(14.4, None, True, 5.5, 3.25, False, None, 407, *NO_IMPACT)
 
 
 def test_never_seen_never_detected():
     assert outcome([keyframe(0), keyframe(1)]) == Outcome(
-        None, 29.0, False, None, None, False, None, 200
+        None, 29.0, False, None, None, False, None, 200, *NO_IMPACT
     )
 
 

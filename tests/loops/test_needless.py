@@ -70,3 +70,10 @@ def test_the_wait_before_the_brake_is_released_does_not_count(world):
     assert leaves.pose_at(world.time)[1] == 9.0
     # It is gone from 0.2 s on, was last needed at 0.1 s, and the wait is half a second.
     assert answers == [False] * 6 + [True] * 4
+
+
+def test_a_body_that_nobody_has_seen_is_no_reason(world):
+    hidden = world.add("hidden", "child", (10.0, 0.0, 0.0))
+    sensor = Frame.mounted(world.ego.pose, LIDAR_POSITION)
+    assert not fresh().judge(world, sensor, True)
+    assert fresh().judge(world, sensor, True, unseen=hidden.body)

@@ -10,9 +10,10 @@ from care_sim.study.journal import Journal
 from care_sim.study.results_formats import EPISODES
 from care_sim.study.rows.parquet import read_rows, write_rows
 
+NO_IMPACT = (False, None, None, None)
 ROWS = [
     EpisodeConfig("dense", policy).row()
-    | asdict(Outcome(distance, 3.0, True, None, 2.5, False, None, 98280))
+    | asdict(Outcome(distance, 3.0, True, None, 2.5, False, None, 98280, *NO_IMPACT))
     for policy, distance in (("history", None), ("care", 1 / 3))
 ]
 

@@ -105,7 +105,7 @@ class CompiledWorlds:
     def _outcome(self, world: int, keyframes: int) -> Outcome:
         """The result of a world's episode of so many keyframes."""
         episode = self._history.episode(world, keyframes)
-        result = outcome_of(episode)
+        result = outcome_of(episode, self._loop.impacts.get(world))
         if self._exact or result.clearance_m is None:
             return result
         appeared = float(episode.time_s[episode.in_view.argmax()])

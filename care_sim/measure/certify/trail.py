@@ -30,6 +30,17 @@ TRAIL_STAGES = (
 """Of every keyframe, in order. The configuration comes before the first, the outcome after the
 last.
 """
+_CLOSED_LOOP_OUTCOME = (
+    "detection_distance_m",
+    "undetected_to_m",
+    "braked",
+    "min_distance_m",
+    "clearance_m",
+    "collision",
+    "impact_speed_mps",
+    "rays_fired",
+)
+"""The fields of the outcome that published trails hold: a later one would change every trail."""
 DIGEST_BYTES = 8
 STAGE_BYTES = 3
 """By chance one of 16.8 million differences is named a stage late."""
@@ -137,11 +148,11 @@ class _Gained:
         """All that was gained; the outcome of the closed loop is that of the keyframes so far, that
         of the open loop is empty before its end.
         """
-        sums = (
-            asdict(outcome(env.keyframes))
-            if isinstance(env, ClosedLoopEnv)
-            else (asdict(env.score.tally()) if "outcome" in info else {})
-        )
+        if isinstance(env, ClosedLoopEnv):
+            ended = outcome(env.keyframes)
+            sums = {name: getattr(ended, name) for name in _CLOSED_LOOP_OUTCOME}
+        else:
+            sums = asdict(env.score.tally()) if "outcome" in info else {}
         # None has no bytes of its own: NaN stands for it.
         values = tuple((name, math.nan if value is None else value) for name, value in sums.items())
         return self._reward, self._objects, self._found, values

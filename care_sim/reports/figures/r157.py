@@ -18,6 +18,7 @@ from care_sim.reports.tables.r157 import cut_in_rows
 from care_sim.scenarios.r157.grid import EGO_KPH, LATERAL_MPS, CutInCase
 from care_sim.scenarios.r157.preventable import PREVENTABLE, verdicts
 from care_sim.study.designs.r157 import case_of
+from care_sim.study.rows.reading import is_avoided
 from care_sim.study.run_config import FULL, Row
 
 R157_FIGURE = "r157-avoided"
@@ -63,7 +64,7 @@ def _draw(axes: Axes, rows: Sequence[Row]) -> None:
     met: dict[tuple[float, float], list[bool]] = {}
     for row in rows:
         case = case_of(row)
-        met.setdefault((case.relative_kph, case.gap_m), []).append(not row["collision"])
+        met.setdefault((case.relative_kph, case.gap_m), []).append(is_avoided(row))
     axes.scatter(
         [relative for relative, _ in met],
         [gap for _, gap in met],

@@ -9,7 +9,14 @@ from care_sim.evaluation.censoring import FEWEST_PAIRS
 from care_sim.reports.contrasts import AVOIDED, DETECTION, Measure, contrast, preventable
 from care_sim.reports.controls import is_control
 from care_sim.reports.findings.contest import Contest, Subject, Tags, is_real, told
-from care_sim.study.rows.reading import Groups, full_of, grouped, policy_of, tags_of_row
+from care_sim.study.rows.reading import (
+    Groups,
+    full_of,
+    grouped,
+    is_avoided,
+    policy_of,
+    tags_of_row,
+)
 from care_sim.study.rows.settings import Setting
 from care_sim.study.run_config import FULL, Row
 
@@ -84,7 +91,7 @@ def _contests(
         )
     spared = " that the full scan ends unhurt" if full else ""
     threatened = {p: preventable(full, rows) if full else rows for p, rows in own.items()}
-    if any(row["collision"] for rows in threatened.values() for row in rows):
+    if not all(is_avoided(row) for rows in threatened.values() for row in rows):
         yield _contest(
             AVOIDED,
             _COLLIDE,

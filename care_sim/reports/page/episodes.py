@@ -49,7 +49,9 @@ class Episode:
         """The outcomes in which the replay departs from the row, each as NAME THEN -> NOW."""
         if self.replay is None:
             return []
-        pairs = {name: (self.row[name], self.replay.row[name]) for name in self.replay.ending}
+        # Older files lack the later columns.
+        told = [name for name in self.replay.ending if name in self.row]
+        pairs = {name: (self.row[name], self.replay.row[name]) for name in told}
         return [
             f"{name} {_text(was)} → {_text(now)}"
             for name, (was, now) in pairs.items()

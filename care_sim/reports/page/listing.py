@@ -10,7 +10,7 @@ from care_sim.base.errors import counted, percent
 from care_sim.reports.formatting import marked
 from care_sim.reports.page.episodes import Episode, in_open_loop
 from care_sim.reports.page.story import packed
-from care_sim.study.rows.reading import policy_of, setting_of, tags_of_row
+from care_sim.study.rows.reading import policy_of, setting_of, stops_for_nothing, tags_of_row
 from care_sim.study.rows.settings import Setting
 from care_sim.study.run_config import Row
 
@@ -126,7 +126,8 @@ def _entry(row: Row, number: int | None, episode: Episode | None) -> EpisodeEntr
     distance = row["detection_distance_m"]
     said = [
         "never detected" if distance is None else f"first detected at {distance:.1f} m",
-        "braked" if row["braked"] else "did not brake",
+        ("braked" if row["braked"] else "did not brake")
+        + (" for nothing before the actor was in view" if stops_for_nothing(row) else ""),
         *(["collided"] if row["collision"] else []),
     ]
     text = "never" if distance is None else f"{distance:.1f}"

@@ -91,9 +91,8 @@ class Recorder:
         self.rays.append(fullness(frame.fired, loop.rig.grid))
         self.sights.append(_sights(loop, frame))
         if frame.impact:
-            kinds = {actor.body: actor.kind.name for actor in self.actors}
             self.hit = {
-                "kind": kinds[frame.impact.body],
+                "kind": frame.impact.kind,
                 "at_front": frame.impact.at_front,
                 "speed": whole(frame.impact.speed_mps, CENTI),
             }

@@ -18,7 +18,7 @@ from care_sim.reports.realism.tables import tables_of, verdict_sentences
 from care_sim.reports.table import Table
 from care_sim.study.designs.realism import CONDITIONS, HEADLINES, IDEAL, LATE_CAMERA, Headline
 from care_sim.study.designs.variants import Variant
-from care_sim.study.rows.reading import detections
+from care_sim.study.rows.reading import detections, is_avoided
 from care_sim.study.run_config import FULL, REFERENCE, Row
 
 
@@ -76,8 +76,7 @@ class RealismEpisodes(GroupRows):
         headline = self._headlines[block]
         rows = self.of(headline, condition, policy)
         if headline.by_collisions:
-            avoided = sum(not row["collision"] for row in rows)
-            return f"{avoided}/{len(rows)}" if rows else ""
+            return f"{sum(map(is_avoided, rows))}/{len(rows)}" if rows else ""
         return median(quartiles(detections(rows))) if rows else ""
 
     def change(self, block: str, condition: Variant, policy: str) -> Contrast | None:

@@ -13,6 +13,7 @@ from care_sim.reports.formatting import interval, marked, tag_notes
 from care_sim.reports.table import Table, TableRow
 from care_sim.scenarios.r157.grid import KPH
 from care_sim.study.designs.r157 import case_of
+from care_sim.study.rows.reading import is_avoided
 from care_sim.study.run_config import REFERENCE, Row
 
 _BEST = (
@@ -99,4 +100,4 @@ def _speed_table(study: CollisionRows, drivers: str) -> Table:
 
 
 def _avoided(rows: Sequence[Row]) -> str:
-    return f"{sum(not row['collision'] for row in rows)}/{len(rows)}" if rows else ""
+    return f"{sum(map(is_avoided, rows))}/{len(rows)}" if rows else ""

@@ -70,7 +70,9 @@ def validation_closing(rows: Sequence[Row]) -> list[str]:
         for name, seeds in parts
         if seeds
     )
-    return [f"Played: {told}.", *(world.verdict for world in played_worlds(rows))]
+    worlds = played_worlds(rows)
+    ran_into = [world.ran_into for world in worlds if world.ran_into]
+    return [f"Played: {told}.", *(world.verdict for world in worlds), *ran_into]
 
 
 _VERDICT_COLUMNS = (

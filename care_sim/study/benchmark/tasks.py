@@ -15,6 +15,7 @@ from care_sim.study.benchmark.worlds import DRIVES, STREETS, TESTS, World
 from care_sim.study.episode_config import grid
 from care_sim.study.parameters import Parameters
 from care_sim.study.play_config import play_grid
+from care_sim.study.rows.reading import is_avoided
 from care_sim.study.run_config import Row, RunConfig
 
 BENCHMARK_BUDGET = 0.01
@@ -147,4 +148,4 @@ def _file_name(value: Any) -> Any:
 
 def reached(part: str, row: Row) -> int:
     """What of the reachable a play reached: a collision avoided, or first sightings found."""
-    return int(row["sighted"]) if part == STREETS else int(not row["collision"])
+    return int(row["sighted"]) if part == STREETS else int(is_avoided(row))

@@ -127,10 +127,12 @@ def full_of(groups: Groups, setting: Setting) -> Sequence[Row] | None:
 def detection(row: Row) -> Reading | None:
     """Detection distance in metres; of an actor never detected, the most it can have been. None of
     an episode without a first-sighting actor: a drive that meets nobody.
+
+    A detection after a stop for nothing does not count: the distance is the most it can have been.
     """
     distance = row["detection_distance_m"]
     if distance is not None:
-        return Reading(float(distance))
+        return Reading(float(distance), censored=stops_for_nothing(row))
     most = row["undetected_to_m"]
     return None if most is None else Reading(float(most), censored=True)
 
@@ -144,6 +146,18 @@ def is_missed(row: Row) -> bool:
     """Whether there was a first-sighting actor who was never detected."""
     found = detection(row)
     return found is not None and found.censored
+
+
+def stops_for_nothing(row: Row) -> bool:
+    """Whether the car braked for what its detector made up, before the actor was in view. Older
+    files, and plays of the open loop, lack the column.
+    """
+    return bool(row.get("braked_before_view"))
+
+
+def is_avoided(row: Row) -> bool:
+    """Whether the car avoids the collision. A stop for nothing avoids none."""
+    return not (row["collision"] or stops_for_nothing(row))
 
 
 _FullScans = dict[tuple[Setting, int], Row]

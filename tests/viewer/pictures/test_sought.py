@@ -76,11 +76,11 @@ def test_whom_the_car_hit_is_named_whoever_it_is(drive):
     others = [actor for actor in loop.world.actors if actor not in sought(loop.world)]
     cars = [actor for actor in others if actor.kind.name == "car"]
     near = min(cars, key=lambda actor: abs(actor.pose_at(0.0)[0] - x - 10) + abs(y))
-    hit = replace(frame, impact=Impact(near.body, 5.04, at_front=True), impact_speed_mps=5.04)
+    hit = replace(frame, impact=Impact(near.body, 5.04, True, "car", 5.04), impact_speed_mps=5.04)
     assert contact_text(loop, frame) is None
     assert contact_text(loop, hit) == f"HIT {near.name} at 5.0 m/s"
     assert arrows(loop, hit) == {OUT_OF_VIEW, HIT}
-    into_the_car = replace(hit, impact=Impact(near.body, 5.04, at_front=False))
+    into_the_car = replace(hit, impact=Impact(near.body, 5.04, False, "car", 5.04))
     assert contact_text(loop, into_the_car) == f"HIT BY {near.name}"
     calm = replace(frame, braking=False)
     assert not np.any(np.all(draw_keyframe(loop, calm)[:40] == HIT.colour, axis=-1))
