@@ -7,8 +7,11 @@ import gymnasium
 from gymnasium.envs.registration import EnvSpec
 
 from care_sim.base.checks import check_known
+from care_sim.base.links import refuse_link
 from care_sim.base.plugins import is_place
 from care_sim.base.scenario_names import SCENARIO_GROUP, is_environment_id, scenario_of
+
+refuse_link(__name__)
 
 CLOSED_LOOP = {
     "CARE-Dartout-v0": "care_sim.envs.scenarios:DartoutEnv",

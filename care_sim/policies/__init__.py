@@ -11,6 +11,7 @@ import gymnasium
 import gymnasium.vector
 
 from care_sim.base.errors import BrokenPolicy, InvalidInput, shown
+from care_sim.base.links import refuse_link
 from care_sim.base.plugins import Plugins
 from care_sim.base.vectors import attribute_of_each, shared_attribute
 from care_sim.policies.base import Policy
@@ -53,6 +54,8 @@ from care_sim.policies.paper.random_points import RandomPoints
 from care_sim.policies.paper.uncertainty import Uncertainty
 from care_sim.policies.vector import VectorPolicy
 from care_sim.policies.vector_rigs import policy_of_rigs
+
+refuse_link(__name__)
 
 __all__ = [
     "BUILT_IN",

@@ -9,6 +9,7 @@ from dataclasses import fields
 
 from care_sim.base.checks import check_known
 from care_sim.base.errors import BrokenScenario, InvalidInput, error_line, shown
+from care_sim.base.links import refuse_link
 from care_sim.base.plugins import Plugins
 from care_sim.base.scenario_names import SCENARIO_GROUP, scenario_of
 from care_sim.scenarios.base import Scenario
@@ -19,6 +20,8 @@ from care_sim.scenarios.drive import DriveScenario
 from care_sim.scenarios.ncap import Ncap
 from care_sim.scenarios.r157.scenario import R157
 from care_sim.scenarios.soundness import scenario_faults
+
+refuse_link(__name__)
 
 SCENARIOS: dict[str, type[Scenario]] = {
     "dartout": Dartout,
