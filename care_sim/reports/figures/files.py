@@ -10,7 +10,7 @@ from matplotlib.axis import Tick
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from care_sim.base.errors import InvalidInput, printable_lines
+from care_sim.base.errors import InvalidInput, printable, printable_lines
 from care_sim.base.files import PNG, SVG, check_output, replacing
 
 _FORMATS = (".png", ".svg")
