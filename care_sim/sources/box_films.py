@@ -67,6 +67,8 @@ def film_of_boxes(
     ):
         place = f"{name} at {time_s + times[0]:g} s"
         frame = car.holding(np.array(setup.position))
+        if not isinstance(seen, Sequence):
+            raise InvalidInput(f"{place}: boxes must be a list, got {shown(seen)}")
         bodies = [_body(place, box, start, frame, numbers) for box in seen]
         annotations, pictures, cloud = sense(
             bodies, frame, setup.position[2], setup.grid, setup.equipped(SURROUND_CAMERAS)

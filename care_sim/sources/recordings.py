@@ -2,6 +2,7 @@
 their films.
 """
 
+import os
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -149,7 +150,8 @@ def recordings_in(
     not None. Raises InvalidInput for a folder that is none, an option that the kind does not have.
     """
     check_path("source", folder)
-    if not Path(folder).is_dir():
+    folder = os.path.expanduser(folder)
+    if not os.path.isdir(folder):
         raise InvalidInput(f"source {name}:{folder}: {folder} is no folder")
     given = {name: value for name, value in options.items() if value is not None}
     for option in given:
@@ -157,7 +159,7 @@ def recordings_in(
             raise InvalidInput(f"{option} has no meaning for {name} recordings")
     if "camera_detections" in given:
         check_path("camera_detections", given["camera_detections"])
-        given["camera_detections"] = Path(str(given["camera_detections"]))
+        given["camera_detections"] = Path(os.path.expanduser(str(given["camera_detections"])))
     for option in {"split", "version"} & set(given):
         if not isinstance(given[option], str):
             raise InvalidInput(f"{option} must be a name, got {shown(given[option])}")

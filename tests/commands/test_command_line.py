@@ -36,3 +36,14 @@ def test_paths_are_told_as_a_shell_takes_them():
     command = parsed_command(["crowding", "--out", "a b"])
     assert command.out == Path("a b")
     assert command_line(command) == "care-sim crowding --out 'a b'"
+
+
+def test_a_home_folder_is_expanded_wherever_a_path_begins(monkeypatch, tmp_path):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    command = parsed_command(
+        ["run", "argoverse2:~/logs", "--picture=~/x.png", "--policy-parameters", "path=~/w.npz"]
+    )
+    assert f"argoverse2:{tmp_path}/logs" in command_line(command)
+    assert command.picture == tmp_path / "x.png"
+    assert f"path={tmp_path}/w.npz" in command_line(command)
+    assert parsed_command(["crowding", "--out", "a~/b"]).out == Path("a~/b")

@@ -3,6 +3,7 @@
 import contextlib
 import inspect
 import io
+import os
 import re
 import shutil
 import sys
@@ -102,10 +103,18 @@ _READINGS: dict[Any, _Reading] = {
 }
 """Types of options that hold numbers: tyro reads them the same, but complains in its own words."""
 
+_HOMES = re.compile("(?<![^=:])~[^/]*(?=/)")
+"""The home folder at the beginning of a path, wherever a path may begin: a shell expands it only at
+the beginning of a word.
+"""
 _HELP_ALL = "--help-all"
 _HELPS = ("-h", "--help")
 _HIDDEN: Any = tyro.conf.Suppress
 """Takes a type, and makes one of an option that no help shows."""
+
+
+def _expanded(home: re.Match[str]) -> str:
+    return os.path.expanduser(home[0])
 
 
 def _number(asked: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Any] | None:
@@ -215,6 +224,7 @@ def chosen_command(
 
     `--help` names the conditions at its end alone, `--help-all` explains them, too.
     """
+    arguments = [_HOMES.sub(_expanded, word) for word in arguments]
     if not arguments:
         raise InvalidInput(f"no command is given; those of {prog}: {', '.join(commands)}")
     named = arguments[0]

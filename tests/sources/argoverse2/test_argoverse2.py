@@ -1,3 +1,5 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,8 @@ from care_sim.sources.argoverse2.films import (
     argoverse2_film,
     logs,
 )
+from care_sim.sources.argoverse2.tables import annotation_file
+from care_sim.sources.named import source_of
 from tests.helpers.av2_log import CAR_AHEAD, at, box, parked, replaced, rewrite, stamp, write
 
 
@@ -217,6 +221,42 @@ def test_a_log_with_sensor_recordings_loads_and_either_name_of_the_annotations(t
         len({argoverse2_film(path).shots[0].annotations.boxes.tobytes() for path in logs(tmp_path)})
         == 1
     )
+
+
+def test_of_several_annotations_the_plain_name_counts(tmp_path):
+    log = parked(tmp_path, CAR_AHEAD, sweeps=3)
+    copy = log / "annotations (1).feather"
+    copy.write_bytes(b"of a download that broke off")
+    assert annotation_file(log) == log / "annotations.feather"
+    (log / "annotations.feather").rename(log / "annotations_old.feather")
+    with pytest.raises(
+        InvalidInput, match=r"annotations \(1\).feather, annotations_old.feather: c"
+    ):
+        annotation_file(log)
+
+
+def test_a_log_is_called_by_its_folder_from_wherever_it_is_asked_for(tmp_path, monkeypatch):
+    log = parked(tmp_path / "here", CAR_AHEAD, sweeps=11)
+    monkeypatch.chdir(log)
+    source = source_of("argoverse2:.")
+    (scene,) = source.scenes()
+    assert scene.name == source.film(scene).name == argoverse2_film(Path()).name == "here"
+    assert source.row(scene) == source_of(f"argoverse2:{log.parent}").row(scene)
+
+
+def test_a_home_folder_is_expanded(tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    parked(tmp_path / "logs" / "a", CAR_AHEAD)
+    assert [scene.name for scene in source_of("argoverse2:~/logs").scenes()] == ["a"]
+
+
+@pytest.mark.parametrize("unit", [10**3, 10**6])
+def test_times_that_are_no_nanoseconds_are_refused(tmp_path, unit):
+    log = parked(tmp_path, CAR_AHEAD, sweeps=11)
+    for path in log.iterdir():
+        rewrite(path, lambda t: replaced(t, "timestamp_ns", t["timestamp_ns"].to_numpy() // unit))
+    with pytest.raises(InvalidInput, match=r"annotations.feather: two sweeps .* must be nanosec"):
+        argoverse2_film(log)
 
 
 def test_a_folder_without_logs_is_named(tmp_path):
