@@ -13,7 +13,7 @@ from care_sim.core.arrays import Floats, Integers
 from care_sim.core.frames import Frame
 from care_sim.core.types import CLASSES
 from care_sim.loops.film import Film, Shot
-from care_sim.sensors.annotated import Annotations
+from care_sim.sensors.annotated import Annotations, Cloud
 from care_sim.sources.plausible import SIZES_M
 
 LEAST_KEYFRAMES = 3
@@ -73,15 +73,11 @@ def _report_once(line: str) -> None:
 
 def _check_shot(film: Film, shot: Shot) -> None:
     place = f"{film.name} at {shot.time_s:g} s"
-    own = [shot.sensor.x, shot.sensor.y, shot.sensor.z]
-    turns = [shot.sensor.yaw, shot.sensor.pitch, shot.sensor.roll]
-    ego = [shot.ego.speed, shot.ego.yaw_rate, shot.ego.acceleration]
-    if not np.isfinite([*own, *turns, *ego]).all():
-        raise InvalidInput(f"{place}: the pose or the motion of the car is not finite")
-    if np.abs(turns).max() > FULL_TURN:
-        raise InvalidInput(
-            f"{place}: the car is turned by {max(turns, key=abs):g}, must be radians"
-        )
+    _check_car(place, shot)
+    for cloud in (shot.cloud, *(sweep.cloud for sweep in shot.sweeps)):
+        _check_cloud(place, cloud, film.grid.size)
+    if not np.isfinite(shot.seen.detections.rows()).all():
+        raise InvalidInput(f"{place}: a box of a camera is not finite")
     objects, boxes = shot.annotations.objects, shot.annotations.boxes
     if not len(objects) == len(shot.annotations.classes) == len(boxes):
         raise InvalidInput(f"{place}: objects, classes and boxes must be equally many")
@@ -92,6 +88,28 @@ def _check_shot(film: Film, shot: Shot) -> None:
         raise InvalidInput(f"{place}: an object is annotated twice")
     if not np.isin(shot.annotations.classes, range(len(CLASSES))).all():
         raise InvalidInput(f"{place}: classes must be numbers from 0 to {len(CLASSES) - 1}")
+
+
+def _check_car(place: str, shot: Shot) -> None:
+    own = [shot.sensor.x, shot.sensor.y, shot.sensor.z]
+    turns = [shot.sensor.yaw, shot.sensor.pitch, shot.sensor.roll]
+    ego = [shot.ego.speed, shot.ego.yaw_rate, shot.ego.acceleration]
+    if not np.isfinite([*own, *turns, *ego]).all():
+        raise InvalidInput(f"{place}: the pose or the motion of the car is not finite")
+    if np.abs(turns).max() > FULL_TURN:
+        raise InvalidInput(
+            f"{place}: the car is turned by {max(turns, key=abs):g}, must be radians"
+        )
+
+
+def _check_cloud(place: str, cloud: Cloud, cells: int) -> None:
+    if not (len(cloud.cells) == len(cloud.objects) and cloud.points.shape == (len(cloud), 3)):
+        raise InvalidInput(f"{place}: cells, points and objects of a cloud must be equally many")
+    if not np.isfinite(cloud.points).all():
+        raise InvalidInput(f"{place}: a point of a cloud is not finite")
+    ascend = np.diff(cloud.cells) >= 0
+    if len(cloud) and not (ascend.all() and 0 <= cloud.cells[0] <= cloud.cells[-1] < cells):
+        raise InvalidInput(f"{place}: cells of a cloud must ascend, from 0 to {cells - 1}")
 
 
 def _check_boxes(place: str, objects: Integers, boxes: Floats, yaw: float) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 from care_sim.base.checks import check_known
@@ -102,6 +103,11 @@ class Installed:
     def check_returns(self, returns: FilmedReturns) -> None:
         """Recordings hold what returned, generated streets are filmed."""
         self._made().check_returns(returns)
+
+    def files(self, scene: Scene) -> list[Path]:
+        """Those of its own."""
+        with self._blamed(f"names no files of {scene.name}"):
+            return [Path(path) for path in self._made().files(scene)]
 
     def row(self, scene: Scene) -> dict[str, Any]:
         """That of its kind, under its own name."""

@@ -4,10 +4,11 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from pathlib import Path
 from typing import Any, ClassVar, NamedTuple, Protocol
 
 from care_sim.base.checks import check_known
-from care_sim.base.digests import data_digest, file_digest
+from care_sim.base.digests import Stamp, data_digest, file_digest, file_stamp, files_below
 from care_sim.base.errors import InvalidInput, shortened
 from care_sim.core.return_settings import RAYS, FilmedReturns, changed_settings
 from care_sim.core.sensor_setup import SensorSetup
@@ -61,6 +62,10 @@ class Source(Protocol):
         """Raise InvalidInput where no film can be made with `returns`."""
         ...
 
+    def files(self, scene: Scene) -> list[Path]:
+        """Return the files and folders that a scene is read from."""
+        ...
+
     def row(self, scene: Scene) -> dict[str, Any]:
         """Columns that tell where a scene comes from: the kind of the source, and of recordings a
         hash of the files that it is read from, wherever they lie.
@@ -108,6 +113,10 @@ class Generated(ABC):
     def check_returns(self, returns: FilmedReturns) -> None:
         """A street is filmed with all but one; see `care_sim.sources.street_films`."""
         check_filmed(returns)
+
+    def files(self, scene: Scene) -> list[Path]:
+        """Return none: code makes a street."""
+        return []
 
     def row(self, scene: Scene) -> dict[str, Any]:
         """The name of a street says all but the sensor."""
@@ -167,13 +176,17 @@ class Recorded:
                 "them"
             )
 
+    def files(self, scene: Scene) -> list[Path]:
+        """Return those of the recorded scene."""
+        return self.recordings.files(scene.name)
+
     def row(self, scene: Scene) -> dict[str, Any]:
         """The kind, the hash of the scene's files, that of the camera detections where there are
         some, and the number of sweeps where it is not one.
         """
         own: dict[str, Any] = {
             "source": self.kind,
-            "recording": data_digest(self.recordings.files(scene.name)),
+            "recording": data_digest(self.files(scene)),
         }
         if not isinstance(self.recordings, NuScenes):
             return own
@@ -189,9 +202,16 @@ LONGEST_NUMBER = 40
 SPLITS = {"evaluation": EVALUATION_SEEDS, "calibration": CALIBRATION_SEEDS}
 
 
-@lru_cache(maxsize=1)
 def film_of(source: Source, scene: Scene) -> Film:
-    """The film of a scene. The last one is kept, for policies that meet the same scene in turn."""
+    """The film of a scene. The last one is kept, for policies that meet the same scene in turn,
+    until one of its files changes.
+    """
+    parts = (files_below(path) if path.is_dir() else [path] for path in source.files(scene))
+    return _film_of(source, scene, tuple(file_stamp(file) for part in parts for file in part))
+
+
+@lru_cache(maxsize=1)
+def _film_of(source: Source, scene: Scene, _stamps: tuple[Stamp, ...]) -> Film:
     return source.film(scene)
 
 
