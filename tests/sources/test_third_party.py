@@ -74,6 +74,22 @@ def test_the_protocol_plays_it_and_names_it(installed, tmp_path, capsys):
     assert "2 of 2 plays found" in capsys.readouterr().err
 
 
+def test_the_documented_source_of_boxes_plays_from_fifteen_lines(tmp_path, monkeypatch, capsys):
+    (mine,) = (one for one in fenced(ROOT / "docs" / "protocol.md", "python") if "Mine" in one)
+    source = mine.partition('if __name__ == "__main__":')[0]
+    assert len([line for line in source.splitlines() if line.strip()]) <= 15
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    (tmp_path / "mine.py").write_text(mine)
+    exec(compile(mine, "mine.py", "exec"), {"__name__": "__main__"})
+    annotated, speed = capsys.readouterr().out.rsplit(maxsplit=1)
+    assert (annotated.count("2") >= 4, float(speed)) == (True, pytest.approx(8.0))
+    assert run("protocol", "--source", "mine:Mine:drives", *SHORT, "--out", tmp_path / "out") == 0
+    (row,) = read_results(tmp_path / "out")[0]
+    assert (row["source"], row["scene"], row["keyframes"]) == ("mine:Mine", "monday", 8)
+    assert row["events"] == 1.0
+
+
 def test_its_streets_hold_first_sightings_and_are_filmed_by_any_sensor(installed):
     source = source_of("crossings", sensor="os1-64")
     film = source.film(source.scenes()[3])
