@@ -5,11 +5,12 @@ it is gone.
 import multiprocessing
 import os
 import signal
+import sys
 import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from multiprocessing import resource_tracker, util
 from typing import TypeVar
 
@@ -92,6 +93,13 @@ def end_group_with_work() -> None:
     lead_group()
     # multiprocessing waits for threads and child processes after these finalizers.
     util.Finalize(None, _end_group, exitpriority=0)
+    util.Finalize(None, flush_output, exitpriority=1)
+
+
+def flush_output() -> None:
+    """Write out what was printed, since a process that is killed does not."""
+    with suppress(Exception):  # whatever foreign code has put there
+        sys.stdout.flush()
 
 
 def end_with_starter(starter: int) -> None:

@@ -32,7 +32,7 @@ from care_sim.base.errors import (
     one_line,
     shortened,
 )
-from care_sim.base.processes import LOOK_S, end_with_parent, lead_group, starting
+from care_sim.base.processes import LOOK_S, end_with_parent, flush_output, lead_group, starting
 from care_sim.core.belief import Belief, Observation
 from care_sim.core.cell_sets import CellSets
 from care_sim.core.rig import Rig
@@ -138,6 +138,8 @@ class PolicyProcess:
 
     def end(self) -> None:
         """End the process, and those that it has started."""
+        if not self.is_usable:
+            return
         self.is_usable = False
         if pid := self._process.pid:
             with suppress(ProcessLookupError, PermissionError):
@@ -234,7 +236,9 @@ def _serve(connection: Connection) -> None:
             request = connection.recv_bytes()
         except EOFError:
             return
-        connection.send_bytes(_answer(request))
+        answer = _answer(request)
+        flush_output()
+        connection.send_bytes(answer)
 
 
 def _answer(request: bytes) -> bytes:

@@ -19,7 +19,6 @@ from care_sim.envs.closed_loop import KEYFRAME_S, ClosedLoopEnv
 from care_sim.envs.vector.coverage import why_separate
 from care_sim.perception.detectors import PROXY
 from care_sim.policies.base import PrivilegedPolicy
-from care_sim.policies.isolation import IsolatedPolicy
 from care_sim.scenarios import SCENARIOS, make_scenario
 from care_sim.sensors.setups import DEFAULT_SETUP, sensor_columns
 from care_sim.study.parameters import Parameters
@@ -70,8 +69,7 @@ class EpisodeConfig(ClosedLoopConditions, RunConfig):
         with self.make_env() as env:
             policy = self.make_policy(env)
             alone = (
-                isinstance(policy, PrivilegedPolicy | IsolatedPolicy)
-                or why_separate(closed_loop(env)) is not None
+                isinstance(policy, PrivilegedPolicy) or why_separate(closed_loop(env)) is not None
             )
         # No field: it follows from them, and is nothing that decides the row.
         object.__setattr__(self, "_alone", alone)
@@ -147,8 +145,7 @@ class EpisodeConfig(ClosedLoopConditions, RunConfig):
     @property
     def alone(self) -> bool:
         """Whether it is played by itself: for a privileged policy, which asks its own world for the
-        truth, for an isolated one, which is not seen to draw from a generator of its process, and
-        in worlds that are not played as arrays (`care_sim.envs.vector.coverage`).
+        truth, and in worlds that are not played as arrays (`care_sim.envs.vector.coverage`).
         """
         return bool(vars(self)["_alone"])
 

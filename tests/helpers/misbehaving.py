@@ -105,10 +105,12 @@ class FailsAtStart(History):
 
 class StartsThread(History):
     def reset(self):
+        print("reset")
         threading.Thread(target=time.sleep, args=[600]).start()
 
 class Forks(History):
     def reset(self):
+        print("reset")
         if os.fork() == 0:
             time.sleep(600)
             os._exit(0)

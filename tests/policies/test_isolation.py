@@ -32,6 +32,7 @@ import care_sim
 
 class Spy(care_sim.Policy):
     def demand(self, belief):
+        print("spying")
         # Cell 7 says that nothing was found.
         seen = [*gc.get_objects(), *(v for f in inspect.stack() for v in f.frame.f_locals.values())]
         found = any(isinstance(each, gymnasium.Env) for each in seen)
@@ -108,13 +109,14 @@ def test_actions_are_the_same_to_the_last_bit(name, env):
     assert demanded_apart == demanded
 
 
-def test_neither_frames_nor_memory_lead_to_the_environment(env, spy):
+def test_neither_frames_nor_memory_lead_to_the_environment(env, spy, capfd):
     observation, _ = env.reset(seed=0)
     with isolated_policies():
         assert tags_of("spy:Spy") == ("causal",)
         apart = care_sim.make_policy("spy:Spy", env)(observation)
         digest = policy_digest("spy:Spy")
         assert "spy" not in sys.modules
+    assert capfd.readouterr().out == "spying\n"
     here = care_sim.make_policy("spy:Spy", env)(observation)
     assert (np.flatnonzero(here), np.flatnonzero(apart)) == ([3], [7])
     assert policy_digest("spy:Spy") == digest
@@ -123,7 +125,7 @@ def test_neither_frames_nor_memory_lead_to_the_environment(env, spy):
 @pytest.mark.parametrize(
     ("name", "line"),
     [
-        ("Raises", r"^RuntimeError: no idea \(spy.py, line 16\)$"),
+        ("Raises", r"^RuntimeError: no idea \(spy.py, line 17\)$"),
         ("ForksAndExits", r"^the process of policy spy:ForksAndExits died$"),
         ("Narrow", r"^action must have shape \(32, 512\) \(rows, columns\), got \(1, 512\)$"),
     ],

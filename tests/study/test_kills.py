@@ -78,6 +78,7 @@ def test_a_study_ends_whatever_a_policy_has_started(policy, third_party, tmp_pat
         assert until(lambda: started.process.poll() is not None, 60)
         assert started.all_end_within(10)
         assert started.process.returncode == 0
+        assert "reset" in started.process.communicate()[0]
     assert (out / "tables.md").is_file()
 
 
