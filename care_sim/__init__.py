@@ -9,6 +9,10 @@ Importing the package registers the environments of the closed loop, `CARE-Darto
 import care_sim.base.interrupts  # noqa: F401
 
 # isort: split
+# Before Numba and Matplotlib look for their caches.
+import care_sim.base.home  # noqa: F401
+
+# isort: split
 from importlib.metadata import version
 
 from care_sim.base.errors import InvalidInput, MissingExtra

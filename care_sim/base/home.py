@@ -1,0 +1,46 @@
+"""Settle a folder for caches where the user has no home folder, or one that cannot be written.
+
+Numba, Matplotlib and Altair keep caches below the home folder. Without one they fail, warn at every
+start, or make a folder named `~`. A container that runs under a foreign user number is such a case.
+Importing this module settles it.
+"""
+
+import os
+import stat
+import sys
+import tempfile
+from pathlib import Path
+
+
+def _settle_caches() -> None:
+    """Send the caches of this process, and of those that it starts, to a private temporary folder
+    where the home folder cannot be written, and say so in one line.
+    """
+    home = os.path.expanduser("~")
+    has_home = os.path.isabs(home)
+    settled = {"XDG_CACHE_HOME", "MPLCONFIGDIR"} <= {*os.environ}
+    if has_home and (settled or os.access(home, os.W_OK)):
+        return
+    try:
+        folder = _private_folder()
+    except OSError:  # a container whose whole disk is read-only
+        folder = Path(os.devnull)
+    if not has_home:
+        os.environ["HOME"] = str(folder)
+    os.environ.setdefault("XDG_CACHE_HOME", str(folder))
+    os.environ.setdefault("MPLCONFIGDIR", str(folder / "matplotlib"))
+    print(f"care_sim: no home folder to write to: caches go to {folder}", file=sys.stderr)
+
+
+def _private_folder() -> Path:
+    """The folder of this user among the temporary files; a new one where somebody else could write
+    to it, since caches of Numba hold code. Raises OSError where there is no place for it.
+    """
+    folder = Path(tempfile.gettempdir()) / f"care-sim-{os.getuid()}"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    found = folder.lstat()
+    is_private = (found.st_uid, stat.S_IMODE(found.st_mode)) == (os.getuid(), 0o700)
+    return folder if is_private and stat.S_ISDIR(found.st_mode) else Path(tempfile.mkdtemp())
+
+
+_settle_caches()
