@@ -107,7 +107,7 @@ class ClosedLoop:
         self._needless = NeedlessBraking(front_m, self.guarded_m / 2, conditions) if plan else None
         # The proxy reports bodies alone. Another detector may make one up.
         self._unfounded = (
-            NeedlessBraking(front_m, self.guarded_m / 2, conditions) if detector else None
+            None if detector is None else NeedlessBraking(front_m, self.guarded_m / 2, conditions)
         )
         self._has_met = False
         self.index = 0
