@@ -29,6 +29,7 @@ from care_sim.study.play_config import PlayConfig
 from care_sim.study.rows.reading import stops_for_nothing
 from care_sim.study.run_config import Row
 from care_sim.study.scene_trace import trace_scene
+from care_sim.study.world_hash import check_worlds
 from care_sim.viewer.pictures.comparison import draw_panel
 from care_sim.viewer.pictures.scene_comparison import draw_scene_panel
 
@@ -126,6 +127,7 @@ def play_side_by_side(
         # What was played is printed whatever happens to the others.
         failures = _report(configs, answers)
     finish_files(record, film, video)
+    check_worlds(row for row in answers if not isinstance(row, str))
     return failures
 
 

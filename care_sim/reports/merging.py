@@ -30,6 +30,7 @@ from care_sim.study.rows.parquet import (
 )
 from care_sim.study.rows.reading import key_of, with_regret
 from care_sim.study.run_config import Row
+from care_sim.study.world_hash import check_worlds
 
 _EVENTS = "events.parquet"
 
@@ -106,6 +107,7 @@ def merged(folders: Sequence[Path]) -> Merged:
         rows += [row for row, new in zip(own, is_new, strict=True) if new]
         if study.results is PLAYS:
             events += _events(folder, own, is_new)
+    check_worlds(rows)
     rows = _in_one_table(rows, firsts)
     told = _descriptions(folders)
     codes = dict(zip(folders, map(_codes, told.values()), strict=True))

@@ -20,8 +20,10 @@ from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.records import Keyframe
 from care_sim.policies.base import Policy
+from care_sim.scenarios import SCENARIOS
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.run_config import Row, flat
+from care_sim.study.world_hash import world_hash
 
 _Result = TypeVar("_Result")
 Watcher = Callable[[ClosedLoop, Keyframe], None]
@@ -48,7 +50,8 @@ def run_episode(config: EpisodeConfig) -> Row:
     Every parameter of `EpisodeConfig.row`; `version` and `digest` of the configuration; as
     `drawn.NAME` the parameters of the scenario that the seed drew; the fields of
     `care_sim.loops.records.Outcome`; `keyframes`; `wall_s`; `peak_rss_mb` of the process so far;
-    and `episode_hash` over cells fired, ranges returned and poses (`care_sim.base.portable_hash`).
+    `episode_hash` over cells fired, ranges returned and poses (`care_sim.base.portable_hash`); and
+    of a scenario that is not built in `world_hash` (`care_sim.study.world_hash`).
     """
     return trace(config)[0]
 
@@ -89,7 +92,11 @@ def trace(
         drawn = played.loop.world.drawn
     wall_s = time.perf_counter() - started
     found = Played(told, drawn, info["outcome"], len(keyframes), wall_s, digest.hexdigest())
-    return found.row(config), keyframes
+    row = found.row(config)
+    # The built-in scenarios are known to draw from the seed alone.
+    if config.scenario not in SCENARIOS:
+        row["world_hash"] = world_hash(played, config.seed)
+    return row, keyframes
 
 
 class Played(NamedTuple):

@@ -100,6 +100,7 @@ _OF_EPISODES = (
         "closing_speed_mps": as_optional(SUM),
         "hit_kind": as_optional(TEXT),
         "hit_at_front": as_optional(FLAG),
+        "world_hash": as_optional(TEXT),
     }
     | {name: CONDITION_COLUMNS[name] for name in COLUMNS_WHERE_CHANGED}
 )

@@ -20,6 +20,7 @@ from care_sim.study.rows.parquet import check_columns, write_columns, write_rows
 from care_sim.study.run_config import Row, RunConfig
 from care_sim.study.runner import Failure
 from care_sim.study.unfinished import Unfinished, forget
+from care_sim.study.world_hash import check_worlds
 
 
 def run_study(
@@ -42,7 +43,8 @@ def run_study(
     No other study can take the folder until all of that is written. Where the folder holds rows
     that were not obtained again because tasks failed, its files stay, unless `force`.
 
-    Raises InvalidInput for no task or no worker, and when the folder cannot be written. Unless
+    Raises InvalidInput for no task or no worker, when the folder cannot be written, and where a
+    scenario builds different worlds of one seed. Unless
     `force`, also when the folder holds another study, finished or not, or rows of this one that are
     none of `configs`.
     """
@@ -69,6 +71,8 @@ def run_study(
         # The journal keeps what finishes, even if this process ends before results are written.
         failures = run_with_progress(configs, journal, workers, make_executor, kind)
         played = [config for config in configs if config.key in journal]
+
+        check_worlds(journal[config.key] for config in played)
 
         # Results of an earlier run are worth more than new ones with holes in their place.
         left = lost(folder, played, study) if failures and not force else ""
