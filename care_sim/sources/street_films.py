@@ -2,7 +2,7 @@
 rendered.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
 from functools import lru_cache, partial
@@ -49,9 +49,12 @@ def record(street: Street, setup: SensorSetup = _DEFAULT, returns: FilmedReturns
     it. nuScenes is alike: it scores what has at least one LiDAR or radar point. Nobody could have
     seen what is wholly hidden. The street knows those too: who is wholly hidden at its first
     keyframe is in `Film.hidden`. Whatever returns, the same are annotated: those whom plain rays or
-    a camera meet.
+    a camera meet. Raises InvalidInput for a pose that is not finite.
     """
     check_filmed(returns)
+    columns = [f"{kind} (column {number})" for number, kind in enumerate(street.kinds)]
+    _check_poses(street, ["the ego"], street.ego[:, None])
+    _check_poses(street, columns, street.poses)
     cameras = setup.equipped(SURROUND_CAMERAS)
     with closing(BulletWorld()) as world:
         bodies = _StreetBodies(street, world, setup, returns)
@@ -59,6 +62,18 @@ def record(street: Street, setup: SensorSetup = _DEFAULT, returns: FilmedReturns
     x, y, z = setup.position
     told = street.name, cameras, z, STREET_KEYFRAME_S
     return Film(*told, shots, hidden[0], setup.grid, (x, y), returns=returns)
+
+
+def _check_poses(street: Street, names: Sequence[str], poses: Floats) -> None:
+    """Raise InvalidInput for the first of the `poses` (k, n, 3) that is not finite."""
+    lost = np.argwhere(~np.isfinite(poses))
+    if len(lost):
+        keyframe, body, _ = lost[0].tolist()
+        place = ", ".join(f"{number:g}" for number in poses[keyframe, body])
+        raise InvalidInput(
+            f"street {street.name}: the pose of {names[body]} is {place} at "
+            f"{keyframe * STREET_KEYFRAME_S:g} s; x, y and heading must be finite numbers"
+        )
 
 
 def check_filmed(returns: FilmedReturns) -> None:

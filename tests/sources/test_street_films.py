@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from care_sim.base.errors import InvalidInput
 from care_sim.core.grid import AngularGrid
 from care_sim.core.sensor_setup import LIDAR_POSITION
 from care_sim.core.types import CLASSES, Ego
@@ -208,3 +209,15 @@ def test_a_body_that_left_and_returned_is_where_it_then_is():
     assert nearest[3] == pytest.approx(nearest[0] + 5.0, abs=0.3)
     for shot in shots[1:3]:
         assert shot.cloud.points[:, 2] == pytest.approx(-LIDAR_POSITION[2], abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("body", "told"),
+    [(0, r"the pose of car \(column 0\) is 10, nan, 0"), (None, "the pose of the ego")],
+)
+def test_who_gets_lost_in_a_street_is_named_with_the_time(body, told):
+    street = standing_street(("car", 10.0, 3.0), ("bus", 20.0, 3.0), keyframes=3)
+    table = street.ego if body is None else street.poses[:, body]
+    table[2, 1] = np.nan
+    with pytest.raises(InvalidInput, match=rf"street hand-built: {told}.* at 1 s; x, y and"):
+        record(street)
