@@ -84,6 +84,9 @@ class GridRays:
         # Tables are megabytes for a large grid: a copy, in a worker for example, makes its own.
         return {one.name: getattr(self, one.name) for one in fields(self)}
 
+    def __deepcopy__(self, _copied: dict[int, Any]) -> Self:
+        return self
+
     def _settle_listed(self) -> None:
         """Check the listed elevations, and make them a tuple of plain numbers."""
         listed = self.listed

@@ -8,7 +8,7 @@ the first LiDAR from its top to its bottom, then those of the second, and so on.
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -69,6 +69,9 @@ class GridStack:
     def __getstate__(self) -> dict[str, Any]:
         # Tables are megabytes: a copy, in a worker for example, makes its own.
         return {one.name: getattr(self, one.name) for one in fields(self)}
+
+    def __deepcopy__(self, _copied: dict[int, Any]) -> Self:
+        return self
 
     @cached_property
     def heads(self) -> tuple[Head, ...]:

@@ -42,15 +42,27 @@ class WordStreams(NamedTuple):
     words: NDArray[np.uint32]
     used: Integers
 
+    def __reduce__(self) -> tuple[object, ...]:
+        # Copied one by one, numbers and words would no longer share their memory.
+        return _streams_of, (self.lanes, self.increments, self.numbers, self.used)
+
 
 def word_streams(worlds: int) -> WordStreams:
     """Streams that are yet to be seeded."""
     numbers = np.zeros((worlds, _LANES), np.uint64)
-    # Numba compiles for machines alone that keep the lower half first.
-    words = numbers.view(np.uint32)
     lanes = np.zeros((worlds, 2, _LANES), np.uint64)
     increments = np.zeros((worlds, 2), np.uint64)
-    return WordStreams(lanes, increments, numbers, words, np.zeros(worlds, np.int64))
+    return _streams_of(lanes, increments, numbers, np.zeros(worlds, np.int64))
+
+
+def _streams_of(
+    lanes: NDArray[np.uint64],
+    increments: NDArray[np.uint64],
+    numbers: NDArray[np.uint64],
+    used: Integers,
+) -> WordStreams:
+    # Numba compiles for machines alone that keep the lower half first.
+    return WordStreams(lanes, increments, numbers, numbers.view(np.uint32), used)
 
 
 def seed_stream(streams: WordStreams, world: int, seed: np.random.SeedSequence) -> None:

@@ -113,7 +113,7 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
     @property
     def truth(self) -> Truth:
         """What privileged policies may ask for; `make_policy` hands it to them alone."""
-        return EpisodeTruth(lambda: self.loop)
+        return EpisodeTruth(self)
 
     def _reseed(self, seed: int | None, options: dict[str, Any] | None) -> None:
         """Begin the environment's own generator anew if a seed is given.

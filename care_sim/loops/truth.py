@@ -52,19 +52,28 @@ class Loop(Protocol):
         ...
 
 
+class Looped(Protocol):
+    """An environment with a running episode."""
+
+    @property
+    def loop(self) -> Loop:
+        """The loop of the running episode."""
+        ...
+
+
 class EpisodeTruth:
     """A `Truth` that follows an environment from episode to episode."""
 
-    def __init__(self, running: Callable[[], Loop]):
-        self._running = running
+    def __init__(self, env: Looped):
+        self._env = env
 
     def boxes(self, tracks: Tracks) -> Floats:
         """(n, 7) true boxes; see `Truth.boxes`."""
-        return self._running().true_boxes(tracks)
+        return self._env.loop.true_boxes(tracks)
 
     def full_scan(self) -> Scan:
         """What a scan of every cell would return; see `Truth.full_scan`."""
-        return self._running().full_scan()
+        return self._env.loop.full_scan()
 
 
 class TrackObjects:

@@ -72,6 +72,7 @@ class Scenario(ABC):
         if not (world.first_sighting or world.meetings or world.route):
             world.close()
             raise BrokenScenario(f"{own}: build sets no first_sighting, the actor that is scored")
+        world.scene = own
         return world
 
 

@@ -1,6 +1,7 @@
 """Cut-in: a car pulls out into the ego's lane from in front of a standing bus."""
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -67,7 +68,7 @@ class CutIn(MirrorableScenario):
         world.first_sighting = world.add("cutting-in car", "car", driver)
         # When the bumper of an ego that never brakes comes to where the rear of the car stands.
         arrival = (rear_x - world.ego_kind.size[0] / 2) / ego_speed
-        world.at(arrival - draw(rng, self.pull_out_s), lambda: driver.pull_out(lane=0))
+        world.at(arrival - draw(rng, self.pull_out_s), partial(driver.pull_out, lane=0))
 
         line_with_terraces(world, RIGHT_FRONT_Y, LEFT_FRONT_Y)
         return world

@@ -4,8 +4,10 @@ All that is drawn, and from which ranges, is in `care_sim.streets.drive` and
 `care_sim.streets.encounters`.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
+from typing import Self
 
 import numpy as np
 
@@ -125,25 +127,33 @@ def _walking(way: Floats) -> Motion:
     moved = way[:-1, None, :2] + shares * np.diff(way[:, :2], axis=0)[:, None]
     headings = np.repeat(way[:-1, 2], between)
     xs, ys = moved.reshape(-1, 2).T.tolist()
-    yaws = headings.tolist()
+    return _Way(tuple(zip(xs, ys, headings.tolist(), strict=True)))
 
-    def pose(time: float) -> Pose:
-        place = min(round(time / WORLD_STEP_S), len(yaws) - 1)
-        return xs[place], ys[place], yaws[place]
 
-    return pose
+@dataclass(frozen=True)
+class _Way:
+    """A motion through `poses`, one per world step."""
+
+    poses: tuple[Pose, ...]
+
+    def __call__(self, time: float) -> Pose:
+        return self.poses[min(round(time / WORLD_STEP_S), len(self.poses) - 1)]
+
+    def __deepcopy__(self, _copied: dict[int, object]) -> Self:
+        # Poses never change, and copying thousands of them takes most of the time of a copy.
+        return self
 
 
 def _add_vehicles(world: World, drive: Drive, traffic: StreetTraffic) -> None:
     """The traffic, which sees the ego where it is at every step."""
     for number, lane in enumerate(drive.lanes):
         for place, kind in enumerate(lane.kinds):
-            world.add(f"driven {kind}", kind, _driving(traffic, number, place))
-    world.at_every_step(lambda now: traffic.step(WORLD_STEP_S, now.along_m, now.ego.speed))
+            world.add(f"driven {kind}", kind, partial(traffic.pose_at, number, place))
+    world.at_every_step(partial(_drive_on, traffic))
 
 
-def _driving(traffic: StreetTraffic, lane: int, number: int) -> Motion:
-    return lambda _time: traffic.pose(lane, number)
+def _drive_on(traffic: StreetTraffic, world: World) -> None:
+    traffic.step(WORLD_STEP_S, world.along_m, world.ego.speed)
 
 
 def _add_encounters(world: World, drive: Drive, traffic: StreetTraffic) -> None:
@@ -152,7 +162,7 @@ def _add_encounters(world: World, drive: Drive, traffic: StreetTraffic) -> None:
         free = _may_go(drive, traffic, CATALOGUE[one.who].size[:2])
         crosser = Crosser(one.walk, one.lead_s, free)
         actor = world.add(one.who, one.who, crosser.pose)
-        world.at_every_step(_looking(crosser, drive.plan, one.arrival_m))
+        world.at_every_step(partial(_look, crosser, drive.plan, one.arrival_m))
         side = "left" if one.side > 0 else "right"
         occluder = one.occluder, one.occluder_reported
         world.meetings.append(
@@ -174,13 +184,9 @@ def _add_encounters(world: World, drive: Drive, traffic: StreetTraffic) -> None:
         world.first_sighting = next(a for a in world.actors if a.body == hits[0].body)
 
 
-def _looking(crosser: Crosser, plan: SpeedPlan, line_m: float) -> Callable[[World], None]:
-    """Somebody who watches the ego, whose middle is on the line `line_m` along the route."""
-
-    def look(world: World) -> None:
-        crosser.look(world.time, lambda: _seconds_left(world, plan, line_m))
-
-    return look
+def _look(crosser: Crosser, plan: SpeedPlan, line_m: float, world: World) -> None:
+    """Let somebody watch the ego, whose middle is on the line `line_m` along the route."""
+    crosser.look(world.time, lambda: _seconds_left(world, plan, line_m))
 
 
 def _seconds_left(world: World, plan: SpeedPlan, line_m: float) -> float:
@@ -192,19 +198,23 @@ def _seconds_left(world: World, plan: SpeedPlan, line_m: float) -> float:
 def _may_go(
     drive: Drive, traffic: StreetTraffic, size: tuple[float, float]
 ) -> Callable[[Walk], bool]:
-    """Whether somebody of a `size` keeps clear of all traffic that drives on evenly."""
+    """Return the rule by which somebody of a `size` sets off."""
     lanes = [
         (flowing, np.array([CATALOGUE[kind].size[:2] for kind in lane.kinds]))
         for flowing, lane in zip(traffic.lanes, drive.lanes, strict=True)
         if lane.kinds
     ]
 
-    def free(walk: Walk) -> bool:
-        times = np.arange(0.0, walk.duration_to(walk.length_m), LOOK_AHEAD_STEP_S)
-        own = np.array([walk.pose(walk.starts_s + time) for time in times.tolist()])
-        return not any(_meet(lane, sizes, times, own, size) for lane, sizes in lanes)
+    return partial(_is_free, lanes, size)
 
-    return free
+
+def _is_free(
+    lanes: Sequence[tuple[FlowingLane, Floats]], size: tuple[float, float], walk: Walk
+) -> bool:
+    """Whether somebody of a `size` keeps clear of all traffic that drives on evenly."""
+    times = np.arange(0.0, walk.duration_to(walk.length_m), LOOK_AHEAD_STEP_S)
+    own = np.array([walk.pose(walk.starts_s + time) for time in times.tolist()])
+    return not any(_meet(lane, sizes, times, own, size) for lane, sizes in lanes)
 
 
 def _meet(

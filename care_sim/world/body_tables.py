@@ -21,8 +21,6 @@ Solids = tuple[Integers, Floats, Floats, Integers]
 
 SHAPES: tuple[Shape, ...] = ("box", "cylinder", "sphere")
 """Round parts stand along their own z; a shape's number is its place here."""
-_BODIES = 32
-"""Rows that tables have room for at first: enough for most streets."""
 
 
 class Footprints:
@@ -31,14 +29,12 @@ class Footprints:
     """
 
     def __init__(self) -> None:
-        self._rows = np.full((_BODIES, 7), np.nan)
-        self.boxes = self._rows[:0]
+        self.boxes = np.empty((0, 7))
 
     def add(self, body: int, size: Triple, pose: Pose) -> None:
         """Take in a body of a size on the ground plane."""
         # Ids count upwards, the ground's among them: rows between stay NaN.
-        self._rows = _with_room(self._rows, body, np.nan)
-        self.boxes = self._rows[: body + 1]
+        self.boxes = _with_room(self.boxes, body, np.nan)
         x, y, heading = pose
         self.boxes[body] = x, y, size[2] / 2, *size, heading
 
@@ -113,15 +109,13 @@ class Primitives:
     """
 
     def __init__(self) -> None:
-        self._rows = np.zeros((_BODIES, 7))
-        self.poses = self._rows[:0]
+        self.poses = np.empty((0, 7))
         self._bodies: list[OwnParts] = []
         self._tables: Solids | None = None
 
     def add(self, body: int, parts: tuple[Part, ...]) -> None:
         """Take in a body, its parts in its own frame; a body that nothing can hit has none."""
-        self._rows = _with_room(self._rows, body, 0.0)
-        self.poses = self._rows[: body + 1]
+        self.poses = _with_room(self.poses, body, 0.0)
         self._bodies.append((body, parts))
         self._tables = None
 
@@ -165,11 +159,11 @@ def _columns(parts: tuple[Part, ...]) -> tuple[Integers, Floats, Floats]:
 
 
 def _with_room(rows: Floats, body: int, empty: float) -> Floats:
-    """A table (n, 7) that has a row for a body: `rows`, or a longer copy, whose new rows hold
+    """Return a table (n, 7) with a row for a body: `rows`, or a longer copy whose new rows hold
     `empty`.
     """
     if body < len(rows):
         return rows
-    longer = np.full((2 * body, 7), empty)
+    longer = np.full((body + 1, 7), empty)
     longer[: len(rows)] = rows
     return longer

@@ -25,8 +25,8 @@ _SHAPES = {
 }
 
 
-class _Unmade(NamedTuple):
-    """A body that PyBullet does not know yet: all its parts, those that are seen, and its group."""
+class _Shape(NamedTuple):
+    """What PyBullet makes a body of: all its parts, those that cameras see, and its group."""
 
     parts: Sequence[Part]
     seen: Sequence[Part]
@@ -39,11 +39,15 @@ class BulletBodies:
     def __init__(self, client: LentClient, ground: bool) -> None:
         self._client = client
         self._ground = ground
-        self._unmade: dict[int, _Unmade] = {}
+        self._shapes: dict[int, _Shape] = {}
         self._moved: set[int] = set()
         # By id the numbers of PyBullet, which counts in the order in which it learns of bodies.
         self._numbers: dict[int, int] = {}
         self._count = int(ground)
+
+    def __getstate__(self) -> dict[str, Any]:
+        # A copy has a client of its own, which knows nobody yet.
+        return vars(self) | {"_numbers": {}, "_moved": set(self._shapes)}
 
     @property
     def made(self) -> int:
@@ -54,7 +58,7 @@ class BulletBodies:
         """Take in a body of `parts`, of which cameras are to see `seen`; its id."""
         body = self._count
         self._count += 1
-        self._unmade[body] = _Unmade(parts, seen, group)
+        self._shapes[body] = _Shape(parts, seen, group)
         self._moved.add(body)
         return body
 
@@ -82,8 +86,8 @@ class BulletBodies:
         """Let PyBullet know of a body, and that it is at `pose`: x, y, z and the quaternion x, y,
         z, w. Its number of it.
         """
-        if body in self._unmade:
-            self._numbers[body] = self._make(self._unmade.pop(body))
+        if body not in self._numbers:
+            self._numbers[body] = self._make(self._shapes[body])
         number = self._numbers[body]
         pybullet.resetBasePositionAndOrientation(
             number, pose[:3], pose[3:], physicsClientId=self._client.number
@@ -108,7 +112,7 @@ class BulletBodies:
         for body in sorted(moved):
             self.put(body, poses[body].tolist())
 
-    def _make(self, body: _Unmade) -> int:
+    def _make(self, body: _Shape) -> int:
         # Mass 0: bodies stand where they are put, and nothing ever falls or is pushed.
         number = pybullet.createMultiBody(
             0,

@@ -41,6 +41,10 @@ class LentClient:
             self._abandoned.atexit = False
         return self._number
 
+    def __getstate__(self) -> dict[str, object]:
+        # Two owners of one client would empty it for each other: a copy borrows its own.
+        return {"_number": _CLOSED if self.closed else None, "_abandoned": None}
+
     @property
     def closed(self) -> bool:
         """Whether `close` was called."""

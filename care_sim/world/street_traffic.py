@@ -43,8 +43,8 @@ class StreetTraffic:
         self.lanes = tuple(lanes)
         self._poses = self._poses_now()
 
-    def pose(self, lane: int, number: int) -> Pose:
-        """World pose of a vehicle, by the numbers of its lane and within it."""
+    def pose_at(self, lane: int, number: int, _time: float) -> Pose:
+        """Return the world pose now of a vehicle, by the numbers of its lane and within it."""
         x, y, heading = self._poses[lane][number]
         return x, y, heading
 

@@ -170,6 +170,10 @@ class RoadVehicle:
         x, y = self._vehicle.position
         return float(x), -float(y), -float(self._vehicle.heading)
 
+    def pose_at(self, _time: float) -> Pose:
+        """Return the pose now, as the motion of an actor."""
+        return self.pose
+
     @property
     def speed(self) -> float:
         """m/s along the heading."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from care_sim.world.approach import ClosestApproach
 from care_sim.world.bodies import CATALOGUE, BodyKind
 from care_sim.world.body_tables import Footprints
 from care_sim.world.bullet import BulletWorld
+from care_sim.world.copying import check_copyable
 from care_sim.world.crosser import Meeting
 from care_sim.world.linear_motion import LinearMotion, rates_between
 from care_sim.world.passage import Passage
@@ -56,6 +58,8 @@ class World:
     drives along x, or at the start of its `route` and along that.
     """
 
+    scene: str
+    """What messages call the world; the scenario that built it."""
     time: float
     """Seconds from the start."""
     actors: list[Actor]
@@ -85,6 +89,7 @@ class World:
     """
 
     def __init__(self, traffic: Traffic, ego_speed: float, route: Route | None = None):
+        self.scene = "the world"
         self.bullet = BulletWorld()
         self.traffic = traffic
         self.route = route
@@ -96,6 +101,7 @@ class World:
             if route is not None
             else traffic.add_ego(0.0, ego_speed, self.ego_kind)
         )
+        self._check_pose("the ego", self.ego.pose)
         self.ego_body = self.bullet.add(self.ego_kind, self.ego.pose, transparent=True)
         self._footprints = Footprints()
         self._footprints.add(self.ego_body, self.ego_kind.size, self.ego.pose)
@@ -104,7 +110,7 @@ class World:
         self.first_sighting = None
         self.speed_plan = None
         self.goal_m = np.inf
-        self.ended = lambda world: world.along_m >= world.goal_m
+        self.ended = has_arrived
         self.has_oncoming = False
         self.meetings = []
         self.drawn = {}
@@ -129,11 +135,13 @@ class World:
 
         Its kind is one of the catalogue, by name, or any other. `reported=False` keeps perception
         silent about it, whatever its kind. A `backdrop` stands behind all that perception reports,
-        so that the camera need not render it. Raises InvalidInput for an unknown name.
+        so that the camera need not render it. Raises InvalidInput for an unknown name, and for a
+        pose that is not finite.
         """
         # Only what may move is asked for its pose at every step.
         pose_at = _motion(pose)
         place = pose_at(self.time)
+        self._check_pose(name, place)
         if isinstance(kind, str):
             check_known("kind of body", kind, CATALOGUE)
             kind = CATALOGUE[kind]
@@ -223,7 +231,9 @@ class World:
         return passage.closest()
 
     def step(self, acceleration: float) -> None:
-        """Move everything by a world step, as `advance` does, and look at nothing."""
+        """Move everything by a world step, as `advance` does, and look at nothing. Raises
+        InvalidInput for a pose that is not finite.
+        """
         # The traffic moves first, the ego in it, then the clock; events are of the new time.
         before = self.ego.speed
         self.ego.accelerate(acceleration, WORLD_STEP_S)
@@ -249,6 +259,9 @@ class World:
         bodies = self._moving_bodies
         poses = [self.ego.pose, *(actor.pose_at(self.time) for actor in self._moving)]
         table = np.array(poses, float)
+        if not np.isfinite(table).all():
+            for name, pose in zip(["the ego", *(a.name for a in self._moving)], poses, strict=True):
+                self._check_pose(name, pose)
         self._before = self._footprints.boxes.copy()
         self.bullet.move_all(bodies, table)
         self._footprints.move_all(bodies, table)
@@ -257,13 +270,34 @@ class World:
         """Free the simulator."""
         self.bullet.close()
 
+    def _check_pose(self, name: str, pose: Pose) -> None:
+        if not np.isfinite(pose).all():
+            place = ", ".join(f"{number:g}" for number in pose)
+            raise InvalidInput(
+                f"{self.scene}: the pose of {name} is {place} at {self.time:g} s; x, y and heading "
+                "must be finite numbers"
+            )
 
+    def __getstate__(self) -> dict[str, object]:
+        check_copyable(self, self.scene)
+        return vars(self)
+
+
+def has_arrived(world: World) -> bool:
+    """Whether the ego has reached its goal."""
+    return world.along_m >= world.goal_m
+
+
+# Motions and events are methods, or `partial` of functions: a copy of a world then holds copies of
+# what moves. A closure would move the bodies of the world that was copied.
 def _motion(pose: Pose | Motion | RoadVehicle) -> Motion:
     if isinstance(pose, RoadVehicle):
-        return lambda _time: pose.pose
-    if callable(pose):
-        return pose
-    return lambda _time: pose
+        return pose.pose_at
+    return pose if callable(pose) else partial(_standing, pose)
+
+
+def _standing(pose: Pose, _time: float) -> Pose:
+    return pose
 
 
 def whole_steps(duration: float) -> int:

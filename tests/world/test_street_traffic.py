@@ -18,7 +18,7 @@ def lane(places, **ego):
 def driven(street, seconds, ego_m, ego_speed=0.0):
     for _ in range(round(seconds / 0.05)):
         street.step(0.05, ego_m, ego_speed)
-    return street.pose(0, 0)[0]
+    return street.pose_at(0, 0, 0.0)[0]
 
 
 def test_who_is_behind_a_standing_ego_stops():
@@ -40,4 +40,4 @@ def test_the_egos_place_in_a_lane_is_shifted():
 def test_poses_are_those_of_the_lane():
     street = StreetTraffic([lane([]), lane([3.0, 30.0])])
     street.step(0.05, 0.0, 0.0)
-    assert street.pose(1, 0) == (pytest.approx(3.4), 0.0, 0.0)
+    assert street.pose_at(1, 0, 0.0) == (pytest.approx(3.4), 0.0, 0.0)

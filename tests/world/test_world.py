@@ -170,3 +170,24 @@ def test_clearances_are_those_of_the_bodies_in_its_own_client(world):
         clearances.append(world.advance(0.0, WORLD_STEP_S).clearance_m)
         assert clearances[-1] == world.bullet.clearance(world.ego_body, person.body)
     assert min(clearances) < 5.0 < max(clearances)
+
+
+@pytest.mark.parametrize("lost", [(np.nan, 0.0, 0.0), (0.0, np.inf, 0.0), (0.0, 0.0, np.nan)])
+def test_an_actor_that_gets_lost_is_named_with_its_place_and_the_time(world, lost):
+    world.scene = "scenario mine:Fog"
+    world.add("ghost", "car", lambda time: (30.0, 3.0, 0.0) if time < 0.2 else lost)
+    place = ", ".join(f"{number:g}" for number in lost)
+    told = f"scenario mine:Fog: the pose of ghost is {place} at 0.2 s; x, y and heading must be"
+    world.advance(0.0, 0.15)
+    with pytest.raises(InvalidInput, match=told):
+        world.advance(0.0, 0.15)
+
+
+def test_a_body_is_not_added_anywhere(world):
+    with pytest.raises(InvalidInput, match="the pose of wall is nan, 0, 0 at 0 s"):
+        world.add("wall", "terrace", (np.nan, 0.0, 0.0))
+
+
+def test_an_ego_that_gets_lost_is_named(world):
+    with pytest.raises(InvalidInput, match="the pose of the ego is nan, "):
+        world.advance(np.nan, 0.2)

@@ -3,6 +3,8 @@
 An ego that does not brake goes along x and has its front at `hit_x` at `hit_s`. Right-hand traffic.
 """
 
+from functools import partial
+
 import numpy as np
 
 from care_sim.core.frames import Pose
@@ -54,16 +56,17 @@ def braking_ahead(way: BrakingAhead, target: Target, ego: Ego) -> Meeting:
     """A car that drives ahead at the ego's speed and brakes."""
     start_x = (ego.length + CATALOGUE[target.body].size[0]) / 2 + way.headway_s * ego.speed
     final = way.final_kph / 3.6
-    longest_s = (ego.speed - final) / way.deceleration
+    return Meeting(partial(_braking, way, start_x, ego.speed, final), Following(final))
 
-    def pose(time: float) -> Pose:
-        braking = min(max(time - way.delay_s, 0.0), longest_s)
-        after = max(time - way.delay_s - longest_s, 0.0)
-        before = min(time, way.delay_s)
-        way_m = ego.speed * (before + braking) - way.deceleration * braking**2 / 2 + final * after
-        return start_x + way_m, 0.0, 0.0
 
-    return Meeting(pose, Following(final))
+def _braking(way: BrakingAhead, start_x: float, speed: float, final: float, time: float) -> Pose:
+    """Return the pose of a car that starts at `start_x` and brakes from `speed` to `final` m/s."""
+    longest_s = (speed - final) / way.deceleration
+    braking = min(max(time - way.delay_s, 0.0), longest_s)
+    after = max(time - way.delay_s - longest_s, 0.0)
+    before = min(time, way.delay_s)
+    way_m = speed * (before + braking) - way.deceleration * braking**2 / 2 + final * after
+    return start_x + way_m, 0.0, 0.0
 
 
 def run_up(start: tuple[float, float], heading: float, speed: float, over_m: float) -> Walk:

@@ -2,6 +2,7 @@
 
 from copy import deepcopy
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -36,7 +37,7 @@ from care_sim.streets.dimensions import LANE_WIDTH_M, Range, draw
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.route import Route
 from care_sim.world.traffic import Traffic
-from care_sim.world.world import World
+from care_sim.world.world import Motion, World
 
 DRAWN = "drawn"
 """In the place of a test's name: the seed draws one."""
@@ -155,7 +156,7 @@ class Ncap(Scenario):
             world.drawn = {"mirrored": "always" if side < 0 else "never"}
         self._add_cars(world, meeting, sizes, side)
         world.first_sighting = world.add(
-            test.target.body, test.target.body, lambda time: _mirrored(meeting.motion(time), side)
+            test.target.body, test.target.body, partial(_mirrored_at, meeting.motion, side)
         )
         world.ended = meeting.end.is_over
         return world
@@ -199,6 +200,10 @@ def _mirrored(pose: Pose, side: float) -> Pose:
     """A pose as it is, or with `side` -1 on the other side of the ego's way."""
     x, y, heading = pose
     return x, side * y, side * heading
+
+
+def _mirrored_at(motion: Motion, side: float, time: float) -> Pose:
+    return _mirrored(motion(time), side)
 
 
 def _mirrored_route(route: Route | None, side: float) -> Route | None:

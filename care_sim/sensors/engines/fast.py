@@ -25,7 +25,9 @@ class Fast:
         self._world = world
         self._cells = grid.size
         self._reach = float(grid.range_m)
-        self._fan = grid.fan
+        # Read at every call: an array that is copied can be written, for which compiled code would
+        # be compiled again.
+        self._grid = grid
         self._tilt = grid.tilt if grid.is_tilted else None
         self._spacing = (*grid.spacing,)
 
@@ -71,7 +73,7 @@ class Fast:
         return cast_rays(
             cells,
             self._reach,
-            self._fan,
+            self._grid.fan,
             self._spacing,
             np.array(pose, float),
             world.primitives.tables,
