@@ -6,7 +6,7 @@ Importing the package registers the environments of the closed loop, `CARE-Darto
 """
 
 # First of all: an interrupt may come while the rest is imported.
-import care_sim.base.interrupts  # noqa: F401
+import care_sim.base.interrupts
 
 # isort: split
 # Before Numba and Matplotlib look for their caches.
