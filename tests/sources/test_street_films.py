@@ -5,6 +5,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.grid import AngularGrid
 from care_sim.core.sensor_setup import LIDAR_POSITION
 from care_sim.core.types import CLASSES, Ego
+from care_sim.envs.open_loop import FilmEnv
 from care_sim.evaluation.sightings import Sightings
 from care_sim.sensors.annotated import NO_OBJECT
 from care_sim.sensors.confidence import FULL_CONFIDENCE, MIN_PIXELS
@@ -221,3 +222,15 @@ def test_who_gets_lost_in_a_street_is_named_with_the_time(body, told):
     table[2, 1] = np.nan
     with pytest.raises(InvalidInput, match=rf"street hand-built: {told}.* at 1 s; x, y and"):
         record(street)
+
+
+def test_a_street_without_bodies_is_played():
+    still = np.zeros((3, 3))
+    empty = Street("empty", (), np.zeros((3, 0, 3)), still, (Ego(),) * 3)
+    with FilmEnv(record(empty)) as env:
+        env.reset(seed=0)
+        for _ in range(3):
+            *_, info = env.step(np.zeros(env.action_space.shape, np.float32))
+        assert info["outcome"]["object_frames"] == info["outcome"]["first_sightings"] == 0
+        assert env.score.event_rows() == []
+        assert env.score.tally().frames == 0
