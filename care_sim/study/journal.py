@@ -7,15 +7,19 @@ import fcntl
 import hashlib
 import json
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple, Self
+
+import pyarrow as pa
 
 from care_sim.base.errors import InvalidInput
 from care_sim.base.files import check_no_link
 from care_sim.base.json_text import check_file_size, parsed_json
 from care_sim.study.rows.parquet import with_tuples
-from care_sim.study.run_config import Row
+from care_sim.study.rows.schema import PARAMETERS, Schema
+from care_sim.study.run_config import Row, RunConfig
 
 JOURNAL = "journal.jsonl"
 """Name of the file in a folder of results."""
@@ -91,6 +95,19 @@ class Journal:
     ) -> None:
         self._file.close()
 
+    def drop_unsound(self, configs: Sequence[RunConfig], schema: Schema) -> None:
+        """Drop rows whose parameters are not those of the task under whose key they stand, and rows
+        that lack a column of the schema. Their tasks run again.
+        """
+        found = [config for config in configs if config.key in self]
+        sound = [config for config in found if _is_of(config, self[config.key])]
+        # Row by row only where the table of all rows has a fault.
+        if sound and _has_fault([self[config.key] for config in sound], schema):
+            sound = [config for config in sound if not _has_fault([self[config.key]], schema)]
+        for key in {config.key for config in found} - {config.key for config in sound}:
+            del self._rows[key]
+            self.damaged += 1
+
     def append(self, row: Row) -> None:
         """Keep a finished row. When this returns, the operating system has it, and it outlives this
         process.
@@ -117,6 +134,23 @@ class Journal:
         except OSError as error:
             # With the name of the file, which errors of write lack.
             raise OSError(error.errno, error.strerror, self._file.name) from error
+
+
+def _is_of(config: RunConfig, row: Row) -> bool:
+    """Whether the row has the parameters of the task, and no others."""
+    asked = config.row()
+    return all(name in row and row[name] == value for name, value in asked.items()) and not any(
+        name.startswith(PARAMETERS) and name not in asked for name in row
+    )
+
+
+def _has_fault(rows: Sequence[Row], schema: Schema) -> bool:
+    names = schema.known([*dict.fromkeys(name for row in rows for name in row)])
+    try:
+        table = pa.table({name: [row.get(name) for row in rows] for name in names})
+    except (pa.ArrowException, OverflowError):
+        return True
+    return any(schema.faults(table))
 
 
 def read_journal(path: Path) -> Finished:

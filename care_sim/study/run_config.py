@@ -79,18 +79,17 @@ class RunConfig(ABC):
         self.installed()
         return policy
 
-    def digest(self) -> str:
-        """Hash of the configuration and of all code and files that decide the row.
+    def digest(self, code: str | None = None) -> str:
+        """Hash of the configuration and of all code and files that decide the row; `code` is the
+        `code_digest` where the caller has it.
 
         A row carries the digest that its worker worked out after playing it. Where code has no
         source to read, the name of this run stands for it, so that no other run has the digest.
         """
-        code = [
-            code_digest(),
-            *(self._session if digest is None else digest for digest in self.installed()),
-        ]
+        own = (self._session if digest is None else digest for digest in self.installed())
         # Sorted, so that the order of the columns does not matter.
-        effective = [sorted(self.row().items()), care_sim.__version__, *code]
+        parameters = sorted(self.row().items())
+        effective = [parameters, care_sim.__version__, code or code_digest(), *own]
         return hashlib.sha256(json.dumps(effective).encode()).hexdigest()[:16]
 
     def installed(self) -> list[str | None]:

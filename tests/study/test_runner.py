@@ -8,6 +8,7 @@ import sys
 import time
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
+from unittest.mock import Mock
 
 import pytest
 
@@ -16,7 +17,8 @@ from care_sim.commands.shared.run_study import run_study
 from care_sim.loops.records import Outcome
 from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.episode_play import result_or_reason, run_episode, trace
-from care_sim.study.journal import JOURNAL, Journal
+from care_sim.study.journal import JOURNAL, Journal, _line, read_journal
+from care_sim.study.provenance import code_digest
 from care_sim.study.results_formats import EPISODES
 from care_sim.study.rows.parquet import read_rows
 from care_sim.study.run_config import in_batches
@@ -75,6 +77,41 @@ def test_an_interrupted_study_loses_and_repeats_nothing(tmp_path):
     assert lines[0] == first
     assert len(lines) == 4
     assert len(read_rows(tmp_path / EPISODES.file)) == 3
+
+
+def test_a_finished_study_is_not_written_again(tmp_path, monkeypatch):
+    configs = short(["history"], seeds=range(3))
+    run_study(configs, tmp_path, 1, ThreadPoolExecutor)
+    before = {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
+    # Hashing the code for every task took most of the time before a large study went on.
+    hashed = Mock(wraps=code_digest)
+    monkeypatch.setattr("care_sim.study.run_config.code_digest", hashed)
+    assert run_study(configs, tmp_path, 1, ThreadPoolExecutor) == []
+    assert {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()} == before
+    hashed.assert_not_called()
+    (tmp_path / "tables.md").unlink()
+    run_study(configs, tmp_path, 1, ThreadPoolExecutor)
+    assert (tmp_path / "tables.md").is_file()
+
+
+def test_what_is_done_after_the_last_task_is_said(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("care_sim.commands.shared.run_study._MANY", 1)
+    run_study(short(["history"]), tmp_path, 1, ThreadPoolExecutor)
+    assert "\nmaking tables and figures of 1 episode\n" in capsys.readouterr().err
+
+
+def test_rows_of_a_journal_that_are_not_of_their_task_are_played_again(tmp_path, capsys):
+    configs = short(["history"], seeds=range(3))
+    run_study(configs, tmp_path, 1, ThreadPoolExecutor)
+    first, second, third = read_journal(tmp_path / JOURNAL).rows
+    del third["collision"]
+    altered = [second | {"digest": first["digest"]}, second, third]
+    lines = [_line(row | {"study": "sweep"}) for row in altered]
+    (tmp_path / JOURNAL).write_text("".join(lines))
+    assert run_study(configs, tmp_path, 1, ThreadPoolExecutor) == []
+    assert "2 lines of " in capsys.readouterr().err
+    rows = read_rows(tmp_path / EPISODES.file)
+    assert [(row["seed"], row["collision"]) for row in rows] == [(n, False) for n in range(3)]
 
 
 def test_what_an_earlier_study_left_is_said_and_its_figures_go(tmp_path, capsys):

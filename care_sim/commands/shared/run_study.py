@@ -9,18 +9,23 @@ from care_sim.base.checks import check_whole
 from care_sim.base.errors import InvalidInput, counted
 from care_sim.base.files import write_text
 from care_sim.commands.shared.folder_checks import check_journal, check_kind, check_results, lost
-from care_sim.reports.report import StudyReport
+from care_sim.reports.report import CONFIG, TABLES, StudyReport
 from care_sim.reports.studies import SWEEP
 from care_sim.reports.study import Study
 from care_sim.study.executors import ExecutorFactory, processes
 from care_sim.study.journal import JOURNAL, Journal
 from care_sim.study.progress import run_with_progress
-from care_sim.study.provenance import machine, versions
-from care_sim.study.rows.parquet import check_columns, write_columns, write_rows
+from care_sim.study.provenance import code_digest, machine, versions
+from care_sim.study.rows.parquet import check_columns, read_rows, write_columns, write_rows
+from care_sim.study.rows.schema import TEXT, Schema, as_optional
 from care_sim.study.run_config import Row, RunConfig
 from care_sim.study.runner import Failure
-from care_sim.study.unfinished import Unfinished, forget
+from care_sim.study.unfinished import UNFINISHED, Unfinished, forget
 from care_sim.study.world_hash import check_worlds
+
+_MANY = 1000
+"""Rows whose tables and figures take more than a second."""
+_DIGESTS = Schema(further={"digest": as_optional(TEXT)})
 
 
 def run_study(
@@ -40,7 +45,8 @@ def run_study(
     have ended and some did not fail, writes `config.json` with the configurations and what failed,
     the Parquet files of the study's kind with the rows of `configs` in their order, `tables.md`,
     `tables.tex` and the figures of `study`.
-    No other study can take the folder until all of that is written. Where the folder holds rows
+    No other study can take the folder until all of that is written. A folder that holds all of it
+    stays as it is, unless `force`. Where the folder holds rows
     that were not obtained again because tasks failed, its files stay, unless `force`.
 
     Raises InvalidInput for no task or no worker, when the folder cannot be written, and where a
@@ -51,14 +57,16 @@ def run_study(
     if not configs:
         raise InvalidInput("a study needs at least one value on every axis")
     check_whole("workers", workers, 1)
-    # A copy has no key yet: its digest is of the code as it is when this run asks for it.
-    configs = [config.changed() for config in configs]
+    # The keys are of the code as it is when this run begins. The code is hashed once for all tasks.
+    code = code_digest()
+    configs = [config.changed(key=config.digest(code)) for config in configs]
     kind = study.results
     check_columns(config.row() for config in configs)
     # The folder is checked before it is locked, which would leave a file in it, and again after, in
     # case that another process has written meanwhile.
     _check(folder, configs, study, force)
     with _journal(folder, study) as journal:
+        journal.drop_unsound(configs, study.schema)
         _check(folder, configs, study, force, journal)
         print(
             f"Results go to {folder}: {counted(len(configs), kind.task)}",
@@ -66,6 +74,8 @@ def run_study(
             flush=True,
         )
         others = _say_what_is_found(configs, journal, folder, kind.unit)
+        if not force and _is_written(configs, journal, folder, kind.file):
+            return []
         Unfinished(study.name, kind.unit, len(configs), others, command).write(folder)
 
         # The journal keeps what finishes, even if this process ends before results are written.
@@ -141,7 +151,8 @@ def _say_what_is_found(
         lines = counted(journal.damaged, "line")
         print(
             f"{lines} of {folder / JOURNAL} passed over, damaged or of a version that wrote no "
-            "checksums; what they held is played again where it is asked for",
+            "checksums, or not of the task that they name; what they held is played again where it "
+            "is asked for",
             file=sys.stderr,
         )
     found = sum(config.key in journal for config in configs)
@@ -150,6 +161,16 @@ def _say_what_is_found(
         rest = f"; {others} of other options or code stay in its journal" if others else ""
         print(f"{found} of {len(configs)} {unit} found in {folder}{rest}", file=sys.stderr)
     return others
+
+
+def _is_written(configs: Sequence[RunConfig], journal: Journal, folder: Path, file: str) -> bool:
+    """Whether an earlier run has written the results of just these tasks, none of which failed."""
+    # A run that was cut off while it wrote has left its note.
+    written = all((folder / name).is_file() for name in (CONFIG, TABLES, file))
+    keys = [config.key for config in configs]
+    if (folder / UNFINISHED).is_file() or not written or not all(key in journal for key in keys):
+        return False
+    return bool([row.get("digest") for row in read_rows(folder / file, _DIGESTS)] == keys)
 
 
 def _write(
@@ -162,10 +183,12 @@ def _write(
     """Write the results of a study: everything is made before the first file is replaced."""
     kind = study.results
     left_out = summary(failures, kind.unit)
+    if len(rows) >= _MANY:
+        print(f"making tables and figures of {counted(len(rows), kind.task)}", file=sys.stderr)
     kept = kind.kept_rows(rows)
     further = kind.further_files(rows)
     report = StudyReport.of(kept, study, left_out)
-    write_text(folder / "config.json", _description(configs, study, failures))
+    write_text(folder / CONFIG, _description(configs, study, failures))
     for name, columns in further.items():
         write_columns(columns, folder / name)
     write_rows(kept, folder / kind.file, study.name, left_out, study.schema)

@@ -19,6 +19,7 @@ from care_sim.study.rows.settings import Setting
 from care_sim.study.run_config import Row
 
 _AXES = ("scenario", "policy", "budget", "seed")
+_PLAIN = frozenset(PLAIN_FIELDS)
 _USUAL_EPISODE = {field.name: field.default for field in fields(EpisodeConfig)}
 _USUAL_PLAY = {name: DEFAULTS[name] for name in OF_BOTH_LOOPS if name != "floor_seed"} | {
     "camera_detections": None,
@@ -38,7 +39,7 @@ def setting_of(row: Row) -> Setting:
 
 
 def _setting_of_episode(row: Row) -> Setting:
-    names = [name for name in row if name in PLAIN_FIELDS or name.startswith("scenario.")]
+    names = [name for name in row if name in _PLAIN or name.startswith("scenario.")]
     # Parameters of a scenario have no default in _USUAL_EPISODE: one that was given names another
     # setting, whatever its value.
     changed = [
