@@ -5,8 +5,9 @@ Importing the package registers the environments of the closed loop, `CARE-Darto
 `CARE-Street-v0` and `CARE-Replay-v0`.
 """
 
-# First of all: an interrupt may come while the rest is imported.
+# First of all: an interrupt may come while the rest is imported, and limits may be too low for it.
 import care_sim.base.interrupts
+import care_sim.base.limits
 
 # isort: split
 # Before Numba and Matplotlib look for their caches.

@@ -22,6 +22,7 @@ from care_sim.base.errors import (
     shown,
 )
 from care_sim.base.foreign_code import foreign_place
+from care_sim.base.limits import limit_in
 from care_sim.commands.entries import COMMANDS, GROUPS
 from care_sim.commands.shared.hints import ways_on
 from care_sim.commands.shared.parsing import chosen_command, option_helps
@@ -76,9 +77,9 @@ _KEPT = {
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run the command line and exit.
 
-    Exit codes: 0 done, 1 something failed, such as code of the user's own, or a policy was left
-    out, 2 bad input, 70 a fault of the software itself, 130 interrupted, 141 nobody reads the
-    output any more. `--debug` shows the trace of a fault.
+    Exit codes: 0 done, 1 something failed, such as code of the user's own or a limit of the
+    machine, or a policy was left out, 2 bad input, 70 a fault of the software itself, 130
+    interrupted, 141 nobody reads the output any more. `--debug` shows the trace of a fault.
     """
     # A host that calls this with arguments keeps its handlers of signals and its process.
     alone = arguments is None
@@ -135,6 +136,9 @@ def _end_with(error: BaseException, trace: bool) -> NoReturn:
         sys.exit(_UNREAD)
     if foreign_place(error) and not trace:
         _complain(error_line(error), _FAILED)
+    if limit := limit_in(error):
+        _leave_output()
+        _complain(limit, _FAILED)
     if isinstance(error, OSError):
         _leave_output()
         _complain(f"{error.filename}: {error.strerror}" if error.filename else str(error))

@@ -13,6 +13,7 @@ from functools import cache
 from types import ModuleType
 from typing import Any, TypeVar
 
+import numpy as np
 from numba import config, njit
 from numba.core import event
 
@@ -32,7 +33,8 @@ def compiled(*, brief: bool = False, **options: Any) -> Callable[[_F], _F]:
 
     def make(function: _F) -> Any:
         if config.DISABLE_JIT:
-            return function
+            # Compiled code overflows and divides by zero without a warning.
+            return np.errstate(all="ignore")(function)
         try:
             kernel = njit(cache=True, nogil=nogil, **options)(function)
         except RuntimeError:  # nowhere to keep it

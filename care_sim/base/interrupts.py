@@ -128,11 +128,11 @@ def _come_again(lost: "sys.UnraisableHookArgs") -> None:
         sys.__unraisablehook__(lost)
 
 
-def _is_command() -> bool:
+def is_command() -> bool:
     """Whether this process is the command `care-sim`, not one that it started."""
     name = os.path.basename((getattr(sys, "argv", None) or [""])[0])
     return name == "care-sim" and "--multiprocessing-fork" not in sys.orig_argv
 
 
-if _is_command():
+if is_command():
     end_at_once()

@@ -172,7 +172,7 @@ def _short(number: float) -> int:
     """The whole part of a number, in 32 bits: they hold any cell, and more of them are computed at
     once.
     """
-    return np.int32(number)  # type: ignore[return-value]
+    return int(np.int32(number))
 
 
 @compiled(inline="always")

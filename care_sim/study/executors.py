@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 from care_sim.base.cores import CORES
 from care_sim.base.errors import InvalidInput, one_line
 from care_sim.base.extras import missing_extra
+from care_sim.base.limits import check_workers
 from care_sim.base.processes import end_group_with_work, end_with_parent, starting
 from care_sim.policies.isolation import are_isolated, isolate_policies
 
@@ -48,8 +49,9 @@ class ClusterLost(OSError):
 
 def processes(workers: int) -> Executor:
     """Worker processes on this machine, forked from a clean server that has imported the simulator.
-    They and the server end with this process.
+    They and the server end with this process. Raises LimitReached where too few can be started.
     """
+    check_workers(workers)
     # A fork of this process would carry its threads' locks along, and a spawned one would import
     # everything again. The fork server imports once and has no threads.
     context = get_context("forkserver")

@@ -15,7 +15,10 @@ import pytest
 
 from care_sim.base.compiled import compiled
 from tests.helpers.forked import Forked
+from tests.helpers.places import ROOT
 
+_BRIEF = ("-k", "not crowds and not window0")
+"""Leaves out what takes more than a few seconds in Python."""
 NOWHERE = """
 import numba.core.caching as caching
 caching.CacheImpl._locator_classes = []
@@ -30,6 +33,26 @@ def test_without_a_folder_for_the_code_it_is_compiled_anew():
         [sys.executable, "-c", NOWHERE], capture_output=True, text=True, check=True
     )
     assert done.stdout.strip() == "(1, 2, 6, 7)"
+
+
+@pytest.mark.slow
+def test_kernels_answer_the_same_without_compiling():
+    files = ("core/test_pcg64", "core/test_cell_sets", "perception/test_tracker")
+    places = [
+        *(str(ROOT / "tests" / f"{file}.py") for file in files),
+        f"{ROOT}/tests/sensors/engines/test_fast.py::test_a_body_at_a_known_distance",
+        f"{ROOT}/tests/sensors/engines/test_picture_kernels.py",
+        f"{ROOT}/tests/core/test_cell_order.py::test_rows_and_columns",
+    ]
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *places, *_BRIEF],
+        cwd=ROOT,
+        env=os.environ | {"NUMBA_DISABLE_JIT": "1"},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stdout[-3000:]
+    assert " passed" in done.stdout
 
 
 # Python tells its bytecode by the second and the size of the source. These tests write a file twice

@@ -23,6 +23,9 @@ from care_sim.sensors.engines.view_kernels import Lens, Meshes, PlacedCamera
 from care_sim.world.bullet import NO_BODY, PixelWindow
 from care_sim.world.polyhedra import Tables
 
+_LOTS = np.uint64(2**64 - LOT)
+"""The bits of a column that say in which lot it is."""
+
 
 class Line(NamedTuple):
     """A row of a picture, by column: `ids` of bodies, NO_BODY where none is, the `inverse_depths`
@@ -135,7 +138,7 @@ def _in_lots(first: int, end: int) -> tuple[np.uint64, np.uint64]:
     """A stretch of columns, widened to whole lots: none is left over to be taken alone. For work
     that does no harm beside the stretch.
     """
-    return np.uint64(first) & np.uint64(-LOT), np.uint64(end + LOT - 1) & np.uint64(-LOT)
+    return np.uint64(first) & _LOTS, np.uint64(end + LOT - 1) & _LOTS
 
 
 @compiled()

@@ -1,0 +1,103 @@
+"""Limits of memory, processes and open files that a shell, a batch system or a container sets.
+
+The command `care-sim` checks them before it imports its libraries, which end a process in their own
+words where they find too little. So this module imports nothing that takes time.
+"""
+
+import errno
+import os
+import resource
+import threading
+
+from care_sim.base.cores import CORES
+from care_sim.base.interrupts import is_command
+
+FAILED = 1
+"""Exit code of a command that a limit has ended."""
+_BYTES_PER_CORE = 100_000_000
+_MEMORY = {
+    "address space": (resource.RLIMIT_AS, 3_000_000_000, "ulimit -v"),
+    "data": (resource.RLIMIT_DATA, 1_500_000_000, "ulimit -d"),
+}
+"""What the libraries of a study reserve, measured on two cores; each core adds a thread of theirs.
+Where one of their threads cannot start, they hang or abort.
+"""
+_TASKS_OF_A_WORKER = 4
+_TASKS_OF_A_POOL = 16
+"""The fork server, the tracker of resources, and threads of libraries."""
+_STACK_BYTES = 2**16
+_UNMAPPED = ("failed to map segment", "cannot allocate memory", "cannot create shared object")
+"""How the system's loader says that there is no room for a library."""
+
+
+class LimitReached(OSError):
+    """The machine, or a limit that is set on it, allows too little."""
+
+
+def check_memory() -> None:
+    """Raise LimitReached where a limit leaves too little memory for the libraries."""
+    for name, (number, reserved, command) in _MEMORY.items():
+        limit, _ = resource.getrlimit(number)
+        least = reserved + _BYTES_PER_CORE * CORES
+        if 0 <= limit < least:
+            raise LimitReached(
+                f"{name} is limited to {limit / 1e9:.2f} GB, and care-sim needs "
+                f"{least / 1e9:.2f} GB: raise the limit ({command})"
+            )
+
+
+def check_workers(workers: int) -> None:
+    """Raise LimitReached unless so many worker processes can be started now."""
+    _check_tasks(_TASKS_OF_A_WORKER * workers + _TASKS_OF_A_POOL, ", or lower --workers")
+
+
+def limit_in(error: BaseException) -> str:
+    """Say in one line which limit an error or one of its causes ran into; empty for another one."""
+    link: BaseException | None = error
+    while link is not None:
+        if isinstance(link, LimitReached):
+            return str(link)
+        number = link.errno if isinstance(link, OSError) else None
+        if number in (errno.EMFILE, errno.ENFILE):
+            return "too many files are open: raise the limit (ulimit -n), or lower --workers"
+        if number == errno.EAGAIN or "can't start new thread" in str(link):
+            return "too many processes or threads: raise the limit (ulimit -u), or lower --workers"
+        is_unmapped = isinstance(link, ImportError) and any(w in str(link) for w in _UNMAPPED)
+        if number == errno.ENOMEM or isinstance(link, MemoryError) or is_unmapped:
+            return (
+                "the memory does not suffice: raise the limit (ulimit -v, ulimit -d), or lower "
+                "--workers"
+            )
+        link = link.__cause__ or link.__context__
+    return ""
+
+
+def _check_tasks(count: int, instead: str = "") -> None:
+    """Raise LimitReached unless so many processes or threads can be added: Linux counts both."""
+    end, started = threading.Event(), list[threading.Thread]()
+    usual = threading.stack_size(_STACK_BYTES)
+    try:
+        for _ in range(count):
+            thread = threading.Thread(target=end.wait, daemon=True)
+            thread.start()
+            started.append(thread)
+    except RuntimeError:
+        raise LimitReached(
+            f"{len(started)} processes or threads can be added, and care-sim needs {count}: raise "
+            f"the limit (ulimit -u){instead}"
+        ) from None
+    finally:
+        threading.stack_size(usual)
+        end.set()
+        for thread in started:
+            thread.join()
+
+
+if is_command():
+    try:
+        check_memory()
+        # Linear algebra starts a thread per core when it is imported.
+        _check_tasks(CORES + 1)
+    except LimitReached as reached:
+        os.write(2, f"care-sim: {reached}\n".encode())
+        os._exit(FAILED)
