@@ -21,7 +21,7 @@ from care_sim.driving.drivers import make_driver
 from care_sim.driving.localisation import Localisation
 from care_sim.driving.odometry import Odometry
 from care_sim.loops.cameras import Cameras
-from care_sim.loops.needless import NeedlessBraking
+from care_sim.loops.needless import NeedlessBraking, UnfoundedBraking
 from care_sim.loops.records import Keyframe, Sight
 from care_sim.loops.scan_detection import ScanDetection
 from care_sim.loops.seeds import SensorSeeds
@@ -107,7 +107,7 @@ class ClosedLoop:
         self._needless = NeedlessBraking(front_m, self.guarded_m / 2, conditions) if plan else None
         # The proxy reports bodies alone. Another detector may make one up.
         self._unfounded = (
-            None if detector is None else NeedlessBraking(front_m, self.guarded_m / 2, conditions)
+            None if detector is None else UnfoundedBraking(front_m, self.guarded_m / 2, conditions)
         )
         self._has_met = False
         self.index = 0
@@ -244,7 +244,11 @@ class ClosedLoop:
         if in_view or (target is not None and target.body in behind):
             self._has_met = True
         unseen = None if self._has_met or target is None else target.body
-        return self._unfounded.judge(self.world, middle, command.braking, unseen)
+        taken_for = self._localisation.taken_for(middle)
+        tracks, ahead = self._memory.tracks(taken_for), self._tracks_ahead(taken_for)
+        return self._unfounded.judge_tracks(
+            self.world, middle, command.braking, tracks, ahead, unseen
+        )
 
     def _tracks_ahead(self, middle: Frame) -> Tracks:
         """The tracks as the controller takes them: along the way that the car is to go."""

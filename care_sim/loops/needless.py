@@ -4,17 +4,21 @@ A keyframe with the brake on is needless if no body, reported or not, lies in th
 the controller guards, nor would enter it within the controller's horizon if it kept its velocity.
 The time for which the controller waits until it lets go does not count.
 
-A brake for what a detector made up is unfounded: it is needless, and the first-sighting actor is
-no reason for it while neither the camera has shown that actor nor a detection has held its returns.
+A brake for what a detector made up is unfounded: it is needless, and no track in the strip touches
+a body, reported or not. Who misjudges the speed or the size of a body has made nothing up. The
+first-sighting actor is no such body, and no reason to brake, while neither the camera has shown
+that actor nor a detection has held its returns.
 """
 
 import numpy as np
 
 from care_sim.base.times import LAST_BITS_S
+from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.driver_settings import DriverSettings
 from care_sim.core.frames import Frame
 from care_sim.core.types import Tracks
 from care_sim.driving.corridor import along_route, enters_strip
+from care_sim.world.gaps import least_gap
 from care_sim.world.world import World
 
 
@@ -29,18 +33,19 @@ class NeedlessBraking:
         self._rules = rules
         self._needed_s = -np.inf
 
-    def judge(self, world: World, sensor: Frame, braking: bool, unseen: int | None = None) -> bool:
-        """Whether the brake is on for nothing; to be asked at every keyframe. The body `unseen`
-        gives no reason to brake.
-        """
+    def judge(self, world: World, sensor: Frame, braking: bool) -> bool:
+        """Whether the brake is on for nothing; to be asked at every keyframe."""
+        return self._judged(world, braking, braking and self._is_needed(world, sensor))
+
+    def _judged(self, world: World, braking: bool, needed: bool) -> bool:
         if not braking:
             return False
-        if self._is_needed(world, sensor, unseen):
+        if needed:
             self._needed_s = world.time
         return world.time - self._needed_s > self._rules.brake_release_s + LAST_BITS_S
 
-    def _is_needed(self, world: World, sensor: Frame, unseen: int | None) -> bool:
-        bodies = np.array([a.body for a in world.actors if a.body != unseen], np.int64)
+    def _is_needed(self, world: World, sensor: Frame, unseen: int | None = None) -> bool:
+        bodies = _bodies(world, unseen)
         count = np.zeros(len(bodies), np.int64)
         true = Tracks(
             bodies,
@@ -53,5 +58,41 @@ class NeedlessBraking:
             count,
         )
         ahead = true if world.route is None else along_route(true, world.route, sensor)
-        reach, horizon = self._reach_m, self._rules.brake_horizon_s
-        return bool(enters_strip(ahead, self._front_m, reach, horizon).any())
+        return bool(self._enters(ahead).any())
+
+    def _enters(self, ahead: Tracks) -> Mask:
+        return enters_strip(ahead, self._front_m, self._reach_m, self._rules.brake_horizon_s)
+
+
+class UnfoundedBraking(NeedlessBraking):
+    """Judges whether the brake of one episode is on for what the detector made up."""
+
+    def judge_tracks(
+        self,
+        world: World,
+        sensor: Frame,
+        braking: bool,
+        tracks: Tracks,
+        ahead: Tracks,
+        unseen: int | None,
+    ) -> bool:
+        """Whether it is; to be asked at every keyframe. `tracks` are in the frame of the sensor,
+        and the same lie `ahead` as the driver takes them; the body `unseen` gives no reason.
+        """
+        needed = braking and (
+            self._is_needed(world, sensor, unseen)
+            or _touch(
+                sensor.boxes_to_world(tracks.boxes[self._enters(ahead)]),
+                world.boxes_of(_bodies(world, unseen)),
+            )
+        )
+        return self._judged(world, braking, needed)
+
+
+def _bodies(world: World, unseen: int | None) -> Integers:
+    return np.array([actor.body for actor in world.actors if actor.body != unseen], np.int64)
+
+
+def _touch(boxes: Floats, others: Floats) -> bool:
+    """Whether one of `boxes` (n, 7) may touch one of `others` (m, 7), seen from above."""
+    return any(least_gap(box, other) <= 0 for box in boxes for other in others)

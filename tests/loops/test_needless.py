@@ -6,7 +6,8 @@ import pytest
 from care_sim.core.driver_settings import DriverSettings
 from care_sim.core.frames import Frame
 from care_sim.core.sensor_setup import LIDAR_POSITION
-from care_sim.loops.needless import NeedlessBraking
+from care_sim.core.types import Tracks
+from care_sim.loops.needless import NeedlessBraking, UnfoundedBraking
 from care_sim.world.route import Route
 from care_sim.world.traffic import Traffic
 from care_sim.world.world import World
@@ -72,8 +73,34 @@ def test_the_wait_before_the_brake_is_released_does_not_count(world):
     assert answers == [False] * 6 + [True] * 4
 
 
+def unfounded(world, box, unseen=None):
+    """Whether the brake is, with a track of a standing car at this x, y of the sensor's frame."""
+    sensor = Frame.mounted(world.ego.pose, LIDAR_POSITION)
+    track = Tracks(
+        np.array([1]),
+        np.array([0]),
+        np.array([[*box, -1.0, 4.6, 1.9, 1.5, 0.0]]),
+        np.zeros((1, 2)),
+        np.array([0]),
+        np.array([3]),
+    )
+    judge = UnfoundedBraking(1.1, 0.87 + 0.3, DriverSettings())
+    return judge.judge_tracks(world, sensor, True, track, track, unseen)
+
+
+def test_a_track_in_the_way_without_a_body_is_made_up(world):
+    world.add("aside", "car", (10.0, 5.0, 0.0))
+    assert unfounded(world, (12.0, 0.0))
+
+
+def test_a_body_whose_place_is_misjudged_is_not_made_up(world):
+    """The car stands 2.2 m aside, out of the way, and its track reaches into the way."""
+    world.add("aside", "car", (12.0, 2.2, 0.0))
+    assert judged(world, fresh())
+    assert not unfounded(world, (12.0, 1.8))
+
+
 def test_a_body_that_nobody_has_seen_is_no_reason(world):
     hidden = world.add("hidden", "child", (10.0, 0.0, 0.0))
-    sensor = Frame.mounted(world.ego.pose, LIDAR_POSITION)
-    assert not fresh().judge(world, sensor, True)
-    assert fresh().judge(world, sensor, True, unseen=hidden.body)
+    assert not unfounded(world, (10.0, 0.0))
+    assert unfounded(world, (10.0, 0.0), unseen=hidden.body)
