@@ -71,6 +71,7 @@ class GridStack:
         return {one.name: getattr(self, one.name) for one in fields(self)}
 
     def __deepcopy__(self, _copied: dict[int, Any]) -> Self:
+        # Frozen: within a process a copy may share it, and its tables.
         return self
 
     @cached_property
