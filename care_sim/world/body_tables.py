@@ -38,9 +38,9 @@ class Footprints:
         x, y, heading = pose
         self.boxes[body] = x, y, size[2] / 2, *size, heading
 
-    def move_all(self, bodies: Integers, poses: Floats) -> None:
-        """Put bodies (n,) at poses (n, 3): x, y, heading."""
-        _move(self.boxes, bodies, poses)
+    def move_all(self, bodies: Integers, poses: Floats) -> bool:
+        """Put bodies (n,) at poses (n, 3): x, y, heading. Return whether all are finite."""
+        return bool(_move(self.boxes, bodies, poses))
 
     def near(self, body: int, within: float) -> Integers:
         """Ids of the other bodies that may be within `within` metres of one. None of those is
@@ -50,11 +50,14 @@ class Footprints:
 
 
 @compiled()
-def _move(boxes: Floats, bodies: Integers, poses: Floats) -> None:
+def _move(boxes: Floats, bodies: Integers, poses: Floats) -> bool:
     """See `Footprints.move_all`."""
+    total = 0.0
     for n in range(len(bodies)):
         box = boxes[bodies[n]]
         box[0], box[1], box[6] = poses[n, 0], poses[n, 1], poses[n, 2]
+        total += poses[n, 0] + poses[n, 1] + poses[n, 2]
+    return math.isfinite(total)
 
 
 @compiled()

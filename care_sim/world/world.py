@@ -259,12 +259,11 @@ class World:
         bodies = self._moving_bodies
         poses = [self.ego.pose, *(actor.pose_at(self.time) for actor in self._moving)]
         table = np.array(poses, float)
-        if not np.isfinite(table).all():
-            for name, pose in zip(["the ego", *(a.name for a in self._moving)], poses, strict=True):
-                self._check_pose(name, pose)
         self._before = self._footprints.boxes.copy()
         self.bullet.move_all(bodies, table)
-        self._footprints.move_all(bodies, table)
+        if not self._footprints.move_all(bodies, table):
+            for name, pose in zip(["the ego", *(a.name for a in self._moving)], poses, strict=True):
+                self._check_pose(name, pose)
 
     def close(self) -> None:
         """Free the simulator."""
