@@ -2,6 +2,7 @@ import warnings
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from care_sim.base.errors import InvalidInput
 from care_sim.evaluation.bootstrap import mean_of_ratios, paired_difference, ratio_of_sums
@@ -45,6 +46,15 @@ def test_equal_differences_are_certain_and_silent(ours, theirs):
 def test_the_same_samples_give_the_same_interval():
     a = np.random.default_rng(4).normal(size=20)
     assert paired_difference(a, np.zeros(20)) == paired_difference(a, np.zeros(20))
+
+
+@pytest.mark.parametrize("count", [2, 20, 129])
+def test_intervals_are_those_of_scipy(count):
+    samples = np.random.default_rng(count).normal(size=count)
+    theirs = stats.bootstrap(
+        (samples,), np.mean, n_resamples=10_000, method="percentile", rng=np.random.default_rng(0)
+    )
+    assert paired_difference(samples, np.zeros(count))[1:] == theirs.confidence_interval
 
 
 @pytest.mark.parametrize(
