@@ -8,26 +8,31 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
+from pathlib import Path
 from types import ModuleType
 
 from care_sim.base.errors import MissingExtra
 
 OPEN3D_PACKAGES = "libusb-1.0-0 libegl1 libgl1 libx11-6 libudev1 libidn2-0"
 """Debian packages with the system libraries that Open3D loads."""
+_HOME = Path(__file__).parents[2]
+"""The clone, or the folder of all installed packages."""
 STANDARD_OUTPUT, STANDARD_ERROR = 1, 2
 
 
 def missing_extra(what: str, extra: str, error: ImportError | None = None) -> MissingExtra:
-    """The error for what a user knows as `what` and an `extra` would bring. CARE-Sim is on no
-    registry, so that extras come from its clone.
-    """
-    told = f"{what} needs the extra '{extra}': {install_command(extra)} in the clone"
+    """The error for what a user knows as `what` and an `extra` would bring."""
+    told = f"{what} needs the extra '{extra}': {install_command(extra)}"
     return MissingExtra(f"{told} ({error})" if error else told)
 
 
 def install_command(extra: str) -> str:
-    """The documented command that brings an extra."""
-    return f"pip install -c constraints.txt -e '.[{extra}]'"
+    """The documented command that brings an extra: in a clone, or to an installed wheel, whose
+    metadata tell pip what the extra needs.
+    """
+    if (_HOME / "constraints.txt").is_file():
+        return f"pip install -c constraints.txt -e '.[{extra}]' in the clone"
+    return f"pip install 'care-sim[{extra}]'"
 
 
 def import_open3d() -> ModuleType:

@@ -74,10 +74,10 @@ def check_output(path: Path, kind: bytes = b"") -> None:
 
 
 def check_no_link(path: Path) -> None:
-    """Raise InvalidInput where a file that grows, or a folder inside an output folder, is a link:
-    its target may lie anywhere.
+    """Raise InvalidInput where a file that grows has another name, or where it, or a folder inside
+    an output folder, is a symbolic link: the target may lie anywhere.
     """
-    if path.is_symlink():
+    if path.is_symlink() or (path.is_file() and path.stat().st_nlink > 1):
         raise InvalidInput(f"{path} is a link, and links are not followed here: remove it first")
 
 
@@ -115,7 +115,8 @@ def _moved_to(path: Path, keep: bool = True) -> Iterator[Path]:
     unfinished = place.with_name(f".{_host()}.{os.getpid()}.{_end_of_name(place)}")
     _being_written.add(place)
     try:
-        place.parent.mkdir(parents=True, exist_ok=True)
+        # By its name: the resolved one would make the missing target of a link.
+        path.parent.mkdir(parents=True, exist_ok=True)
         # Whoever may write to the folder can guess the name: a link there must not be followed.
         unfinished.unlink(missing_ok=True)
         unfinished.open("x").close()
@@ -149,7 +150,8 @@ def why_unwritable(path: Path) -> str | None:
 def _written_into(path: Path) -> Iterator[Path]:
     """Yield a file elsewhere whose content goes into the stream `path`."""
     with _opened(path) as handle, TemporaryDirectory(prefix="care-sim-") as folder:
-        unfinished = Path(folder) / path.name
+        # Its ending tells writers the form; of a name such as ..gif they would see none.
+        unfinished = Path(folder) / f"stream{path.suffix}"
         unfinished.touch()
         yield unfinished
 

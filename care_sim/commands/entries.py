@@ -123,6 +123,9 @@ GROUPS = {
         ),
         "detectors": CommandEntry("listings", "Detectors", "List the detectors."),
         "sensors": CommandEntry("listings", "Sensors", "List the sensor set-ups."),
+        "completion": CommandEntry(
+            "completion", "Completion", "Print what completes commands and options in a shell."
+        ),
     },
     "Is this installation sound?": {
         "certify": CommandEntry(

@@ -68,8 +68,7 @@ class Judge(PlayOptions):
     out: Path = Path("runs/judge")
     """Folder of tables, figure and numbers."""
     official: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
-    """Write all boxes, too, in the form that `make official-precision` gives to the nuScenes
-    devkit."""
+    """Write all boxes, too, in the form that the official nuScenes devkit scores."""
     force: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """Replace what such a command wrote there."""
 

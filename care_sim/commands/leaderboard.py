@@ -106,7 +106,7 @@ class Leaderboard:
             self.minus not in names_in(own) for own in sets.values() if own[0].sealed is None
         ):
             print(
-                f"no {self.minus} among these files: add results/leaderboard for leads",
+                f"no {self.minus} among these files: add a folder with its result for leads",
                 file=sys.stderr,
             )
         print(f"Page: {told}")

@@ -5,8 +5,9 @@ import sys
 
 import pytest
 
+from care_sim.base import extras
 from care_sim.base.errors import MissingExtra
-from care_sim.base.extras import STANDARD_ERROR, import_open3d, silenced
+from care_sim.base.extras import STANDARD_ERROR, import_open3d, install_command, silenced
 
 
 def test_a_missing_system_library_names_the_debian_packages(tmp_path, monkeypatch):
@@ -25,9 +26,14 @@ def test_a_missing_system_library_names_the_debian_packages(tmp_path, monkeypatc
 
 def test_a_missing_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "open3d", None)
-    told = "needs the extra 'open3d': pip install -c constraints.txt -e '.[open3d]' in the clone ("
+    told = f"needs the extra 'open3d': {install_command('open3d')} ("
     with pytest.raises(MissingExtra, match=re.escape(told)):
         import_open3d()
+
+
+def test_an_installed_wheel_needs_no_clone(tmp_path, monkeypatch):
+    monkeypatch.setattr(extras, "_HOME", tmp_path)
+    assert install_command("page") == "pip install 'care-sim[page]'"
 
 
 def test_open3d_where_it_is_installed():

@@ -98,6 +98,10 @@ def test_a_link_to_a_folder_is_a_folder(tmp_path):
     (tmp_path / "out").symlink_to("far")
     write_text(tmp_path / "out" / "table.csv", "ours")
     assert (tmp_path / "far" / "table.csv").read_text() == "ours"
+    (tmp_path / "nowhere").symlink_to("missing")
+    with pytest.raises(OSError, match=r"nowhere"):
+        write_text(tmp_path / "nowhere" / "table.csv", "ours")
+    assert not (tmp_path / "missing").exists()
     (tmp_path / "round").symlink_to("round")
     with pytest.raises((InvalidInput, OSError), match=r"round"):
         check_output(tmp_path / "round" / "table.csv")
@@ -124,14 +128,15 @@ def test_a_terminal_and_a_pipe_are_written_into(tmp_path):
     assert stat.S_ISCHR(os.stat(os.ttyname(theirs)).st_mode)
     os.close(ours)
     os.close(theirs)
-    pipe = tmp_path / "pipe"
+    pipe = tmp_path / "..gif"
     os.mkfifo(pipe)
     with open(os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)) as reader:
         with replacing(pipe, JSON) as unfinished:
+            assert os.path.splitext(unfinished)[1] == ".gif"
             unfinished.write_text("into a pipe")
         assert reader.read() == "into a pipe"
     assert pipe.is_fifo()
-    assert not [path for path in tmp_path.iterdir() if path.name.startswith(".")]
+    assert [*tmp_path.iterdir()] == [pipe]
 
 
 def test_the_output_of_the_process_is_written_into_wherever_it_goes(tmp_path):

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -49,9 +50,10 @@ def test_a_file_system_without_locks_will_do(tmp_path, monkeypatch):
         assert "a" in journal
 
 
-def test_a_journal_that_is_a_link_is_refused_and_its_target_stays(tmp_path):
+@pytest.mark.parametrize("link", [Path.symlink_to, Path.hardlink_to])
+def test_a_journal_that_is_a_link_is_refused_and_its_target_stays(link, tmp_path):
     (tmp_path / "theirs").write_text("theirs")
-    (tmp_path / "journal.jsonl").symlink_to("theirs")
+    link(tmp_path / "journal.jsonl", tmp_path / "theirs")
     with pytest.raises(InvalidInput, match=r"journal\.jsonl is a link, .*: remove it first"):
         Journal(tmp_path / "journal.jsonl")
     assert (tmp_path / "theirs").read_text() == "theirs"

@@ -14,6 +14,7 @@ CAMPAIGNS = {
     "kills": 4,
     "writers": 1,
     "disk": 2,
+    "folders": 2,
 }
 
 

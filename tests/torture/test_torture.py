@@ -23,6 +23,7 @@ SHORT = {
     "kills": 1,
     "writers": 1,
     "disk": 2,
+    "folders": 30,
 }
 """Cases of each campaign: 50 seconds together, on two cores."""
 

@@ -21,7 +21,7 @@ class SensingOptions(ClosedLoopConditions):
     """LiDAR and cameras: a name of `care-sim sensors`, or a .toml file of a set-up."""
     detector: str = PROXY
     """returns (the paper's proxy), graded (the surer the more returns), cluster (a real
-    one), pillars (a learned one), torchscript, or that of an installed package.
+    one), pillars (a learned one), torchscript, the name of an installed one, or MODULE:CLASS.
     """
     detector_parameters: tuple[str, ...] = ()
     """Parameters of the detector as NAME=VALUE, for example file=model.pt for torchscript."""

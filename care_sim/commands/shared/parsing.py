@@ -11,7 +11,7 @@ import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, Field, fields, is_dataclass
 from functools import partial
-from typing import Any, Literal, NamedTuple, cast, get_type_hints
+from typing import Any, Literal, NamedTuple, cast, get_args, get_type_hints
 
 import docstring_parser
 import tyro
@@ -264,14 +264,25 @@ def option_helps(command: type) -> dict[str, str]:
     each with its help.
     """
     helps: dict[str, str] = {}
+    types = get_type_hints(command, include_extras=True)
     for field in fields(command):
-        written = field.name.replace("_", "-")
         if is_dataclass(field.default):
             helps |= option_helps(type(field.default))
             continue
-        names = [written, f"no-{written}"] if isinstance(field.default, bool) else [written]
+        marks = get_args(types[field.name])
+        if tyro.conf.Positional in marks:
+            continue
+        named = next((mark.name for mark in marks if _is_named(mark)), field.name)
+        written = named.replace("_", "-")
+        is_pair = isinstance(field.default, bool) and tyro.conf.FlagCreatePairsOff not in marks
+        names = [written, f"no-{written}"] if is_pair else [written]
         helps |= dict.fromkeys([f"--{name}" for name in names], _help_of(command, field.name))
     return helps
+
+
+def _is_named(mark: Any) -> bool:
+    """Whether a mark of a field's type gives the option another name, as `tyro.conf.arg` does."""
+    return isinstance(getattr(mark, "name", None), str)
 
 
 def _refusal(end: BaseException | None) -> InvalidInput | None:

@@ -71,7 +71,7 @@ class PlayOptions(SourceOptions):
     """
     detector: str = PROXY
     """returns (the paper's proxy), graded (the surer the more returns), cluster (a real
-    one), pillars (a learned one), torchscript, or that of an installed package.
+    one), pillars (a learned one), torchscript, the name of an installed one, or MODULE:CLASS.
     """
     detector_parameters: tuple[str, ...] = ()
     """Parameters of the detector as NAME=VALUE, for example file=model.pt for torchscript."""

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from care_sim.base.checks import check_whole
-from care_sim.base.errors import InvalidInput, counted
+from care_sim.base.errors import InvalidInput, counted, one_line
 from care_sim.base.files import write_text
 from care_sim.commands.shared.folder_checks import check_journal, check_kind, check_results, lost
 from care_sim.reports.report import CONFIG, TABLES, StudyReport
@@ -69,7 +69,7 @@ def run_study(
         journal.drop_unsound(configs, study.schema)
         _check(folder, configs, study, force, journal)
         print(
-            f"Results go to {folder}: {counted(len(configs), kind.task)}",
+            f"Results go to {one_line(str(folder))}: {counted(len(configs), kind.task)}",
             file=sys.stderr,
             flush=True,
         )
@@ -150,16 +150,17 @@ def _say_what_is_found(
     if journal.damaged:
         lines = counted(journal.damaged, "line")
         print(
-            f"{lines} of {folder / JOURNAL} passed over, damaged or of a version that wrote no "
-            "checksums, or not of the task that they name; what they held is played again where it "
-            "is asked for",
+            f"{lines} of {one_line(str(folder / JOURNAL))} passed over, damaged or of a version "
+            "that wrote no checksums, or not of the task that they name; what they held is played "
+            "again where it is asked for",
             file=sys.stderr,
         )
     found = sum(config.key in journal for config in configs)
     others = len(journal) - found
     if found or others:
         rest = f"; {others} of other options or code stay in its journal" if others else ""
-        print(f"{found} of {len(configs)} {unit} found in {folder}{rest}", file=sys.stderr)
+        told = one_line(str(folder))
+        print(f"{found} of {len(configs)} {unit} found in {told}{rest}", file=sys.stderr)
     return others
 
 

@@ -26,7 +26,7 @@ def makers_of(kind: type[ClosedLoopEnv], arguments: Mapping[str, Any], worlds: i
         if not lists_itself and _is_list(arguments.get(name)):
             raise InvalidInput(
                 f"{name} takes one value for all worlds, got {shown(arguments[name])}; budget "
-                "and the camera's faults alone may be a list, one for each (docs/vectors.md)"
+                "and the camera's faults alone may be a list, one for each"
             )
     given = {name: arguments[name] for name in OF_EACH_WORLD if name in arguments}
     lists = {name: [*value] for name, value in given.items() if _is_list(value)}
