@@ -67,7 +67,10 @@ def _is_foreign(frame: FrameType) -> bool:
 
 def _plugged_in() -> set[str]:
     """The top-level modules of packages that add something."""
-    installed = entry_points()
+    try:
+        installed = entry_points()
+    except (OSError, MemoryError):  # the error at hand may be of a limit that holds here, too
+        return set()
     ours = [group for group in installed.groups if group.startswith(_GROUPS)]
     return {_top(entry.module) for group in ours for entry in installed.select(group=group)}
 

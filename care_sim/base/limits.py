@@ -93,7 +93,8 @@ def _check_tasks(count: int, instead: str = "") -> None:
             thread.join()
 
 
-if is_command():
+def check_at_start() -> None:
+    """End the process in one line where its limits leave too little for the libraries."""
     try:
         check_memory()
         # Linear algebra starts a thread per core when it is imported.
@@ -101,3 +102,7 @@ if is_command():
     except LimitReached as reached:
         os.write(2, f"care-sim: {reached}\n".encode())
         os._exit(FAILED)
+
+
+if is_command():
+    check_at_start()

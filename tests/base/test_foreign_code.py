@@ -32,3 +32,12 @@ def test_the_file_and_line_of_a_users_code_are_told(tmp_path):
 @pytest.mark.parametrize("folder", LIBRARIES)
 def test_code_of_a_library_is_nobodys_wherever_it_was_installed(folder):
     assert foreign_place(raised_in(str(Path(folder) / "library" / "file.py"))) == ""
+
+
+@pytest.mark.parametrize("error", [OSError(24, "Too many open files"), MemoryError()])
+def test_without_the_list_of_plugins_a_librarys_code_is_nobodys(monkeypatch, error):
+    def fail():
+        raise error
+
+    monkeypatch.setattr("care_sim.base.foreign_code.entry_points", fail)
+    assert foreign_place(raised_in(f"{sysconfig.get_path('purelib')}/library.py")) == ""

@@ -12,7 +12,7 @@ import pytest
 from care_sim.base import limits
 from care_sim.base.limits import LimitReached, check_workers, limit_in
 from care_sim.study.executors import processes
-from tests.torture.processes import entry_point
+from tests.torture.processes import ANOTHER_USER, entry_point
 
 
 def ended(arguments, prefix=(), limited=None):
@@ -40,13 +40,8 @@ def test_too_little_memory(name, size):
 
 @pytest.mark.skipif(os.geteuid() != 0 or not shutil.which("setpriv"), reason="needs another user")
 def test_too_few_processes():
-    rights = "-all,+dac_override"  # so that another user can read where root has put the package
-    prefix = [
-        *("setpriv", "--reuid=65534", "--regid=65534", "--clear-groups", f"--inh-caps={rights}"),
-        *(f"--ambient-caps={rights}", f"--bounding-set={rights}"),
-    ]
     code, err = ended(
-        ["policies"], prefix, lambda: resource.setrlimit(resource.RLIMIT_NPROC, (1, 1))
+        ["policies"], ANOTHER_USER, lambda: resource.setrlimit(resource.RLIMIT_NPROC, (1, 1))
     )
     assert code == limits.FAILED
     (line,) = err.splitlines()

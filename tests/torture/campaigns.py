@@ -15,6 +15,8 @@ CAMPAIGNS = {
     "writers": 1,
     "disk": 2,
     "folders": 2,
+    "environment": 2,
+    "limits": 2,
 }
 
 

@@ -23,6 +23,12 @@ from tests.torture.case import Fault
 
 MARK = "CARE_SIM_TORTURE"
 MEMORY = 2**30
+_RIGHTS = "-all,+dac_override"
+ANOTHER_USER = (
+    *("setpriv", "--reuid=65534", "--regid=65534", "--clear-groups", f"--inh-caps={_RIGHTS}"),
+    *(f"--ambient-caps={_RIGHTS}", f"--bounding-set={_RIGHTS}"),
+)
+"""Before a command: it runs as nobody, who may read and write where root does."""
 HANGS_S = 10.0
 """On a quiet machine; others are given `patience` times as long."""
 LEAVES_S = 6.0
@@ -83,22 +89,28 @@ class Command:
     behind.
 
     `file_bytes`: the largest file that it may write, which stands in for a full disk. `stdout`: a
-    device in its place, or a "closed pipe".
+    device in its place, or a "closed pipe". `tasks`: how many processes and threads it may have, as
+    another user than root.
     """
 
-    def __init__(self, arguments, folder, file_bytes=None, stdout=None, **environment):
+    def __init__(self, arguments, folder, file_bytes=None, stdout=None, tasks=None, **environment):
         self.arguments, self.mark = [str(argument) for argument in arguments], new_mark()
 
         def limited():
             listen_to_interrupts()
             if file_bytes is not None:
                 resource.setrlimit(resource.RLIMIT_FSIZE, (file_bytes, file_bytes))
+            if tasks is not None:
+                resource.setrlimit(resource.RLIMIT_NPROC, (tasks, tasks))
 
         usual = {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
         usual[MARK] = f"{os.environ.get(MARK, '')}/{self.mark}"
         output = _output(stdout)
         self.process = subprocess.Popen(
-            [sys.executable, "-c", entry_point(), *self.arguments],
+            [
+                *(() if tasks is None else ANOTHER_USER),
+                *(sys.executable, "-c", entry_point(), *self.arguments),
+            ],
             cwd=folder,
             stdin=subprocess.DEVNULL,
             stdout=output,

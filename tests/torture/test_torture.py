@@ -24,6 +24,8 @@ SHORT = {
     "writers": 1,
     "disk": 2,
     "folders": 30,
+    "environment": 20,
+    "limits": 20,
 }
 """Cases of each campaign: 50 seconds together, on two cores."""
 
