@@ -36,7 +36,8 @@ def test_the_map_names_every_room_and_the_root_holds_nothing_else():
         path.name for path in PACKAGE.iterdir() if path.is_dir() and path.name != "__pycache__"
     }
     assert folders == set(ROOMS)
-    assert {path.name for path in PACKAGE.glob("*.py")} == {"__init__.py", "cli.py", "wrappers.py"}
+    root = {"__init__.py", "__main__.py", "cli.py", "wrappers.py"}
+    assert {path.name for path in PACKAGE.glob("*.py")} == root
 
 
 @pytest.mark.parametrize("name", ROOMS)

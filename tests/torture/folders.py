@@ -6,6 +6,7 @@ but what the command names may change.
 
 import os
 import stat
+from pathlib import Path
 
 from tests.torture import commands, props
 from tests.torture.case import Fault
@@ -72,7 +73,7 @@ def play(case):
             after = {path: kept for path, kept in after.items() if path in before}
         if after != before:
             raise Fault("a changed file outside the named folder", f"{before} -> {after}")
-        left = [path.name for path in here.rglob(".*.*") if f".{os.getpid()}." in path.name]
+        left = [path.name for path in Path().rglob(".*.*") if f".{os.getpid()}." in path.name]
         if left:
             raise Fault("an unfinished file is left", str(left))
 
