@@ -46,11 +46,13 @@ KNOWN = (
 )
 """Variables whose faults are known and being mended: left out until they are."""
 ALLOWED = {
+    "NUMBA_DISABLE_JIT": ("0", "1"),
+    "NUMBA_NUM_THREADS": ("1", "2"),
     "PYTHONIOENCODING": ("", "ascii", "utf-8", "latin-1:strict"),
     "PYTHONUTF8": ("", "0", "1"),
     "PYTHONHASHSEED": ("0", "7", "random"),
 }
-"""Python itself ends at once with any other value."""
+"""Python itself ends at once with any other value, and Numba warns with a traceback."""
 FOUND_CASES = (({"NUMBA_DISABLE_JIT": "1"}, ("policies",)),)
 
 prepare = warm.prepare
