@@ -3,6 +3,7 @@ by its own faults; see `care_sim.sensors.camera_faults`.
 """
 
 from collections.abc import Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -47,7 +48,7 @@ class BatchMisses:
         """Begin an episode with so many `objects` that can be missed."""
         if self.any:
             rng = np.random.default_rng(seed)
-            self._draws.begin(world, lambda keyframes: rng.random((keyframes, objects)))
+            self._draws.begin(world, partial(_uniform, rng, objects))
             self._started[world] = False
 
     def draw(self, live: Mask, ranges: Floats) -> Mask:
@@ -67,6 +68,15 @@ class BatchMisses:
         self._lasting = np.where(live[:, None], drawn - missed, lasting)
         self._started |= live
         return missed
+
+
+# No closures: a copy of the worlds then draws from copies of the generators.
+def _uniform(rng: np.random.Generator, objects: int, keyframes: int) -> Floats:
+    return rng.random((keyframes, objects))
+
+
+def _below(rng: np.random.Generator, most: int, keyframes: int) -> Integers:
+    return rng.integers(most, size=(keyframes, 1))
 
 
 class _Sent(NamedTuple):
@@ -109,7 +119,7 @@ class BatchDelay:
         self._sent.taken[world] = 0
         if self._jitters.any():
             rng, most = np.random.default_rng(seed), self._jitters[world] + 1
-            self._draws.begin(world, lambda keyframes: rng.integers(most, size=(keyframes, 1)))
+            self._draws.begin(world, partial(_below, rng, most))
 
     def newest(self, live: Mask, seen: Detected, headings: Floats) -> Detected:
         """Take in what is `seen` at a keyframe of the worlds that are `live`, the cars with these

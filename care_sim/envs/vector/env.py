@@ -210,17 +210,22 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         for worlds in self._worlds:
             worlds.close()
 
-    def __getstate__(self) -> object:
-        # The worlds write into rows of the observations that are handed out. In a copy they would
-        # write elsewhere, and it would hand out what never changes.
-        raise InvalidInput("many worlds cannot be copied or pickled: make the environment anew")
+    def __getstate__(self) -> dict[str, Any]:
+        return vars(self) | {"_threads": None}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self._threads = Threads(len(self._shares))
+        # In a copy, too, the worlds write into rows of the observations that are handed out.
+        for worlds, share in zip(self._worlds, self._shares, strict=True):
+            worlds.observed.update(_rows(self._observed, share))
 
     def _check_open(self) -> None:
         if self.closed:
             raise gymnasium.error.ClosedEnvironmentError("the environment is closed: make another")
 
     def _made(self, share: slice, makers: Sequence[Maker]) -> Worlds:
-        rows = {name: values[share] for name, values in self._observed.items()}
+        rows = _rows(self._observed, share)
         if not any(map(why_separate, {*self._models})):
             # Where no info tells of clearances, few of them are needed.
             exact = self._model.scoring_info
@@ -285,6 +290,10 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         if not self.copy:
             return self._observed
         return {name: values.copy() for name, values in self._observed.items()}
+
+
+def _rows(observed: Observed, share: slice) -> Observed:
+    return {name: values[share] for name, values in observed.items()}
 
 
 def _places(who: Mask) -> list[int]:

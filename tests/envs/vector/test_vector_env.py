@@ -3,7 +3,6 @@
 import copy
 import gc
 import multiprocessing
-import pickle
 import threading
 import time
 
@@ -114,12 +113,6 @@ def test_call_reads_an_attribute_of_every_world():
     env = native(NAME, 2, budget=[0.01, 0.1])
     assert [rig.budget for rig in env.call("rig")] == [164, 1638]
     env.close()
-
-
-@pytest.mark.parametrize("take", [copy.deepcopy, copy.copy, pickle.dumps])
-def test_a_copy_is_refused(vector, take):
-    with pytest.raises(InvalidInput, match="make the environment anew"):
-        take(vector)
 
 
 def test_a_list_of_what_all_worlds_share_is_refused_by_name():
