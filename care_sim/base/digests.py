@@ -67,7 +67,7 @@ def file_stamp(path: Path) -> Stamp:
     """Return the stamp of a file, without reading the file. Empty where there is no file."""
     try:
         stat = path.stat()
-    except OSError:
+    except (OSError, ValueError):  # a table of a recording may name any text as a file
         return ()
     # A file that is written anew keeps neither of its times; the last one no program can set back.
     return stat.st_ino, stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns

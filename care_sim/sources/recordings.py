@@ -109,8 +109,9 @@ class NuScenes(Recordings):
         )
 
     def files(self, scene: str) -> list[Path]:
-        """All tables that are read, and the sweeps of the scene."""
-        return [*_tables(self.folder, self.version), *self._sweep_files(scene)]
+        """All tables that are read, the sweeps of the scene, and the camera detections."""
+        tables, sweeps = _tables(self.folder, self.version), self._sweep_files(scene)
+        return [*tables, *sweeps, *filter(None, [self.camera_detections])]
 
     def _sweep_files(self, scene: str) -> tuple[Path, ...]:
         """Return no file where the tables are damaged. `film` then refuses the scene."""

@@ -1,5 +1,6 @@
 """The scenes of the open loop: generated streets, or recordings in a folder."""
 
+import os
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -206,7 +207,7 @@ def film_of(source: Source, scene: Scene) -> Film:
     """The film of a scene. The last one is kept, for policies that meet the same scene in turn,
     until one of its files changes.
     """
-    parts = (files_below(path) if path.is_dir() else [path] for path in source.files(scene))
+    parts = (files_below(path) if os.path.isdir(path) else [path] for path in source.files(scene))
     return _film_of(source, scene, tuple(file_stamp(file) for part in parts for file in part))
 
 

@@ -1,5 +1,6 @@
 """Whatever a source reads is part of the key of its plays."""
 
+import json
 import sys
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from care_sim.base import digests
 from care_sim.base.errors import InvalidInput
 from care_sim.sources.named import source_of
+from care_sim.sources.scenes import film_of
 from care_sim.study.play_config import PlayConfig
 from tests.helpers.nuscenes_database import change
 from tests.helpers.nuscenes_drive import write_drive
@@ -88,10 +90,27 @@ def test_damaged_tables_have_a_key_too(drive):
     assert len(keys(f"nuscenes:{drive}")) == 2
 
 
-@pytest.mark.parametrize("name", ["x" * 5000, "a\0b", "", "../../..", "/proc"])
+@pytest.mark.parametrize("name", ["x" * 5000, "a\0b", "\ud800", "", "../../..", "/proc"])
 def test_a_file_of_any_name_has_a_key(drive, name):
     change(drive, "sample_data", lambda rows: rows[0].update(filename=name))
-    assert len(keys(f"nuscenes:{drive}")) == 2
+    source = f"nuscenes:{drive}"
+    assert len(keys(source)) == 2
+    with pytest.raises(InvalidInput):
+        film_of(source_of(source), source_of(source).scenes()[0])
+
+
+def test_camera_detections_that_change_are_read_again_in_the_same_process(drive, tmp_path):
+    found = tmp_path / "found.json"
+    rows = json.loads((drive / "v1.0-trainval" / "sample_data.json").read_text())
+    front = next(row for row in rows if "CAM_FRONT/" in row["filename"])
+    row = {"sample_data_token": front["token"], "bbox_corners": [0, 0, 9, 9], "score": 0.6}
+    source = source_of(f"nuscenes:{drive}", camera_detections=found)
+    counts = []
+    for times in (1, 2):
+        found.write_text(json.dumps([row | {"category_name": "vehicle.car"}] * times))
+        film = film_of(source, source.scenes()[0])
+        counts.append(sum(len(shot.seen.detections.boxes) for shot in film.shots))
+    assert counts == [1, 2]
 
 
 def test_own_recordings_read_their_whole_folder_unless_they_say_what(tmp_path, monkeypatch):
