@@ -11,10 +11,12 @@ import sys
 import tempfile
 from pathlib import Path
 
+from care_sim.base.interrupts import is_command
+
 
 def _settle_caches() -> None:
     """Send the caches of this process, and of those that it starts, to a private temporary folder
-    where the home folder cannot be written, and say so in one line.
+    where the home folder cannot be written. The command `care-sim` says so in one line.
     """
     home = os.path.expanduser("~")
     has_home = os.path.isabs(home)
@@ -29,7 +31,8 @@ def _settle_caches() -> None:
         os.environ["HOME"] = str(folder)
     os.environ.setdefault("XDG_CACHE_HOME", str(folder))
     os.environ.setdefault("MPLCONFIGDIR", str(folder / "matplotlib"))
-    print(f"care_sim: no home folder to write to: caches go to {folder}", file=sys.stderr)
+    if is_command():
+        print(f"care-sim: no home folder to write to: caches go to {folder}", file=sys.stderr)
 
 
 def _private_folder() -> Path:

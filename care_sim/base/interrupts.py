@@ -129,9 +129,14 @@ def _come_again(lost: "sys.UnraisableHookArgs") -> None:
 
 
 def is_command() -> bool:
-    """Whether this process is the command `care-sim`, not one that it started."""
-    name = os.path.basename((getattr(sys, "argv", None) or [""])[0])
-    return name == "care-sim" and "--multiprocessing-fork" not in sys.orig_argv
+    """Whether this process is the command `care-sim` or begins as `python -m care_sim`, and none
+    that the command started.
+    """
+    arguments = getattr(sys, "argv", None) or [""]
+    name = os.path.basename(arguments[0])
+    # Python calls a module "-m" until it is found. Its name stands before its arguments.
+    is_module = name == "-m" and sys.orig_argv[-len(arguments)].removeprefix("-m") == "care_sim"
+    return (name == "care-sim" or is_module) and "--multiprocessing-fork" not in sys.orig_argv
 
 
 if is_command():

@@ -14,13 +14,13 @@ from care_sim.base.interrupts import is_command
 
 FAILED = 1
 """Exit code of a command that a limit has ended."""
-_BYTES_PER_CORE = 100_000_000
+_BYTES_PER_THREAD = 100_000_000
 _MEMORY = {
     "address space": (resource.RLIMIT_AS, 3_000_000_000, "ulimit -v"),
     "data": (resource.RLIMIT_DATA, 1_500_000_000, "ulimit -d"),
 }
-"""What the libraries of a study reserve, measured on two cores; each core adds a thread of theirs.
-Where one of their threads cannot start, they hang or abort.
+"""What the libraries of a study reserve, measured on two cores, besides their threads. Where one of
+their threads cannot start, they hang or abort.
 """
 _TASKS_OF_A_WORKER = 4
 _TASKS_OF_A_POOL = 16
@@ -38,12 +38,20 @@ def check_memory() -> None:
     """Raise LimitReached where a limit leaves too little memory for the libraries."""
     for name, (number, reserved, command) in _MEMORY.items():
         limit, _ = resource.getrlimit(number)
-        least = reserved + _BYTES_PER_CORE * CORES
+        least = reserved + _BYTES_PER_THREAD * _library_threads()
         if 0 <= limit < least:
+            suffices = reserved + _BYTES_PER_THREAD <= limit
+            instead = ", or set OMP_NUM_THREADS=1" if suffices else ""
             raise LimitReached(
                 f"{name} is limited to {limit / 1e9:.2f} GB, and care-sim needs "
-                f"{least / 1e9:.2f} GB: raise the limit ({command})"
+                f"{least / 1e9:.2f} GB: raise the limit ({command}){instead}"
             )
+
+
+def _library_threads() -> int:
+    """Count the threads that each library starts: one per core, unless OMP_NUM_THREADS is less."""
+    asked = os.environ.get("OMP_NUM_THREADS", "")
+    return min(CORES, max(int(asked), 1)) if asked.isdecimal() else CORES
 
 
 def check_workers(workers: int) -> None:
@@ -97,8 +105,8 @@ def check_at_start() -> None:
     """End the process in one line where its limits leave too little for the libraries."""
     try:
         check_memory()
-        # Linear algebra starts a thread per core when it is imported.
-        _check_tasks(CORES + 1)
+        # Linear algebra starts its threads when it is imported.
+        _check_tasks(_library_threads() + 1)
     except LimitReached as reached:
         os.write(2, f"care-sim: {reached}\n".encode())
         os._exit(FAILED)

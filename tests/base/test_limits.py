@@ -38,6 +38,27 @@ def test_too_little_memory(name, size):
     assert f"raise the limit ({command})" in line
 
 
+def test_the_module_is_checked_as_the_command_is():
+    done = subprocess.run(
+        [sys.executable, "-m", "care_sim", "policies"],
+        capture_output=True,
+        text=True,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (500_000_000, 500_000_000)),
+    )
+    line = "care-sim: address space is limited to 0.50 GB, and care-sim needs "
+    assert (done.returncode, done.stderr[: len(line)]) == (limits.FAILED, line)
+
+
+def test_many_cores_need_less_with_one_thread_each(monkeypatch):
+    monkeypatch.setattr(limits, "CORES", 64)
+    monkeypatch.setattr(limits.resource, "getrlimit", lambda _: (8_000_000_000, -1))
+    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
+    with pytest.raises(LimitReached, match=r"needs 9.40 GB: raise .*, or set OMP_NUM_THREADS=1$"):
+        limits.check_memory()
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    limits.check_memory()
+
+
 @pytest.mark.skipif(os.geteuid() != 0 or not shutil.which("setpriv"), reason="needs another user")
 def test_too_few_processes():
     code, err = ended(
