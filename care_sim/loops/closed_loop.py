@@ -243,12 +243,12 @@ class ClosedLoop:
         target = self.world.first_sighting
         if in_view or (target is not None and target.body in behind):
             self._has_met = True
+        if not command.braking:
+            return False
         unseen = None if self._has_met or target is None else target.body
         taken_for = self._localisation.taken_for(middle)
         tracks, ahead = self._memory.tracks(taken_for), self._tracks_ahead(taken_for)
-        return self._unfounded.judge_tracks(
-            self.world, middle, command.braking, tracks, ahead, unseen
-        )
+        return self._unfounded.judge_tracks(self.world, middle, tracks, ahead, unseen)
 
     def _tracks_ahead(self, middle: Frame) -> Tracks:
         """The tracks as the controller takes them: along the way that the car is to go."""

@@ -71,22 +71,19 @@ class UnfoundedBraking(NeedlessBraking):
         self,
         world: World,
         sensor: Frame,
-        braking: bool,
         tracks: Tracks,
         ahead: Tracks,
         unseen: int | None,
     ) -> bool:
-        """Whether it is; to be asked at every keyframe. `tracks` are in the frame of the sensor,
-        and the same lie `ahead` as the driver takes them; the body `unseen` gives no reason.
+        """Whether it is; to be asked at every keyframe with the brake on. `tracks` are in the frame
+        of the sensor, and the same lie `ahead` as the driver takes them; the body `unseen` gives no
+        reason.
         """
-        needed = braking and (
-            self._is_needed(world, sensor, unseen)
-            or _touch(
-                sensor.boxes_to_world(tracks.boxes[self._enters(ahead)]),
-                world.boxes_of(_bodies(world, unseen)),
-            )
+        needed = self._is_needed(world, sensor, unseen) or _touch(
+            sensor.boxes_to_world(tracks.boxes[self._enters(ahead)]),
+            world.boxes_of(_bodies(world, unseen)),
         )
-        return self._judged(world, braking, needed)
+        return self._judged(world, True, needed)
 
 
 def _bodies(world: World, unseen: int | None) -> Integers:

@@ -85,7 +85,7 @@ def unfounded(world, box, unseen=None):
         np.array([3]),
     )
     judge = UnfoundedBraking(1.1, 0.87 + 0.3, DriverSettings())
-    return judge.judge_tracks(world, sensor, True, track, track, unseen)
+    return judge.judge_tracks(world, sensor, track, track, unseen)
 
 
 def test_a_track_in_the_way_without_a_body_is_made_up(world):
