@@ -122,8 +122,7 @@ class PolicyProcess:
             raise BrokenPolicy(f"the process of policy {self.name} died") from error
         if answer[:1] == b"+":
             return answer[1:]
-        kind, told = self.read(json.loads, answer[1:])
-        raise _ERRORS.get(str(kind), InvalidInput)(shortened(one_line(str(told)), LONGEST))
+        raise self.read(_told_error, answer[1:])
 
     def read(self, function: Callable[[bytes], Any], answer: bytes) -> Any:
         """Read an answer with a function. Raises BrokenPolicy where the function fails."""
@@ -182,7 +181,7 @@ class IsolatedMaker:
         """The policy for a rig."""
         name = self._process.name
         number = self._process.ask(_make, name, self._load, rig, parameters)
-        return IsolatedPolicy(self._process, rig, int(self._process.read(json.loads, number)))
+        return IsolatedPolicy(self._process, rig, self._process.read(int, number))
 
 
 class IsolatedPolicy(Policy):
@@ -252,6 +251,11 @@ def _answer(request: bytes) -> bytes:
         kind = next((name for name, each in _ERRORS.items() if isinstance(error, each)), "")
         told = str(error) if kind == MissingExtra.__name__ else failure_line(error)
         return b"-" + json.dumps([kind, told]).encode()
+
+
+def _told_error(answer: bytes) -> Exception:
+    kind, told = json.loads(answer)
+    return _ERRORS.get(str(kind), InvalidInput)(shortened(one_line(str(told)), LONGEST))
 
 
 def _described(name: str, load: _Load) -> dict[str, Any]:

@@ -66,6 +66,11 @@ class Refuses(Spy):
     def __init__(self, rig, wings=2):
         raise care_sim.InvalidInput("wings must be 3")
 
+class Babbles(Spy):
+    def __init__(self, rig, answer=""):
+        from care_sim.policies import isolation
+        isolation._answer = lambda request: answer.encode()
+
 class Privileged(care_sim.PrivilegedPolicy, Spy):
     tags = ("privileged",)
 """
@@ -184,3 +189,11 @@ def members(group):
             state, _, of, *_ = stat.read_text().rpartition(")")[2].split()
             found += [stat.parent.name] * (int(of) == group and state not in "ZX")
     return found
+
+
+@pytest.mark.parametrize("answer", ["-1", "-[1, 2, 3]", "+null"])
+def test_an_answer_of_another_form_is_one_line(answer, env, spy):
+    with isolated_policies():
+        care_sim.make_policy("spy:Babbles", env, answer=answer)
+        with pytest.raises(InvalidInput, match="policy spy:Babbles answers with no action: "):
+            care_sim.make_policy("spy:Babbles", env)
