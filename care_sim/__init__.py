@@ -15,6 +15,7 @@ import care_sim.base.home  # noqa: F401
 
 # isort: split
 from importlib.metadata import version
+from typing import TYPE_CHECKING
 
 from care_sim.base.errors import InvalidInput, MissingExtra
 from care_sim.core.allocation import allocate
@@ -50,11 +51,14 @@ __all__ = [
 
 register_all()
 
+if TYPE_CHECKING:
+    from care_sim.sources.box_films import film_of_boxes
+else:
 
-def __getattr__(name: str) -> object:
-    """Load the simulator only for who makes films."""
-    if name == "film_of_boxes":
-        from care_sim.sources.box_films import film_of_boxes
+    def __getattr__(name: str) -> object:
+        """Load the simulator only for users that make films."""
+        if name == "film_of_boxes":
+            from care_sim.sources.box_films import film_of_boxes
 
-        return film_of_boxes
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+            return film_of_boxes
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
