@@ -95,7 +95,9 @@ def _text(error: BaseException, most: int = _SAID) -> str:
     """The first `most` characters of what an error says."""
     try:
         text = str(error)
-    except Exception:  # An error of foreign code may fail in its own `__str__`.
+    except KeyboardInterrupt:
+        raise
+    except BaseException:  # An error of foreign code may fail in its own `__str__`.
         return "its text cannot be read"
     return text if len(text) <= most else f"{text[:most]}..."
 
@@ -151,7 +153,7 @@ def printable(text: str) -> str:
 
 
 def printable_lines(text: str) -> str:
-    """The same of a text of several lines."""
+    """Return a text whose lines are each `printable`."""
     return "\n".join(map(printable, text.split("\n")))
 
 

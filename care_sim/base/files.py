@@ -117,7 +117,7 @@ def _moved_to(path: Path, keep: bool = True) -> Iterator[Path]:
     try:
         # By its name: the resolved one would make the missing target of a link.
         path.parent.mkdir(parents=True, exist_ok=True)
-        # Whoever may write to the folder can guess the name: a link there must not be followed.
+        # Anybody who may write to the folder can guess the name: no link there is followed.
         unfinished.unlink(missing_ok=True)
         unfinished.open("x").close()
         yield unfinished

@@ -63,7 +63,7 @@ def isolate_policies() -> None:
 
 @contextmanager
 def isolated_policies() -> Iterator[None]:
-    """Do so until the end of the block, and end these processes there."""
+    """Isolate policies until the end of the block, then end their processes."""
     if are_isolated():
         yield
         return

@@ -47,6 +47,7 @@ def film_of_boxes(
     setup = sensor_setup(sensor)
     times = _numbers(f"{name}: times_s", times_s, (-1,), MAP_M)
     poses = _numbers(f"{name}: ego_poses", ego_poses, (-1, 4), MAP_M)
+    _check_list(name, boxes)
     if not LEAST_KEYFRAMES <= len(times) == len(poses) == len(boxes):
         raise InvalidInput(
             f"{name}: times_s, ego_poses and boxes must hold as many keyframes, at least "
@@ -67,8 +68,7 @@ def film_of_boxes(
     ):
         place = f"{name} at {time_s + times[0]:g} s"
         frame = car.holding(np.array(setup.position))
-        if not isinstance(seen, Sequence):
-            raise InvalidInput(f"{place}: boxes must be a list, got {shown(seen)}")
+        _check_list(place, seen)
         bodies = [_body(place, box, start, frame, numbers) for box in seen]
         annotations, pictures, cloud = sense(
             bodies, frame, setup.position[2], setup.grid, setup.equipped(SURROUND_CAMERAS)
@@ -90,6 +90,11 @@ def film_of_boxes(
     )
     check_film(film, recorded=True)
     return film
+
+
+def _check_list(place: str, boxes: Any) -> None:
+    if not isinstance(boxes, Sequence):
+        raise InvalidInput(f"{place}: boxes must be a list, got {shown(boxes)}")
 
 
 def _body(

@@ -105,7 +105,7 @@ class Installed:
         self._made().check_returns(returns)
 
     def files(self, scene: Scene) -> list[Path]:
-        """Those of its own."""
+        """Return the files that its class names."""
         with self._blamed(f"names no files of {scene.name}"):
             return [Path(path) for path in self._made().files(scene)]
 

@@ -87,9 +87,9 @@ class RaisesItsOwn(History):
     def demand(self, belief):
         raise unpicklable()
 
-class Unreadable(Exception):
+class Unreadable(BaseException):
     def __str__(self):
-        raise RuntimeError("no words")
+        raise Unreadable
 
 class RaisesWithoutText(History):
     def demand(self, belief):

@@ -181,6 +181,7 @@ TOLD_WRONG = {
     "keys": ({"boxes": [[{"id": 1}]] * 6}, "a box must have id, class, size and pose, got"),
     "no map": ({"boxes": [["x"]] * 6}, "a box must have id, class, size and pose, got 'x'"),
     "no list": ({"boxes": [5] * 6}, "mine at 0 s: boxes must be a list, got 5"),
+    "nothing at all": ({"boxes": None}, "mine: boxes must be a list, got None"),
     "uneven": ({"times_s": [0, 1]}, "must hold as many keyframes, at least 3, got 2, 6 and 6"),
     "times": ({"times_s": [0, 1, 2, 3, 4, 4]}, "mine: times_s must ascend"),
     "ego": ({"ego_poses": [[0, 0, 0]] * 6}, "mine: ego_poses must be n x 4 numbers"),
