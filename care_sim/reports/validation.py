@@ -13,7 +13,7 @@ from care_sim.evaluation.censoring import FEWEST_PAIRS
 from care_sim.reports.contrasts import AVOIDED, DETECTION, Contrast, contrast, preventable
 from care_sim.reports.controls import is_control
 from care_sim.study.designs.validate import CAMERA_POLICIES, is_training
-from care_sim.study.rows.reading import detections, setting_of, tags_of_row
+from care_sim.study.rows.reading import detections, is_avoided, setting_of, tags_of_row
 from care_sim.study.rows.settings import Setting
 from care_sim.study.run_config import FULL, Row
 
@@ -194,7 +194,7 @@ def played_worlds(rows: Sequence[Row]) -> list[WorldPlays]:
 
 
 def _best(cells: _Cells, policies: Sequence[str], budget: float) -> str | None:
-    """The policy with the fewest collisions, of equal ones that with the earliest detection, over
+    """The policy that avoids the most collisions, then the one with the earliest detection, over
     the seeds of `cells` that all have played; of equals the first.
     """
     by_seed = {
@@ -212,7 +212,7 @@ def _best(cells: _Cells, policies: Sequence[str], budget: float) -> str | None:
 
 def _rank(rows: Sequence[Row]) -> tuple[int, float]:
     distances = [found.value for found in detections(rows)]
-    return sum(row["collision"] for row in rows), -float(np.mean(distances or [0.0]))
+    return sum(not is_avoided(row) for row in rows), -float(np.mean(distances or [0.0]))
 
 
 def _by_cell(rows: Iterable[Row]) -> _Cells:

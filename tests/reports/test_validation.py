@@ -39,6 +39,13 @@ def test_fewest_collisions_are_the_best_and_then_the_earliest_detection():
     assert only(rows).best_control(0.03) == "rows"
 
 
+def test_a_stop_for_nothing_counts_as_a_collision_where_the_best_is_chosen():
+    rows = [*cell("rows", [9.0] * 5, training=True), *cell("fan", [14.0] * 5, training=True)]
+    assert only(rows).best_control(0.03) == "fan"
+    rows[-1]["braked_before_view"] = True
+    assert only(rows).best_control(0.03) == "rows"
+
+
 def test_the_choice_hangs_on_training_seeds_alone_and_the_memoriser_is_no_control():
     """On the test seeds `fan` is better than `rows`, and `seed-finder` than both."""
     played = only(world(TELLING, TRAINING))
