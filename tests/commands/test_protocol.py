@@ -92,6 +92,13 @@ def test_one_policy_alone_is_read_again(source, tmp_path):
     assert (row["differing_keyframes"], row["differing_cells"]) == (None, None)
 
 
+@pytest.mark.parametrize("lost", ["events.parquet", "tables.tex"])
+def test_a_finished_study_writes_a_lost_file_again(source, tmp_path, lost):
+    for _ in range(2):
+        assert not run_study(small(source, ["care"]), tmp_path / "out", 1, study=PROTOCOL)
+        (tmp_path / "out" / lost).unlink()
+
+
 def test_the_rows_of_a_play_do_not_depend_on_what_was_played_beside_it(source):
     together = small(source, ["history", "care", "full"], floors=(0, 1))
     rows = attempted(together)

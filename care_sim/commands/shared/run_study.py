@@ -16,6 +16,7 @@ from care_sim.study.executors import ExecutorFactory, processes
 from care_sim.study.journal import JOURNAL, Journal
 from care_sim.study.progress import run_with_progress
 from care_sim.study.provenance import code_digest, machine, versions
+from care_sim.study.results_formats import ResultsFormat
 from care_sim.study.rows.parquet import check_columns, read_rows, write_columns, write_rows
 from care_sim.study.rows.schema import TEXT, Schema, as_optional
 from care_sim.study.run_config import Row, RunConfig
@@ -46,7 +47,7 @@ def run_study(
     the Parquet files of the study's kind with the rows of `configs` in their order, `tables.md`,
     `tables.tex` and the figures of `study`.
     No other study can take the folder until all of that is written. A folder that holds all of it
-    stays as it is, unless `force`. Where the folder holds rows
+    stays as it is, unless `force`; `report` draws lost figures. Where the folder holds rows
     that were not obtained again because tasks failed, its files stay, unless `force`.
 
     Raises InvalidInput for no task or no worker, when the folder cannot be written, and where a
@@ -74,7 +75,7 @@ def run_study(
             flush=True,
         )
         others = _say_what_is_found(configs, journal, folder, kind.unit)
-        if not force and _is_written(configs, journal, folder, kind.file):
+        if not force and _is_written(configs, journal, folder, kind):
             return []
         Unfinished(study.name, kind.unit, len(configs), others, command).write(folder)
 
@@ -164,14 +165,19 @@ def _say_what_is_found(
     return others
 
 
-def _is_written(configs: Sequence[RunConfig], journal: Journal, folder: Path, file: str) -> bool:
-    """Whether an earlier run has written the results of just these tasks, none of which failed."""
+def _is_written(
+    configs: Sequence[RunConfig], journal: Journal, folder: Path, kind: ResultsFormat
+) -> bool:
+    """Whether an earlier run has written the results of just these tasks, none of which failed, and
+    all files but figures are still there.
+    """
     # A run that was cut off while it wrote has left its note.
-    written = all((folder / name).is_file() for name in (CONFIG, TABLES, file))
+    names = (CONFIG, TABLES, "tables.tex", kind.file, *kind.further_files([]))
+    written = all((folder / name).is_file() for name in names)
     keys = [config.key for config in configs]
     if (folder / UNFINISHED).is_file() or not written or not all(key in journal for key in keys):
         return False
-    return bool([row.get("digest") for row in read_rows(folder / file, _DIGESTS)] == keys)
+    return bool([row.get("digest") for row in read_rows(folder / kind.file, _DIGESTS)] == keys)
 
 
 def _write(
