@@ -76,12 +76,13 @@ class RowChecks:
     def _unknown(self, names: Sequence[str]) -> Iterator[str]:
         if not names:
             return
-        versions = sorted({str(row.get("version")) for _, row in self._rows.values()})
+        versions = sorted({row.get("version") or "unknown" for _, row in self._rows.values()})
         rest = [f"{len(names) - _MOST_NAMED} more"] if len(names) > _MOST_NAMED else []
         yield (
-            f"columns of care-sim {', '.join(versions)} that this version, {care_sim.__version__}, "
-            f"does not know: {', '.join([*map(printable, names[:_MOST_NAMED]), *rest])}; rows that "
-            "differ in them are counted together"
+            f"rows of care-sim {', '.join(versions)} have columns that this version, "
+            f"{care_sim.__version__}, does not know: "
+            f"{', '.join([*map(printable, names[:_MOST_NAMED]), *rest])}; rows that differ in them "
+            "are counted together"
         )
 
     def _missing(self, parts: Sequence[tuple[Sequence[Row], int]]) -> Iterator[str]:

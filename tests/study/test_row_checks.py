@@ -57,8 +57,8 @@ def test_two_rows_of_one_task_must_be_alike(tmp_path):
 def test_columns_of_a_newer_version_are_named(tmp_path):
     foggy = folder(tmp_path / "one", [each | {"fog": 0.5, "version": "9.9.0"} for each in ROWS])
     told = (
-        f"columns of care-sim 9.9.0 that this version, {care_sim.__version__}, does not know: fog; "
-        "rows that differ in them are counted together"
+        f"rows of care-sim 9.9.0 have columns that this version, {care_sim.__version__}, does not "
+        "know: fog; rows that differ in them are counted together"
     )
     assert read_results(foggy)[2] == [told]
     assert merged([foggy, foggy]).left_out == [told]
