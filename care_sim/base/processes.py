@@ -1,5 +1,5 @@
-"""Processes that this one starts: deaf to interrupts, which are this one's to handle, and gone when
-it is gone.
+"""Processes that this one starts: deaf to interrupts, which are this one's to handle, gone when it
+is gone, and blind to what lies in the current folder.
 """
 
 import multiprocessing
@@ -28,15 +28,19 @@ _LONGEST_FOLDER = 75
 """Bytes of the folder for temporary files: the address of a socket inside one of its folders holds
 107 in all.
 """
+_SAFE_PATH = "PYTHONSAFEPATH"
+"""Where it is set, a new Python does not search the current folder before all libraries."""
 
 
 @contextmanager
 def starting() -> Iterator[None]:
     """Processes started meanwhile, and theirs, never hear the terminal's interrupts; this one hears
     them afterwards, when nothing is half started.
+
+    They search for modules where this one does: no file of the current folder stands for a library.
     """
     _shorten_socket_folder()
-    with held_back():
+    with held_back(), _safe_path():
         # Blocked signals stay blocked over fork and exec: a new process is deaf before it runs a
         # line.
         before = signal.pthread_sigmask(signal.SIG_BLOCK, UNHEARD)
@@ -47,6 +51,19 @@ def starting() -> Iterator[None]:
             yield
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def _safe_path() -> Iterator[None]:
+    # multiprocessing starts Python with `-c`, and the fork server imports before it knows where.
+    before = os.environ.get(_SAFE_PATH)
+    os.environ[_SAFE_PATH] = "1"
+    try:
+        yield
+    finally:
+        del os.environ[_SAFE_PATH]
+        if before is not None:
+            os.environ[_SAFE_PATH] = before
 
 
 def _shorten_socket_folder() -> None:
