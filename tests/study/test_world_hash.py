@@ -1,7 +1,7 @@
 """A scenario that draws outside its seed is refused: policies would play in different worlds."""
 
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import count
 
@@ -16,6 +16,7 @@ from care_sim.scenarios.dartout import Dartout
 from care_sim.study.episode_config import grid
 from care_sim.study.episode_play import run_episode
 from care_sim.study.world_hash import check_worlds
+from care_sim.world.bodies import CATALOGUE
 from care_sim.world.walker import Walk
 
 _BUILT = count()
@@ -55,6 +56,43 @@ class Counting(Sound):
         return 1.0 + next(_BUILT)
 
 
+@dataclass(frozen=True)
+class Shaping(Sound):
+    """Counts in a part of a body, whose size stays as it is."""
+
+    def build(self, rng):
+        world = super().build(rng)
+        hedge = CATALOGUE["hedge"]
+        parts = tuple(replace(p, size=(1.0, 0.5, 1.0 + 0.01 * next(_BUILT))) for p in hedge.parts)
+        world.add("hedge", replace(hedge, parts=parts), (20.0, 5.0, 0.0))
+        return world
+
+
+class Startled:
+    """Jumps, as the system draws, when the car brakes."""
+
+    y = 9.0
+
+    def look(self, world):
+        if world.ego_motion.acceleration < 0:
+            self.y += np.random.default_rng().uniform(0.0, 1.0)
+
+    def pose(self, _time):
+        return 20.0, self.y, 0.0
+
+
+@dataclass(frozen=True)
+class Reacting(Sound):
+    """Draws from the system what somebody does when the car brakes."""
+
+    def build(self, rng):
+        world = super().build(rng)
+        startled = Startled()
+        world.add("startled", "pedestrian", startled.pose)
+        world.at_every_step(startled.look)
+        return world
+
+
 def plays(kind, policies=("history", "care"), seeds=(0, 1)):
     return grid([f"tests.study.test_world_hash:{kind}"], policies, [0.05], seeds)
 
@@ -66,7 +104,7 @@ def told(kind):
     )
 
 
-@pytest.mark.parametrize("kind", ["Drawing", "Counting"])
+@pytest.mark.parametrize("kind", ["Drawing", "Counting", "Shaping", "Reacting"])
 def test_a_study_refuses_it_and_keeps_what_was_played(kind, tmp_path):
     with pytest.raises(InvalidInput, match=told(kind)):
         studied(plays(kind), tmp_path)
