@@ -1,7 +1,7 @@
 """Refuse to copy a world that holds functions with a state of their own.
 
 `copy` and `pickle` keep a function as it is. A closure over an actor would go on to move, and to
-read, the actor of the world that was copied.
+read, the actor of the world that was copied; `values.pop` would take from the list of that world.
 """
 
 import dis
@@ -41,6 +41,12 @@ class _FunctionFinder(pickle.Pickler):
 
     def reducer_override(self, found: object) -> Any:
         """Check a function. Pass over the owner, classes, and what copies itself."""
+        # `copy.deepcopy` keeps it as it is, and with it the list that it is a method of.
+        if isinstance(found, BuiltinFunctionType) and _changes(found):
+            raise InvalidInput(
+                f"{found.__qualname__} is held as a method of a {type(found.__self__).__name__}; "
+                "use a method of an object of your own, or functools.partial"
+            )
         if isinstance(found, FunctionType) and _has_state(found):
             code = found.__code__
             raise InvalidInput(
@@ -63,13 +69,14 @@ def _has_state(function: FunctionType) -> bool:
 
 
 def _may_change(values: Iterable[object]) -> bool:
-    for value in values:
-        if isinstance(value, tuple | frozenset):
-            if _may_change(value):
-                return True
-        elif isinstance(value, FunctionType):
-            if _has_state(value):
-                return True
-        elif not isinstance(value, (*_UNCHANGING, BuiltinFunctionType)):
-            return True
-    return False
+    return any(map(_changes, values))
+
+
+def _changes(value: object) -> bool:
+    if isinstance(value, tuple | frozenset):
+        return _may_change(value)
+    if isinstance(value, FunctionType):
+        return _has_state(value)
+    if isinstance(value, BuiltinFunctionType):
+        return _changes(value.__self__)
+    return not isinstance(value, _UNCHANGING)

@@ -130,6 +130,26 @@ class Tied(Dartout):
         return world
 
 
+class Steps:
+    """Takes each of its steps off a list."""
+
+    def __init__(self):
+        self.take = [0.01 * number for number in range(500)].pop
+
+    def pose(self, _time):
+        return 20.0, self.take(), 0.0
+
+
+@dataclass(frozen=True)
+class Popping(Dartout):
+    """A person who is moved by the method of a list."""
+
+    def build(self, rng):
+        world = super().build(rng)
+        world.add("walker", "pedestrian", Steps().pose)
+        return world
+
+
 @dataclass(frozen=True)
 class Even(Dartout):
     """A car whose motion is a closure over numbers, which never change."""
@@ -151,6 +171,14 @@ def test_a_scenario_with_a_closure_over_its_world_is_refused_in_one_line(copied)
     assert message.startswith("scenario tests.envs.test_copies:Tied cannot be copied: Tied.build.")
     assert "(test_copies.py, line " in message
     assert "\n" not in message
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, pickle.dumps])
+def test_a_scenario_that_holds_the_method_of_a_list_is_refused(copied):
+    with ScenarioEnv(scenario=Popping) as env:
+        env.reset(seed=0)
+        with pytest.raises(InvalidInput, match=r"cannot be copied: list\.pop is held as a method"):
+            copied(env)
 
 
 def test_a_closure_over_numbers_is_copied():
