@@ -64,8 +64,9 @@ class Plugins(Generic[Made]):
 
     def _in_a_file(self, name: object) -> str:
         """How to ask for what a file here holds, where a name is that of a file; else empty."""
-        stem = name.removesuffix(".py") if isinstance(name, str) else ""
-        place = f"{stem}:{stem.title().replace('_', '')}"
+        file, _, made = name.partition(":") if isinstance(name, str) else ("", "", "")
+        stem = str(Path(file)).removesuffix(".py")
+        place = f"{stem}:{made or stem.title().replace('_', '')}"
         if not (is_place(place) and Path(f"{stem}.py").is_file()):
             return ""
         return f"a {self.kind} in a file is MODULE:CLASS, as {place}"
@@ -156,7 +157,8 @@ def dataclass_faults(made: Any, told: Container[str] = ()) -> Iterator[str]:
 
 def is_place(name: str) -> bool:
     """Whether a name is a place, MODULE:OBJECT."""
-    return _PLACE.fullmatch(name) is not None
+    # FILE.py:OBJECT would be a module `py` of a package, and is always meant otherwise.
+    return _PLACE.fullmatch(name) is not None and ".py:" not in name
 
 
 def _look_here() -> None:

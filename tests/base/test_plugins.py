@@ -61,6 +61,8 @@ def test_what_does_not_count_is_told_with_what_does(installed):
     [
         ("mine", "; a thing in a file is MODULE:CLASS, as mine:Mine; known: usual"),
         ("mine.py", "; a thing in a file is MODULE:CLASS, as mine:Mine; known: usual"),
+        ("mine.py:Own", "; a thing in a file is MODULE:CLASS, as mine:Own; known: usual"),
+        ("./mine.py:Own", "; a thing in a file is MODULE:CLASS, as mine:Own; known: usual"),
         ("my_own", "; a thing in a file is MODULE:CLASS, as my_own:MyOwn; known: usual"),
         ("other", "; known: usual"),
         ("a-b", "; known: usual"),
