@@ -65,7 +65,10 @@ def made(
 
 
 def tags_of_maker(make: PolicyMaker) -> tuple[str, ...]:
-    """Return the tags of a policy. Code that changes the tags of a privileged class later changes nothing."""
+    """Return the tags of a policy.
+
+    Code that changes the tags of a privileged class later changes nothing.
+    """
     tags: tuple[str, ...] = getattr(make, "tags", Policy.tags)
     return honest_tags(tags) if is_privileged(make) else tags
 
