@@ -124,6 +124,7 @@ def test_a_film_is_taken_with_the_sensor_of_its_source(file, monkeypatch):
     monkeypatch.setattr(
         "care_sim.sources.scenes.record", lambda street, setup, returns: filmed.append(setup)
     )
+    monkeypatch.setattr("care_sim.sources.scenes.check_film", lambda film: None)
     source_of("streets", sensor=str(file)).film(SCENE)
     assert filmed == [sensor_setup(file)]
 

@@ -37,6 +37,8 @@ NOTICES = (
     r"the car never braked: no picture",
     r"measuring .*",
     r"(calibration|held out) street \d+ of \d+",
+    r"(street|drive|test) \d+ of \d+ *",
+    r"the first take longer on a machine that has not played before: .*",
 )
 """What a command may say on stderr about how far it is, beside lines of its own name."""
 OWN_SIGNATURE = re.compile(

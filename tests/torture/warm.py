@@ -66,7 +66,9 @@ def _code(arguments, before):
     from care_sim.base.limits import check_at_start
     from care_sim.cli import main
 
-    # The limit of a case of this process is none of the fork's.
+    # A recording that this process has made is none of the fork's, nor is the limit of a case.
+    if "rerun" in sys.modules:
+        sys.modules["rerun"].cleanup_if_forked_child()
     resource.setrlimit(resource.RLIMIT_DATA, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
     try:
         before()
