@@ -11,6 +11,7 @@ from typing import Any, NoReturn
 
 import care_sim
 from care_sim.base import interrupts
+from care_sim.base.causes import causes
 from care_sim.base.errors import (
     LONGEST,
     InvalidInput,
@@ -111,14 +112,8 @@ def _is_interrupt(error: BaseException) -> bool:
     """Whether an error is an interrupt, or what an import has made of one."""
     # A compiled module that is interrupted while it is imported raises ImportError or SystemError,
     # and keeps the interrupt as the cause.
-    link: BaseException | None = error
-    while link is not None and not isinstance(link, KeyboardInterrupt):
-        link = (
-            link.__cause__ or link.__context__
-            if isinstance(error, ImportError | SystemError)
-            else None
-        )
-    return link is not None
+    links = causes(error) if isinstance(error, ImportError | SystemError) else [error]
+    return any(isinstance(link, KeyboardInterrupt) for link in links)
 
 
 def _end_with(error: BaseException, trace: bool) -> NoReturn:

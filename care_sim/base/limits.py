@@ -9,6 +9,7 @@ import os
 import resource
 import threading
 
+from care_sim.base.causes import causes
 from care_sim.base.cores import CORES
 from care_sim.base.interrupts import is_command
 
@@ -61,22 +62,20 @@ def check_workers(workers: int) -> None:
 
 def limit_in(error: BaseException) -> str:
     """Say in one line which limit an error or one of its causes ran into; empty for another one."""
-    link: BaseException | None = error
-    while link is not None:
+    for link in causes(error):
         if isinstance(link, LimitReached):
             return str(link)
         number = link.errno if isinstance(link, OSError) else None
         if number in (errno.EMFILE, errno.ENFILE):
             return "too many files are open: raise the limit (ulimit -n), or lower --workers"
-        if number == errno.EAGAIN or "can't start new thread" in str(link):
+        if number == errno.EAGAIN or link.args == ("can't start new thread",):
             return "too many processes or threads: raise the limit (ulimit -u), or lower --workers"
-        is_unmapped = isinstance(link, ImportError) and any(w in str(link) for w in _UNMAPPED)
+        is_unmapped = isinstance(link, ImportError) and any(w in str(link.msg) for w in _UNMAPPED)
         if number == errno.ENOMEM or isinstance(link, MemoryError) or is_unmapped:
             return (
                 "the memory does not suffice: raise the limit (ulimit -v, ulimit -d), or lower "
                 "--workers"
             )
-        link = link.__cause__ or link.__context__
     return ""
 
 

@@ -10,6 +10,7 @@ import sys
 import pytest
 
 from care_sim.base import limits
+from care_sim.base.causes import causes
 from care_sim.base.limits import LimitReached, check_workers, limit_in
 from care_sim.study.executors import processes
 from tests.torture.processes import ANOTHER_USER, entry_point
@@ -109,3 +110,10 @@ def test_an_error_names_its_limit(error, named):
     for told in (limit_in(error), limit_in(other)):
         assert named in told
         assert bool(told) == bool(named)
+
+
+def test_a_circle_of_errors_has_an_end():
+    first, second = ValueError("first"), OSError(errno.ENOSPC, "No space left on device")
+    first.__cause__, second.__cause__ = second, first
+    assert limit_in(first) == ""
+    assert [*causes(first)] == [first, second]

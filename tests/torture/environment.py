@@ -49,7 +49,7 @@ ALLOWED = {
 """Python itself ends at once with any other value, and Numba warns with a traceback."""
 FOUND_CASES = (({"NUMBA_DISABLE_JIT": "1"}, ("policies",)),)
 
-prepare = warm.prepare
+prepare, FORKS = warm.prepare, warm.FORKS
 
 
 def drawn(case):

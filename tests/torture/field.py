@@ -138,7 +138,7 @@ class _Worker:
         self._mark = processes.new_mark()
         self._process = None
         self._played = 0
-        self._name = self._began = self._handed = None
+        self._name = self._began = self._handed = self._campaign = None
 
     @property
     def busy(self):
@@ -150,8 +150,11 @@ class _Worker:
 
     def hand(self, name):
         """Give it a case."""
-        if self._process is None or self._played >= MOST_CASES:
+        campaign = importlib.import_module(f"tests.torture.{name.campaign}")
+        is_unfit = getattr(campaign, "FORKS", False) and name.campaign != self._campaign
+        if self._process is None or self._played >= MOST_CASES or is_unfit:
             self._begin_anew()
+        self._campaign = name.campaign
         self._name, self._began, self._buffer = name, None, b""
         self._handed = time.monotonic()
         self._played += 1

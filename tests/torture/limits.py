@@ -34,7 +34,7 @@ FOUND_CASES = (
     ("NOFILE", 7, ("policies",)),
 )
 
-prepare = warm.prepare
+prepare, FORKS = warm.prepare, warm.FORKS
 
 
 def drawn(case):

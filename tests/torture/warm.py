@@ -26,6 +26,10 @@ LINES = (
     ("--version",),
 )
 
+FORKS = True
+"""Rerun makes no recording in a fork of a process that has made one: these campaigns begin in new
+processes."""
+
 
 def prepare(_name):
     """Load what the lines need."""
@@ -66,9 +70,7 @@ def _code(arguments, before):
     from care_sim.base.limits import check_at_start
     from care_sim.cli import main
 
-    # A recording that this process has made is none of the fork's, nor is the limit of a case.
-    if "rerun" in sys.modules:
-        sys.modules["rerun"].cleanup_if_forked_child()
+    # The limit of a case of this process is none of the fork's.
     resource.setrlimit(resource.RLIMIT_DATA, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
     try:
         before()

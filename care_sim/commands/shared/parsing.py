@@ -25,6 +25,7 @@ from tyro.constructors import (
     StructTypeInfo,
 )
 
+from care_sim.base.causes import causes
 from care_sim.base.errors import InvalidInput, shown, unknown
 from care_sim.commands.shared.help_text import Captured, grouped, wrapped
 from care_sim.commands.shared.own_defaults import settled_command
@@ -287,9 +288,7 @@ def _is_named(mark: Any) -> bool:
 
 def _refusal(end: BaseException | None) -> InvalidInput | None:
     """The InvalidInput of an options' class, which tyro takes for a mistake of its own kind."""
-    while end is not None and not isinstance(end, InvalidInput):
-        end = end.__cause__ or end.__context__
-    return end
+    return next((link for link in causes(end) if isinstance(link, InvalidInput)), None)
 
 
 def _one_line(box: str) -> str:
