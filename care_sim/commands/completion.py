@@ -22,8 +22,10 @@ _ZSH = "autoload -U +X compinit bashcompinit && compinit && bashcompinit\n"
 
 @dataclass(frozen=True)
 class Completion:
-    """Print a script by which a shell completes commands and options: `docs/install.md` says where
-    each shell looks for it. Values of options are completed as names of files.
+    """Print what completes commands and options in a shell.
+
+    `docs/install.md` says where each shell looks for it. Values of options complete as names of
+    files.
     """
 
     shell: Annotated[Literal["bash", "zsh", "fish"], tyro.conf.Positional]
