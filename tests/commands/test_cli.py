@@ -572,7 +572,7 @@ def test_absurd_input_is_one_line_and_exit_code_2(arguments, named, capsys, tmp_
     assert len(err) < 2100
 
 
-@pytest.mark.parametrize("fault", [TypeError, RecursionError, MemoryError, OverflowError])
+@pytest.mark.parametrize("fault", [TypeError, RecursionError, OverflowError])
 def test_a_fault_of_the_software_is_one_line_and_its_trace_is_to_be_had(fault, capsys, monkeypatch):
     # Raised by the library, since what this file raises is no fault of the software's own.
     fails = Mock(side_effect=fault("deep\ninside"))
