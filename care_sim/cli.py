@@ -131,7 +131,7 @@ def _end_with(error: BaseException, trace: bool) -> NoReturn:
         sys.exit(_UNREAD)
     if foreign_place(error) and not trace:
         _complain(error_line(error), _FAILED)
-    if limit := limit_in(error):
+    if (limit := limit_in(error)) and not trace:
         _leave_output()
         _complain(limit, _FAILED)
     if isinstance(error, OSError):

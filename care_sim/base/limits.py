@@ -20,8 +20,8 @@ _MEMORY = {
     "address space": (resource.RLIMIT_AS, 3_000_000_000, "ulimit -v"),
     "data": (resource.RLIMIT_DATA, 1_500_000_000, "ulimit -d"),
 }
-"""What the libraries of a study reserve, measured on two cores, besides their threads. Where one of
-their threads cannot start, they hang or abort.
+"""Bytes that the libraries of a study reserve besides their threads, measured on two cores. The
+libraries hang or abort where one of their threads cannot start.
 """
 _TASKS_OF_A_WORKER = 4
 _TASKS_OF_A_POOL = 16

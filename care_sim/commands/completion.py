@@ -38,7 +38,7 @@ class Completion:
 
 
 def _words() -> dict[str, list[str]]:
-    """What may follow each command: its options, or the commands below it with theirs."""
+    """Return the words after each command: its options, or the commands below it with theirs."""
     words = {}
     for name, entry in COMMANDS.items():
         loaded = entry.loaded()

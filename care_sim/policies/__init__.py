@@ -201,8 +201,9 @@ def make_policy(name: str, env: _AnyEnv, /, **parameters: object) -> Policy | Ve
 
 
 def maker(name: str) -> PolicyMaker:
-    """What makes the policy, in a process of its own where policies of others are isolated. Raises
-    InvalidInput with the reason for one that cannot be loaded.
+    """Return the maker of a policy, in a process of its own where policies of others are isolated.
+
+    Raises InvalidInput with the reason for one that cannot be loaded.
     """
     if are_isolated() and name not in BUILT_IN:
         return IsolatedMaker(name, maker)

@@ -107,7 +107,7 @@ class PolicyProcess:
         theirs.close()
 
     def ask(self, function: Callable[..., object], *arguments: object) -> bytes:
-        """What a function returns there: bytes as they are, anything else as JSON.
+        """Call a function there and return its answer: bytes as they are, anything else as JSON.
 
         Raises what the function raises, as a single line, and BrokenPolicy when the process dies.
         """

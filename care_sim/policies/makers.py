@@ -48,8 +48,8 @@ def check_parameters(name: str, make: PolicyMaker, parameters: Mapping[str, obje
 def made(
     name: str, make: PolicyMaker, given: Sequence[object], parameters: Mapping[str, object]
 ) -> Policy:
-    """What `make` makes. Raises BrokenPolicy for what is no policy."""
-    # Whatever else somebody's code raises is a fault of the policy and named as such.
+    """Return the policy that `make` makes. Raises BrokenPolicy for what is no policy."""
+    # Any other error of somebody's code is a fault of the policy, and is named as one.
     try:
         policy = make(*given, **parameters)
     except (KeyboardInterrupt, InvalidInput, MissingExtra):

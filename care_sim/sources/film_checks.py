@@ -22,7 +22,7 @@ FULL_TURN = 2 * np.pi + 1e-6
 MOVES_M = 5.0
 """The car must move so far in the life of an object, or nothing is known of the object's frame."""
 STILL_M = (0.3, 1.0)
-"""What stands moves at most a twentieth of the car's way, within these bounds: labels err."""
+"""A standing object may move a twentieth of the car's way, within these bounds: labels err."""
 MOST_ASTRAY = 0.3
 """Share of the objects that a real drive may have of those which stand in another frame alone: cars
 in a convoy, for example. 17 drives of KITTI, two of nuScenes, two of Argoverse 2 and one of Boreas

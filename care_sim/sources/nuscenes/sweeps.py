@@ -25,7 +25,7 @@ _OTHERS = {
     4: "x, y, z and intensity (KITTI)",
     6: "x, y, z, intensity, elongation and another (Waymo)",
 }
-"""What files with another number of values per point hold."""
+"""Contents of files with another number of values per point."""
 OWN_CAR_M = 1.0
 """Points nearer than this lie on the recording car (the radius within which the devkit drops them
 from sweeps).
