@@ -109,7 +109,6 @@ class ClosedLoop:
         self._unfounded = (
             None if detector is None else UnfoundedBraking(front_m, self.guarded_m / 2, conditions)
         )
-        self._has_met = False
         self.index = 0
         self.told = {}
         self._look(np.zeros(rig.grid.shape, np.float32))
@@ -225,7 +224,7 @@ class ClosedLoop:
 
     def _command(self, middle: Frame) -> Command:
         """What the car's software asks for, from the tracks of this keyframe."""
-        ahead = self._tracks_ahead(middle)
+        ahead = self._along_way(self._memory.tracks(middle), middle)
         ego = self.belief.ego
         command = self._driver.command(ahead, ego)
         if self._cruising is None:
@@ -242,17 +241,17 @@ class ClosedLoop:
             return False
         target = self.world.first_sighting
         if in_view or (target is not None and target.body in behind):
-            self._has_met = True
+            self._unfounded.has_met = True
         if not command.braking:
             return False
-        unseen = None if self._has_met or target is None else target.body
+        unseen = None if self._unfounded.has_met or target is None else target.body
         taken_for = self._localisation.taken_for(middle)
-        tracks, ahead = self._memory.tracks(taken_for), self._tracks_ahead(taken_for)
+        tracks = self._memory.tracks(taken_for)
+        ahead = self._along_way(tracks, taken_for)
         return self._unfounded.judge_tracks(self.world, middle, tracks, ahead, unseen)
 
-    def _tracks_ahead(self, middle: Frame) -> Tracks:
-        """The tracks as the controller takes them: along the way that the car is to go."""
-        tracks = self._memory.tracks(middle)
+    def _along_way(self, tracks: Tracks, middle: Frame) -> Tracks:
+        """Return tracks as the controller takes them: along the way that the car is to go."""
         route = self.world.route
         return tracks if route is None else along_route(tracks, route, middle)
 

@@ -67,6 +67,9 @@ class NeedlessBraking:
 class UnfoundedBraking(NeedlessBraking):
     """Judges whether the brake of one episode is on for what the detector made up."""
 
+    has_met: bool = False
+    """Whether the camera has shown the first-sighting actor, or a detection held its returns."""
+
     def judge_tracks(
         self,
         world: World,
