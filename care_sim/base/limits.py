@@ -26,6 +26,10 @@ libraries hang or abort where one of their threads cannot start.
 _TASKS_OF_A_WORKER = 4
 _TASKS_OF_A_POOL = 16
 """The fork server, the tracker of resources, and threads of libraries."""
+_FILES = 16
+"""Files that a command opens beside those that it inherits. Rerun aborts where it is imported with
+fewer than 5.
+"""
 _STACK_BYTES = 2**16
 _UNMAPPED = ("failed to map segment", "cannot allocate memory", "cannot create shared object")
 """How the system's loader says that there is no room for a library."""
@@ -100,10 +104,29 @@ def _check_tasks(count: int, instead: str = "") -> None:
             thread.join()
 
 
+def check_files() -> None:
+    """Raise LimitReached unless a command can open the files that it needs."""
+    opened = list[int]()
+    try:
+        while len(opened) < _FILES:
+            opened.append(os.open(os.devnull, os.O_RDONLY))
+    except OSError as error:
+        if error.errno not in (errno.EMFILE, errno.ENFILE):
+            raise
+        raise LimitReached(
+            f"{len(opened)} files can be opened, and care-sim needs {_FILES}: raise the limit "
+            "(ulimit -n)"
+        ) from None
+    finally:
+        for file in opened:
+            os.close(file)
+
+
 def check_at_start() -> None:
     """End the process in one line where its limits leave too little for the libraries."""
     try:
         check_memory()
+        check_files()
         # Linear algebra starts its threads when it is imported.
         _check_tasks(_library_threads() + 1)
     except LimitReached as reached:

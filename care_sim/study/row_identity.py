@@ -1,5 +1,6 @@
 """What was asked for with a row: two rows of which the same was asked are of one task."""
 
+from functools import lru_cache
 from typing import Any
 
 from care_sim.core.conditions import DEFAULTS
@@ -19,10 +20,16 @@ def asked_with(row: Row) -> Row:
     """The parameters of a row that differ from the defaults."""
     # A row holds the digest of a file of camera detections. It counts only whether one was given,
     # so that the same command may replace its own rows after the file has changed.
-    given = {name: value for name, value in row.items() if is_parameter(name) and value is not None}
+    given = {name: row[name] for name in _parameters(tuple(row)) if row[name] is not None}
     if "camera_detections" in given:
         given["camera_detections"] = True
     return {name: value for name, value in given.items() if value != USUAL.get(name)}
+
+
+@lru_cache
+def _parameters(names: tuple[str, ...]) -> list[str]:
+    """The parameters among columns. Thousands of rows share the same `names`."""
+    return [*filter(is_parameter, names)]
 
 
 def identity(row: Row) -> Task:

@@ -2,6 +2,7 @@
 
 import errno
 import os
+import re
 import resource
 import shutil
 import subprocess
@@ -58,6 +59,17 @@ def test_many_cores_need_less_with_one_thread_each(monkeypatch):
         limits.check_memory()
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
     limits.check_memory()
+
+
+def test_too_few_files():
+    code, err = ended(
+        ["policies"], limited=lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (9, 9))
+    )
+    assert code == limits.FAILED
+    assert re.fullmatch(
+        r"care-sim: \d files can be opened, and care-sim needs 16: raise the limit \(ulimit -n\)\n",
+        err,
+    )
 
 
 @pytest.mark.skipif(os.geteuid() != 0 or not shutil.which("setpriv"), reason="needs another user")

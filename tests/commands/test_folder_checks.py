@@ -256,6 +256,7 @@ def test_a_damaged_line_is_played_again_and_said(tmp_path, capsys):
     first, second = path.read_text().splitlines()
     seed = json.loads(second)["rays_fired"]
     path.write_text(f"{first}\n{second.replace(str(seed), str(seed + 1))}\n")
+    (tmp_path / "episodes.parquet").unlink()
     capsys.readouterr()
     assert run_study(short(seeds=(0, 1)), tmp_path, workers=1) == []
     said = capsys.readouterr().err

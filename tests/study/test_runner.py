@@ -108,10 +108,26 @@ def test_rows_of_a_journal_that_are_not_of_their_task_are_played_again(tmp_path,
     altered = [second | {"digest": first["digest"]}, second, third]
     lines = [_line(row | {"study": "sweep"}) for row in altered]
     (tmp_path / JOURNAL).write_text("".join(lines))
+    (tmp_path / EPISODES.file).unlink()
     assert run_study(configs, tmp_path, 1, ThreadPoolExecutor) == []
     assert "2 lines of " in capsys.readouterr().err
     rows = read_rows(tmp_path / EPISODES.file)
     assert [(row["seed"], row["collision"]) for row in rows] == [(n, False) for n in range(3)]
+
+
+def test_a_finished_study_is_taken_from_its_results_without_its_journal(
+    tmp_path, monkeypatch, capsys
+):
+    run_study(short(["history"], seeds=range(3)), tmp_path, 1, ThreadPoolExecutor)
+    monkeypatch.setattr("care_sim.commands.shared.run_study.Journal", None)
+    assert run_study(short(["history"], seeds=range(3)), tmp_path, 1, ThreadPoolExecutor) == []
+    assert f"3 of 3 episodes found in {tmp_path}\n" in capsys.readouterr().err
+    # Fewer or more tasks, or a lost file, need the journal again.
+    for lost, seeds in (("", range(4)), ("tables.md", range(3))):
+        if lost:
+            (tmp_path / lost).unlink()
+        with pytest.raises(TypeError, match="NoneType"):
+            run_study(short(["history"], seeds=seeds), tmp_path, 1, ThreadPoolExecutor)
 
 
 def test_what_an_earlier_study_left_is_said_and_its_figures_go(tmp_path, capsys):

@@ -17,7 +17,13 @@ from care_sim.study.journal import JOURNAL, Journal
 from care_sim.study.progress import run_with_progress
 from care_sim.study.provenance import code_digest, machine, versions
 from care_sim.study.results_formats import ResultsFormat
-from care_sim.study.rows.parquet import check_columns, read_rows, write_columns, write_rows
+from care_sim.study.rows.parquet import (
+    check_columns,
+    read_notes,
+    read_rows,
+    write_columns,
+    write_rows,
+)
 from care_sim.study.rows.schema import TEXT, Schema, as_optional
 from care_sim.study.run_config import Row, RunConfig
 from care_sim.study.runner import Failure
@@ -65,18 +71,26 @@ def run_study(
     check_columns(config.row() for config in configs)
     # The folder is checked before it is locked, which would leave a file in it, and again after, in
     # case that another process has written meanwhile.
+    if not force and _is_finished(configs, folder, study):
+        _say_where(configs, folder, kind)
+        _say_what_is_found(len(configs), len(configs), 0, folder, kind.unit)
+        return []
     _check(folder, configs, study, force)
     with _journal(folder, study) as journal:
         journal.drop_unsound(configs, study.schema)
         _check(folder, configs, study, force, journal)
-        print(
-            f"Results go to {one_line(str(folder))}: {counted(len(configs), kind.task)}",
-            file=sys.stderr,
-            flush=True,
-        )
-        others = _say_what_is_found(configs, journal, folder, kind.unit)
-        if not force and _is_written(configs, journal, folder, kind):
-            return []
+        _say_where(configs, folder, kind)
+        if journal.damaged:
+            lines = counted(journal.damaged, "line")
+            print(
+                f"{lines} of {one_line(str(folder / JOURNAL))} passed over, damaged or of a "
+                "version that wrote no checksums, or not of the task that they name; what they "
+                "held is played again where it is asked for",
+                file=sys.stderr,
+            )
+        found = sum(config.key in journal for config in configs)
+        others = len(journal) - found
+        _say_what_is_found(found, len(configs), others, folder, kind.unit)
         Unfinished(study.name, kind.unit, len(configs), others, command).write(folder)
 
         # The journal keeps what finishes, even if this process ends before results are written.
@@ -142,42 +156,35 @@ def _journal(folder: Path, study: Study) -> Journal:
         raise InvalidInput(f"cannot write results to {folder}: {error.strerror}") from error
 
 
-def _say_what_is_found(
-    configs: Sequence[RunConfig], journal: Journal, folder: Path, unit: str
-) -> int:
-    """Print one line when the journal holds tasks of this study or of others, and one for lines of
-    it that are damaged; returns how many of others it holds.
-    """
-    if journal.damaged:
-        lines = counted(journal.damaged, "line")
-        print(
-            f"{lines} of {one_line(str(folder / JOURNAL))} passed over, damaged or of a version "
-            "that wrote no checksums, or not of the task that they name; what they held is played "
-            "again where it is asked for",
-            file=sys.stderr,
-        )
-    found = sum(config.key in journal for config in configs)
-    others = len(journal) - found
+def _say_where(configs: Sequence[RunConfig], folder: Path, kind: ResultsFormat) -> None:
+    print(
+        f"Results go to {one_line(str(folder))}: {counted(len(configs), kind.task)}",
+        file=sys.stderr,
+        flush=True,
+    )
+
+
+def _say_what_is_found(found: int, of: int, others: int, folder: Path, unit: str) -> None:
+    """Print one line when the folder holds tasks of this study, or `others`."""
     if found or others:
         rest = f"; {others} of other options or code stay in its journal" if others else ""
-        told = one_line(str(folder))
-        print(f"{found} of {len(configs)} {unit} found in {told}{rest}", file=sys.stderr)
-    return others
+        print(f"{found} of {of} {unit} found in {one_line(str(folder))}{rest}", file=sys.stderr)
 
 
-def _is_written(
-    configs: Sequence[RunConfig], journal: Journal, folder: Path, kind: ResultsFormat
-) -> bool:
-    """Whether an earlier run has written the results of just these tasks, none of which failed, and
-    all files but figures are still there.
+def _is_finished(configs: Sequence[RunConfig], folder: Path, study: Study) -> bool:
+    """Check if an earlier run wrote the results of exactly these tasks, and no file but a figure is
+    lost. The journal, which takes longer to read, is then not needed.
     """
+    kind = study.results
+    path = folder / kind.file
     # A run that was cut off while it wrote has left its note.
-    names = (CONFIG, TABLES, "tables.tex", kind.file, *kind.further_files([]))
-    written = all((folder / name).is_file() for name in names)
-    keys = [config.key for config in configs]
-    if (folder / UNFINISHED).is_file() or not written or not all(key in journal for key in keys):
+    names = (CONFIG, TABLES, "tables.tex", kind.file, JOURNAL, *kind.further_files([]))
+    if (folder / UNFINISHED).is_file() or not all((folder / name).is_file() for name in names):
         return False
-    return bool([row.get("digest") for row in read_rows(folder / kind.file, _DIGESTS)] == keys)
+    if (read_notes(path)[0] or SWEEP.name) != study.name:
+        return False
+    keys = [config.key for config in configs]
+    return bool([row.get("digest") for row in read_rows(path, _DIGESTS)] == keys)
 
 
 def _write(

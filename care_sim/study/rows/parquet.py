@@ -83,7 +83,7 @@ def check_columns(rows: Iterable[Row]) -> None:
 
 def with_tuples(row: Row) -> Row:
     """The row with ranges as tuples again, which Parquet and JSON hold as lists."""
-    return {name: _with_tuples(value) for name, value in row.items()}
+    return {n: _with_tuples(v) if isinstance(v, list) else v for n, v in row.items()}
 
 
 def _with_tuples(value: Any) -> Any:

@@ -7,6 +7,7 @@ the policies, tell.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
+from functools import lru_cache
 from typing import Any
 
 from care_sim.base.checks import is_number
@@ -39,13 +40,12 @@ def setting_of(row: Row) -> Setting:
 
 
 def _setting_of_episode(row: Row) -> Setting:
-    names = [name for name in row if name in _PLAIN or name.startswith("scenario.")]
     # Parameters of a scenario have no default in _USUAL_EPISODE: one that was given names another
     # setting, whatever its value.
     changed = [
         (n, row[n])
-        for n in names
-        if n not in _AXES and row[n] is not None and row[n] != _USUAL_EPISODE.get(n)
+        for n in _condition_columns(tuple(row))
+        if row[n] is not None and row[n] != _USUAL_EPISODE.get(n)
     ]
     # Sorted, so that the order of columns in a file does not make another setting.
     conditions = sorted((n.removeprefix("scenario."), v) for n, v in changed)
@@ -55,6 +55,13 @@ def _setting_of_episode(row: Row) -> Setting:
     if row.get("detector") is not None:
         conditions.append(("detector", with_parameters(row, "detector")))
     return Setting(row["scenario"], tuple(conditions))
+
+
+@lru_cache
+def _condition_columns(names: tuple[str, ...]) -> list[str]:
+    """Columns that name a setting. Thousands of rows share the same `names`."""
+    kept = (name for name in names if name in _PLAIN or name.startswith("scenario."))
+    return [name for name in kept if name not in _AXES]
 
 
 def _setting_of_play(row: Row) -> Setting:
@@ -92,14 +99,22 @@ def with_parameters(row: Row, kind: str) -> str:
     """The name in the column `kind`, with the parameters in the columns whose names begin with it
     and a dot.
     """
-    given = [
-        (name.removeprefix(f"{kind}."), value)
-        for name, value in row.items()
-        if name.startswith(f"{kind}.")
-    ]
+    given = [(name, row[name]) for name in _parameter_columns(tuple(row), f"{kind}.")]
     return " ".join(
-        [row[kind], *(f"{name}={_text(value)}" for name, value in given if value is not None)]
+        [
+            row[kind],
+            *(
+                f"{name.removeprefix(f'{kind}.')}={_text(value)}"
+                for name, value in given
+                if value is not None
+            ),
+        ]
     )
+
+
+@lru_cache
+def _parameter_columns(names: tuple[str, ...], prefix: str) -> list[str]:
+    return [name for name in names if name.startswith(prefix)]
 
 
 def _text(value: Any) -> str:
