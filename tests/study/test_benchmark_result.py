@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
+from care_sim.core.cell_order import CELL_ORDERS
 from care_sim.policies import tags_of
 from care_sim.study.benchmark.made_by import is_of_this_code, made_by, own_code_of
 from care_sim.study.benchmark.replay import ONE_IN
@@ -179,6 +180,13 @@ def test_a_parameter_that_a_built_in_policy_lacks_is_refused(file):
     assert refusal(changed(file, policy="care")).startswith(
         f"{file}: unknown parameter of policy care 'speed'"
     )
+
+
+def test_an_unknown_order_of_cells_is_refused(file):
+    assert read_result(changed(file, cell_order=CELL_ORDERS[-1])).entry.cell_order
+    known = ", ".join(CELL_ORDERS)
+    told = refusal(changed(file, cell_order="best"))
+    assert told == f"{file} has the unknown cell_order 'best'; known: {known}"
 
 
 def test_what_a_damaged_file_lacks_is_named(file):

@@ -10,6 +10,7 @@ from typing import Any
 from care_sim.base.checks import LARGEST_INTEGER
 from care_sim.base.errors import InvalidInput, counted, printable, shown
 from care_sim.base.json_text import json_content
+from care_sim.core.cell_order import CELL_ORDERS
 from care_sim.policies import POLICIES, maker, tags_of
 from care_sim.policies.base import TAGS
 from care_sim.policies.makers import check_parameters
@@ -115,12 +116,16 @@ def _row(values: Any) -> ResultRow:
 
 
 def _check_policy(path: Path, result: BenchmarkResult) -> None:
-    """Raise InvalidInput for unknown tags, and for tags and parameters that a built-in policy does
-    not have.
+    """Raise InvalidInput for unknown tags or an unknown order of cells, and for tags and parameters
+    that a built-in policy does not have.
     """
-    policy, tags = result.entry.policy, result.tags
+    policy, tags, order = result.entry.policy, result.tags, result.entry.cell_order
     if unknown := {*tags} - {*TAGS}:
         raise InvalidInput(f"{path} has unknown tags {shown(sorted(unknown))}; known: {TAGS}")
+    if order not in CELL_ORDERS:
+        raise InvalidInput(
+            f"{path} has the unknown cell_order {shown(order)}; known: {', '.join(CELL_ORDERS)}"
+        )
     if policy not in POLICIES.built_in:
         return
     if {*tags} != {*tags_of(policy)}:
