@@ -5,6 +5,7 @@ allowed, and text made fit to be shown.
 import sys
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
+from typing import TextIO
 
 from care_sim.base.foreign_code import foreign_place, is_raised_by_foreign, raised_place
 
@@ -66,6 +67,13 @@ def _listed(names: Sequence[str]) -> str:
     if len(names) > _MOST_NAMES:
         return f"{names[0]} to {names[-1]}, {len(names)} in all"
     return ", ".join(names) or "none"
+
+
+def print_lines(*lines: str, file: TextIO | None = None) -> None:
+    """Print texts to `file` or standard output at once, each on a line of its own and `printable`,
+    as anybody may have named a folder.
+    """
+    print(*map(printable, lines), sep="\n", file=file, flush=True)
 
 
 def report_problems(problems: Sequence[str]) -> None:

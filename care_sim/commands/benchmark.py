@@ -10,7 +10,7 @@ from typing import Annotated
 import tyro
 
 from care_sim.base.bounds import bounded, check_fields
-from care_sim.base.errors import BrokenPolicy, InvalidInput, report_problems
+from care_sim.base.errors import BrokenPolicy, InvalidInput, print_lines, report_problems
 from care_sim.base.files import JSON, check_output
 from care_sim.commands.shared.run_study import summary
 from care_sim.commands.shared.selection import check_values, playable, policy_parameters
@@ -81,7 +81,7 @@ class Benchmark:
         entries, left_out = self._entries()
         for entry in entries:
             check_output(self._file(entry), JSON)
-        print(f"Results go to {self.out}", file=sys.stderr, flush=True)
+        print_lines(f"Results go to {self.out}", file=sys.stderr)
         with player_in(self.out, self.workers, processes) as player:
             worlds = screened_worlds(player, salt) if salt else self._published()
             results = played(entries, worlds, player, self.quick, salt.digest if salt else None)
@@ -89,7 +89,7 @@ class Benchmark:
             result.write(self._file(result.entry))
         if results:
             console().print(leaderboard_table(results).rich())
-            print(*(f"Result: {self._file(result.entry)}" for result in results), sep="\n")
+            print_lines(*(f"Result: {self._file(result.entry)}" for result in results))
         failed = [f"failed: {line}" for line in summary(player.failures, "plays")]
         report_problems([*failed, *left_out])
         return FAILED if failed or left_out else DONE

@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.progress import track
 
 import care_sim
-from care_sim.base.errors import InvalidInput
+from care_sim.base.errors import InvalidInput, print_lines
 from care_sim.base.files import JSON, replacing
 from care_sim.commands.shared.play_options import PlayOptions
 from care_sim.sources.nuscenes.results_form import MODALITIES, result_boxes
@@ -53,7 +53,8 @@ class Export(PlayOptions):
                 json.dumps({"meta": self._meta(configs[0]), "results": results}), encoding="utf-8"
             )
         count = sum(map(len, results.values()))
-        print(f"{count} boxes in {len(results)} samples of {len(configs)} scenes are in {self.out}")
+        samples = f"{len(results)} samples of {len(configs)} scenes"
+        print_lines(f"{count} boxes in {samples} are in {self.out}")
         if not count:
             print("care-sim: the official devkit refuses results without a box", file=sys.stderr)
         return 0

@@ -12,7 +12,7 @@ import numpy as np
 import tyro
 
 from care_sim.base.bounds import bounded, check_fields
-from care_sim.base.errors import InvalidInput, report_problems
+from care_sim.base.errors import InvalidInput, print_lines, report_problems
 from care_sim.base.files import JSON, check_no_link, check_output, write_text
 from care_sim.commands.shared.play_options import PlayOptions
 from care_sim.commands.shared.selection import check_values
@@ -172,7 +172,8 @@ class Judge(PlayOptions):
             self._write_samples(_TRUTH, [one.true for one in scenes[self._names[0]]])
         for table in tables:
             console().print(table.rich(self.out / _TABLES))
-        print(f"Tables: {self.out / _TABLES}\nFigure: {self.out / DETECTORS_FIGURE}.png")
+        figure = f"Figure: {self.out / DETECTORS_FIGURE}.png"
+        print_lines(f"Tables: {self.out / _TABLES}", figure)
 
     def _write_samples(self, name: str, scenes: Sequence[Samples]) -> None:
         samples = {token: boxes for scene in scenes for token, boxes in scene.items()}

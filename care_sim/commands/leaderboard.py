@@ -12,7 +12,14 @@ from typing import Annotated
 import tyro
 
 from care_sim.base.bounds import bounded, check_fields
-from care_sim.base.errors import InvalidInput, MissingExtra, counted, report_problems, unknown
+from care_sim.base.errors import (
+    InvalidInput,
+    MissingExtra,
+    counted,
+    print_lines,
+    report_problems,
+    unknown,
+)
 from care_sim.base.files import check_output, told_if_replaced, write_text
 from care_sim.base.json_text import json_content
 from care_sim.commands.shared.study_command import DONE, FAILED, console
@@ -109,7 +116,7 @@ class Leaderboard:
                 f"no {self.minus} among these files: add a folder with its result for leads",
                 file=sys.stderr,
             )
-        print(f"Page: {told}")
+        print_lines(f"Page: {told}")
 
     @isolated_policies()
     def _verified(self, results: dict[Path, BenchmarkResult]) -> list[str]:
@@ -129,9 +136,9 @@ class Leaderboard:
                 problems.append(f"{path} cannot be verified: {error}")
                 continue
             if replay.holds:
-                print(f"{path}: {_drawn(replay, result)} came out again as the file says")
+                print_lines(f"{path}: {_drawn(replay, result)} came out again as the file says")
             if replay.detours:
-                print(
+                print_lines(
                     f"{path}: of {_drawn(replay, result)} {replay.detours} reached as much with "
                     f"another hash; played {elsewhere(result)}"
                 )

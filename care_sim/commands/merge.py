@@ -7,7 +7,7 @@ from typing import Annotated
 
 import tyro
 
-from care_sim.base.errors import InvalidInput, counted, report_problems
+from care_sim.base.errors import InvalidInput, counted, print_lines, report_problems
 from care_sim.commands.shared.study_command import DONE, console
 from care_sim.reports.merging import Merged, merged
 from care_sim.reports.report import print_report, where_it_lies
@@ -36,7 +36,7 @@ class Merge:
         whole = merged(self.folders)
         whole.write(self.out)
         print_report(whole.rows, console(), whole.study, whole.left_out, self.out)
-        print(*where_it_lies(self.out, whole.study, whole.rows), sep="\n")
+        print_lines(*where_it_lies(self.out, whole.study, whole.rows))
         if whole.twice:
             alike = counted(whole.twice, whole.study.results.task)
             print(f"Alike in two of the folders, and kept once: {alike}")

@@ -8,7 +8,7 @@ import tyro
 
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.checks import LARGEST_INTEGER
-from care_sim.base.errors import InvalidInput, counted, report_problems
+from care_sim.base.errors import InvalidInput, counted, print_lines, report_problems
 from care_sim.base.extras import check_page
 from care_sim.commands.shared.play_options import SourceOptions
 from care_sim.commands.shared.study_command import FAILED, console
@@ -78,7 +78,7 @@ class PrintReport(SourceOptions):
             report_problems([f"tables and figures in {self.folder} are not written anew: {error}"])
             return FAILED
         print_report(rows, console(), study, left_out, self.folder)
-        print(*where_it_lies(self.folder, study, rows), sep="\n")
+        print_lines(*where_it_lies(self.folder, study, rows))
         return 0
 
     def _write(self, path: Path) -> int:
@@ -90,7 +90,7 @@ class PrintReport(SourceOptions):
         source = None if self.source is None else self.source_named(self.source)
         page = write_page(self.folder, path, self.episodes, self.workers, source=source)
         report_problems(page.warnings)
-        print(
+        print_lines(
             f"{path}: {path.stat().st_size / 1e6:.1f} MB, {counted(page.watchable, 'episode')} to "
             "watch"
         )

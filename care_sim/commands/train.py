@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar
 import tyro
 
 from care_sim.base.bounds import bounded
-from care_sim.base.errors import InvalidInput
+from care_sim.base.errors import InvalidInput, print_lines
 from care_sim.base.files import told_if_replaced
 from care_sim.commands.shared.end_of_training import end_of_training
 from care_sim.commands.shared.study_command import console
@@ -62,17 +62,17 @@ class Learner(AgentConfig):
         """Train it."""
         table = read_hyperparameters(self.kind, self.env, self.hyperparameters, self.drawn)
         config = self.kind(**{one.name: getattr(self, one.name) for one in fields(self.kind)})
-        print(*table.told(config), sep="\n", flush=True)
+        print_lines(*table.told(config))
         if self.tune:
             best = tune(config, self.tune, train_agent)
             print(best.read_text(encoding="utf-8"), end="")
             line = ["care-sim", "train", config.algorithm, "--env", *config.env]
             line += ["--drawn"] if config.drawn else []
             line += ["--without", *config.without] if config.without else []
-            print(f"train with them: {shlex.join([*line, '--hyperparameters', str(best)])}")
+            print_lines(f"train with them: {shlex.join([*line, '--hyperparameters', str(best)])}")
             return 0
         train_agent(config)
-        print(*end_of_training(config), sep="\n")
+        print_lines(*end_of_training(config))
         return 0
 
 
@@ -120,7 +120,7 @@ class DrawCurves:
         told = told_if_replaced(self.out.with_suffix(".png"))
         save(curves_figure(groups), self.out)
         console().print(table.rich())
-        print(f"Figure: {told}")
+        print_lines(f"Figure: {told}")
         return 0
 
 

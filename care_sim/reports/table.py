@@ -245,7 +245,7 @@ def brief(texts: Sequence[str], width: int, rest: Path | None) -> str:
     if rest is None or len(whole) <= _NOTE_LINES:
         return "\n".join(whole)
     # A folder may have a name that leaves a line no room for anything else.
-    names = (f"More: {rest}", f"More: {rest.name}")
+    names = [f"More: {printable(str(path))}" for path in (rest, rest.name)]
     more = next((name for name in names if len(name) <= width - len(_CUT)), "")
     sentences = _SENTENCE_END.split(" ".join(texts))
     for count in range(len(sentences) - 1, 0, -1):

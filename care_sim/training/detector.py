@@ -20,7 +20,7 @@ import numpy as np
 
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.checks import LARGEST_INTEGER
-from care_sim.base.errors import InvalidInput, report_problems
+from care_sim.base.errors import InvalidInput, print_lines, report_problems
 from care_sim.base.extras import import_torch
 from care_sim.base.files import ZIP, check_output
 from care_sim.base.seed_ranges import TRAINING, VALIDATION
@@ -124,9 +124,11 @@ class TrainDetector:
             raise
         self._save(network, curve, self.steps, calibration, result)
         told = ", ".join(f"{name} {value:.3f}" for name, value in result.items())
-        print(f"{self.out}: {told}; {time.perf_counter() - started:.0f} s")
+        print_lines(f"{self.out}: {told}; {time.perf_counter() - started:.0f} s")
         file = f"file={self.out}"
-        print(how_to_play("run", "street", "--detector", "pillars", "--detector-parameters", file))
+        print_lines(
+            how_to_play("run", "street", "--detector", "pillars", "--detector-parameters", file)
+        )
         return 0
 
     def _save(
@@ -190,7 +192,7 @@ def train_detector(
 
 
 def _say(line: str) -> None:
-    print(line, file=sys.stderr, flush=True)
+    print_lines(line, file=sys.stderr)
 
 
 def _curve(losses: list[float]) -> list[float]:

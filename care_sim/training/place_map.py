@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
+from care_sim.base.errors import print_lines
 from care_sim.base.files import ZIP, check_output
 from care_sim.core.grid import AZIMUTH_MARGIN, ELEVATION_MARGIN, AngularGrid, Cells
 from care_sim.envs.open_loop import FilmEnv
@@ -41,8 +42,7 @@ class TrainPlace:
             print(told, end="\r", file=sys.stderr, flush=True)
             found += first_returns(street_film(seed))
         save_weights(self.out, {"sightings": sighting_map(found, grid)}, _card(grid, len(found)))
-        print(f"{self.out}: {len(found)} first sightings")
-        print(how_to_play("enjoy", self.out))
+        print_lines(f"{self.out}: {len(found)} first sightings", how_to_play("enjoy", self.out))
         return 0
 
 

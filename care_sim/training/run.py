@@ -8,7 +8,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import care_sim
-from care_sim.base.errors import InvalidInput, counted
+from care_sim.base.errors import InvalidInput, counted, print_lines
 from care_sim.base.extras import import_torch, missing_extra
 from care_sim.base.files import check_no_link
 from care_sim.envs.sensing import sensing
@@ -219,4 +219,4 @@ def _check_tensorboard(config: AgentConfig) -> None:
 
 
 def _say(line: str) -> None:
-    print(line, flush=True)
+    print_lines(line)

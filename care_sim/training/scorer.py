@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from care_sim.base.array_files import Arrays
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.checks import LARGEST_INTEGER
+from care_sim.base.errors import print_lines
 from care_sim.base.extras import import_torch
 from care_sim.base.files import ZIP, check_output
 from care_sim.base.seed_ranges import TRAINING, VALIDATION
@@ -90,8 +91,8 @@ class TrainScorer:
         arrays, losses = train_scorer(data, self.seed, self.steps)
         save_weights(self.out, arrays, _card(self, next(iter(data.values())), losses))
         told = ", ".join(f"{name} {loss:.4f}" for name, loss in losses.items())
-        print(f"{self.out}: loss {told}; {time.perf_counter() - started:.0f} s")
-        print(how_to_play("enjoy", self.out))
+        took = f"{time.perf_counter() - started:.0f} s"
+        print_lines(f"{self.out}: loss {told}; {took}", how_to_play("enjoy", self.out))
         return 0
 
 

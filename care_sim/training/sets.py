@@ -15,6 +15,7 @@ from typing import get_args
 
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.checks import LARGEST_INTEGER, check_known
+from care_sim.base.errors import print_lines
 from care_sim.base.extras import import_torch
 from care_sim.base.files import ZIP, check_output
 from care_sim.base.seed_ranges import TRAINING, VALIDATION
@@ -83,7 +84,7 @@ class TrainSets:
         except BaseException:
             if rounds:
                 told = f"{self.out} holds what {rounds} of {len(ROUNDS)} rounds have taught"
-                print(told, file=sys.stderr, flush=True)
+                print_lines(told, file=sys.stderr)
             raise
         losses = {
             f"loss per {what}, {name}": loss
@@ -92,8 +93,8 @@ class TrainSets:
         }
         save_weights(self.out, arrays, _card(self, examples, ROUNDS, losses))
         told = ", ".join(f"{name} {loss:.4f}" for name, loss in losses.items())
-        print(f"{self.out}: {told}; {time.perf_counter() - started:.0f} s")
-        print(how_to_play("enjoy", self.out))
+        took = f"{time.perf_counter() - started:.0f} s"
+        print_lines(f"{self.out}: {told}; {took}", how_to_play("enjoy", self.out))
         return 0
 
 

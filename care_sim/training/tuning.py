@@ -20,7 +20,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from care_sim.base.errors import InvalidInput, one_line
+from care_sim.base.errors import InvalidInput, one_line, print_lines
 from care_sim.base.extras import missing_extra
 from care_sim.base.files import check_no_link, write_text
 from care_sim.training.config import AgentConfig
@@ -230,4 +230,4 @@ def _import_optuna() -> Any:
 
 
 def _say(line: str) -> None:
-    print(line, flush=True)
+    print_lines(line)

@@ -511,6 +511,24 @@ def _explained(text, options):
     return {one for one in options if re.search(rf"^[^\w-]*{one}(?![\w-])", plain, re.MULTILINE)}
 
 
+def test_a_name_that_a_terminal_would_obey_stays_on_its_line(capsys, tmp_path):
+    odd, told = tmp_path / "a\nb\x1b[31m\u202ec", r"a\nb\x1b[31m\u202ec"
+    axes = ["--policies", "care", "--scenarios", "dartout", "--budgets", "0.1", "--seeds", "1"]
+    sweep = ["sweep", *axes, *SHORT, "--workers", "1", "--out", odd]
+    for command in (
+        sweep,
+        sweep,
+        ["report", odd],
+        ["merge", odd, odd, "--out", odd / "whole"],
+        ["run", "dartout", *SHORT, "--video", odd / "film.gif"],
+    ):
+        code, out, err = run(capsys, *command)
+        assert code == 0, err
+        text = out + err
+        assert text.count(told) == text.count(told[3:]) > 0
+        assert all(map(str.isprintable, text.split("\n")))
+
+
 def test_a_picture_of_the_braking_car(capsys, tmp_path):
     from PIL import Image
 

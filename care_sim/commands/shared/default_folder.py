@@ -4,7 +4,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from care_sim.base.errors import InvalidInput
+from care_sim.base.errors import InvalidInput, print_lines
 from care_sim.commands.shared.folder_checks import (
     WAYS_OUT,
     check_journal,
@@ -29,7 +29,7 @@ def free_folder(name: str, configs: Sequence[RunConfig], study: Study) -> Path:
         folder = _RUNS / f"{name}-{number}"
         reason = _why_not(folder, configs, study)
     if first:
-        print(f"another folder is taken, because {first}", file=sys.stderr)
+        print_lines(f"another folder is taken, because {first}", file=sys.stderr)
     return folder
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from care_sim.base.checks import check_whole
-from care_sim.base.errors import InvalidInput, counted, one_line
+from care_sim.base.errors import InvalidInput, counted, print_lines
 from care_sim.base.files import write_text
 from care_sim.commands.shared.folder_checks import check_journal, check_kind, check_results, lost
 from care_sim.reports.report import CONFIG, TABLES, StudyReport
@@ -71,26 +71,17 @@ def run_study(
     check_columns(config.row() for config in configs)
     # The folder is checked before it is locked, which would leave a file in it, and again after, in
     # case that another process has written meanwhile.
+    goes = f"Results go to {folder}: {counted(len(configs), kind.task)}"
     if not force and _is_finished(configs, folder, study):
-        _say_where(configs, folder, kind)
-        _say_what_is_found(len(configs), len(configs), 0, folder, kind.unit)
+        everything = f"{len(configs)} of {len(configs)} {kind.unit}"
+        print_lines(goes, f"{everything} found in {folder}", file=sys.stderr)
         return []
     _check(folder, configs, study, force)
     with _journal(folder, study) as journal:
         journal.drop_unsound(configs, study.schema)
         _check(folder, configs, study, force, journal)
-        _say_where(configs, folder, kind)
-        if journal.damaged:
-            lines = counted(journal.damaged, "line")
-            print(
-                f"{lines} of {one_line(str(folder / JOURNAL))} passed over, damaged or of a "
-                "version that wrote no checksums, or not of the task that they name; what they "
-                "held is played again where it is asked for",
-                file=sys.stderr,
-            )
-        found = sum(config.key in journal for config in configs)
-        others = len(journal) - found
-        _say_what_is_found(found, len(configs), others, folder, kind.unit)
+        print_lines(goes, file=sys.stderr)
+        others = _say_what_is_found(configs, journal, folder, kind.unit)
         Unfinished(study.name, kind.unit, len(configs), others, command).write(folder)
 
         # The journal keeps what finishes, even if this process ends before results are written.
@@ -102,7 +93,7 @@ def run_study(
         # Results of an earlier run are worth more than new ones with holes in their place.
         left = lost(folder, played, study) if failures and not force else ""
         if left:
-            print(left, file=sys.stderr)
+            print_lines(left, file=sys.stderr)
         elif played:
             _write([journal[config.key] for config in played], configs, folder, study, failures)
             forget(folder)
@@ -156,19 +147,26 @@ def _journal(folder: Path, study: Study) -> Journal:
         raise InvalidInput(f"cannot write results to {folder}: {error.strerror}") from error
 
 
-def _say_where(configs: Sequence[RunConfig], folder: Path, kind: ResultsFormat) -> None:
-    print(
-        f"Results go to {one_line(str(folder))}: {counted(len(configs), kind.task)}",
-        file=sys.stderr,
-        flush=True,
-    )
-
-
-def _say_what_is_found(found: int, of: int, others: int, folder: Path, unit: str) -> None:
-    """Print one line when the folder holds tasks of this study, or `others`."""
+def _say_what_is_found(
+    configs: Sequence[RunConfig], journal: Journal, folder: Path, unit: str
+) -> int:
+    """Print one line when the journal holds tasks of this study or of others, and one for lines of
+    it that are damaged; returns how many of others it holds.
+    """
+    if journal.damaged:
+        lines = counted(journal.damaged, "line")
+        print_lines(
+            f"{lines} of {folder / JOURNAL} passed over, damaged or of a version "
+            "that wrote no checksums, or not of the task that they name; what they held is played "
+            "again where it is asked for",
+            file=sys.stderr,
+        )
+    found = sum(config.key in journal for config in configs)
+    others = len(journal) - found
     if found or others:
         rest = f"; {others} of other options or code stay in its journal" if others else ""
-        print(f"{found} of {of} {unit} found in {one_line(str(folder))}{rest}", file=sys.stderr)
+        print_lines(f"{found} of {len(configs)} {unit} found in {folder}{rest}", file=sys.stderr)
+    return others
 
 
 def _is_finished(configs: Sequence[RunConfig], folder: Path, study: Study) -> bool:

@@ -8,7 +8,7 @@ from rich.console import Console
 
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.console import TableConsole
-from care_sim.base.errors import report_problems
+from care_sim.base.errors import print_lines, report_problems
 from care_sim.commands.shared.command_line import command_line
 from care_sim.commands.shared.default_folder import free_folder
 from care_sim.commands.shared.run_study import run_study, summary
@@ -69,7 +69,7 @@ class StudyCommand:
         if len(failures) < len(configs):
             rows, _, missing = read_results(out)
             print_report(rows, console(), STUDIES[study], missing, out)
-            print(*where_it_lies(out, STUDIES[study], rows), sep="\n")
+            print_lines(*where_it_lies(out, STUDIES[study], rows))
         report_problems(
             [
                 *(f"failed: {line}" for line in summary(failures, STUDIES[study].results.unit)),
