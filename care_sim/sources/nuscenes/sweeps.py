@@ -77,7 +77,7 @@ def _other_form(content: NDArray[np.uint8]) -> str:
     for count, names in _OTHERS.items():
         if content.size and content.size % (4 * count) == 0:
             rows = content.view("<f4").reshape(-1, count)
-            # Intensities, rings and times are never negative. Places on one side of the car are.
+            # Intensity and elongation are never negative, places on one side of the car are.
             with np.errstate(invalid="ignore"):
                 fits = (np.abs(rows[:, :3]) <= REACH_M).all() and (rows[:, 3:5] >= 0).all()
             if fits:
