@@ -12,6 +12,7 @@ from care_sim.reports.figures.styles import OPEN_LOOP_DODGE, bare_axes, name_out
 from care_sim.reports.formatting import marked, tag_notes
 from care_sim.reports.protocol.controls import RULE, OverControl, named_controls
 from care_sim.reports.protocol.rows import SettingPlays
+from care_sim.study.run_config import REFERENCE
 
 _NOTE_WIDTH = 100
 """Letters of a note in one line below the panels."""
@@ -55,8 +56,12 @@ def _draw_differences(axes: Axes, plays: SettingPlays, measure: OverControl) -> 
             if difference
         }
         means = [difference.mean for difference in known.values()]
-        (line,) = axes.plot(list(known), means, look.line, color=look.colour, linewidth=1.4)
+        # The policy under test lies above those that it is held against.
+        order = 4 if policy == REFERENCE else 3
+        (line,) = axes.plot(list(known), means, look.line, color=look.colour, zorder=order)
         line.set(marker=look.marker, markersize=6, label=marked(policy, plays.tags[policy]))
+        line.set(linewidth=1.4)
         for place, difference in known.items():
             if difference.interval:
-                axes.plot([place] * 2, difference.interval[1:], color=look.colour, linewidth=1.2)
+                (bar,) = axes.plot([place] * 2, difference.interval[1:], color=look.colour)
+                bar.set(linewidth=1.2, zorder=order)

@@ -167,6 +167,8 @@ def test_the_figure_has_the_control_at_zero_and_a_curve_a_policy():
     said = " ".join(figure.get_supxlabel().split())
     assert NAMED in said
     assert RULE in said
+    others = [line for line in overall.lines if line.get_color() != care.get_color()]
+    assert care.zorder > max(line.zorder for line in others)
 
 
 def test_the_page_has_the_same_chart():
