@@ -11,98 +11,27 @@ import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, Field, fields, is_dataclass
 from functools import partial
-from typing import Any, Literal, NamedTuple, cast, get_args, get_type_hints
+from typing import Any, cast, get_args, get_type_hints
 
 import docstring_parser
 import tyro
 from tyro.constructors import (
     MISSING_NONPROP,
     ConstructorRegistry,
-    PrimitiveConstructorSpec,
-    PrimitiveTypeInfo,
     StructConstructorSpec,
     StructFieldSpec,
     StructTypeInfo,
 )
 
 from care_sim.base.causes import causes
-from care_sim.base.errors import InvalidInput, shown, unknown
+from care_sim.base.errors import InvalidInput, unknown
 from care_sim.commands.shared.help_text import Captured, grouped, wrapped
+from care_sim.commands.shared.numbers import number_rule
 from care_sim.commands.shared.own_defaults import settled_command
 
 UNRECOGNIZED = "Unrecognized options"
 """How a complaint begins that is of options which a command lacks."""
 
-
-class _Reading(NamedTuple):
-    """How the words after an option become a value: the words as help shows them, how many there
-    are, what makes the value of them, and what tells such a value from others.
-    """
-
-    metavar: str
-    nargs: int | Literal["*"]
-    value_of: Callable[[list[str]], Any]
-    is_value: Callable[[Any], bool]
-
-
-def _whole(text: str) -> int:
-    try:
-        return int(text)
-    except ValueError:
-        raise ValueError(f"must be a whole number, got {shown(text)}") from None
-
-
-def _real(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise ValueError(f"must be a number, got {shown(text)}{_as_share(text)}") from None
-
-
-def _as_share(text: str) -> str:
-    """How a share in percent is written; nothing for another text."""
-    try:
-        share = float(text.removesuffix("%")) / 100
-    except ValueError:
-        return ""
-    return f": write {share:g} for {text}" if 0 < share <= 1 else ""
-
-
-def _whole_or_none(text: str) -> int | None:
-    return None if text == "None" else _whole(text)
-
-
-def _is_whole(value: Any) -> bool:
-    return isinstance(value, int)
-
-
-def _is_real(value: Any) -> bool:
-    return isinstance(value, int | float)
-
-
-_READINGS: dict[Any, _Reading] = {
-    int: _Reading("INT", 1, lambda words: _whole(words[0]), _is_whole),
-    float: _Reading("FLOAT", 1, lambda words: _real(words[0]), _is_real),
-    int | None: _Reading(
-        "{None}|INT",
-        1,
-        lambda words: _whole_or_none(words[0]),
-        lambda value: value is None or _is_whole(value),
-    ),
-    tuple[int, ...]: _Reading(
-        "[INT [INT ...]]",
-        "*",
-        lambda words: tuple(map(_whole, words)),
-        lambda value: isinstance(value, tuple) and all(map(_is_whole, value)),
-    ),
-    tuple[float, ...]: _Reading(
-        "[FLOAT [FLOAT ...]]",
-        "*",
-        lambda words: tuple(map(_real, words)),
-        lambda value: isinstance(value, tuple) and all(map(_is_real, value)),
-    ),
-}
-"""Types of options that hold numbers: tyro reads them the same, but complains in its own words."""
 
 _HOMES = re.compile("(?<![^=:])~[^/]*(?=/)")
 """The home folder at the beginning of a path, wherever a path may begin: a shell expands it only at
@@ -116,21 +45,6 @@ _HIDDEN: Any = tyro.conf.Suppress
 
 def _expanded(home: re.Match[str]) -> str:
     return os.path.expanduser(home[0])
-
-
-def _number(asked: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Any] | None:
-    reading = _READINGS.get(asked.type)
-    if reading is None:
-        return None
-    return PrimitiveConstructorSpec(
-        nargs=reading.nargs,
-        metavar=reading.metavar,
-        instance_from_str=reading.value_of,
-        is_instance=reading.is_value,
-        str_from_instance=lambda value: list(
-            map(str, value if isinstance(value, tuple) else [value])
-        ),
-    )
 
 
 def _options(asked: StructTypeInfo, brief: bool = False) -> StructConstructorSpec | None:
@@ -160,7 +74,7 @@ def _options(asked: StructTypeInfo, brief: bool = False) -> StructConstructorSpe
 def _registry(brief: bool) -> ConstructorRegistry:
     """How tyro reads options."""
     rules = ConstructorRegistry()
-    rules.primitive_rule(_number)
+    rules.primitive_rule(number_rule)
     rules.struct_rule(partial(_options, brief=brief))
     return rules
 

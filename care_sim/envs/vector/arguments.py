@@ -1,10 +1,11 @@
-"""Arguments of which every world of a vector environment may have its own."""
+"""The arguments of a vector environment; every world may have its own of some of them."""
 
 from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
+from gymnasium.vector import AutoresetMode
 
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.conditions import CAMERA_FAULTS, DEFAULTS
@@ -55,6 +56,16 @@ def models_of(makers: Sequence[Maker]) -> list[ClosedLoopEnv]:
             made[own] = make()
         models.append(made[own])
     return models
+
+
+def autoreset_of(mode: AutoresetMode | str) -> AutoresetMode:
+    """Return a mode that may be given by its name. Raises InvalidInput for another name."""
+    if isinstance(mode, AutoresetMode):
+        return mode
+    allowed = [one.value for one in AutoresetMode]
+    if mode not in allowed:
+        raise InvalidInput(f"autoreset_mode must be one of {', '.join(allowed)}, got {shown(mode)}")
+    return AutoresetMode(mode)
 
 
 def _is_list(value: object) -> bool:

@@ -21,7 +21,7 @@ from care_sim.core.types import Action
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.envs.sensing import Observed
 from care_sim.envs.spaces import checked_scores
-from care_sim.envs.vector.arguments import Maker, makers_of, models_of
+from care_sim.envs.vector.arguments import Maker, autoreset_of, makers_of, models_of
 from care_sim.envs.vector.compiled_worlds import CompiledWorlds
 from care_sim.envs.vector.coverage import why_separate
 from care_sim.envs.vector.infos import joined, kept
@@ -75,12 +75,12 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
             check_whole("max_episode_steps", max_episode_steps, 1, MOST_STEPS)
         self._most_steps = max_episode_steps or MOST_STEPS
         self.num_envs = num_envs
-        self.autoreset_mode = _autoreset(autoreset_mode)
+        self.autoreset_mode = autoreset_of(autoreset_mode)
         self.metadata = {**self.single.metadata, "autoreset_mode": self.autoreset_mode}
         self.copy = copy
         makers = makers_of(self.single, arguments, num_envs)
         self._models = models_of(makers)
-        # What is alike in all worlds is asked of the first.
+        # Settings that all worlds share are read from world 0.
         self._model = self._models[0]
         self._one_budget = len({model.rig.budget for model in self._models}) == 1
         self.single_observation_space = self._model.observation_space
@@ -192,13 +192,7 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         else:
             infos = self._begin(begins, anybody, infos)
             self._over = over
-        return (
-            self._handed_out(),
-            stepped.rewards,
-            stepped.terminated,
-            stepped.truncated,
-            infos,
-        )
+        return self._handed_out(), stepped.rewards, stepped.terminated, stepped.truncated, infos
 
     def render(self) -> None:
         """Raise InvalidInput: many worlds draw no pictures."""
@@ -299,12 +293,3 @@ def _rows(observed: Observed, share: slice) -> Observed:
 def _places(who: Mask) -> list[int]:
     places: list[int] = np.flatnonzero(who).tolist()
     return places
-
-
-def _autoreset(mode: AutoresetMode | str) -> AutoresetMode:
-    allowed = {one.value: one for one in AutoresetMode}
-    if isinstance(mode, AutoresetMode):
-        return mode
-    if mode not in allowed:
-        raise InvalidInput(f"autoreset_mode must be one of {', '.join(allowed)}, got {shown(mode)}")
-    return allowed[mode]
