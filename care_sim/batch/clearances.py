@@ -112,7 +112,7 @@ def _note(
             continue
         ego, target, step = egos[world], targets[world], steps[world]
         box, other = bodies.boxes[world, ego], bodies.boxes[world, target]
-        away = math.hypot(other[0] - box[0], other[1] - box[1])
+        away = np.hypot(other[0] - box[0], other[1] - box[1])
         nearest_m[world] = min(nearest_m[world], away)
         bounds[world, step] = least_gap(box, other) - PADDING_M
         poses[world, step, 0] = bodies.poses[world, ego]

@@ -37,7 +37,12 @@ def test_without_a_folder_for_the_code_it_is_compiled_anew():
 
 @pytest.mark.slow
 def test_kernels_answer_the_same_without_compiling():
-    files = ("core/test_pcg64", "core/test_cell_sets", "perception/test_tracker")
+    files = (
+        "core/test_pcg64",
+        "core/test_cell_sets",
+        "perception/test_tracker",
+        "batch/test_motion",
+    )
     places = [
         *(str(ROOT / "tests" / f"{file}.py") for file in files),
         f"{ROOT}/tests/sensors/engines/test_fast.py::test_a_body_at_a_known_distance",
