@@ -1,6 +1,6 @@
 """Proximal policy optimisation (Stable-Baselines3) that ranks sectors for the LiDAR's reserve.
 
-    python docs/examples/train_ppo.py        # about five minutes on one core; needs the extra rl
+    python docs/examples/train_ppo.py        # two minutes of one core; needs the extra rl
 
 The settings matter: with Stable-Baselines3's own ones the agent learns nothing in these steps.
 `care-sim train ppo` keeps checkpoints too, and makes the weights a policy of the benchmark.
