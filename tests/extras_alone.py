@@ -45,6 +45,10 @@ USES = {
     "bench": ["care-sim bench --seconds 0.01 --repeats 1 --samples 3 --resets 3 --seeds 0"],
     "video": [f"care-sim run dense {SHORT} --video a.mp4"],
     "cluster": ["python cluster.py"],
+    "minari": [
+        f"care-sim collect dense {SHORT} --episodes 2 --dataset care-sim/tried-v0",
+        "minari list local",
+    ],
 }
 """What each extra is for, as commands; what they write lies in an empty folder."""
 

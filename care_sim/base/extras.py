@@ -83,6 +83,11 @@ def import_rerun() -> ModuleType:
     return _import("rerun", "Rerun", "viewer")
 
 
+def import_minari() -> ModuleType:
+    """Minari. Raises MissingExtra with the extra to install."""
+    return _import("minari", "A Minari dataset", "minari")
+
+
 def vega_bundle() -> str:
     """Vega, Vega-Lite and Vega-Embed as one script. Raises MissingExtra with the extra."""
     bundle: str = _import("vl_convert", "A page", "page").javascript_bundle()

@@ -98,6 +98,9 @@ GROUPS = {
         ),
     },
     "Learn": {
+        "collect": CommandEntry(
+            "collect", "Collect", "Write a policy's episodes as a Minari dataset."
+        ),
         "train": CommandEntry(
             "train", "LEARNERS", "Train a policy: `care-sim train --help` lists the learners."
         ),

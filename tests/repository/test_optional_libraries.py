@@ -194,6 +194,7 @@ MISSED = {
     "enjoy ppo-dartout --view": "viewer",
     "view film.rrd": "viewer",
     "reproduce --cluster tcp://127.0.0.1:1": "cluster",
+    "collect dense --dataset care-sim/dense/care-v0": "minari",
     "train ppo": "rl",
     "train ppo --tune 2": "tune",
     "train recurrent-ppo": "rl",

@@ -171,6 +171,7 @@ LONG = (
     "ncap",
     "report",
     "export",
+    "collect",
 )
 """Commands that may take their time."""
 
