@@ -364,9 +364,10 @@ def test_the_notebook_is_kept_without_outputs():
     assert all(cell["outputs"] == [] and cell["execution_count"] is None for cell in code)
 
 
-def test_the_citation_names_this_version():
+def test_the_citation_and_the_notebook_name_this_version():
     version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
     assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text()
+    assert f"care_sim-{version}-py3-none-any.whl" in NOTEBOOK.read_text()
 
 
 @pytest.mark.parametrize("file", sorted((ROOT / "results").rglob("*.parquet")), ids=name_of)

@@ -1,0 +1,54 @@
+"""Texts for other places name what this repository holds."""
+
+import re
+
+import pytest
+from pyarrow.parquet import read_metadata
+
+from care_sim.envs import IDS
+from tests.helpers.places import ROOT
+
+yaml = pytest.importorskip("yaml")
+COMMUNITY = ROOT / "docs" / "community"
+
+
+def front_matter(name):
+    """What Hugging Face reads of a card."""
+    _, head, text = (COMMUNITY / name).read_text().split("---\n", 2)
+    assert text.startswith("\n# ")
+    return yaml.safe_load(head)
+
+
+def test_the_dataset_card_has_a_configuration_for_every_file_of_rows():
+    card = front_matter("dataset-card.md")
+    named = [config["data_files"] for config in card["configs"]]
+    files = sorted((ROOT / "results").rglob("*.parquet"))
+    assert named == [file.relative_to(ROOT / "results").as_posix() for file in files]
+    assert len({config["config_name"] for config in card["configs"]}) == len(named)
+    assert sum("default" in config for config in card["configs"]) == 1
+    rows = sum(read_metadata(file).num_rows for file in files)
+    assert card["size_categories"] == "1M<n<10M"
+    assert 1_000_000 < rows < 10_000_000
+
+
+def test_the_paper_has_the_same_authors_wherever_it_is_cited():
+    paper = yaml.safe_load((ROOT / "CITATION.cff").read_text())["preferred-citation"]
+    names = [f"{one['family-names']}, {one['given-names']}" for one in paper["authors"]]
+    for page in (ROOT / "docs" / "cite.md", COMMUNITY / "dataset-card.md"):
+        assert f"author    = {{{' and '.join(names)}}}" in page.read_text()
+
+
+def test_the_space_shows_a_page_of_the_site_and_counts_its_entries():
+    card = front_matter("space-card.md")
+    page = (ROOT / card["app_file"]).with_suffix(".md")
+    entries = [*page.parent.glob("*.json")]
+    assert f" {len(entries)} policies " in card["short_description"]
+    assert card["sdk"] == "static"
+
+
+def test_the_entry_for_gymnasium_names_the_tested_version():
+    entry = (COMMUNITY / "gymnasium.md").read_text()
+    (version,) = re.findall(r"^gymnasium==(.*)$", (ROOT / "constraints.txt").read_text(), re.M)
+    assert f"badge/Gymnasium-v{version}-blue" in entry
+    assert len(IDS) == 8
+    assert "Eight environments" in entry
