@@ -16,7 +16,6 @@ from care_sim.study.executors import ExecutorFactory, processes
 from care_sim.study.journal import JOURNAL, Journal
 from care_sim.study.progress import run_with_progress
 from care_sim.study.provenance import code_digest, machine, versions
-from care_sim.study.results_formats import ResultsFormat
 from care_sim.study.rows.parquet import (
     check_columns,
     read_notes,
