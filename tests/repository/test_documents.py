@@ -9,7 +9,6 @@ import shlex
 import tomllib
 from dataclasses import replace
 from html.parser import HTMLParser
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +28,7 @@ from care_sim.study.benchmark.result_file import read_result
 from care_sim.study.benchmark.tasks import tasks_of
 from care_sim.study.benchmark.worlds import PARTS, published_worlds
 from care_sim.study.results_formats import RESULTS_FORMATS
+from tests.helpers.examples import EXAMPLES, loaded
 from tests.helpers.forked import LEARNING, LIBRARIES, Forked
 from tests.helpers.pages import PAGES, README, SITE, fenced, links, name_of
 from tests.helpers.places import ROOT
@@ -121,7 +121,7 @@ def test_the_learner_of_the_examples_learns():
     prints may fall by ten metres.
     """
     pytest.importorskip("stable_baselines3")
-    example = loaded(ROOT / "docs" / "examples" / "train_ppo.py")
+    example = loaded(EXAMPLES / "train_ppo.py")
     before, after = example.main(steps=1_024, rate=0.0)
     assert before == after
     model, means = example.make_model(example.RATE), []
@@ -133,7 +133,7 @@ def test_the_learner_of_the_examples_learns():
 
 def test_a_detector_runs_on_a_sweep_in_one_file(tmp_path, monkeypatch, capsys):
     pytest.importorskip("torch")
-    example = loaded(ROOT / "docs" / "examples" / "detect_a_sweep.py")
+    example = loaded(EXAMPLES / "detect_a_sweep.py")
     film = street_film(2500)
     forward, left, up = film.shots[0].cloud.points.T
     monkeypatch.setattr(example, "HEIGHT_M", film.sensor_height_m)
@@ -149,7 +149,7 @@ def test_a_detector_runs_on_a_sweep_in_one_file(tmp_path, monkeypatch, capsys):
 
 def test_other_ways_through_the_network_of_pillars_answer_alike():
     pytest.importorskip("torch")
-    example = loaded(ROOT / "docs" / "examples" / "pillars_in_numpy.py")
+    example = loaded(EXAMPLES / "pillars_in_numpy.py")
     told = {name: made[0] for name, (made, _) in example.answers_and_times(1).items()}
     assert np.abs(told["PyTorch"]).max() > 1
     np.testing.assert_allclose(told["NumPy"], told["PyTorch"], atol=1e-4)
@@ -157,7 +157,7 @@ def test_other_ways_through_the_network_of_pillars_answer_alike():
 
 
 def test_by_the_proxy_the_car_brakes_for_somebody_in_view():
-    example = loaded(ROOT / "docs" / "examples" / "early_brakes.py")
+    example = loaded(EXAMPLES / "early_brakes.py")
     assert -1 < example.early_s("CARE-Dartout-v0", "returns", 0) < 0
 
 
@@ -166,7 +166,7 @@ BLIND = re.compile(r"blind_camera\.py results/leaderboard/\{([^}]+)\}\.json")
 
 
 def test_a_blind_camera_takes_nothing_from_who_asks_none(tmp_path):
-    example = loaded(ROOT / "docs" / "examples" / "blind_camera.py")
+    example = loaded(EXAMPLES / "blind_camera.py")
     worlds = [next(world for world in published_worlds() if world.part == part) for part in PARTS]
     told = [read_result(ROOT / f"results/leaderboard/{name}.json") for name in ("fan", "care")]
     with player_in(tmp_path, 2) as player:
@@ -203,7 +203,7 @@ def test_the_published_plays_with_a_blind_camera_make_the_table_of_their_page(ca
     plays = ROOT / "results" / "leaderboard" / "blind-camera.csv"
     files = BLIND.findall(page)[0].replace("\\\n", "").split(",")
     paths = [str(ROOT / f"results/leaderboard/{name}.json") for name in files]
-    loaded(ROOT / "docs" / "examples" / "blind_camera.py").main([str(plays), *paths])
+    loaded(EXAMPLES / "blind_camera.py").main([str(plays), *paths])
     table = capsys.readouterr().out.replace("blind, minus the last", "blind, minus `place`")
     assert table.count("\n") == 2 + len(files)
     assert table in page
@@ -227,23 +227,15 @@ def test_the_blind_camera_misses_everything():
 )
 def test_without_result_files_the_blind_camera_says_so(files, line):
     with pytest.raises(SystemExit, match=line):
-        loaded(ROOT / "docs" / "examples" / "blind_camera.py").main(files)
+        loaded(EXAMPLES / "blind_camera.py").main(files)
 
 
 def test_what_training_seeds_tell_stands_in_its_page(capsys):
-    loaded(ROOT / "docs" / "examples" / "training_seeds.py").main()
+    loaded(EXAMPLES / "training_seeds.py").main()
     page = (ROOT / "results" / "worlds-that-vary.md").read_text()
     tables = capsys.readouterr().out.strip().split("\n\n")
     assert len(tables) == 5
     assert all(table in page for table in tables)
-
-
-def loaded(file):
-    """The module of a file that is in no package."""
-    place = spec_from_file_location(file.stem, file)
-    module = module_from_spec(place)
-    place.loader.exec_module(module)
-    return module
 
 
 def test_the_policy_has_twenty_lines_at_most():

@@ -1,0 +1,126 @@
+"""The paper's method in one file, held to the package: it is given what a policy is given, keeps
+its own tracks, and must choose the same cells in the same order.
+"""
+
+import runpy
+import sys
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from care_sim.core.firing.base import demanded
+from care_sim.core.types import ImageDetections
+from care_sim.loops.seeds import EpisodeSeeds
+from care_sim.perception.tracker import TrackMemory
+from care_sim.study.designs.paper import paper_study
+from care_sim.study.episode_config import EpisodeConfig
+from tests.helpers.examples import EXAMPLES, loaded
+
+FILE = EXAMPLES / "care_in_one_file.py"
+SEEDS = [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 5))]
+
+
+@pytest.fixture
+def one_file():
+    return loaded(FILE)
+
+
+@pytest.fixture
+def detector_output(monkeypatch):
+    """What the LiDAR detector found, scan by scan."""
+    found = []
+    update = TrackMemory.update
+
+    def noted(memory, detections, sensor):
+        found.append([*zip(detections.classes.tolist(), detections.boxes, strict=True)])
+        return update(memory, detections, sensor)
+
+    monkeypatch.setattr(TrackMemory, "update", noted)
+    return found
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_it_fires_the_cells_of_the_published_episodes(seed, one_file, detector_output):
+    """All 49 of a seed, keyframe by keyframe."""
+    for config in paper_study([seed]):
+        assert play(config, one_file, detector_output) == 60, config.label
+
+
+def test_on_bends_with_late_pictures_of_six_cameras_too(one_file, detector_output, monkeypatch):
+    """The paper's scenes are straight roads, with exact positions."""
+    monkeypatch.setattr(one_file, "POSITION_SIGMA_M", 0.4)
+    sigma = (("position_sigma_m", 0.4),)
+    late = {"budget": 0.05, "camera_latency": 2}
+    for own in ({"policy": "care-sbf", "policy_parameters": sigma}, {"policy": "care-priority"}):
+        assert play(EpisodeConfig("drive", **own, **late), one_file, detector_output) > 100
+
+
+def play(config, one_file, detector_output):
+    """How many keyframes an episode has. Fails where the file chooses other cells."""
+    with config.make_env().unwrapped as env:
+        policy = config.make_policy(env)
+        observation, _ = env.reset(seed=config.seed)
+        policy.reset()
+        cameras = [camera_of(camera, one_file) for camera in env.rig.cameras]
+        floors = np.random.default_rng(EpisodeSeeds.of(config.seed).floor)
+        # With a budget of all cells, CARE is the full scan.
+        name = "care" if config.policy == "full" else config.policy
+        scanner = one_file.Scanner(name, config.budget, config.reserve_fraction, config.keyframe_s)
+        keyframes, is_over = 0, False
+        while not is_over:
+            sensor = env.loop.sensor
+            ego = one_file.Ego(
+                sensor.x, sensor.y, sensor.z, sensor.yaw, float(observation["ego"][0])
+            )
+            seen = [
+                one_file.CameraDetection(
+                    int(row[ImageDetections.CLASS]),
+                    tuple(row[ImageDetections.BOX].tolist()),
+                    cameras[int(row[ImageDetections.CAMERA])],
+                    float(row[ImageDetections.YAW_CHANGE]),
+                )
+                for row in observation["detections"]
+                if row[ImageDetections.CLASS] >= 0
+            ]
+            floor = floors.permutation(env.rig.grid.size)
+            shares = scanner.choose(seen, ego, floor)
+            chosen = np.array([*shares])
+            action = policy(observation)
+            observation, _, terminated, truncated, info = env.step(action)
+            where = f"{config.label}, keyframe {keyframes}"
+            assert np.array_equal(np.sort(chosen), info["fired"]), where
+            if config.policy != "full":
+                # Scores fall in the order of selection. The environment adds the floor.
+                order = demanded(action)
+                assert np.array_equal(chosen[: len(order)], order), where
+                rest = len(chosen) - len(order)
+                assert np.array_equal(chosen[len(order) :], free(floor, order)[:rest]), where
+                assert Counter(shares.values())["floor"] == rest, where
+            scanner.remember(detector_output[-1], ego)
+            is_over = terminated or truncated
+            keyframes += 1
+    return keyframes
+
+
+def free(floor, cells):
+    taken = np.zeros(len(floor), bool)
+    taken[cells] = True
+    return floor[~taken[floor]]
+
+
+def camera_of(camera, one_file):
+    centre = camera.width / 2, camera.height / 2
+    return one_file.Camera(camera.focal, centre, np.array(camera.position), camera.axes)
+
+
+def test_it_is_short_and_takes_nothing_but_numpy(capsys, monkeypatch):
+    lines = FILE.read_text().splitlines()
+    assert len(lines) <= 400
+    imported = {
+        line.split()[1].split(".")[0] for line in lines if line.startswith(("import", "from"))
+    }
+    assert imported - sys.stdlib_module_names == {"numpy"}
+    runpy.run_path(str(FILE), run_name="__main__")
+    printed = dict(line.split(" ", 1) for line in capsys.readouterr().out.splitlines())
+    assert list(printed) == ["history", "care", "care-sbf"]
