@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 Array = np.ndarray
-Layer = list[Array]
+Sets = list[Array]  # of cells
 
 # ===== Section 3, Remark 1: the angular grid of firing cells ======================================
 
@@ -53,7 +53,7 @@ RHO = 0.3  # reserve fraction (Remark 2)
 
 
 def allocate(
-    budget: int, rho: float, exploitation: Layer, layers: Sequence[Layer], floor: Array
+    budget: int, rho: float, exploitation: Sets, layers: Sequence[Sets], floor: Array
 ) -> dict[int, str]:
     """Return S: the chosen cells in order of selection, each with the share that paid for it."""
     chosen: dict[int, str] = {}
@@ -64,7 +64,7 @@ def allocate(
     return chosen
 
 
-def fill(chosen: dict[int, str], share: str, sets: Layer, limit: int) -> None:
+def fill(chosen: dict[int, str], share: str, sets: Sets, limit: int) -> None:
     """Let the sets take turns until S has `limit` cells: each gives its next cell that S lacks."""
     queues = deque(iter(cells.tolist()) for cells in sets)
     while queues and len(chosen) < limit:
@@ -247,7 +247,7 @@ def wedge(detection: CameraDetection) -> Array:
 
 def residual_and_explained(
     detections: Iterable[CameraDetection], forecasts: Sequence[Forecast]
-) -> tuple[Layer, Layer]:
+) -> tuple[Sets, Sets]:
     """Return U and M: the wedges of unexplained and of explained detections.
 
     The forecasts are full, never shrunk by forgetting: forgetting makes no false residual.
@@ -286,11 +286,12 @@ def uncertainty_margin(distance: float) -> int:
 RECEDING_MPS, STATIC_MPS = 1.0, 0.5  # tau_rec, tau_st (Remark 3)
 
 
-def forget(forecasts: Iterable[Forecast], ego: Ego) -> Layer:
+def forget(forecasts: Iterable[Forecast], ego: Ego) -> Sets:
     """Return the exploitation sets, full hulls before shrunk ones. Call it once per keyframe."""
     full, shrunk = [], []
     for track, box, velocity in forecasts:
         distance = np.hypot(box[0], box[1])
+        # What recedes does so from the car, which drives along x.
         receding = (velocity - [ego.speed, 0]) @ box[:2] > RECEDING_MPS * distance
         static = np.hypot(*velocity) < STATIC_MPS
         # A track needs two hits for a velocity.
