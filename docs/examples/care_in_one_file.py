@@ -3,8 +3,9 @@
     python docs/examples/care_in_one_file.py
 
 The sections come in the paper's order, and each heading names the equation or algorithm below it.
-`Scanner` at the end joins them. A test of CARE-Sim gives it the camera boxes, the detections and
-the odometry of the paper's 245 closed-loop episodes: it chooses the same cells in the same order.
+"Ours" marks what the paper leaves open. `Scanner` at the end joins the sections. A test of CARE-Sim
+gives it the camera boxes, the detections and the odometry of the paper's 245 closed-loop episodes:
+it chooses the same cells in the same order.
 
 The LiDAR frame is x forward, y left, z up. Units are metres, seconds and radians. A box in space is
 an array (x, y, z, length, width, height, yaw). A set of cells is an array of cell indices.
@@ -18,19 +19,19 @@ from typing import NamedTuple
 import numpy as np
 
 Array = np.ndarray
-Sets = list[Array]  # of cells
+Sets = list[Array]  # sets of cells, each in the order in which its cells are taken
 
 # ===== Section 3, Remark 1: the angular grid of firing cells ======================================
 
 A, E = 512, 32  # azimuth columns and elevation rows
 N = A * E  # cells; the index of a cell is row * A + column
 CELL_WIDTH = 2 * np.pi / A
-TOP, BOTTOM = np.deg2rad([10.67, -30.67])  # elevations of the rays of the first and the last row
+TOP, BOTTOM = np.deg2rad([10.67, -30.67])  # nuScenes' LiDAR: rays of the first and the last row
 CELL_HEIGHT = (TOP - BOTTOM) / (E - 1)
 
 
 def column_at(azimuth: float) -> int:
-    """Return the column that holds an azimuth. Column 0 begins at -pi, behind the car."""
+    """Return the column of an azimuth, modulo A. Column 0 begins at -pi, behind the car."""
     return int(np.floor((azimuth + np.pi) / CELL_WIDTH))
 
 
@@ -55,7 +56,7 @@ RHO = 0.3  # reserve fraction (Remark 2)
 def allocate(
     budget: int, rho: float, exploitation: Sets, layers: Sequence[Sets], floor: Array
 ) -> dict[int, str]:
-    """Return S: the chosen cells in order of selection, each with the share that paid for it."""
+    """Return the selection S: its cells in order, each with the share that paid for it."""
     chosen: dict[int, str] = {}
     fill(chosen, "exploitation", exploitation, round((1 - rho) * budget))
     for layer in layers:
@@ -145,7 +146,7 @@ AZIMUTH_MARGIN, ELEVATION_MARGIN = 2, 1  # dilation in columns and rows (Remark 
 
 
 def hull(box: Array, azimuth_margin: int = AZIMUTH_MARGIN) -> Array:
-    """Return H_i: the cells that a forecast box covers, dilated."""
+    """Return H_i: the rectangle of cells around a forecast box, dilated, top row first."""
     centre, half, height, yaw = box[:2], box[3:5] / 2, box[5], box[6]
     corners = centre + turned(half * [[1, 1], [1, -1], [-1, -1], [-1, 1]], yaw)
     x, y = np.vstack([centre, corners]).T
@@ -217,7 +218,7 @@ def is_explained(detection: CameraDetection, forecasts: Iterable[Forecast]) -> b
     left, top, right, bottom = detection.box
     for track, box, _ in forecasts:
         if track.label == detection.label:
-            # The camera frame is older than the forecast: turn the centre back to its time.
+            # Ours: the camera frame is older than the forecast. Turn the centre back to its time.
             u, v = detection.camera.pixel(turned(box[:3], detection.yaw_change))
             if left <= u <= right and top <= v <= bottom:
                 return True
@@ -228,10 +229,10 @@ def is_explained(detection: CameraDetection, forecasts: Iterable[Forecast]) -> b
 
 
 def wedge(detection: CameraDetection) -> Array:
-    """Return W(d): the cells behind an image box at any depth, dilated as a hull is."""
+    """Return W(d): the cells behind an image box, seen from the LiDAR, dilated as a hull is."""
     left, top, right, bottom = detection.box
     u, v = (left + right) / 2, (top + bottom) / 2
-    # Centre and corners; then, for wide boxes, where the edges pass nearest to the image centre.
+    # Centre and corners; ours, for wide boxes: where the edges pass nearest to the image centre.
     near_u, near_v = np.clip(detection.camera.centre, [left, top], [right, bottom])
     rays = detection.camera.rays(
         np.array([u, left, left, right, right, near_u, near_u, left, right]),
@@ -277,7 +278,7 @@ POSITION_SIGMA_M = 0.0  # sigma_pos: 0 in simulation, 0.4 on the paper's vehicle
 
 
 def uncertainty_margin(distance: float) -> int:
-    """Return m_unc: the columns that a shrunk hull keeps at this range, at most a full margin."""
+    """Return m_unc: the columns that a shrunk hull keeps at this range. Ours: the cap at 2."""
     return min(int(np.ceil(POSITION_SIGMA_M / distance / CELL_WIDTH)), AZIMUTH_MARGIN)
 
 
@@ -291,7 +292,7 @@ def forget(forecasts: Iterable[Forecast], ego: Ego) -> Sets:
     full, shrunk = [], []
     for track, box, velocity in forecasts:
         distance = np.hypot(box[0], box[1])
-        # What recedes does so from the car, which drives along x.
+        # Ours: an object recedes from the car, which drives along x, and is static over ground.
         receding = (velocity - [ego.speed, 0]) @ box[:2] > RECEDING_MPS * distance
         static = np.hypot(*velocity) < STATIC_MPS
         # A track needs two hits for a velocity.
@@ -299,7 +300,7 @@ def forget(forecasts: Iterable[Forecast], ego: Ego) -> Sets:
         low_criticality = harmless and distance > guard_distance(ego.speed)
         track.streak = track.streak + 1 if low_criticality else 0
         if low_criticality:
-            # Our schedule: every keyframe of the streak takes one column, never the row.
+            # Ours: every keyframe of the streak takes one column from the margin, and never a row.
             margin = max(AZIMUTH_MARGIN - track.streak, uncertainty_margin(distance))
             shrunk.append(hull(box, margin))
         else:
@@ -308,7 +309,7 @@ def forget(forecasts: Iterable[Forecast], ego: Ego) -> Sets:
 
 
 # ===== Section 4, Figure 1: the 3D detections update the track memory =============================
-
+# The paper names no tracker: ours.
 GATE_M = 2.0  # a detection belongs to a forecast within this distance (Remark 1)
 FIRST_SPEED_MPS = 15.0  # a track without a velocity may have moved this fast
 COAST_S = 1.5  # a track without a detection is dropped after this time
@@ -350,12 +351,12 @@ def update_tracks(
 
 @dataclass
 class Scanner:
-    """A policy of the paper: CARE is "care". The others switch parts of it off or on."""
+    """CARE is the policy "care". "history", "all-camera", "care-priority" and "care-sbf" differ."""
 
     policy: str = "care"
     beta: float = 0.1
     rho: float = RHO
-    keyframe_s: float = 0.1
+    keyframe_s: float = 0.1  # in the closed loop; 0.5 on nuScenes
     tracks: list[Track] = field(default_factory=list)
 
     def choose(
@@ -363,7 +364,7 @@ class Scanner:
     ) -> dict[int, str]:
         """Return S_t before any return of the keyframe exists: each cell with its share.
 
-        `floor` is a permutation of all cells, seeded by the frame.
+        `floor` is a permutation of all cells, seeded by the frame and equal for all policies.
         """
         forecasts = [forecast(track, self.keyframe_s, ego) for track in self.tracks]
         forecasts.sort(key=lambda known: np.hypot(*known.box[:2]))  # nearest first
