@@ -75,6 +75,8 @@ class Compare(SceneOptions):
     """File for a film of all episodes, side by side: MP4 (extra 'video'), or animated GIF, WebP or
     PNG, by its ending.
     """
+    video_start: float | None = None
+    """Start the film this many seconds after the episodes start."""
     conditions: Annotated[Options, tyro.conf.arg(name="")] = DEFAULT_OPTIONS
     """Further conditions."""
 
@@ -86,7 +88,7 @@ class Compare(SceneOptions):
         policies, left_out = playable(self.policies, lambda name: made([name]))
         if not policies:
             raise InvalidInput("none of the policies can be played")
-        failures = play_side_by_side(made(policies), self.record, self.video)
+        failures = play_side_by_side(made(policies), self.record, self.video, self.video_start)
         return FAILED if left_out or failures else DONE
 
     def _episodes(self, common: dict[str, Any]) -> Callable[[Sequence[str]], list[EpisodeConfig]]:
@@ -102,12 +104,16 @@ class Compare(SceneOptions):
 
 
 def play_side_by_side(
-    configs: Sequence[AnyConfig], record: Path | None = None, video: Path | None = None
+    configs: Sequence[AnyConfig],
+    record: Path | None = None,
+    video: Path | None = None,
+    video_start: float | None = None,
 ) -> list[str]:
     """Play episodes one after the other, into one recording and one film where files are given, and
     print their outcomes. A line for each that failed is printed too, and returned.
     """
-    film = Clip(video, draw_scene_panel if isinstance(configs[0], PlayConfig) else draw_panel)
+    draw = draw_scene_panel if isinstance(configs[0], PlayConfig) else draw_panel
+    film = Clip(video, draw, video_start)
     # All plays of a scene meet its one film.
     shown = configs[0].film() if isinstance(configs[0], PlayConfig) else None
     answers: list[Row | str] = []
@@ -118,7 +124,9 @@ def play_side_by_side(
                 watch, wrap = film.episode(config.policy), partial(wrapped, config.policy)
                 if isinstance(config, PlayConfig):
                     return trace_scene(config, cast(Film, shown), watch, wrap=wrap).row
-                return trace(config, watch, wrap=wrap)[0]
+                row = trace(config, watch, wrap=wrap)[0]
+                film.show_outcome(row)
+                return row
 
             for config in configs:
                 # One by one, so that an interrupt leaves those that were played.

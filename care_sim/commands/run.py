@@ -39,6 +39,8 @@ class Watched(SceneOptions):
     """File for a clip of the episode: MP4 (extra 'video'), or animated GIF, WebP or PNG, by its
     ending.
     """
+    video_start: float | None = None
+    """Start the clip this many seconds after the episode starts."""
     record: Path | None = None
     """File (.rrd) for a recording that `care-sim view FILE` plays (extra 'viewer')."""
     export: Path | None = None
@@ -73,12 +75,10 @@ class Run(Watched):
         if config.budget != self.budget:
             print("full fires every cell, whatever the budget", file=sys.stderr)
         photographer = BrakePhoto(self.picture, self.at)
-        film = Clip(self.video)
-        print_timeline(
-            config,
-            *trace(config, photographer, film.episode(self.policy), wrap=self._watched),
-            console(),
-        )
+        film = Clip(self.video, start=self.video_start)
+        played = trace(config, photographer, film.episode(self.policy), wrap=self._watched)
+        film.show_outcome(played[0])
+        print_timeline(config, *played, console())
         photographer.report()
         finish_files(self.record, film, self.video)
         return 0
@@ -92,7 +92,7 @@ class Run(Watched):
         if config.budget != self.budget:
             print("full fires every cell, whatever the budget", file=sys.stderr)
         photographer = SightingPhoto(self.picture, self.at)
-        film = Clip(self.video, draw_scene)
+        film = Clip(self.video, draw_scene, self.video_start)
 
         def wrap(env: GymEnv, policy: Policy) -> GymEnv:
             return photographer.watching(self._watched(env, policy), policy)

@@ -17,13 +17,13 @@ from care_sim.cli import main
 from care_sim.commands.compare import play_side_by_side
 from care_sim.loops.records import Keyframe
 from care_sim.policies.paper.care import Care
-from care_sim.reports.episodes.clips import Clip
+from care_sim.reports.episodes.clips import Clip, outcome_words
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.episode_play import run_episode, trace
 from care_sim.viewer.pictures import comparison as panel
 from care_sim.viewer.pictures import keyframe as picture
 from care_sim.viewer.pictures.clip_files import ENDINGS, write_clip
-from care_sim.viewer.pictures.sought import DETECTED
+from care_sim.viewer.pictures.sought import DETECTED, HIT
 
 SIZE = (64, 48)
 COLOURS = [(200, 30, 30), (30, 200, 30), (30, 30, 200)]
@@ -167,6 +167,58 @@ def test_episodes_side_by_side_end_together(tmp_path, capsys):
     assert np.array_equal(left[1], left[3])
     assert not np.array_equal(left[0], left[1])
     assert not np.array_equal(right[1], right[3])
+
+
+def test_a_film_starts_where_it_is_told_and_ends_with_the_outcome(tmp_path):
+    config = EpisodeConfig("dartout", "history", scenario_parameters=(("duration_s", 0.4),))
+    whole, late = tmp_path / "whole.png", tmp_path / "late.png"
+    play_side_by_side([config], video=whole)
+    play_side_by_side([config], video=late, video_start=0.2)
+    shown = frames_of(late)
+    # Two keyframes are left, the last of which stays for 2.5 s.
+    assert len(shown) == 1 + 25
+    assert np.array_equal(shown, frames_of(whole)[2:])
+    green = (np.asarray(shown) == DETECTED.colour).all(axis=-1).sum(axis=(1, 2))
+    assert green[0] < 1000 < green[-1]
+
+
+@pytest.mark.parametrize(
+    ("options", "line"),
+    [
+        (["--video-start", "1"], "--video-start has no meaning without --video"),
+        (["--video", "a.gif", "--video-start", "-1"], "video-start must be a finite number >= 0"),
+    ],
+)
+@pytest.mark.parametrize("command", ["run", "compare"])
+def test_a_start_needs_a_film_and_is_not_negative(command, options, line, capsys):
+    with pytest.raises(SystemExit) as end:
+        main([command, "dartout", *options])
+    assert end.value.code == 2
+    assert line in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("row", "words"),
+    [
+        (
+            {"collision": True, "impact_speed_mps": 7.78, "hit_at_front": True},
+            "collision at 28 km/h",
+        ),
+        (
+            {
+                "collision": True,
+                "impact_speed_mps": 0.0,
+                "hit_at_front": False,
+                "hit_kind": "car",
+            },
+            "hit by car",
+        ),
+        ({"collision": False, "clearance_m": 3.44}, "clear by 3.4 m"),
+        ({"collision": False, "clearance_m": None}, "no collision"),
+    ],
+)
+def test_the_outcome_in_words(row, words):
+    assert outcome_words(row) == (words, HIT.colour if row["collision"] else DETECTED.colour)
 
 
 def keyframes(*states, distance_m=20.0):
