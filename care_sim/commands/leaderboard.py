@@ -12,6 +12,7 @@ from typing import Annotated
 import tyro
 
 from care_sim.base.bounds import bounded, check_fields
+from care_sim.base.checks import check_known
 from care_sim.base.errors import (
     InvalidInput,
     MissingExtra,
@@ -24,8 +25,12 @@ from care_sim.base.files import check_output, told_if_replaced, write_text
 from care_sim.base.json_text import json_content
 from care_sim.commands.shared.study_command import DONE, FAILED, console
 from care_sim.policies.isolation import isolated_policies
-from care_sim.reports.figures.files import check_figure, save
-from care_sim.reports.figures.leaderboard import LEADERBOARD_FIGURE, leaderboard_figure
+from care_sim.reports.figures.files import FORMATS, check_figure, save
+from care_sim.reports.figures.leaderboard import (
+    LEADERBOARD_FIGURE,
+    leaderboard_figure,
+    score_chart,
+)
 from care_sim.reports.leaderboard import CONTROL, leaderboard_table, leads_table, names_in
 from care_sim.study.benchmark.made_by import elsewhere, own_code_of
 from care_sim.study.benchmark.player import Player, player_in
@@ -62,6 +67,9 @@ class Leaderboard:
     out: Path | None = None
     """Folder for the page and the figure; without it runs/leaderboard, and runs/leaderboard-quick
     with --quick. A table that lies there is replaced, which is told."""
+    chart: Path | None = None
+    """PNG or SVG file for a bar chart of the scores alone; the other format is written beside
+    it."""
     workers: int = bounded(WORKERS, 1, MOST_WORKERS)
     """With --verify: processes that play at the same time."""
 
@@ -69,6 +77,10 @@ class Leaderboard:
         check_fields(self)
         if self.sealed and not self.verify:
             raise InvalidInput("sealed is the salt of results that are verified: give verify too")
+        if self.chart:
+            check_known("ending of a chart", self.chart.suffix, FORMATS)
+        if self.verify and self.chart:
+            raise InvalidInput("chart is for a table, which verify does not make")
         if self.verify and self.minus != CONTROL.name:
             raise InvalidInput("minus is for a table, which verify does not make")
 
@@ -100,9 +112,13 @@ class Leaderboard:
         page = folder / f"{LEADERBOARD_FIGURE}.md"
         check_output(page)
         check_figure(folder / LEADERBOARD_FIGURE)
+        if self.chart:
+            check_figure(self.chart)
         told = told_if_replaced(page)
         first = next(iter(sets.values()))
         save(leaderboard_figure(first), folder / LEADERBOARD_FIGURE)
+        if self.chart:
+            save(score_chart(first), self.chart.with_suffix(""))
         by_part = [leads_table(own, self.minus) for own in sets.values()]
         shown = [*tables, *(table for table in by_part if table)]
         write_text(page, _page([table.markdown() for table in shown]))
@@ -117,6 +133,8 @@ class Leaderboard:
                 file=sys.stderr,
             )
         print_lines(f"Page: {told}")
+        if self.chart:
+            print_lines(f"Chart: {self.chart}")
 
     @isolated_policies()
     def _verified(self, results: dict[Path, BenchmarkResult]) -> list[str]:

@@ -74,3 +74,16 @@ def test_two_of_one_name_and_different_code_are_two_entries(capsys, here):
         made_result("mine:Mine", n, made_by=made).write(here / f"{n}.json")
     out = run(capsys, "leaderboard", ".")[1]
     assert "As the files say, played on 2 kinds of processor: care-sim" in " ".join(out.split())
+
+
+def test_a_chart_is_written_in_both_formats_where_it_is_told(capsys, library, here):
+    code, out, _ = run(capsys, "leaderboard", library, "--chart", "mine.svg")
+    assert (code, out.splitlines()[-1]) == (0, "Chart: mine.svg")
+    assert (here / "mine.svg").read_text().startswith("<?xml")
+    assert (here / "mine.png").read_bytes().startswith(b"\x89PNG")
+    for options, line in (
+        (["--chart", "mine.pdf"], "unknown ending of a chart '.pdf'; known: .png, .svg"),
+        (["--chart", "a.png", "--verify"], "chart is for a table, which verify does not make"),
+    ):
+        code, _, err = run(capsys, "leaderboard", library, *options)
+        assert (code, line in err) == (2, True)

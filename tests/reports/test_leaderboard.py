@@ -6,7 +6,7 @@ from io import StringIO
 import pytest
 from rich.console import Console
 
-from care_sim.reports.figures.leaderboard import leaderboard_figure
+from care_sim.reports.figures.leaderboard import leaderboard_figure, score_chart
 from care_sim.reports.leaderboard import leaderboard_table, leads_table
 from care_sim.reports.table import Bold
 from care_sim.study.benchmark.tasks import Entry
@@ -120,3 +120,18 @@ def test_the_figure_shows_every_result_the_best_on_top():
     marks = [bars.get_xydata(), *(shown.get_offsets() for shown in axes.collections[:3])]
     heights = {round(float(points[2][1]), 6) for points in marks}
     assert len(heights) == len(marks)
+
+
+def test_the_chart_shows_every_score_with_its_interval_and_who_uses_no_camera():
+    seeing = replace(
+        GOOD, rows=tuple(row._replace(hash=f"{row.camera} {row.hash}") for row in GOOD.rows)
+    )
+    shown = [LOW, PLACE, seeing]
+    (axes,) = score_chart([PLACE, seeing, LOW]).axes
+    scores = [each.score() for each in shown]
+    bars = [bar for container in axes.containers[1::2] for bar in container]
+    assert [bar.get_width() for bar in bars] == pytest.approx([score.mean for score in scores])
+    assert [text.get_text() for text in axes.texts] == [f"{score.mean:.0f}" for score in scores]
+    ends = [line.get_segments()[0][:, 0] for line in axes.collections]
+    assert ends == [pytest.approx([score.low, score.high]) for score in scores]
+    assert bars[0].get_facecolor() == bars[1].get_facecolor() != bars[2].get_facecolor()

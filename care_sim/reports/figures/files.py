@@ -13,7 +13,8 @@ from matplotlib.text import Text
 from care_sim.base.errors import InvalidInput, printable, printable_lines
 from care_sim.base.files import PNG, SVG, check_output, replacing
 
-_FORMATS = (".png", ".svg")
+FORMATS = (".png", ".svg")
+"""Endings of the two files of a figure."""
 
 
 @contextmanager
@@ -66,7 +67,7 @@ def check_beside(out: Path) -> None:
     """Raise what `check_figure` does, and InvalidInput where the figure that is drawn beside a file
     for JSON would take its place.
     """
-    if out.suffix in _FORMATS:
+    if out.suffix in FORMATS:
         raise InvalidInput(f"out must be a file for JSON, got {out}; the figure is drawn beside it")
     check_figure(out)
 
@@ -76,7 +77,7 @@ def remove_others(folder: Path, names: Iterable[str], kept: Container[str]) -> N
     stands for any text.
     """
     found = [
-        path for name in names for suffix in _FORMATS for path in folder.glob(f"{name}{suffix}")
+        path for name in names for suffix in FORMATS for path in folder.glob(f"{name}{suffix}")
     ]
     for path in found:
         if path.stem not in kept:

@@ -65,6 +65,14 @@ class BenchmarkResult:
         seen = [row for row in self.rows if row.camera == MEASURED]
         return tuple((row.part, row.world, row.reachable) for row in seen)
 
+    @property
+    def uses_camera(self) -> bool:
+        """Whether any play differs between the cameras; without a camera all are alike."""
+        hashes: dict[tuple[str, int], set[str]] = {}
+        for row in self.rows:
+            hashes.setdefault((row.part, row.world), set()).add(row.hash)
+        return any(len(alike) > 1 for alike in hashes.values())
+
     def of_part(self, part: str, camera: str) -> list[ResultRow]:
         """Its rows, in the order of their worlds."""
         return [row for row in self.rows if (row.part, row.camera) == (part, camera)]
