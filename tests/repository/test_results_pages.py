@@ -103,23 +103,27 @@ def test_how_many_tests_of_the_suite_are_of_a_kind_that_training_met():
     assert "`care-sightlines` avoids {} and {}.".format(*avoided("care-sightlines")) in page
 
 
-ENTRIES = {
-    "history": "history",
-    "CARE": "care",
-    "map": "place",
-    "CARE, middle first": "care-core-spread",
-    "learned-sets": "learned-sets",
-    "care-sector": "care-sector",
-}
-"""The columns of the headline, and their files on the leaderboard."""
-
-
 @pytest.mark.parametrize("page", ["README.md", "docs/index.md"])
-def test_the_headline_is_the_score_of_the_suite(page):
-    scores = [read_result(FOLDER / f"leaderboard/{name}.json").score() for name in ENTRIES.values()]
-    head = f"| {' | '.join(ENTRIES)} |"
-    below = (ROOT / page).read_text().partition(head)[2]
-    assert below.splitlines()[2] == f"| {' | '.join(f'{score.mean:.0f}' for score in scores)} |"
+def test_the_chart_of_the_headline_is_that_of_its_files_and_its_page_names_their_scores(
+    page, tmp_path, capsys
+):
+    (line,) = (line for line in LINES if line.startswith("| [scores.png]"))
+    words = shlex.split(re.findall(r"`care-sim ([^`]*)`", line)[0])
+    files = [ROOT / word for word in words if word.endswith(".json")]
+    with pytest.raises(SystemExit) as end:
+        cli.main(
+            ["leaderboard", *map(str, files), f"--out={tmp_path}", f"--chart={tmp_path}/scores.svg"]
+        )
+    assert end.value.code == 0
+    capsys.readouterr()
+    assert (tmp_path / "scores.svg").read_text() == (FOLDER / "scores.svg").read_text()
+    ranked = sorted(map(read_result, files), key=lambda one: -one.score().mean)
+    scores = {one.entry.name: f"{one.score().mean:.0f}" for one in ranked}
+    text = " ".join((ROOT / page).read_text().split())
+    assert f"![Scores: {', '.join(map(' '.join, scores.items()))}](" in text
+    told = dict(re.findall(r"`([\w -]+)` \((\d+)\)", text))
+    assert len(told) >= 4
+    assert told.items() <= scores.items()
 
 
 def test_every_entry_of_the_leaderboard_stands_on_its_page_as_it_scores():
