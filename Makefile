@@ -13,7 +13,9 @@
 #                 environment of its own; SPLIT=val, VERSION=v1.0-trainval and OUT=FOLDER unless given otherwise
 # make official-precision FOLDER=DIR   average precision by the devkit of what `care-sim judge --official` wrote to DIR
 # make test-official   test both with the devkit
-PYTHON ?= python3.11
+# The newest Python that has venv; a pyenv of several versions has commands that do not run.
+newest = $(shell for python in $(1); do $$python -c "import ensurepip" 2>/dev/null && echo $$python && break; done)
+PYTHON ?= $(call newest,python3.13 python3.12 python3.11)
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := python -m pip install --quiet --disable-pip-version-check --constraint
@@ -43,16 +45,14 @@ ifneq ($(filter official,$(MAKECMDGOALS)),)
   endif
 endif
 
-# What would stop a set-up is told in one line, before anything is installed. Of PyBullet there are
-# wheels up to Python 3.11: pip builds it for a later one.
+# Stop in one line before anything is installed.
 define python_is_fit
-  $(if $(filter yes,$(call asked,(3,11) <= sys.version_info)),,$(error PYTHON=$(PYTHON) must be a Python of at least \
-    3.11 that has venv (on Debian: apt-get install python3.11-venv); another one: make $(MAKECMDGOALS) PYTHON=NAME))
-  $(if $(or $(filter yes,$(call asked,sys.version_info < (3,12))),$(shell command -v $(CXX))),,$(error \
-    PYTHON=$(PYTHON) is later than 3.11, and pip has to build PyBullet for it: that needs a C++ compiler, of which \
-    there is none (on Debian: apt-get install g++); with Python 3.11 nothing is built))
+  $(if $(filter yes,$(shell $(PYTHON) -c $(IS_FIT) 2>/dev/null)),,$(error CARE-Sim needs Python 3.11, 3.12 or 3.13 with \
+    venv (on Debian: apt-get install python3-venv)$(if $(PYTHON),$(comma) which PYTHON=$(PYTHON) is not); choose one by \
+    make $(MAKECMDGOALS) PYTHON=PATH))
 endef
-asked = $(shell { $(PYTHON) -c "import ensurepip, sys; print('yes' if $(1) else 'no')"; } 2>/dev/null)
+IS_FIT := "import ensurepip, sys; print('yes' if (3, 11) <= sys.version_info < (3, 14) else 'no')"
+comma := ,
 
 .PHONY: setup reproduce test test-installed test-extras test-speed dist check docs lint torture official official-precision test-official clean
 
