@@ -1,5 +1,6 @@
 # make setup      create .venv and install what the benchmark needs
 # make reproduce  set up, run the paper's closed-loop study, print it beside the paper's figures
+# make smoke      set up with pytest, run a few tests per promise
 # make test       set up with the development tools, run every test
 # make dist       build the sdist, and the wheel from it, in dist/
 # make test-installed   install that wheel in an environment of its own, run the sdist's tests with it
@@ -19,7 +20,10 @@ PYTHON ?= $(call newest,python3.13 python3.12 python3.11)
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := python -m pip install --quiet --disable-pip-version-check --constraint
-INSTALL := $(BIN)/$(PIP) constraints.txt
+# Bytecode is written on all cores, and not of the libraries' tests: pip takes three times as long. It is written even
+# where Python is told to write none, since each of the many processes would compile everything anew.
+INSTALL := $(BIN)/$(PIP) constraints.txt --no-compile
+COMPILE := $(BIN)/python -m compileall -qq -j 0 -x '/tests?/|/pybullet_' $(VENV)/lib care_sim || true
 OFFICIAL := .venv-official
 INSTALLED := build/installed
 SPLIT := val
@@ -47,14 +51,14 @@ endif
 
 # Stop in one line before anything is installed.
 define python_is_fit
-  $(if $(filter yes,$(shell $(PYTHON) -c $(IS_FIT) 2>/dev/null)),,$(error CARE-Sim needs Python 3.11, 3.12 or 3.13 with \
+  $(if $(filter yes,$(shell { $(PYTHON) -c $(IS_FIT); } 2>/dev/null)),,$(error CARE-Sim needs Python 3.11, 3.12 or 3.13 with \
     venv (on Debian: apt-get install python3-venv)$(if $(PYTHON),$(comma) which PYTHON=$(PYTHON) is not); choose one by \
     make $(MAKECMDGOALS) PYTHON=PATH))
 endef
 IS_FIT := "import ensurepip, sys; print('yes' if (3, 11) <= sys.version_info < (3, 14) else 'no')"
 comma := ,
 
-.PHONY: setup reproduce test test-installed test-extras test-speed dist check docs lint torture official official-precision test-official clean
+.PHONY: setup reproduce smoke test test-installed test-extras test-speed dist check docs lint torture official official-precision test-official clean
 
 setup: $(VENV)/.installed
 
@@ -62,19 +66,28 @@ $(BIN)/pip:
 	$(python_is_fit)
 	$(PYTHON) -m venv --clear $(VENV)
 
-# pip compiles what it installs, but for what it installs for editing: where Python is told to write no bytecode, each
-# process would compile the package anew, and the tests start hundreds.
-$(VENV)/.installed: $(BIN)/pip pyproject.toml constraints.txt
+$(VENV)/.installed: $(BIN)/pip pyproject.toml constraints.txt requirements-pybullet.txt
+	$(INSTALL) --no-deps --requirement requirements-pybullet.txt
 	$(INSTALL) --editable .
-	$(BIN)/python -m compileall -q care_sim
+	$(COMPILE)
+	touch $@
+
+$(VENV)/.testing: $(VENV)/.installed
+	$(INSTALL) --editable .[test]
+	$(COMPILE)
 	touch $@
 
 $(VENV)/.developing: $(VENV)/.installed
 	$(INSTALL) --editable .[dev]
+	$(COMPILE)
 	touch $@
 
 reproduce: setup
 	$(BIN)/care-sim reproduce
+
+# Only the files with such tests: pytest imports what it looks into, and other files need extras.
+smoke: $(VENV)/.testing
+	$(BIN)/python -m pytest -m smoke --numprocesses 2 $(shell grep -rl "^@pytest.mark.smoke" tests)
 
 # worksteal: each process begins with half of the tests, in order; who is done first takes over from the end of the
 # other's list.
@@ -121,8 +134,9 @@ torture: $(VENV)/.developing
 	$(BIN)/python -m tests.torture $(if $(CASE),--case $(CASE),--seed $(SEED) \
 	  $(if $(CASES),--cases $(CASES),--seconds $(SECONDS)) $(if $(CAMPAIGNS),--campaigns $(CAMPAIGNS)))
 
+# The devkit's numpy has no wheels for Python 3.13.
 $(OFFICIAL)/.installed: constraints-official.txt
-	$(PYTHON) -m venv --clear $(OFFICIAL)
+	$(if $(filter file,$(origin PYTHON)),$(call newest,python3.12 python3.11),$(PYTHON)) -m venv --clear $(OFFICIAL)
 	$(OFFICIAL)/bin/$(PIP) $< nuscenes-devkit
 	touch $@
 

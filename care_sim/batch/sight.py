@@ -21,6 +21,7 @@ from care_sim.core.frames import turned_alike
 from care_sim.core.pinhole import NEAR_M
 from care_sim.core.pinhole_kernels import CameraModels, model_of, window_on
 from care_sim.core.rig import Rig
+from care_sim.core.row_kernels import copy_rows
 from care_sim.core.types import ImageDetections
 from care_sim.sensors.camera_kernels import reported_boxes, surest_first
 from care_sim.sensors.confidence import MIN_PIXELS
@@ -142,8 +143,9 @@ def _see_boxes(
         if live[w]:
             count = reported.counts[w]
             for n in range(count):
-                boxes[w, n] = bodies.boxes[w, reported.bodies[w, n]]
-            boxes[w, :count] = seen_by(sensors, w, boxes[w, :count])
+                for k in range(boxes.shape[2]):
+                    boxes[w, n, k] = bodies.boxes[w, reported.bodies[w, n], k]
+            copy_rows(seen_by(sensors, w, boxes[w, :count]), boxes[w])
 
 
 @compiled()
@@ -191,11 +193,11 @@ def _look(
                 shown[w, table[n, 0]] |= table[n, 5] >= MIN_PIXELS
             outlined = table[:, 1:5].astype(np.float64)
             rows, _ = reported_boxes(table[:, 0], outlined, table[:, 5], classes, camera)
-            seen.rows[w, count : count + len(rows)] = rows
+            copy_rows(rows, seen.rows[w, count:])
             count += len(rows)
         rows = seen.rows[w, :count]
         surest, _ = surest_first(rows, np.empty(count, np.int64), cameras.least[w])
-        seen.rows[w, : len(surest)] = surest
+        copy_rows(surest, seen.rows[w])
         seen.counts[w] = len(surest)
 
 

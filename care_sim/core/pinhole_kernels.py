@@ -85,11 +85,10 @@ def box_spans(boxes: Floats, camera: CameraModel, nearest: float) -> Floats:
     wholly behind the plane at the depth `nearest`; see
     `care_sim.core.pinhole.PinholeCamera.project_boxes`.
     """
-    spans = np.empty((len(boxes), 4))
+    spans = np.full((len(boxes), 4), math.nan)
     corners = np.empty((8, 3))
     for n, box in enumerate(boxes):
         if _is_behind(box, camera, nearest):
-            spans[n] = math.nan
             continue
         # Beyond the near plane, the picture of a box is the convex hull of those of its corners,
         # so these bound it.
@@ -107,8 +106,9 @@ def box_spans(boxes: Floats, camera: CameraModel, nearest: float) -> Floats:
                     share = (nearest - corners[one, 0]) / (corners[other, 0] - corners[one, 0])
                     cut = corners[one] + (corners[other] - corners[one]) * share
                     span = _widened(span, cut, camera)
-        seen = span[0] <= span[2]
-        spans[n] = span if seen else (math.nan, math.nan, math.nan, math.nan)
+        if span[0] <= span[2]:
+            for side in range(4):
+                spans[n, side] = span[side]
     return spans
 
 

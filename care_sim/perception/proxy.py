@@ -68,10 +68,15 @@ def count_hits(bodies: Integers, hits: Integers) -> Integers:
     first = bodies[0]
     span = bodies[-1] - first + 1
     if span > _WIDEST:
-        # Places among the bodies stand for numbers that lie far apart.
-        at = np.searchsorted(bodies, hits)
-        known = bodies[np.minimum(at, len(bodies) - 1)] == hits
-        return count_hits(np.arange(len(bodies)), np.where(known, at, -1))
+        # A table of numbers that lie far apart would be mostly empty.
+        for hit in hits:
+            low, high = 0, len(bodies)
+            while low < high:
+                middle = (low + high) // 2
+                low, high = (middle + 1, high) if bodies[middle] < hit else (low, middle)
+            if low < len(bodies) and bodies[low] == hit:
+                counts[low] += 1
+        return counts
 
     # Neighbouring rays mostly hit the same body, and to count it again waits for the count before:
     # so they count in turn in one of four tables. Others count in the last column.

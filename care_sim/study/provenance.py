@@ -30,6 +30,8 @@ _LIBRARIES = (
     "pybullet",
     "scipy",
 )
+_FORKS = {"pybullet": "pybullet-arm64"}
+"""The fork has the same module, in wheels for Python 3.12 and later. Rows keep the first name."""
 _EXTRAS = ("mujoco-core", "open3d", "open3d-cpu", "panda-gym", "torch")
 """Libraries of detectors, policies and measurements, recorded where they are installed."""
 
@@ -136,8 +138,13 @@ def versions() -> dict[str, str]:
 
 
 def package_versions(*packages: str) -> dict[str, str]:
-    """The versions of installed packages."""
-    return {package: metadata.version(package) for package in packages}
+    """The versions of installed packages, or of the forks in their place."""
+    return {
+        package: metadata.version(
+            package if _is_installed(package) else _FORKS.get(package, package)
+        )
+        for package in packages
+    }
 
 
 def _is_installed(library: str) -> bool:

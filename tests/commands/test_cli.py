@@ -291,6 +291,7 @@ def test_lists_and_tables_fit_eighty_columns_and_lose_nothing(command, capsys):
     assert "…" not in out
 
 
+@pytest.mark.smoke
 def test_run_prints_the_timeline_and_the_outcome(capsys):
     code, out, _ = run(capsys, "run", "dense", "--policy", "full", "--budget", "0.2", *SHORT)
     assert code == 0
@@ -301,6 +302,7 @@ def test_run_prints_the_timeline_and_the_outcome(capsys):
     )
 
 
+@pytest.mark.smoke
 def test_a_sweep_runs_the_grid_and_its_folder_can_be_reported(capsys, tmp_path):
     axes = ["--scenarios", "dartout", "--policies", "random", "full", "--budgets", "0.05", "0.1"]
     code, out, err = run(
@@ -410,6 +412,7 @@ def test_what_is_no_number_is_told_in_plain_words(arguments, message, capsys):
     assert (code, err) == (2, f"care-sim: {message}\n")
 
 
+@pytest.mark.smoke
 def test_the_lists(capsys):
     assert "care-sbf" in run(capsys, "policies")[1]
     out = " ".join(run(capsys, "scenarios")[1].split())

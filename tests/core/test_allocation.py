@@ -55,6 +55,7 @@ def turn_by_turn(sets, limit, chosen):
         queues = waiting
 
 
+@pytest.mark.smoke
 def test_worked_by_hand():
     """Ten cells, three reserved. Overlaps cost no turn; two cells left over by exploitation go to
     the layers.
@@ -164,6 +165,7 @@ def test_what_the_stages_take_is_what_each_adds_by_the_letter(demand, budget, rh
     assert [took.tolist() for took in taken_by_stage(demand, budget, rho)] == expected
 
 
+@pytest.mark.smoke
 @given(demands, budgets, fractions, floors)
 def test_agrees_with_the_algorithm_by_the_letter(demand, budget, rho, floor):
     assert allocate(demand, budget, rho, floor).tolist() == by_the_letter(
@@ -187,6 +189,7 @@ def test_agrees_with_nested_loops_over_rectangles_of_the_grid(grid, rectangles, 
     assert allocate(Demand(sets[0], sets[1:]), budget, 0.3).tolist() == [*expected]
 
 
+@pytest.mark.smoke
 @given(demands, budgets, fractions, floors)
 def test_never_overspends_repeats_or_wavers(demand, budget, rho, floor):
     chosen = allocate(demand, budget, rho, floor).tolist()
@@ -194,6 +197,7 @@ def test_never_overspends_repeats_or_wavers(demand, budget, rho, floor):
     assert allocate(demand, budget, rho, floor).tolist() == chosen
 
 
+@pytest.mark.smoke
 @given(demands, budgets, fractions, floors)
 def test_an_allocation_survives_the_way_through_an_action(demand, budget, rho, floor):
     scores = scores_of(allocate(demand, budget, rho), (4, 10))

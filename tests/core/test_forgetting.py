@@ -29,6 +29,7 @@ def settled(tracks, ego=STANDING, keyframes=6, **rules):
     return margins.tolist(), low.tolist()
 
 
+@pytest.mark.smoke
 @pytest.mark.parametrize(("speed", "guard"), [(0.0, 4.0), (10.0, 44.0), (8.0, 36.0), (-8.0, 36.0)])
 def test_guard_distance_of_the_paper(speed, guard):
     assert ForgettingRules().guard_distance(speed) == guard
@@ -39,6 +40,7 @@ def test_without_scale_there_is_no_guard(tracks_at):
     assert settled(tracks_at(("car", 1, 0, 0, 0)), Ego(30.0), k_safe=0.0) == ([0], [True])
 
 
+@pytest.mark.smoke
 def test_static_tracks_are_forgotten_only_outside_the_guard(tracks_at):
     tracks = tracks_at(
         ("car", 3.99, 0, 0, 0), ("car", 4.0, 0, 0, 0), ("car", 4.01, 0, 0, 0), ("car", 0, 40, 0, 0)
@@ -113,6 +115,7 @@ def test_streaks_belong_to_ids_and_end_with_the_track(tracks_at):
     assert advanced(memory, first)[0][0] >= 1
 
 
+@pytest.mark.smoke
 @pytest.mark.parametrize(("distance", "columns"), [(10, 2), (20, 2), (30, 2), (33, 1), (50, 1)])
 def test_localization_noise_keeps_the_margin_of_equation_4(tracks_at, distance, columns):
     """0.4 m at range r, in columns of 2 pi / 512 rounded up, never more than the full margin."""

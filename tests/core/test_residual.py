@@ -24,6 +24,7 @@ def belief(detections, tracks):
     return Belief(Ego(), RIG.budget, detections, tracks, np.zeros(RIG.grid.shape, np.float32))
 
 
+@pytest.mark.smoke
 def test_a_same_class_centre_inside_the_box_explains_it(tracks_at, seen):
     tracks = tracks_at(("pedestrian", 20, 2, 0, 0))
     inside = seen(("pedestrian", *box_around((20, 2, -1))))
@@ -95,6 +96,7 @@ def test_every_detection_is_judged_by_its_own_camera(tracks_at, seen, camera):
     assert rig.grid.cells_of([[x, y, 0.0]])[0] in wedge
 
 
+@pytest.mark.smoke
 def test_layers_part_what_memory_explains_from_what_it_does_not(tracks_at, seen):
     tracks = tracks_at(("car", 20, 2, 0, 0), ("car", 30, -6, 0, 0))
     boxes = seen(

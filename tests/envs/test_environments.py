@@ -84,6 +84,7 @@ def test_stable_baselines3_finds_nothing_to_complain_about(name):
     assert unexplained(caught) == []
 
 
+@pytest.mark.smoke
 @pytest.mark.parametrize("name", CLOSED_LOOP)
 def test_an_episode_stays_inside_its_spaces_and_ends(name):
     env = make(name, duration_s=2.0)

@@ -99,6 +99,7 @@ def test_it_documents_itself_and_travels(make):
     assert again.unwrapped.rig.budget == env.unwrapped.rig.budget == 3277
 
 
+@pytest.mark.smoke
 def test_an_episode_shows_every_keyframe_once_and_ends_with_the_recalls(make):
     env = make(budget=0.1)
     infos, rewards = played(env, "care")

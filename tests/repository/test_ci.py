@@ -1,25 +1,68 @@
-"""What CI runs installs a browser where there is none, and asks nothing."""
+"""What CI runs: a browser where there is none, all tests with Python 3.11, some with later ones."""
 
 import shutil
 import subprocess
 
+import pytest
+
 from tests.helpers.places import ROOT
 
 
-def test_the_browser_is_installed_without_a_question(tmp_path):
-    programs, told = tmp_path / "bin", tmp_path / "told"
-    programs.mkdir()
-    (programs / "dirname").symlink_to(shutil.which("dirname"))
+@pytest.fixture
+def clone(tmp_path):
+    """A folder with CI's script, and programs that write down how they are called."""
+    (tmp_path / ".ci").mkdir()
+    shutil.copy(ROOT / ".ci" / "run", tmp_path / ".ci" / "run")
+    (tmp_path / "bin").mkdir()
+    (tmp_path / "bin" / "dirname").symlink_to(shutil.which("dirname"))
     for name in ("apt-get", "make"):
-        (programs / name).write_text(f'#!/bin/sh\necho "{name} $* $DEBIAN_FRONTEND" >>"{told}"\n')
-        (programs / name).chmod(0o755)
-    command = [shutil.which("bash"), str(ROOT / ".ci" / "run")]
+        program(tmp_path / "bin" / name, f'echo "{name} $* $DEBIAN_FRONTEND" >>"{tmp_path}/told"')
+    return tmp_path
+
+
+def program(path, line):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(f"#!/bin/sh\n{line}\n")
+    path.chmod(0o755)
+
+
+def ran(clone):
+    """What CI's script prints, and the programs that it called."""
     done = subprocess.run(
-        command, env={"PATH": str(programs)}, capture_output=True, text=True, check=False
+        [shutil.which("bash"), str(clone / ".ci" / "run")],
+        env={"PATH": str(clone / "bin"), "HOME": str(clone)},
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert done.returncode == 0, done.stderr
-    update, install, *made = told.read_text().splitlines()
+    return done.stdout, (clone / "told").read_text().splitlines()
+
+
+def test_the_browser_is_installed_without_a_question_before_the_tests(clone):
+    _, (update, install, *made) = ran(clone)
     assert update == "apt-get update -qq noninteractive"
     assert install.startswith("apt-get install")
     assert install.endswith("chromium noninteractive")
     assert [line.split()[1] for line in made] == ["test", "test-speed", "test-official", "lint"]
+    assert all(" PYTHON=python3.11 " in line for line in made)
+
+
+def test_later_pythons_that_run_are_tested_and_the_others_named(clone):
+    # A command of pyenv for a version that is not selected.
+    program(clone / "bin" / "python3.13", "exit 127")
+    python = clone / ".pyenv" / "versions" / "3.13.0" / "bin" / "python"
+    program(python, "exit 0")
+    certify = f'echo "care-sim $*" >>"{clone}/told"'
+    program(clone / "build" / "python3.13" / "bin" / "care-sim", certify)
+    out, told = ran(clone)
+    assert out == "Python 3.12 is not here: nothing was tested with it\n"
+    smoke = f"make smoke PYTHON={python} VENV=build/python3.13 noninteractive"
+    assert told[-2:] == [smoke, "care-sim certify"]
+
+
+def test_what_fails_with_a_later_python_fails(clone):
+    program(clone / "bin" / "python3.12", "exit 0")
+    program(clone / "build" / "python3.12" / "bin" / "care-sim", "exit 1")
+    with pytest.raises(AssertionError):
+        ran(clone)

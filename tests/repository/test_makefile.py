@@ -1,6 +1,7 @@
 """`make` says in one line what stops a set-up, or what it lacks, before it installs anything."""
 
 import os
+import shutil
 import subprocess
 import sys
 
@@ -14,7 +15,7 @@ def made(*arguments, **variables):
         name: value for name, value in os.environ.items() if not name.startswith(("MAKE", "MFLAGS"))
     }
     return subprocess.run(
-        ["make", *arguments],
+        [shutil.which("make"), *arguments],
         cwd=ROOT,
         env=surroundings | variables,
         capture_output=True,
@@ -28,14 +29,21 @@ def official(folder, *arguments):
     return made("official", f"OFFICIAL={folder / 'environment'}", "PYTHON=false", *arguments)
 
 
-def setup(folder, python, *arguments, version=(3, 11)):
-    """What would be done with a Python that says it is of this version."""
+def setup(folder, *arguments, **variables):
+    """What would be done to set up an environment that is not there."""
+    return made("--dry-run", "setup", f"VENV={folder / 'environment'}", *arguments, **variables)
+
+
+def says_it_is(version, folder):
+    """A command that runs Python and says that it is of this version."""
     # A folder each: bytecode kept of a file is taken for that of one as long, a moment later.
     says = folder / f"says-{version}"
-    says.mkdir(exist_ok=True)
+    says.mkdir(parents=True)
     (says / "sitecustomize.py").write_text(f"import sys; sys.version_info = {version}\n")
-    given = ("--dry-run", "setup", f"VENV={folder / 'environment'}", f"PYTHON={python}")
-    return made(*given, *arguments, PYTHONPATH=str(says))
+    command = folder / f"python{'.'.join(map(str, version))}"
+    command.write_text(f'#!/bin/sh\nPYTHONPATH="{says}" exec "{sys.executable}" "$@"\n')
+    command.chmod(0o755)
+    return command
 
 
 def complaint(done):
@@ -45,23 +53,42 @@ def complaint(done):
     return line
 
 
-def test_a_python_that_does_not_fit_is_told(tmp_path):
-    missing = complaint(setup(tmp_path, "python3.11-of-nobody"))
-    assert "*** PYTHON=python3.11-of-nobody must be a Python of at least 3.11" in missing
-    assert missing.endswith("another one: make setup PYTHON=NAME.  Stop.")
-    assert " must be a Python of at least 3.11" in complaint(
-        setup(tmp_path, sys.executable, version=(3, 10))
-    )
+@pytest.mark.parametrize("version", [(3, 10), (3, 14)])
+def test_a_python_without_wheels_is_refused(version, tmp_path):
+    python = says_it_is(version, tmp_path)
+    told = complaint(setup(tmp_path, f"PYTHON={python}"))
+    assert " *** CARE-Sim needs Python 3.11, 3.12 or 3.13 with venv " in told
+    assert f"which PYTHON={python} is not; choose one by make setup PYTHON=PATH." in told
 
 
-def test_a_later_python_needs_a_compiler_and_3_11_none(tmp_path):
-    none = "CXX=compiler-of-nobody"
-    assert "pip has to build PyBullet for it: that needs a C++ compiler" in complaint(
-        setup(tmp_path, sys.executable, none, version=(3, 12))
+def test_a_python_that_is_not_there_is_refused(tmp_path):
+    assert "PYTHON=python-of-nobody is not" in complaint(setup(tmp_path, "PYTHON=python-of-nobody"))
+
+
+@pytest.mark.parametrize("version", [(3, 11), (3, 12), (3, 13)])
+def test_a_chosen_python_with_wheels_is_taken(version, tmp_path):
+    python = says_it_is(version, tmp_path)
+    done = setup(tmp_path, f"PYTHON={python}", CXX="compiler-of-nobody")
+    assert done.stdout.startswith(f"{python} -m venv --clear {tmp_path}")
+
+
+def test_the_newest_python_that_runs_is_taken(tmp_path):
+    programs = tmp_path / "bin"
+    programs.mkdir()
+    (programs / "sh").symlink_to(shutil.which("sh"))
+    path = {"PATH": str(programs)}
+    assert (
+        "needs Python 3.11, 3.12 or 3.13 with venv (on Debian: apt-get install python3-venv);"
+        in (complaint(setup(tmp_path, **path)))
     )
-    for version, compiler in {(3, 12): "CXX=sh", (3, 11): none}.items():
-        done = setup(tmp_path, sys.executable, compiler, version=version)
-        assert done.stdout.startswith(f"{sys.executable} -m venv --clear {tmp_path}")
+    for minor in (11, 12):
+        says_it_is((3, minor), programs)
+        assert setup(tmp_path, **path).stdout.startswith(f"python3.{minor} -m venv ")
+    # pyenv has commands for versions that are not selected: they fail.
+    broken = programs / "python3.13"
+    broken.write_text("#!/bin/sh\nexit 127\n")
+    broken.chmod(0o755)
+    assert setup(tmp_path, **path).stdout.startswith("python3.12 -m venv ")
 
 
 @pytest.fixture

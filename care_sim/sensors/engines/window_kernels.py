@@ -92,7 +92,8 @@ def place_parts(
             )
             last = owner
         if _is_beyond(away, parts.offsets[part], parts.halves[part], reach):
-            windows[part] = NO_CELLS
+            for side in range(4):
+                windows[part, side] = NO_CELLS[side]
             continue
         # Into the frame of the sensor: the origin of the body first, then the part's offset along
         # the axes of the body.
@@ -105,7 +106,9 @@ def place_parts(
         # The sides of an upright box are seen along its edges below: those above lie over them.
         is_upright = axes[part, 2, 0] == 0.0 and axes[part, 2, 1] == 0.0
         outline = corners[:4] if is_upright else corners
-        windows[part], nearest[part] = _window(centres[part], corners, outline, grid)
+        window, nearest[part] = _window(centres[part], corners, outline, grid)
+        for side in range(4):
+            windows[part, side] = window[side]
 
     up = np.array((sensor_axes[0][2], sensor_axes[1][2], sensor_axes[2][2]))
     return PlacedParts(centres, axes, windows, nearest, up)

@@ -354,12 +354,14 @@ def test_a_missing_or_damaged_list_is_one_line(tmp_path):
         published.read(file)
 
 
+@pytest.mark.smoke
 def test_some_of_the_list_goes_as_published():
     """A short form of the certificate; `care-sim certify` is the whole."""
     short = [
         episode for episode in LIST if episode.environment != STREET and episode.keyframes <= 12
     ]
-    chosen = [one.number for mode in MODES for one in [e for e in short if e.mode == mode][:5]]
+    here, _ = playable_here(short)
+    chosen = [one.number for mode in MODES for one in [e for e in here if e.mode == mode][:5]]
     verdict = verdict_of(trails_of(chosen, 1), published.read())
     assert verdict.as_published, "\n".join(verdict.lines())
 
