@@ -107,8 +107,7 @@ def box_spans(boxes: Floats, camera: CameraModel, nearest: float) -> Floats:
                     cut = corners[one] + (corners[other] - corners[one]) * share
                     span = _widened(span, cut, camera)
         if span[0] <= span[2]:
-            for side in range(4):
-                spans[n, side] = span[side]
+            spans[n, 0], spans[n, 1], spans[n, 2], spans[n, 3] = span
     return spans
 
 

@@ -68,14 +68,8 @@ def count_hits(bodies: Integers, hits: Integers) -> Integers:
     first = bodies[0]
     span = bodies[-1] - first + 1
     if span > _WIDEST:
-        # A table of numbers that lie far apart would be mostly empty.
         for hit in hits:
-            low, high = 0, len(bodies)
-            while low < high:
-                middle = (low + high) // 2
-                low, high = (middle + 1, high) if bodies[middle] < hit else (low, middle)
-            if low < len(bodies) and bodies[low] == hit:
-                counts[low] += 1
+            _count_among(bodies, hit, counts)
         return counts
 
     # Neighbouring rays mostly hit the same body, and to count it again waits for the count before:
@@ -88,6 +82,17 @@ def count_hits(bodies: Integers, hits: Integers) -> Integers:
         for k in range(4):
             counts[row] += table[k, bodies[row] - first]
     return counts
+
+
+@compiled(brief=True)
+def _count_among(bodies: Integers, hit: int, counts: Integers) -> None:
+    """Count a hit if it is one of `bodies` (n,), which may lie too far apart for a table."""
+    low, high = 0, len(bodies)
+    while low < high:
+        middle = (low + high) // 2
+        low, high = (middle + 1, high) if bodies[middle] < hit else (low, middle)
+    if low < len(bodies) and bodies[low] == hit:
+        counts[low] += 1
 
 
 class ReturnsProxy:
