@@ -25,7 +25,7 @@ def words(instruction):
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory):
-    """A folder that anybody may look into, with what the image holds below `build` and `venv`."""
+    """A folder with what the image holds, below `build` and `venv`."""
     if os.geteuid():
         pytest.skip("only root may take another user's number")
     # A Python of pyenv lies in a home folder, which is closed to others.
@@ -33,8 +33,6 @@ def place(tmp_path_factory):
     if not Path(python).exists():
         pytest.skip(f"no {python}")
     place = tmp_path_factory.mktemp("image")
-    for folder in (place, place.parent, place.parent.parent):
-        folder.chmod(0o755)
     (place / "build").mkdir()
     for *names, target in words("COPY"):
         for name in names:
@@ -56,6 +54,9 @@ def play(place, home):
     for folder in (work, work / "tmp"):
         folder.mkdir()
         os.chown(folder, USER, USER)
+    # pytest keeps its folders to their owner, and each run of it does so anew.
+    for folder in (place, place.parent, place.parent.parent):
+        folder.chmod(0o755)
     ((entry_point,),) = words("ENTRYPOINT")
     done = subprocess.run(
         [
