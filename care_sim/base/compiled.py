@@ -48,6 +48,12 @@ def compiled(*, brief: bool = False, **options: Any) -> Callable[[_F], _F]:
     return make
 
 
+def lacks_code(kernel: Any) -> bool:
+    """Return True if the machine code of a compiled function can be kept, but is not yet."""
+    kept = getattr(getattr(kernel, "_cache", None), "_cache_file", None)
+    return kept is not None and not kept._load_index()
+
+
 @cache
 def _sources_digest(name: str) -> str:
     """Hash of all that is compiled into the functions of a module: its source, the constants that

@@ -12,6 +12,7 @@ from care_sim.study.episodes_together import MOST_TOGETHER, play_episodes
 from care_sim.study.executors import ClusterLost, ExecutorFactory, parallel_batches, processes
 from care_sim.study.journal import Journal
 from care_sim.study.run_config import Row, RunConfig, in_batches
+from care_sim.study.shared_compiling import compile_from_the_end, is_compiling_due
 
 Batch = Sequence[RunConfig]
 PlayBatch = Callable[[Any], list[Row | str]]
@@ -104,6 +105,7 @@ class _Run:
         self._deaths: Counter[str] = Counter()
         self._play_batch = play_batch
         self._parts_last = most is not None
+        self._compiles = play_batch is play_episodes and make_executor is processes
         self._journal = journal
         self._workers = workers
         self._make_executor = make_executor
@@ -115,7 +117,10 @@ class _Run:
         No more are in flight than there are workers, so that few are suspected.
         """
         in_flight: _InFlight = {}
-        with self._make_executor(min(self._workers, len(waiting))) as executor:
+        workers = min(self._workers, len(waiting))
+        with self._make_executor(workers) as executor:
+            if workers > 1 and self._compiles and is_compiling_due():
+                executor.submit(compile_from_the_end)
             try:
                 while waiting or in_flight:
                     self._submit_waiting(executor, waiting, in_flight)
