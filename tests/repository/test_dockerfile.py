@@ -7,6 +7,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -24,7 +25,7 @@ def words(instruction):
 
 
 @pytest.fixture(scope="module")
-def place(tmp_path_factory):
+def place():
     """A folder with what the image holds, below `build` and `venv`."""
     if os.geteuid():
         pytest.skip("only root may take another user's number")
@@ -32,7 +33,16 @@ def place(tmp_path_factory):
     python = f"/usr/bin/python{sys.version_info.major}.{sys.version_info.minor}"
     if not Path(python).exists():
         pytest.skip(f"no {python}")
-    place = tmp_path_factory.mktemp("image")
+    # pytest keeps its own folders to their owner.
+    with tempfile.TemporaryDirectory() as name:
+        place = Path(name)
+        place.chmod(0o755)
+        install(place, python)
+        yield place
+
+
+def install(place, python):
+    """Do as the Dockerfile says."""
     (place / "build").mkdir()
     for *names, target in words("COPY"):
         for name in names:
@@ -45,7 +55,6 @@ def place(tmp_path_factory):
             # Without bytecode of the libraries it takes half as long.
             quick = os.environ | {"PIP_NO_COMPILE": "1"}
             subprocess.run(command, cwd=place / "build", env=quick, check=True)
-    return place
 
 
 def play(place, home):
@@ -54,9 +63,6 @@ def play(place, home):
     for folder in (work, work / "tmp"):
         folder.mkdir()
         os.chown(folder, USER, USER)
-    # pytest keeps its folders to their owner, and each run of it does so anew.
-    for folder in (place, place.parent, place.parent.parent):
-        folder.chmod(0o755)
     ((entry_point,),) = words("ENTRYPOINT")
     done = subprocess.run(
         [

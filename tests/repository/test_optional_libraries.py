@@ -18,7 +18,7 @@ from tests.repository.test_house import MODULES, imported
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 EXTRAS = PROJECT["optional-dependencies"]
-FOR_DEVELOPERS = {"all", "dev", "docs"}
+FOR_DEVELOPERS = {"all", "dev", "docs", "test"}
 MODULE_OF = {
     "mujoco_core": "mujoco",
     "open3d_cpu": "open3d",
