@@ -24,6 +24,9 @@ PIP := python -m pip install --quiet --disable-pip-version-check --constraint
 # where Python is told to write none, since each of the many processes would compile everything anew.
 INSTALL := $(BIN)/$(PIP) constraints.txt --no-compile
 COMPILE := $(BIN)/python -m compileall -qq -j 0 -x '/tests?/|/pybullet_' $(VENV)/lib care_sim || true
+# worksteal: each process begins with half of the tests, in order. The process that is done first takes over from the
+# end of the other's list. Two that begin with the same test would both compile the same.
+SPREAD := --numprocesses 2 --dist worksteal
 OFFICIAL := .venv-official
 INSTALLED := build/installed
 SPLIT := val
@@ -87,12 +90,10 @@ reproduce: setup
 
 # Only the files with such tests: pytest imports what it looks into, and other files need extras.
 smoke: $(VENV)/.testing
-	$(BIN)/python -m pytest -m smoke --numprocesses 2 $(shell grep -rl "^@pytest.mark.smoke" tests)
+	$(BIN)/python -m pytest -m smoke $(SPREAD) $(shell grep -rl "^@pytest.mark.smoke" tests)
 
-# worksteal: each process begins with half of the tests, in order; who is done first takes over from the end of the
-# other's list.
 test: $(VENV)/.developing
-	$(BIN)/python -m pytest --numprocesses 2 --dist worksteal
+	$(BIN)/python -m pytest $(SPREAD)
 
 # From nothing: setuptools would pack what its last lists of files name.
 dist: $(VENV)/.developing
@@ -108,7 +109,7 @@ test-installed: dist
 	mkdir $(INSTALLED)/sdist
 	tar xzf dist/*.tar.gz -C $(INSTALLED)/sdist --strip-components 1
 	rm -r $(INSTALLED)/sdist/care_sim
-	cd $(INSTALLED)/sdist && ../venv/bin/python -m pytest --numprocesses 2 --dist worksteal
+	cd $(INSTALLED)/sdist && ../venv/bin/python -m pytest $(SPREAD)
 
 test-extras: dist
 	$(BIN)/python -m tests.extras_alone $$(echo dist/*.whl) constraints.txt $(EXTRAS)
