@@ -90,8 +90,10 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         if alone:
             interrupts.raise_them()
         _settle_output()
-        # An unknown backend would end the import of Matplotlib. No figure here needs a backend.
-        os.environ.pop("MPLBACKEND", None)
+        # An unknown backend would end the import of Matplotlib, and an unknown value that of Rerun.
+        # No figure here needs a backend, and a recording depends on no setting.
+        for name in [name for name in os.environ if name.startswith(("MPLBACKEND", "RERUN"))]:
+            del os.environ[name]
         sys.exit(_finished(arguments))
     except SystemExit:
         raise

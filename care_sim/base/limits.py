@@ -132,6 +132,9 @@ def check_at_start() -> None:
     except LimitReached as reached:
         os.write(2, f"care-sim: {reached}\n".encode())
         os._exit(FAILED)
+    # Arrow's own allocator reserves a gigabyte at once. Under a limit, what it leaves may be so
+    # little that another library aborts.
+    os.environ["ARROW_DEFAULT_MEMORY_POOL"] = "system"
 
 
 if is_command():

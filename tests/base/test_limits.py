@@ -15,6 +15,7 @@ from care_sim.base.causes import causes
 from care_sim.base.limits import LimitReached, check_workers, limit_in
 from care_sim.study.executors import processes
 from tests.torture.processes import ANOTHER_USER, entry_point
+from tests.torture.warm import TINY
 
 
 def ended(arguments, prefix=(), limited=None):
@@ -59,6 +60,17 @@ def test_many_cores_need_less_with_one_thread_each(monkeypatch):
         limits.check_memory()
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
     limits.check_memory()
+
+
+@pytest.mark.parametrize(("name", "size"), [("AS", 3_600_000_000), ("DATA", 1_600_000_000)])
+def test_memory_that_suffices(name, size, tmp_path):
+    number = getattr(resource, f"RLIMIT_{name}")
+    code, err = ended(
+        ["run", "dartout", "--record", str(tmp_path / "x.rrd"), *TINY],
+        ("env", "OMP_NUM_THREADS=1"),
+        limited=lambda: resource.setrlimit(number, (size, size)),
+    )
+    assert (code, err) == (0, "")
 
 
 def test_too_few_files():

@@ -47,7 +47,11 @@ ALLOWED = {
     "PYTHONHASHSEED": ("0", "7", "random"),
 }
 """Python itself ends at once with any other value, and Numba warns with a traceback."""
-FOUND_CASES = (({"NUMBA_DISABLE_JIT": "1"}, ("policies",)),)
+FOUND_CASES = (
+    ({"NUMBA_DISABLE_JIT": "1"}, ("policies",)),
+    # Rerun raised NameError while it was imported.
+    ({"RERUN_STRICT": " "}, ("run", "dartout", "--record", "out.rrd", *warm.TINY)),
+)
 
 prepare, FORKS = warm.prepare, warm.FORKS
 
