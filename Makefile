@@ -91,7 +91,7 @@ reproduce: setup
 
 # Only the files with such tests: pytest imports what it looks into, and other files need extras.
 smoke: $(VENV)/.testing
-	$(BIN)/python -m pytest -m smoke $(SPREAD) $(shell grep -rl "^@pytest.mark.smoke" tests)
+	$(BIN)/python -m pytest -m smoke $(SPREAD) $(sort $(shell grep -rl "@pytest.mark.smoke" --include=test_*.py tests))
 
 test: $(VENV)/.developing
 	$(BIN)/python -m pytest $(SPREAD)

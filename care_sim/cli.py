@@ -90,8 +90,8 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         if alone:
             interrupts.raise_them()
         _settle_output()
-        # An unknown backend would end the import of Matplotlib, and an unknown value that of Rerun.
-        # No figure here needs a backend, and a recording depends on no setting.
+        # An unknown backend would end the import of Matplotlib. An unknown value of its settings
+        # would end the import of Rerun. Figures and recordings depend on neither.
         for name in [name for name in os.environ if name.startswith(("MPLBACKEND", "RERUN"))]:
             del os.environ[name]
         sys.exit(_finished(arguments))

@@ -7,6 +7,7 @@ also told by those.
 
 import hashlib
 import inspect
+import pickle
 import sys
 from collections.abc import Callable, Iterator
 from functools import cache
@@ -51,7 +52,11 @@ def compiled(*, brief: bool = False, **options: Any) -> Callable[[_F], _F]:
 def lacks_code(kernel: Any) -> bool:
     """Return True if the machine code of a compiled function can be kept, but is not yet."""
     kept = getattr(getattr(kernel, "_cache", None), "_cache_file", None)
-    return kept is not None and not kept._load_index()
+    try:
+        return kept is not None and not kept._load_index()
+    # Numba replaces a damaged index when it compiles.
+    except (OSError, EOFError, pickle.UnpicklingError):
+        return False
 
 
 @cache

@@ -132,8 +132,8 @@ def check_at_start() -> None:
     except LimitReached as reached:
         os.write(2, f"care-sim: {reached}\n".encode())
         os._exit(FAILED)
-    # Arrow's own allocator reserves a gigabyte at once. Under a limit, what it leaves may be so
-    # little that another library aborts.
+    # Arrow's own allocator reserves a gigabyte at once. Under a limit, the rest may be too small
+    # for another library, which then aborts.
     os.environ["ARROW_DEFAULT_MEMORY_POOL"] = "system"
 
 

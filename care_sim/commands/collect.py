@@ -1,9 +1,10 @@
 """`care-sim collect`: a policy's episodes as a Minari dataset, for offline learning."""
 
+import inspect
 import shutil
 import sys
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Generator, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -13,12 +14,13 @@ from rich.console import Console
 from rich.progress import track
 
 import care_sim
-from care_sim.base.checks import check_whole
-from care_sim.base.errors import InvalidInput, shown
+from care_sim.base.bounds import bounded, check_fields
+from care_sim.base.errors import InvalidInput, counted, print_lines, shown
 from care_sim.base.extras import import_minari
 from care_sim.base.seed_ranges import training_seeds
 from care_sim.commands.shared.options import DEFAULT_OPTIONS, Options
 from care_sim.study.episode_config import EpisodeConfig, grid
+from care_sim.study.run_config import MOST_TASKS
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,15 +43,17 @@ class Collect:
     """`care-sim policies` lists them. `full` always runs with budget 1.0."""
     budget: float = 0.1
     """Share of the cells that may fire at a keyframe, above 0 and at most 1."""
-    episodes: int = 20
+    episodes: int = bounded(20, 1, MOST_TASKS)
     """Episodes to play, on the training seeds from 10000 on."""
     conditions: Annotated[Options, tyro.conf.arg(name="")] = DEFAULT_OPTIONS
     """Further conditions."""
 
+    def __post_init__(self) -> None:
+        check_fields(self)
+
     def __call__(self) -> int:
         """Run it."""
         minari = import_minari()
-        check_whole("episodes", self.episodes, 1)
         folder = _folder(self.dataset)
         axes = ([self.scenario], [self.policy], [self.budget], training_seeds(self.episodes))
         configs = grid(*axes, **self.conditions.arguments([self.policy]))
@@ -60,10 +64,11 @@ class Collect:
         with configs[0].make_env() as env, warnings.catch_warnings():
             # Minari asks for an author, an e-mail and a link, which are the publisher's to give.
             warnings.filterwarnings("ignore", category=UserWarning, module="minari")
+            episodes = _played(env, shown_configs, returns)
             try:
                 dataset = minari.create_dataset_from_buffers(
                     self.dataset,
-                    _played(env, shown_configs, returns),
+                    episodes,
                     env,
                     algorithm_name=self.policy,
                     description=f"{self.policy} in {self.scenario}, budget {configs[0].budget:g}",
@@ -72,19 +77,22 @@ class Collect:
                     data_format="parquet",
                 )
             except BaseException:
-                shutil.rmtree(folder, ignore_errors=True)
+                # Minari makes the folder before it asks for the first episode. Until then, the
+                # folder may be another process's.
+                if inspect.getgeneratorstate(episodes) != inspect.GEN_CREATED:
+                    shutil.rmtree(folder, ignore_errors=True)
                 raise
         mean = sum(returns) / len(returns)
-        print(
-            f"{dataset.total_episodes} episodes, {dataset.total_steps} steps, mean return "
-            f"{mean:.2f}, in {folder}: minari.load_dataset({self.dataset!r})"
+        print_lines(
+            f"{counted(dataset.total_episodes, 'episode')}, {dataset.total_steps} steps, mean "
+            f"return {mean:.2f}, in {folder}: minari.load_dataset({self.dataset!r})"
         )
         return 0
 
 
 def _folder(dataset: str) -> Path:
-    """The folder of a dataset that is not yet there. Raises InvalidInput for an id that is none,
-    and for that of a dataset.
+    """Return the folder of a new dataset. Raises InvalidInput for an invalid id or an existing
+    dataset.
     """
     from minari.dataset.minari_dataset import DATASET_ID_RE
     from minari.storage import get_dataset_path
@@ -102,10 +110,10 @@ def _folder(dataset: str) -> Path:
     return folder
 
 
-def _played(env: Any, configs: Iterable[EpisodeConfig], returns: list[float]) -> Iterator[Any]:
-    """The episodes as Minari's buffers, one after the other since many do not fit into memory;
-    their returns are added to `returns`.
-    """
+def _played(
+    env: Any, configs: Iterable[EpisodeConfig], returns: list[float]
+) -> Generator[Any, None, None]:
+    """Yield episodes as Minari's buffers, and add their returns to `returns`."""
     from minari.data_collector import EpisodeBuffer
 
     for number, config in enumerate(configs):

@@ -27,9 +27,9 @@ def asked_with(row: Row) -> Row:
 
 
 @lru_cache
-def _parameters(names: tuple[str, ...]) -> list[str]:
-    """The parameters among columns. Thousands of rows share the same `names`."""
-    return [*filter(is_parameter, names)]
+def _parameters(names: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the parameters among columns. Thousands of rows share the same `names`."""
+    return tuple(filter(is_parameter, names))
 
 
 def identity(row: Row) -> Task:

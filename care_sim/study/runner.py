@@ -105,6 +105,7 @@ class _Run:
         self._deaths: Counter[str] = Counter()
         self._play_batch = play_batch
         self._parts_last = most is not None
+        # On a cluster, workers of many machines would compile.
         self._compiles = play_batch is play_episodes and make_executor is processes
         self._journal = journal
         self._workers = workers
@@ -119,9 +120,11 @@ class _Run:
         in_flight: _InFlight = {}
         workers = min(self._workers, len(waiting))
         with self._make_executor(workers) as executor:
-            if workers > 1 and self._compiles and is_compiling_due():
-                executor.submit(compile_from_the_end)
             try:
+                if workers > 1 and self._compiles and is_compiling_due():
+                    # Its end is nobody's concern: a task that cannot be played fails by itself.
+                    executor.submit(compile_from_the_end)
+                    self._compiles = False
                 while waiting or in_flight:
                     self._submit_waiting(executor, waiting, in_flight)
                     self._collect_finished(in_flight)

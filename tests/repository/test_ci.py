@@ -66,3 +66,4 @@ def test_what_fails_with_a_later_python_fails(clone):
     program(clone / "build" / "python3.12" / "bin" / "care-sim", "exit 1")
     with pytest.raises(AssertionError):
         ran(clone)
+    assert (clone / "told").read_text().splitlines()[-1].startswith("make smoke PYTHON=python3.12 ")

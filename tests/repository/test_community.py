@@ -41,6 +41,7 @@ def test_the_paper_has_the_same_authors_wherever_it_is_cited():
 def test_the_space_shows_a_page_of_the_site_and_counts_its_entries():
     card = front_matter("space-card.md")
     page = (ROOT / card["app_file"]).with_suffix(".md")
+    assert page.exists()
     entries = [*page.parent.glob("*.json")]
     assert f" {len(entries)} policies " in card["short_description"]
     assert card["sdk"] == "static"

@@ -68,7 +68,7 @@ def test_a_python_that_is_not_there_is_refused(tmp_path):
 @pytest.mark.parametrize("version", [(3, 11), (3, 12), (3, 13)])
 def test_a_chosen_python_with_wheels_is_taken(version, tmp_path):
     python = says_it_is(version, tmp_path)
-    done = setup(tmp_path, f"PYTHON={python}", CXX="compiler-of-nobody")
+    done = setup(tmp_path, f"PYTHON={python}")
     assert done.stdout.startswith(f"{python} -m venv --clear {tmp_path}")
 
 

@@ -47,7 +47,7 @@ PURPOSES = {
     "what is measured": "seconds, repeats, samples, resets",
     "what is written": (
         "out, force, resume, tensorboard, picture, at, video, record, export, view, web, page, "
-        "official, write, dataset"
+        "official, write, dataset, chart, video-start"
     ),
     "the machine": "workers, cluster, environments, processes, threads",
     "help": "help",

@@ -9,8 +9,10 @@ from care_sim.base.errors import shown
 
 
 class _Reading(NamedTuple):
-    """How the words after an option become a value: the words as help shows them, how many there
-    are, what makes the value of them, and what tells such a value from others.
+    """Convert the words after an option to a value.
+
+    `metavar` and `nargs` are the words in the help and their number. `value_of` makes the value,
+    and `is_value` recognises it.
     """
 
     metavar: str

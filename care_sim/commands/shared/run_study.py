@@ -68,13 +68,13 @@ def run_study(
     configs = [config.changed(key=config.digest(code)) for config in configs]
     kind = study.results
     check_columns(config.row() for config in configs)
-    # The folder is checked before it is locked, which would leave a file in it, and again after, in
-    # case that another process has written meanwhile.
     goes = f"Results go to {folder}: {counted(len(configs), kind.task)}"
     if not force and _is_finished(configs, folder, study):
         everything = f"{len(configs)} of {len(configs)} {kind.unit}"
         print_lines(goes, f"{everything} found in {folder}", file=sys.stderr)
         return []
+    # The folder is checked before it is locked, which would leave a file in it, and again after, in
+    # case that another process has written meanwhile.
     _check(folder, configs, study, force)
     with _journal(folder, study) as journal:
         journal.drop_unsound(configs, study.schema)

@@ -58,10 +58,10 @@ def _setting_of_episode(row: Row) -> Setting:
 
 
 @lru_cache
-def _condition_columns(names: tuple[str, ...]) -> list[str]:
-    """Columns that name a setting. Thousands of rows share the same `names`."""
+def _condition_columns(names: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the columns that name a setting. Thousands of rows share the same `names`."""
     kept = (name for name in names if name in _PLAIN or name.startswith("scenario."))
-    return [name for name in kept if name not in _AXES]
+    return tuple(name for name in kept if name not in _AXES)
 
 
 def _setting_of_play(row: Row) -> Setting:
@@ -113,8 +113,8 @@ def with_parameters(row: Row, kind: str) -> str:
 
 
 @lru_cache
-def _parameter_columns(names: tuple[str, ...], prefix: str) -> list[str]:
-    return [name for name in names if name.startswith(prefix)]
+def _parameter_columns(names: tuple[str, ...], prefix: str) -> tuple[str, ...]:
+    return tuple(name for name in names if name.startswith(prefix))
 
 
 def _text(value: Any) -> str:
