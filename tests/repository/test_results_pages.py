@@ -4,6 +4,7 @@ question, which begins with the answer.
 
 import re
 import shlex
+from collections import Counter
 
 import numpy as np
 import pytest
@@ -16,6 +17,8 @@ from care_sim.scenarios import make_scenario
 from care_sim.study.benchmark.made_by import processor_of
 from care_sim.study.benchmark.result_file import read_result
 from care_sim.study.benchmark.worlds import TESTS, published_worlds
+from care_sim.study.results_formats import EPISODES
+from care_sim.study.rows.parquet import read_rows
 from care_sim.training.sets import ROUNDS
 from tests.helpers.pages import RESULTS, links
 from tests.helpers.places import ROOT
@@ -167,3 +170,16 @@ def test_every_policy_is_on_the_leaderboard_or_its_page_says_why_not():
     entered = {one.entry.policy for one in entries}
     assert not without & entered
     assert without | entered == {*BUILT_IN}
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/index.md"])
+def test_the_first_page_counts_the_collisions_of_other_drives(page):
+    rows = read_rows(FOLDER / "validate-drive" / EPISODES.file)
+    rows = [row for row in rows if row["budget"] == 0.03]
+    seeds = {row["seed"] for row in rows if row["policy"] == "history"}
+    hits = Counter(row["policy"] for row in rows if row["seed"] in seeds and row["collision"])
+    told = (
+        f"In {len(seeds)} other drives, history collides in {hits['history']}, CARE in "
+        f"{hits['care']}, a fan straight ahead in {hits['fan']}."
+    )
+    assert told in " ".join((ROOT / page).read_text().split())
