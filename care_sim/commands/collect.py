@@ -25,10 +25,10 @@ from care_sim.study.run_config import MOST_TASKS
 
 @dataclass(frozen=True, kw_only=True)
 class Collect:
-    """Write a policy's episodes as a Minari dataset, for offline learning.
+    """Write a policy's episodes as a Minari dataset.
 
-    Every episode has a training seed. The dataset holds observations, actions, rewards, seeds and
-    the environment.
+    The dataset is for offline learning. It holds observations, actions, rewards, seeds and the
+    environment. Every episode has a training seed.
     """
 
     scenario: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCENARIO")]

@@ -63,7 +63,7 @@ def test_datasets_of_several_policies_are_put_in_one(capsys):
         ("care-sim/dense/care", (), "must be NAMESPACE/NAME-vNUMBER"),
         ("../care-v0", (), "must be NAMESPACE/NAME-vNUMBER"),
         ("c/care-v0", (), "the namespace of at least two characters"),
-        (DATASET, ("--episodes", "0"), "episodes must be a whole number >= 1, got 0"),
+        (DATASET, ("--episodes", "0"), "episodes must be a whole number >= 1 and <= 100000, got 0"),
         (DATASET, ("--policy", "nobody"), "unknown policy 'nobody'"),
     ],
 )
@@ -100,9 +100,9 @@ class Broken(care_sim.Policy):
 
 
 def test_a_policy_that_breaks_leaves_no_part_of_a_dataset(capsys, folder, tmp_path, monkeypatch):
-    (tmp_path / "broken.py").write_text(BROKEN)
+    (tmp_path / "breaks_late.py").write_text(BROKEN)
     monkeypatch.chdir(tmp_path)
-    code, _, err = collect(capsys, "--policy", "broken:Broken")
+    code, _, err = collect(capsys, "--policy", "breaks_late:Broken")
     assert code == 1
     assert "in the second episode" in err
     assert not [*folder.rglob("*.parquet")]

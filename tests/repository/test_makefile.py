@@ -11,9 +11,9 @@ from tests.helpers.places import ROOT
 
 
 def made(*arguments, **variables):
-    surroundings = {
-        name: value for name, value in os.environ.items() if not name.startswith(("MAKE", "MFLAGS"))
-    }
+    # A make that runs the tests hands down its flags, and the variables of its command line.
+    own = ("MAKE", "MFLAGS", "PYTHON", "VENV")
+    surroundings = {name: value for name, value in os.environ.items() if not name.startswith(own)}
     return subprocess.run(
         [shutil.which("make"), *arguments],
         cwd=ROOT,
