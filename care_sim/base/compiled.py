@@ -54,7 +54,7 @@ def lacks_code(kernel: Any) -> bool:
     kept = getattr(getattr(kernel, "_cache", None), "_cache_file", None)
     try:
         return kept is not None and not kept._load_index()
-    # Numba replaces a damaged index when it compiles.
+    # A damaged index is named by the first task that reads it.
     except (OSError, EOFError, pickle.UnpicklingError):
         return False
 

@@ -18,6 +18,12 @@ def _settle_caches() -> None:
     """Send the caches of this process, and of those that it starts, to a private temporary folder
     where the home folder cannot be written. The command `care-sim` says so in one line.
     """
+    given = os.environ.get("MPLCONFIGDIR")
+    if given and not _can_be_written(given):
+        # Matplotlib would complain with the whole name, and take a new folder at every start.
+        del os.environ["MPLCONFIGDIR"]
+        if is_command():
+            print("care-sim: MPLCONFIGDIR cannot be written, and is ignored", file=sys.stderr)
     home = os.path.expanduser("~")
     has_home = os.path.isabs(home)
     settled = {"XDG_CACHE_HOME", "MPLCONFIGDIR"} <= {*os.environ}
@@ -33,6 +39,16 @@ def _settle_caches() -> None:
     os.environ.setdefault("MPLCONFIGDIR", str(folder / "matplotlib"))
     if is_command():
         print(f"care-sim: no home folder to write to: caches go to {folder}", file=sys.stderr)
+
+
+def _can_be_written(folder: str) -> bool:
+    """Return True if a folder, or the nearest one above it that exists, can be written."""
+    path = Path(folder)
+    try:
+        nearest = next((each for each in (path, *path.parents) if each.exists()), path)
+        return nearest.is_dir() and os.access(nearest, os.W_OK)
+    except OSError:
+        return False
 
 
 def _private_folder() -> Path:

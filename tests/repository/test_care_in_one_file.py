@@ -28,7 +28,7 @@ def one_file():
 
 @pytest.fixture
 def detector_output(monkeypatch):
-    """What the LiDAR detector found, scan by scan."""
+    """Note the detections of the LiDAR, scan by scan."""
     found = []
     update = TrackMemory.update
 

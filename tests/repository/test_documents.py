@@ -54,6 +54,8 @@ settings 3, a learning rate of 0 up to 2.
 BLOCKS = [
     pytest.param(block, id=f"{name_of(page)}-{number}")
     for page in PAGES
+    # The policy of the README has a test of its own, which plays it.
+    if page != README
     for number, block in enumerate(fenced(page, "python"))
 ]
 LINES = [
@@ -81,7 +83,7 @@ def test_a_block_runs_on_its_own(block, tmp_path, drive, forked):
     (tmp_path / "results").symlink_to(ROOT / "results")
     done = forked.run(block, tmp_path)
     assert done.returncode == 0, done.stderr
-    assert done.stdout.strip() or "print(" not in block
+    assert done.stdout.strip()
 
 
 def understood(line):
@@ -269,7 +271,7 @@ def test_the_readme_is_read_in_three_minutes():
 
 def test_the_policy_of_the_readme_plays_with_its_command(tmp_path, forked):
     (block,) = fenced(README, "python")
-    assert len([line for line in block.splitlines() if line.strip()]) <= 12
+    assert len([line for line in block.splitlines() if line.strip()]) <= 10
     (tmp_path / "corridor.py").write_text(block)
     (line,) = (line for page, line in LINES if page == "README.md" and " run " in line)
     played = f"from care_sim import cli\ncli.main({shlex.split(line)[1:]})"

@@ -30,7 +30,7 @@ def official(folder, *arguments):
 
 
 def setup(folder, *arguments, **variables):
-    """What would be done to set up an environment that is not there."""
+    """Say how make would set up a missing environment."""
     return made("--dry-run", "setup", f"VENV={folder / 'environment'}", *arguments, **variables)
 
 

@@ -27,7 +27,7 @@ def test_a_function_lacks_code_until_it_is_called(tmp_path, monkeypatch):
     assert not lacks_code(doubled)
 
 
-def test_a_damaged_index_is_left_to_numba(tmp_path, monkeypatch):
+def test_a_damaged_index_is_no_reason_to_compile(tmp_path, monkeypatch):
     (tmp_path / "index.nbi").write_bytes(b"\x80")
     monkeypatch.setattr(doubled._cache._cache_file, "_index_path", str(tmp_path / "index.nbi"))
     assert not lacks_code(doubled)

@@ -39,8 +39,6 @@ NOTICES = (
     r"(calibration|held out) street \d+ of \d+",
     r"(street|drive|test) \d+ of \d+ *",
     r"the first take longer on a machine that has not played before: .*",
-    # Matplotlib names its own variable, and goes on without it.
-    r"mkdir -p failed for path .*",
 )
 """What a command may say on stderr about how far it is, beside lines of its own name."""
 OWN_SIGNATURE = re.compile(
