@@ -59,6 +59,7 @@ def processes(workers: int) -> Executor:
         [
             "care_sim.study.episodes_together",
             "care_sim.envs.closed_loop",
+            "care_sim.world.lane_driver",
             "care_sim.study.scene_play",
         ]
     )

@@ -144,4 +144,5 @@ def _plain_rows(given: Row) -> list[Row]:
         elif is_parameter(name) and name != "sensor":
             row[name] = value
     (plural,) = _SEEDS.keys() & given.keys()
-    return [with_tuples(row | {_SEEDS[plural]: seed}) for seed in given[plural]]
+    row = with_tuples(row)
+    return [row | {_SEEDS[plural]: seed} for seed in given[plural]]

@@ -18,12 +18,16 @@ _SEEDS = ("seed", "floor_seed")
 
 def asked_with(row: Row) -> Row:
     """The parameters of a row that differ from the defaults."""
+    asked = {
+        name: value
+        for name in _parameters(tuple(row))
+        if (value := row[name]) is not None and value != USUAL.get(name)
+    }
     # A row holds the digest of a file of camera detections. It counts only whether one was given,
     # so that the same command may replace its own rows after the file has changed.
-    given = {name: row[name] for name in _parameters(tuple(row)) if row[name] is not None}
-    if "camera_detections" in given:
-        given["camera_detections"] = True
-    return {name: value for name, value in given.items() if value != USUAL.get(name)}
+    if "camera_detections" in asked:
+        asked["camera_detections"] = True
+    return asked
 
 
 @lru_cache

@@ -17,7 +17,7 @@ MOST_MPS2 = 6.0
 GAINING_MPS2 = 3.0
 BRAKING_MPS2 = 5.0
 STANDING_GAP_M = 10.0
-"""From centre to centre."""
+"""From centre to centre, what an IDM driver leaves before what stands ahead."""
 TIME_GAP_S = 1.5
 EXPONENT = 4.0
 

@@ -6,18 +6,18 @@ the right.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from highway_env.road.road import Road, RoadNetwork
-from highway_env.utils import not_zero
-from highway_env.vehicle.behavior import IDMVehicle
-from highway_env.vehicle.kinematics import Vehicle
-from highway_env.vehicle.objects import Obstacle
 
 from care_sim.core.frames import Pose
 from care_sim.world.bodies import BodyKind
-from care_sim.world.lane_driver import LaneAlongX, LaneDriver, StraightVehicle
+from care_sim.world.lane_flow import STANDING_GAP_M
+
+# highway-env loads pandas and Matplotlib, half a second: functions import it, and only a world with
+# a road waits for it.
+if TYPE_CHECKING:
+    from highway_env.vehicle.kinematics import Vehicle
 
 _ROAD_LENGTH_M = 1000.0
 MAX_STEERING = np.deg2rad(35.0)
@@ -30,8 +30,6 @@ _DRAWS = np.random.RandomState(0)
 """highway-env's roads want a generator, and each makes one from the system's entropy where it is
 given none. Nothing here draws from it: neither vehicles nor behaviours are random.
 """
-STANDING_GAP_M = float(IDMVehicle.DISTANCE_WANTED)
-"""From centre to centre, what an IDM driver leaves before what stands ahead."""
 
 
 class LaneKeeper(NamedTuple):
@@ -59,6 +57,10 @@ class Traffic:
     def __init__(
         self, directions: Sequence[int], ego_lane: int, lane_width: float, speed_limit: float
     ):
+        from highway_env.road.road import Road, RoadNetwork
+
+        from care_sim.world.lane_driver import LaneAlongX
+
         # highway-env numbers the lanes of each direction apart, in the order in which they are
         # added; here all lanes have one numbering, from right to left.
         network = RoadNetwork()
@@ -79,7 +81,7 @@ class Traffic:
 
     def add_ego(self, x: float, speed: float, kind: BodyKind) -> "RoadVehicle":
         """The car with the sensors, in lane 0 at `x`; `RoadVehicle.accelerate` drives it."""
-        ego = self._make(StraightVehicle, x, 0, speed, kind)
+        ego = self._make(x, 0, speed, kind, decides=False)
         ego.enter()
         ego.forget_lane()
         return ego
@@ -89,7 +91,7 @@ class Traffic:
 
         It drives at `speed` m/s, and wants to.
         """
-        vehicle = self._make(LaneDriver, x, lane, speed, kind)
+        vehicle = self._make(x, lane, speed, kind)
         vehicle.enter()
         return vehicle
 
@@ -99,12 +101,14 @@ class Traffic:
         """An IDM driver who stands in `lane` until told to `pull_out`, and then wants
         `target_speed`.
         """
-        vehicle = self._make(LaneDriver, x, lane, target_speed, kind)
+        vehicle = self._make(x, lane, target_speed, kind)
         vehicle.stand()
         return vehicle
 
     def add_stop_line(self, x: float, lane: int) -> None:
         """Let drivers of `lane` come to rest with their centres at `x`, where they give way."""
+        from highway_env.vehicle.objects import Obstacle
+
         key = self.lane_key(lane)
         road_lane = self._road.network.get_lane(key)
         ahead = STANDING_GAP_M * (1 if road_lane.end[0] > road_lane.start[0] else -1)
@@ -118,7 +122,7 @@ class Traffic:
         """highway-env's index of a lane."""
         return self._lanes[self._ego_lane + lane]
 
-    def join(self, vehicle: Vehicle) -> None:
+    def join(self, vehicle: "Vehicle") -> None:
         """Put a vehicle on the road."""
         self._road.vehicles.append(vehicle)
 
@@ -142,8 +146,11 @@ class Traffic:
         self._road.step(dt)
 
     def _make(
-        self, model: type[Vehicle], x: float, lane: int, speed: float, kind: BodyKind
+        self, x: float, lane: int, speed: float, kind: BodyKind, decides: bool = True
     ) -> "RoadVehicle":
+        from care_sim.world.lane_driver import LaneDriver, StraightVehicle
+
+        model = LaneDriver if decides else StraightVehicle
         key = self.lane_key(lane)
         road_lane = self._road.network.get_lane(key)
         along = float(road_lane.local_coordinates(np.array([x, road_lane.start[1]]))[0])
@@ -160,7 +167,7 @@ class Traffic:
 class RoadVehicle:
     """One vehicle on the road, in the world frame."""
 
-    def __init__(self, vehicle: Vehicle, traffic: Traffic):
+    def __init__(self, vehicle: "Vehicle", traffic: Traffic):
         self._vehicle = vehicle
         self._traffic = traffic
 
@@ -184,21 +191,22 @@ class RoadVehicle:
         """rad/s: 0, since what asks for it, the ego, drives straight ahead."""
         return 0.0
 
-    def is_of(self, vehicle: Vehicle) -> bool:
+    def is_of(self, vehicle: "Vehicle") -> bool:
         """Whether it is this one of highway-env."""
         return self._vehicle is vehicle
 
     def keeping_lane(self, seconds: float) -> LaneKeeper | None:
         """What it goes by if it can do nothing for `seconds` but keep its lane, else None."""
+        from highway_env.utils import not_zero
+
         vehicle, lane = self._vehicle, self._vehicle.lane
         x, speed = float(vehicle.position[0]), float(vehicle.speed)
         # A driver looks for another lane 2.5 m before the end of its own. Who is faster than any
         # vehicle may be becomes slower.
         way = max(abs(speed), vehicle.MAX_SPEED + 1.0) * seconds
         stays = abs(x) + way < _ROAD_LENGTH_M - lane.VEHICLE_LENGTH
-        changes = isinstance(vehicle, LaneDriver) and (
-            vehicle.lane_index != vehicle.target_lane_index
-        )
+        # Drivers alone have a lane that they want to be in.
+        changes = vehicle.lane_index != getattr(vehicle, "target_lane_index", vehicle.lane_index)
         along_x = vehicle.heading == lane.heading == 0.0 and vehicle.position[1] == lane.start[1]
         if not stays or changes or not along_x:
             return None

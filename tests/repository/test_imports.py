@@ -53,12 +53,18 @@ def test_an_episode_loads_nothing_heavy_that_it_does_not_use(engine):
     assert "scipy.stats" not in loaded
 
 
-def test_the_package_alone_loads_neither_bullet_nor_traffic():
-    """They come with the first scenario, and would double the time of every command."""
-    line = "import sys, care_sim.cli; print(*sys.modules)"
+@pytest.mark.parametrize(
+    ("module", "unused"),
+    [
+        ("care_sim.cli", {"highway_env", "matplotlib", "pandas", "pybullet"}),
+        ("care_sim.commands.shared.run_study", {"highway_env", "pandas", "scipy.stats"}),
+    ],
+)
+def test_what_only_worlds_need_is_loaded_with_the_first_world(module, unused):
+    """It would double the time of every command that plays nothing, such as a report."""
+    line = f"import sys, {module}; print(*sys.modules)"
     told = subprocess.run([sys.executable, "-c", line], capture_output=True, text=True, check=True)
-    loaded = {name.partition(".")[0] for name in told.stdout.split()}
-    assert loaded & {"highway_env", "matplotlib", "pandas", "pybullet"} == set()
+    assert unused & {*told.stdout.split()} == set()
 
 
 def test_the_wrapper_that_records_loads_rerun_only_when_it_is_used():

@@ -1,10 +1,12 @@
 import numpy as np
 import pytest
 from highway_env.road.lane import StraightLane
+from highway_env.vehicle.behavior import IDMVehicle
+from highway_env.vehicle.kinematics import Vehicle
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from care_sim.world import traffic
+from care_sim.world import lane_driver, traffic
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.traffic import Traffic
 
@@ -140,9 +142,9 @@ def mixed():
 def as_highway_env_drives(monkeypatch, run):
     """What `run` gives on the vehicles and lanes of highway-env itself."""
     with monkeypatch.context() as patch:
-        patch.setattr(traffic, "LaneDriver", traffic.IDMVehicle)
-        patch.setattr(traffic, "StraightVehicle", traffic.Vehicle)
-        patch.setattr(traffic, "LaneAlongX", StraightLane)
+        patch.setattr(lane_driver, "LaneDriver", IDMVehicle)
+        patch.setattr(lane_driver, "StraightVehicle", Vehicle)
+        patch.setattr(lane_driver, "LaneAlongX", StraightLane)
         patch.setattr(traffic.RoadVehicle, "forget_lane", lambda vehicle: None)
         return run()
 
@@ -156,12 +158,12 @@ def test_all_vehicles_go_as_those_of_highway_env_to_the_last_bit(monkeypatch):
 def test_who_is_faster_than_any_vehicle_goes_as_in_highway_env(monkeypatch):
     def run():
         road = Traffic((1,), 0, 3.5, 14.0)
-        ego = road.add_ego(0.0, traffic.Vehicle.MAX_SPEED + 4.0, EGO)
+        ego = road.add_ego(0.0, Vehicle.MAX_SPEED + 4.0, EGO)
         poses = drive(road, 1.0, ego, ego=ego, acceleration=lambda time: 2.0)
         return ego.speed, poses.tobytes()
 
     speed, poses = run()
-    assert speed == pytest.approx(traffic.Vehicle.MAX_SPEED, abs=2.0)
+    assert speed == pytest.approx(Vehicle.MAX_SPEED, abs=2.0)
     assert (speed, poses) == as_highway_env_drives(monkeypatch, run)
 
 

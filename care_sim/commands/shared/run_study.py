@@ -10,7 +10,7 @@ from care_sim.base.errors import InvalidInput, counted, print_lines
 from care_sim.base.files import write_text
 from care_sim.commands.shared.folder_checks import check_journal, check_kind, check_results, lost
 from care_sim.reports.report import CONFIG, TABLES, StudyReport
-from care_sim.reports.studies import SWEEP
+from care_sim.reports.studies import SWEEP, study_of
 from care_sim.reports.study import Study
 from care_sim.study.executors import ExecutorFactory, processes
 from care_sim.study.journal import JOURNAL, Journal
@@ -18,12 +18,10 @@ from care_sim.study.progress import run_with_progress
 from care_sim.study.provenance import code_digest, machine, versions
 from care_sim.study.rows.parquet import (
     check_columns,
-    read_notes,
-    read_rows,
+    read_table,
     write_columns,
     write_rows,
 )
-from care_sim.study.rows.schema import TEXT, Schema, as_optional
 from care_sim.study.run_config import Row, RunConfig
 from care_sim.study.runner import Failure
 from care_sim.study.unfinished import UNFINISHED, Unfinished, forget
@@ -31,7 +29,6 @@ from care_sim.study.world_hash import check_worlds
 
 _MANY = 1000
 """Rows whose tables and figures take more than a second."""
-_DIGESTS = Schema(further={"digest": as_optional(TEXT)})
 
 
 def run_study(
@@ -67,12 +64,12 @@ def run_study(
     code = code_digest()
     configs = [config.changed(key=config.digest(code)) for config in configs]
     kind = study.results
-    check_columns(config.row() for config in configs)
     goes = f"Results go to {folder}: {counted(len(configs), kind.task)}"
     if not force and _is_finished(configs, folder, study):
         everything = f"{len(configs)} of {len(configs)} {kind.unit}"
         print_lines(goes, f"{everything} found in {folder}", file=sys.stderr)
         return []
+    check_columns(config.row() for config in configs)
     # The folder is checked before it is locked, which would leave a file in it, and again after, in
     # case that another process has written meanwhile.
     _check(folder, configs, study, force)
@@ -178,10 +175,10 @@ def _is_finished(configs: Sequence[RunConfig], folder: Path, study: Study) -> bo
     names = (CONFIG, TABLES, "tables.tex", kind.file, JOURNAL, *kind.further_files([]))
     if (folder / UNFINISHED).is_file() or not all((folder / name).is_file() for name in names):
         return False
-    if (read_notes(path)[0] or SWEEP.name) != study.name:
+    table = read_table(path)
+    if study_of(path) is not study or "digest" not in table.column_names:
         return False
-    keys = [config.key for config in configs]
-    return bool([row.get("digest") for row in read_rows(path, _DIGESTS)] == keys)
+    return bool(table["digest"].to_pylist() == [config.key for config in configs])
 
 
 def _write(

@@ -15,12 +15,11 @@ from care_sim.core.conditions import DEFAULTS, OF_BOTH_LOOPS
 from care_sim.evaluation.censoring import Reading
 from care_sim.evaluation.sightings import ANNOTATED
 from care_sim.policies import tags_of
-from care_sim.study.episode_config import PLAIN_FIELDS, EpisodeConfig
+from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.rows.settings import Setting
-from care_sim.study.run_config import Row
+from care_sim.study.run_config import CONDITION_NAMES, Row
 
-_AXES = ("scenario", "policy", "budget", "seed")
-_PLAIN = frozenset(PLAIN_FIELDS)
+_OF_A_SETTING = {*CONDITION_NAMES, "scenario", "sensor", "sensor_hash", "detector", "keyframe_s"}
 _USUAL_EPISODE = {field.name: field.default for field in fields(EpisodeConfig)}
 _USUAL_PLAY = {name: DEFAULTS[name] for name in OF_BOTH_LOOPS if name != "floor_seed"} | {
     "camera_detections": None,
@@ -39,13 +38,31 @@ def setting_of(row: Row) -> Setting:
     return _setting_of_play(row) if "source" in row else _setting_of_episode(row)
 
 
+# Thousands of rows share their columns, and their setting.
 def _setting_of_episode(row: Row) -> Setting:
+    names = _setting_columns(tuple(row))
+    return _setting_with(names, *[row[name] for name in names])
+
+
+@lru_cache
+def _setting_columns(names: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the columns that name a setting."""
+    return tuple(n for n in names if n in _OF_A_SETTING or n.startswith(("scenario.", "detector.")))
+
+
+# Typed, since 1, 1.0 and True are equal and not written the same.
+@lru_cache(typed=True)
+def _setting_with(names: tuple[str, ...], *values: Any) -> Setting:
+    """Return the setting of rows that hold these values."""
+    row = dict(zip(names, values, strict=True))
     # Parameters of a scenario have no default in _USUAL_EPISODE: one that was given names another
     # setting, whatever its value.
     changed = [
-        (n, row[n])
-        for n in _condition_columns(tuple(row))
-        if row[n] is not None and row[n] != _USUAL_EPISODE.get(n)
+        (n, value)
+        for n, value in row.items()
+        if (n in CONDITION_NAMES or n.startswith("scenario."))
+        and value is not None
+        and value != _USUAL_EPISODE.get(n)
     ]
     # Sorted, so that the order of columns in a file does not make another setting.
     conditions = sorted((n.removeprefix("scenario."), v) for n, v in changed)
@@ -55,13 +72,6 @@ def _setting_of_episode(row: Row) -> Setting:
     if row.get("detector") is not None:
         conditions.append(("detector", with_parameters(row, "detector")))
     return Setting(row["scenario"], tuple(conditions))
-
-
-@lru_cache
-def _condition_columns(names: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the columns that name a setting. Thousands of rows share the same `names`."""
-    kept = (name for name in names if name in _PLAIN or name.startswith("scenario."))
-    return tuple(name for name in kept if name not in _AXES)
 
 
 def _setting_of_play(row: Row) -> Setting:
