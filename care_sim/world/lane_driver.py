@@ -5,11 +5,22 @@ from functools import cached_property
 
 import numpy as np
 from highway_env.road.lane import StraightLane
+from highway_env.road.road import Road, RoadNetwork
 from highway_env.utils import not_zero
 from highway_env.vehicle.behavior import IDMVehicle
 from highway_env.vehicle.kinematics import Vehicle
 
 from care_sim.core.arrays import Floats
+
+_DRAWS = np.random.RandomState(0)
+"""highway-env's roads want a generator, and each makes one from the system's entropy where it is
+given none. Nothing here draws from it: neither vehicles nor behaviours are random.
+"""
+
+
+def empty_road() -> Road:
+    """A road without lanes."""
+    return Road(RoadNetwork(), np_random=_DRAWS)
 
 
 class LaneAlongX(StraightLane):  # type: ignore[misc]

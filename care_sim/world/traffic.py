@@ -26,10 +26,6 @@ sideways.
 """
 _NEAR_LANE_M = 1.0
 """What highway-env adds to either side of a lane to find who drives ahead in it."""
-_DRAWS = np.random.RandomState(0)
-"""highway-env's roads want a generator, and each makes one from the system's entropy where it is
-given none. Nothing here draws from it: neither vehicles nor behaviours are random.
-"""
 
 
 class LaneKeeper(NamedTuple):
@@ -57,13 +53,13 @@ class Traffic:
     def __init__(
         self, directions: Sequence[int], ego_lane: int, lane_width: float, speed_limit: float
     ):
-        from highway_env.road.road import Road, RoadNetwork
-
-        from care_sim.world.lane_driver import LaneAlongX
+        # The first import of highway-env: its modules import each other, and two threads that enter
+        # it at different ones get halves of it.
+        from care_sim.world.lane_driver import LaneAlongX, empty_road
 
         # highway-env numbers the lanes of each direction apart, in the order in which they are
         # added; here all lanes have one numbering, from right to left.
-        network = RoadNetwork()
+        self._road = empty_road()
         self._lanes: list[tuple[str, str, int]] = []
         counts = {1: 0, -1: 0}
         for number, direction in enumerate(directions):
@@ -71,13 +67,12 @@ class Traffic:
             ends = ([-_ROAD_LENGTH_M, y], [_ROAD_LENGTH_M, y])
             start, end = ends if direction > 0 else ends[::-1]
             nodes = ("a", "b") if direction > 0 else ("b", "a")
-            network.add_lane(
+            self._road.network.add_lane(
                 *nodes, LaneAlongX(start, end, width=lane_width, speed_limit=speed_limit)
             )
             self._lanes.append((*nodes, counts[direction]))
             counts[direction] += 1
         self._ego_lane = ego_lane
-        self._road = Road(network, np_random=_DRAWS)
 
     def add_ego(self, x: float, speed: float, kind: BodyKind) -> "RoadVehicle":
         """The car with the sensors, in lane 0 at `x`; `RoadVehicle.accelerate` drives it."""

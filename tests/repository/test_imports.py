@@ -85,3 +85,22 @@ def test_only_the_viewer_imports_rerun():
     ]
     assert importing
     assert {file.parent for file in importing} == {package / "viewer" / "recording"}
+
+
+THREADS = """
+import sys, threading
+from care_sim.world.traffic import Traffic
+sys.setswitchinterval(1e-5)
+begin = threading.Barrier(4)
+def build():
+    begin.wait()
+    Traffic((1,), 0, 3.5, 14.0).add_stop_line(10.0, 0)
+threads = [threading.Thread(target=build) for _ in range(4)]
+[each.start() for each in threads], [each.join() for each in threads]
+"""
+
+
+def test_threads_that_build_the_first_worlds_at_once_all_find_highway_env_whole():
+    """Its modules import each other: two threads that enter it at different ones get halves."""
+    done = subprocess.run([sys.executable, "-c", THREADS], capture_output=True, text=True)
+    assert done.stderr == ""
