@@ -14,9 +14,9 @@ import care_sim
 from care_sim.base.errors import InvalidInput, print_lines
 from care_sim.base.files import JSON, replacing
 from care_sim.commands.shared.play_options import PlayOptions
+from care_sim.sources.nuscenes.recordings import NuScenes
 from care_sim.sources.nuscenes.results_form import MODALITIES, result_boxes
 from care_sim.sources.nuscenes.table_files import JsonRow
-from care_sim.sources.recordings import NuScenes
 from care_sim.study.play_config import PlayConfig, play_grid
 from care_sim.study.scene_play import play_through_film
 

@@ -51,9 +51,9 @@ class ReplayEnv(FilmEnv):
     `source` names the recordings, `argoverse2:FOLDER`, `nuscenes:FOLDER` or a source of your own
     (`care_sim.sources.named`), and `scene` one of their scenes by name; the first, unless given.
     `split`, `version`, `camera_detections` and `sweeps` are those of
-    `care_sim.sources.recordings.NuScenes`. A file that is missing or damaged, or a token that
-    points nowhere, raises `care_sim.InvalidInput` with its name. The seed of `reset` draws faults,
-    noise and floor.
+    `care_sim.sources.nuscenes.recordings.NuScenes`. A file that is missing or damaged, or a token
+    that points nowhere, raises `care_sim.InvalidInput` with its name. The seed of `reset` draws
+    faults, noise and floor.
     """
 
     __doc__ = f"{__doc__}\n    {OpenLoopEnv.__doc__}"

@@ -17,7 +17,8 @@ from care_sim.base.plugins import Plugins, dataclass_faults
 from care_sim.core.return_settings import RAYS, FilmedReturns
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.loops.film import Film
-from care_sim.sources.recordings import RECORDING_KINDS, Recordings, recordings_in
+from care_sim.sources.kinds import RECORDING_KINDS, recordings_in
+from care_sim.sources.recordings import Recordings
 from care_sim.sources.scenes import Generated, Recorded, Scene, Source, Streets
 
 

@@ -13,14 +13,14 @@ from care_sim.base.plugins import is_place
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.sensors.setups import DEFAULT_SETUP
 from care_sim.sources.installed import SOURCES, Installed
-from care_sim.sources.recordings import RECORDING_KINDS, recordings
+from care_sim.sources.kinds import RECORDING_KINDS, recordings
 from care_sim.sources.scenes import SPLITS, Recorded, Source, Streets
 
 
 def source_of(text: str, **options: object) -> Source:
     """The source that a text names: `streets`, `argoverse2:FOLDER`, `nuscenes:FOLDER`, or one of
     another package, with `options` of its kind (`split`, and those of
-    `care_sim.sources.recordings.NuScenes`); those that are None are not given.
+    `care_sim.sources.nuscenes.recordings.NuScenes`); those that are None are not given.
 
     Raises InvalidInput for another text, a folder that is none, an option that the kind does not
     have, a source that cannot be loaded.

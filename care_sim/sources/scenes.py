@@ -9,14 +9,14 @@ from pathlib import Path
 from typing import Any, ClassVar, NamedTuple, Protocol
 
 from care_sim.base.checks import check_known
-from care_sim.base.digests import Stamp, data_digest, file_digest, file_stamp, files_below
+from care_sim.base.digests import Stamp, data_digest, file_stamp, files_below
 from care_sim.base.errors import InvalidInput, shortened
 from care_sim.core.return_settings import RAYS, FilmedReturns, changed_settings
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.loops.film import Film
 from care_sim.sensors.setups import DEFAULT_SETUP, sensor_columns, sensor_setup
 from care_sim.sources.film_checks import check_film
-from care_sim.sources.recordings import NuScenes, Recordings
+from care_sim.sources.recordings import Recordings
 from care_sim.sources.street_films import check_filmed, record
 from care_sim.streets.street import (
     CALIBRATION_SEEDS,
@@ -148,8 +148,12 @@ class Streets(Generated):
 class Recorded:
     """Scenes of recordings, whose cameras and mounts are their own."""
 
-    sensor = DEFAULT_SETUP
     recordings: Recordings
+
+    @property
+    def sensor(self) -> str | SensorSetup:
+        """That of the recordings."""
+        return self.recordings.setup
 
     @property
     def kind(self) -> str:
@@ -182,20 +186,10 @@ class Recorded:
         return self.recordings.files(scene.name)
 
     def row(self, scene: Scene) -> dict[str, Any]:
-        """The kind, the hash of the scene's files, that of the camera detections where there are
-        some, and the number of sweeps where it is not one.
-        """
-        own: dict[str, Any] = {
-            "source": self.kind,
-            "recording": data_digest(self.files(scene)),
-        }
-        if not isinstance(self.recordings, NuScenes):
-            return own
-        if self.recordings.camera_detections:
-            own["camera_detections"] = file_digest(self.recordings.camera_detections)
-        if self.recordings.sweeps > 1:
-            own["sweeps"] = self.recordings.sweeps
-        return own
+        """The kind, the hash of the scene's files, and how they are read."""
+        recording = data_digest(self.files(scene))
+        own = {"source": self.kind, "recording": recording}
+        return own | sensor_columns(self.sensor) | self.recordings.columns()
 
 
 LONGEST_NUMBER = 40

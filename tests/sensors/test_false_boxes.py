@@ -23,8 +23,8 @@ from care_sim.sensors.camera import FRONT_CAMERA, CameraDetector
 from care_sim.sensors.false_boxes import MOST_DRAWS, FalseBoxes
 from care_sim.sensors.surround import SURROUND_CAMERAS
 from care_sim.sources.argoverse2 import films as argoverse2
+from care_sim.sources.kinds import recordings
 from care_sim.sources.nuscenes.cameras import CAMERA_CHANNELS
-from care_sim.sources.recordings import recordings
 from care_sim.sources.street_films import record
 from care_sim.streets.street import make_street
 from care_sim.world import bullet_clients as clients

@@ -7,7 +7,7 @@ from time import process_time
 
 import pytest
 
-from care_sim.sources.recordings import NuScenes
+from care_sim.sources.nuscenes.recordings import NuScenes
 from tests.helpers.nuscenes_tables_of_size import BOXES, SAMPLES, TRAINVAL_SCENES, write_tables
 from tests.helpers.places import ROOT
 
@@ -18,7 +18,7 @@ LOAD = """
 import json, sys
 from pathlib import Path
 from time import perf_counter, process_time
-from care_sim.sources.recordings import NuScenes
+from care_sim.sources.nuscenes.recordings import NuScenes
 from care_sim.study.episode_play import peak_rss_mb
 
 start, busy = perf_counter(), process_time()

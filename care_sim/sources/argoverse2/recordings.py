@@ -1,0 +1,39 @@
+"""Folders of Argoverse 2 sensor logs."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from care_sim.base.checks import check_known
+from care_sim.base.errors import InvalidInput
+from care_sim.loops.film import Film
+from care_sim.sources.argoverse2.films import argoverse2_film, logs
+from care_sim.sources.argoverse2.tables import POSE_FILE, annotation_file
+from care_sim.sources.recordings import Recordings
+
+
+@dataclass(frozen=True)
+class Argoverse2(Recordings):
+    """Argoverse 2 sensor logs; a scene is a log."""
+
+    kind = "argoverse2"
+
+    def scenes(self) -> list[str]:
+        """The names of the log folders."""
+        return list(self._logs())
+
+    def film(self, scene: str) -> Film:
+        """See `care_sim.sources.argoverse2.films.argoverse2_film`."""
+        known = self._logs()
+        check_known(f"log in {self.folder}", scene, known)
+        return argoverse2_film(known[scene])
+
+    def files(self, scene: str) -> list[Path]:
+        """Poses and annotations."""
+        log = self._logs().get(scene, self.folder / scene)
+        try:
+            return [log / POSE_FILE, annotation_file(log)]
+        except InvalidInput:  # `film` refuses the scene
+            return [log / POSE_FILE]
+
+    def _logs(self) -> dict[str, Path]:
+        return {log.name: log for log in logs(self.folder)}

@@ -1,0 +1,51 @@
+"""The kinds of recordings, and recordings by a text, such as `argoverse2:FOLDER`."""
+
+import os
+from collections.abc import Mapping
+from dataclasses import fields
+from pathlib import Path
+
+from care_sim.base.checks import check_path
+from care_sim.base.errors import InvalidInput, shown
+from care_sim.sources.argoverse2.recordings import Argoverse2
+from care_sim.sources.nuscenes.recordings import NuScenes
+from care_sim.sources.recordings import Recordings
+
+RECORDING_KINDS: dict[str, type[Recordings]] = {made.kind: made for made in (Argoverse2, NuScenes)}
+
+
+def recordings(text: str, options: Mapping[str, object] | None = None) -> Recordings:
+    """The recordings that a text `KIND:FOLDER` names, with the `options` of its kind; those that
+    are None are not given. Raises InvalidInput for another text, a folder that is none, an option
+    that the kind does not have.
+    """
+    kind, colon, folder = text.partition(":") if isinstance(text, str) else ("", "", "")
+    if not (colon and folder) or kind not in RECORDING_KINDS:
+        known = ", ".join(f"{name}:FOLDER" for name in RECORDING_KINDS)
+        raise InvalidInput(
+            f"source must be {known}, or one of your own, MODULE:CLASS, got {shown(text)}"
+        )
+    return recordings_in(RECORDING_KINDS[kind], kind, folder, options or {})
+
+
+def recordings_in(
+    kind: type[Recordings], name: str, folder: str, options: Mapping[str, object]
+) -> Recordings:
+    """The recordings of a kind, called by `name`, in a folder, with those of the `options` that are
+    not None. Raises InvalidInput for a folder that is none, an option that the kind does not have.
+    """
+    check_path("source", folder)
+    folder = os.path.expanduser(folder)
+    if not os.path.isdir(folder):
+        raise InvalidInput(f"source {name}:{folder}: {folder} is no folder")
+    given = {name: value for name, value in options.items() if value is not None}
+    for option in given:
+        if option not in {field.name for field in fields(kind)}:
+            raise InvalidInput(f"{option} has no meaning for {name} recordings")
+    if "camera_detections" in given:
+        check_path("camera_detections", given["camera_detections"])
+        given["camera_detections"] = Path(os.path.expanduser(str(given["camera_detections"])))
+    for option in {"split", "version"} & set(given):
+        if not isinstance(given[option], str):
+            raise InvalidInput(f"{option} must be a name, got {shown(given[option])}")
+    return kind(Path(folder), **given)
