@@ -23,6 +23,8 @@ MAP_M: ValueRange = (-1e8, 1e8)
 """x, y and z in a map: more than twice round the Earth, and yet a float tells a micrometre."""
 MOUNT_M: ValueRange = (-100.0, 100.0)
 """x, y and z of a sensor in its car, which may be a road train."""
+REACH_M: ValueRange = (-500.0, 500.0)
+"""x, y and z of a point from its sensor: farther than any LiDAR reaches."""
 STAMPS_NS: ValueRange = (0, 2**62)
 """Nanoseconds since 1970, until 2116: differences stay within 64 bits."""
 LONGEST_S = 86_400

@@ -1,9 +1,10 @@
-"""Argoverse 2 sensor logs as films: annotated boxes and car poses become bodies, and rays are cast
-at them.
+"""Argoverse 2 sensor logs as films: of recorded sweeps, or of annotated boxes that become bodies,
+at which rays are cast.
 
 Wilson et al. 2021, "Argoverse 2: Next Generation Datasets for Self-Driving Perception and
 Forecasting"; the layout and the taxonomy are those of its Sensor Dataset guide. A log folder needs
-`city_SE3_egovehicle.feather` and one `annotations*.feather`; its sensor recordings are not used.
+`city_SE3_egovehicle.feather` and one `annotations*.feather`. Its sweeps are used if it holds one of
+every keyframe (`sensors/lidar/TIMESTAMP.feather`). Pictures are those of the boxes in any case.
 
 Boxes without a recorded LiDAR point inside are left out, as the official evaluation leaves them
 out: nobody saw those objects there. Those of the first keyframe are in `Film.hidden`, since the
@@ -16,6 +17,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from care_sim.base.checks import check_known
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Integers
 from care_sim.core.frames import Frame
@@ -32,11 +34,14 @@ from care_sim.sources.argoverse2.tables import (
     TURN,
     annotation_file,
     read_boxes,
+    read_points,
     read_poses,
     table,
 )
 from care_sim.sources.boxes_as_bodies import AnnotatedBody, annotations_of, sense
 from care_sim.sources.car_motion import SPAN_S, motions
+from care_sim.sources.film_checks import report_once
+from care_sim.sources.nuscenes.sweeps import recorded_cloud
 
 UP_LIDAR = (1.35, 0.0, 1.64)
 """Metres in the car's frame: `up_lidar` in the calibration of the Sensor Dataset guide."""
@@ -46,25 +51,32 @@ wheels' radius, and where the returns of a recorded sweep lie within 10 m."""
 ARGOVERSE2_SENSOR_HEIGHT_M = UP_LIDAR[2] + CAR_FRAME_HEIGHT_M
 ARGOVERSE2_KEYFRAME_S = 0.5
 NANOSECONDS = 10**9
+LABELLED_SPLITS = ("train", "val")
+"""Folders of the official download whose logs are annotated; those of `test` are not."""
 HALF_SWEEP_NS = NANOSECONDS // 20
 """Annotations come at 10 Hz. The nearest is at most this far from a moment, unless a sweep holds
 none.
 """
 
 
-def logs(folder: Path) -> list[Path]:
-    """The log folders in a folder, by name; a folder that is itself a log is the only one.
+def logs(folder: Path, split: str | None = None) -> list[Path]:
+    """The log folders in a folder, by name; a folder that is itself a log is the only one. Without
+    any, those in its folders `train` and `val`; of a `split`, those in the folder of that name.
 
     Raises InvalidInput where there is none.
     """
     # Absolute, since a log is called by its folder: `.` has no name.
     folder = Path(os.path.abspath(folder))
-    found = [path for path in (folder, *sorted(folder.glob("*"))) if _is_log(path)]
-    if not found:
-        raise InvalidInput(
-            f"{folder}: no Argoverse 2 log (a folder with {POSE_FILE} and {ANNOTATION_FILES})"
-        )
-    return found[:1] if found[0] == folder else found
+    if split is not None:
+        check_known(f"split in {folder}", split, {path.name for path in folder.glob("*/")})
+        folder = folder / split
+    below = [log for name in LABELLED_SPLITS for log in sorted((folder / name).glob("*"))]
+    for places in ([folder], sorted(folder.glob("*")), below):
+        if found := [path for path in places if _is_log(path)]:
+            return found
+    raise InvalidInput(
+        f"{folder}: no Argoverse 2 log (a folder with {POSE_FILE} and {ANNOTATION_FILES})"
+    )
 
 
 def argoverse2_film(log: Path, grid: AngularGrid | None = None) -> Film:
@@ -84,6 +96,12 @@ def argoverse2_film(log: Path, grid: AngularGrid | None = None) -> Film:
             f"{pose_file}: no pose for the timestamp {without_pose[0]} of {boxes_file.name}"
         )
     keyframes = _keyframes(sweeps, poses["timestamp_ns"])
+    recorded = _sweep_files(log, keyframes)
+    if recorded and len(recorded) < len(keyframes):
+        report_once(
+            f"{log.name}: {len(recorded)} of {len(keyframes)} keyframes have a sweep, so rays are "
+            "cast at the boxes of all"
+        )
     # The car's motion is fitted to all annotated moments, the film is made of the keyframes. An
     # earlier pose gives the first keyframe a past.
     before = poses["timestamp_ns"][poses["timestamp_ns"] < sweeps[0]]
@@ -93,13 +111,26 @@ def argoverse2_film(log: Path, grid: AngularGrid | None = None) -> Film:
     times = (moments - keyframes[0]) / NANOSECONDS
     egos = motions(times, cars)
     grid = grid or AngularGrid()
-    shots = []
+    shots: list[Shot] = []
     for row in np.searchsorted(moments, keyframes).tolist():
         sensor = cars[row].holding(np.array(UP_LIDAR))
-        seen = sense(
+        annotations, pictures, cloud = sense(
             _bodies(_rows(boxes, moments[row], seen=True)), sensor, ARGOVERSE2_SENSOR_HEIGHT_M, grid
         )
-        shots.append(Shot(float(times[row]), str(moments[row]), sensor, egos[row], *seen))
+        if len(recorded) == len(keyframes):
+            points = read_points(recorded[len(shots)])
+            cloud = recorded_cloud(points - UP_LIDAR, grid, annotations, sensor)
+        shots.append(
+            Shot(
+                float(times[row]),
+                str(moments[row]),
+                sensor,
+                egos[row],
+                annotations,
+                pictures,
+                cloud,
+            )
+        )
     unseen = _bodies(_rows(boxes, keyframes[0], seen=False))
     hidden = annotations_of([body for body in unseen if body.label is not None])
     return Film(
@@ -111,6 +142,23 @@ def argoverse2_film(log: Path, grid: AngularGrid | None = None) -> Film:
         hidden,
         grid,
     )
+
+
+def sweep_files(log: Path) -> list[Path]:
+    """Return the recorded sweeps that the film of a log is made of; none unless every keyframe has
+    one. Raises InvalidInput for tables that cannot be read.
+    """
+    keyframes = _keyframes(
+        read_boxes(annotation_file(log))[0], read_poses(log / POSE_FILE)["timestamp_ns"]
+    )
+    found = _sweep_files(log, keyframes)
+    return found if len(found) == len(keyframes) else []
+
+
+def _sweep_files(log: Path, keyframes: Integers) -> list[Path]:
+    """Those that there are."""
+    files = [log / "sensors" / "lidar" / f"{stamp}.feather" for stamp in keyframes.tolist()]
+    return [file for file in files if file.is_file()]
 
 
 def _is_log(path: Path) -> bool:

@@ -1,21 +1,26 @@
 """Folders of Argoverse 2 sensor logs."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 from care_sim.base.checks import check_known
+from care_sim.base.digests import Stamp, file_stamp
 from care_sim.base.errors import InvalidInput
 from care_sim.loops.film import Film
-from care_sim.sources.argoverse2.films import argoverse2_film, logs
+from care_sim.sources.argoverse2.films import argoverse2_film, logs, sweep_files
 from care_sim.sources.argoverse2.tables import POSE_FILE, annotation_file
 from care_sim.sources.recordings import Recordings
 
 
 @dataclass(frozen=True)
 class Argoverse2(Recordings):
-    """Argoverse 2 sensor logs; a scene is a log."""
+    """Argoverse 2 sensor logs; a scene is a log. Of a download, those in its folder `split`; in
+    `train` and `val` unless it is given.
+    """
 
     kind = "argoverse2"
+    split: str | None = None
 
     def scenes(self) -> list[str]:
         """The names of the log folders."""
@@ -28,12 +33,20 @@ class Argoverse2(Recordings):
         return argoverse2_film(known[scene])
 
     def files(self, scene: str) -> list[Path]:
-        """Poses and annotations."""
+        """Poses, annotations, and the sweeps where all that the film needs are there."""
         log = self._logs().get(scene, self.folder / scene)
         try:
-            return [log / POSE_FILE, annotation_file(log)]
+            tables = (log / POSE_FILE, annotation_file(log))
+            return [*tables, *_sweep_files(log, tuple(map(file_stamp, tables)))]
         except InvalidInput:  # `film` refuses the scene
             return [log / POSE_FILE]
 
     def _logs(self) -> dict[str, Path]:
-        return {log.name: log for log in logs(self.folder)}
+        return {log.name: log for log in logs(self.folder, self.split)}
+
+
+# Tables are read once for all plays of a log, until one of them changes. Sweeps that are added
+# later are found in a new process.
+@lru_cache(maxsize=1000)
+def _sweep_files(log: Path, _stamps: tuple[Stamp, ...]) -> tuple[Path, ...]:
+    return tuple(sweep_files(log))

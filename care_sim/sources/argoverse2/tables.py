@@ -12,6 +12,7 @@ from care_sim.sources.argoverse2.feather import Columns, read_columns
 from care_sim.sources.plausible import (
     AWAY_M,
     MAP_M,
+    REACH_M,
     SIZES_M,
     STAMPS_NS,
     check_span,
@@ -147,6 +148,18 @@ def read_poses(path: Path) -> Columns:
         raise InvalidInput(f"{path}: the pose at {stamps[fault[0]]} has {fault[1]}")
     order = np.argsort(stamps)
     return {name: column[order] for name, column in poses.items()}
+
+
+def read_points(path: Path) -> Floats:
+    """(n, 3) the points of a sweep in the frame of the car, corrected for its motion.
+
+    Raises InvalidInput for a file that is missing, truncated or incomplete, or a point beyond the
+    reach of any LiDAR.
+    """
+    names = ("x", "y", "z")
+    return table(
+        read_columns(path, dict.fromkeys(names, float), dict.fromkeys(names, REACH_M)), names
+    )
 
 
 def _seen(boxes: Columns, row: int) -> str:
