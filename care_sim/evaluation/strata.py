@@ -2,7 +2,8 @@
 
 The paper stratifies by range and azimuth. Class and `entry` are ours. `entry` is how an object came
 within the range R that is scored, told by where the film first shows it. On a street that is where
-a return or a camera pixel first does, in a recording where its box first holds a recorded point:
+a return or a camera pixel first does, in a recording where its box first holds a point, or without
+points where it is first labelled:
 
 - `emergence`: nearer than R less `RING_WIDTH_M`, presumably out from behind a body;
 - `ring`: from there to R, presumably over the edge of the range;
@@ -34,6 +35,10 @@ keyframe of 0.5 s.
 ENTRY = "entry"
 ENTRIES = EMERGENCE, RING, BEYOND, AT_START = ("emergence", "ring", "beyond", "at start")
 """The kind of strata by how an object came within range, and its strata; see above."""
+EMERGING, ENTERING = "emerging", "entering"
+NEWCOMERS = {EMERGING: (EMERGENCE,), ENTERING: (RING, BEYOND)}
+"""The two kinds of newcomers by their entries: who comes out from behind something near, and who
+merely comes within range. Every table of first sightings shows them apart."""
 SCENE_THIRDS = ("sparse", "middle", "dense")
 
 

@@ -6,8 +6,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from care_sim.base.errors import percent
+from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, TTFD
 from care_sim.reports.formatting import interval, marked, tag_notes
-from care_sim.reports.protocol.differences import RATIOS, MeasuredDifference, PolicyPair
+from care_sim.reports.protocol.differences import MeasuredDifference, PolicyPair
 from care_sim.reports.protocol.formatting import PAPER, claims_of_paper
 from care_sim.reports.protocol.notes import (
     UNITS_OF_DIFFERENCES,
@@ -89,12 +90,14 @@ def _contrasts(
     plays: SettingPlays, base: str, equal_scenes: bool, base_first: bool
 ) -> Iterator[_ContrastLine]:
     """The base less each of the others, or each of the others less the base."""
-    for ratio in RATIOS:
+    kinds = () if equal_scenes else [kind for kind, count in plays.newcomers.items() if count]
+    first_sightings = [(FIRST_SIGHTING, kind) for kind in ("", *kinds)]
+    for ratio, within in (*first_sightings, (OVERALL, ""), (TTFD, "")):
         for policy in plays.other_than(base):
             # A positive difference speaks for the policy under test: for the base that stands
             # first, for the others against history.
             first, second = (base, policy) if base_first else (policy, base)
-            pair = PolicyPair(first, second, ratio, equal_scenes=equal_scenes)
+            pair = PolicyPair(first, second, ratio, within, equal_scenes)
             yield _ContrastLine(
                 policy, pair, [pair.measured(plays, budget) for budget in plays.budgets]
             )

@@ -107,8 +107,8 @@ class Comparison(Protocol):
 
 @dataclass(frozen=True)
 class PolicyPair:
-    """`first` less `second`, of all or `within` one stratum; with `equal_scenes` every scene
-    weighs the same.
+    """`first` less `second`, of all or `within` a stratum or a kind of newcomers; with
+    `equal_scenes` every scene weighs the same.
     """
 
     first: str
@@ -120,7 +120,7 @@ class PolicyPair:
     @property
     def heading(self) -> str:
         """The measure, the stratum, the weights."""
-        within = [self.within.partition("/")[2]] if self.within else []
+        within = [self.within.rpartition("/")[2]] if self.within else []
         return ", ".join(
             [HEADINGS[self.ratio], *within, *(["equal scenes"] if self.equal_scenes else [])]
         )

@@ -24,7 +24,7 @@ _TOLD = {
 }
 ENTRY_NOTE = (
     "Entry: by where the film first shows the object (streets: a return or a camera pixel; "
-    "recordings: a recorded point in its box). "
+    "recordings: a point in its box, or without points its first label). "
     + "; ".join(f"{entry}: {told}" for entry, told in _TOLD.items())
     + f"; {AT_START}: present at scene start, no event."
 )

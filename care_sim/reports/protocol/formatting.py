@@ -23,11 +23,14 @@ def written(ratio: Ratio, value: float | None) -> str:
 
 def level_of_paper(said: PublishedLevel) -> tuple[str, ...]:
     """The paper's levels of a policy, in the order of the columns: recall and share of the full
-    scan's, which it gives without an interval, of first sightings and of all; TTFD.
+    scan's, which it gives without an interval, of first sightings, not told apart by kind, and of
+    all; TTFD.
     """
     return (
         written(FIRST_SIGHTING, said.first),
         rounded(said.first_of_full),
+        "",
+        "",
         "",
         written(OVERALL, said.overall),
         rounded(said.overall_of_full),

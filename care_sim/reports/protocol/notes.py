@@ -39,8 +39,10 @@ def played(plays: SettingPlays) -> str:
     seeds = {
         len(plays.seeds(policy, budget)) for policy in plays.policies for budget in plays.budgets
     }
+    kinds = ", ".join(f"{count:,.0f} {kind}" for kind, count in plays.newcomers.items())
     return (
-        f"{counted(len(plays.scenes), 'scene')}, {total.events:,.0f} events, {total.frames:,.0f} "
+        f"{counted(len(plays.scenes), 'scene')}, {total.events:,.0f} events"
+        f"{f' ({kinds})' if kinds else ''}, {total.frames:,.0f} "
         f"object frames; {counted(max(seeds, default=0), 'floor seed')}, averaged per "
         f"scene.{by_both_counts(plays.scenes.values())}"
     )

@@ -13,6 +13,7 @@ from care_sim.core.return_settings import RETURN_SETTINGS
 from care_sim.evaluation.allocation_differences import AllocationDifference
 from care_sim.evaluation.recall import Tally
 from care_sim.evaluation.scene_contrasts import (
+    FIRST_SIGHTING,
     Ratio,
     RatioLevel,
     SceneShare,
@@ -21,7 +22,7 @@ from care_sim.evaluation.scene_contrasts import (
     ratio_level,
     scene_share,
 )
-from care_sim.evaluation.strata import thirds
+from care_sim.evaluation.strata import ENTRY, NEWCOMERS, thirds
 from care_sim.study.rows.reading import policy_of, setting_of, tags_of_row
 from care_sim.study.rows.settings import Setting
 from care_sim.study.run_config import FULL, REFERENCE, Row
@@ -77,7 +78,9 @@ class SettingPlays:
         return self.full if policy == FULL else self._groups.get((policy, budget), ())
 
     def seeds(self, policy: str, budget: float, within: str = "") -> list[Tallies]:
-        """The tallies of every floor seed, of all or of one stratum ("range/below 20 m")."""
+        """The tallies of every floor seed, of all, of one stratum ("range/below 20 m"), or of
+        one kind of newcomers ("emerging").
+        """
         seeds: dict[int, dict[str, Tally]] = {}
         for row in self.rows(policy, budget):
             seeds.setdefault(row["floor_seed"], {})[row["scene"]] = _tally(row, within)
@@ -142,6 +145,13 @@ class SettingPlays:
         """The labels of the strata by kind, of the kinds that all rows have."""
         return self._strata
 
+    @property
+    def newcomers(self) -> dict[str, float]:
+        """The events of each of the two kinds of newcomers; none where rows do not tell."""
+        if ENTRY not in self._strata:
+            return {}
+        return {kind: self.counted(FIRST_SIGHTING, kind) for kind in NEWCOMERS}
+
     def counted(self, ratio: Ratio, within: str = "") -> float:
         """How many events or object frames a measure is of, in all scenes."""
         return sum(ratio.denominator(_tally(row, within)) for row in self.scenes.values())
@@ -194,6 +204,9 @@ def _check_films(rows: Sequence[Row]) -> None:
 
 
 def _tally(row: Row, within: str) -> Tally:
+    if within in NEWCOMERS:
+        entries = (_tally(row, f"{ENTRY}/{entry}") for entry in NEWCOMERS[within])
+        return sum(entries, Tally())
     # Columns of a stratum are named KIND/STRATUM/FIELD, those of all events by the field alone.
     prefix = f"{within}/" if within else ""
     return Tally(*(row[f"{prefix}{column}"] for column in _COLUMNS))

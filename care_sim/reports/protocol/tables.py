@@ -11,6 +11,7 @@ from care_sim.evaluation.scene_contrasts import (
     among,
     ratio_level,
 )
+from care_sim.evaluation.strata import NEWCOMERS
 from care_sim.reports.formatting import marked, tag_notes
 from care_sim.reports.protocol.contrasts import protocol_contrast_tables
 from care_sim.reports.protocol.controls import control_tables
@@ -37,6 +38,8 @@ _LEVEL_COLUMNS = (
     "first sightings %",
     "of full %",
     "interval",
+    "emerging %",
+    "entering %",
     "overall %",
     "of full %",
     "interval",
@@ -50,6 +53,8 @@ _LEVEL_COLUMNS = (
 )
 _OF_FULL = ("of full %", "interval")
 """Columns of a setting in which the full scan was played."""
+_KINDS = tuple(f"{kind} %" for kind in NEWCOMERS)
+"""Columns of rows that tell how newcomers entered."""
 _DETAILS = tuple(name for name in _LEVEL_COLUMNS if ": " in name or name == "scenes")
 """Columns of which the paper says nothing."""
 _LEVEL_FILES_ONLY = ("interval", *_DETAILS)
@@ -79,7 +84,8 @@ def levels_tables(plays: SettingPlays) -> list[Table]:
     budgeted = ((policy, budget) for budget in plays.budgets for policy in plays.policies)
     keys = [key for key in (*budgeted, *ceiling) if plays.rows(*key)]
     lines = [line for key in keys for line in _level_lines(plays, *key)]
-    kept = [n for n, name in enumerate(_LEVEL_COLUMNS) if plays.full or name not in _OF_FULL]
+    missing = (*(() if plays.full else _OF_FULL), *(() if plays.newcomers else _KINDS))
+    kept = [n for n, name in enumerate(_LEVEL_COLUMNS) if name not in missing]
     return [
         Table(
             f"{plays.setting.label}: levels",
@@ -104,6 +110,7 @@ def _level_lines(plays: SettingPlays, policy: str, budget: float) -> list[tuple[
         written(FIRST_SIGHTING, first.by_event),
         share(first_share),
         share_ends(first_share),
+        *(_of_kind(plays, kind, policy, budget) for kind in NEWCOMERS),
         written(OVERALL, overall.by_event),
         share(overall_share),
         share_ends(overall_share),
@@ -119,6 +126,12 @@ def _level_lines(plays: SettingPlays, policy: str, budget: float) -> list[tuple[
     if said is None:
         return [line]
     return [line, ("", PAPER, *level_of_paper(said), *("" for _ in _DETAILS))]
+
+
+def _of_kind(plays: SettingPlays, kind: str, policy: str, budget: float) -> str:
+    if not plays.newcomers:
+        return ""
+    return written(FIRST_SIGHTING, plays.level(FIRST_SIGHTING, policy, budget, kind).by_event)
 
 
 def _deviation(plays: SettingPlays, ratio: Ratio, policy: str, budget: float) -> str:

@@ -98,7 +98,8 @@ def test_the_notes_tell_the_events_by_both_counts_where_the_rows_do():
         return next(note for note in tables(rows)[CONTRASTS].notes if "events" in note)
 
     assert note().endswith(
-        "6 scenes, 120 events, 1,200 object frames; 3 floor seeds, averaged per scene."
+        "6 scenes, 120 events (42 emerging, 78 entering), 1,200 object frames; 3 floor seeds, "
+        "averaged per scene."
     )
     assert note(emerging=2).endswith(
         "averaged per scene. 12 objects hidden within range at scene start are no event; presence "

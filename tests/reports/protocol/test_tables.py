@@ -62,10 +62,15 @@ def test_contrasts_stand_above_the_papers():
     )
     bold = [isinstance(line[1], Bold) for line in block(table, "First sightings")]
     assert bold == [True, False, False, False, True, True, False]
+    # Of 20 events a scene 7 emerge; care sees 2 of them at once, and 4 of the 13 others.
+    assert block(table, "First sightings, emerging")[0] == ("history", *["+0.0 [0.0,0.0]"] * 3)
+    assert block(table, "First sightings, entering")[0] == ("history", *["+15.4 [15.4,15.4]"] * 3)
     assert block(table, "Overall recall")[0] == ("history", *["-10.0 [-10.0,-10.0]"] * 3)
     assert block(table, "Censored TTFD")[0] == ("history", *["-0.60 [-0.60,-0.60]"] * 3)
     assert any(
-        "6 scenes, 120 events, 1,200 object frames; 3 floor seeds" in note for note in table.notes
+        "6 scenes, 120 events (42 emerging, 78 entering), 1,200 object frames; 3 floor seeds"
+        in note
+        for note in table.notes
     )
     assert any(note.startswith("†") for note in table.notes)
     assert any(quote.startswith('Paper: "Table 1') for quote in table.quotes)
@@ -116,21 +121,27 @@ def test_equal_scene_weights_have_a_table_in_the_files():
 def test_levels_are_shares_of_what_the_full_scan_finds():
     table = tables()["levels"]
     lines = {(line[0], line[1]): line for line in table.rows}
-    assert lines["20%", "care"][2:9] == ("30.0", "75", "[75,75]", "50.0", "62", "[62,62]", "4.20")
-    assert lines["100%", "full"][2:9] == (
-        "40.0", "100", "[100,100]", "80.0", "100", "[100,100]", "3.60"
-    )  # fmt: skip
-    assert lines["20%", "care"][9:] == ("30.0", "50.0", "4.20", "0.0", "0.0", "6")
+    assert lines["20%", "care"][2:11] == (
+        *("30.0", "75", "[75,75]", "28.6", "30.8", "50.0", "62", "[62,62]", "4.20"),
+    )
+    assert lines["100%", "full"][2:11] == (
+        *("40.0", "100", "[100,100]", "42.9", "38.5", "80.0", "100", "[100,100]", "3.60"),
+    )
+    assert lines["20%", "care"][11:] == ("30.0", "50.0", "4.20", "0.0", "0.0", "6")
     said = [line for line in table.rows if line[1] == "(paper)"]
-    assert said[-1][2:9] == ("24.5", "100", "", "49.4", "100", "", "")
-    assert ("", "(paper)", "", "88", "", "", "94", "", "3.33") in {line[:9] for line in said}
+    assert said[-1][2:11] == ("24.5", "100", "", "", "", "49.4", "100", "", "")
+    assert ("", "(paper)", "", "88", "", "", "", "", "94", "", "3.33") in {
+        line[:11] for line in said
+    }
     assert {len(line) for line in table.rows} == {len(table.columns)}
 
 
 def test_without_a_full_scan_there_is_no_column_of_shares_and_a_note_says_why():
     levels = tables(study({"care": (6, 5)}))["levels"]
-    assert levels.columns[:5] == ("budget", "policy", "first sightings %", "overall %", "TTFD")
-    assert levels.rows[0][:5] == ("10%", "care", "30.0", "50.0", "4.20")
+    assert levels.columns[:7] == (
+        *("budget", "policy", "first sightings %", "emerging %", "entering %", "overall %", "TTFD"),
+    )
+    assert levels.rows[0][:7] == ("10%", "care", "30.0", "28.6", "30.8", "50.0", "4.20")
     assert levels.notes[0] == "Of full: the full scan was not played."
     (care, *_) = block(
         tables(study({"care": (6, 5)}))["first-sighting recall by entry"], "emergence, 42 events"
@@ -142,7 +153,7 @@ def test_a_full_scan_that_finds_nothing_has_no_share():
     levels = tables(study({"care": (6, 5), "full": (0, 5)}))["levels"]
     care = dict(zip(levels.columns[2:5], levels.rows[0][2:5], strict=True))
     assert care == {"first sightings %": "30.0", "of full %": "", "interval": ""}
-    assert levels.rows[0][5:8] == ("50.0", "100", "[100,100]")
+    assert levels.rows[0][7:10] == ("50.0", "100", "[100,100]")
 
 
 def unequal(policy, sighted, scenes):
