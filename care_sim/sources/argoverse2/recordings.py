@@ -2,8 +2,9 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from care_sim.base.checks import check_known
+from care_sim.base.checks import check_flag, check_known
 from care_sim.base.errors import InvalidInput
 from care_sim.loops.film import Film
 from care_sim.sources.argoverse2.films import argoverse2_film, logs
@@ -13,9 +14,15 @@ from care_sim.sources.recordings import Recordings
 
 @dataclass(frozen=True)
 class Argoverse2(Recordings):
-    """Argoverse 2 sensor logs; a scene is a log."""
+    """Argoverse 2 sensor logs; a scene is a log. With `empty_boxes` also boxes without a recorded
+    point are annotated.
+    """
 
     kind = "argoverse2"
+    empty_boxes: bool = False
+
+    def __post_init__(self) -> None:
+        check_flag("empty_boxes", self.empty_boxes)
 
     def scenes(self) -> list[str]:
         """The names of the log folders."""
@@ -25,7 +32,7 @@ class Argoverse2(Recordings):
         """See `care_sim.sources.argoverse2.films.argoverse2_film`."""
         known = self._logs()
         check_known(f"log in {self.folder}", scene, known)
-        return argoverse2_film(known[scene])
+        return argoverse2_film(known[scene], empty_boxes=self.empty_boxes)
 
     def files(self, scene: str) -> list[Path]:
         """Poses and annotations."""
@@ -34,6 +41,10 @@ class Argoverse2(Recordings):
             return [log / POSE_FILE, annotation_file(log)]
         except InvalidInput:  # `film` refuses the scene
             return [log / POSE_FILE]
+
+    def columns(self) -> dict[str, Any]:
+        """Whether boxes without a point are annotated, where they are."""
+        return {"empty_boxes": True} if self.empty_boxes else {}
 
     def _logs(self) -> dict[str, Path]:
         return {log.name: log for log in logs(self.folder)}
