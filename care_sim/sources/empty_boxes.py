@@ -36,5 +36,5 @@ def tell_empty_boxes(
     report_once(
         f"{name}: {np.sum(~holds)} of {len(holds)} boxes within {range_m:g} m hold no recorded "
         f"point: {without} newcomers without these boxes, {with_them} with them "
-        f"(--empty-boxes: {'on' if empty_boxes else 'off'})"
+        f"(empty_boxes is {'on' if empty_boxes else 'off'})"
     )
