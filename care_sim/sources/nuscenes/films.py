@@ -15,7 +15,8 @@ The car's motion is that of the keyframes' poses. Pictures are taken within 50 m
 """
 
 import os
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -42,14 +43,13 @@ from care_sim.sources.nuscenes.cameras import RecordedCamera, projected_detectio
 from care_sim.sources.nuscenes.detections import DetectionFile
 from care_sim.sources.nuscenes.earlier_sweeps import earlier, with_earlier_sweeps
 from care_sim.sources.nuscenes.mounts import camera_of, frame_of, lidar_mount
-from care_sim.sources.nuscenes.pictures import OWN, Pictures, pictures_of
+from care_sim.sources.nuscenes.pictures import OWN, pictures_of
 from care_sim.sources.nuscenes.sweeps import read_points, recorded_cloud
 from care_sim.sources.nuscenes.table_files import JsonRow
 from care_sim.sources.nuscenes.tables import CAMERA_CHANNELS, LIDAR, Database
 
 NUSCENES_KEYFRAME_S = 0.5
 """nuScenes annotates its keyframes at 2 Hz."""
-_UP = np.array([0.0, 0.0, 1.0])
 
 
 def nuscenes_film(
@@ -74,9 +74,13 @@ def nuscenes_film(
         detections.check(database)
     samples = database.samples(scene)
     data = [_recordings(database, sample) for sample in samples]
-    is_swept = has_sweeps(database, scene)
+    files = [database.root / recordings[LIDAR]["filename"] for recordings in data]
+    is_swept = any(map(os.path.exists, files))
     if not is_swept:
-        _tell_no_sweeps(database, sweeps)
+        absent = f"{database.root}: no recorded sweeps (samples/{LIDAR})"
+        if sweeps > 1:
+            raise InvalidInput(f"{absent}: sweeps must be 1, got {sweeps}")
+        report_once(f"{absent}: annotated boxes become bodies, and rays are cast at them")
     grid = grid or AngularGrid()
     lidar = lidar_mount(database, data[0][LIDAR])
     cameras = tuple(camera_of(database, data[0][channel], lidar) for channel in CAMERA_CHANNELS)
@@ -93,10 +97,9 @@ def nuscenes_film(
     times = np.array([sample["timestamp"] - samples[0]["timestamp"] for sample in samples]) * 1e-6
     moments = zip(samples, data, times.tolist(), cars, motions(times, cars), strict=True)
     shots: tuple[Shot, ...]
-    shots, every = zip(*(setup.shot(*moment) for moment in moments), strict=True)
+    shots, every, filled = zip(*(setup.shot(*moment) for moment in moments), strict=True)
     if sweeps > 1:
         shots = with_earlier_sweeps(database, samples, shots, lidar, grid, sweeps - 1)
-    filled = [setup.hold_points(sample) for sample in samples]
     tell_empty_boxes(scene["name"], every, filled, grid.range_m, empty_boxes)
     return Film(
         scene["name"],
@@ -107,26 +110,6 @@ def nuscenes_film(
         every[0].take(~(filled[0] | empty_boxes)),
         grid,
         detected=detections is not None,
-    )
-
-
-def has_sweeps(database: Database, scene: JsonRow) -> bool:
-    """Whether a sweep of any keyframe of a scene is recorded. Raises InvalidInput for tables that
-    do not name them.
-    """
-    rows = [_recordings(database, sample)[LIDAR] for sample in database.samples(scene)]
-    return any(os.path.exists(database.root / row["filename"]) for row in rows)
-
-
-def _tell_no_sweeps(database: Database, sweeps: int) -> None:
-    if sweeps > 1:
-        raise InvalidInput(
-            f"{database.root}: sweeps must be 1 without recorded sweeps (samples/{LIDAR}), got "
-            f"{sweeps}"
-        )
-    report_once(
-        f"{database.root}: no recorded sweeps (samples/{LIDAR}): annotated boxes become bodies, "
-        "and rays are cast at them"
     )
 
 
@@ -162,59 +145,48 @@ class _SceneSetup:
 
     def shot(
         self, sample: JsonRow, recordings: dict[str, JsonRow], time_s: float, car: Frame, ego: Ego
-    ) -> tuple[Shot, Annotations]:
-        """The keyframe of a sample, and all boxes of the five classes, those without points too."""
+    ) -> tuple[Shot, Annotations, Mask]:
+        """The keyframe of a sample, all boxes (n) of the five classes, and (n,) which of them hold
+        a point.
+        """
         sensor = car.holding(self.lidar.origin, self.lidar.rotation)
-        every = annotations_of(self.database, self._labelled(sample), self.numbers, sensor)
-        kept = self.hold_points(sample) | self.empty_boxes
+        boxes = self.database.annotations(sample["token"])
+        labelled = [box for box in boxes if class_name(self.database, box) is not None]
+        every = annotations_of(self.database, labelled, self.numbers, sensor)
+        filled = np.array([box["has_points"] for box in labelled], bool)
+        kept = filled | self.empty_boxes
         annotations = every.take(kept)
         taken = [recordings[channel] for channel in CAMERA_CHANNELS]
         pictures = pictures_of(self.database, sample, taken, self.lidar, sensor, self.camera_times)
+        own = [moment.boxes_of(sensor, annotations.boxes) for moment in pictures.moments]
         if self.is_swept:
             points = read_points(self.database.root / recordings[LIDAR]["filename"])
             cloud = recorded_cloud(points, self.grid, annotations, sensor)
-        else:
-            rendered, cloud = self._rendered(sample, sensor, pictures)
-        own = [moment.boxes_of(sensor, annotations.boxes) for moment in pictures.moments]
-        if self.detections:
-            seen = self.detections.seen(self.cameras, [*zip(taken, own, strict=True)], annotations)
-        elif self.is_swept:
-            shares = visible_shares(self.database, self._labelled(sample))[kept]
+            shares = visible_shares(self.database, labelled)[kept]
             seen = projected_detections(self.cameras, own, annotations, shares)
         else:
-            seen = rendered
+            seen, cloud = self._sensed(boxes, sensor, pictures.moments)
+        if self.detections:
+            seen = self.detections.seen(self.cameras, [*zip(taken, own, strict=True)], annotations)
         seen = seen.taken_at(pictures.timing)
-        return Shot(time_s, sample["token"], sensor, ego, annotations, seen, cloud), every
+        shot = Shot(time_s, sample["token"], sensor, ego, annotations, seen, cloud)
+        return shot, every, filled
 
-    def hold_points(self, sample: JsonRow) -> Mask:
-        """(n,) which boxes of the five classes hold a point."""
-        return np.array([box["has_points"] for box in self._labelled(sample)], bool)
-
-    def _labelled(self, sample: JsonRow) -> list[JsonRow]:
-        """The boxes of the five classes."""
-        boxes = self.database.annotations(sample["token"])
-        return [box for box in boxes if class_name(self.database, box) is not None]
-
-    def _rendered(
-        self, sample: JsonRow, sensor: Frame, pictures: Pictures
+    def _sensed(
+        self, boxes: Sequence[JsonRow], sensor: Frame, moments: Sequence[Frame]
     ) -> tuple[IdentifiedDetections, Cloud]:
         """What cameras and LiDAR see of the boxes as bodies."""
-        boxes = self.database.annotations(sample["token"])
         bodies = [
             body_of(self.database, box, self.numbers, sensor)
             for box in boxes
             if box["has_points"] or self.empty_boxes
         ]
-        # Map coordinates lie kilometres from their origin, too far for a picture's float32.
-        here = replace(sensor, x=0.0, y=0.0, z=0.0)
-        moments = [
-            replace(moment, x=moment.x - sensor.x, y=moment.y - sensor.y, z=moment.z - sensor.z)
-            for moment in pictures.moments
-        ]
-        views = [camera.view(moment) for camera, moment in zip(self.cameras, moments, strict=True)]
-        # Boxes from a file need no pictures.
-        views = [] if self.detections else views
-        up = self.lidar.vectors_to_local(_UP)
+        # Boxes from a file need no pictures. All is seen from the LiDAR, since the coordinates of a
+        # map lie kilometres from their origin.
+        places = () if self.detections else zip(self.cameras, moments, strict=True)
+        views = [camera.view(sensor.seeing(moment)) for camera, moment in places]
+        up = self.lidar.vectors_to_local(np.array([0.0, 0.0, 1.0]))
+        here = Frame(0.0, 0.0, 0.0, 0.0)
         _, seen, cloud = sense(bodies, here, self.lidar.z, self.grid, views=views, up=up)
         return seen, cloud
 

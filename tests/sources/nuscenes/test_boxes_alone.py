@@ -17,7 +17,7 @@ from care_sim.sources.named import source_of
 from care_sim.sources.nuscenes.recordings import NuScenes
 from care_sim.sources.scenes import film_of
 from care_sim.study.scene_play import film_hash
-from tests.helpers.nuscenes_database import annotated, as_recorded, pose, write
+from tests.helpers.nuscenes_database import SENSORS, annotated, as_recorded, pose, write
 from tests.helpers.nuscenes_drive import write_drive
 from tests.helpers.nuscenes_scene import CAR, SCENE, WORLD, database, first
 
@@ -89,6 +89,21 @@ def test_recorded_cameras_show_what_projection_shows(tmp_path):
     assert rendered.cameras[0].width < 340
 
 
+def test_what_lies_beside_the_recorded_picture_is_not_shown(tmp_path):
+    """The back camera's principal point is 29 pixels off the middle, so its pinhole is wider."""
+    beside = 1640.0
+    focal, u, _ = SENSORS["CAM_BACK"][2]
+    away = SENSORS["CAM_BACK"][0][0] - 10.0, (beside - u) / focal * 10.0
+    thin = annotated("vehicle.bicycle", (*away, 1.0), (0.1, 0.1, 2.0), instance="thin")
+    movie = first(alone(tmp_path, thin))
+    (shot,) = movie.shots
+    back = movie.cameras[5]
+    ((x, _),), (depth,) = back.project(shot.annotations.boxes[:, :3])
+    assert 320 < x < back.width, "the pinhole would show it"
+    assert depth > 0
+    assert 5 not in shot.seen.detections.cameras
+
+
 def test_what_is_outside_the_classes_hides_and_is_no_object(tmp_path):
     (free,), (hidden,) = (
         first(alone(tmp_path / str(n), CAR, *more)).shots for n, more in enumerate([(), (TRAILER,)])
@@ -141,7 +156,7 @@ def test_a_missing_sweep_among_others_is_named(tmp_path):
 
 def test_sweeps_that_are_not_there_cannot_be_gathered(tmp_path):
     root = alone(tmp_path, CAR)
-    with pytest.raises(InvalidInput, match=r"sweeps must be 1 without recorded sweeps .*, got 3"):
+    with pytest.raises(InvalidInput, match=r"no recorded sweeps .*: sweeps must be 1, got 3"):
         first(root, sweeps=3)
 
 
