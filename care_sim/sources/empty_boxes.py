@@ -11,17 +11,13 @@ from care_sim.sources.film_checks import report_once
 
 
 def tell_empty_boxes(
-    name: str,
-    every: Sequence[Annotations],
-    filled: Sequence[Mask],
-    range_m: float,
-    empty_boxes: bool,
+    name: str, every: Sequence[Annotations], filled: Sequence[Mask], range_m: float
 ) -> None:
     """Print once how many boxes of a scene hold no recorded point, and how many newcomers there are
     without and with them.
 
-    `every` are all annotations per keyframe and `filled` (n,) which of them hold a point; those
-    within `range_m` metres count. `empty_boxes` says whether the film annotates the others.
+    `every` are all annotations per keyframe, and `filled` (n,) which of them hold a point. Those
+    within `range_m` metres count.
     """
     near = [planar_ranges(annotations.boxes) <= range_m for annotations in every]
     objects = [part.objects[own] for part, own in zip(every, near, strict=True)]
@@ -35,6 +31,5 @@ def tell_empty_boxes(
     )
     report_once(
         f"{name}: {np.sum(~holds)} of {len(holds)} boxes within {range_m:g} m hold no recorded "
-        f"point: {without} newcomers without these boxes, {with_them} with them "
-        f"(empty_boxes is {'on' if empty_boxes else 'off'})"
+        f"point: {without} newcomers without these boxes, {with_them} with them"
     )

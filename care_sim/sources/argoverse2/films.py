@@ -109,7 +109,7 @@ def argoverse2_film(log: Path, grid: AngularGrid | None = None, empty_boxes: boo
         reported = np.array([body.label is not None for body in bodies], bool)
         every.append(annotations_of([body for body in bodies if body.label is not None]))
         filled.append(holds[reported])
-    tell_empty_boxes(log.name, every, filled, grid.range_m, empty_boxes)
+    tell_empty_boxes(log.name, every, filled, grid.range_m)
     hidden = every[0].take(~(filled[0] | empty_boxes))
     return Film(
         log.name,

@@ -100,7 +100,7 @@ def nuscenes_film(
     shots, every, filled = zip(*(setup.shot(*moment) for moment in moments), strict=True)
     if sweeps > 1:
         shots = with_earlier_sweeps(database, samples, shots, lidar, grid, sweeps - 1)
-    tell_empty_boxes(scene["name"], every, filled, grid.range_m, empty_boxes)
+    tell_empty_boxes(scene["name"], every, filled, grid.range_m)
     return Film(
         scene["name"],
         tuple(camera.pinhole for camera in cameras),
@@ -162,12 +162,13 @@ class _SceneSetup:
         if self.is_swept:
             points = read_points(self.database.root / recordings[LIDAR]["filename"])
             cloud = recorded_cloud(points, self.grid, annotations, sensor)
-            shares = visible_shares(self.database, labelled)[kept]
-            seen = projected_detections(self.cameras, own, annotations, shares)
         else:
             seen, cloud = self._sensed(boxes, sensor, pictures.moments)
         if self.detections:
             seen = self.detections.seen(self.cameras, [*zip(taken, own, strict=True)], annotations)
+        elif self.is_swept:
+            shares = visible_shares(self.database, labelled)[kept]
+            seen = projected_detections(self.cameras, own, annotations, shares)
         seen = seen.taken_at(pictures.timing)
         shot = Shot(time_s, sample["token"], sensor, ego, annotations, seen, cloud)
         return shot, every, filled

@@ -56,8 +56,7 @@ def pictures_of(
         if abs(age) > MOST_APART_S:
             raise InvalidInput(
                 f"{database.path('sample_data')}: {row['token']!r} was taken {abs(age):g} s from "
-                f"its sample, may be {MOST_APART_S:g} s (microseconds; camera_times='sweep' reads "
-                "no times)"
+                f"its sample, may be {MOST_APART_S:g} s (timestamps are microseconds)"
             )
     turns = sensor.yaw - np.array([moment.yaw for moment in moments])
     turns = (turns + np.pi) % (2 * np.pi) - np.pi

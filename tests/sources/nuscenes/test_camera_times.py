@@ -31,6 +31,14 @@ def at(seconds):
     return pose(SPEED * seconds, 0.0, TURN * seconds)
 
 
+def as_turned(seconds):
+    """The pose of LEFT's picture in a car that does nothing but turn by 20 degrees until the
+    sweep.
+    """
+    seconds += EARLY_S
+    return pose(SPEED * seconds, 0.0, TURN * seconds + np.radians(20))
+
+
 def timed(folder, early_s=EARLY_S, keyframes=3, own_pose=at):
     """Keyframes of a car that drives and turns, LEFT before the sweep, other cameras with it."""
     moments = [0.5 * n for n in range(keyframes)]
@@ -110,7 +118,7 @@ def test_a_picture_just_after_the_sweep_has_age_0_and_its_turn(tmp_path):
 
 def test_a_turn_across_the_back_of_the_compass_is_small(tmp_path):
     root = timed(tmp_path)
-    yaw = np.pi - TURN * 1.02
+    yaw = np.pi - TURN * (0.5 - EARLY_S / 2)
     change(root, "ego_pose", lambda rows: [turn(row, yaw) for row in rows])
     for shot in first(root).shots:
         assert np.abs(shot.seen.pictures[:, 1]).max() < 0.1
@@ -124,10 +132,6 @@ def turn(row, yaw):
 
 def test_wedges_are_turned_back_to_where_the_object_is(tmp_path):
     """Nothing but a turn of 20 degrees lies between picture and sweep."""
-
-    def as_turned(seconds):
-        x = SPEED * (seconds + EARLY_S)
-        return pose(x, 0.0, TURN * (seconds + EARLY_S) + np.radians(20))
 
     movie = first(timed(tmp_path, own_pose=as_turned))
     shot = movie.shots[1]
@@ -146,8 +150,8 @@ def test_wedges_are_turned_back_to_where_the_object_is(tmp_path):
 
 
 def test_detections_from_a_file_lie_on_the_object_of_their_picture(tmp_path):
-    root = timed(tmp_path)
-    then = projected_by_hand(VAN, at(0.5 - EARLY_S), LEFT)
+    root = timed(tmp_path, own_pose=as_turned)
+    then = projected_by_hand(VAN, as_turned(0.5 - EARLY_S), LEFT)
     found = {"sample_data_token": f"{SCENE}-1-{LEFT}", "bbox_corners": then.tolist()}
     path = tmp_path / "boxes.json"
     path.write_text(json.dumps([found | {"category_name": "truck", "score": 0.9}]))
@@ -156,11 +160,20 @@ def test_detections_from_a_file_lie_on_the_object_of_their_picture(tmp_path):
     (row,) = np.flatnonzero(shot.annotations.objects == seen.objects[0])
     assert CLASSES[shot.annotations.classes[row]] == "truck"
     assert seen.detections.ages == pytest.approx([EARLY_S])
-    assert seen.detections.yaw_changes == pytest.approx([TURN * EARLY_S], abs=1e-6)
+    assert seen.detections.yaw_changes == pytest.approx([-np.radians(20)], abs=1e-6)
 
 
 def test_latency_adds_to_the_age_and_false_boxes_have_that_of_their_picture(tmp_path):
-    movie = first(timed(tmp_path, keyframes=6))
+    root = timed(tmp_path, keyframes=6)
+    # The picture that arrives is 4 ms older than those of which false boxes are made.
+    older = f"{SCENE}-0-{LEFT}"
+
+    def age(rows):
+        (row,) = (row for row in rows if row["token"] == older)
+        row["timestamp"] -= 4000
+
+    change(root, "sample_data", age)
+    movie = first(root)
     with FilmEnv(movie, budget=0.1, camera_latency=1, false_positive_rate=3.0) as env:
         env.reset(seed=0)
         loop = env.loop
@@ -170,7 +183,7 @@ def test_latency_adds_to_the_age_and_false_boxes_have_that_of_their_picture(tmp_
         assert is_false.any()
         left = seen.cameras == 1
         assert (left & is_false).any()
-        assert seen.ages == pytest.approx(np.where(left, 0.5 + EARLY_S, 0.5))
+        assert seen.ages == pytest.approx(np.where(left, 0.504 + EARLY_S, 0.5))
         turns = TURN * np.where(left, 0.5 + EARLY_S, 0.5)
         assert seen.yaw_changes == pytest.approx(turns, abs=1e-6)
 
