@@ -46,8 +46,9 @@ class NuScenes(Recordings):
 
     def scenes(self) -> list[str]:
         """The names of the split's scenes. Prints a line where an official one is held in part."""
+        names = list(self._rows())
         splits.tell_missing(_database(self.folder, self.version), self.split)
-        return list(self._rows())
+        return names
 
     def film(self, scene: str) -> Film:
         """See `care_sim.sources.nuscenes.films.nuscenes_film`."""
