@@ -17,8 +17,8 @@ from care_sim.sources.named import source_of
 from care_sim.sources.nuscenes.recordings import NuScenes
 from care_sim.sources.scenes import film_of
 from care_sim.study.scene_play import film_hash
-from tests.helpers.nuscenes_database import SENSORS, annotated, as_recorded, pose, write
-from tests.helpers.nuscenes_drive import write_drive
+from tests.helpers.nuscenes_database import SENSORS, annotated, as_recorded, change, pose, write
+from tests.helpers.nuscenes_drive import SPEED, write_drive
 from tests.helpers.nuscenes_scene import CAR, SCENE, WORLD, database, first
 
 PERSON = annotated("human.pedestrian.adult", (15.0, -3.0, 0.9), (0.7, 0.7, 1.8), instance="p")
@@ -226,6 +226,19 @@ def test_a_split_that_is_held_in_part_names_what_is_missing(tmp_path, capsys):
     NuScenes(root, split="mini_val").scenes()
     NuScenes(root, split="all").scenes()
     assert not capsys.readouterr().err
+
+
+def test_boxes_in_the_frame_of_the_car_are_told(tmp_path, capsys):
+    root = write_drive(tmp_path / "drive")
+
+    def seen_from_the_car(rows):
+        for row in rows:
+            row["translation"][0] -= SPEED * int(row["sample_token"].split("-")[2])
+
+    change(root, "sample_annotation", seen_from_the_car)
+    source = source_of(f"nuscenes:{root}")
+    film_of(source, source.scenes()[0])
+    assert "scene-0103: its boxes move against the car" in capsys.readouterr().err
 
 
 def test_the_metadata_of_two_real_scenes_plays(tmp_path, recorded):
