@@ -79,7 +79,8 @@ def print_lines(*lines: str, file: TextIO | None = None) -> None:
 def report_problems(problems: Sequence[str]) -> None:
     """Print them, one per line, where complaints go."""
     for problem in problems:
-        print(f"care-sim: {one_line(problem)}", file=sys.stderr)
+        # In one write: workers print at once.
+        print(f"care-sim: {one_line(problem)}\n", end="", file=sys.stderr)
 
 
 def error_line(error: BaseException) -> str:

@@ -107,6 +107,11 @@ class Frame:
         turn = self.rotation if rotation is None else self.rotation * rotation
         return Frame.turned_by(turn, self.origin + self.vectors_to_world(origin))
 
+    def seeing(self, other: "Frame") -> "Frame":
+        """Another world frame, seen in this one."""
+        turn = self.rotation.inv() * other.rotation
+        return Frame.turned_by(turn, self.vectors_to_local(other.origin - self.origin))
+
     @property
     def origin(self) -> Floats:
         """(3,) world position."""
@@ -134,6 +139,10 @@ class Frame:
     def points_of(self, other: "Frame", points: Floats) -> Floats:
         """Points (n, 3) of another frame in this one."""
         return self.vectors_to_local(other.origin + other.vectors_to_world(points) - self.origin)
+
+    def boxes_of(self, other: "Frame", boxes: Floats) -> Floats:
+        """Boxes (n, 7) of another frame in this one; see `boxes_to_local`."""
+        return boxes if self == other else self.boxes_to_local(other.boxes_to_world(boxes))
 
     def boxes_to_local(self, boxes: Floats) -> Floats:
         """World boxes (n, 7) seen in this frame: exact centres, headings projected on its x, y

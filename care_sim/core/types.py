@@ -132,6 +132,7 @@ class ImageDetections(_Table):
     )  # fmt: skip
     CLASS, CONFIDENCE, LEFT, CAMERA, AGE, YAW_CHANGE = 0, 1, 2, 6, 7, 8
     BOX = slice(2, 6)
+    TIMING = slice(7, 9)
     """Places in COLUMNS."""
     _PLACES = {  # noqa: RUF012 (a constant)
         "classes": CLASS, "confidences": CONFIDENCE, "boxes": BOX, "cameras": CAMERA, "ages": AGE,
@@ -151,12 +152,11 @@ class ImageDetections(_Table):
         return cls.from_checked_rows(table)
 
     def aged(self, age_s: float, yaw_change: float) -> "ImageDetections":
-        """The same detections of a picture that was taken `age_s` seconds ago, since when the car
-        has turned by `yaw_change` radians.
+        """The same detections `age_s` seconds later, in which the car has turned by `yaw_change`
+        radians.
         """
         rows = self.rows().copy()
-        rows[:, self.AGE] = age_s
-        rows[:, self.YAW_CHANGE] = yaw_change
+        rows[:, self.TIMING] += age_s, yaw_change
         return ImageDetections.from_checked_rows(rows)
 
     def unturned(self) -> "ImageDetections":

@@ -50,7 +50,7 @@ class ReplayEnv(FilmEnv):
 
     `source` names the recordings, `argoverse2:FOLDER`, `nuscenes:FOLDER` or a source of your own
     (`care_sim.sources.named`), and `scene` one of their scenes by name; the first, unless given.
-    `split`, `version`, `camera_detections` and `sweeps` are those of
+    `split`, `version`, `camera_detections`, `sweeps`, `camera_times` and `empty_boxes` are those of
     `care_sim.sources.nuscenes.recordings.NuScenes`. A file that is missing or damaged, or a token
     that points nowhere, raises `care_sim.InvalidInput` with its name. The seed of `reset` draws
     faults, noise and floor.
@@ -67,6 +67,8 @@ class ReplayEnv(FilmEnv):
         version: str | None = None,
         camera_detections: str | PathLike[str] | None = None,
         sweeps: int | None = None,
+        camera_times: str | None = None,
+        empty_boxes: bool | None = None,
         **parameters: Any,
     ):
         # Before the scene is read, so that a wrong name is refused at once.
@@ -79,6 +81,8 @@ class ReplayEnv(FilmEnv):
             version=version,
             camera_detections=camera_detections,
             sweeps=sweeps,
+            camera_times=camera_times,
+            empty_boxes=empty_boxes,
         )
         scenes = recorded.scenes()
         # The source refuses a name that it does not have.

@@ -5,7 +5,7 @@ The objects are truth: for the scoring and privileged policies.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -31,6 +31,10 @@ class Annotations:
 
     def __len__(self) -> int:
         return len(self.objects)
+
+    def take(self, rows: Integers | Mask) -> "Annotations":
+        """Some of the rows, by index or mask."""
+        return Annotations(self.objects[rows], self.classes[rows], self.boxes[rows])
 
 
 NO_ANNOTATIONS = Annotations(np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, 7)))
@@ -109,12 +113,21 @@ def cloud_of(scan: Scan, objects: Integers, grid: Grid) -> Cloud:
 class IdentifiedDetections:
     """Camera detections, with `objects` (n,) the annotated object or the body behind each box, or
     NO_OBJECT. `visible` (n,) is the share of each object that its picture shows, where the source
-    annotates it; else boxes are those of what is visible.
+    annotates it; else boxes are those of what is visible. `pictures` (k, 2) are age (seconds) and
+    yaw change (radians) of the picture of each camera, where they are not all of the keyframe.
     """
 
     detections: ImageDetections
     objects: Integers
     visible: Floats | None = None
+    pictures: Floats | None = None
+
+    def taken_at(self, pictures: Floats) -> "IdentifiedDetections":
+        """The same detections on `pictures` (k, 2) of such ages and yaw changes."""
+        rows = self.detections.rows().copy()
+        rows[:, ImageDetections.TIMING] = pictures[self.detections.cameras]
+        detections = ImageDetections.from_checked_rows(rows)
+        return replace(self, detections=detections, pictures=pictures)
 
     def __len__(self) -> int:
         return len(self.objects)

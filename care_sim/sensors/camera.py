@@ -161,6 +161,9 @@ class CameraDetector:
             rows = rows[left]
             objects = objects[left]
         if len(false):
+            if seen.pictures is not None:
+                cameras = false[:, ImageDetections.CAMERA].astype(np.int64)
+                false[:, ImageDetections.TIMING] = seen.pictures[cameras]
             rows, objects = _with_false_boxes(rows, objects, false)
 
         # In the dark nothing is reported, false boxes included; delays go on.

@@ -5,7 +5,8 @@ degrees apart, the back 110 degrees wide, at the places of one of its calibratio
 LIDAR_TOP.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,7 +25,7 @@ from care_sim.sensors.camera import (
     faultless_detections,
     window_on,
 )
-from care_sim.world.bullet import NO_BODY, BulletWorld
+from care_sim.world.bullet import NO_BODY, BulletWorld, PixelWindow
 
 
 def _camera(yaw: float, position: tuple[float, float, float], width: float = 70.0) -> PinholeCamera:
@@ -42,43 +43,70 @@ SURROUND_CAMERAS = (
 """Front, front left, front right, back left, back right, back."""
 
 
+class View(NamedTuple):
+    """A picture: its camera, the frame of the sensor when it was taken, and the `window` of the
+    camera's picture that it shows, all of it unless given.
+    """
+
+    camera: PinholeCamera
+    sensor: Frame
+    window: PixelWindow | None = None
+
+    def window_on(self, boxes: Floats) -> PixelWindow:
+        """The part of the window that holds every box (n, 7) of the frame."""
+        left, top, right, bottom = window_on(self.camera, boxes)
+        if self.window is None:
+            return left, top, right, bottom
+        first, highest, last, lowest = self.window
+        return max(left, first), max(top, highest), min(right, last), min(bottom, lowest)
+
+
 def surround_detections(
     world: BulletWorld,
-    cameras: tuple[PinholeCamera, ...],
+    views: Sequence[View],
     sensor: Frame,
     labels: Mapping[int, int],
     boxes: Floats,
 ) -> IdentifiedDetections:
-    """What cameras mounted in the frame `sensor` see of the bodies that `labels` maps to classes;
-    `objects` are body ids.
+    """What `views` show of the bodies that `labels` maps to classes; `objects` are body ids.
 
-    `boxes` (n, 7) are those of the bodies in the sensor frame; nothing outside them is rendered.
+    `boxes` (n, 7) are those of the bodies in the frame `sensor`; nothing outside them is rendered.
     """
-    windows = [window_on(camera, boxes) for camera in cameras]
-    views = zip(cameras, windows, strict=True)
-    return faultless_detections(
-        [Picture.of(world.body_ids(camera, sensor, window), window) for camera, window in views],
-        class_table(labels),
-    )
+    pictures = []
+    for view in views:
+        window = view.window_on(view.sensor.boxes_of(sensor, boxes))
+        ids = world.body_ids(view.camera, view.sensor, window)
+        pictures.append(Picture.of(ids, window))
+    return faultless_detections(pictures, class_table(labels))
 
 
 def full_sweep(
-    world: BulletWorld, grid: Grid, sensor: Frame, boxes: Floats, height_m: float
+    world: BulletWorld,
+    grid: Grid,
+    sensor: Frame,
+    boxes: Floats,
+    height_m: float,
+    up: Floats | None = None,
 ) -> Cloud:
     """The returns of every cell, fired from the frame `sensor`.
 
     `objects` are body ids; for the road NO_BODY, or the world's ground where it has one. `boxes`
     (n, 7) in the sensor frame hold all bodies. Rays are cast where these are. All others can only
-    meet the road, a plane `height_m` below the sensor and parallel to its x, y plane. In a world
-    without ground the road hides nothing.
+    meet the road, a plane `height_m` below the sensor and parallel to its x, y plane, or at a right
+    angle to `up` (3,) in the sensor frame. In a world without ground the road hides nothing.
     """
-    parts = [_own_sweep(world, head, sensor, boxes, height_m) for head in grid.heads]
+    parts = [_own_sweep(world, head, sensor, boxes, height_m, up) for head in grid.heads]
     cells, ranges, bodies = map(np.concatenate, zip(*parts, strict=True))
     return Cloud(cells, grid.points(cells, ranges), bodies)
 
 
 def _own_sweep(
-    world: BulletWorld, head: Head, sensor: Frame, boxes: Floats, height_m: float
+    world: BulletWorld,
+    head: Head,
+    sensor: Frame,
+    boxes: Floats,
+    height_m: float,
+    up: Floats | None,
 ) -> tuple[Cells, Floats, Integers]:
     """Cells, ranges and bodies of what one LiDAR gives to the sweep."""
     grid, own = head.grid, head.frame(sensor)
@@ -89,7 +117,7 @@ def _own_sweep(
 
     # Every other cell meets the road, at a distance that a formula gives. So does a ray that was
     # cast at a body and missed it.
-    ranges = road_ranges(grid, height_m + head.place[2])
+    ranges = road_ranges(grid, height_m + head.place[2], up)
     bodies = np.full(grid.size, NO_BODY)
     directions = own.vectors_to_world(grid.directions[covered])
     cast, hit = world.cast(own.origin, directions, grid.range_m)
@@ -99,12 +127,12 @@ def _own_sweep(
     return cells + head.first, ranges[cells], bodies[cells]
 
 
-def road_ranges(grid: AngularGrid, height_m: float) -> Floats:
+def road_ranges(grid: AngularGrid, height_m: float, up: Floats | None = None) -> Floats:
     """(N,) the distance along every ray to a plane `height_m` below the sensor, inf beyond the
-    reach of a ray.
+    reach of a ray. The plane is at a right angle to `up` (3,), or to the sensor's z axis.
     """
     # A unit ray falls by this per metre; level or rising, it meets no road.
-    fall = -grid.directions[:, 2]
+    fall = -(grid.directions[:, 2] if up is None else grid.directions @ up)
     ranges = np.divide(height_m, fall, out=np.full(grid.size, np.inf), where=fall > 0)
     return np.where(ranges <= grid.range_m, ranges, np.inf)
 

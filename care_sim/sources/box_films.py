@@ -74,7 +74,7 @@ def film_of_boxes(
             bodies, frame, setup.position[2], setup.grid, setup.equipped(SURROUND_CAMERAS)
         )
         given.append((frame, annotations))
-        annotated = _some(annotations, _is_shown(annotations, pictures, cloud))
+        annotated = annotations.take(_is_shown(annotations, pictures, cloud))
         shots.append(Shot(time_s, f"{name}/{len(shots)}", frame, ego, annotated, pictures, cloud))
     tell_other_frame(name, given)
     first, everyone = shots[0], given[0][1]
@@ -84,7 +84,7 @@ def film_of_boxes(
         setup.position[2],
         float(np.median(np.diff(times))),
         tuple(shots),
-        _some(everyone, ~_is_shown(everyone, first.seen, first.cloud)),
+        everyone.take(~_is_shown(everyone, first.seen, first.cloud)),
         setup.grid,
         setup.position[:2],
     )
@@ -112,9 +112,7 @@ def _body(
     length, width, height = _numbers(f"{named}: size", box["size"], (3,), SIZES_M).tolist()
     pose = _numbers(f"{named}: pose", box["pose"], (4,), MAP_M)
     _check_turns(f"{named}: pose", pose[None])
-    world = Frame(*(pose - start).tolist())
-    turn = sensor.rotation.inv() * world.rotation
-    own = Frame.turned_by(turn, sensor.vectors_to_local(world.origin - sensor.origin))
+    own = sensor.seeing(Frame(*(pose - start).tolist()))
     if np.abs(own.origin).max() > AWAY_M[1]:
         raise InvalidInput(
             f"{named}: pose lies {np.abs(own.origin).max():g} m from the car, may lie "
@@ -152,9 +150,3 @@ def _is_shown(annotations: Annotations, pictures: IdentifiedDetections, cloud: C
         annotations.objects, np.concatenate([cloud.objects, pictures.objects])
     )
     return shown_there
-
-
-def _some(annotations: Annotations, kept: Mask) -> Annotations:
-    return Annotations(
-        annotations.objects[kept], annotations.classes[kept], annotations.boxes[kept]
-    )

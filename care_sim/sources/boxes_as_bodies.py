@@ -12,7 +12,13 @@ from care_sim.core.grid_stack import Grid
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import CLASSES
 from care_sim.sensors.annotated import Annotations, Cloud, IdentifiedDetections
-from care_sim.sensors.surround import SURROUND_CAMERAS, full_sweep, numbers_of, surround_detections
+from care_sim.sensors.surround import (
+    SURROUND_CAMERAS,
+    View,
+    full_sweep,
+    numbers_of,
+    surround_detections,
+)
 from care_sim.world.bodies import sized
 from care_sim.world.bullet import BulletWorld
 
@@ -52,12 +58,15 @@ def sense(
     height_m: float,
     grid: Grid,
     cameras: tuple[PinholeCamera, ...] = SURROUND_CAMERAS,
+    views: Sequence[View] | None = None,
+    up: Floats | None = None,
 ) -> tuple[Annotations, IdentifiedDetections, Cloud]:
     """Return what LiDARs in the frame `sensor` and its `cameras` see of `annotated`, every cell
-    fired.
+    fired. `views` are the pictures of cameras that took them at other moments, in their place.
 
-    The road is a plane `height_m` below the sensor, parallel to the car. It hides nothing, because
-    real roads undulate: a plane in the world would bury what stands where they fall.
+    The road is a plane `height_m` below the sensor, parallel to the car: at a right angle to `up`
+    (3,) in the sensor frame, or to the sensor's z axis. It hides nothing, because real roads
+    undulate: a plane in the world would bury what stands where they fall.
     """
     reported = [one for one in annotated if one.label is not None]
     annotations = annotations_of(reported)
@@ -66,8 +75,12 @@ def sense(
         bodies = {id(one): _add(world, one, sensor) for one in annotated}
         numbers = {bodies[id(one)]: one.number for one in reported}
         labels = {bodies[id(one)]: CLASSES.index(str(one.label)) for one in reported}
-        seen = surround_detections(world, cameras, sensor, labels, annotations.boxes)
-        swept = full_sweep(world, grid, sensor, _table([one.bounds for one in annotated]), height_m)
+        # A recorded sensor leans, and an upright box does not hold the body that leans back in it.
+        shown = annotations.boxes if views is None else _table([one.bounds for one in reported])
+        views = [View(camera, sensor) for camera in cameras] if views is None else views
+        seen = surround_detections(world, views, sensor, labels, shown)
+        bounds = _table([one.bounds for one in annotated])
+        swept = full_sweep(world, grid, sensor, bounds, height_m, up)
     identified = IdentifiedDetections(seen.detections, numbers_of(seen.objects, numbers))
     return (
         annotations,

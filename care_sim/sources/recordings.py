@@ -42,3 +42,7 @@ class Recordings(ABC):
     def columns(self) -> dict[str, Any]:
         """Columns of a row that tell how the recordings are read, where it is not the usual way."""
         return {}
+
+    def scene_columns(self, scene: str) -> dict[str, Any]:
+        """Columns that tell how a scene is read, where it is not the usual way."""
+        return {}

@@ -189,7 +189,8 @@ class Recorded:
         """The kind, the hash of the scene's files, and how they are read."""
         recording = data_digest(self.files(scene))
         own = {"source": self.kind, "recording": recording}
-        return own | sensor_columns(self.sensor) | self.recordings.columns()
+        told = self.recordings.columns() | self.recordings.scene_columns(scene.name)
+        return own | sensor_columns(self.sensor) | told
 
 
 LONGEST_NUMBER = 40

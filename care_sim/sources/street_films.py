@@ -22,7 +22,13 @@ from care_sim.sensors.annotated import Annotations, Cloud, IdentifiedDetections,
 from care_sim.sensors.beams import Beams
 from care_sim.sensors.setups import DEFAULT_SETUP, sensor_setup
 from care_sim.sensors.signal import Signal
-from care_sim.sensors.surround import SURROUND_CAMERAS, full_sweep, numbers_of, surround_detections
+from care_sim.sensors.surround import (
+    SURROUND_CAMERAS,
+    View,
+    full_sweep,
+    numbers_of,
+    surround_detections,
+)
 from care_sim.streets.draft import STREET_KEYFRAME_S
 from care_sim.streets.street import Street, make_street
 from care_sim.world.bodies import CATALOGUE
@@ -140,7 +146,8 @@ class _StreetBodies:
         boxes = everything[reported]
         numbers = {self._bodies[number]: number for number in labelled.tolist()}
         labels = {body: int(self._classes[number]) for body, number in numbers.items()}
-        seen = surround_detections(self._world, cameras, sensor, labels, boxes)
+        views = [View(camera, sensor) for camera in cameras]
+        seen = surround_detections(self._world, views, sensor, labels, boxes)
         swept = full_sweep(self._world, self._setup.grid, sensor, everything, sensor.z)
         identified = IdentifiedDetections(seen.detections, numbers_of(seen.objects, numbers))
         cloud = Cloud(swept.cells, swept.points, numbers_of(swept.objects, numbers))

@@ -21,7 +21,7 @@ from care_sim.study.mechanism_play import (
 )
 from care_sim.study.play_config import PLAY_FIELDS, listed_plays
 from care_sim.study.play_events import event_columns, without_events
-from care_sim.study.rows.reading import with_added_columns, with_tags
+from care_sim.study.rows.reading import READ_WITH, with_added_columns, with_tags
 from care_sim.study.rows.schema import (
     CONDITION_COLUMNS,
     COUNT,
@@ -139,6 +139,9 @@ _OF_SOME_PLAYS = {
     "recording": as_optional(TEXT),
     "camera_detections": as_optional(TEXT),
     "sweeps": as_optional(COUNT),
+    "camera_times": as_optional(TEXT),
+    "empty_boxes": as_optional(FLAG),
+    "points": as_optional(TEXT),
     "presence": as_optional(TEXT),
 } | {name: CONDITION_COLUMNS[name] for name in COLUMNS_WHERE_CHANGED if name in OF_BOTH_LOOPS}
 _PLAYS = Schema(
@@ -237,8 +240,7 @@ _PARAMETERS = frozenset(
         "sensor_setup",
         "detector",
         "keyframe_s",
-        "camera_detections",
-        "sweeps",
+        *READ_WITH,
         "presence",
         "driver",
     }

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import care_sim
 from care_sim.envs import CLOSED_LOOP
-from care_sim.sources.nuscenes.cameras import CAMERA_CHANNELS
+from care_sim.sources.nuscenes.tables import CAMERA_CHANNELS
 from tests.helpers.av2_log import CAR_AHEAD, at, box, write
 from tests.helpers.nuscenes_drive import write_drive
 

@@ -193,12 +193,12 @@ def add_scene(tables, root, name, samples):
             | links
         )
         for channel in SENSORS:
-            add_data(tables, root, tokens[n], channel, car, points)
+            add_data(tables, root, tokens[n], channel, car, points, START_US + n * 500_000)
         for m, box in enumerate(boxes):
             add_box(tables, f"{tokens[n]}-{m}", tokens[n], name, box)
 
 
-def add_data(tables, root, sample, channel, car, points):
+def add_data(tables, root, sample, channel, car, points, stamp):
     token = f"{sample}-{channel}"
     tables["ego_pose"].append({"token": f"pose-{token}", "timestamp": 0} | car)
     suffix = "pcd.bin" if channel == "LIDAR_TOP" else "jpg"
@@ -215,7 +215,7 @@ def add_data(tables, root, sample, channel, car, points):
             "fileformat": suffix,
             "width": 1600 * camera,
             "height": 900 * camera,
-            "timestamp": 0,
+            "timestamp": stamp,
             "prev": "",
             "next": "",
         }

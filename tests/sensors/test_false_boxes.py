@@ -24,7 +24,7 @@ from care_sim.sensors.false_boxes import MOST_DRAWS, FalseBoxes
 from care_sim.sensors.surround import SURROUND_CAMERAS
 from care_sim.sources.argoverse2 import films as argoverse2
 from care_sim.sources.kinds import recordings
-from care_sim.sources.nuscenes.cameras import CAMERA_CHANNELS
+from care_sim.sources.nuscenes.tables import CAMERA_CHANNELS
 from care_sim.sources.street_films import record
 from care_sim.streets.street import make_street
 from care_sim.world import bullet_clients as clients

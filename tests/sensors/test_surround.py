@@ -5,7 +5,13 @@ import pytest
 
 from care_sim.core.frames import Frame
 from care_sim.sensors.annotated import NO_OBJECT
-from care_sim.sensors.surround import SURROUND_CAMERAS, full_sweep, numbers_of, surround_detections
+from care_sim.sensors.surround import (
+    SURROUND_CAMERAS,
+    View,
+    full_sweep,
+    numbers_of,
+    surround_detections,
+)
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.bullet import NO_BODY, BulletWorld
 
@@ -85,10 +91,11 @@ def test_cameras_report_labelled_bodies_alone(bullet):
             ]
         )
     )
-    identified = surround_detections(bullet, SURROUND_CAMERAS, SENSOR, {bus: 2}, boxes)
+    views = [View(camera, SENSOR) for camera in SURROUND_CAMERAS]
+    identified = surround_detections(bullet, views, SENSOR, {bus: 2}, boxes)
     assert set(identified.objects.tolist()) == {bus}
     assert set(identified.detections.classes.tolist()) == {2}
-    both = surround_detections(bullet, SURROUND_CAMERAS, SENSOR, {bus: 2, van: 1}, boxes)
+    both = surround_detections(bullet, views, SENSOR, {bus: 2, van: 1}, boxes)
     assert set(both.objects.tolist()) == {bus, van}
     assert numbers_of(both.objects, {bus: 7}).tolist() == [
         7 if b == bus else NO_OBJECT for b in both.objects

@@ -5,6 +5,7 @@ another file than the caches of its tables was written to.
 """
 
 import json
+import shutil
 
 import numpy as np
 
@@ -186,13 +187,18 @@ OTHER_LOGS = (
 def nuscenes(case):
     """A database whose tables or sweeps are damaged."""
     folder = props.copy("base", case.folder / "base")
+    options = {}
     if case.rng.random() < 0.75:
+        if case.rng.random() < 0.5:
+            # Without sweeps boxes become bodies.
+            shutil.rmtree(folder / "samples")
+            options = case.rng.choice(({}, {"empty_boxes": True}, {"camera_times": "sweep"}))
         spoilt(
             case, case.rng.choice(sorted(folder.rglob("*.json"))), spoil.json_node, spoil.json_node
         )
     else:
         spoilt(case, case.rng.choice(sorted(folder.rglob("*.bin"))), spoil.points)
-    return _judged(case, folder, "nuscenes:base", exporting=True)
+    return _judged(case, folder, "nuscenes:base", exporting=True, **options)
 
 
 def other_sweeps(case):
@@ -202,14 +208,17 @@ def other_sweeps(case):
     sweeps = sorted(folder.rglob("*.bin"))
     form = rng.choice(("kitti", "waymo", "doubles", "millimetres", "gone", "empty", "folder"))
     case.tell(form)
-    for path in sweeps if rng.random() < 0.5 else sweeps[:1]:
+    chosen = sweeps if rng.random() < 0.5 else sweeps[:1]
+    for path in chosen:
         values = np.frombuffer(path.read_bytes(), "<f4").reshape(-1, 5).astype(float)
         path.unlink()
         if form == "folder":
             path.mkdir()
         elif form != "gone":
             path.write_bytes(_other_sweep(form, values, rng).tobytes())
-    return _judged(case, folder, "nuscenes:base", refused=True, exporting=True)
+    # Without any sweep boxes become bodies.
+    refused = form != "gone" or len(chosen) < len(sweeps)
+    return _judged(case, folder, "nuscenes:base", refused, exporting=True)
 
 
 def _other_sweep(form, values, rng):

@@ -32,8 +32,8 @@ class SourceOptions:
     """Which of a source's scenes there are, and what their camera saw."""
 
     split: str | None = None
-    """For streets: evaluation (150 scenes) or calibration (20). For nuScenes: val, all, or one of
-    splits.json.
+    """For streets: evaluation (150 scenes) or calibration (20). For nuScenes: train, val,
+    mini_train, mini_val, all, or one of splits.json.
     """
     version: str | None = None
     """For nuScenes: the version, where the folder holds several."""
@@ -45,20 +45,23 @@ class SourceOptions:
     """For nuScenes: sweeps that a detector gets at a keyframe, 1 unless given: its own, and the
     last before it, fired by the mask of the keyframe before.
     """
+    camera_times: str | None = None
+    """For nuScenes: own (the default: each camera at the time of its picture) or sweep (all at the
+    time of the sweep)."""
+    empty_boxes: bool = False
+    """For nuScenes and Argoverse 2: annotate boxes without a recorded point, too."""
 
     def source_named(self, text: str) -> Source:
         """The source that a text and the options name. Raises InvalidInput where there is none."""
         # Of two with one name it is told which one plays.
         kind = text.partition(":")[0]
         report_problems([line for one, line in SOURCES.refusals() if one.name == kind])
-        return source_of(
-            text, **{field.name: getattr(self, field.name) for field in fields(SourceOptions)}
-        )
+        return source_of(text, **{name: getattr(self, name) for name in self.source_options()})
 
     def source_options(self) -> list[str]:
         """Those that are given."""
         names = [field.name for field in fields(SourceOptions)]
-        return [name for name in names if getattr(self, name) is not None]
+        return [name for name in names if getattr(self, name) not in (None, False)]
 
 
 @dataclass(frozen=True, kw_only=True)

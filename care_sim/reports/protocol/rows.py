@@ -23,7 +23,7 @@ from care_sim.evaluation.scene_contrasts import (
     scene_share,
 )
 from care_sim.evaluation.strata import ENTRY, NEWCOMERS, thirds
-from care_sim.study.rows.reading import policy_of, setting_of, tags_of_row
+from care_sim.study.rows.reading import READ_WITH, policy_of, setting_of, tags_of_row
 from care_sim.study.rows.settings import Setting
 from care_sim.study.run_config import FULL, REFERENCE, Row
 
@@ -186,9 +186,8 @@ def _check_films(rows: Sequence[Row]) -> None:
     """The data of a source may have changed between two runs into one folder."""
     films: dict[tuple[object, ...], str] = {}
     for row in rows:
-        # Camera detections from a file, sweeps between keyframes and what becomes of pulses make
-        # another film of the scene.
-        names = ("camera_detections", "sweeps", *RETURN_SETTINGS)
+        # How a recording is read, and what becomes of pulses, makes another film of the scene.
+        names = (*READ_WITH, *RETURN_SETTINGS)
         made_with = [row.get(name) for name in names]
         scene = (row["source"], row["scene"], *made_with)
         if len(row["ttfds"]) != row["events"]:

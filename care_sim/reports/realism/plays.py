@@ -21,11 +21,11 @@ from care_sim.study.designs.realism import (
     LATE_FILM_CAMERA,
 )
 from care_sim.study.designs.variants import FilmPlace, Variant
-from care_sim.study.rows.reading import Key, policy_of, tags_of_row
+from care_sim.study.rows.reading import READ_WITH, Key, policy_of, tags_of_row
 from care_sim.study.run_config import FULL, REFERENCE, Row
 
 _RATIOS = (FIRST_SIGHTING, OVERALL)
-_OF_THE_FILM = ("sensor", "sensor_hash", "camera_detections", "sweeps")
+_OF_THE_FILM = ("sensor", "sensor_hash", *READ_WITH)
 """Columns of a source, which are no conditions."""
 
 

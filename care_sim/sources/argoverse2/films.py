@@ -8,7 +8,8 @@ every keyframe (`sensors/lidar/TIMESTAMP.feather`). Pictures are those of the bo
 
 Boxes without a recorded LiDAR point inside are left out, as the official evaluation leaves them
 out: nobody saw those objects there. Those of the first keyframe are in `Film.hidden`, since the
-objects were present. Static surroundings are not annotated, so only what is annotated occludes.
+objects were present. With `empty_boxes` they are annotated. Static surroundings are not annotated,
+so only what is annotated occludes.
 """
 
 import os
@@ -19,10 +20,11 @@ from scipy.spatial.transform import Rotation
 
 from care_sim.base.checks import check_known
 from care_sim.base.errors import InvalidInput
-from care_sim.core.arrays import Integers
+from care_sim.core.arrays import Integers, Mask
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.loops.film import Film, Shot
+from care_sim.sensors.annotated import Annotations
 from care_sim.sensors.surround import SURROUND_CAMERAS
 from care_sim.sources.argoverse2.feather import Columns
 from care_sim.sources.argoverse2.tables import (
@@ -40,6 +42,7 @@ from care_sim.sources.argoverse2.tables import (
 )
 from care_sim.sources.boxes_as_bodies import AnnotatedBody, annotations_of, sense
 from care_sim.sources.car_motion import SPAN_S, motions
+from care_sim.sources.empty_boxes import tell_empty_boxes
 from care_sim.sources.film_checks import report_once
 from care_sim.sources.nuscenes.sweeps import recorded_cloud
 
@@ -79,8 +82,9 @@ def logs(folder: Path, split: str | None = None) -> list[Path]:
     )
 
 
-def argoverse2_film(log: Path, grid: AngularGrid | None = None) -> Film:
+def argoverse2_film(log: Path, grid: AngularGrid | None = None, empty_boxes: bool = False) -> Film:
     """The film of a log, every cell of `grid` (the paper's, unless given) fired in every keyframe.
+    With `empty_boxes` also boxes without a recorded point are annotated, and bodies.
 
     Raises InvalidInput for a file that is missing, truncated or incomplete, a timestamp without a
     pose, an unknown category, an object annotated twice at once.
@@ -112,27 +116,23 @@ def argoverse2_film(log: Path, grid: AngularGrid | None = None) -> Film:
     egos = motions(times, cars)
     grid = grid or AngularGrid()
     shots: list[Shot] = []
+    every: list[Annotations] = []
+    filled: list[Mask] = []
     for row in np.searchsorted(moments, keyframes).tolist():
         sensor = cars[row].holding(np.array(UP_LIDAR))
-        annotations, pictures, cloud = sense(
-            _bodies(_rows(boxes, moments[row], seen=True)), sensor, ARGOVERSE2_SENSOR_HEIGHT_M, grid
-        )
+        bodies, holds = _bodies(boxes, moments[row])
+        kept = [body for body, held in zip(bodies, holds, strict=True) if held or empty_boxes]
+        annotations, pictures, cloud = sense(kept, sensor, ARGOVERSE2_SENSOR_HEIGHT_M, grid)
         if len(recorded) == len(keyframes):
             points = read_points(recorded[len(shots)])
             cloud = recorded_cloud(points - UP_LIDAR, grid, annotations, sensor)
-        shots.append(
-            Shot(
-                float(times[row]),
-                str(moments[row]),
-                sensor,
-                egos[row],
-                annotations,
-                pictures,
-                cloud,
-            )
-        )
-    unseen = _bodies(_rows(boxes, keyframes[0], seen=False))
-    hidden = annotations_of([body for body in unseen if body.label is not None])
+        seen = (annotations, pictures, cloud)
+        shots.append(Shot(float(times[row]), str(moments[row]), sensor, egos[row], *seen))
+        reported = np.array([body.label is not None for body in bodies], bool)
+        every.append(annotations_of([body for body in bodies if body.label is not None]))
+        filled.append(holds[reported])
+    tell_empty_boxes(log.name, every, filled, grid.range_m)
+    hidden = every[0].take(~(filled[0] | empty_boxes))
     return Film(
         log.name,
         SURROUND_CAMERAS,
@@ -205,14 +205,12 @@ def _car_frames(poses: Columns, moments: Integers, origin: int) -> list[Frame]:
     ]
 
 
-def _rows(boxes: Columns, sweep: int, seen: bool) -> Columns:
-    """The boxes of a sweep that a point was recorded in, or those that none was."""
-    kept = (boxes["timestamp_ns"] == sweep) & ((boxes["num_interior_pts"] > 0) == seen)
-    return {name: column[kept] for name, column in boxes.items()}
-
-
-def _bodies(boxes: Columns) -> list[AnnotatedBody]:
-    """The boxes as bodies; the sensor's axes are the car's."""
+def _bodies(boxes: Columns, sweep: int) -> tuple[list[AnnotatedBody], Mask]:
+    """The boxes of a sweep as bodies, and (n,) in which of them a point was recorded. The sensor's
+    axes are the car's.
+    """
+    own = boxes["timestamp_ns"] == sweep
+    boxes = {name: column[own] for name, column in boxes.items()}
     numbers = boxes["number"].tolist()
     labels = [ARGOVERSE2_CATEGORIES[name] for name in boxes["category"].tolist()]
     sizes = [tuple(size) for size in table(boxes, SIZE).tolist()]
@@ -223,4 +221,5 @@ def _bodies(boxes: Columns) -> list[AnnotatedBody]:
         Frame.turned_by(Rotation.from_quat(turn), place)
         for turn, place in zip(turns, places, strict=True)
     ]
-    return [AnnotatedBody(*values) for values in zip(numbers, labels, sizes, frames, strict=True)]
+    bodies = [AnnotatedBody(*one) for one in zip(numbers, labels, sizes, frames, strict=True)]
+    return bodies, boxes["num_interior_pts"] > 0

@@ -22,7 +22,7 @@ from care_sim.sources.nuscenes.table_files import (
     table_rows,
 )
 
-FORM = "1"
+FORM = "2"
 """Raised whenever the same files make another table."""
 _VECTOR = pa.list_(pa.float64(), 3)
 _QUATERNION = pa.list_(pa.float64(), 4)
@@ -68,16 +68,19 @@ def boxes_by_sample(path: TablePath, samples: Sequence[str]) -> pa.Table:
 
 
 def recordings_by_sample(
-    path: TablePath, samples: Sequence[str], lidars: Sequence[str]
+    path: TablePath, samples: Sequence[str], lidars: Sequence[str], cameras: Sequence[str]
 ) -> pa.Table:
     """The recordings of each of the tokens `samples`, as `boxes_by_sample` has the boxes: those of
     keyframes, and all of the calibrated sensors `lidars`, together about one in four. Those of the
-    lidars have the `pose` of the car, null where `ego_pose` lacks it.
+    lidars, and of the `cameras` at keyframes, have the `pose` of the car, null where `ego_pose`
+    lacks it.
 
     Raises InvalidInput as `table_rows` does, and for a token that stands twice.
     """
     tokens = _column(path("sample"), samples, pa.string())
-    return _grouped(_with_poses(path, _recordings(path, lidars), lidars), tokens)
+    # No other recording of a camera is read.
+    posed = [*lidars, *cameras]
+    return _grouped(_with_poses(path, _recordings(path, lidars), posed), tokens)
 
 
 def _boxes(path: TablePath, samples: pa.Array) -> pa.Table:
@@ -106,10 +109,10 @@ def _recordings(path: TablePath, lidars: Sequence[str]) -> pa.Table:
     return _columns(path("sample_data"), table_rows(path("sample_data"), is_needed), RECORDINGS)
 
 
-def _with_poses(path: TablePath, recordings: pa.Table, lidars: Sequence[str]) -> pa.Table:
-    known = _column(path("calibrated_sensor"), lidars, pa.string())
-    of_lidars = pc.is_in(recordings["calibrated_sensor_token"], known)
-    tokens = pc.if_else(of_lidars, recordings["ego_pose_token"], None)
+def _with_poses(path: TablePath, recordings: pa.Table, sensors: Sequence[str]) -> pa.Table:
+    known = _column(path("calibrated_sensor"), sensors, pa.string())
+    is_posed = pc.is_in(recordings["calibrated_sensor_token"], known)
+    tokens = pc.if_else(is_posed, recordings["ego_pose_token"], None)
     poses = _poses(path("ego_pose"), set(tokens.drop_null().to_pylist()))
     places = poses.drop_columns("token").to_struct_array().combine_chunks()
     where = pc.index_in(tokens, value_set=poses["token"].combine_chunks())

@@ -3,7 +3,8 @@ visibility.
 """
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -14,17 +15,10 @@ from care_sim.core.frames import Frame
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import ImageDetections
 from care_sim.sensors.annotated import Annotations, IdentifiedDetections
-from care_sim.sensors.camera import CAMERA_WIDTH
+from care_sim.sensors.camera import CAMERA_HEIGHT, CAMERA_WIDTH
 from care_sim.sensors.confidence import MIN_PIXELS, confidence_of
+from care_sim.sensors.surround import View
 
-CAMERA_CHANNELS = (
-    "CAM_FRONT",
-    "CAM_FRONT_LEFT",
-    "CAM_FRONT_RIGHT",
-    "CAM_BACK_LEFT",
-    "CAM_BACK_RIGHT",
-    "CAM_BACK",
-)
 PICTURE = (1600, 900)
 """Width and height of a picture in pixels."""
 
@@ -36,13 +30,14 @@ wholly visible."""
 
 @dataclass(frozen=True)
 class RecordedCamera:
-    """One camera in the sensor frame of the LiDAR: optical centre and axes `frame`, and its
-    intrinsics in pixels.
+    """One camera in the sensor frame of the LiDAR: optical centre and axes `frame`, its intrinsics
+    in pixels, and the `size` of its pictures.
     """
 
     frame: Frame
     focal: float
     centre: tuple[float, float]
+    size: tuple[int, int] = PICTURE
 
     @cached_property
     def pinhole(self) -> PinholeCamera:
@@ -54,7 +49,7 @@ class RecordedCamera:
         frame = self.frame
         width, height = (
             2 * math.ceil(max(middle, size - middle))
-            for middle, size in zip(self.centre, PICTURE, strict=True)
+            for middle, size in zip(self.centre, self.size, strict=True)
         )
         position = (frame.x, frame.y, frame.z)
         angle = float(2 * np.arctan(width / 2 / self.focal))
@@ -65,6 +60,21 @@ class RecordedCamera:
     def shift(self) -> Floats:
         """(4,) from a box in the recorded picture to one in `pinhole`'s."""
         return np.tile(np.array([self.pinhole.width, self.pinhole.height]) / 2 - self.centre, 2)
+
+    @property
+    def rendered(self) -> "RecordedCamera":
+        """The same camera with pictures as small as the rendered ones of a street."""
+        share = CAMERA_WIDTH / PICTURE[0]
+        u, v = self.centre
+        size = CAMERA_WIDTH, CAMERA_HEIGHT
+        return replace(self, focal=self.focal * share, centre=(u * share, v * share), size=size)
+
+    def view(self, sensor: Frame) -> View:
+        """The picture that it takes while the LiDAR is at the frame `sensor`."""
+        left, top, right, bottom = (
+            np.rint(self.shift + np.array([0, 0, *self.size])).astype(int).tolist()
+        )
+        return View(self.pinhole, sensor, (left, top, right, bottom))
 
 
 def recorded_camera(mount: Frame, intrinsic: Floats, lidar: Frame) -> RecordedCamera:
@@ -81,9 +91,13 @@ def recorded_camera(mount: Frame, intrinsic: Floats, lidar: Frame) -> RecordedCa
 
 
 def projected_detections(
-    cameras: tuple[RecordedCamera, ...], annotations: Annotations, shares: Floats
+    cameras: Sequence[RecordedCamera],
+    pictures: Sequence[Floats],
+    annotations: Annotations,
+    shares: Floats,
 ) -> IdentifiedDetections:
-    """Boxes of the annotated objects that the pictures show: `shares` (n,) of each are visible.
+    """Boxes of the annotated objects (n) that the pictures show: `shares` (n,) of each are visible.
+    `pictures` are the boxes (n, 7) per camera, in the frame of the LiDAR when it took its picture.
 
     An object has a box in every picture in which its projected box, cut at the edges and times the
     visible share, would fill MIN_PIXELS of a picture CAMERA_WIDTH wide. Confidence grows with those
@@ -92,8 +106,8 @@ def projected_detections(
     rows = [np.empty((0, len(ImageDetections.COLUMNS)))]
     objects = [np.empty(0, np.int64)]
     visible = [np.empty(0)]
-    for number, camera in enumerate(cameras):
-        boxes = projected(camera, annotations.boxes)
+    for number, (camera, own) in enumerate(zip(cameras, pictures, strict=True)):
+        boxes = projected(camera, own)
         area = np.prod(np.clip(boxes[:, 2:] - boxes[:, :2], 0, None), axis=1)
         pixels = area * shares * (CAMERA_WIDTH / PICTURE[0]) ** 2
         # The same rule as for rendered pictures, at their width.

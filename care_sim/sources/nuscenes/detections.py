@@ -71,15 +71,16 @@ class DetectionFile:
     def seen(
         self,
         cameras: Sequence[RecordedCamera],
-        pictures: Sequence[JsonRow],
+        pictures: Sequence[tuple[JsonRow, Floats]],
         annotations: Annotations,
     ) -> IdentifiedDetections:
         """The detections on the pictures of a keyframe, one picture per camera, each with the
-        object that it lies on.
+        object that it lies on. A picture is its recording and the boxes (n, 7) of the annotated
+        objects in the frame of the LiDAR when it was taken.
         """
         rows = [np.empty((0, len(ImageDetections.COLUMNS)))]
         objects = [np.empty(0, np.int64)]
-        for number, (camera, picture) in enumerate(zip(cameras, pictures, strict=True)):
+        for number, (camera, (picture, own)) in enumerate(zip(cameras, pictures, strict=True)):
             # COCO names pictures by token or by file, so a picture may be known under both.
             found = self._found.get(picture["token"], []) + self._found.get(picture["filename"], [])
             boxes = np.array([box for _, _, box in found]).reshape(-1, 4) + camera.shift
@@ -90,9 +91,7 @@ class DetectionFile:
                     [classes, [c for _, c, _ in found], boxes, zeros + number, zeros, zeros]
                 )
             )
-            objects.append(
-                _behind(boxes, classes, projected(camera, annotations.boxes), annotations)
-            )
+            objects.append(_behind(boxes, classes, projected(camera, own), annotations))
         return IdentifiedDetections(
             ImageDetections.from_rows(np.concatenate(rows)), np.concatenate(objects)
         )

@@ -22,6 +22,14 @@ from care_sim.sources.nuscenes.table_files import (
 from care_sim.sources.plausible import STAMPS_NS, ValueRange, check_span
 
 LIDAR = "LIDAR_TOP"
+CAMERA_CHANNELS = (
+    "CAM_FRONT",
+    "CAM_FRONT_LEFT",
+    "CAM_FRONT_RIGHT",
+    "CAM_BACK_LEFT",
+    "CAM_BACK_RIGHT",
+    "CAM_BACK",
+)
 UNBOUNDED: ValueRange = (float("-inf"), float("inf"))
 
 
@@ -96,7 +104,7 @@ class Database:
         )
 
     def pose_of(self, data: JsonRow) -> JsonRow:
-        """The pose of the car at a recording of the LiDAR."""
+        """The pose of the car at a recording of the LiDAR, or at a keyframe's of a camera."""
         token = data["ego_pose_token"]
         if data["pose"] is None:
             raise InvalidInput(f"{self.path('ego_pose')}: no row with the token {token!r}")
@@ -160,20 +168,25 @@ class Database:
         return self._cached(
             "recordings",
             tables,
-            lambda: recordings_by_sample(self.path, self._samples, self._lidars()),
+            lambda: recordings_by_sample(
+                self.path,
+                self._samples,
+                self._calibrated(LIDAR),
+                self._calibrated(*CAMERA_CHANNELS),
+            ),
         )
 
     def _cached(self, name: str, tables: tuple[str, ...], make: Callable[[], pa.Table]) -> pa.Table:
         file = self.folder / f"care-sim-{name}.arrow"
         return cached_table(file, FORM, map(self.path, tables), make)
 
-    def _lidars(self) -> list[str]:
-        """The tokens under which the LiDAR was calibrated."""
+    def _calibrated(self, *channels: str) -> list[str]:
+        """The tokens under which sensors were calibrated."""
         sensors = self.rows("sensor")
         return [
             token
             for token, row in self.rows("calibrated_sensor").items()
-            if sensors.get(row["sensor_token"], {}).get("channel") == LIDAR
+            if sensors.get(row["sensor_token"], {}).get("channel") in channels
         ]
 
     @property

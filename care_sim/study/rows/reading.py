@@ -21,11 +21,19 @@ from care_sim.study.run_config import CONDITION_NAMES, Row
 
 _OF_A_SETTING = {*CONDITION_NAMES, "scenario", "sensor", "sensor_hash", "detector", "keyframe_s"}
 _USUAL_EPISODE = {field.name: field.default for field in fields(EpisodeConfig)}
-_USUAL_PLAY = {name: DEFAULTS[name] for name in OF_BOTH_LOOPS if name != "floor_seed"} | {
+READ_WITH = {
     "camera_detections": None,
     "sweeps": 1,
-    "presence": ANNOTATED,
+    "camera_times": None,
+    "empty_boxes": None,
+    "points": None,
 }
+"""Columns that tell how a recording is read, and what they hold where it is the usual way."""
+_USUAL_PLAY = (
+    {name: DEFAULTS[name] for name in OF_BOTH_LOOPS if name != "floor_seed"}
+    | READ_WITH
+    | {"presence": ANNOTATED}
+)
 
 
 Key = tuple[Setting, str, float]

@@ -89,9 +89,12 @@ def test_a_real_sweep_has_as_many_points_in_every_box_as_are_annotated(recorded)
     log = recorded / "argoverse2" / "adcf7d18-0510-35b0-a2fa-b4cea13a6d76"
     (sweep,) = (log / "sensors" / "lidar").glob("*.feather")
     _, boxes = read_boxes(log / "annotations.feather")
-    now = {name: rows[boxes["timestamp_ns"] == int(sweep.stem)] for name, rows in boxes.items()}
     # A label of one kind: only the five classes make annotations, and all boxes are counted here.
-    everything = annotations_of([replace(body, label="car") for body in _bodies(now)])
+    everything = annotations_of(
+        [replace(body, label="car") for body in _bodies(boxes, int(sweep.stem))[0]]
+    )
     found = owners(read_points(sweep) - UP_LIDAR, everything, Frame(0.0, 0.0, 0.0, 0.0))
-    counts = [(found == number).sum() for number in now["number"]]
-    assert np.array_equal(counts, now["num_interior_pts"])
+    counts = [(found == number).sum() for number in everything.objects]
+    assert np.array_equal(
+        counts, boxes["num_interior_pts"][boxes["timestamp_ns"] == int(sweep.stem)]
+    )

@@ -21,15 +21,9 @@ def swept(folder, *moments, filed=1):
     """
     samples = [([CAR], pose(4.0 * n), as_recorded(WORLD - [4.0 * n, 0, 0])) for n in range(3)]
     root = database(folder, samples)
-    change(root, "sample_data", stamp_keyframes)
     for moment in moments:
         add_sweep(root, moment, filed)
     return root
-
-
-def stamp_keyframes(rows):
-    for row in rows:
-        row["timestamp"] = START_US + 500_000 * int(row["sample_token"].removeprefix(f"{SCENE}-"))
 
 
 def add_sweep(root, moment, filed):

@@ -10,7 +10,7 @@ from care_sim.core.grid import AngularGrid
 from care_sim.core.types import CLASSES
 from care_sim.sensors.annotated import NO_OBJECT, Annotations
 from care_sim.sources.nuscenes.categories import DETECTION_NAMES, NUSCENES_CATEGORIES
-from care_sim.sources.nuscenes.splits import VAL, scenes
+from care_sim.sources.nuscenes.splits import OFFICIAL, scenes
 from care_sim.sources.nuscenes.sweeps import owners, read_points
 from care_sim.sources.nuscenes.tables import Database
 from tests.helpers.nuscenes_database import SENSORS, annotated, as_recorded, change, pose, write
@@ -189,10 +189,19 @@ def test_boxes_without_a_point_were_present_at_the_first_keyframe(tmp_path):
 
 
 def test_the_validation_split_holds_the_150_scenes_of_the_devkit():
-    assert len(VAL) == len(set(VAL)) == 150
-    assert {VAL[0], VAL[-1], "scene-0103", "scene-0916"} <= set(VAL)
-    assert {"scene-0061", "scene-0553"} - set(VAL) == {"scene-0061"}, "train, and val"
-    assert {"scene-0037", "scene-0628", "scene-0918", "scene-0970", "scene-1074"}.isdisjoint(VAL)
+    val = OFFICIAL["val"]
+    assert len(val) == len(set(val)) == 150
+    assert {"scene-0003", "scene-1073", *OFFICIAL["mini_val"]} <= set(val)
+    assert {"scene-0037", "scene-0628", "scene-0918", "scene-0970", "scene-1074"}.isdisjoint(val)
+
+
+def test_the_training_split_holds_the_700_other_scenes_that_have_boxes():
+    train, val = (set(OFFICIAL[name]) for name in ("train", "val"))
+    assert len(train) == 700
+    assert len(train | val) == 850
+    assert {"scene-0001", "scene-0161", "scene-0120", "scene-1110"} <= train
+    assert train.isdisjoint({"scene-0077", "scene-0137", "scene-0827", "scene-1043"}), "of test"
+    assert set(OFFICIAL["mini_train"]) - train == {"scene-0553", "scene-0796"} < val
 
 
 def test_splits_choose_scenes(tmp_path):
@@ -207,19 +216,24 @@ def test_splits_choose_scenes(tmp_path):
     assert [row["name"] for row in scenes(tables, "mine")] == ["scene-0061"]
     with pytest.raises(InvalidInput, match=r"splits.json: the split 'gone' names 'scene-9'"):
         scenes(tables, "gone")
-    with pytest.raises(InvalidInput, match="unknown split 'x'; known: all, gone, mine, val"):
+    with pytest.raises(
+        InvalidInput, match="unknown split 'x'; known: all, gone, mine, mini_train, "
+    ):
         scenes(tables, "x")
 
 
 def test_an_empty_split_names_those_that_hold_scenes(tmp_path):
     root = write(tmp_path, {"scene-0061": [([CAR], pose(), as_recorded(WORLD))]})
     with pytest.raises(
-        InvalidInput, match=r"scene.json: holds no scene of the split 'val'; splits it holds: all$"
+        InvalidInput,
+        match=r"scene.json: holds no scene of the split 'val'; .*: all, train, mini_train$",
     ):
         scenes(Database(root))
     own = {"mine": ["scene-0061"], "gone": ["scene-9"], "none": []}
     (root / "v1.0-trainval" / "splits.json").write_text(json.dumps(own))
-    with pytest.raises(InvalidInput, match=r"the split 'val'; splits it holds: all, mine$"):
+    with pytest.raises(
+        InvalidInput, match=r"the split 'val'; splits it holds: all, train, mini_train, mine$"
+    ):
         scenes(Database(root))
 
 

@@ -73,9 +73,9 @@ BREAKS = {
         lambda root: change(root, "sample_data", lambda rows: rows.pop(0)),
         f"sample_data.json: no LIDAR_TOP of the sample '{SCENE}-0'",
     ),
-    "no sweep": (
-        dangling("filename", "sample_data", "samples/gone.bin"),
-        "samples/gone.bin: no such file",
+    "a folder for a sweep": (
+        dangling("filename", "sample_data", "samples"),
+        "nuscenes/samples: no such file",
     ),
     "short sweep": (
         lambda root: next(root.glob("samples/LIDAR_TOP/*")).write_bytes(b"0" * 47),
