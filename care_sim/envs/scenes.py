@@ -48,10 +48,12 @@ class StreetEnv(OpenLoopEnv):
 class ReplayEnv(FilmEnv):
     """`CARE-Replay-v0`: a recorded scene, at 2 Hz.
 
-    `source` names the recordings, `argoverse2:FOLDER`, `nuscenes:FOLDER` or a source of your own
+    `source` names the recordings, `boreas` (a drive that comes with the package),
+    `argoverse2:FOLDER`, `nuscenes:FOLDER`, `kitti:FOLDER` or a source of your own
     (`care_sim.sources.named`), and `scene` one of their scenes by name; the first, unless given.
     `split`, `version`, `camera_detections` and `sweeps` are those of
-    `care_sim.sources.nuscenes.recordings.NuScenes`. A file that is missing or damaged, or a token
+    `care_sim.sources.nuscenes.recordings.NuScenes`. `sensor` is the set-up that sees the boxes of
+    Boreas and KITTI. A file that is missing or damaged, or a token
     that points nowhere, raises `care_sim.InvalidInput` with its name. The seed of `reset` draws
     faults, noise and floor.
     """
@@ -67,6 +69,7 @@ class ReplayEnv(FilmEnv):
         version: str | None = None,
         camera_detections: str | PathLike[str] | None = None,
         sweeps: int | None = None,
+        sensor: Sensor | None = None,
         **parameters: Any,
     ):
         # Before the scene is read, so that a wrong name is refused at once.
@@ -79,6 +82,7 @@ class ReplayEnv(FilmEnv):
             version=version,
             camera_detections=camera_detections,
             sweeps=sweeps,
+            sensor=sensor,
         )
         scenes = recorded.scenes()
         # The source refuses a name that it does not have.

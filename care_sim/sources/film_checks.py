@@ -63,11 +63,12 @@ def tell_other_frame(name: str, seen: Sequence[tuple[Frame, Annotations]]) -> No
     LiDAR and the annotations in it, per keyframe.
     """
     if told := _other_frame(seen):
-        _report_once(f"{name}: its boxes {told}: {_FRAMES[told]}")
+        report_once(f"{name}: its boxes {told}: {_FRAMES[told]}")
 
 
 @lru_cache(maxsize=1000)
-def _report_once(line: str) -> None:
+def report_once(line: str) -> None:
+    """Print a line on stderr, the first time in this process."""
     report_problems([line])
 
 
