@@ -21,6 +21,7 @@ from scipy.spatial.transform import Rotation
 
 from care_sim.base.checks import check_known
 from care_sim.base.errors import InvalidInput, shown, unknown
+from care_sim.base.json_text import check_file_size
 from care_sim.core.arrays import Floats
 from care_sim.core.frames import Frame
 from care_sim.core.sensor_setup import SensorSetup, between, on_car
@@ -56,6 +57,8 @@ _AXES = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 _LABEL_WORDS = 17
 _OXTS_NUMBERS = 30
 _EARTH_RADIUS_M = 6_378_137.0
+_MOST_BYTES = 2**24
+"""Ten times the longest file of the benchmark."""
 _ROUNDED = 0.01
 """Numbers of a rotation matrix may be off by this much."""
 
@@ -261,6 +264,7 @@ def _numbers(line: str, words: Sequence[str], count: int) -> Floats:
 def _lines(path: Path) -> Iterator[tuple[str, list[str]]]:
     """Return file and number of every line, for messages, and its words."""
     try:
+        check_file_size(path, _MOST_BYTES)
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError:
         raise InvalidInput(f"{path}: no such file") from None
