@@ -13,6 +13,7 @@ such file, they come from `FOLDER/training/oxts/NNNN.txt` and `FOLDER/training/c
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -59,6 +60,8 @@ _OXTS_NUMBERS = 30
 _EARTH_RADIUS_M = 6_378_137.0
 _MOST_BYTES = 2**24
 """Ten times the longest file of the benchmark."""
+_LONGEST_STEP_M = 10.0
+"""A car stays below 100 m/s."""
 _ROUNDED = 0.01
 """Numbers of a rotation matrix may be off by this much."""
 
@@ -95,6 +98,7 @@ class Kitti(Recordings):
         check_known(f"drive in {self.folder}", scene, self.scenes())
         pose_file, *calibration = self._pose_files(scene)
         poses = _oxts_poses(pose_file, *calibration) if calibration else _camera_poses(pose_file)
+        _check_steps(pose_file, poses)
         boxes = _boxes(self._labels / f"{scene}.txt", poses)
         own = sensor_setup(KITTI_SETUP)
         camera = np.array(on_car(own.position, own.cameras[0]))
@@ -147,6 +151,17 @@ def _car(pose: _Pose, camera: Floats) -> list[float]:
     turn = pose.turn @ _AXES.T
     frame = Frame.turned_by(Rotation.from_matrix(turn), pose.place - turn @ camera)
     return [frame.x, frame.y, frame.z, frame.yaw, frame.roll, frame.pitch]
+
+
+def _check_steps(path: Path, poses: Sequence[_Pose]) -> None:
+    """Raise InvalidInput where the car jumps, as in other units or after a lost line."""
+    for line, (before, pose) in enumerate(pairwise(poses), 2):
+        step = np.linalg.norm(pose.place - before.place)
+        if step > _LONGEST_STEP_M:
+            raise InvalidInput(
+                f"{path}, line {line}: the car jumps by {step:g} m; may move {_LONGEST_STEP_M:g} m "
+                f"in {FRAME_S:g} s"
+            )
 
 
 def _boxes(path: Path, poses: Sequence[_Pose]) -> list[list[dict[str, Any]]]:
@@ -231,10 +246,10 @@ def _camera_from_imu(path: Path) -> tuple[Floats, Floats]:
         line, words = next((rows[name] for name in names if name in rows), (None, []))
         if line is None:
             raise InvalidInput(f"{path}: {' or '.join(names)} is missing")
-        if names[0] == "R_rect":
-            numbers = np.insert(_numbers(line, words, 9), [3, 6, 9], 0.0)
-        else:
-            numbers = _numbers(line, words, 12)
+        is_turn = "R_rect" in names
+        numbers = _numbers(line, words, 9 if is_turn else 12)
+        if is_turn:
+            numbers = np.insert(numbers, [3, 6, 9], 0.0)
         own_turn, own_place = _rigid(line, numbers)
         turn, place = own_turn @ turn, own_turn @ place + own_place
     return turn, place

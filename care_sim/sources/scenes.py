@@ -212,8 +212,8 @@ def _film_of(source: Source, scene: Scene, _stamps: tuple[Stamp, ...]) -> Film:
 
 def chosen_scenes(scenes: list[Scene], names: tuple[str, ...]) -> list[Scene]:
     """The scenes that are asked for. One whole number means that many, from the first, unless a
-    scene is called so. Otherwise they are names, and without any all scenes are meant. Raises InvalidInput for a name or a number
-    that there is not.
+    scene is called so. Otherwise they are names, and without any all scenes are meant. Raises
+    InvalidInput for a name or a number that there is not.
     """
     if not names:
         return scenes

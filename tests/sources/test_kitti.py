@@ -8,6 +8,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.evaluation.sightings import Sightings
 from care_sim.sensors.setups import sensor_setup
 from care_sim.sources.named import source_of
+from care_sim.sources.scenes import chosen_scenes
 from tests.helpers.kitti_drive import STANDING, cameras, write
 
 LIDAR_FROM_CAMERA = np.array([-0.27, 0.0, 0.08])
@@ -80,6 +81,14 @@ def test_every_set_up_has_the_front_camera_alone(tmp_path):
     assert row.row(row.scenes()[0])["sensor"] == "hdl-64e"
 
 
+def test_the_number_of_a_drive_is_its_name_and_no_count(tmp_path):
+    for drive in ("0000", "0001"):
+        write(tmp_path, drive)
+    scenes = source_of(f"kitti:{tmp_path}").scenes()
+    assert [scene.name for scene in chosen_scenes(scenes, ("0001",))] == ["0001"]
+    assert chosen_scenes(scenes, ("2",)) == scenes
+
+
 def test_gymnasium_replays_a_drive(tmp_path):
     write(tmp_path)
     with gymnasium.make("CARE-Replay-v0", source=f"kitti:{tmp_path}", sensor="hdl-64e") as env:
@@ -139,6 +148,7 @@ FAULTS = {
     "kilometres": (word(15, "90000"), "object 0: pose lies 9"),
     "yaw in degrees": (word(5, "45", **OXTS), "oxts/0000.txt, line 2: must begin with latitude"),
     "metres": (word(0, "457000", **OXTS), "oxts/0000.txt, line 2: must begin with latitude"),
+    "a jump": (word(0, "50", **OXTS), "oxts/0000.txt, line 2: the car jumps by"),
     "few columns": (lines(lambda line: line[:90], **OXTS), "line 2: must have 30 numbers"),
     "no rectification": (word(0, "R:", **CALIB), "calib/0000.txt: R_rect or R0_rect is missing"),
     "no rotation": (word(1, "3", number=2, **CALIB), "line 3: is no pose; its first three columns"),
