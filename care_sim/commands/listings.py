@@ -101,7 +101,8 @@ def _source_lines(name: str) -> list[str]:
         source: Any = SOURCES.maker(name)
     except InvalidInput as error:
         return [f"{name:17} (broken) {error}{package}"]
-    asked = f"{name}:FOLDER" if issubclass(source, Recordings) else name
+    has_folder = issubclass(source, Recordings) and not source.shipped
+    asked = f"{name}:FOLDER" if has_folder else name
     about, _, _ = (inspect.getdoc(source) or "").partition("\n\n")
     return [
         f"{asked:17} {' '.join(about.split())}{package}",

@@ -48,10 +48,12 @@ class StreetEnv(OpenLoopEnv):
 class ReplayEnv(FilmEnv):
     """`CARE-Replay-v0`: a recorded scene, at 2 Hz.
 
-    `source` names the recordings, `argoverse2:FOLDER`, `nuscenes:FOLDER` or a source of your own
+    `source` names the recordings, `boreas` (a drive that comes with the package),
+    `argoverse2:FOLDER`, `nuscenes:FOLDER`, `kitti:FOLDER` or a source of your own
     (`care_sim.sources.named`), and `scene` one of their scenes by name; the first, unless given.
     `split`, `version`, `camera_detections`, `sweeps`, `camera_times` and `empty_boxes` are those of
-    `care_sim.sources.nuscenes.recordings.NuScenes`. A file that is missing or damaged, or a token
+    `care_sim.sources.nuscenes.recordings.NuScenes`. `sensor` is the set-up that sees the boxes of
+    Boreas and KITTI. A file that is missing or damaged, or a token
     that points nowhere, raises `care_sim.InvalidInput` with its name. The seed of `reset` draws
     faults, noise and floor.
     """
@@ -69,6 +71,7 @@ class ReplayEnv(FilmEnv):
         sweeps: int | None = None,
         camera_times: str | None = None,
         empty_boxes: bool | None = None,
+        sensor: Sensor | None = None,
         **parameters: Any,
     ):
         # Before the scene is read, so that a wrong name is refused at once.
@@ -83,6 +86,7 @@ class ReplayEnv(FilmEnv):
             sweeps=sweeps,
             camera_times=camera_times,
             empty_boxes=empty_boxes,
+            sensor=sensor,
         )
         scenes = recorded.scenes()
         # The source refuses a name that it does not have.

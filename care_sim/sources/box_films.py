@@ -31,10 +31,11 @@ def film_of_boxes(
     """Make a film of boxes: they become bodies, and a sensor set-up sees them at every keyframe.
 
     All poses are x, y, z (metres) and yaw (radians, from x towards y) in one world frame, z up.
+    Poses of the car may go on with its roll and its pitch (`care_sim.core.frames.Frame`).
 
     - `times_s` (k,): seconds at the keyframes, ascending, about evenly apart.
-    - `ego_poses` (k, 4): the pose of the car at each keyframe: the point on the road below its
-      middle, x ahead, y to its left.
+    - `ego_poses` (k, 4) or (k, 6): the pose of the car at each keyframe: the point on the road
+      below its middle, x ahead, y to its left.
     - `boxes`: per keyframe a list of maps. `id` names an object throughout the film. `class` is one
       of `care_sim.CLASSES`, or None for a body that only hides others. `size` is length, width and
       height. `pose` is that of the middle of the box, in the world: neither in the car's frame nor
@@ -46,7 +47,8 @@ def film_of_boxes(
     """
     setup = sensor_setup(sensor)
     times = _numbers(f"{name}: times_s", times_s, (-1,), MAP_M)
-    poses = _numbers(f"{name}: ego_poses", ego_poses, (-1, 4), MAP_M)
+    tilted = as_array(f"{name}: ego_poses", ego_poses).shape[1:] == (6,)
+    poses = _numbers(f"{name}: ego_poses", ego_poses, (-1, 6 if tilted else 4), MAP_M)
     _check_list(name, boxes)
     if not LEAST_KEYFRAMES <= len(times) == len(poses) == len(boxes):
         raise InvalidInput(
@@ -58,7 +60,7 @@ def film_of_boxes(
     check_span(name, times[-1] - times[0])
     _check_turns(f"{name}: ego_poses", poses)
     # A map's coordinates lie far from their origin, so the world of a film begins at the car.
-    start = np.append(poses[0, :3], 0.0)
+    start = np.pad(poses[0, :3], (0, poses.shape[1] - 3))
     cars = [Frame(*pose) for pose in (poses - start).tolist()]
     numbers: dict[Any, int] = {}
     shots: list[Shot] = []
@@ -112,7 +114,7 @@ def _body(
     length, width, height = _numbers(f"{named}: size", box["size"], (3,), SIZES_M).tolist()
     pose = _numbers(f"{named}: pose", box["pose"], (4,), MAP_M)
     _check_turns(f"{named}: pose", pose[None])
-    own = sensor.seeing(Frame(*(pose - start).tolist()))
+    own = sensor.seeing(Frame(*(pose - start[:4]).tolist()))
     if np.abs(own.origin).max() > AWAY_M[1]:
         raise InvalidInput(
             f"{named}: pose lies {np.abs(own.origin).max():g} m from the car, may lie "
@@ -139,9 +141,10 @@ def _numbers(name: str, value: Any, shape: tuple[int, ...], within: ValueRange) 
 
 
 def _check_turns(name: str, poses: Floats) -> None:
-    most = poses[np.abs(poses[:, 3]).argmax(), 3]
-    if abs(most) > FULL_TURN:
-        raise InvalidInput(f"{name}: yaw must be radians within a full turn, got {most:g}")
+    for turn, angles in zip(("yaw", "roll", "pitch"), poses[:, 3:].T, strict=False):
+        most = angles[np.abs(angles).argmax()]
+        if abs(most) > FULL_TURN:
+            raise InvalidInput(f"{name}: {turn} must be radians within a full turn, got {most:g}")
 
 
 def _is_shown(annotations: Annotations, pictures: IdentifiedDetections, cloud: Cloud) -> Mask:

@@ -8,24 +8,35 @@ from pathlib import Path
 from care_sim.base.checks import check_path
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.sources.argoverse2.recordings import Argoverse2
+from care_sim.sources.boreas import Boreas
+from care_sim.sources.kitti import Kitti
 from care_sim.sources.nuscenes.recordings import NuScenes
 from care_sim.sources.recordings import Recordings
 
-RECORDING_KINDS: dict[str, type[Recordings]] = {made.kind: made for made in (Argoverse2, NuScenes)}
+RECORDING_KINDS: dict[str, type[Recordings]] = {
+    made.kind: made for made in (Argoverse2, NuScenes, Kitti, Boreas)
+}
+RECORDING_TEXTS = tuple(
+    name if made.shipped else f"{name}:FOLDER" for name, made in RECORDING_KINDS.items()
+)
+"""How each kind is asked for."""
 
 
 def recordings(text: str, options: Mapping[str, object] | None = None) -> Recordings:
-    """The recordings that a text `KIND:FOLDER` names, with the `options` of its kind; those that
-    are None are not given. Raises InvalidInput for another text, a folder that is none, an option
-    that the kind does not have.
+    """The recordings that a text `KIND:FOLDER` names, or `KIND` where they come with the package,
+    with the `options` of their kind; those that are None are not given. Raises InvalidInput for
+    another text, a folder that is none, an option that the kind does not have.
     """
     kind, colon, folder = text.partition(":") if isinstance(text, str) else ("", "", "")
-    if not (colon and folder) or kind not in RECORDING_KINDS:
-        known = ", ".join(f"{name}:FOLDER" for name in RECORDING_KINDS)
+    made = RECORDING_KINDS.get(kind)
+    if made is not None and made.shipped and not colon:
+        return recordings_in(made, kind, str(made.shipped), options or {})
+    if made is None or made.shipped or not folder:
         raise InvalidInput(
-            f"source must be {known}, or one of your own, MODULE:CLASS, got {shown(text)}"
+            f"source must be {', '.join(RECORDING_TEXTS)}, or one of your own, MODULE:CLASS, got "
+            f"{shown(text)}"
         )
-    return recordings_in(RECORDING_KINDS[kind], kind, folder, options or {})
+    return recordings_in(made, kind, folder, options or {})
 
 
 def recordings_in(

@@ -13,14 +13,14 @@ from care_sim.base.plugins import is_place
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.sensors.setups import DEFAULT_SETUP
 from care_sim.sources.installed import SOURCES, Installed
-from care_sim.sources.kinds import RECORDING_KINDS, recordings
+from care_sim.sources.kinds import RECORDING_KINDS, RECORDING_TEXTS, recordings
 from care_sim.sources.scenes import SPLITS, Recorded, Source, Streets
 
 
 def source_of(text: str, **options: object) -> Source:
-    """The source that a text names: `streets`, `argoverse2:FOLDER`, `nuscenes:FOLDER`, or one of
-    another package, with `options` of its kind (`split`, and those of
-    `care_sim.sources.nuscenes.recordings.NuScenes`); those that are None are not given.
+    """The source that a text names: `streets`, one of
+    `care_sim.sources.kinds.RECORDING_TEXTS`, or one of another package, with `options` of its kind
+    (`split`, and the fields of its class); those that are None are not given.
 
     Raises InvalidInput for another text, a folder that is none, an option that the kind does not
     have, a source that cannot be loaded.
@@ -79,8 +79,7 @@ def _is_foreign(name: str) -> bool:
 
 
 def _unknown(text: str) -> InvalidInput:
-    kinds = [f"{kind}:FOLDER" for kind in RECORDING_KINDS]
-    known = [Streets.kind, *kinds, *SOURCES.names()[len(SOURCES.built_in) :]]
+    known = [Streets.kind, *RECORDING_TEXTS, *SOURCES.names()[len(SOURCES.built_in) :]]
     known.append("MODULE:CLASS")
     return InvalidInput(
         f"unknown source {text!r:.200}; known: {', '.join(known)}; `care-sim sources` tells what "

@@ -18,6 +18,8 @@ class Recordings(ABC):
 
     kind: ClassVar[str] = ""
     """What a built-in one is called; one of another package is called by its entry or place."""
+    shipped: ClassVar[Path | None] = None
+    """The folder of recordings that come with the package, which are called by their kind alone."""
     folder: Path
 
     @abstractmethod

@@ -212,13 +212,14 @@ def _film_of(source: Source, scene: Scene, _stamps: tuple[Stamp, ...]) -> Film:
 
 
 def chosen_scenes(scenes: list[Scene], names: tuple[str, ...]) -> list[Scene]:
-    """The scenes that are asked for. One whole number means that many, from the first. Otherwise
-    they are names, and without any all scenes are meant. Raises InvalidInput for a name or a number
-    that there is not.
+    """The scenes that are asked for. One whole number means that many, from the first, unless a
+    scene is called so. Otherwise they are names, and without any all scenes are meant. Raises
+    InvalidInput for a name or a number that there is not.
     """
     if not names:
         return scenes
-    if len(names) == 1 and _is_number(names[0]):
+    known = {scene.name: scene for scene in scenes}
+    if len(names) == 1 and names[0] not in known and _is_number(names[0]):
         count = int(names[0][:LONGEST_NUMBER]) if names[0].isdecimal() else 0
         if not 1 <= count <= len(scenes):
             raise InvalidInput(
@@ -226,7 +227,6 @@ def chosen_scenes(scenes: list[Scene], names: tuple[str, ...]) -> list[Scene]:
                 f"{shortened(names[0], LONGEST_NUMBER)}"
             )
         return scenes[:count]
-    known = {scene.name: scene for scene in scenes}
     for name in names:
         check_known("scene", name, known)
     # Each once, in the order in which they were asked for.

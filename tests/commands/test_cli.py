@@ -274,6 +274,8 @@ def test_the_sources_are_listed_as_they_are_asked_for_and_a_broken_one_with_its_
         "streets",
         "argoverse2:FOLDER",
         "nuscenes:FOLDER",
+        "kitti:FOLDER",
+        "boreas",
         "torn",
     ]
     assert "    split='val'\n" in out

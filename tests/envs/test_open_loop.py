@@ -290,13 +290,13 @@ def test_what_the_open_loop_does_not_take_is_named(make, arguments, complaint):
     [
         (
             {"source": ""},
-            "source must be argoverse2:FOLDER, nuscenes:FOLDER, or one of your own, MODULE:CLASS, "
-            "got ''",
+            "source must be argoverse2:FOLDER, nuscenes:FOLDER, kitti:FOLDER, boreas, or one of "
+            "your own, MODULE:CLASS, got ''",
         ),
         (
             {"source": "waymo:."},
-            "source must be argoverse2:FOLDER, nuscenes:FOLDER, or one of your own, MODULE:CLASS, "
-            "got 'waymo:.'",
+            "source must be argoverse2:FOLDER, nuscenes:FOLDER, kitti:FOLDER, boreas, or one of "
+            "your own, MODULE:CLASS, got 'waymo:.'",
         ),
         ({"source": "argoverse2:nowhere"}, "source argoverse2:nowhere: nowhere is no folder"),
         (
@@ -305,7 +305,11 @@ def test_what_the_open_loop_does_not_take_is_named(make, arguments, complaint):
         ),
         (
             {"source": "argoverse2:{drive}", "split": "val"},
-            "split has no meaning for argoverse2 recordings",
+            "unknown split in .*drive 'val'; known: none",
+        ),
+        (
+            {"source": "argoverse2:{drive}", "version": "v1.0-mini"},
+            "version has no meaning for argoverse2 recordings",
         ),
     ],
 )

@@ -73,6 +73,8 @@ def test_the_default_is_what_was_mounted_before_there_was_a_choice():
         ("os1-128", (128, 1024), 360, (22.5, -22.5), 120, LIDAR_POSITION),
         ("m1-forward", (126, 600), 120, (12.5, -12.5), 150, (0.6, 0.0, 1.5)),
         ("paper-vehicle", (32, 512), 360, (10.67, -30.67), 50, LIDAR_POSITION),
+        ("hdl-64e", (64, 2083), 360, (2.0, -24.33), 120, (-0.445, 0.0, 1.73)),
+        ("kitti", (32, 512), 360, (10.67, -30.67), 50, (-0.445, 0.0, 1.73)),
     ],
 )
 def test_what_comes_with_the_package_is_as_its_data_sheet_says(
@@ -88,9 +90,15 @@ def test_what_comes_with_the_package_is_as_its_data_sheet_says(
     assert any(line.startswith(name) for line in setup_lines())
 
 
+def test_the_rows_of_a_64_row_lidar_are_as_far_apart_as_its_halves_are():
+    steps = -np.diff(np.rad2deg(sensor_setup("hdl-64e").grid.elevations))
+    assert steps[:31] == pytest.approx(1 / 3, abs=0.011)
+    assert steps[31:] == pytest.approx(0.5, abs=0.011)
+
+
 def test_these_are_all_and_no_two_have_one_hash():
-    assert len(setup_names()) == 6
-    assert len({sensor_setup(name).digest for name in setup_names()}) == 6
+    assert len(setup_names()) == 8
+    assert len({sensor_setup(name).digest for name in setup_names()}) == 8
 
 
 def test_a_file_is_read_in_metres_and_degrees_of_the_car(written):

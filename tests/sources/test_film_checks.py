@@ -156,6 +156,17 @@ def test_who_is_hidden_is_not_annotated():
     assert len(film.hidden) == 1
 
 
+def test_a_tilted_car_sees_what_stands_in_its_own_axes():
+    level, tilted = told(), told()
+    tilted["ego_poses"] = [[*pose, 0.03, -0.05] for pose in level["ego_poses"]]
+    straight, film = (care_sim.film_of_boxes(**given) for given in (level, tilted))
+    for one, other in zip(straight.shots, film.shots, strict=True):
+        car = Frame(*tilted["ego_poses"][0][:3], 0.0, 0.03, -0.05)
+        turn = car.rotation.inv()
+        place = one.sensor.boxes_to_world(one.annotations.boxes)[:, :3] - other.sensor.origin
+        assert other.annotations.boxes[:, :3] == pytest.approx(turn.apply(place), abs=1e-9)
+
+
 def test_a_film_of_boxes_is_seen_by_any_rig():
     film = care_sim.film_of_boxes(**told(sensor="os1-64"))
     assert film.grid.rows == 64
@@ -185,6 +196,10 @@ TOLD_WRONG = {
     "uneven": ({"times_s": [0, 1]}, "must hold as many keyframes, at least 3, got 2, 6 and 6"),
     "times": ({"times_s": [0, 1, 2, 3, 4, 4]}, "mine: times_s must ascend"),
     "ego": ({"ego_poses": [[0, 0, 0]] * 6}, "mine: ego_poses must be n x 4 numbers"),
+    "ego pitch": (
+        {"ego_poses": [[100, 50, 10, 0, 0, 9]] * 6},
+        "mine: ego_poses: pitch must be radians",
+    ),
     "ego degrees": ({"ego_poses": [[100, 50, 10, 90]] * 6}, "mine: ego_poses: yaw must be radi"),
     "nothing": ({"boxes": [[]] * 6}, "mine: no car, no truck"),
 }

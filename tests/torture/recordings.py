@@ -184,6 +184,25 @@ OTHER_LOGS = (
 """Changes of a log, and whether it must be refused then."""
 
 
+def kitti(case):
+    """A drive of KITTI: one of its files is damaged, or a word of it is another."""
+    from tests.helpers.kitti_drive import write
+
+    folder = case.folder / "kitti"
+    write(folder, oxts=case.rng.random() < 0.5)
+    spoilt(case, case.rng.choice(sorted(folder.rglob("*.txt"))), _word, _word, _word)
+    return _judged(case, folder, "kitti:kitti")
+
+
+def _word(rng, path):
+    words = path.read_text().split(" ")
+    words[rng.randrange(len(words))] = rng.choice(
+        ("", "x", "-1", "0", "7", "90", "0.5", "1e6", "1e308", "nan", "inf", "Tram", "Bus", "\n")
+    )
+    path.write_text(" ".join(words))
+    return "word"
+
+
 def nuscenes(case):
     """A database whose tables or sweeps are damaged."""
     folder = props.copy("base", case.folder / "base")
@@ -388,5 +407,6 @@ KINDS = {
     camera_detections: 2,
     splits: 1,
     own_boxes: 6,
+    kitti: 5,
 }
 """What is read, and how often."""

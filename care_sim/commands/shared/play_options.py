@@ -38,7 +38,9 @@ class SourceOptions:
     version: str | None = None
     """For nuScenes: the version, where the folder holds several."""
     sensor: str | None = None
-    """For streets: LiDAR and cameras, a name of `care-sim sensors` or a .toml file of a set-up."""
+    """For streets, KITTI and Boreas: LiDAR and cameras, a name of `care-sim sensors` or a .toml
+    file of a set-up.
+    """
     camera_detections: Path | None = None
     """For nuScenes: a file with a camera detector's boxes, in nuScenes or COCO results form."""
     sweeps: int | None = None
@@ -69,8 +71,8 @@ class PlayOptions(SourceOptions):
     """Options that all plays share."""
 
     source: str = "streets"
-    """streets, argoverse2:FOLDER, nuscenes:FOLDER, or a source of your own: the name of an
-    installed one or MODULE:CLASS, of recordings with :FOLDER behind it.
+    """streets, argoverse2:FOLDER, nuscenes:FOLDER, kitti:FOLDER, boreas, or a source of your own:
+    the name of an installed one or MODULE:CLASS, of recordings with :FOLDER behind it.
     """
     detector: str = PROXY
     """returns (the paper's proxy), graded (the surer the more returns), cluster (a real

@@ -8,7 +8,13 @@ from care_sim.perception.detectors import PROXY
 
 ChangedConditions = tuple[tuple[str, Any], ...]
 """Names and values of the conditions that are not the default."""
-SOURCES = {"streets": "generated streets", "argoverse2": "Argoverse 2", "nuscenes": "nuScenes"}
+SOURCES = {
+    "streets": "generated streets",
+    "argoverse2": "Argoverse 2",
+    "nuscenes": "nuScenes",
+    "kitti": "KITTI",
+    "boreas": "Boreas",
+}
 """How headings name the sources of films."""
 
 
