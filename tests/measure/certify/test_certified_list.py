@@ -53,6 +53,8 @@ LEFT_OUT = {
     "camera_latency_s": "begins with the next list: one more choice changes every episode of this",
     "camera_profile": "begins with the next list, too",
     "sweeps": "of nuScenes",
+    "camera_times": "of nuScenes",
+    "empty_boxes": "of nuScenes and Argoverse 2",
     **dict.fromkeys(LOCALISATION, "begin with the next list, too"),
     **dict.fromkeys(RETURN_SETTINGS, "recordings refuse them, but for crosstalk"),
 }
