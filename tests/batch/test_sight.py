@@ -189,6 +189,8 @@ def test_what_is_late_arrives_as_in_one_world(seed, latencies, jitters):
     for _ in range(25):
         live = rng.random(2) < 0.8
         counts, rows, headings = rng.integers(0, 4, 2), rng.random((2, 3, 9)), rng.random(2)
+        # A picture of a rendered world is new when it is taken.
+        rows[:, :, ImageDetections.AGE :] = 0.0
         arrived = together.newest(live, Detected(counts, rows), headings)
         for world in np.flatnonzero(live).tolist():
             taken = ImageDetections.from_checked_rows(rows[world, : counts[world]].copy())
