@@ -92,10 +92,10 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     try:
         if alone:
             interrupts.raise_them()
+            # Modules, compiled code and rows live to the end: a collector that walks them all every
+            # few thousand new objects takes a seventh of the time of a report.
+            gc.set_threshold(_NEW_OBJECTS)
         _settle_output()
-        # Modules, compiled code and rows live to the end: a collector that walks them all every few
-        # thousand new objects takes a seventh of the time of a report.
-        gc.set_threshold(_NEW_OBJECTS)
         # An unknown backend would end the import of Matplotlib. An unknown value of its settings
         # would end the import of Rerun. Figures and recordings depend on neither.
         for name in [name for name in os.environ if name.startswith(("MPLBACKEND", "RERUN"))]:

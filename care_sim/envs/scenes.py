@@ -53,9 +53,8 @@ class ReplayEnv(FilmEnv):
     (`care_sim.sources.named`), and `scene` one of their scenes by name; the first, unless given.
     `split`, `version`, `camera_detections`, `sweeps`, `camera_times` and `empty_boxes` are those of
     `care_sim.sources.nuscenes.recordings.NuScenes`. `sensor` is the set-up that sees the boxes of
-    Boreas and KITTI. A file that is missing or damaged, or a token
-    that points nowhere, raises `care_sim.InvalidInput` with its name. The seed of `reset` draws
-    faults, noise and floor.
+    Boreas and KITTI. A file that is missing or damaged, or a token that points nowhere, raises
+    `care_sim.InvalidInput` with its name. The seed of `reset` draws faults, noise and floor.
     """
 
     __doc__ = f"{__doc__}\n    {OpenLoopEnv.__doc__}"

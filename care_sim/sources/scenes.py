@@ -152,7 +152,7 @@ class Recorded:
 
     @property
     def sensor(self) -> str | SensorSetup:
-        """That of the recordings."""
+        """The set-up of the recordings."""
         return self.recordings.setup
 
     @property

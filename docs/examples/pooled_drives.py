@@ -23,7 +23,7 @@ from care_sim.study.run_config import FULL
 def pooled(
     settings: list[SettingPlays], policy: str, budget: float, kind: str = ""
 ) -> dict[str, Tally]:
-    """What a policy found in every drive that has newcomers."""
+    """Return the tally of a policy in every drive that has newcomers."""
     found: dict[str, Tally] = {}
     for plays in settings:
         for scene, tally in plays.tallies(policy, budget, kind).items():

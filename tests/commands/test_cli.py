@@ -1,3 +1,4 @@
+import gc
 import inspect
 import re
 import signal
@@ -41,12 +42,14 @@ def run(capsys, *arguments):
 
 def test_a_host_that_calls_a_command_keeps_its_handlers_and_may_do_so_in_a_thread(capsys):
     before = [signal.getsignal(number) for number in (*SIGNALS, signal.SIGALRM)]
+    collector = gc.get_threshold()
     with ThreadPoolExecutor(1) as threads:
         code, out, err = threads.submit(run, capsys, "detectors").result()
     assert (code, err) == (0, "")
     assert "cluster" in out
     assert run(capsys, "detectors")[0] == 0
     assert [signal.getsignal(number) for number in (*SIGNALS, signal.SIGALRM)] == before
+    assert gc.get_threshold() == collector
 
 
 @pytest.mark.parametrize(

@@ -32,6 +32,13 @@ def test_the_line_of_a_command_is_the_command(line):
     assert len(told) == 1 + len(shlex.split(line))
 
 
+@pytest.mark.parametrize(("given", "told"), [("--sweeps 0", ["sweeps"]), ("--no-empty-boxes", [])])
+def test_an_option_of_a_source_counts_as_given_if_it_is_a_number(given, told):
+    """0 is equal to False, which a switch is that nobody turned on."""
+    command = parsed_command(shlex.split(f"protocol --source nuscenes:data {given}"))
+    assert command.source_options() == told
+
+
 def test_paths_are_told_as_a_shell_takes_them():
     command = parsed_command(["crowding", "--out", "a b"])
     assert command.out == Path("a b")

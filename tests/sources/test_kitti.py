@@ -200,6 +200,6 @@ def moves(film):
     for places in seen.values():
         (start, first), (end, last) = places[0], places[-1]
         moved = np.linalg.norm(last - first)
-        # What moves, moves farther than a standing car seems to.
+        # A moving car goes farther than a standing one seems to.
         if np.linalg.norm(end - start) > 5 and moved < 2.5:
             yield moved

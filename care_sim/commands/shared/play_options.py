@@ -62,8 +62,9 @@ class SourceOptions:
 
     def source_options(self) -> list[str]:
         """Those that are given."""
-        names = [field.name for field in fields(SourceOptions)]
-        return [name for name in names if getattr(self, name) not in (None, False)]
+        given = {field.name: getattr(self, field.name) for field in fields(SourceOptions)}
+        # By identity: 0 is equal to False, and a number that somebody gave.
+        return [name for name, value in given.items() if value is not None and value is not False]
 
 
 @dataclass(frozen=True, kw_only=True)

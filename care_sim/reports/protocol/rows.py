@@ -4,6 +4,7 @@ every scene.
 
 from collections.abc import Sequence
 from dataclasses import fields
+from functools import cached_property
 
 import numpy as np
 
@@ -145,7 +146,7 @@ class SettingPlays:
         """The labels of the strata by kind, of the kinds that all rows have."""
         return self._strata
 
-    @property
+    @cached_property
     def newcomers(self) -> dict[str, float]:
         """The events of each of the two kinds of newcomers; none where rows do not tell."""
         if ENTRY not in self._strata:

@@ -156,7 +156,7 @@ def sweep_files(log: Path) -> list[Path]:
 
 
 def _sweep_files(log: Path, keyframes: Integers) -> list[Path]:
-    """Those that there are."""
+    """Return the sweeps of the keyframes, as far as they are there."""
     files = [log / "sensors" / "lidar" / f"{stamp}.feather" for stamp in keyframes.tolist()]
     return [file for file in files if file.is_file()]
 

@@ -176,7 +176,7 @@ class _SceneSetup:
     def _sensed(
         self, boxes: Sequence[JsonRow], sensor: Frame, moments: Sequence[Frame]
     ) -> tuple[IdentifiedDetections, Cloud]:
-        """What cameras and LiDAR see of the boxes as bodies."""
+        """Return what cameras and LiDAR see of the boxes as bodies."""
         bodies = [
             body_of(self.database, box, self.numbers, sensor)
             for box in boxes

@@ -12,6 +12,7 @@ from care_sim.core.arrays import Floats, Integers
 from care_sim.core.frames import Frame, turned
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.sensors.annotated import NO_OBJECT, Annotations, Cloud
+from care_sim.sources.plausible import REACH_M
 
 VALUES_PER_POINT = 5
 """float32 x, y, z, intensity and ring."""
@@ -19,8 +20,6 @@ MOST_SWEEP_BYTES = 2**28
 """Bytes of a file: 13 million points, some hundred times a sweep of any LiDAR."""
 RINGS = 256
 """More than any LiDAR has. nuScenes' has 32."""
-REACH_M = 500.0
-"""Farther than any LiDAR reaches. nuScenes' reaches 100 m."""
 _OTHERS = {
     4: "x, y, z and intensity (KITTI)",
     6: "x, y, z, intensity, elongation and another (Waymo)",
@@ -63,10 +62,10 @@ def read_points(path: Path) -> Floats:
         raise InvalidInput(f"{path}: {point}{_other_form(values)}")
     with np.errstate(invalid="ignore"):
         whole = (rings >= 0) & (rings < RINGS) & (rings == np.rint(rings))
-    if not (whole.all() and (np.abs(places) <= REACH_M).all()):
+    if not (whole.all() and (np.abs(places) <= REACH_M[1]).all()):
         raise InvalidInput(
-            f"{path}: must hold float32 x, y, z within {REACH_M:g} m, intensity, and a whole ring "
-            f"from 0 to {RINGS - 1} per point{_other_form(values)}"
+            f"{path}: must hold float32 x, y, z within {REACH_M[1]:g} m, intensity, and a whole "
+            f"ring from 0 to {RINGS - 1} per point{_other_form(values)}"
         )
     points = places.astype(float)
     return np.column_stack([points[:, 1], -points[:, 0], points[:, 2]])
@@ -79,7 +78,7 @@ def _other_form(content: NDArray[np.uint8]) -> str:
             rows = content.view("<f4").reshape(-1, count)
             # Intensity and elongation are never negative, places on one side of the car are.
             with np.errstate(invalid="ignore"):
-                fits = (np.abs(rows[:, :3]) <= REACH_M).all() and (rows[:, 3:5] >= 0).all()
+                fits = (np.abs(rows[:, :3]) <= REACH_M[1]).all() and (rows[:, 3:5] >= 0).all()
             if fits:
                 return f"; it looks like {count} values per point: {names}"
     return ""
