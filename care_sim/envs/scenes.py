@@ -1,5 +1,6 @@
 """The environments of the open loop by id: generated streets and recorded scenes."""
 
+from collections.abc import Sequence
 from os import PathLike
 from typing import Any
 
@@ -48,10 +49,12 @@ class StreetEnv(OpenLoopEnv):
 class ReplayEnv(FilmEnv):
     """`CARE-Replay-v0`: a recorded scene, at 2 Hz.
 
-    `source` names the recordings, `argoverse2:FOLDER`, `nuscenes:FOLDER` or a source of your own
-    (`care_sim.sources.named`), and `scene` one of their scenes by name; the first, unless given.
-    `split`, `version`, `camera_detections` and `sweeps` are those of
-    `care_sim.sources.nuscenes.recordings.NuScenes`. A file that is missing or damaged, or a token
+    `source` names the recordings, `argoverse2:FOLDER`, `nuscenes:FOLDER`, `sweeps:FOLDER` or a
+    source of your own (`care_sim.sources.named`), and `scene` one of their scenes by name; the
+    first, unless given. `split`, `version`, `camera_detections` and `sweeps` are those of
+    `care_sim.sources.nuscenes.recordings.NuScenes`; `sensor`, `reference`, `lidar_yaw_deg` and
+    `topics` are those of `care_sim.sources.sweeps.recordings.Sweeps`. A file that is missing or
+    damaged, or a token
     that points nowhere, raises `care_sim.InvalidInput` with its name. The seed of `reset` draws
     faults, noise and floor.
     """
@@ -67,6 +70,10 @@ class ReplayEnv(FilmEnv):
         version: str | None = None,
         camera_detections: str | PathLike[str] | None = None,
         sweeps: int | None = None,
+        sensor: Sensor | None = None,
+        reference: str | None = None,
+        lidar_yaw_deg: float | None = None,
+        topics: Sequence[str] | None = None,
         **parameters: Any,
     ):
         # Before the scene is read, so that a wrong name is refused at once.
@@ -79,6 +86,10 @@ class ReplayEnv(FilmEnv):
             version=version,
             camera_detections=camera_detections,
             sweeps=sweeps,
+            sensor=sensor,
+            reference=reference,
+            lidar_yaw_deg=lidar_yaw_deg,
+            topics=topics,
         )
         scenes = recorded.scenes()
         # The source refuses a name that it does not have.

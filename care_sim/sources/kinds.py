@@ -10,8 +10,11 @@ from care_sim.base.errors import InvalidInput, shown
 from care_sim.sources.argoverse2.recordings import Argoverse2
 from care_sim.sources.nuscenes.recordings import NuScenes
 from care_sim.sources.recordings import Recordings
+from care_sim.sources.sweeps.recordings import Sweeps
 
-RECORDING_KINDS: dict[str, type[Recordings]] = {made.kind: made for made in (Argoverse2, NuScenes)}
+RECORDING_KINDS: dict[str, type[Recordings]] = {
+    made.kind: made for made in (Argoverse2, NuScenes, Sweeps)
+}
 
 
 def recordings(text: str, options: Mapping[str, object] | None = None) -> Recordings:
@@ -36,7 +39,8 @@ def recordings_in(
     """
     check_path("source", folder)
     folder = os.path.expanduser(folder)
-    if not os.path.isdir(folder):
+    is_file = os.path.isfile(folder) and folder.endswith(kind.suffixes)
+    if not (os.path.isdir(folder) or is_file):
         raise InvalidInput(f"source {name}:{folder}: {folder} is no folder")
     given = {name: value for name, value in options.items() if value is not None}
     for option in given:

@@ -18,6 +18,8 @@ class Recordings(ABC):
 
     kind: ClassVar[str] = ""
     """What a built-in one is called; one of another package is called by its entry or place."""
+    suffixes: ClassVar[tuple[str, ...]] = ()
+    """Ends of files that may stand for the folder."""
     folder: Path
 
     @abstractmethod

@@ -139,6 +139,7 @@ _OF_SOME_PLAYS = {
     "recording": as_optional(TEXT),
     "camera_detections": as_optional(TEXT),
     "sweeps": as_optional(COUNT),
+    "reference": as_optional(TEXT),
     "presence": as_optional(TEXT),
 } | {name: CONDITION_COLUMNS[name] for name in COLUMNS_WHERE_CHANGED if name in OF_BOTH_LOOPS}
 _PLAYS = Schema(

@@ -38,13 +38,21 @@ class SourceOptions:
     version: str | None = None
     """For nuScenes: the version, where the folder holds several."""
     sensor: str | None = None
-    """For streets: LiDAR and cameras, a name of `care-sim sensors` or a .toml file of a set-up."""
+    """For streets and sweeps: LiDAR and cameras, a name of `care-sim sensors` or a .toml file of a
+    set-up.
+    """
     camera_detections: Path | None = None
     """For nuScenes: a file with a camera detector's boxes, in nuScenes or COCO results form."""
     sweeps: int | None = None
     """For nuScenes: sweeps that a detector gets at a keyframe, 1 unless given: its own, and the
     last before it, fired by the mask of the keyframe before.
     """
+    reference: str | None = None
+    """For sweeps: the detector whose full scan annotates them, cluster unless given."""
+    lidar_yaw_deg: float | None = None
+    """For sweeps: how far to the left of ahead the x axis of the LiDAR points, 0 unless given."""
+    topics: tuple[str, ...] | None = None
+    """For sweeps in a bag: the topics of the points and of the poses, where it has several."""
 
     def source_named(self, text: str) -> Source:
         """The source that a text and the options name. Raises InvalidInput where there is none."""
@@ -66,8 +74,8 @@ class PlayOptions(SourceOptions):
     """Options that all plays share."""
 
     source: str = "streets"
-    """streets, argoverse2:FOLDER, nuscenes:FOLDER, or a source of your own: the name of an
-    installed one or MODULE:CLASS, of recordings with :FOLDER behind it.
+    """streets, argoverse2:FOLDER, nuscenes:FOLDER, sweeps:FOLDER, or a source of your own: the name
+    of an installed one or MODULE:CLASS, of recordings with :FOLDER behind it.
     """
     detector: str = PROXY
     """returns (the paper's proxy), graded (the surer the more returns), cluster (a real

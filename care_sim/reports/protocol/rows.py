@@ -178,7 +178,7 @@ def _check_films(rows: Sequence[Row]) -> None:
     for row in rows:
         # Camera detections from a file, sweeps between keyframes and what becomes of pulses make
         # another film of the scene.
-        names = ("camera_detections", "sweeps", *RETURN_SETTINGS)
+        names = ("camera_detections", "sweeps", "reference", *RETURN_SETTINGS)
         made_with = [row.get(name) for name in names]
         scene = (row["source"], row["scene"], *made_with)
         if len(row["ttfds"]) != row["events"]:

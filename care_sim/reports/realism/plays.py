@@ -25,7 +25,7 @@ from care_sim.study.rows.reading import Key, policy_of, tags_of_row
 from care_sim.study.run_config import FULL, REFERENCE, Row
 
 _RATIOS = (FIRST_SIGHTING, OVERALL)
-_OF_THE_FILM = ("sensor", "sensor_hash", "camera_detections", "sweeps")
+_OF_THE_FILM = ("sensor", "sensor_hash", "camera_detections", "sweeps", "reference")
 """Columns of a source, which are no conditions."""
 
 

@@ -14,6 +14,7 @@ from care_sim.base.checks import is_number
 from care_sim.core.conditions import DEFAULTS, OF_BOTH_LOOPS
 from care_sim.evaluation.censoring import Reading
 from care_sim.evaluation.sightings import ANNOTATED
+from care_sim.perception.detectors import CLUSTER
 from care_sim.policies import tags_of
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.rows.settings import Setting
@@ -24,6 +25,7 @@ _USUAL_EPISODE = {field.name: field.default for field in fields(EpisodeConfig)}
 _USUAL_PLAY = {name: DEFAULTS[name] for name in OF_BOTH_LOOPS if name != "floor_seed"} | {
     "camera_detections": None,
     "sweeps": 1,
+    "reference": CLUSTER,
     "presence": ANNOTATED,
 }
 

@@ -10,6 +10,8 @@ ChangedConditions = tuple[tuple[str, Any], ...]
 """Names and values of the conditions that are not the default."""
 SOURCES = {"streets": "generated streets", "argoverse2": "Argoverse 2", "nuscenes": "nuScenes"}
 """How headings name the sources of films."""
+WITHOUT_LABELS = "sweeps"
+"""The source that a detector annotates."""
 
 
 @dataclass(frozen=True, order=True)
