@@ -18,8 +18,8 @@ from care_sim.sources.scenes import SPLITS, Recorded, Source, Streets
 
 
 def source_of(text: str, **options: object) -> Source:
-    """The source that a text names: `streets`, `argoverse2:FOLDER`, `nuscenes:FOLDER`, or one of
-    another package, with `options` of its kind (`split`, and those of
+    """The source that a text names: `streets`, `argoverse2:FOLDER`, `nuscenes:FOLDER`,
+    `sweeps:FOLDER`, or one of another package, with `options` of its kind (`split`, and those of
     `care_sim.sources.nuscenes.recordings.NuScenes`); those that are None are not given.
 
     Raises InvalidInput for another text, a folder that is none, an option that the kind does not

@@ -110,7 +110,10 @@ def test_a_source_of_a_single_street_has_no_other_seed(tmp_path, monkeypatch):
         ("run dartout --picture x", "unknown ending of a picture ''; known: .png"),
         ("run street --picture x.png --at -1", "at must be a finite number >= 0, got -1"),
         ("run street --engine bullet", "engine cannot be changed in the open loop"),
-        ("run argoverse2", "source must be argoverse2:FOLDER, nuscenes:FOLDER, or one of your own"),
+        (
+            "run argoverse2",
+            "source must be argoverse2:FOLDER, nuscenes:FOLDER, sweeps:FOLDER, or one",
+        ),
         ("run argoverse2:nowhere", "source argoverse2:nowhere: nowhere is no folder"),
         ("run dartout --scene x", "--scene has no meaning in the closed loop"),
         ("compare dartout --split val", "--split has no meaning in the closed loop"),

@@ -49,7 +49,7 @@ def _sides(x, y, length, width, height):
         ]
     )
     heights = np.arange(0.1, height, 0.15)
-    plan = np.repeat(around + [x, y], len(heights), axis=0)
+    plan = np.repeat(around + np.array([x, y]), len(heights), axis=0)
     return np.column_stack([plan, np.tile(heights, len(around))])
 
 

@@ -15,8 +15,9 @@ class EitherLoopStudy(FixedStudy, SourceOptions):
     """A study of the closed loop, or with `source` of the open one."""
 
     source: str | None = None
-    """Play the open loop instead, on streets, argoverse2:FOLDER, nuscenes:FOLDER, or a source of
-    your own: the name of an installed one or MODULE:CLASS, of recordings with :FOLDER behind it.
+    """Play the open loop instead, on streets, argoverse2:FOLDER, nuscenes:FOLDER, sweeps:FOLDER, or
+    a source of your own: the name of an installed one or MODULE:CLASS, of recordings with :FOLDER
+    behind it.
     """
     scenes: tuple[str, ...] = ()
     """With --source. One number: that many scenes, from the first. Otherwise names of scenes.

@@ -1,6 +1,6 @@
 """ROS 2 bags and MCAP files as logs."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,9 @@ from care_sim.sources.sweeps.points import checked_points
 BAG_SUFFIXES = (".mcap", ".db3", ".bag")
 METADATA_FILE = "metadata.yaml"
 POINTS = "sensor_msgs/msg/PointCloud2"
+TRANSFORMS = "tf2_msgs/msg/TFMessage"
+POSES = ("nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseStamped", TRANSFORMS)
+BASE = "base_link"
 _NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
 """The datatypes of sensor_msgs/PointField."""
 
@@ -36,30 +39,24 @@ def log_of_bag(path: Path, topics: Sequence[str]) -> Log:
     then it lists them. Raises MissingExtra without the extra `rosbags`.
     """
     with _opened(path) as reader:
-        points = _topic(path, reader, topics, [POINTS])
-        posed = _topic(path, reader, topics, [*_POSES])
-        clouds = [(_stamp(message), logged) for message, logged in _messages(reader, points)]
-        poses = [_POSES[posed.msgtype](message) for message, _ in _messages(reader, posed)]
-    order = sorted(range(len(clouds)), key=lambda number: clouds[number][0])
+        points, posed = (_topic(path, reader, topics, kinds) for kinds in ([POINTS], POSES))
+        clouds = sorted((_stamp(cloud), logged) for cloud, logged in _messages(reader, points))
+        poses = [pose for message, _ in _messages(reader, posed) if (pose := _pose(message))]
 
     def points_of(number: int) -> Floats:
-        time_s, logged = clouds[order[number]]
+        time_s, logged = clouds[number]
         with _opened(path) as opened:
             again = _topic(path, opened, topics, [POINTS])
-            message = next(
-                message
-                for message, _ in _messages(opened, again, logged, logged + 1)
-                if _stamp(message) == time_s
-            )
-        return checked_points(f"{path}: {points.topic} at {time_s:.3f} s", _points(message))
+            moment = _messages(opened, again, start=logged, stop=logged + 1)
+            found = [_points(cloud) for cloud, _ in moment if _stamp(cloud) == time_s]
+        return checked_points(f"{path}: {points.topic} at {time_s:.3f} s", found[0])
 
-    known = np.array([pose for pose in poses if pose is not None], float).reshape(-1, 8)
-    return Log.of(
+    return Log(
         path.stem,
         f"{path}: {points.topic}",
-        np.array([clouds[number][0] for number in order]),
+        np.array([time_s for time_s, _ in clouds]),
         points_of,
-        known[np.argsort(known[:, 0], kind="stable")],
+        np.array(sorted(poses), float).reshape(-1, 8),
         f"{path}: {posed.topic}",
     )
 
@@ -93,11 +90,9 @@ def _topic(path: Path, reader: Any, topics: Sequence[str], kinds: Sequence[str])
     return named[0]
 
 
-def _messages(
-    reader: Any, connection: Any, start: int | None = None, stop: int | None = None
-) -> Iterator[tuple[Any, int]]:
+def _messages(reader: Any, connection: Any, **between: int) -> Iterator[tuple[Any, int]]:
     """Yield the messages of a connection, each with the time at which it was logged."""
-    for own, logged, raw in reader.messages([connection], start=start, stop=stop):
+    for own, logged, raw in reader.messages([connection], **between):
         yield reader.deserialize(raw, own.msgtype), logged
 
 
@@ -123,30 +118,17 @@ def _points(cloud: Any) -> Floats:
     return np.stack([rows[axis] for axis in "xyz"], axis=1).astype(float)
 
 
-def _pose(time_s: float, place: Any, turn: Any) -> tuple[float, ...]:
-    return (time_s, place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w)
-
-
-def _of_odometry(message: Any) -> tuple[float, ...]:
-    pose = message.pose.pose
-    return _pose(_stamp(message), pose.position, pose.orientation)
-
-
-def _of_pose(message: Any) -> tuple[float, ...]:
-    return _pose(_stamp(message), message.pose.position, message.pose.orientation)
-
-
-def _of_transforms(message: Any) -> tuple[float, ...] | None:
-    """Return the pose of `base_link` in `odom` or `map` (REP 105), if it is in a message."""
-    for each in message.transforms:
-        if each.child_frame_id.strip("/") == "base_link":
-            return _pose(_stamp(each), each.transform.translation, each.transform.rotation)
-    return None
-
-
-_POSES: dict[str, Callable[[Any], tuple[float, ...] | None]] = {
-    "nav_msgs/msg/Odometry": _of_odometry,
-    "geometry_msgs/msg/PoseStamped": _of_pose,
-    "tf2_msgs/msg/TFMessage": _of_transforms,
-}
-"""What reads the pose of the car, by the type of the message."""
+def _pose(message: Any) -> list[float] | None:
+    """Return seconds, place and quaternion of odometry, of a stamped pose, or of `base_link` among
+    transforms (REP 105), if it is there.
+    """
+    if message.__msgtype__ == TRANSFORMS:
+        own = [each for each in message.transforms if each.child_frame_id.strip("/") == BASE]
+        if not own:
+            return None
+        message = own[0]
+        place, turn = message.transform.translation, message.transform.rotation
+    else:
+        pose = getattr(message.pose, "pose", message.pose)
+        place, turn = pose.position, pose.orientation
+    return [_stamp(message), place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w]

@@ -36,8 +36,8 @@ class CameraBoxes:
                 ) from error
         if any(not 0 <= number < len(cameras) for number in pictures):
             raise InvalidInput(
-                f"{path}: cameras {sorted(pictures)}; those of the set-up have numbers from 0 to "
-                f"{len(cameras) - 1}"
+                f"{path}: cameras must be numbers from 0 on of the {len(cameras)} [[cameras]] in "
+                f"the set-up, got {sorted(pictures)}"
             )
         self._pictures = {}
         for number, taken in pictures.items():
@@ -56,7 +56,9 @@ class CameraBoxes:
             found = pictures[newest]
             boxes = np.array([box for _, _, box in found])
             classes = np.array([label for label, _, _ in found], np.int64)
-            (then,) = self._log.cars(np.clip(times[newest : newest + 1], *self._log.posed))
+            # A picture may be older than the first pose.
+            taken = np.clip(times[newest : newest + 1], *self._log.poses[[0, -1], 0])
+            (then,) = self._log.cars(taken)
             turn = (car.yaw - then.yaw + np.pi) % (2 * np.pi) - np.pi
             told = np.tile([number, time_s - times[newest], turn], (len(found), 1))
             rows.append(np.column_stack([classes, [sure for _, sure, _ in found], boxes, told]))

@@ -99,7 +99,8 @@ def _off_the_car(points: Floats, setup: SensorSetup) -> Floats:
     x, y, _ = setup.position
     length, width, _ = CATALOGUE["ego"].size
     ahead, left = np.abs(points[:, :2] + (x, y)).T
-    return points[(ahead > length / 2 + _AROUND_CAR_M) | (left > width / 2 + _AROUND_CAR_M)]
+    kept: Floats = points[(ahead > length / 2 + _AROUND_CAR_M) | (left > width / 2 + _AROUND_CAR_M)]
+    return kept
 
 
 @lru_cache(maxsize=1000)

@@ -29,7 +29,7 @@ def log_of_folder(folder: Path) -> Log:
     order = np.argsort(times, kind="stable")
     files = [sweeps[row] for row in order.tolist()]
     path = folder / POSES_FILE
-    return Log.of(
+    return Log(
         folder.name,
         str(folder / SWEEPS_FOLDER),
         times[order],

@@ -71,12 +71,14 @@ def _pcd(path: Path) -> Floats:
             if key == "DATA":
                 break
         body = file.read()
-    (form,), (points,) = header["DATA"], header["POINTS"]
+    (form,), (points,) = header["DATA"], map(int, header["POINTS"])
+    if points < 0:
+        raise ValueError(f"{points} points")
     names = header["FIELDS"]
     counts = [int(count) for count in header.get("COUNT", ["1"] * len(names))]
     if form == "ascii":
         starts = dict(zip(names, np.cumsum([0, *counts]).tolist(), strict=False))
-        table = np.array(body.decode("ascii").split(), dtype=float).reshape(int(points), -1)
+        table = np.array(body.decode("ascii").split(), dtype=float).reshape(points, -1)
         return table[:, [starts[axis] for axis in _AXES]]
     if form != "binary":
         raise ValueError(f"DATA {form}, must be ascii or binary")
@@ -89,13 +91,13 @@ def _pcd(path: Path) -> Floats:
             for place, (name, (letter, size), count) in enumerate(fields)
         ]
     )
-    rows = np.frombuffer(body, kind, int(points))
+    rows = np.frombuffer(body, kind, points)
     return np.concatenate([rows[axis] for axis in _AXES], axis=1).astype(float)
 
 
 def _npy(path: Path) -> Floats:
     # Mapped: an array that says it has billions of numbers is refused by the file's length.
-    array = np.lib.format.open_memmap(path, mode="r")
+    array = np.asarray(np.lib.format.open_memmap(path, mode="r"))
     if array.dtype.names:
         array = np.stack([array[axis].ravel() for axis in _AXES], axis=1)
     if array.ndim != 2 or array.shape[1] < 3 or array.dtype.kind not in "fiu":

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from care_sim.base.checks import check_known, check_number
-from care_sim.base.errors import InvalidInput
+from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.loops.film import Film
 from care_sim.perception.detectors import CLUSTER
@@ -58,6 +58,8 @@ class Sweeps(Recordings):
     topics: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        if not (isinstance(self.topics, tuple | list) and {*map(type, self.topics)} <= {str}):
+            raise InvalidInput(f"topics must be a list of names, got {shown(self.topics)}")
         object.__setattr__(self, "topics", tuple(self.topics))
         check_number("lidar_yaw_deg", self.lidar_yaw_deg, -360, 360)
         check_reference(self.reference)

@@ -10,7 +10,7 @@ from care_sim.core.arrays import Floats, Integers
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.core.types import CLASSES, Detections
-from care_sim.perception.detectors import CLUSTER, PRIVILEGED, make_detector
+from care_sim.perception.detectors import CLUSTER, PRIVILEGED, check_detector, make_detector
 from care_sim.perception.tracker import MemoryRules, TrackMemory
 from care_sim.sensors.annotated import NO_ANNOTATIONS, NO_OBJECT, Annotations, Cloud
 from care_sim.sources.nuscenes.sweeps import points_of_grid
@@ -25,7 +25,8 @@ _RULES = MemoryRules(coast_s=SWEEPS_KEYFRAME_S)
 
 
 def check_reference(name: str) -> None:
-    """Raise InvalidInput for a detector that needs annotations itself."""
+    """Raise InvalidInput for no detector, and for one that needs annotations itself."""
+    check_detector(name)
     if name in PRIVILEGED:
         raise InvalidInput(f"reference must be a detector that sees points alone, got {name}")
 

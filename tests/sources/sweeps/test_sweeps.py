@@ -152,7 +152,7 @@ def test_a_car_that_stands_has_a_single_pose(tmp_path):
 def test_poses_between_sweeps_are_interpolated(tmp_path):
     own = write_log(tmp_path / "drive")
     turn = ["time,x,y,z,yaw"] + [
-        f"{START_NS * 1e-9 + t:.6f},{6 * t:.6f},0,0,{3.0 + 0.2 * t - (6.283185 if t > 0.75 else 0):.6f}"
+        f"{START_NS * 1e-9 + t:.6f},{6 * t:.6f},0,0,{3 + 0.2 * t - 6.283185 * (t > 0.75):.6f}"
         for t in (0, 0.7, 1.4, 2.1, 2.8, 3.5, 4.2)
     ]
     (own / "poses.csv").write_text("\n".join(turn))
