@@ -274,6 +274,7 @@ def test_the_sources_are_listed_as_they_are_asked_for_and_a_broken_one_with_its_
         "streets",
         "argoverse2:FOLDER",
         "nuscenes:FOLDER",
+        "sweeps:FOLDER",
         "torn",
     ]
     assert "    split='val'\n" in out

@@ -22,9 +22,9 @@ SETUP_FILE = "sensor.toml"
 
 @dataclass(frozen=True)
 class Sweeps(Recordings):
-    """LiDAR sweeps and poses of the car, which nobody annotated.
+    """LiDAR sweeps and poses of the car that nobody annotated: folders, MCAP files or ROS 2 bags.
 
-    A scene is a ROS 2 bag (`care_sim.sources.sweeps.bags`), or a folder:
+    A scene is a bag (`care_sim.sources.sweeps.bags`), or a folder:
 
     - `sweeps/`: one file per sweep, all PCD, NPY, CSV or BIN
       (`care_sim.sources.sweeps.points.read_sweep`). A name is a time: nanoseconds, microseconds or

@@ -53,6 +53,7 @@ LEFT_OUT = {
     "camera_latency_s": "begins with the next list: one more choice changes every episode of this",
     "camera_profile": "begins with the next list, too",
     "sweeps": "of nuScenes",
+    **dict.fromkeys(("reference", "lidar_yaw_deg", "topics"), "of logs without labels"),
     **dict.fromkeys(LOCALISATION, "begin with the next list, too"),
     **dict.fromkeys(RETURN_SETTINGS, "recordings refuse them, but for crosstalk"),
 }
