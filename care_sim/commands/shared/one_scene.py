@@ -35,18 +35,30 @@ class SceneOptions:
     """
     version: str | None = None
     """For nuScenes: the version, where the folder holds several."""
+    lidar_yaw_deg: float | None = None
+    """For sweeps: how far to the left of ahead the x axis of the LiDAR points, 0 unless given."""
+    topics: tuple[str, ...] | None = None
+    """For sweeps in a bag: the topics of the points and of the poses, where it has several."""
 
     def check_unused(self) -> None:
         """Raise InvalidInput where one is given, and no source is named."""
         for field in fields(SceneOptions):
             if getattr(self, field.name) is not None:
-                raise InvalidInput(f"--{field.name} has no meaning in the closed loop")
+                option = field.name.replace("_", "-")
+                raise InvalidInput(f"--{option} has no meaning in the closed loop")
 
     def source(self, text: str, sensor: str) -> Source:
         """The source that is named in the place of a scenario."""
         named = Streets.kind if text == _STREET else text
         given = None if sensor == DEFAULT_SETUP else sensor
-        return source_of(named, split=self.split, version=self.version, sensor=given)
+        return source_of(
+            named,
+            split=self.split,
+            version=self.version,
+            sensor=given,
+            lidar_yaw_deg=self.lidar_yaw_deg,
+            topics=self.topics,
+        )
 
     def scene_of(self, source: Source, seed: int) -> Scene:
         """The scene that is named, or else that of the seed. Raises InvalidInput where there is
