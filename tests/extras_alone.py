@@ -27,6 +27,20 @@ from torchrl.envs import GymWrapper
 made = gym.make_vec("CARE-Dense-v0", num_envs=2, autoreset_mode="Disabled", duration_s=0.5)
 print(GymWrapper(VectorGridObservation(VectorSectorReserve(made))).rollout(3).shape)
 """
+BAG = """
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
+from care_sim.base.errors import InvalidInput
+from care_sim.sources.kinds import recordings
+
+store = get_typestore(Stores.ROS2_HUMBLE)
+with Writer("drive", version=9, storage_plugin=StoragePlugin.MCAP) as bag:
+    bag.add_connection("/points", "sensor_msgs/msg/PointCloud2", typestore=store)
+try:
+    recordings("sweeps:drive").film("drive")
+except InvalidInput as error:
+    assert "the bag has /points" in str(error), error
+"""
 USES = {
     "open3d": [f"care-sim run dense --policy farthest-points {SHORT} --export scans"],
     "rl": [
@@ -49,6 +63,7 @@ USES = {
         f"care-sim collect dense {SHORT} --episodes 2 --dataset care-sim/tried-v0",
         "minari list local",
     ],
+    "rosbags": ["python bag.py"],
 }
 """What each extra is for, as commands; what they write lies in an empty folder."""
 
@@ -59,6 +74,7 @@ def fails(extra: str, wheel: Path, constraints: Path) -> str:
         folder = Path(name)
         (folder / "cluster.py").write_text(SCHEDULER)
         (folder / "vector.py").write_text(VECTOR)
+        (folder / "bag.py").write_text(BAG)
         venv.create(folder / "venv", with_pip=True)
         install = ["python", "-m", "pip", "install", "--quiet", "--constraint", f"{constraints}"]
         for command in ([*install, f"{wheel}[{extra}]"], *map(str.split, USES[extra])):

@@ -88,6 +88,12 @@ def import_minari() -> ModuleType:
     return _import("minari", "A Minari dataset", "minari")
 
 
+def import_rosbags() -> tuple[ModuleType, ModuleType]:
+    """Rosbags' readers and its types. Raises MissingExtra with the extra to install."""
+    _import("rosbags", "A bag", "rosbags")
+    return import_module("rosbags.highlevel"), import_module("rosbags.typesys")
+
+
 def vega_bundle() -> str:
     """Vega, Vega-Lite and Vega-Embed as one script. Raises MissingExtra with the extra."""
     bundle: str = _import("vl_convert", "A page", "page").javascript_bundle()

@@ -58,7 +58,7 @@ class Compare(SceneOptions):
     scenario: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCENARIO")]
     """dartout, dense, cutin, ncap, r157, drive, that of an installed package, or MODULE:CLASS;
     `care-sim scenarios` lists their parameters. For the open loop street, argoverse2:FOLDER,
-    nuscenes:FOLDER, kitti:FOLDER, boreas, or another of `care-sim sources`.
+    nuscenes:FOLDER, kitti:FOLDER, sweeps:FOLDER, boreas, or another of `care-sim sources`.
     """
     policies: tuple[str, ...] = ("history", "care")
     """Names of `care-sim policies`; `all` stands for all but the controls. `full` always runs with

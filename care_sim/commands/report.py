@@ -46,8 +46,8 @@ class PrintReport(SourceOptions):
     """Processes that play them."""
     source: str | None = None
     """Where the recordings lie that a study of the open loop played, for its page:
-    argoverse2:FOLDER, nuscenes:FOLDER, kitti:FOLDER, boreas, or a source of your own. Streets need
-    none."""
+    argoverse2:FOLDER, nuscenes:FOLDER, kitti:FOLDER, sweeps:FOLDER, boreas, or a source of your
+    own. Streets need none."""
 
     def __post_init__(self) -> None:
         check_fields(self)

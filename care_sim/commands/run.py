@@ -57,7 +57,7 @@ class Run(Watched):
     scenario: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCENARIO")]
     """dartout, dense, cutin, ncap, r157, drive, that of an installed package, or MODULE:CLASS;
     `care-sim scenarios` lists their parameters. For the open loop street, argoverse2:FOLDER,
-    nuscenes:FOLDER, kitti:FOLDER, boreas, or another of `care-sim sources`.
+    nuscenes:FOLDER, kitti:FOLDER, sweeps:FOLDER, boreas, or another of `care-sim sources`.
     """
     policy: str = "care"
     """`care-sim policies` lists them. `full` always runs with budget 1.0."""

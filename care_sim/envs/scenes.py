@@ -1,5 +1,6 @@
 """The environments of the open loop by id: generated streets and recorded scenes."""
 
+from collections.abc import Sequence
 from os import PathLike
 from typing import Any
 
@@ -49,12 +50,15 @@ class ReplayEnv(FilmEnv):
     """`CARE-Replay-v0`: a recorded scene, at 2 Hz.
 
     `source` names the recordings, `boreas` (a drive that comes with the package),
-    `argoverse2:FOLDER`, `nuscenes:FOLDER`, `kitti:FOLDER` or a source of your own
-    (`care_sim.sources.named`), and `scene` one of their scenes by name; the first, unless given.
+    `argoverse2:FOLDER`, `nuscenes:FOLDER`, `kitti:FOLDER`, `sweeps:FOLDER` or a source of your
+    own (`care_sim.sources.named`), and `scene` one of their scenes by name; the first, unless
+    given.
     `split`, `version`, `camera_detections`, `sweeps`, `camera_times` and `empty_boxes` are those of
     `care_sim.sources.nuscenes.recordings.NuScenes`. `sensor` is the set-up that sees the boxes of
-    Boreas and KITTI. A file that is missing or damaged, or a token that points nowhere, raises
-    `care_sim.InvalidInput` with its name. The seed of `reset` draws faults, noise and floor.
+    Boreas and KITTI, or that recorded the sweeps; `reference` and `topics` are those of
+    `care_sim.sources.sweeps.recordings.Sweeps`. A file that is missing or damaged, or a token that
+    points nowhere, raises `care_sim.InvalidInput` with its name. The seed of `reset` draws faults,
+    noise and floor.
     """
 
     __doc__ = f"{__doc__}\n    {OpenLoopEnv.__doc__}"
@@ -71,6 +75,8 @@ class ReplayEnv(FilmEnv):
         camera_times: str | None = None,
         empty_boxes: bool | None = None,
         sensor: Sensor | None = None,
+        reference: str | None = None,
+        topics: Sequence[str] | None = None,
         **parameters: Any,
     ):
         # Before the scene is read, so that a wrong name is refused at once.
@@ -86,6 +92,8 @@ class ReplayEnv(FilmEnv):
             camera_times=camera_times,
             empty_boxes=empty_boxes,
             sensor=sensor,
+            reference=reference,
+            topics=topics,
         )
         scenes = recorded.scenes()
         # The source refuses a name that it does not have.

@@ -28,7 +28,7 @@ CLUSTER = "cluster"
 """The classical one. It is told the grid, and so how far apart neighbouring points are."""
 PILLARS = "pillars"
 """The learned one."""
-_PRIVILEGED = (PROXY, GRADED)
+PRIVILEGED = (PROXY, GRADED)
 """Those that read whose return each one is; all others are `PointDetector`s."""
 
 
@@ -72,7 +72,7 @@ def make_detector(name: str, sensor_height_m: float, /, **parameters: object) ->
     """
     make = _maker(name)
     _check_parameters(name, make, parameters)
-    if name in _PRIVILEGED:
+    if name in PRIVILEGED:
         proxy: Detector = make(**parameters)
         return proxy
     return PointsOnly(name, _point_detector(name, make, parameters), sensor_height_m)

@@ -12,9 +12,10 @@ from care_sim.sources.boreas import Boreas
 from care_sim.sources.kitti import Kitti
 from care_sim.sources.nuscenes.recordings import NuScenes
 from care_sim.sources.recordings import Recordings
+from care_sim.sources.sweeps.recordings import Sweeps
 
 RECORDING_KINDS: dict[str, type[Recordings]] = {
-    made.kind: made for made in (Argoverse2, NuScenes, Kitti, Boreas)
+    made.kind: made for made in (Argoverse2, NuScenes, Kitti, Sweeps, Boreas)
 }
 RECORDING_TEXTS = tuple(
     name if made.shipped else f"{name}:FOLDER" for name, made in RECORDING_KINDS.items()
@@ -47,7 +48,8 @@ def recordings_in(
     """
     check_path("source", folder)
     folder = os.path.expanduser(folder)
-    if not os.path.isdir(folder):
+    is_file = os.path.isfile(folder) and folder.endswith(kind.suffixes)
+    if not (os.path.isdir(folder) or is_file):
         raise InvalidInput(f"source {name}:{folder}: {folder} is no folder")
     given = {name: value for name, value in options.items() if value is not None}
     for option in given:

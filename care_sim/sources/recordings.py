@@ -20,6 +20,8 @@ class Recordings(ABC):
     """What a built-in one is called; one of another package is called by its entry or place."""
     shipped: ClassVar[Path | None] = None
     """The folder of recordings that come with the package, which are called by their kind alone."""
+    suffixes: ClassVar[tuple[str, ...]] = ()
+    """Ends of files that may stand for the folder."""
     folder: Path
 
     @abstractmethod

@@ -278,6 +278,7 @@ def test_the_sources_are_listed_as_they_are_asked_for_and_a_broken_one_with_its_
         "argoverse2:FOLDER",
         "nuscenes:FOLDER",
         "kitti:FOLDER",
+        "sweeps:FOLDER",
         "boreas",
         "torn",
     ]

@@ -112,7 +112,8 @@ def test_a_source_of_a_single_street_has_no_other_seed(tmp_path, monkeypatch):
         ("run street --engine bullet", "engine cannot be changed in the open loop"),
         (
             "run argoverse2",
-            "source must be argoverse2:FOLDER, nuscenes:FOLDER, kitti:FOLDER, boreas, or",
+            "source must be argoverse2:FOLDER, nuscenes:FOLDER, kitti:FOLDER, sweeps:FOLDER, "
+            "boreas, or",
         ),
         ("run argoverse2:nowhere", "source argoverse2:nowhere: nowhere is no folder"),
         ("run dartout --scene x", "--scene has no meaning in the closed loop"),

@@ -290,13 +290,13 @@ def test_what_the_open_loop_does_not_take_is_named(make, arguments, complaint):
     [
         (
             {"source": ""},
-            "source must be argoverse2:FOLDER, nuscenes:FOLDER, kitti:FOLDER, boreas, or one of "
-            "your own, MODULE:CLASS, got ''",
+            "source must be argoverse2:FOLDER, nuscenes:FOLDER, kitti:FOLDER, sweeps:FOLDER, "
+            "boreas, or one of your own, MODULE:CLASS, got ''",
         ),
         (
             {"source": "waymo:."},
-            "source must be argoverse2:FOLDER, nuscenes:FOLDER, kitti:FOLDER, boreas, or one of "
-            "your own, MODULE:CLASS, got 'waymo:.'",
+            "source must be argoverse2:FOLDER, nuscenes:FOLDER, kitti:FOLDER, sweeps:FOLDER, "
+            "boreas, or one of your own, MODULE:CLASS, got 'waymo:.'",
         ),
         ({"source": "argoverse2:nowhere"}, "source argoverse2:nowhere: nowhere is no folder"),
         (

@@ -195,6 +195,7 @@ MISSED = {
     "view film.rrd": "viewer",
     "reproduce --cluster tcp://127.0.0.1:1": "cluster",
     "collect dense --dataset care-sim/dense/care-v0": "minari",
+    "run sweeps:drive.mcap": "rosbags",
     "train ppo": "rl",
     "train ppo --tune 2": "tune",
     "train recurrent-ppo": "rl",
@@ -207,6 +208,7 @@ MISSED = {
 @pytest.mark.slow
 def test_a_command_without_its_extra_says_so_in_a_line(tmp_path):
     given = [json.dumps(sorted(OPTIONAL)), json.dumps([*MISSED])]
+    (tmp_path / "drive.mcap").touch()
     done = subprocess.run(
         [sys.executable, "-c", WITHOUT, *given],
         cwd=tmp_path,

@@ -153,13 +153,16 @@ def replay(case):
             "version",
             "camera_detections",
             "sweeps",
+            "sensor",
+            "reference",
+            "topics",
             "detector",
             "budget",
             "unknown",
         )
     )
     known["source"] = lambda: case.rng.choice(
-        ("argoverse2:.", "nuscenes:.", "argoverse2:", "nuscenes:/nowhere", ":")
+        ("argoverse2:.", "nuscenes:.", "argoverse2:", "nuscenes:/nowhere", "sweeps:.", ":")
     )
     gymnasium.make("CARE-Replay-v0", disable_env_checker=True, **draw(case, known)).close()
 

@@ -84,6 +84,9 @@ def _templates():
 def template(name):
     """The template of that name, made by the function of the name below."""
     path = _templates() / name
+    if name in LOGS:
+        _log(name, path)
+        return path
     here = os.open(".", os.O_RDONLY)
     os.chdir(_templates())
     try:
@@ -125,6 +128,10 @@ def _make_protocol(path):
     care_sim("protocol", "--source", f"argoverse2:{drive}", *options, "--out", path)
 
 
+LOGS = ("npy", "csv", "headless", "ascii", "binary", "kitti", "nuscenes")
+"""Logs without labels, by the form of their sweeps."""
+
+
 def _make_drive(path):
     from tests.helpers.av2_log import at, box, write
 
@@ -145,6 +152,18 @@ def _make_base(path):
     from tests.helpers.nuscenes_drive import samples
 
     write(path, {"scene-0103": samples(0.0)[:3]})
+
+
+def _log(form, path):
+    from tests.helpers.sweeps_log import write_log
+
+    write_log(path, form, seconds=1.2)
+
+
+def _make_bag(path):
+    from tests.helpers.sweeps_bag import write_bag
+
+    write_bag(path)
 
 
 def _make_scorer(path):

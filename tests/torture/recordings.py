@@ -277,6 +277,43 @@ def camera_detections(case):
     return _judged(case, root, f"nuscenes:{root}", camera_detections=str(path))
 
 
+def sweeps(case):
+    """A log without labels whose files are damaged."""
+    form = case.rng.choice((*props.LOGS, "bag"))
+    folder = props.copy(form, case.folder / "log")
+    own = {"csv": (spoil.csv,), "headless": (spoil.csv,), "kitti": (spoil.points,)}.get(form, ())
+    path = case.rng.choice(sorted(path for path in folder.rglob("*") if path.is_file()))
+    if path.name == "poses.csv":
+        own = (spoil.csv,)
+    spoilt(case, path, *own)
+    return _judged(case, folder, "sweeps:log")
+
+
+def other_logs_of_sweeps(case):
+    """A log without labels whose files are sound, and mean something else."""
+    folder = props.copy("npy", case.folder / "log")
+    poses, paths = folder / "poses.csv", sorted((folder / "sweeps").iterdir())
+    change = case.rng.choice(("gone", "late", "fast", "sideways", "millimetres", "numbers", "flip"))
+    case.tell(change)
+    table = np.loadtxt(poses, delimiter=",", skiprows=1)
+    if change == "gone":
+        poses.unlink()
+    elif change in ("late", "fast", "sideways"):
+        column, value = {"late": (0, 90.0), "fast": (1, 1e3), "sideways": (4, 1.6)}[change]
+        table[:, column] = (
+            table[:, column] * value if change == "fast" else value + table[:, column]
+        )
+        rows = "\n".join(",".join(f"{cell:.6f}" for cell in row) for row in table)
+        poses.write_text(f"time,x,y,z,yaw\n{rows}\n")
+    elif change == "numbers":
+        for number, path in enumerate(paths):
+            path.rename(path.with_name(f"{number}.npy"))
+    else:
+        for path in paths:
+            np.save(path, np.load(path) * (1000 if change == "millimetres" else [1, 1, -1]))
+    return _judged(case, folder, "sweeps:log", refused=True)
+
+
 def splits(case):
     """A split of one's own."""
     root = props.copy("base", case.folder / "base")
@@ -408,5 +445,7 @@ KINDS = {
     splits: 1,
     own_boxes: 6,
     kitti: 5,
+    sweeps: 6,
+    other_logs_of_sweeps: 2,
 }
 """What is read, and how often."""

@@ -16,8 +16,8 @@ class EitherLoopStudy(FixedStudy, SourceOptions):
 
     source: str | None = None
     """Play the open loop instead, on streets, argoverse2:FOLDER, nuscenes:FOLDER, kitti:FOLDER,
-    boreas, or a source of your own: the name of an installed one or MODULE:CLASS, of recordings
-    with :FOLDER behind it.
+    sweeps:FOLDER, boreas, or a source of your own: the name of an installed one or MODULE:CLASS,
+    of recordings with :FOLDER behind it.
     """
     scenes: tuple[str, ...] = ()
     """With --source. One number: that many scenes, from the first. Otherwise names of scenes.

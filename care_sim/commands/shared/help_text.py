@@ -16,7 +16,7 @@ PURPOSES = {
     ),
     "sensor and detector": (
         "sensor, sensors, detector, detectors, detector-parameters, least-scores, "
-        "camera-detections, sweeps"
+        "camera-detections, camera-times, empty-boxes, sweeps, reference, topics"
     ),
     "LiDAR": (
         "lidar-stated-range-m, lidar-stated-reflectance, visibility-m, rain-mm-h, "

@@ -35,18 +35,21 @@ class SceneOptions:
     """
     version: str | None = None
     """For nuScenes: the version, where the folder holds several."""
+    topics: tuple[str, ...] = ()
+    """For bags: the topics of points and poses, where there are several."""
 
     def check_unused(self) -> None:
         """Raise InvalidInput where one is given, and no source is named."""
         for field in fields(SceneOptions):
-            if getattr(self, field.name) is not None:
+            if getattr(self, field.name) not in (None, ()):
                 raise InvalidInput(f"--{field.name} has no meaning in the closed loop")
 
     def source(self, text: str, sensor: str) -> Source:
         """The source that is named in the place of a scenario."""
         named = Streets.kind if text == _STREET else text
         given = None if sensor == DEFAULT_SETUP else sensor
-        return source_of(named, split=self.split, version=self.version, sensor=given)
+        topics = self.topics or None
+        return source_of(named, split=self.split, version=self.version, sensor=given, topics=topics)
 
     def scene_of(self, source: Source, seed: int) -> Scene:
         """The scene that is named, or else that of the seed. Raises InvalidInput where there is

@@ -38,8 +38,8 @@ class SourceOptions:
     version: str | None = None
     """For nuScenes: the version, where the folder holds several."""
     sensor: str | None = None
-    """For streets, KITTI and Boreas: LiDAR and cameras, a name of `care-sim sensors` or a .toml
-    file of a set-up.
+    """For streets, KITTI, Boreas and sweeps: LiDAR and cameras, a name of `care-sim sensors` or a
+    .toml file of a set-up.
     """
     camera_detections: Path | None = None
     """For nuScenes: a file with a camera detector's boxes, in nuScenes or COCO results form."""
@@ -52,6 +52,10 @@ class SourceOptions:
     time of the sweep)."""
     empty_boxes: bool = False
     """For nuScenes and Argoverse 2: annotate boxes without a recorded point, too."""
+    reference: Annotated[str | None, tyro.conf.arg(metavar="STR")] = None
+    """For sweeps: the detector that annotates them, cluster unless given."""
+    topics: tuple[str, ...] = ()
+    """For bags: the topics of points and poses, where there are several."""
 
     def source_named(self, text: str) -> Source:
         """The source that a text and the options name. Raises InvalidInput where there is none."""
@@ -64,7 +68,11 @@ class SourceOptions:
         """Those that are given."""
         given = {field.name: getattr(self, field.name) for field in fields(SourceOptions)}
         # By identity: 0 is equal to False, and a number that somebody gave.
-        return [name for name, value in given.items() if value is not None and value is not False]
+        return [
+            name
+            for name, value in given.items()
+            if not (value is None or value is False or value == ())
+        ]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,8 +80,8 @@ class PlayOptions(SourceOptions):
     """Options that all plays share."""
 
     source: str = "streets"
-    """streets, argoverse2:FOLDER, nuscenes:FOLDER, kitti:FOLDER, boreas, or a source of your own:
-    the name of an installed one or MODULE:CLASS, of recordings with :FOLDER behind it.
+    """streets, argoverse2:FOLDER, nuscenes:FOLDER, kitti:FOLDER, sweeps:FOLDER, boreas, or a source
+    of your own: the name of an installed one or MODULE:CLASS, of recordings with :FOLDER behind it.
     """
     detector: str = PROXY
     """returns (the paper's proxy), graded (the surer the more returns), cluster (a real

@@ -16,6 +16,7 @@ from care_sim.reports.formatting import marked, tag_notes
 from care_sim.reports.protocol.contrasts import protocol_contrast_tables
 from care_sim.reports.protocol.controls import control_tables
 from care_sim.reports.protocol.differences import RATIOS
+from care_sim.reports.protocol.earlier import earlier_tables
 from care_sim.reports.protocol.entries import entry_tables
 from care_sim.reports.protocol.formatting import (
     PAPER,
@@ -65,6 +66,7 @@ def protocol_tables(rows: Sequence[Row]) -> list[Table]:
     """All tables, one setting after the other."""
     # What answers the main question comes first: differences, then levels, then details.
     made: list[Callable[[SettingPlays], list[Table]]] = [
+        earlier_tables,
         protocol_contrast_tables,
         control_tables,
         levels_tables,

@@ -44,7 +44,7 @@ class DetectionFile:
 
     def __init__(self, path: Path):
         self.path = path
-        self._found: dict[str, list[Found]] = defaultdict(list)
+        self.pictures: dict[str, list[Found]] = defaultdict(list)
         for number, row in enumerate(_rows(path)):
             try:
                 picture, detection = _read(row)
@@ -57,11 +57,11 @@ class DetectionFile:
                     f"{path}: detection {number} cannot be read ({error})"
                 ) from error
             if detection is not None:
-                self._found[picture].append(detection)
+                self.pictures[picture].append(detection)
 
     def check(self, database: Database) -> None:
         """Raise InvalidInput for a detection whose picture is no keyframe of the database."""
-        for picture in self._found:
+        for picture in self.pictures:
             if picture not in database.pictures:
                 table = database.path("sample_data")
                 raise InvalidInput(
@@ -82,7 +82,9 @@ class DetectionFile:
         objects = [np.empty(0, np.int64)]
         for number, (camera, (picture, own)) in enumerate(zip(cameras, pictures, strict=True)):
             # COCO names pictures by token or by file, so a picture may be known under both.
-            found = self._found.get(picture["token"], []) + self._found.get(picture["filename"], [])
+            found = self.pictures.get(picture["token"], []) + self.pictures.get(
+                picture["filename"], []
+            )
             boxes = np.array([box for _, _, box in found]).reshape(-1, 4) + camera.shift
             classes = np.array([label for label, _, _ in found], dtype=np.int64)
             zeros = np.zeros(len(found))
@@ -91,7 +93,7 @@ class DetectionFile:
                     [classes, [c for _, c, _ in found], boxes, zeros + number, zeros, zeros]
                 )
             )
-            objects.append(_behind(boxes, classes, projected(camera, own), annotations))
+            objects.append(objects_behind(boxes, classes, projected(camera, own), annotations))
         return IdentifiedDetections(
             ImageDetections.from_rows(np.concatenate(rows)), np.concatenate(objects)
         )
@@ -153,7 +155,9 @@ def _coco_class(number: object) -> str | None:
     return COCO.get(cast(int, number))
 
 
-def _behind(boxes: Floats, classes: Integers, shown: Floats, annotations: Annotations) -> Integers:
+def objects_behind(
+    boxes: Floats, classes: Integers, shown: Floats, annotations: Annotations
+) -> Integers:
     """(n,) the object behind each detected box, NO_OBJECT where no projected box (m, 4) overlaps it
     enough.
     """

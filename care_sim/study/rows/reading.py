@@ -14,6 +14,7 @@ from care_sim.base.checks import is_number
 from care_sim.core.conditions import DEFAULTS, OF_BOTH_LOOPS
 from care_sim.evaluation.censoring import Reading
 from care_sim.evaluation.sightings import ANNOTATED
+from care_sim.perception.detectors import CLUSTER
 from care_sim.policies import tags_of
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.rows.settings import Setting
@@ -27,6 +28,7 @@ READ_WITH = {
     "camera_times": None,
     "empty_boxes": None,
     "points": None,
+    "reference": CLUSTER,
 }
 """Columns that tell how a recording is read, and what they hold where it is the usual way."""
 _USUAL_PLAY = (

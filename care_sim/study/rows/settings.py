@@ -16,6 +16,8 @@ SOURCES = {
     "boreas": "Boreas",
 }
 """How headings name the sources of films."""
+WITHOUT_LABELS = "sweeps"
+"""The source that a detector annotates."""
 
 
 @dataclass(frozen=True, order=True)

@@ -55,6 +55,7 @@ LEFT_OUT = {
     "sweeps": "of nuScenes",
     "camera_times": "of nuScenes",
     "empty_boxes": "of nuScenes and Argoverse 2",
+    **dict.fromkeys(("reference", "topics"), "of logs without labels"),
     **dict.fromkeys(LOCALISATION, "begin with the next list, too"),
     **dict.fromkeys(RETURN_SETTINGS, "recordings refuse them, but for crosstalk"),
 }

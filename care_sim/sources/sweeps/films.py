@@ -1,0 +1,130 @@
+"""Films of logs without labels."""
+
+from collections.abc import Sequence
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from care_sim.base.errors import InvalidInput, report_problems
+from care_sim.core.arrays import Floats
+from care_sim.core.grid import AngularGrid
+from care_sim.core.sensor_setup import SensorSetup
+from care_sim.core.types import ImageDetections
+from care_sim.loops.film import Film, Shot
+from care_sim.perception.cluster.road import SETTLING_M
+from care_sim.sensors.annotated import NO_ANNOTATIONS, IdentifiedDetections
+from care_sim.sensors.surround import SURROUND_CAMERAS
+from care_sim.sources.car_motion import motions
+from care_sim.sources.film_checks import LEAST_KEYFRAMES
+from care_sim.sources.nuscenes.sweeps import recorded_cloud
+from care_sim.sources.sweeps.camera_boxes import CameraBoxes
+from care_sim.sources.sweeps.logs import SWEEPS_KEYFRAME_S, Log
+from care_sim.sources.sweeps.reference import reference
+from care_sim.world.bodies import CATALOGUE
+
+BOXES_FILE = "camera_boxes.json"
+_ROAD_M = (3.0, 12.0)
+"""Returns so far away are those of the road where they are lowest."""
+_LEAST_HEIGHT_M = 0.5
+_BIN_M = 0.1
+_AROUND_CAR_M = 0.3
+"""Mirrors, racks and aerials reach so far beyond the body."""
+_NOTHING_SEEN = IdentifiedDetections(
+    ImageDetections.from_rows(np.empty((0, len(ImageDetections.COLUMNS)))), np.empty(0, np.int64)
+)
+
+
+def film_of_log(log: Log, setup: SensorSetup, detector: str, boxes: Path | None) -> Film:
+    """Return the film of a log, annotated by `detector` (`care_sim.sources.sweeps.reference`).
+
+    The points of a sweep are in the axes of the LiDAR, as `setup` says that it is mounted. Camera
+    boxes come from the file `boxes`. Without them the film has cameras that report nothing, and a
+    line says so.
+
+    Raises InvalidInput for a set-up of several LiDARs, for a road that is not where the set-up has
+    it, and as the parts do.
+    """
+    grid = setup.grid
+    if not isinstance(grid, AngularGrid):
+        raise InvalidInput(f"{log.source}: sweeps are of one LiDAR, {setup.name} has several")
+    rows = log.keyframes()
+    if len(rows) < LEAST_KEYFRAMES:
+        raise InvalidInput(
+            f"{log.source}: a film needs {LEAST_KEYFRAMES} keyframes, {SWEEPS_KEYFRAME_S:g} s "
+            f"apart, and the sweeps are enough for {len(rows)}"
+        )
+    # The motion of the car is fitted to the poses of all sweeps.
+    cars = log.cars(log.times_s)
+    egos = motions(log.times_s, cars)
+    mount = Rotation.from_euler("ZYX", [grid.heading, -grid.pitch, grid.roll])
+    sweeps = [_off_the_car(mount.apply(log.points_of(row)), setup) for row in rows.tolist()]
+    _check_height(log, setup, sweeps)
+    sensors = [cars[row].holding(np.array(setup.position)) for row in rows.tolist()]
+    height_m = setup.position[2]
+    annotated = reference(sweeps, sensors, detector, grid, height_m)
+    cameras = CameraBoxes(boxes, setup.cameras, log) if boxes else None
+    if cameras is None:
+        _report_no_camera(log.source)
+    shots = []
+    for row, points, sensor, annotations in zip(
+        rows.tolist(), sweeps, sensors, annotated, strict=True
+    ):
+        time_s = log.times_s[row]
+        seen = cameras.seen(time_s, cars[row], annotations) if cameras else _NOTHING_SEEN
+        cloud = recorded_cloud(points, grid, annotations, sensor)
+        from_start = float(time_s - log.times_s[0])
+        token = f"{log.name}/{row}"
+        shots.append(Shot(from_start, token, sensor, egos[row], annotations, seen, cloud))
+    return Film(
+        log.name,
+        setup.equipped(SURROUND_CAMERAS),
+        height_m,
+        SWEEPS_KEYFRAME_S,
+        tuple(shots),
+        NO_ANNOTATIONS,
+        grid,
+        setup.position[:2],
+        detected=cameras is not None,
+    )
+
+
+def _off_the_car(points: Floats, setup: SensorSetup) -> Floats:
+    """Return the points (n, 3) that do not lie on the recording car, which would be an object."""
+    x, y, _ = setup.position
+    length, width, _ = CATALOGUE["ego"].size
+    ahead, left = np.abs(points[:, :2] + (x, y)).T
+    kept: Floats = points[(ahead > length / 2 + _AROUND_CAR_M) | (left > width / 2 + _AROUND_CAR_M)]
+    return kept
+
+
+@lru_cache(maxsize=1000)
+def _report_no_camera(source: str) -> None:
+    report_problems(
+        [f"{source}: no {BOXES_FILE}: the camera reports nothing, so CARE has no residual"]
+    )
+
+
+def _check_height(log: Log, setup: SensorSetup, sweeps: Sequence[Floats]) -> None:
+    """Raise InvalidInput where the road does not lie as far below the LiDAR as the set-up says.
+
+    The detector looks for the road there, and would take it for objects.
+    """
+    points = np.concatenate(sweeps)
+    ranges = np.hypot(*points[:, :2].T)
+    low = (ranges > _ROAD_M[0]) & (ranges < _ROAD_M[1]) & (points[:, 2] < -_LEAST_HEIGHT_M)
+    heights = -points[low, 2]
+    if not len(heights):
+        raise InvalidInput(
+            f"{log.source}: no returns below the LiDAR within {_ROAD_M[1]:g} m; z must point up"
+        )
+    # The densest height. A mean would be drawn up by what stands on the road.
+    bins = np.bincount((heights / _BIN_M).astype(np.int64))
+    near = np.abs(heights - (bins.argmax() + 0.5) * _BIN_M) <= _BIN_M
+    measured, told = float(np.median(heights[near])), setup.position[2]
+    if abs(measured - told) > SETTLING_M:
+        raise InvalidInput(
+            f"{log.source}: the road lies {measured:.2f} m below the LiDAR, and position_m of the "
+            f"set-up {setup.name} says {told:g}; describe the LiDAR in a set-up file sensor.toml"
+        )

@@ -1,0 +1,137 @@
+"""Points of one sweep, from a PCD, NPY, CSV or BIN file."""
+
+import os
+from collections.abc import Callable
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+
+from care_sim.base.errors import InvalidInput
+from care_sim.core.arrays import Floats
+from care_sim.sources.nuscenes.sweeps import MOST_SWEEP_BYTES, RINGS
+from care_sim.sources.plausible import REACH_M
+from care_sim.sources.sweeps.tables import columns_of, read_csv
+
+_AXES = ("x", "y", "z")
+_MOST_HEADER_LINES = 100
+_KINDS = {"F": "f", "I": "i", "U": "u"}
+
+
+def read_sweep(path: Path) -> Floats:
+    """Return the points (n, 3) of a sweep as the file has them, metres.
+
+    - PCD: fields x, y, z, `DATA ascii` or `binary`.
+    - NPY: an array (n, 3 or more) that begins with x, y, z.
+    - CSV: columns x, y, z, or no heading and x, y, z first.
+    - BIN: float32 x, y, z, intensity (KITTI), with a whole ring behind them in nuScenes' form.
+
+    Raises InvalidInput with the path for a file that is missing, too large or of another form, and
+    as `checked_points` does.
+    """
+    if not os.path.isfile(path):
+        raise InvalidInput(f"{path}: no such file")
+    if path.stat().st_size > MOST_SWEEP_BYTES:
+        raise InvalidInput(f"{path}: a sweep may hold {MOST_SWEEP_BYTES} bytes")
+    try:
+        points = READERS[path.suffix](path)
+    except InvalidInput:
+        raise
+    except KeyError as error:
+        raise InvalidInput(f"{path}: no sweep (it lacks {error})") from error
+    except (OSError, ValueError, TypeError, OverflowError, MemoryError) as error:
+        raise InvalidInput(f"{path}: no sweep ({' '.join(str(error).split())[:200]})") from error
+    return checked_points(path, points)
+
+
+def checked_points(place: object, points: Floats) -> Floats:
+    """Return the points without rays that met nothing: NaN in x, y and z (as PCL writes them).
+
+    Raises InvalidInput with the `place` where no point is left, and for one that is not finite or
+    farther than any LiDAR reaches.
+    """
+    points = points[~np.isnan(points).all(axis=1)]
+    if not len(points):
+        raise InvalidInput(f"{place}: no points")
+    near = (np.abs(points) <= REACH_M[1]).all(axis=1)
+    if not near.all():
+        wrong = int(near.argmin())
+        raise InvalidInput(
+            f"{place}: point {wrong} lies at {points[wrong].tolist()}, must be metres within "
+            f"{REACH_M[1]:g}"
+        )
+    return points
+
+
+def _pcd(path: Path) -> Floats:
+    with path.open("rb") as file:
+        header: dict[str, list[str]] = {}
+        for line in islice(file, _MOST_HEADER_LINES):
+            key, *values = line.decode("ascii").split() or ("",)
+            header[key] = values
+            if key == "DATA":
+                break
+        body = file.read()
+    (form,), (points,) = header["DATA"], map(int, header["POINTS"])
+    if points < 0:
+        raise ValueError(f"{points} points")
+    names = header["FIELDS"]
+    counts = [int(count) for count in header.get("COUNT", ["1"] * len(names))]
+    if form == "ascii":
+        starts = dict(zip(names, np.cumsum([0, *counts]).tolist(), strict=False))
+        table = np.array(body.decode("ascii").split(), dtype=float).reshape(points, -1)
+        return table[:, [starts[axis] for axis in _AXES]]
+    if form != "binary":
+        raise ValueError(f"DATA {form}, must be ascii or binary")
+    # Padding may have one name several times.
+    numbers = zip(header["TYPE"], header["SIZE"], strict=True)
+    fields = zip(names, numbers, counts, strict=True)
+    kind = np.dtype(
+        [
+            (name if name in _AXES else f"{place} {name}", f"<{_KINDS[letter]}{size}", (count,))
+            for place, (name, (letter, size), count) in enumerate(fields)
+        ]
+    )
+    rows = np.frombuffer(body, kind, points)
+    return np.concatenate([rows[axis] for axis in _AXES], axis=1).astype(float)
+
+
+def _npy(path: Path) -> Floats:
+    # Mapped: an array that says it has billions of numbers is refused by the file's length.
+    array = np.asarray(np.lib.format.open_memmap(path, mode="r"))
+    if array.ndim != 2 or array.shape[1] < 3 or array.dtype.kind not in "fiu":
+        raise ValueError(f"numbers (n, 3 or more) are asked for, got {array.dtype} {array.shape}")
+    return array[:, :3].astype(float)
+
+
+def _csv(path: Path) -> Floats:
+    with path.open("rb") as file:
+        first = file.readline(1000).split(b",")[0].strip()
+    # A first line of numbers is no heading.
+    try:
+        float(first)
+    except ValueError:
+        return columns_of(path, read_csv(path), _AXES)
+    table = read_csv(path, headless=True)
+    return columns_of(path, table, ("f0", "f1", "f2"))
+
+
+def _bin(path: Path) -> Floats:
+    values = np.fromfile(path, "<f4")
+    with np.errstate(invalid="ignore"):
+        for count in (5, 4):
+            if values.size % count == 0 and path.stat().st_size == values.nbytes:
+                rows = values.reshape(-1, count)
+                rings = rows[:, 4] if count == 5 else np.zeros(1)
+                if ((rings >= 0) & (rings < RINGS) & (rings == np.rint(rings))).all():
+                    return rows[:, :3].astype(float)
+    raise ValueError("float32 x, y, z, intensity and perhaps a whole ring are asked for")
+
+
+READERS: dict[str, Callable[[Path], Floats]] = {
+    ".pcd": _pcd,
+    ".npy": _npy,
+    ".csv": _csv,
+    ".bin": _bin,
+}
+"""What reads a file, by the end of its name."""
