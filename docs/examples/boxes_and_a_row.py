@@ -1,4 +1,4 @@
-"""A rule of thirty lines, to hold a policy against: four cells of every camera box, then one row.
+"""A rule of thirty lines, to hold a policy against: some cells of every camera box, then one row.
 
 It has neither tracks nor the paper's idea, and remembers nothing:
 
@@ -11,14 +11,15 @@ import numpy as np
 import care_sim
 from care_sim.core.residual import wedges
 
-PER_BOX = 4
-"""Cells of a box: one more than the returns with which the proxy detects."""
 ENTERS_AT_DEG = -1.25
 """Elevation of the middle of a car 50 m ahead, where what drives comes into range."""
 
 
 class BoxesAndARow(care_sim.Policy):
     """Fire at the middle of every camera box, then along one row, from straight ahead outwards."""
+
+    # Cells of a box: one more than the returns with which the proxy detects.
+    per_box = 4
 
     def __init__(self, rig):
         super().__init__(rig)
@@ -31,5 +32,11 @@ class BoxesAndARow(care_sim.Policy):
 
     def demand(self, belief):
         """Two layers: the boxes, then the row."""
-        boxes = self.rig.listed(wedges(belief.detections, self.rig), "core-spread", PER_BOX)
+        boxes = self.rig.listed(wedges(belief.detections, self.rig), "core-spread", self.per_box)
         return care_sim.Demand(layers=[boxes, [self.row]])
+
+
+class SixteenAndARow(BoxesAndARow):
+    """The same with sixteen cells of every box."""
+
+    per_box = 16

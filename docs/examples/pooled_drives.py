@@ -13,7 +13,7 @@ from pathlib import Path
 from care_sim.base.errors import percent
 from care_sim.evaluation.censoring import FEWEST_PAIRS
 from care_sim.evaluation.recall import Tally
-from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, ratio_level, scene_contrast
+from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, ratio_level, scene_contrast
 from care_sim.evaluation.strata import NEWCOMERS
 from care_sim.reports.protocol.rows import SettingPlays, plays_by_setting
 from care_sim.reports.report import read_results
@@ -33,17 +33,18 @@ def pooled(
 
 
 def main(reference: str, folders: list[str]) -> None:
-    """Print a Markdown table for all newcomers, and one for each kind."""
+    """Print a Markdown table for all newcomers, one for each kind, and one of overall recall."""
     settings = [
         plays for name in folders for plays in plays_by_setting(read_results(Path(name))[0])
     ]
     budgets = sorted({budget for plays in settings for budget in plays.budgets})
     policies = dict.fromkeys(policy for plays in settings for policy in plays.policies)
-    for kind in ("", *NEWCOMERS):
+    for ratio, kind in (*((FIRST_SIGHTING, kind) for kind in ("", *NEWCOMERS)), (OVERALL, "")):
         bound = pooled(settings, FULL, 1.0, kind)
-        events = sum(tally.events for tally in bound.values())
-        level = ratio_level(FIRST_SIGHTING, bound).by_event or 0.0
-        print(f"\n{kind or 'all'}: {events:.0f} in {len(bound)} drives; full scan {level:.1f}%\n")
+        number = sum(map(ratio.denominator, bound.values()))
+        level = ratio_level(ratio, bound).by_event or 0.0
+        named = kind or ("object keyframes" if ratio == OVERALL else "all")
+        print(f"\n{named}: {number:.0f} in {len(bound)} drives; full scan {level:.1f}%\n")
         print(f"| policy | {' | '.join(map(percent, budgets))} |")
         print("|---" * (len(budgets) + 1) + "|")
         for policy in policies:
@@ -52,9 +53,11 @@ def main(reference: str, folders: list[str]) -> None:
                 ours, theirs = (
                     pooled(settings, name, budget, kind) for name in (reference, policy)
                 )
-                own = ratio_level(FIRST_SIGHTING, theirs).by_event
+                own = ratio_level(ratio, theirs).by_event
                 text = "" if own is None else f"{own:.1f}"
-                less = scene_contrast(FIRST_SIGHTING, ours, theirs) if policy != reference else None
+                if own is not None and len(theirs) < len(bound):
+                    text += f" in {len(theirs)} drives"
+                less = scene_contrast(ratio, ours, theirs) if policy != reference else None
                 if less and less.scenes >= FEWEST_PAIRS:
                     mean, low, high = less.by_event
                     text += f" ({mean:+.1f} [{low:.1f}, {high:.1f}])"

@@ -3,12 +3,11 @@
     python docs/examples/radiate_sweeps.py RADIATE/tiny_foggy tiny_foggy
     care-sim protocol --source sweeps:tiny_foggy
 
-Sweeps are HDL-32 in CSV without a heading, with x to the right and y ahead (a yaw of -91 degrees
-fits best). GPS gives the poses. Its clock is another one: both logs begin together.
+Sweeps are HDL-32, with x to the right and y ahead; they are turned, so that x is ahead.
+GPS gives the poses. Its clock is another one: both logs begin together.
 """
 
 import re
-import shutil
 import sys
 from pathlib import Path
 
@@ -16,6 +15,7 @@ import numpy as np
 
 DEGREE_M = 111_320.0  # along a meridian
 HEIGHT_M = 2.03  # of the LiDAR above the road, measured in its sweeps
+YAW_DEG = -91  # of its x axis; this fits best
 SETUP = f"""name = "radiate"
 
 [lidar]
@@ -23,7 +23,6 @@ columns = 512
 rows = 32
 top_deg = 10.67
 bottom_deg = -30.67
-yaw_deg = -91
 range_m = 50.0
 position_m = [0.0, 0.0, {HEIGHT_M}]
 """
@@ -62,9 +61,12 @@ def convert(folder: Path, out: Path) -> None:
     period, start = np.polyfit([*told], [*told.values()], 1)
     sweeps = sorted((folder / "velo_lidar").glob("*.csv"))
     first = start + period * int(sweeps[0].stem)
+    cos, sin = np.cos(np.radians(YAW_DEG)), np.sin(np.radians(YAW_DEG))
     for path in sweeps:
         time = start + period * int(path.stem)
-        shutil.copyfile(path, out / "sweeps" / f"{time:.6f}.csv")
+        x, y, z, *_ = np.loadtxt(path, delimiter=",").T
+        turned = np.stack([cos * x - sin * y, sin * x + cos * y, z], axis=1)
+        np.save(out / "sweeps" / f"{time:.6f}.npy", turned)
     table = poses(folder)
     table[:, 0] += first
     np.savetxt(

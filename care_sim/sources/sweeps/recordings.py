@@ -39,8 +39,9 @@ class Sweeps(Recordings):
 
     The folder is a scene, or its sub-folders and MCAP files are scenes. `sensor.toml` in it, or
     the option `sensor`, is the set-up: rows and reach of the LiDAR, its height (`position_m`) and
-    the cameras. The default is `hdl-32e`. Points are in the LiDAR's axes, x ahead, y left, z up;
-    where x is to the right and y ahead, the set-up has `yaw_deg = -90`.
+    the cameras. The default is `hdl-32e`. Points are in the LiDAR's axes, x ahead, y left, z up.
+    Where x is to the right and y ahead, turn them, or give the set-up `yaw_deg = -90`; what was
+    learned does not fit that grid.
 
     Keyframes are 0.5 s apart. The detector `reference` gets all points of a keyframe. What it
     detects and tracks becomes the annotations, and a cluster that appears within range is a first
