@@ -23,8 +23,8 @@ LABELS = GENERIC | {"fault", "recipe", "statement", "stratum", "test", "third", 
 
 
 class Cell(NamedTuple):
-    """`title` is the table's. `heading` is the row of one entry above, `labels` are the entries that
-    name the row, `column` is the heading of the column. `numbers` are as printed, in order.
+    """`title` is the table's. `heading` is the row of one entry above the row, `labels` are the
+    entries that name the row, `column` is the heading of the column. `numbers` are as printed.
     """
 
     folder: str
@@ -36,7 +36,7 @@ class Cell(NamedTuple):
 
     @property
     def key(self) -> tuple[str, ...]:
-        """The texts without the title, sorted: a table that is turned on its side keeps its keys."""
+        """The texts without the title, sorted: the same where a table is turned on its side."""
         return tuple(sorted(filter(None, (self.heading, *self.labels, self.column))))
 
     @property

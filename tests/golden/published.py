@@ -1,6 +1,6 @@
 """The golden file: every number that the published folders print, recomputed from their rows.
 
-    python -m tests.golden.published            writes the file anew
+    python -m tests.golden.published            writes the file anew, in two minutes of one core
     python -m tests.golden.published streets    prints the cells of one folder
 
 This module is the only one that calls the tables of the package. A new engine of tables changes
