@@ -24,7 +24,7 @@ from tests.helpers.short_streets import few_and_short
 
 # An unpacked sdist holds no published results, nor what else only a clone has: what is tested there
 # is the installed package (`make test-installed`).
-collect_ignore = [] if PUBLISHED.is_dir() else ["repository"]
+collect_ignore = [] if PUBLISHED.is_dir() else ["golden", "repository"]
 
 settings.register_profile(
     "repeatable", deadline=None, derandomize=True, database=None, max_examples=60
