@@ -30,8 +30,6 @@ from care_sim.study.rows.reading import stops_for_nothing
 from care_sim.study.run_config import Row
 from care_sim.study.scene_trace import trace_scene
 from care_sim.study.world_hash import check_worlds
-from care_sim.viewer.pictures.comparison import draw_panel
-from care_sim.viewer.pictures.scene_comparison import draw_scene_panel
 
 AnyConfig = EpisodeConfig | PlayConfig
 _COLUMNS = {
@@ -112,8 +110,7 @@ def play_side_by_side(
     """Play episodes one after the other, into one recording and one film where files are given, and
     print their outcomes. A line for each that failed is printed too, and returned.
     """
-    draw = draw_scene_panel if isinstance(configs[0], PlayConfig) else draw_panel
-    film = Clip(video, draw, video_start)
+    film = Clip(video, video_start, panels=True)
     # All plays of a scene meet its one film.
     shown = configs[0].film() if isinstance(configs[0], PlayConfig) else None
     answers: list[Row | str] = []

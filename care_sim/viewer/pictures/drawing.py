@@ -9,20 +9,42 @@ from care_sim.core.arrays import Floats
 from care_sim.core.boxes import BOX_EDGES, box_corners
 from care_sim.core.grid_stack import Grid
 from care_sim.core.pinhole import NEAR_M, PinholeCamera
+from care_sim.viewer.palette import (
+    BACKGROUND,
+    FAINT_INK,
+    NO_RETURN_COLOUR,
+    NOT_FIRED_COLOUR,
+    Colour,
+)
 
-Colour = tuple[int, int, int]
-
-INK = (235, 237, 240)
-FAINT_INK = (150, 155, 162)
-BACKGROUND = (24, 26, 30)
-NOT_FIRED_COLOUR = (44, 47, 53)
-NO_RETURN_COLOUR = (112, 116, 124)
 _RANGE_COLOURS = colormaps["plasma_r"]
 
 
 def font(size: int) -> ImageFont.ImageFont | ImageFont.FreeTypeFont:
     """The font of every text, `size` pixels high."""
     return ImageFont.load_default(size)
+
+
+def plate(
+    draw: ImageDraw.ImageDraw,
+    at: tuple[float, float],
+    text: str,
+    colour: Colour,
+    size: int,
+    anchor: str = "mm",
+) -> None:
+    """Text in the background's colour on a plate of `colour`, its `anchor` at a pixel."""
+    left, top, right, bottom = draw.textbbox(at, text, font(size), anchor=anchor)
+    draw.rounded_rectangle((left - 10, top - 8, right + 10, bottom + 8), 7, colour)
+    draw.text(at, text, BACKGROUND, font(size), anchor=anchor)
+
+
+def key(draw: ImageDraw.ImageDraw, at: tuple[int, int], colour: Colour, words: str) -> int:
+    """What a colour means: a patch of it and words. Gives the column where the next may begin."""
+    x, y = at
+    draw.rectangle((x, y, x + 14, y + 12), colour)
+    draw.text((x + 20, y - 2), words, FAINT_INK, font(13))
+    return round(x + 44 + draw.textlength(words, font(13)))
 
 
 def wireframe(
@@ -40,13 +62,6 @@ def point_above(camera: PinholeCamera, box: Floats) -> tuple[float, float] | Non
     (pixel,), (depth,) = camera.project([[box[0], box[1], box[2] + box[5] / 2]])
     inside = depth > NEAR_M and 0 <= pixel[0] < camera.width and 0 <= pixel[1] < camera.height
     return (float(pixel[0]), float(pixel[1])) if inside else None
-
-
-def grid_picture(grid: Grid, ranges: NDArray[np.floating]) -> Image.Image:
-    """The scan (E, n) of the grid, or of some of its columns, as the car sees it: its left is left.
-    A pixel a cell.
-    """
-    return cells_picture(scan_colours(grid, ranges))
 
 
 def cells_picture(colours: NDArray[np.uint8]) -> Image.Image:

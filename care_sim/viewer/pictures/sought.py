@@ -2,29 +2,15 @@
 whom the car hit.
 """
 
-from typing import NamedTuple
-
 from care_sim.core.boxes import planar_ranges
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.records import Keyframe
 from care_sim.loops.watcher import sought
+from care_sim.viewer.palette import DETECTED, HIT, IN_VIEW, OUT_OF_VIEW, State
 from care_sim.viewer.pictures import drawing
 from care_sim.viewer.pictures.labels import Labels
 from care_sim.world.world import Actor
-
-
-class State(NamedTuple):
-    """How it stands with somebody: words and their colour."""
-
-    words: str
-    colour: drawing.Colour
-
-
-OUT_OF_VIEW = State("out of view", (225, 225, 225))
-IN_VIEW = State("in view", (255, 170, 40))
-DETECTED = State("detected", (80, 230, 110))
-HIT = State("hit", (255, 80, 70))
 
 
 def mark_sought(

@@ -1,9 +1,5 @@
 """What a recording holds: every entity with its content, unit and frame."""
 
-from collections.abc import Mapping
-
-from care_sim.core.types import CLASSES
-
 ABOUT_ENTITY = "about"
 """The page that says what a recording holds; every other entity is one of an episode."""
 SECONDS = "seconds"
@@ -23,8 +19,9 @@ MOST_POINTS = 6000
 ENTITIES = {
     "world": "axes: x along the road, y left, z up; metres",
     "world/bodies": (
-        "boxes of all actors (truth), coloured by class, grey where perception reports none; "
-        "world frame"
+        "boxes of all actors (truth), coloured by class, grey where perception reports none; of "
+        "the open loop those of the annotated objects: green found by this scan, orange not found, "
+        "grey beyond 50 m; world frame"
     ),
     "world/first_sighting": (
         "box of the first-sighting actor (truth), coloured by `states/actor`; world frame"
@@ -48,7 +45,8 @@ ENTITIES = {
     ),
     "world/lidar/wedges/explained": "the same of those that a forecast explains",
     "world/lidar/camera": (
-        "the camera that the policy knows, and its picture before any fault; pixels"
+        "the first camera that the policy knows, and its picture before any fault, of which the "
+        "open loop keeps nothing; pixels"
     ),
     "world/lidar/camera/explained": "detections that a forecast explains, as they arrived; pixels",
     "world/lidar/camera/residual": "detections that no forecast explains; pixels",
@@ -76,6 +74,8 @@ ENTITIES = {
         "hull to hull to that actor, at its least until the next keyframe, metres"
     ),
     "measures/braking": "1 while the brake is on, else 0",
+    "measures/objects": "annotated objects within 50 m",
+    "measures/found": "how many of them this scan found",
     "budget/exploitation": "cells fired for exploitation, percent of the budget",
     "budget/reserve": "cells fired for the reserve, percent of the budget",
     "budget/floor": "cells that the random floor filled up, percent of the budget",
@@ -88,12 +88,15 @@ ENTITIES = {
         "this scan"
     ),
     "states/brake": "on or off",
-    "events": "what changed, in words",
-    "outcome": "the result of the episode, `care_sim.loops.records.Outcome`",
+    "events": "what changed, or who appears for the first time, in words",
+    "outcome": (
+        "the result of the episode, `care_sim.loops.records.Outcome`, or of the play, "
+        "`care_sim.evaluation.recall.SceneOutcome`"
+    ),
 }
-"""Entities of an episode, each below the name of its lane, and what they hold."""
+"""Entities of both loops, each below the name of its lane, and what they hold."""
 
-_OF_CARS_THAT_ACT = (
+_CLOSED_LOOP_ALONE = (
     "world/first_sighting",
     "world/lidar/path",
     "measures/speed",
@@ -103,83 +106,32 @@ _OF_CARS_THAT_ACT = (
     "states/actor",
     "states/brake",
 )
-SCENE_ENTITIES = {
-    **{name: told for name, told in ENTITIES.items() if name not in _OF_CARS_THAT_ACT},
-    "world/bodies": (
-        "boxes of the annotated objects (truth): green found by this scan, orange not found, grey "
-        "beyond 50 m; world frame"
-    ),
-    "world/lidar/camera": "the first camera that the policy knows; of its picture nothing is kept",
-    "measures/objects": "annotated objects within 50 m",
-    "measures/found": "how many of them this scan found",
-    "events": "who appears for the first time, and whether it was found at once",
-    "outcome": "the result of the play, `care_sim.evaluation.recall.SceneOutcome`",
-}
-"""The same of a play of the open loop."""
-
-BODY_COLOURS = dict(
-    zip(
-        CLASSES,
-        [(88, 142, 212), (196, 154, 92), (206, 112, 178), (146, 190, 92), (240, 200, 70)],
-        strict=True,
-    )
-)
-NO_CLASS = (120, 124, 132)
-SHARE_COLOURS = (
-    (38, 41, 48),
-    (80, 200, 255),
-    (255, 150, 30),
-    (112, 116, 132),
-    (170, 225, 110),
-    (150, 120, 170),
-)
-"""Not fired, exploitation, reserve, floor, chosen, along."""
-EXPLAINED_RGB = (80, 200, 255)
-RESIDUAL_RGB = (255, 150, 30)
-MISSED_RGB = (255, 80, 120)
-_OUT_OF_VIEW_RGB = (225, 225, 225)
-_IN_VIEW_RGB = (255, 170, 40)
-_DETECTED_RGB = (80, 230, 110)
-EGO_RGB = (200, 204, 212)
-COASTING_RGB = (110, 130, 165)
-BRAKE_RGB = (255, 80, 70)
-PATH_RGB = (46, 54, 68)
-ACTOR_COLOURS = {
-    "out of view": _OUT_OF_VIEW_RGB,
-    "in view": _IN_VIEW_RGB,
-    "detected": _DETECTED_RGB,
-}
-FOUND_RGB = _DETECTED_RGB
-NOT_FOUND_RGB = _IN_VIEW_RGB
-LANES = (
-    (170, 225, 110),
-    (230, 120, 200),
-    (240, 200, 70),
-    (130, 160, 255),
-    (255, 120, 90),
-    (225, 225, 225),
-)
-"""Colours of the curves of episodes that are played side by side."""
+_OPEN_LOOP_ALONE = ("measures/objects", "measures/found")
 
 
-def about(entities: Mapping[str, str] = ENTITIES) -> str:
+def entities_of(open_loop: bool) -> dict[str, str]:
+    """The entities that a recording of one of the loops holds."""
+    others = _CLOSED_LOOP_ALONE if open_loop else _OPEN_LOOP_ALONE
+    return {path: content for path, content in ENTITIES.items() if path not in others}
+
+
+def about(entities: dict[str, str]) -> str:
     """The entities, as a table in Markdown."""
+    rows = "\n".join(f"| `{path}` | {content} |" for path, content in entities.items())
     return (
         "Recorded with CARE-Sim. Metres, seconds, radians; timelines `seconds` (of the scan) and "
         "`keyframe` (from 0).\n"
         "Bodies, pictures, what was missed and the states are truth, which no policy is shown.\n\n"
-        f"{_table(entities)}"
+        f"| entity | content |\n|---|---|\n{rows}\n"
     )
 
 
-def _table(entities: Mapping[str, str]) -> str:
-    rows = "\n".join(f"| `{path}` | {content} |" for path, content in entities.items())
-    return f"| entity | content |\n|---|---|\n{rows}\n"
+def _listed(paths: tuple[str, ...]) -> str:
+    return ", ".join(f"`{path}`" for path in paths)
 
 
-_OTHERWISE = {name: told for name, told in SCENE_ENTITIES.items() if told != ENTITIES.get(name)}
 __doc__ = (
-    f"{__doc__}\n\n{about()}\n"
-    f"Of the open loop {', '.join(f'`{name}`' for name in _OF_CARS_THAT_ACT)} are missing, and "
-    f"these hold something else:\n\n{_table(_OTHERWISE)}"
+    f"{__doc__}\n\n{about(ENTITIES)}\n"
+    f"The closed loop alone has {_listed(_CLOSED_LOOP_ALONE)}; the open loop alone has "
+    f"{_listed(_OPEN_LOOP_ALONE)}.\n"
 )

@@ -43,12 +43,14 @@ class Lane:
         self._counts[entity] = count
 
     def log_curve(
-        self, entity: str, keyframes: Sequence[int], times_s: Sequence[float], values: Floats
+        self, entity: str, keyframes: Sequence[tuple[int, float]], values: Floats
     ) -> None:
-        """Log one number per keyframe, `values` (n,), at once: it costs as much as logging one."""
+        """Log one number per keyframe, `values` (n,), at once: it costs as much as logging one.
+        `keyframes` are their numbers and times in seconds.
+        """
         times = (
-            rr.TimeColumn(KEYFRAME, sequence=keyframes),
-            rr.TimeColumn(SECONDS, duration=times_s),
+            rr.TimeColumn(KEYFRAME, sequence=[number for number, _ in keyframes]),
+            rr.TimeColumn(SECONDS, duration=[time_s for _, time_s in keyframes]),
         )
         self._stream.send_columns(
             entity_path(self.name, entity), times, rr.Scalars.columns(scalars=values)

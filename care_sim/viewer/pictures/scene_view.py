@@ -1,0 +1,226 @@
+"""What pictures show of the open loop: the scene from above, the car driving to the right, with who
+is found, and where it is known what the policy knew.
+"""
+
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+from PIL import Image, ImageDraw
+
+from care_sim.core.arrays import Floats
+from care_sim.core.boxes import box_corners, planar_ranges
+from care_sim.core.residual import wedge_rays
+from care_sim.core.rig import Rig
+from care_sim.evaluation.sightings import RANGE_M
+from care_sim.loops.open_loop import OpenLoop
+from care_sim.loops.scene_records import SceneKeyframe
+from care_sim.loops.watcher import TrueSituation, Watched, object_names, returned
+from care_sim.viewer.palette import (
+    BACKGROUND,
+    EXPLAINED_COLOUR,
+    FAINT_INK,
+    FALSE_COLOUR,
+    FOUND_COLOUR,
+    INK,
+    NOT_FOUND_COLOUR,
+    SHARE_COLOURS,
+    UNEXPLAINED_COLOUR,
+    UNSCORED_COLOUR,
+    Colour,
+    State,
+    found_colour,
+)
+from care_sim.viewer.pictures import drawing
+from care_sim.viewer.pictures.labels import Labels
+from care_sim.viewer.pictures.view import BELOW_SIZE, PANEL_WIDTH, PICTURE_WIDTH, Scenery, View
+from care_sim.world.bodies import CATALOGUE
+
+MAP_HEIGHT = 460
+_PIXELS_PER_M = MAP_HEIGHT / (2 * RANGE_M + 4)
+_RINGS = (10.0, 20.0, 30.0, 40.0, RANGE_M)
+"""Radii of the range rings, metres."""
+_CAR = np.array([0.0, 0.0, 0.0, *CATALOGUE["ego"].size, 0.0])
+_AROUND = np.array([0.0, 0.0, 0.0, 1.8, 1.8, 0.0, 0.0])
+"""What a box gains in length and width for its second line."""
+_RING_COLOUR = (52, 56, 63)
+RETURN_COLOUR = (172, 176, 184)
+TRACK_COLOUR = (205, 160, 255)
+_AHEAD_S = 1.0
+"""For how long the line of a forecast shows where it goes."""
+_DOT = 3
+"""Radius of a forecast, pixels."""
+_CLEAR = 10
+"""Pixels from the middle of a box to its name."""
+_DIMMED = 0.45
+"""What is left of the colour of a wedge: a scene has many of them."""
+_LINE = 18
+"""Height of a line of the legend, pixels."""
+_OBJECTS = (
+    State("found", FOUND_COLOUR),
+    State("not found", NOT_FOUND_COLOUR),
+    State("beyond 50 m", UNSCORED_COLOUR),
+    State("double line: its first sighting", INK),
+)
+_SCAN = (State("small dots: returns", RETURN_COLOUR),)
+_KNOWN = (
+    State("small dots: returns, by their share of the budget", FAINT_INK),
+    State("dot: forecast of a track, hollow: missed", TRACK_COLOUR),
+    State("with a line to where it is in a second", TRACK_COLOUR),
+    State("camera box, explained by a track", EXPLAINED_COLOUR),
+    State("camera box, new", UNEXPLAINED_COLOUR),
+    State("camera box, false", FALSE_COLOUR),
+)
+
+
+def scene_view(
+    loop: OpenLoop, frames: Sequence[SceneKeyframe], watched: Watched | None = None
+) -> View:
+    """The last of the keyframes `frames`, which `loop` has just played, or is about to play first.
+
+    The map has the annotated objects, which are found, not found, or beyond the range that is
+    scored; those that appear have a double line and a name. It has the returns of the fired cells.
+    Where the keyframe was `watched` it has what was known when its cells were chosen, too: the
+    forecasts of tracks, and where the camera's detections lie, which have no depth. The episode is
+    left as it was.
+    """
+    last = frames[-1]
+    entries = sum(frame.entries for frame in frames)
+    found = sum(frame.entries_found for frame in frames)
+    told = State(
+        f"{found} of {entries} first sightings found at once",
+        FOUND_COLOUR if found == entries else NOT_FOUND_COLOUR,
+    )
+    return View(
+        rig=loop.rig,
+        time_s=last.time_s,
+        progress=f"{last.objects_found} of {last.objects} objects found",
+        braking=False,
+        contact=None,
+        aside=loop.film.name[:28],
+        verdict=told if entries else State("no first sighting yet", FAINT_INK),
+        fired=last.fired,
+        ranges=loop.last_ranges,
+        shares=watched and watched.shares,
+        is_moment=bool(last.entries),
+        scenery=partial(_scenery, loop, last, watched),
+    )
+
+
+def _scenery(
+    loop: OpenLoop, keyframe: SceneKeyframe, watched: Watched | None, whole: bool
+) -> Scenery:
+    legend = _OBJECTS + (_KNOWN if watched else _SCAN)
+    picture = Image.new("RGB", (PICTURE_WIDTH if whole else PANEL_WIDTH, MAP_HEIGHT), BACKGROUND)
+    street = Map(picture)
+    street.draw_rings()
+    if watched:
+        _draw_wedges(street, loop.rig, watched.situation)
+    _draw_returns(street, loop, watched)
+    _draw_objects(street, loop, keyframe)
+    if watched:
+        _draw_tracks(street, watched.situation)
+    if not whole:
+        _write_legend(street.draw, (8, MAP_HEIGHT - _LINE * len(legend)), legend)
+        return Scenery(picture, None)
+    below = Image.new("RGB", BELOW_SIZE, BACKGROUND)
+    draw = ImageDraw.Draw(below)
+    draw.text((20, 8), "From above, driving to the right:", INK, drawing.font(14))
+    _write_legend(draw, (20, 34), legend)
+    return Scenery(picture, below)
+
+
+class Map:
+    """A picture of the ground from above, the car in its middle."""
+
+    def __init__(self, picture: Image.Image):
+        self.draw = ImageDraw.Draw(picture)
+        self._middle = np.array(picture.size) / 2
+
+    def pixels(self, places: Floats) -> Floats:
+        """(n, 2) pixels of places (n, 2) in the sensor frame: ahead is right, left is up."""
+        on_map: Floats = self._middle + places * [_PIXELS_PER_M, -_PIXELS_PER_M]
+        return on_map
+
+    def draw_box(self, box: Floats, colour: Colour, width: int) -> None:
+        """The outline of a box (7,)."""
+        corners = self.pixels(box_corners(box[None])[0, :4, :2])
+        self.draw.polygon(corners.ravel().tolist(), outline=colour, width=width)
+
+    def draw_rings(self) -> None:
+        """The rings of range around the car."""
+        for metres in _RINGS:
+            ends = self.pixels(np.array([[-metres, metres], [metres, -metres]]))
+            (left, top), (right, bottom) = ends.tolist()
+            self.draw.ellipse((left, top, right, bottom), outline=_RING_COLOUR)
+            at, words = (right - 4, (top + bottom) / 2), f"{metres:.0f} m"
+            self.draw.text(at, words, FAINT_INK, drawing.font(11), anchor="rm")
+
+
+def _draw_returns(street: Map, loop: OpenLoop, watched: Watched | None) -> None:
+    cells, points = returned(loop.last_ranges, loop.rig.grid)
+    shares = watched.shares.ravel()[cells].tolist() if watched else [None] * len(cells)
+    for (x, y), share in zip(street.pixels(points[:, :2]), shares, strict=True):
+        colour = RETURN_COLOUR if share is None else tuple(SHARE_COLOURS[share].tolist())
+        street.draw.rectangle((x, y, x + 1, y + 1), colour)
+
+
+def _draw_objects(street: Map, loop: OpenLoop, keyframe: SceneKeyframe) -> None:
+    """The car, and the annotated objects in the colours of how it stands with them; those that
+    appear with a second line and a name, since a person is a few pixels large.
+    """
+    annotations = loop.film.shots[keyframe.index].annotations
+    boxes, names = annotations.boxes, object_names(annotations)
+    street.draw_box(_CAR, INK, 2)
+    for row, box in enumerate(boxes):
+        colour = found_colour(keyframe, row)
+        street.draw_box(box, colour, 2)
+        if keyframe.appearing[row]:
+            street.draw_box(box + _AROUND, colour, 1)
+    labels = Labels(street.draw)
+    # The nearest first, whose names keep their places.
+    for row in np.argsort(planar_ranges(boxes), kind="stable").tolist():
+        if keyframe.appearing[row]:
+            (x, y) = street.pixels(boxes[row, :2]).tolist()
+            labels.over((x, y - _CLEAR), f"{names[row]} appears", found_colour(keyframe, row))
+
+
+def _draw_wedges(street: Map, rig: Rig, situation: TrueSituation) -> None:
+    """The outermost rays through every image box, as far as objects are scored."""
+    rays = wedge_rays(situation.belief.detections, rig)
+    for nine, known, false in zip(rays, situation.known, situation.false, strict=True):
+        colour = FALSE_COLOUR if false else EXPLAINED_COLOUR if known else UNEXPLAINED_COLOUR
+        dimmed = tuple(round(_DIMMED * part) for part in colour)
+        for end in outermost(nine):
+            line = street.pixels(np.array([[0.0, 0.0], RANGE_M * end]))
+            street.draw.line(line.ravel().tolist(), dimmed)
+
+
+def outermost(rays: Floats) -> Floats:
+    """(2, 2) the directions on the ground of the leftmost and rightmost of rays (n, 3) that lie
+    within half a turn.
+    """
+    flat = rays[:, :2] / np.linalg.norm(rays[:, :2], axis=1, keepdims=True)
+    # Angles from the first of them, so that it does not matter where a turn begins.
+    across = flat[0, 0] * flat[:, 1] - flat[0, 1] * flat[:, 0]
+    off = np.arctan2(across, flat @ flat[0])
+    ends: Floats = flat[[np.argmax(off), np.argmin(off)]]
+    return ends
+
+
+def _draw_tracks(street: Map, situation: TrueSituation) -> None:
+    """A dot at the centre of every forecast, hollow where the last scan missed the track, and a
+    line to where it would be in a second, over ground.
+    """
+    tracks = situation.belief.tracks
+    centres = tracks.boxes[:, :2]
+    ends = street.pixels(centres + _AHEAD_S * tracks.velocities)
+    for (x, y), end, misses in zip(street.pixels(centres), ends, tracks.misses, strict=True):
+        street.draw.line((x, y, *end.tolist()), TRACK_COLOUR)
+        dot = (x - _DOT, y - _DOT, x + _DOT, y + _DOT)
+        street.draw.ellipse(dot, None if misses else TRACK_COLOUR, TRACK_COLOUR)
+
+
+def _write_legend(draw: ImageDraw.ImageDraw, at: tuple[int, int], legend: Sequence[State]) -> None:
+    for row, (words, colour) in enumerate(legend):
+        draw.text((at[0], at[1] + _LINE * row), words, colour, drawing.font(13))
