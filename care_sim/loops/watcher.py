@@ -20,7 +20,7 @@ from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.open_loop import OpenLoop
 from care_sim.loops.records import Keyframe
 from care_sim.loops.scene_records import SceneKeyframe
-from care_sim.sensors.annotated import NO_OBJECT, Annotations
+from care_sim.sensors.annotated import NO_OBJECT
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.world import Actor, World
 
@@ -49,12 +49,6 @@ def way_ahead(world: World, sensor_x: float, ahead: float) -> Pose:
     x, y, yaw = world.ego.pose
     reach = sensor_x + ahead
     return x + reach * float(np.cos(yaw)), y + reach * float(np.sin(yaw)), yaw
-
-
-def object_names(annotations: Annotations) -> tuple[str, ...]:
-    """(n,) the names of annotated objects: class and number."""
-    named = zip(annotations.classes.tolist(), annotations.objects.tolist(), strict=True)
-    return tuple(f"{CLASSES[label]} {number}" for label, number in named)
 
 
 def returned(ranges: NDArray[np.floating], grid: Grid) -> tuple[Cells, Floats]:
@@ -191,13 +185,15 @@ def _of_world(loop: ClosedLoop) -> Surroundings:
 def _of_film(loop: OpenLoop) -> Surroundings:
     shot, (x, y, height), size = loop.shot, loop.film.position, CATALOGUE["ego"].size
     car = np.array([[-x, -y, size[2] / 2 - height, *size, 0.0]])
+    annotations = shot.annotations
+    named = zip(annotations.classes.tolist(), annotations.objects.tolist(), strict=True)
     return Surroundings(
         time_s=shot.time_s,
         sensor=shot.sensor,
         ego=shot.sensor.boxes_to_world(car)[0],
         way=np.empty((0, 3)),
-        names=object_names(shot.annotations),
-        labels=tuple(shot.annotations.classes.tolist()),
-        bodies=shot.sensor.boxes_to_world(shot.annotations.boxes),
+        names=tuple(f"{CLASSES[label]} {number}" for label, number in named),
+        labels=tuple(annotations.classes.tolist()),
+        bodies=shot.sensor.boxes_to_world(annotations.boxes),
         target=None,
     )

@@ -6,7 +6,6 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from care_sim.core.arrays import Mask
-from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.residual import explained
 from care_sim.core.types import CLASSES
 from care_sim.loops.closed_loop import ClosedLoop

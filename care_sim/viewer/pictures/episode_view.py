@@ -49,22 +49,27 @@ def episode_view(loop: ClosedLoop, frames: Sequence[Keyframe]) -> View:
     detections. The episode is left as it was.
     """
     frame = frames[-1] if frames else None
-    target = loop.world.first_sighting
-    near = frame is not None and target is not None and np.isfinite(frame.clearance_m)
     return View(
         rig=loop.rig,
         time_s=loop.world.time,
         progress=f"{loop.world.ego_motion.speed:.1f} m/s",
         braking=frame is not None and frame.braking,
-        contact=frame and contact_text(loop, frame),
-        aside=f"clearance to {target.name} {frame.clearance_m:.1f} m" if near else "",
+        contact=contact_text(loop, frame) if frame else None,
+        aside=_clearance(loop, frame) if frame else "",
         verdict=verdict(frames, loop.rig.keyframe_s),
-        fired=frame and frame.fired,
+        fired=frame.fired if frame else None,
         ranges=loop.belief.ranges,
         shares=None,
         is_moment=frame is not None and frame.braking,
         scenery=partial(_scenery, loop, frame),
     )
+
+
+def _clearance(loop: ClosedLoop, frame: Keyframe) -> str:
+    target = loop.world.first_sighting
+    if target is None or not np.isfinite(frame.clearance_m):
+        return ""
+    return f"clearance to {target.name} {frame.clearance_m:.1f} m"
 
 
 def verdict(frames: Sequence[Keyframe], keyframe_s: float) -> State:
@@ -77,8 +82,8 @@ def verdict(frames: Sequence[Keyframe], keyframe_s: float) -> State:
         so_long_s = frames[-1].time_s - seen + keyframe_s
         return State(f"in view for {so_long_s:.1f} s, not detected", IN_VIEW.colour)
     so_far = outcome(frames)
-    later = seen is not None and found > seen
-    after = f", {found - seen:.1f} s after coming into view" if later else ""
+    delay_s = 0.0 if seen is None else found - seen
+    after = f", {delay_s:.1f} s after coming into view" if delay_s > 0 else ""
     clearance = "" if so_far.clearance_m is None else f"; clearance {so_far.clearance_m:.1f} m"
     words = f"detected at {so_far.detection_distance_m:.1f} m{after}{clearance}"
     return State(words, DETECTED.colour)

@@ -34,7 +34,8 @@ _PATH = (0.47, 0.47, 0.5)
 _BAR = (0.8, 0.8, 0.78)
 _SKY = (128, 147, 166)
 """Dark enough for words."""
-_ROAD = (58, 60, 65)
+_ROAD = (85, 85, 90)
+"""The asphalt, as it is painted."""
 _NOTHING = 255
 """What the renderer paints where no body is."""
 

@@ -15,7 +15,7 @@ from care_sim.core.rig import Rig
 from care_sim.evaluation.sightings import RANGE_M
 from care_sim.loops.open_loop import OpenLoop
 from care_sim.loops.scene_records import SceneKeyframe
-from care_sim.loops.watcher import TrueSituation, Watched, object_names, returned
+from care_sim.loops.watcher import TrueSituation, Watched, returned
 from care_sim.viewer.palette import (
     BACKGROUND,
     EXPLAINED_COLOUR,
@@ -79,10 +79,10 @@ def scene_view(
     """The last of the keyframes `frames`, which `loop` has just played, or is about to play first.
 
     The map has the annotated objects, which are found, not found, or beyond the range that is
-    scored; those that appear have a double line and a name. It has the returns of the fired cells.
-    Where the keyframe was `watched` it has what was known when its cells were chosen, too: the
-    forecasts of tracks, and where the camera's detections lie, which have no depth. The episode is
-    left as it was.
+    scored; those that appear have a double line. It has the returns of the fired cells. Where the
+    keyframe was `watched`, those that appear have a name, and the map has what was known when the
+    cells were chosen: the forecasts of tracks, and where the camera's detections lie, which have no
+    depth. The episode is left as it was.
     """
     last = frames[-1]
     entries = sum(frame.entries for frame in frames)
@@ -101,7 +101,7 @@ def scene_view(
         verdict=told if entries else State("no first sighting yet", FAINT_INK),
         fired=last.fired,
         ranges=loop.last_ranges,
-        shares=watched and watched.shares,
+        shares=watched.shares if watched else None,
         is_moment=bool(last.entries),
         scenery=partial(_scenery, loop, last, watched),
     )
@@ -117,9 +117,10 @@ def _scenery(
     if watched:
         _draw_wedges(street, loop.rig, watched.situation)
     _draw_returns(street, loop, watched)
-    _draw_objects(street, loop, keyframe)
+    _draw_objects(street, loop.film.shots[keyframe.index].annotations.boxes, keyframe)
     if watched:
         _draw_tracks(street, watched.situation)
+        _name_sightings(street, watched.situation, keyframe)
     if not whole:
         _write_legend(street.draw, (8, MAP_HEIGHT - _LINE * len(legend)), legend)
         return Scenery(picture, None)
@@ -165,24 +166,16 @@ def _draw_returns(street: Map, loop: OpenLoop, watched: Watched | None) -> None:
         street.draw.rectangle((x, y, x + 1, y + 1), colour)
 
 
-def _draw_objects(street: Map, loop: OpenLoop, keyframe: SceneKeyframe) -> None:
-    """The car, and the annotated objects in the colours of how it stands with them; those that
-    appear with a second line and a name, since a person is a few pixels large.
+def _draw_objects(street: Map, boxes: Floats, keyframe: SceneKeyframe) -> None:
+    """The car, and the annotated boxes (n, 7) in the colours of how it stands with them; those that
+    appear have a second line.
     """
-    annotations = loop.film.shots[keyframe.index].annotations
-    boxes, names = annotations.boxes, object_names(annotations)
     street.draw_box(_CAR, INK, 2)
     for row, box in enumerate(boxes):
         colour = found_colour(keyframe, row)
         street.draw_box(box, colour, 2)
         if keyframe.appearing[row]:
             street.draw_box(box + _AROUND, colour, 1)
-    labels = Labels(street.draw)
-    # The nearest first, whose names keep their places.
-    for row in np.argsort(planar_ranges(boxes), kind="stable").tolist():
-        if keyframe.appearing[row]:
-            (x, y) = street.pixels(boxes[row, :2]).tolist()
-            labels.over((x, y - _CLEAR), f"{names[row]} appears", found_colour(keyframe, row))
 
 
 def _draw_wedges(street: Map, rig: Rig, situation: TrueSituation) -> None:
@@ -219,6 +212,19 @@ def _draw_tracks(street: Map, situation: TrueSituation) -> None:
         street.draw.line((x, y, *end.tolist()), TRACK_COLOUR)
         dot = (x - _DOT, y - _DOT, x + _DOT, y + _DOT)
         street.draw.ellipse(dot, None if misses else TRACK_COLOUR, TRACK_COLOUR)
+
+
+def _name_sightings(street: Map, situation: TrueSituation, keyframe: SceneKeyframe) -> None:
+    """Who appears, the nearest first, whose name keeps its place: a person is a few pixels large.
+    A film has no names: they hide who else is there.
+    """
+    labels = Labels(street.draw)
+    boxes = situation.sensor.boxes_to_local(situation.bodies)
+    for row in np.argsort(planar_ranges(boxes), kind="stable").tolist():
+        if keyframe.appearing[row]:
+            x, y = street.pixels(boxes[row, :2]).tolist()
+            words = f"{situation.names[row]} appears"
+            labels.over((x, y - _CLEAR), words, found_colour(keyframe, row))
 
 
 def _write_legend(draw: ImageDraw.ImageDraw, at: tuple[int, int], legend: Sequence[State]) -> None:
