@@ -20,8 +20,7 @@ from care_sim.commands.shared.written_files import finish_files
 from care_sim.envs.wrappers.record_rerun import RecordRerun, recording
 from care_sim.loops.film import Film
 from care_sim.reports.episodes.clips import Clip
-from care_sim.reports.episodes.scene_timeline import LABELS, outcome_text
-from care_sim.reports.episodes.timeline import text
+from care_sim.reports.episodes.timeline import SCENE_LABELS, outcome_text, text
 from care_sim.reports.table import Table
 from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.episode_play import GymEnv, result_or_reason, trace
@@ -166,7 +165,7 @@ def _outcome_table(played: Sequence[tuple[AnyConfig, Row]]) -> Table:
     """One line per episode."""
     config = played[0][0]
     if isinstance(config, PlayConfig):
-        title, told, written = config.scene.name, LABELS, outcome_text
+        title, told, written = config.scene.name, SCENE_LABELS, outcome_text
     else:
         title, told = f"{config.scenario} seed {config.seed}", {**_COLUMNS}
         told |= _OF_COLLISIONS if any(row["collision"] for _, row in played) else {}

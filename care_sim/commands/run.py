@@ -17,8 +17,7 @@ from care_sim.envs.wrappers.record_rerun import RecordRerun
 from care_sim.policies.base import Policy
 from care_sim.reports.episodes.clips import Clip
 from care_sim.reports.episodes.photos import Photo
-from care_sim.reports.episodes.scene_timeline import print_scene_timeline
-from care_sim.reports.episodes.timeline import print_timeline
+from care_sim.reports.episodes.timeline import episode_timeline, scene_timeline
 from care_sim.study.episode_config import grid
 from care_sim.study.episode_play import GymEnv, trace
 from care_sim.study.scene_trace import trace_scene
@@ -79,7 +78,7 @@ class Run(Watched):
         film = Clip(self.video, self.video_start)
         played = trace(config, film.episode(self.policy), wrap=partial(self._watched, photo))
         film.show_outcome(played[0])
-        print_timeline(config, *played, console())
+        episode_timeline(config, *played).print(console())
         photo.report()
         finish_files(self.record, film, self.video)
         return 0
@@ -96,7 +95,7 @@ class Run(Watched):
         film = Clip(self.video, self.video_start)
         wrap = partial(self._watched, photo)
         played = trace_scene(config, config.film(), film.episode(self.policy), wrap=wrap)
-        print_scene_timeline(config, played, console())
+        scene_timeline(config, played).print(console())
         photo.report()
         finish_files(self.record, film, self.video)
         return 0
