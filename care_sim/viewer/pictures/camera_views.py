@@ -29,7 +29,7 @@ _ROW_HEIGHT = 140
 """Of a row of cameras with its words, pixels."""
 _ALONE_SIZE = (352, 180)
 """Of the picture of a single camera, at the most: the grid is drawn beside it."""
-_PICTURES_TOP = 30
+PICTURES_TOP = 30
 _BEHIND_RAD = np.deg2rad(170.0)
 _AHEAD_RAD = np.deg2rad(10.0)
 
@@ -59,15 +59,15 @@ def cameras_picture(scene: BulletWorld, loop: ClosedLoop) -> Image.Image:
         (camera,) = cameras
         scale = min(1.0, _ALONE_SIZE[0] / camera.width, _ALONE_SIZE[1] / camera.height)
         alone = _picture(scene, loop, known, 0, round(scale * camera.width))
-        canvas.paste(alone, (20, _PICTURES_TOP))
+        canvas.paste(alone, (20, PICTURES_TOP))
         return canvas
     share = PICTURE_WIDTH // len(cameras)
     # By where they look.
     from_left = sorted(range(len(cameras)), key=lambda number: -cameras[number].yaw)
     for place, number in enumerate(from_left):
         picture = _picture(scene, loop, known, number, share)
-        canvas.paste(picture, (place * share, _PICTURES_TOP))
-        at = (place * share + share / 2, _PICTURES_TOP + picture.height + 2)
+        canvas.paste(picture, (place * share, PICTURES_TOP))
+        at = (place * share + share / 2, PICTURES_TOP + picture.height + 2)
         draw.text(at, _towards(cameras[number].yaw), FAINT_INK, drawing.font(13), anchor="ma")
     return canvas
 
