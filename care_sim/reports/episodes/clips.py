@@ -20,9 +20,8 @@ from care_sim.viewer.palette import BACKGROUND, DETECTED, HIT, State
 from care_sim.viewer.pictures.clip_files import check_clip, write_clip
 from care_sim.viewer.pictures.drawing import plate
 from care_sim.viewer.pictures.episode_view import episode_view
-from care_sim.viewer.pictures.keyframe import draw_keyframe, draw_panel
+from care_sim.viewer.pictures.keyframe import View, draw_keyframe, draw_panel
 from care_sim.viewer.pictures.scene_view import scene_view
-from care_sim.viewer.pictures.view import View
 
 _LAST_PICTURE_S = 2.5
 """Seconds for which the last picture stays."""

@@ -10,19 +10,11 @@ from care_sim.core.residual import explained
 from care_sim.core.types import CLASSES
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.sensors.annotated import NO_OBJECT
-from care_sim.viewer.palette import (
-    BACKGROUND,
-    EXPLAINED_COLOUR,
-    FAINT_INK,
-    FALSE_COLOUR,
-    INK,
-    UNEXPLAINED_COLOUR,
-    Colour,
-)
+from care_sim.viewer import palette
 from care_sim.viewer.pictures import drawing
 from care_sim.viewer.pictures.furnished_world import photograph
+from care_sim.viewer.pictures.keyframe import BELOW_SIZE, PICTURE_WIDTH
 from care_sim.viewer.pictures.labels import Labels
-from care_sim.viewer.pictures.view import BELOW_SIZE, PICTURE_WIDTH
 from care_sim.world.bullet import BulletWorld
 
 _ROW_HEIGHT = 140
@@ -46,13 +38,15 @@ def cameras_picture(scene: BulletWorld, loop: ClosedLoop) -> Image.Image:
     cameras = loop.rig.cameras
     known = explained(loop.belief.detections, loop.belief.tracks, loop.rig)
     row = len(cameras) > 1
-    canvas = Image.new("RGB", (PICTURE_WIDTH, _ROW_HEIGHT) if row else BELOW_SIZE, BACKGROUND)
+    canvas = Image.new(
+        "RGB", (PICTURE_WIDTH, _ROW_HEIGHT) if row else BELOW_SIZE, palette.BACKGROUND
+    )
     draw = ImageDraw.Draw(canvas)
     for x, text, colour in (
-        (20, "Cameras:" if row else "Front camera:", INK),
-        (124, "explained by a track", EXPLAINED_COLOUR),
-        (264, "new", UNEXPLAINED_COLOUR),
-        (304, "false", FALSE_COLOUR),
+        (20, "Cameras:" if row else "Front camera:", palette.INK),
+        (124, "explained by a track", palette.EXPLAINED_COLOUR),
+        (264, "new", palette.UNEXPLAINED_COLOUR),
+        (304, "false", palette.FALSE_COLOUR),
     ):
         draw.text((x, 8), text, colour, drawing.font(14))
     if not row:
@@ -68,7 +62,9 @@ def cameras_picture(scene: BulletWorld, loop: ClosedLoop) -> Image.Image:
         picture = _picture(scene, loop, known, number, share)
         canvas.paste(picture, (place * share, PICTURES_TOP))
         at = (place * share + share / 2, PICTURES_TOP + picture.height + 2)
-        draw.text(at, _towards(cameras[number].yaw), FAINT_INK, drawing.font(13), anchor="ma")
+        draw.text(
+            at, _towards(cameras[number].yaw), palette.FAINT_INK, drawing.font(13), anchor="ma"
+        )
     return canvas
 
 
@@ -89,7 +85,7 @@ def _picture(
     draw, alone = ImageDraw.Draw(picture), len(loop.rig.cameras) == 1
     for (left, top, right, bottom), _, colour in marks:
         draw.rectangle((left, top, right, bottom), outline=colour, width=2 if alone else 1)
-        if colour == FALSE_COLOUR:
+        if colour == palette.FALSE_COLOUR:
             draw.line((left, top, right, bottom), colour)
             draw.line((left, bottom, right, top), colour)
     labels = Labels(draw)
@@ -100,14 +96,14 @@ def _picture(
     return picture
 
 
-def _colour(loop: ClosedLoop, known: Mask, row: int) -> Colour:
+def _colour(loop: ClosedLoop, known: Mask, row: int) -> palette.Colour:
     """That of a detection: a false box is told, whether a track explains it or not."""
     if loop.detected_bodies[row] == NO_OBJECT:
-        return FALSE_COLOUR
-    return EXPLAINED_COLOUR if known[row] else UNEXPLAINED_COLOUR
+        return palette.FALSE_COLOUR
+    return palette.EXPLAINED_COLOUR if known[row] else palette.UNEXPLAINED_COLOUR
 
 
-def _height(mark: tuple[list[float], str, Colour]) -> float:
+def _height(mark: tuple[list[float], str, palette.Colour]) -> float:
     (_, top, _, bottom), _, _ = mark
     return bottom - top
 

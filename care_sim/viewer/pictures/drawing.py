@@ -9,13 +9,7 @@ from care_sim.core.arrays import Floats
 from care_sim.core.boxes import BOX_EDGES, box_corners
 from care_sim.core.grid_stack import Grid
 from care_sim.core.pinhole import NEAR_M, PinholeCamera
-from care_sim.viewer.palette import (
-    BACKGROUND,
-    FAINT_INK,
-    NO_RETURN_COLOUR,
-    NOT_FIRED_COLOUR,
-    Colour,
-)
+from care_sim.viewer import palette
 
 _RANGE_COLOURS = colormaps["plasma_r"]
 
@@ -29,26 +23,30 @@ def plate(
     draw: ImageDraw.ImageDraw,
     at: tuple[float, float],
     text: str,
-    colour: Colour,
+    colour: palette.Colour,
     size: int,
     anchor: str = "mm",
 ) -> None:
     """Text in the background's colour on a plate of `colour`, its `anchor` at a pixel."""
     left, top, right, bottom = draw.textbbox(at, text, font(size), anchor=anchor)
     draw.rounded_rectangle((left - 10, top - 8, right + 10, bottom + 8), 7, colour)
-    draw.text(at, text, BACKGROUND, font(size), anchor=anchor)
+    draw.text(at, text, palette.BACKGROUND, font(size), anchor=anchor)
 
 
-def key(draw: ImageDraw.ImageDraw, at: tuple[int, int], colour: Colour, words: str) -> int:
+def key(draw: ImageDraw.ImageDraw, at: tuple[int, int], colour: palette.Colour, words: str) -> int:
     """What a colour means: a patch of it and words. Gives the column where the next may begin."""
     x, y = at
     draw.rectangle((x, y, x + 14, y + 12), colour)
-    draw.text((x + 20, y - 2), words, FAINT_INK, font(13))
+    draw.text((x + 20, y - 2), words, palette.FAINT_INK, font(13))
     return round(x + 44 + draw.textlength(words, font(13)))
 
 
 def wireframe(
-    draw: ImageDraw.ImageDraw, camera: PinholeCamera, box: Floats, colour: Colour, width: int
+    draw: ImageDraw.ImageDraw,
+    camera: PinholeCamera,
+    box: Floats,
+    colour: palette.Colour,
+    width: int,
 ) -> None:
     """The edges of a sensor-frame box (7,) that lie wholly before the camera."""
     pixels, depth = camera.project(box_corners(box[None])[0])
@@ -72,10 +70,10 @@ def cells_picture(colours: NDArray[np.uint8]) -> Image.Image:
 
 def scan_colours(grid: Grid, ranges: NDArray[np.floating]) -> NDArray[np.uint8]:
     """(E, n, 3) colours of the cells of a scan (E, n), by range."""
-    colours = np.full((*ranges.shape, 3), NOT_FIRED_COLOUR, np.uint8)
+    colours = np.full((*ranges.shape, 3), palette.NOT_FIRED_COLOUR, np.uint8)
     fired = ranges > 0
     returned = fired & (ranges < grid.range_m)
-    colours[fired] = NO_RETURN_COLOUR
+    colours[fired] = palette.NO_RETURN_COLOUR
     colours[returned] = range_colours(ranges[returned] / grid.range_m)
     return colours
 

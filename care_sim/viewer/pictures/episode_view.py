@@ -8,28 +8,22 @@ from functools import partial
 import numpy as np
 from PIL import Image, ImageDraw
 
+from care_sim.core.boxes import planar_ranges
 from care_sim.core.frames import Frame
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import CLASSES
 from care_sim.evaluation.metrics import outcome
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.records import Keyframe
-from care_sim.loops.watcher import way_ahead
-from care_sim.viewer.palette import (
-    COASTING_COLOUR,
-    DETECTED,
-    EXPLAINED_COLOUR,
-    FAINT_INK,
-    IN_VIEW,
-    INK,
-    State,
-)
+from care_sim.loops.watcher import sought, way_ahead
+from care_sim.viewer import palette
+from care_sim.viewer.palette import State
 from care_sim.viewer.pictures import drawing
 from care_sim.viewer.pictures.camera_views import cameras_picture
 from care_sim.viewer.pictures.furnished_world import METRE_MARKS, add_car, furnished, photograph
+from care_sim.viewer.pictures.keyframe import PANEL_WIDTH, PICTURE_WIDTH, Scenery, View
 from care_sim.viewer.pictures.labels import Labels
-from care_sim.viewer.pictures.sought import contact_text, mark_sought
-from care_sim.viewer.pictures.view import PANEL_WIDTH, PICTURE_WIDTH, Scenery, View
+from care_sim.world.world import Actor
 
 CHASE_CAMERA = PinholeCamera(
     PICTURE_WIDTH, 460, np.deg2rad(80.0), (-10.0, 0.0, 3.6), 0.0, np.deg2rad(-16.0)
@@ -78,15 +72,15 @@ def verdict(frames: Sequence[Keyframe], keyframe_s: float) -> State:
     found = next((frame.time_s for frame in frames if frame.detected), None)
     if found is None:
         if seen is None:
-            return State("not in view yet", FAINT_INK)
+            return State("not in view yet", palette.FAINT_INK)
         so_long_s = frames[-1].time_s - seen + keyframe_s
-        return State(f"in view for {so_long_s:.1f} s, not detected", IN_VIEW.colour)
+        return State(f"in view for {so_long_s:.1f} s, not detected", palette.IN_VIEW.colour)
     so_far = outcome(frames)
     delay_s = 0.0 if seen is None else found - seen
     after = f", {delay_s:.1f} s after coming into view" if delay_s > 0 else ""
     clearance = "" if so_far.clearance_m is None else f"; clearance {so_far.clearance_m:.1f} m"
     words = f"detected at {so_far.detection_distance_m:.1f} m{after}{clearance}"
-    return State(words, DETECTED.colour)
+    return State(words, palette.DETECTED.colour)
 
 
 def _scenery(loop: ClosedLoop, frame: Keyframe | None, whole: bool) -> Scenery:
@@ -102,7 +96,7 @@ def _scenery(loop: ClosedLoop, frame: Keyframe | None, whole: bool) -> Scenery:
         bar = Frame.mounted(way_ahead(loop.world, loop.rig.sensor_x_m, metres), (0.0, 1.6, 0.0))
         (ground,) = loop.sensor.boxes_to_local(np.array([[bar.x, bar.y, *[0.0] * 5]]))
         if at := drawing.point_above(camera, ground):
-            labels.beside(at, f"{metres:.0f} m", INK, 12)
+            labels.beside(at, f"{metres:.0f} m", palette.INK, 12)
     return Scenery(street, below)
 
 
@@ -114,7 +108,12 @@ def _mark_street(
     """
     draw, tracks = ImageDraw.Draw(street), loop.belief.tracks
     marks = [
-        (box, CLASSES[number], misses, COASTING_COLOUR if misses else EXPLAINED_COLOUR)
+        (
+            box,
+            CLASSES[number],
+            misses,
+            palette.COASTING_COLOUR if misses else palette.EXPLAINED_COLOUR,
+        )
         for box, number, misses in zip(tracks.boxes, tracks.classes, tracks.misses, strict=True)
     ]
     # Tracks come nearest first: the nearest is drawn last, over the others, and named first.
@@ -123,8 +122,62 @@ def _mark_street(
     labels = Labels(draw)
     mark_sought(labels, camera, loop, frame)
     # Before the tracks, whose names leave room for it.
-    labels.over((0, street.height), BOXES_MEAN, EXPLAINED_COLOUR)
+    labels.over((0, street.height), BOXES_MEAN, palette.EXPLAINED_COLOUR)
     for box, name, _, colour in marks:
         if at := drawing.point_above(camera, box):
             labels.over(at, name, colour)
     return labels
+
+
+def mark_sought(
+    labels: Labels, camera: PinholeCamera, loop: ClosedLoop, frame: Keyframe | None
+) -> None:
+    """An arrow at everybody whom the episode is about, and at whom the car hit.
+
+    Whom a drive lets the ego meet has one within the range of the LiDAR: further down the street
+    arrows would lie on one another. `frame` is the keyframe before, None before the first.
+    """
+    actors = sought(loop.world)
+    hit = _hit_actor(loop, frame)
+    if hit and hit not in actors:
+        actors.append(hit)
+    boxes = loop.sensor.boxes_to_local(loop.world.boxes(actors))
+    for actor, box, away in zip(actors, boxes, planar_ranges(boxes).tolist(), strict=True):
+        if loop.world.meetings and away > loop.rig.grid.range_m:
+            continue
+        state = palette.HIT if actor is hit else _state(loop, frame, actor)
+        if at := drawing.point_above(camera, box):
+            labels.arrow(at, f"{actor.name}: {state.words}", state.colour)
+
+
+def contact_text(loop: ClosedLoop, frame: Keyframe) -> str | None:
+    """Whom the car hit in a keyframe, and how fast it was, or who hit the car; None without a
+    contact.
+    """
+    hit = _hit_actor(loop, frame)
+    if hit is None or frame.impact is None:
+        return None
+    if not frame.impact.at_front:
+        return f"HIT BY {hit.name}"
+    return f"HIT {hit.name} at {frame.impact.speed_mps:.1f} m/s"
+
+
+def _hit_actor(loop: ClosedLoop, frame: Keyframe | None) -> Actor | None:
+    if frame is None or frame.impact is None:
+        return None
+    return next(actor for actor in loop.world.actors if actor.body == frame.impact.body)
+
+
+def _state(loop: ClosedLoop, frame: Keyframe | None, actor: Actor) -> State:
+    if frame is not None and _is_detected(loop, frame, actor):
+        return palette.DETECTED
+    return palette.IN_VIEW if loop.shows(actor.body) else palette.OUT_OF_VIEW
+
+
+def _is_detected(loop: ClosedLoop, frame: Keyframe, actor: Actor) -> bool:
+    if not loop.world.meetings:
+        return frame.detected
+    return any(
+        sight.detected and one.body == actor.body
+        for one, sight in zip(loop.world.meetings, frame.sights, strict=True)
+    )

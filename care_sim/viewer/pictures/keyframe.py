@@ -2,26 +2,26 @@
 narrow one that is shown beside those of other policies.
 """
 
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from care_sim.core.actions import SHARES
-from care_sim.core.grid import AngularGrid
+from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.grid_stack import Grid
-from care_sim.viewer.palette import (
-    BACKGROUND,
-    BRAKING_COLOUR,
-    FAINT_INK,
-    HIT,
-    INK,
-    NO_RETURN_COLOUR,
-    NOT_FIRED_COLOUR,
-    SHARE_COLOURS,
-)
+from care_sim.core.rig import Rig
+from care_sim.viewer import palette
 from care_sim.viewer.pictures import drawing
-from care_sim.viewer.pictures.view import BELOW_SIZE, PANEL_WIDTH, PICTURE_WIDTH, View
 
+PICTURE_WIDTH = 960
+PANEL_WIDTH = 512
+"""Of a picture that is shown beside others."""
+BELOW_SIZE = (392, 220)
+"""Of what is below the street, to the left of the grid."""
 STREET_TOP = 40
 CELLS_TOP = 30
 """Pixels from the top of the picture of a grid to its cells; its words are above them."""
@@ -40,6 +40,45 @@ _DIRECTIONS = {
 """Azimuths that are named below the grid."""
 
 
+class Scenery(NamedTuple):
+    """The street, as wide as the picture, and what is below it: a picture of `BELOW_SIZE`, or one
+    as wide as the street; None in a panel.
+    """
+
+    street: Image.Image
+    below: Image.Image | None
+
+
+@dataclass(frozen=True)
+class View:
+    """A keyframe of either loop, before the first scan with nothing fired."""
+
+    rig: Rig
+    time_s: float
+    """Seconds from the start."""
+    progress: str
+    """How far the episode is: the speed of the car, or how many objects are found."""
+    braking: bool
+    contact: str | None
+    """Whom the car has hit."""
+    aside: str
+    """What a picture tells besides, where nobody is hit."""
+    verdict: palette.State
+    """What a panel tells, where nobody is hit."""
+    fired: Cells | None
+    """(n,) the cells that fired, each as often as it was fired."""
+    ranges: NDArray[np.floating]
+    """(E, A) the scan in metres: 0 not fired, maximum range without a return."""
+    shares: NDArray[np.uint8] | None
+    """(E, A) the shares of the budget, a place in `care_sim.core.actions.SHARES` for each cell.
+    They colour the cells; without them the ranges do.
+    """
+    is_moment: bool
+    """Whether a picture of the episode is of this keyframe: the car brakes, or somebody appears."""
+    scenery: Callable[[bool], Scenery]
+    """Draws the scenery of a whole picture, or of a panel."""
+
+
 def draw_keyframe(view: View) -> Image.Image:
     """A picture, `PICTURE_WIDTH` x 720 pixels, or 860 where several cameras take a row.
 
@@ -53,16 +92,16 @@ def draw_keyframe(view: View) -> Image.Image:
     top = STREET_TOP + street.height
     left = (PICTURE_WIDTH - CELLS_SIZE[0]) // 2 if row else BELOW_SIZE[0]
     height = top + BELOW_SIZE[1] + (below.height if row else 0)
-    canvas = Image.new("RGB", (PICTURE_WIDTH, height), BACKGROUND)
+    canvas = Image.new("RGB", (PICTURE_WIDTH, height), palette.BACKGROUND)
     draw = ImageDraw.Draw(canvas)
-    draw.text((12, 8), f"{view.time_s:.1f} s", INK, drawing.font(20))
-    draw.text((90, 8), view.progress, INK, drawing.font(20))
+    draw.text((12, 8), f"{view.time_s:.1f} s", palette.INK, drawing.font(20))
+    draw.text((90, 8), view.progress, palette.INK, drawing.font(20))
     if view.braking:
-        drawing.plate(draw, (250, 20), "BRAKING", BRAKING_COLOUR, 20)
+        drawing.plate(draw, (250, 20), "BRAKING", palette.BRAKING_COLOUR, 20)
     if view.contact:
-        drawing.plate(draw, (PICTURE_WIDTH - 18, 20), view.contact, HIT.colour, 20, "rm")
+        drawing.plate(draw, (PICTURE_WIDTH - 18, 20), view.contact, palette.HIT.colour, 20, "rm")
     else:
-        draw.text((PICTURE_WIDTH - 12, 8), view.aside, INK, drawing.font(20), anchor="ra")
+        draw.text((PICTURE_WIDTH - 12, 8), view.aside, palette.INK, drawing.font(20), anchor="ra")
     canvas.paste(street, (0, STREET_TOP))
     canvas.paste(below, (0, top))
     _draw_grid(canvas, (left, top + (below.height if row else 0)), view)
@@ -78,16 +117,16 @@ def draw_panel(name: str, view: View) -> Image.Image:
     street, _ = view.scenery(False)
     below = STREET_TOP + street.height
     size = PANEL_WIDTH, below + _GRID_HEIGHT + _LINE_HEIGHT
-    canvas = Image.new("RGB", size, BACKGROUND)
+    canvas = Image.new("RGB", size, palette.BACKGROUND)
     draw = ImageDraw.Draw(canvas)
-    draw.text((8, 6), name, INK, drawing.font(22))
-    draw.text((250, 8), f"{view.time_s:.1f} s", FAINT_INK, drawing.font(18))
-    draw.text((305, 8), view.progress, FAINT_INK, drawing.font(18))
+    draw.text((8, 6), name, palette.INK, drawing.font(22))
+    draw.text((250, 8), f"{view.time_s:.1f} s", palette.FAINT_INK, drawing.font(18))
+    draw.text((305, 8), view.progress, palette.FAINT_INK, drawing.font(18))
     if view.braking:
-        drawing.plate(draw, (453, 18), "BRAKING", BRAKING_COLOUR, 20)
+        drawing.plate(draw, (453, 18), "BRAKING", palette.BRAKING_COLOUR, 20)
     canvas.paste(street, (0, STREET_TOP))
     _draw_grid(canvas, (0, below), view)
-    text, colour = (view.contact, HIT.colour) if view.contact else view.verdict
+    text, colour = (view.contact, palette.HIT.colour) if view.contact else view.verdict
     draw.text((8, size[1] - 26), text, colour, drawing.font(16))
     return canvas
 
@@ -97,10 +136,10 @@ def _draw_grid(canvas: Image.Image, at: tuple[int, int], view: View) -> None:
     directions and a legend of its colours.
     """
     draw = ImageDraw.Draw(canvas)
-    draw.text((at[0] + 2, at[1] + 8), _grid_words(view), INK, drawing.font(14))
+    draw.text((at[0] + 2, at[1] + 8), _grid_words(view), palette.INK, drawing.font(14))
     grid = view.rig.grid
     if view.shares is not None:
-        top = draw_cells(canvas, at, grid, SHARE_COLOURS[view.shares])
+        top = draw_cells(canvas, at, grid, palette.SHARE_COLOURS[view.shares])
         _write_shares(draw, (at[0], top), view)
     else:
         top = draw_cells(canvas, at, grid, drawing.scan_colours(grid, view.ranges))
@@ -141,7 +180,7 @@ def draw_cells(
         for share, name in directions(head.grid):
             anchor = {0.0: "la", 1.0: "ra"}.get(share, "ma")
             place = (left + share * width, upper + strip + 4)
-            draw.text(place, name, FAINT_INK, drawing.font(13), anchor=anchor)
+            draw.text(place, name, palette.FAINT_INK, drawing.font(13), anchor=anchor)
     return upper + strip + 26
 
 
@@ -160,15 +199,15 @@ def directions(grid: AngularGrid) -> list[tuple[float, str]]:
 def _write_ranges(canvas: Image.Image, at: tuple[int, int], reach: float) -> None:
     draw, (left, top) = ImageDraw.Draw(canvas), at
     for x, colour, name in (
-        (0, NOT_FIRED_COLOUR, "not fired"),
-        (95, NO_RETURN_COLOUR, "no return"),
+        (0, palette.NOT_FIRED_COLOUR, "not fired"),
+        (95, palette.NO_RETURN_COLOUR, "no return"),
     ):
         drawing.key(draw, (left + x, top), colour, name)
     # The scale of ranges, from 0 to the reach.
     scale = np.tile(drawing.range_colours(np.linspace(0.0, 1.0, 160)), (13, 1, 1))
     canvas.paste(Image.fromarray(scale), (left + 245, top))
-    draw.text((left + 240, top - 2), "0 m", FAINT_INK, drawing.font(13), anchor="ra")
-    draw.text((left + 411, top - 2), f"{reach:.0f} m", FAINT_INK, drawing.font(13))
+    draw.text((left + 240, top - 2), "0 m", palette.FAINT_INK, drawing.font(13), anchor="ra")
+    draw.text((left + 411, top - 2), f"{reach:.0f} m", palette.FAINT_INK, drawing.font(13))
 
 
 def _write_shares(draw: ImageDraw.ImageDraw, at: tuple[int, int], view: View) -> None:
@@ -179,4 +218,4 @@ def _write_shares(draw: ImageDraw.ImageDraw, at: tuple[int, int], view: View) ->
     x = at[0]
     for share in np.flatnonzero(paid).tolist():
         words = f"{SHARES[share]} {paid[share]}"
-        x = drawing.key(draw, (x, at[1]), tuple(SHARE_COLOURS[share].tolist()), words)
+        x = drawing.key(draw, (x, at[1]), tuple(palette.SHARE_COLOURS[share].tolist()), words)

@@ -16,24 +16,11 @@ from care_sim.evaluation.sightings import RANGE_M
 from care_sim.loops.open_loop import OpenLoop
 from care_sim.loops.scene_records import SceneKeyframe
 from care_sim.loops.watcher import TrueSituation, Watched, returned
-from care_sim.viewer.palette import (
-    BACKGROUND,
-    EXPLAINED_COLOUR,
-    FAINT_INK,
-    FALSE_COLOUR,
-    FOUND_COLOUR,
-    INK,
-    NOT_FOUND_COLOUR,
-    SHARE_COLOURS,
-    UNEXPLAINED_COLOUR,
-    UNSCORED_COLOUR,
-    Colour,
-    State,
-    found_colour,
-)
+from care_sim.viewer import palette
+from care_sim.viewer.palette import State
 from care_sim.viewer.pictures import drawing
+from care_sim.viewer.pictures.keyframe import BELOW_SIZE, PANEL_WIDTH, PICTURE_WIDTH, Scenery, View
 from care_sim.viewer.pictures.labels import Labels
-from care_sim.viewer.pictures.view import BELOW_SIZE, PANEL_WIDTH, PICTURE_WIDTH, Scenery, View
 from care_sim.world.bodies import CATALOGUE
 
 MAP_HEIGHT = 460
@@ -57,19 +44,19 @@ _DIMMED = 0.45
 _LINE = 18
 """Height of a line of the legend, pixels."""
 _OBJECTS = (
-    State("found", FOUND_COLOUR),
-    State("not found", NOT_FOUND_COLOUR),
-    State("beyond 50 m", UNSCORED_COLOUR),
-    State("double line: its first sighting", INK),
+    State("found", palette.FOUND_COLOUR),
+    State("not found", palette.NOT_FOUND_COLOUR),
+    State("beyond 50 m", palette.UNSCORED_COLOUR),
+    State("double line: its first sighting", palette.INK),
 )
 _SCAN = (State("small dots: returns", RETURN_COLOUR),)
 _KNOWN = (
-    State("small dots: returns, by their share of the budget", FAINT_INK),
+    State("small dots: returns, by their share of the budget", palette.FAINT_INK),
     State("dot: forecast of a track, hollow: missed", TRACK_COLOUR),
     State("with a line to where it is in a second", TRACK_COLOUR),
-    State("camera box, explained by a track", EXPLAINED_COLOUR),
-    State("camera box, new", UNEXPLAINED_COLOUR),
-    State("camera box, false", FALSE_COLOUR),
+    State("camera box, explained by a track", palette.EXPLAINED_COLOUR),
+    State("camera box, new", palette.UNEXPLAINED_COLOUR),
+    State("camera box, false", palette.FALSE_COLOUR),
 )
 
 
@@ -89,7 +76,7 @@ def scene_view(
     found = sum(frame.entries_found for frame in frames)
     told = State(
         f"{found} of {entries} first sightings found at once",
-        FOUND_COLOUR if found == entries else NOT_FOUND_COLOUR,
+        palette.FOUND_COLOUR if found == entries else palette.NOT_FOUND_COLOUR,
     )
     return View(
         rig=loop.rig,
@@ -98,7 +85,7 @@ def scene_view(
         braking=False,
         contact=None,
         aside=loop.film.name[:28],
-        verdict=told if entries else State("no first sighting yet", FAINT_INK),
+        verdict=told if entries else State("no first sighting yet", palette.FAINT_INK),
         fired=last.fired,
         ranges=loop.last_ranges,
         shares=watched.shares if watched else None,
@@ -111,7 +98,9 @@ def _scenery(
     loop: OpenLoop, keyframe: SceneKeyframe, watched: Watched | None, whole: bool
 ) -> Scenery:
     legend = _OBJECTS + (_KNOWN if watched else _SCAN)
-    picture = Image.new("RGB", (PICTURE_WIDTH if whole else PANEL_WIDTH, MAP_HEIGHT), BACKGROUND)
+    picture = Image.new(
+        "RGB", (PICTURE_WIDTH if whole else PANEL_WIDTH, MAP_HEIGHT), palette.BACKGROUND
+    )
     street = Map(picture)
     street.draw_rings()
     if watched:
@@ -124,9 +113,9 @@ def _scenery(
     if not whole:
         _write_legend(street.draw, (8, MAP_HEIGHT - _LINE * len(legend)), legend)
         return Scenery(picture, None)
-    below = Image.new("RGB", BELOW_SIZE, BACKGROUND)
+    below = Image.new("RGB", BELOW_SIZE, palette.BACKGROUND)
     draw = ImageDraw.Draw(below)
-    draw.text((20, 8), "From above, driving to the right:", INK, drawing.font(14))
+    draw.text((20, 8), "From above, driving to the right:", palette.INK, drawing.font(14))
     _write_legend(draw, (20, 34), legend)
     return Scenery(picture, below)
 
@@ -143,7 +132,7 @@ class Map:
         on_map: Floats = self._middle + places * [_PIXELS_PER_M, -_PIXELS_PER_M]
         return on_map
 
-    def draw_box(self, box: Floats, colour: Colour, width: int) -> None:
+    def draw_box(self, box: Floats, colour: palette.Colour, width: int) -> None:
         """The outline of a box (7,)."""
         corners = self.pixels(box_corners(box[None])[0, :4, :2])
         self.draw.polygon(corners.ravel().tolist(), outline=colour, width=width)
@@ -155,14 +144,14 @@ class Map:
             (left, top), (right, bottom) = ends.tolist()
             self.draw.ellipse((left, top, right, bottom), outline=_RING_COLOUR)
             at, words = (right - 4, (top + bottom) / 2), f"{metres:.0f} m"
-            self.draw.text(at, words, FAINT_INK, drawing.font(11), anchor="rm")
+            self.draw.text(at, words, palette.FAINT_INK, drawing.font(11), anchor="rm")
 
 
 def _draw_returns(street: Map, loop: OpenLoop, watched: Watched | None) -> None:
     cells, points = returned(loop.last_ranges, loop.rig.grid)
     shares = watched.shares.ravel()[cells].tolist() if watched else [None] * len(cells)
     for (x, y), share in zip(street.pixels(points[:, :2]), shares, strict=True):
-        colour = RETURN_COLOUR if share is None else tuple(SHARE_COLOURS[share].tolist())
+        colour = RETURN_COLOUR if share is None else tuple(palette.SHARE_COLOURS[share].tolist())
         street.draw.rectangle((x, y, x + 1, y + 1), colour)
 
 
@@ -170,9 +159,9 @@ def _draw_objects(street: Map, boxes: Floats, keyframe: SceneKeyframe) -> None:
     """The car, and the annotated boxes (n, 7) in the colours of how it stands with them; those that
     appear have a second line.
     """
-    street.draw_box(_CAR, INK, 2)
+    street.draw_box(_CAR, palette.INK, 2)
     for row, box in enumerate(boxes):
-        colour = found_colour(keyframe, row)
+        colour = palette.found_colour(keyframe, row)
         street.draw_box(box, colour, 2)
         if keyframe.appearing[row]:
             street.draw_box(box + _AROUND, colour, 1)
@@ -182,7 +171,13 @@ def _draw_wedges(street: Map, rig: Rig, situation: TrueSituation) -> None:
     """The outermost rays through every image box, as far as objects are scored."""
     rays = wedge_rays(situation.belief.detections, rig)
     for nine, known, false in zip(rays, situation.known, situation.false, strict=True):
-        colour = FALSE_COLOUR if false else EXPLAINED_COLOUR if known else UNEXPLAINED_COLOUR
+        colour = (
+            palette.FALSE_COLOUR
+            if false
+            else palette.EXPLAINED_COLOUR
+            if known
+            else palette.UNEXPLAINED_COLOUR
+        )
         dimmed = tuple(round(_DIMMED * part) for part in colour)
         for end in outermost(nine):
             line = street.pixels(np.array([[0.0, 0.0], RANGE_M * end]))
@@ -224,7 +219,7 @@ def _name_sightings(street: Map, situation: TrueSituation, keyframe: SceneKeyfra
         if keyframe.appearing[row]:
             x, y = street.pixels(boxes[row, :2]).tolist()
             words = f"{situation.names[row]} appears"
-            labels.over((x, y - _CLEAR), words, found_colour(keyframe, row))
+            labels.over((x, y - _CLEAR), words, palette.found_colour(keyframe, row))
 
 
 def _write_legend(draw: ImageDraw.ImageDraw, at: tuple[int, int], legend: Sequence[State]) -> None:

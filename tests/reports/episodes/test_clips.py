@@ -23,7 +23,7 @@ from care_sim.study.episode_play import run_episode, trace
 from care_sim.viewer.palette import DETECTED, HIT
 from care_sim.viewer.pictures.clip_files import ENDINGS, write_clip
 from care_sim.viewer.pictures.episode_view import verdict
-from care_sim.viewer.pictures.view import PANEL_WIDTH, PICTURE_WIDTH
+from care_sim.viewer.pictures.keyframe import PANEL_WIDTH, PICTURE_WIDTH
 
 SIZE = (64, 48)
 COLOURS = [(200, 30, 30), (30, 200, 30), (30, 30, 200)]

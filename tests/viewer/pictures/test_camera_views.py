@@ -8,7 +8,7 @@ from care_sim.sensors.annotated import NO_OBJECT
 from care_sim.viewer.palette import EXPLAINED_COLOUR, FALSE_COLOUR, UNEXPLAINED_COLOUR
 from care_sim.viewer.pictures.camera_views import PICTURES_TOP, cameras_picture
 from care_sim.viewer.pictures.furnished_world import furnished
-from care_sim.viewer.pictures.view import PICTURE_WIDTH
+from care_sim.viewer.pictures.keyframe import PICTURE_WIDTH
 
 FROM_LEFT = (5, 3, 1, 0, 2, 4)
 """The cameras of the ring: back, back left, front left, front, front right, back right."""

@@ -16,15 +16,17 @@ from care_sim.viewer import palette
 from care_sim.viewer.pictures import drawing
 from care_sim.viewer.pictures.episode_view import episode_view
 from care_sim.viewer.pictures.keyframe import (
+    BELOW_SIZE,
     CELLS_SIZE,
     CELLS_TOP,
+    PANEL_WIDTH,
+    PICTURE_WIDTH,
     directions,
     draw_cells,
     draw_keyframe,
     draw_panel,
 )
 from care_sim.viewer.pictures.scene_view import scene_view
-from care_sim.viewer.pictures.view import BELOW_SIZE, PANEL_WIDTH, PICTURE_WIDTH
 from tests.helpers.lidars import CORNERS, STACK
 
 HEIGHT = 720

@@ -11,7 +11,13 @@ from care_sim.sources.named import source_of
 from care_sim.study.play_config import play_grid
 from care_sim.study.scene_trace import trace_scene
 from care_sim.viewer.palette import FOUND_COLOUR, NOT_FOUND_COLOUR, SHARE_COLOURS
-from care_sim.viewer.pictures.keyframe import CELLS_TOP, STREET_TOP, draw_keyframe
+from care_sim.viewer.pictures.keyframe import (
+    BELOW_SIZE,
+    CELLS_TOP,
+    PICTURE_WIDTH,
+    STREET_TOP,
+    draw_keyframe,
+)
 from care_sim.viewer.pictures.scene_view import (
     MAP_HEIGHT,
     RETURN_COLOUR,
@@ -19,7 +25,6 @@ from care_sim.viewer.pictures.scene_view import (
     outermost,
     scene_view,
 )
-from care_sim.viewer.pictures.view import BELOW_SIZE, PICTURE_WIDTH
 
 STEPS_OUT = 5
 """The keyframe at which the person of the drive appears."""

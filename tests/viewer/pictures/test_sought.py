@@ -11,10 +11,14 @@ import care_sim
 from care_sim.loops.records import Sight
 from care_sim.loops.watcher import sought
 from care_sim.viewer.palette import DETECTED, HIT, IN_VIEW, OUT_OF_VIEW
-from care_sim.viewer.pictures.episode_view import CHASE_CAMERA, episode_view
+from care_sim.viewer.pictures.episode_view import (
+    CHASE_CAMERA,
+    contact_text,
+    episode_view,
+    mark_sought,
+)
 from care_sim.viewer.pictures.keyframe import draw_keyframe
 from care_sim.viewer.pictures.labels import Labels
-from care_sim.viewer.pictures.sought import contact_text, mark_sought
 from care_sim.world.approach import Impact
 
 SEED = 105
