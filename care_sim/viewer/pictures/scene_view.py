@@ -41,6 +41,10 @@ _CLEAR = 10
 """Pixels from the middle of a box to its name."""
 _DIMMED = 0.45
 """What is left of the colour of a wedge: a scene has many of them."""
+_SIDES = [7, 8]
+"""Among the rays of an image box, those through the points of its left and right edge where its
+azimuth is extreme.
+"""
 _LINE = 18
 """Height of a line of the legend, pixels."""
 _OBJECTS = (
@@ -168,7 +172,7 @@ def _draw_objects(street: Map, boxes: Floats, keyframe: SceneKeyframe) -> None:
 
 
 def _draw_wedges(street: Map, rig: Rig, situation: TrueSituation) -> None:
-    """The outermost rays through every image box, as far as objects are scored."""
+    """The rays through the left and right of every image box, as far as objects are scored."""
     rays = wedge_rays(situation.belief.detections, rig)
     for nine, known, false in zip(rays, situation.known, situation.false, strict=True):
         colour = (
@@ -179,21 +183,9 @@ def _draw_wedges(street: Map, rig: Rig, situation: TrueSituation) -> None:
             else palette.UNEXPLAINED_COLOUR
         )
         dimmed = tuple(round(_DIMMED * part) for part in colour)
-        for end in outermost(nine):
-            line = street.pixels(np.array([[0.0, 0.0], RANGE_M * end]))
+        for x, y, _ in nine[_SIDES]:
+            line = street.pixels(np.array([[0.0, 0.0], [x, y]]) * RANGE_M / np.hypot(x, y))
             street.draw.line(line.ravel().tolist(), dimmed)
-
-
-def outermost(rays: Floats) -> Floats:
-    """(2, 2) the directions on the ground of the leftmost and rightmost of rays (n, 3) that lie
-    within half a turn.
-    """
-    flat = rays[:, :2] / np.linalg.norm(rays[:, :2], axis=1, keepdims=True)
-    # Angles from the first of them, so that it does not matter where a turn begins.
-    across = flat[0, 0] * flat[:, 1] - flat[0, 1] * flat[:, 0]
-    off = np.arctan2(across, flat @ flat[0])
-    ends: Floats = flat[[np.argmax(off), np.argmin(off)]]
-    return ends
 
 
 def _draw_tracks(street: Map, situation: TrueSituation) -> None:

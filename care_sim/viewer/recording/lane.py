@@ -1,6 +1,6 @@
 """A lane of a recording: the entities of one episode, all below its name."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -35,11 +35,11 @@ class Lane:
         """Log at the present keyframe."""
         self._stream.log(entity_path(self.name, entity), *content)
 
-    def log_list(self, entity: str, count: int, make: Callable[[], Sequence[Any]]) -> None:
-        """Log a list of `count` things at the present keyframe, made by `make`."""
+    def log_list(self, entity: str, count: int, *content: Any) -> None:
+        """Log a list of `count` things at the present keyframe."""
         # An empty list is logged once, to clear what stood there, and then no more.
         if count or self._counts.get(entity) != 0:
-            self.log(entity, *make())
+            self.log(entity, *content)
         self._counts[entity] = count
 
     def log_curve(

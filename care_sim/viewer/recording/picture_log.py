@@ -9,7 +9,7 @@ import rerun as rr
 from PIL import Image
 
 from care_sim.core.actions import SHARES
-from care_sim.core.arrays import Floats
+from care_sim.core.arrays import Floats, Mask
 from care_sim.core.grid import Cells
 from care_sim.core.grid_stack import Grid
 from care_sim.core.residual import wedges
@@ -54,13 +54,8 @@ class PictureLog:
             image_plane_distance=1.0,
         )
         lane.fix(_CAMERA, place, lens)
-        shares = [
-            (n, name, colour)
-            for n, (name, colour) in enumerate(
-                zip(SHARES, palette.SHARE_COLOURS.tolist(), strict=True)
-            )
-        ]
-        lane.fix("grid", rr.AnnotationContext(shares))
+        shares = zip(range(len(SHARES)), SHARES, palette.SHARE_COLOURS.tolist(), strict=True)
+        lane.fix("grid", rr.AnnotationContext([*shares]))
         for kind, colour in _BOX_COLOURS.items():
             # Explained ones stand side by side, so that their names would overlap.
             names = rr.Points2D.from_fields(
@@ -91,39 +86,31 @@ class PictureLog:
 
     def _log_detections(self, situation: TrueSituation) -> None:
         seen = situation.belief.detections
-        names = [
-            f"false {name}" if false else name
-            for name, false in zip(_names(seen), situation.false, strict=True)
-        ]
-        # The picture is that of the first camera.
-        own = seen.cameras == 0
-        for kind, known in (("explained", situation.known), ("residual", ~situation.known)):
-            chosen = own & known
-            self._log_named(kind, seen.boxes[chosen], list(compress(names, chosen)))
+        kinds = ["false " if false else "" for false in situation.false]
+        self._log_named("explained", seen, kinds, situation.known)
+        self._log_named("residual", seen, kinds, ~situation.known)
         missed = situation.missed
-        own = missed.cameras == 0
-        self._log_named(
-            "missed",
-            missed.boxes[own],
-            list(compress([f"missed {name}" for name in _names(missed)], own)),
-        )
+        self._log_named("missed", missed, ["missed "] * len(missed), np.ones(len(missed), bool))
 
-    def _log_named(self, kind: str, boxes: Floats, names: list[str]) -> None:
+    def _log_named(
+        self, entity: str, seen: ImageDetections, kinds: Sequence[str], chosen: Mask
+    ) -> None:
         """Log boxes, and their names as those of points below them, since the viewer breaks names
         of boxes into lines.
         """
+        # The picture is that of the first camera.
+        rows = np.flatnonzero(chosen & (seen.cameras == 0)).tolist()
+        names = [kinds[row] + CLASSES[seen.classes[row]] for row in rows]
+        boxes = seen.boxes[rows]
         below = np.column_stack([boxes[:, [0, 2]].mean(axis=1), boxes[:, 3]])
-        self._lane.log_list(
-            f"{_CAMERA}/{kind}",
-            len(boxes),
-            lambda: (_boxes(boxes), rr.Points2D(below, labels=names)),
-        )
+        points = rr.Points2D(below, labels=names)
+        self._lane.log_list(f"{_CAMERA}/{entity}", len(rows), _boxes(boxes), points)
 
     def _log_grid(self, watched: Watched) -> None:
         belief = watched.situation.belief
         known = watched.situation.known
         rig = self._rig
-        # Left is left, as in the pictures of `care_sim.viewer.pictures.drawing.grid_picture`.
+        # Left is left, as in the pictures of `care_sim.viewer.pictures.drawing.cells_picture`.
         cells = np.repeat(watched.shares[:, ::-1], ROW_PIXELS, axis=0)
         self._lane.log("grid/cells", rr.SegmentationImage(cells))
         sectors = wedges(belief.detections, rig)
@@ -132,18 +119,12 @@ class PictureLog:
             ("wedges/explained", list(compress(sectors, known))),
             ("wedges/residual", list(compress(sectors, ~known))),
         ):
-            self._log_outlines(f"grid/{entity}", outlines(chosen, rig.grid))
-
-    def _log_outlines(self, entity: str, lines: Floats) -> None:
-        self._lane.log_list(entity, len(lines), lambda: [_boxes(lines)])
+            lines = outlines(chosen, rig.grid)
+            self._lane.log_list(f"grid/{entity}", len(lines), _boxes(lines))
 
 
 def _boxes(boxes: Floats) -> rr.Boxes2D:
     return rr.Boxes2D(array=boxes, array_format=rr.Box2DFormat.XYXY)
-
-
-def _names(detections: ImageDetections) -> list[str]:
-    return [CLASSES[number] for number in detections.classes]
 
 
 def _encoded(picture: Image.Image) -> rr.EncodedImage:

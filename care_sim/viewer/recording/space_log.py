@@ -43,36 +43,29 @@ class SpaceLog:
         self._rig = rig
         self._guarded_m = guarded_m
         self._driven: list[Floats] = []
-        lane.fix("world", rr.ViewCoordinates.FLU)
-
+        solid, lines = FillMode.Solid, rr.LineStrips3D.from_fields
         # What stays as it is for the whole episode; places follow with every keyframe.
-        lane.fix(
-            "world/ego",
-            rr.Boxes3D.from_fields(colors=[palette.EGO_COLOUR], fill_mode=FillMode.Solid),
-        )
+        for entity, look in {
+            "": rr.ViewCoordinates.FLU,
+            "/ego": rr.Boxes3D.from_fields(colors=[palette.EGO_COLOUR], fill_mode=solid),
+            "/bodies": rr.Boxes3D.from_fields(show_labels=False, fill_mode=_GLASSY),
+            "/driven": lines(colors=[palette.EGO_COLOUR], radii=[THIN]),
+            "/lidar/returns": rr.Points3D.from_fields(radii=[2 * THIN]),
+            "/lidar/tracks": rr.Boxes3D.from_fields(show_labels=False),
+            "/lidar/velocities": rr.Arrows3D.from_fields(
+                colors=[palette.EXPLAINED_COLOUR], radii=[0.08]
+            ),
+            "/lidar/wedges/residual": lines(
+                colors=[(*palette.UNEXPLAINED_COLOUR, 200)], radii=[THIN]
+            ),
+            "/lidar/wedges/explained": lines(
+                colors=[(*palette.EXPLAINED_COLOUR, 50)], radii=[THIN]
+            ),
+        }.items():
+            lane.fix(f"world{entity}", look)
         if guarded_m:
-            lane.fix(
-                "world/lidar/path",
-                rr.Boxes3D.from_fields(colors=[_PATH_COLOUR], fill_mode=FillMode.Solid),
-            )
-        lane.fix("world/bodies", rr.Boxes3D.from_fields(show_labels=False, fill_mode=_GLASSY))
-        lane.fix(
-            "world/driven", rr.LineStrips3D.from_fields(colors=[palette.EGO_COLOUR], radii=[THIN])
-        )
-        lane.fix("world/lidar/returns", rr.Points3D.from_fields(radii=[2 * THIN]))
-        lane.fix("world/lidar/tracks", rr.Boxes3D.from_fields(show_labels=False))
-        lane.fix(
-            "world/lidar/velocities",
-            rr.Arrows3D.from_fields(colors=[palette.EXPLAINED_COLOUR], radii=[0.08]),
-        )
-        for kind, colour in (
-            ("residual", (*palette.UNEXPLAINED_COLOUR, 200)),
-            ("explained", (*palette.EXPLAINED_COLOUR, 50)),
-        ):
-            lane.fix(
-                f"world/lidar/wedges/{kind}",
-                rr.LineStrips3D.from_fields(colors=[colour], radii=[THIN]),
-            )
+            path = rr.Boxes3D.from_fields(colors=[_PATH_COLOUR], fill_mode=solid)
+            lane.fix("world/lidar/path", path)
 
     def log(self, watched: Watched) -> None:
         """A keyframe."""
@@ -142,19 +135,16 @@ class SpaceLog:
             for misses in tracks.misses
         ]
         names = [CLASSES[label] for label in tracks.classes]
+        boxes = box_batch(tracks.boxes, colors=colours, labels=names)
         moves = np.column_stack([tracks.velocities, np.zeros(len(tracks))])
-        for entity, make in (
-            ("tracks", lambda: [box_batch(tracks.boxes, colors=colours, labels=names)]),
-            ("velocities", lambda: [rr.Arrows3D(vectors=moves, origins=tracks.boxes[:, :3])]),
-        ):
-            self._lane.log_list(f"world/lidar/{entity}", len(tracks), make)
+        arrows = rr.Arrows3D(vectors=moves, origins=tracks.boxes[:, :3])
+        self._lane.log_list("world/lidar/tracks", len(tracks), boxes)
+        self._lane.log_list("world/lidar/velocities", len(tracks), arrows)
 
     def _log_wedges(self, kind: str, rays: Floats) -> None:
         ends = WEDGE_M * rays / np.linalg.norm(rays, axis=-1, keepdims=True)
         strips = [strip for corners in ends for strip in _pyramid(corners)]
-        self._lane.log_list(
-            f"world/lidar/wedges/{kind}", len(strips), lambda: [rr.LineStrips3D(strips)]
-        )
+        self._lane.log_list(f"world/lidar/wedges/{kind}", len(strips), rr.LineStrips3D(strips))
 
 
 def _pyramid(corners: Floats) -> list[Floats]:

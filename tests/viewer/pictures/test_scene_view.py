@@ -2,15 +2,14 @@
 
 import numpy as np
 import pytest
-from hypothesis import example, given
-from hypothesis import strategies as st
 
 from care_sim.core.actions import EXPLOITATION, FLOOR, RESERVE
+from care_sim.core.residual import wedge_rays
 from care_sim.envs.wrappers.watching import Watching
 from care_sim.sources.named import source_of
 from care_sim.study.play_config import play_grid
 from care_sim.study.scene_trace import trace_scene
-from care_sim.viewer.palette import FOUND_COLOUR, NOT_FOUND_COLOUR, SHARE_COLOURS
+from care_sim.viewer.palette import EXPLAINED_COLOUR, FOUND_COLOUR, NOT_FOUND_COLOUR, SHARE_COLOURS
 from care_sim.viewer.pictures.keyframe import (
     BELOW_SIZE,
     CELLS_TOP,
@@ -22,7 +21,6 @@ from care_sim.viewer.pictures.scene_view import (
     MAP_HEIGHT,
     RETURN_COLOUR,
     TRACK_COLOUR,
-    outermost,
     scene_view,
 )
 
@@ -124,16 +122,22 @@ def test_forecasts_are_drawn_where_they_are_and_none_before_there_are_any(drawn)
         assert count(picture[y - 4 : y + 5, x - 4 : x + 5], TRACK_COLOUR) >= 8
 
 
-@given(
-    st.floats(-np.pi, np.pi),
-    st.lists(st.floats(-1.2, 1.2), min_size=1, max_size=9),
-    st.floats(-0.9, 0.9),
-)
-@example(0.0, [1.125, 0.0, -1.0], 0.0)  # more than a quarter of a turn from the first
-def test_the_outermost_rays_hold_all_others_between_them(middle, offsets, rise):
-    yaws = middle + np.array(offsets)
-    rays = np.column_stack([np.cos(yaws), np.sin(yaws), np.full(len(yaws), rise)])
-    left, right = outermost(rays)
-    for wanted, found in ((max(offsets), left), (min(offsets), right)):
-        turn = middle + wanted
-        np.testing.assert_allclose(found, [np.cos(turn), np.sin(turn)], atol=1e-7)
+def test_the_lines_of_a_camera_box_are_its_outermost_rays(drawn, drive):
+    watched, _, picture = drawn[4]
+    situation = watched.situation
+    dimmed = np.round(0.45 * np.array(EXPLAINED_COLOUR)).astype(np.uint8)
+    rows, columns = np.nonzero(np.all(picture[MAP] == dimmed, axis=-1))
+    left, ahead = MAP_HEIGHT / 2 - rows, columns - PICTURE_WIDTH / 2
+    # Near the car a pixel is a large angle.
+    bearings = np.arctan2(left, ahead)[np.hypot(left, ahead) > 100]
+    source = source_of(f"argoverse2:{drive}")
+    (config,) = play_grid(source, source.scenes(), ["care"], [0.05])
+    with config.make_env(config.film()) as env:
+        rays = wedge_rays(situation.belief.detections, env.rig)[situation.known]
+    azimuths = np.arctan2(rays[..., 1], rays[..., 0])
+    assert np.ptp(azimuths, axis=1).max() < np.pi
+    outermost = np.concatenate([azimuths.min(axis=1), azimuths.max(axis=1)])
+    apart = np.abs(bearings[:, None] - outermost)
+    assert apart.min(axis=1).max() < 0.02
+    # A line may lie under others.
+    assert np.count_nonzero(apart.min(axis=0) < 0.02) >= 3
