@@ -104,7 +104,7 @@ def episode_timeline(config: EpisodeConfig, row: Row, keyframes: Sequence[Keyfra
         config.label,
         _COLUMNS,
         3,
-        [frame and _cells(frame) for frame in frames],
+        [_cells(frame) if frame else None for frame in frames],
         _LEGEND.format(delay=brake_delay_s(config)),
         [f"encounter {number}: {encounter_text(each, keyframes)}" for number, each in encounters],
         row,
@@ -120,7 +120,7 @@ def scene_timeline(config: PlayConfig, played: PlayedScene) -> Timeline:
         config.label,
         _SCENE_COLUMNS,
         0,
-        [frame and _scene_cells(frame) for frame in frames],
+        [_scene_cells(frame) if frame else None for frame in frames],
         _SCENE_LEGEND,
         [
             f"{keyframes[event['keyframe']].time_s:5.1f} s  {event['class']} "

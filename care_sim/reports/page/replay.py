@@ -228,7 +228,7 @@ def _replayed_scene(config: PlayConfig, recorder: Recorder) -> Replay:
     """
     film = _film(config.source, config.scene, config.filmed)
     played = trace_scene(config, film, recorder.after, begin=recorder.before)
-    about = {}
+    about: dict[int, dict[str, Any]] = {}
     for annotations in (shot.annotations for shot in film.shots):
         objects = annotations.objects.tolist()
         for number, label, box in zip(objects, annotations.classes, annotations.boxes, strict=True):

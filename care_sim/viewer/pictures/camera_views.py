@@ -78,21 +78,22 @@ def _picture(
     picture = photograph(scene, small, loop.sensor)
     seen = loop.belief.detections
     (own,) = np.nonzero(seen.cameras == number)
-    marks = [
-        ((scale * seen.boxes[row]).tolist(), CLASSES[seen.classes[row]], _colour(loop, known, row))
-        for row in own.tolist()
-    ]
+    boxes = scale * seen.boxes
     draw, alone = ImageDraw.Draw(picture), len(loop.rig.cameras) == 1
-    for (left, top, right, bottom), _, colour in marks:
+    for row in own.tolist():
+        left, top, right, bottom = boxes[row].tolist()
+        colour = _colour(loop, known, row)
         draw.rectangle((left, top, right, bottom), outline=colour, width=2 if alone else 1)
         if colour == palette.FALSE_COLOUR:
             draw.line((left, top, right, bottom), colour)
             draw.line((left, bottom, right, top), colour)
     labels = Labels(draw)
     # The highest are the nearest, whose names keep their places.
-    for (left, top, right, _), name, colour in sorted(marks, key=_height, reverse=True):
-        if alone:
-            labels.over(((left + right) / 2, top), name, colour, 11)
+    heights = boxes[own, 3] - boxes[own, 1]
+    for row in own[np.argsort(-heights, kind="stable")].tolist() if alone else ():
+        left, top, right, _ = boxes[row].tolist()
+        name = CLASSES[seen.classes[row]]
+        labels.over(((left + right) / 2, top), name, _colour(loop, known, row), 11)
     return picture
 
 
@@ -101,11 +102,6 @@ def _colour(loop: ClosedLoop, known: Mask, row: int) -> palette.Colour:
     if loop.detected_bodies[row] == NO_OBJECT:
         return palette.FALSE_COLOUR
     return palette.EXPLAINED_COLOUR if known[row] else palette.UNEXPLAINED_COLOUR
-
-
-def _height(mark: tuple[list[float], str, palette.Colour]) -> float:
-    (_, top, _, bottom), _, _ = mark
-    return bottom - top
 
 
 def _towards(yaw: float) -> str:

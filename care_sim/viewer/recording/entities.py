@@ -18,81 +18,44 @@ MOST_POINTS = 6000
 
 ENTITIES = {
     "world": "axes: x along the road, y left, z up; metres",
-    "world/bodies": (
-        "boxes of all actors (truth), coloured by class, grey where perception reports none; of "
-        "the open loop those of the annotated objects: green found by this scan, orange not found, "
-        "grey beyond 50 m; world frame"
-    ),
-    "world/first_sighting": (
-        "box of the first-sighting actor (truth), coloured by `states/actor`; world frame"
-    ),
+    "world/bodies": "boxes of all actors or annotated objects (truth); world frame",
+    "world/first_sighting": "box of the first-sighting actor (truth), coloured by `states/actor`",
     "world/ego": "box of the car; world frame",
     "world/driven": "the way of the car's centre so far, on the ground; world frame",
-    "world/lidar": (
-        "the sensor frame in the world: x forward, y left, z up; metres. What is below it is in "
-        "this frame"
-    ),
+    "world/lidar": "the sensor frame in the world: x forward, y left, z up; what is below is in it",
     "world/lidar/path": "the strip that the controller guards, as far as it is drawn; sensor frame",
-    "world/lidar/returns": (
-        f"points, coloured by share; every nth of more than {MOST_POINTS} returns; sensor frame"
-    ),
-    "world/lidar/tracks": (
-        "forecasts for this keyframe, faint when the last scan missed them; sensor frame"
-    ),
+    "world/lidar/returns": f"points, coloured by share, at most {MOST_POINTS}; sensor frame",
+    "world/lidar/tracks": "forecasts for this keyframe, faint where the last scan missed them",
     "world/lidar/velocities": "their motion over ground in the next second, m/s; sensor axes",
-    "world/lidar/wedges/residual": (
-        f"edges of the wedges that no forecast explains, {WEDGE_M:.0f} m; sensor frame"
-    ),
-    "world/lidar/wedges/explained": "the same of those that a forecast explains",
-    "world/lidar/camera": (
-        "the first camera that the policy knows, and its picture before any fault, of which the "
-        "open loop keeps nothing; pixels"
-    ),
+    "world/lidar/wedges/residual": f"edges of wedges that no forecast explains, {WEDGE_M:.0f} m",
+    "world/lidar/wedges/explained": f"edges of wedges that a forecast explains, {WEDGE_M:.0f} m",
+    "world/lidar/camera": "the first camera that the policy knows, its picture before any fault",
     "world/lidar/camera/explained": "detections that a forecast explains, as they arrived; pixels",
     "world/lidar/camera/residual": "detections that no forecast explains; pixels",
-    "world/lidar/camera/missed": (
-        "what the camera without its faults would have given besides; pixels"
-    ),
-    "grid": (
-        "the angular grid as the car sees it: left is left; one that goes all round has ahead in "
-        "the middle and behind at both ends"
-    ),
+    "world/lidar/camera/missed": "what the camera without its faults would add; pixels",
+    "grid": "the angular grid as the car sees it: left is left, ahead in the middle if it goes round",
     "grid/cells": (
         f"share of every cell; pixel x = A - 1 - column, y = {ROW_PIXELS} * row (row 0 the "
         "highest); several LiDARs one below the other"
     ),
-    "grid/hulls": "dilated hulls of the forecasts, as outlines; pixels of `grid/cells`",
-    "grid/wedges/residual": "dilated wedges of the residual, as outlines; pixels of `grid/cells`",
-    "grid/wedges/explained": (
-        "dilated wedges of explained detections, as outlines; pixels of `grid/cells`"
-    ),
+    "grid/hulls": "outlines of the dilated hulls of forecasts; pixels of `grid/cells`",
+    "grid/wedges/residual": "outlines of the dilated wedges of the residual",
+    "grid/wedges/explained": "outlines of the dilated wedges of explained detections",
     "measures/speed": "the car's speed at the scan, m/s",
-    "measures/distance": (
-        "sensor to the centre of the first-sighting actor at the scan, planar, metres"
-    ),
-    "measures/clearance": (
-        "hull to hull to that actor, at its least until the next keyframe, metres"
-    ),
+    "measures/distance": "sensor to the centre of the first-sighting actor at the scan, m",
+    "measures/clearance": "least distance of its hull to the car's until the next keyframe, m",
     "measures/braking": "1 while the brake is on, else 0",
     "measures/objects": "annotated objects within 50 m",
     "measures/found": "how many of them this scan found",
     "budget/exploitation": "cells fired for exploitation, percent of the budget",
     "budget/reserve": "cells fired for the reserve, percent of the budget",
     "budget/floor": "cells that the random floor filled up, percent of the budget",
-    "budget/chosen": (
-        "cells that a raw action scored, whose share is not known, percent of the budget"
-    ),
+    "budget/chosen": "cells that a raw action scored, with no known share, percent of the budget",
     "budget/along": "cells of a window that nothing asked for, percent of the budget",
-    "states/actor": (
-        "the first-sighting actor: in or out of view of the unimpaired camera, or detected by "
-        "this scan"
-    ),
+    "states/actor": "the first-sighting actor: out of view, in view, or detected by this scan",
     "states/brake": "on or off",
     "events": "what changed, or who appears for the first time, in words",
-    "outcome": (
-        "the result of the episode, `care_sim.loops.records.Outcome`, or of the play, "
-        "`care_sim.evaluation.recall.SceneOutcome`"
-    ),
+    "outcome": "the result of the episode, as `info` has it at the end",
 }
 """Entities of both loops, each below the name of its lane, and what they hold."""
 
@@ -121,7 +84,9 @@ def about(entities: dict[str, str]) -> str:
     return (
         "Recorded with CARE-Sim. Metres, seconds, radians; timelines `seconds` (of the scan) and "
         "`keyframe` (from 0).\n"
-        "Bodies, pictures, what was missed and the states are truth, which no policy is shown.\n\n"
+        "Bodies, pictures, what was missed and the states are truth, which no policy is shown.\n"
+        "Actors are coloured by class, grey where perception reports none. Annotated objects are "
+        "green where this scan found them, orange where it did not, grey beyond 50 m.\n\n"
         f"| entity | content |\n|---|---|\n{rows}\n"
     )
 
