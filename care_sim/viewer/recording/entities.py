@@ -33,7 +33,7 @@ ENTITIES = {
     "world/lidar/camera/explained": "detections that a forecast explains, as they arrived; pixels",
     "world/lidar/camera/residual": "detections that no forecast explains; pixels",
     "world/lidar/camera/missed": "what the camera without its faults would add; pixels",
-    "grid": "the angular grid as the car sees it: left is left, ahead in the middle if it goes round",
+    "grid": "the angular grid as the car sees it: left is left, ahead in the middle if all round",
     "grid/cells": (
         f"share of every cell; pixel x = A - 1 - column, y = {ROW_PIXELS} * row (row 0 the "
         "highest); several LiDARs one below the other"
