@@ -146,7 +146,7 @@ def test_policies_are_compared_on_one_film_and_filmed_side_by_side(played, drive
         ["1", "1", "100.0"],
     ]
     with Image.open(film) as pictures:
-        assert pictures.size == (3 * 512 + 2 * 8, 646)
+        assert pictures.size == (3 * 512 + 2 * 8, 730)
         # As long as the film: one picture a keyframe.
         assert pictures.n_frames == len(film_of(source, source.scenes()[0]).shots)
 

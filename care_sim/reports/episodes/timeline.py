@@ -87,7 +87,7 @@ class Timeline:
         told = self.outcome | ending
         width = max(len(label) for label in told)
         for label, value in told.items():
-            console.print(f"{label:{width}} {value}")
+            console.print(f"{label:{width}}  {value}")
 
 
 def episode_timeline(config: EpisodeConfig, row: Row, keyframes: Sequence[Keyframe]) -> Timeline:
