@@ -20,8 +20,7 @@ from care_sim.commands.shared.written_files import finish_files
 from care_sim.envs.wrappers.record_rerun import RecordRerun, recording
 from care_sim.loops.film import Film
 from care_sim.reports.episodes.clips import Clip
-from care_sim.reports.episodes.scene_timeline import LABELS, outcome_text
-from care_sim.reports.episodes.timeline import text
+from care_sim.reports.episodes.timeline import SCENE_LABELS, outcome_text, text
 from care_sim.reports.table import Table
 from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.episode_play import GymEnv, result_or_reason, trace
@@ -30,8 +29,6 @@ from care_sim.study.rows.reading import stops_for_nothing
 from care_sim.study.run_config import Row
 from care_sim.study.scene_trace import trace_scene
 from care_sim.study.world_hash import check_worlds
-from care_sim.viewer.pictures.comparison import draw_panel
-from care_sim.viewer.pictures.scene_comparison import draw_scene_panel
 
 AnyConfig = EpisodeConfig | PlayConfig
 _COLUMNS = {
@@ -112,8 +109,7 @@ def play_side_by_side(
     """Play episodes one after the other, into one recording and one film where files are given, and
     print their outcomes. A line for each that failed is printed too, and returned.
     """
-    draw = draw_scene_panel if isinstance(configs[0], PlayConfig) else draw_panel
-    film = Clip(video, draw, video_start)
+    film = Clip(video, video_start, panels=True)
     # All plays of a scene meet its one film.
     shown = configs[0].film() if isinstance(configs[0], PlayConfig) else None
     answers: list[Row | str] = []
@@ -169,7 +165,7 @@ def _outcome_table(played: Sequence[tuple[AnyConfig, Row]]) -> Table:
     """One line per episode."""
     config = played[0][0]
     if isinstance(config, PlayConfig):
-        title, told, written = config.scene.name, LABELS, outcome_text
+        title, told, written = config.scene.name, SCENE_LABELS, outcome_text
     else:
         title, told = f"{config.scenario} seed {config.seed}", {**_COLUMNS}
         told |= _OF_COLLISIONS if any(row["collision"] for _, row in played) else {}

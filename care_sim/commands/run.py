@@ -2,6 +2,7 @@
 
 import sys
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -14,10 +15,9 @@ from care_sim.commands.shared.written_files import finish_files
 from care_sim.envs.wrappers.export_scans import ExportScans
 from care_sim.envs.wrappers.record_rerun import RecordRerun
 from care_sim.policies.base import Policy
-from care_sim.reports.episodes.clips import Clip, draw_scene
-from care_sim.reports.episodes.photos import BrakePhoto, SightingPhoto
-from care_sim.reports.episodes.scene_timeline import print_scene_timeline
-from care_sim.reports.episodes.timeline import print_timeline
+from care_sim.reports.episodes.clips import Clip
+from care_sim.reports.episodes.photos import Photo
+from care_sim.reports.episodes.timeline import episode_timeline, scene_timeline
 from care_sim.study.episode_config import grid
 from care_sim.study.episode_play import GymEnv, trace
 from care_sim.study.scene_trace import trace_scene
@@ -74,12 +74,12 @@ class Run(Watched):
         (config,) = grid(*axes, **self.conditions.arguments([self.policy]))
         if config.budget != self.budget:
             print("full fires every cell, whatever the budget", file=sys.stderr)
-        photographer = BrakePhoto(self.picture, self.at)
-        film = Clip(self.video, start=self.video_start)
-        played = trace(config, photographer, film.episode(self.policy), wrap=self._watched)
+        photo = Photo(self.picture, self.at)
+        film = Clip(self.video, self.video_start)
+        played = trace(config, film.episode(self.policy), wrap=partial(self._watched, photo))
         film.show_outcome(played[0])
-        print_timeline(config, *played, console())
-        photographer.report()
+        episode_timeline(config, *played).print(console())
+        photo.report()
         finish_files(self.record, film, self.video)
         return 0
 
@@ -91,22 +91,19 @@ class Run(Watched):
         (config,) = scene_plays(source, scene, [self.policy], self.budget, given)
         if config.budget != self.budget:
             print("full fires every cell, whatever the budget", file=sys.stderr)
-        photographer = SightingPhoto(self.picture, self.at)
-        film = Clip(self.video, draw_scene, self.video_start)
-
-        def wrap(env: GymEnv, policy: Policy) -> GymEnv:
-            return photographer.watching(self._watched(env, policy), policy)
-
+        photo = Photo(self.picture, self.at)
+        film = Clip(self.video, self.video_start)
+        wrap = partial(self._watched, photo)
         played = trace_scene(config, config.film(), film.episode(self.policy), wrap=wrap)
-        print_scene_timeline(config, played, console())
-        photographer.report()
+        scene_timeline(config, played).print(console())
+        photo.report()
         finish_files(self.record, film, self.video)
         return 0
 
-    def _watched(self, env: GymEnv, policy: Policy) -> GymEnv:
+    def _watched(self, photo: Photo, env: GymEnv, policy: Policy) -> GymEnv:
         """`env`, which is recorded and whose scans are written where files are given."""
         if self.record is not None:
             env = RecordRerun(env, self.record, policy)
         if self.export is not None:
             env = ExportScans(env, self.export, policy)
-        return env
+        return photo.watching(env, policy)

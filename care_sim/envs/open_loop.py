@@ -28,7 +28,8 @@ from care_sim.loops.scene_records import SceneKeyframe
 from care_sim.loops.seeds import SensorSeeds
 from care_sim.perception import matching
 from care_sim.perception.detectors import PROXY
-from care_sim.viewer.pictures.scene_from_above import draw_plan
+from care_sim.viewer.pictures.keyframe import draw_keyframe
+from care_sim.viewer.pictures.scene_view import scene_view
 
 UNFILMED = ("camera_rotation_sigma_deg", "camera_position_sigma_m", "engine")
 """Conditions that a film cannot take on once it is made."""
@@ -184,13 +185,12 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         if self.render_mode is None:
             return None
         if self.keyframes:
-            return draw_plan(self.loop, self.last)
-        index, seen = self.loop.index, self._sightings
-        nothing = np.zeros(len(self.loop.shot.annotations), bool)
-        before = SceneKeyframe(
-            self.loop.shot.time_s, None, nothing, seen.scored(index), seen.appearing(index)
-        )
-        return draw_plan(self.loop, before)
+            shown = self.last
+        else:
+            shot, seen = self.loop.shot, self._sightings
+            nothing = np.zeros(len(shot.annotations), bool)
+            shown = SceneKeyframe(shot.time_s, None, nothing, seen.scored(0), seen.appearing(0))
+        return np.asarray(draw_keyframe(scene_view(self.loop, [shown])))
 
 
 class FilmEnv(OpenLoopEnv):

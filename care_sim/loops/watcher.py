@@ -1,4 +1,4 @@
-"""The closed loop with all that is true about it, for people who watch an episode.
+"""Either loop with all that is true about it, for people who watch an episode or a play.
 
 It is gathered only while somebody watches.
 """
@@ -9,16 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.core.actions import shares_of
-from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.arrays import Floats, Mask
 from care_sim.core.belief import Belief
 from care_sim.core.frames import Frame, Pose
 from care_sim.core.grid import Cells
 from care_sim.core.grid_stack import Grid
 from care_sim.core.residual import explained
-from care_sim.core.types import Action, Demand, ImageDetections
+from care_sim.core.types import CLASSES, Action, Demand, ImageDetections
 from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.loops.open_loop import OpenLoop
 from care_sim.loops.records import Keyframe
+from care_sim.loops.scene_records import SceneKeyframe
 from care_sim.sensors.annotated import NO_OBJECT
+from care_sim.world.bodies import CATALOGUE
 from care_sim.world.world import Actor, World
 
 WAY_M = 40.0
@@ -48,14 +51,19 @@ def way_ahead(world: World, sensor_x: float, ahead: float) -> Pose:
     return x + reach * float(np.cos(yaw)), y + reach * float(np.sin(yaw)), yaw
 
 
-@dataclass(frozen=True)
-class TrueSituation:
-    """What is there when the cells of a keyframe are chosen.
-
-    Truth: for people and scoring, never for a policy.
-
-    Boxes are in the world frame.
+def returned(ranges: NDArray[np.floating], grid: Grid) -> tuple[Cells, Floats]:
+    """The cells (n,) of a scan `ranges` (E, A) that returned, ascending, and the points (n, 3),
+    sensor frame.
     """
+    flat = ranges.ravel()
+    # Neither not fired (0) nor without return (the reach).
+    cells = np.flatnonzero((flat > 0) & (flat < grid.range_m))
+    return cells, grid.points(cells, flat[cells].astype(np.float64))
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What is there when the cells of a keyframe are chosen. Boxes are in the world frame."""
 
     time_s: float
     """Seconds from the start."""
@@ -68,13 +76,22 @@ class TrueSituation:
     sensor on; one piece where no route bends it, none in the open loop.
     """
     names: tuple[str, ...]
-    """(n,) of all actors."""
+    """(n,) of all actors, or of the annotated objects."""
     labels: tuple[int | None, ...]
     """(n,) places in `CLASSES`; None where perception does not report the actor."""
     bodies: Floats
-    """(n, 7) the boxes of all actors."""
+    """(n, 7) their boxes."""
     target: int | None
     """The row of the first-sighting actor, None without one."""
+
+
+@dataclass(frozen=True)
+class TrueSituation(Surroundings):
+    """The surroundings, and what of them the policy was shown.
+
+    Truth: for people and scoring, never for a policy.
+    """
+
     belief: Belief
     """All that the policy was shown."""
     known: Mask
@@ -95,73 +112,88 @@ class Watched:
     """(E, A) the share of the budget of each cell, a place in `care_sim.core.actions.SHARES`."""
     ranges: NDArray[np.float32]
     """(E, A) the scan in metres: 0 not fired, maximum range without a return."""
+    record: Keyframe | SceneKeyframe
+    """For the scoring: of the closed loop, or what a keyframe of a film found."""
+    fired: Cells
+    """(n,) the cells that fired, each as often as it was fired."""
 
     def returned(self, grid: Grid) -> tuple[Cells, Floats]:
         """The cells (n,) that returned, ascending, and the points (n, 3), sensor frame."""
-        ranges = self.ranges.ravel()
-        # Neither not fired (0) nor without return (the reach).
-        cells = np.flatnonzero((ranges > 0) & (ranges < grid.range_m))
-        return cells, grid.points(cells, ranges[cells].astype(np.float64))
+        return returned(self.ranges, grid)
 
 
-@dataclass(frozen=True)
-class WatchedKeyframe(Watched):
-    """One of the closed loop."""
-
-    record: Keyframe
-    """For the scoring."""
-
-
-def _way(world: World, sensor_x: float) -> Floats:
-    pieces = 1 if world.route is None else _PIECES
-    middles = (np.arange(pieces) + 0.5) * WAY_M / pieces
-    return np.array([way_ahead(world, sensor_x, ahead) for ahead in middles.tolist()])
-
-
-class EpisodeWatcher:
+class Watcher:
     """Follows the running episode of a loop: `situation` is asked before every keyframe, `watched`
     after it.
 
     `confidence` is the threshold of the camera's detector.
     """
 
-    def __init__(self, loop: ClosedLoop, confidence: float):
+    def __init__(self, loop: ClosedLoop | OpenLoop, confidence: float):
         self._loop = loop
         self._confidence = confidence
 
     def situation(self) -> TrueSituation:
         """How things stand before the next keyframe."""
         loop = self._loop
-        world = loop.world
-        shown = loop.belief.detections
+        if isinstance(loop, ClosedLoop):
+            # Through the camera as designed: what an error of its mount hides is missed, too.
+            there, given, clear = _of_world(loop), loop.detected_bodies, loop.cameras.faultless()
+        else:
+            there, given, clear = _of_film(loop), loop.true_detected_objects(), loop.shot.seen
+        sure = clear.detections.confidences >= self._confidence
+        missed = clear.detections.rows()[sure & ~np.isin(clear.objects, given)]
         return TrueSituation(
-            time_s=world.time,
-            sensor=loop.sensor,
-            ego=world.boxes_of(np.array([world.ego_body]))[0],
-            way=_way(world, loop.rig.sensor_x_m),
-            names=tuple(actor.name for actor in world.actors),
-            labels=tuple(actor.label for actor in world.actors),
-            bodies=world.boxes(world.actors).copy(),
-            target=world.actors.index(world.first_sighting) if world.first_sighting else None,
+            **vars(there),
             belief=loop.belief,
-            known=explained(shown, loop.belief.tracks, loop.rig),
-            false=loop.detected_bodies == NO_OBJECT,
-            missed=self._missed(loop.detected_bodies),
+            known=explained(loop.belief.detections, loop.belief.tracks, loop.rig),
+            false=given == NO_OBJECT,
+            missed=ImageDetections.from_rows(missed),
         )
 
     def watched(
-        self, situation: TrueSituation, action: Action, demand: Demand | None, record: Keyframe
-    ) -> WatchedKeyframe:
+        self,
+        situation: TrueSituation,
+        action: Action,
+        demand: Demand | None,
+        record: Keyframe | SceneKeyframe,
+    ) -> Watched:
         """The keyframe that the loop has played since the situation."""
-        loop = self._loop
-        return WatchedKeyframe(
-            situation, shares_of(record.fired, action, demand, loop.rig), loop.belief.ranges, record
-        )
+        loop, fired = self._loop, record.fired
+        assert fired is not None
+        shares = shares_of(fired, action, demand, loop.rig)
+        ranges = loop.belief.ranges if isinstance(loop, ClosedLoop) else loop.last_ranges
+        return Watched(situation, shares, ranges, record, fired)
 
-    def _missed(self, given: Integers) -> ImageDetections:
-        """What a camera without faults would report now, less the bodies that were `given`."""
-        # Through the camera as designed: what an error of its mount hides is missed, too.
-        clear = self._loop.cameras.faultless()
-        rows = clear.detections.rows()
-        sure = clear.detections.confidences >= self._confidence
-        return ImageDetections.from_rows(rows[sure & ~np.isin(clear.objects, given)])
+
+def _of_world(loop: ClosedLoop) -> Surroundings:
+    world = loop.world
+    pieces = 1 if world.route is None else _PIECES
+    middles = (np.arange(pieces) + 0.5) * WAY_M / pieces
+    return Surroundings(
+        time_s=world.time,
+        sensor=loop.sensor,
+        ego=world.boxes_of(np.array([world.ego_body]))[0],
+        way=np.array([way_ahead(world, loop.rig.sensor_x_m, m) for m in middles.tolist()]),
+        names=tuple(actor.name for actor in world.actors),
+        labels=tuple(actor.label for actor in world.actors),
+        bodies=world.boxes(world.actors).copy(),
+        target=world.actors.index(world.first_sighting) if world.first_sighting else None,
+    )
+
+
+def _of_film(loop: OpenLoop) -> Surroundings:
+    shot, (x, y, height), size = loop.shot, loop.film.position, CATALOGUE["ego"].size
+    car = np.array([[-x, -y, size[2] / 2 - height, *size, 0.0]])
+    annotations = shot.annotations
+    named = zip(annotations.classes.tolist(), annotations.objects.tolist(), strict=True)
+    return Surroundings(
+        time_s=shot.time_s,
+        sensor=shot.sensor,
+        ego=shot.sensor.boxes_to_world(car)[0],
+        way=np.empty((0, 3)),
+        names=tuple(f"{CLASSES[label]} {number}" for label, number in named),
+        labels=tuple(annotations.classes.tolist()),
+        bodies=shot.sensor.boxes_to_world(annotations.boxes),
+        target=None,
+    )

@@ -1,4 +1,4 @@
-"""What a watcher tells of an episode whose camera errs."""
+"""What a watcher tells of an episode whose camera errs, and of a film."""
 
 from types import SimpleNamespace
 
@@ -7,10 +7,13 @@ import numpy as np
 import pytest
 
 import care_sim
+from care_sim.core.actions import EXPLOITATION, FLOOR, RESERVE
 from care_sim.core.sensor_setup import LIDAR_POSITION
 from care_sim.envs.wrappers.watching import Watching
-from care_sim.loops.watcher import WAY_M, EpisodeWatcher
+from care_sim.loops.watcher import WAY_M, Watcher
 from care_sim.sensors.confidence import MIN_PIXELS
+from care_sim.sources.named import source_of
+from care_sim.study.play_config import play_grid
 
 
 class Notes(Watching):
@@ -132,7 +135,7 @@ def ways(name, seed):
     """The way at the start, in the sensor frame."""
     with gymnasium.make(name, disable_env_checker=True) as env:
         env.reset(seed=seed)
-        situation = EpisodeWatcher(env.unwrapped.loop, 0.0).situation()
+        situation = Watcher(env.unwrapped.loop, 0.0).situation()
         boxes = np.zeros((len(situation.way), 7))
         boxes[:, [0, 1, 6]] = situation.way
         return situation.sensor.boxes_to_local(boxes)
@@ -151,3 +154,37 @@ def test_the_way_follows_the_turn_of_the_route():
     assert way[-1, 0] > 35
     assert way[-1, 6] == pytest.approx((LIDAR_POSITION[0] + WAY_M - 0.5 - 33.671) / 10.0, abs=1e-3)
     assert way[-1, 1] > 0.5
+
+
+def test_what_is_watched_is_how_the_film_stands(drive):
+    source = source_of(f"argoverse2:{drive}")
+    faults = {"false_negative_rate": 0.3, "false_positive_rate": 0.5}
+    (config,) = play_grid(source, source.scenes(), ["care"], [0.05], **faults)
+    film = config.film()
+    with config.make_env(film) as env:
+        policy = config.make_policy(env)
+        observation, _ = env.reset(seed=0)
+        policy.reset()
+        watcher = Watcher(env.loop, env.conditions.camera_confidence)
+        for shot in film.shots:
+            situation = watcher.situation()
+            local = shot.sensor.boxes_to_local(situation.bodies)
+            assert local == pytest.approx(shot.annotations.boxes, abs=1e-6)
+            # The LiDAR stands where the film says on the car.
+            ego = shot.sensor.boxes_to_local(situation.ego[None])[0]
+            assert ego[:2] == pytest.approx([-film.place[0], -film.place[1]], abs=1e-6)
+            assert ego[2] - ego[5] / 2 == pytest.approx(-film.sensor_height_m)
+            # Of what the camera showed, each object is either in the belief or missed.
+            behind = env.loop.true_detected_objects()
+            assert (situation.false == (behind < 0)).all()
+            given = int((behind >= 0).sum())
+            assert len(situation.missed) + given == len(shot.seen.detections)
+            observation, *_ = env.step(policy(observation))
+            watched = watcher.watched(situation, env.acted, policy.demanded, env.last)
+            assert (watched.shares.ravel()[env.last.fired] > 0).all()
+            cells, points = watched.returned(film.grid)
+            assert {*cells.tolist()} <= {*env.last.fired.tolist()}
+            assert np.isin(cells, shot.cloud.cells).all()
+            assert len(points) == len(cells)
+    shares = {*np.unique(watched.shares).tolist()}
+    assert shares <= {0, EXPLOITATION, RESERVE, FLOOR}

@@ -1,4 +1,4 @@
-"""A recording of an episode, held against the episode's own row and keyframes."""
+"""A recording of an episode of either loop, held against the episode's own row and keyframes."""
 
 import time
 from dataclasses import replace
@@ -12,10 +12,13 @@ from care_sim.core.actions import CHOSEN, EXPLOITATION, FLOOR, RESERVE, SHARES
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.envs.wrappers.record_rerun import RecordRerun, recording
-from care_sim.loops.watcher import EpisodeWatcher
+from care_sim.loops.watcher import Watcher
 from care_sim.scenarios import SCENARIOS
+from care_sim.sources.named import source_of
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.episode_play import run_episode, trace
+from care_sim.study.play_config import play_grid
+from care_sim.study.scene_trace import trace_scene
 from care_sim.viewer.recording import entities
 from care_sim.viewer.recording.layout import blueprint
 from care_sim.viewer.recording.recording import Recording
@@ -37,6 +40,21 @@ def episode(tmp_path_factory, read):
     return row, keyframes, after, read(path), path
 
 
+@pytest.fixture(scope="module")
+def play(drive, tmp_path_factory, read):
+    """The same of a play of the open loop: as it goes without a recording, with one, and what was
+    recorded.
+    """
+    path = tmp_path_factory.mktemp("recordings") / "out.rrd"
+    source = source_of(f"argoverse2:{drive}")
+    faults = {"false_negative_rate": 0.3, "false_positive_rate": 0.5}
+    (config,) = play_grid(source, source.scenes(), ["care"], [0.05], **faults)
+    film = config.film()
+    plain = trace_scene(config, film)
+    played = trace_scene(config, film, wrap=lambda env, policy: RecordRerun(env, path, policy))
+    return plain, played, read(path)
+
+
 def test_settings_of_rerun_switch_no_recording_off(tmp_path, monkeypatch, capfd):
     monkeypatch.setenv("RERUN", "off")
     with Recording(tmp_path / "out.rrd", ["care"]):
@@ -45,9 +63,11 @@ def test_settings_of_rerun_switch_no_recording_off(tmp_path, monkeypatch, capfd)
     assert capfd.readouterr().err == ""
 
 
-def test_recording_changes_nothing(episode):
+def test_recording_changes_nothing(episode, play):
     row, *_ = episode
     assert row["episode_hash"] == run_episode(CONFIG)["episode_hash"]
+    plain, played, _ = play
+    assert played.row["episode_hash"] == plain.row["episode_hash"]
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
@@ -91,16 +111,16 @@ def test_the_returns_of_several_lidars_are_recorded_in_the_frame_of_the_first(tm
     assert {*grid.lidars_of(cells[high]).tolist()} == {0, 1, 2}
 
 
-def test_every_entity_is_documented_and_every_documented_one_is_there(episode):
-    found = episode[3]
-    names = {
-        name.removeprefix("care/")
-        for name in {*found.rows, *found.fixed}
-        if name.startswith("care/")
-    }
-    assert names == set(entities.ENTITIES)
-    (about,) = found.fixed["about"]["TextDocument:text"]
-    assert all(f"`{name}` | {content}" in about for name, content in entities.ENTITIES.items())
+def test_every_entity_is_documented_and_every_documented_one_is_there(episode, play):
+    for found, open_loop in ((episode[3], False), (play[2], True)):
+        there = {*found.rows, *found.fixed}
+        names = {name.removeprefix("care/") for name in there if name.startswith("care/")}
+        documented = entities.entities_of(open_loop)
+        assert names == set(documented)
+        (about,) = found.fixed["about"]["TextDocument:text"]
+        assert all(f"`{name}` | {content}" in about for name, content in documented.items())
+    both = {**entities.entities_of(False), **entities.entities_of(True)}
+    assert both == entities.ENTITIES
 
 
 def test_the_timelines_are_those_of_the_keyframes(episode):
@@ -134,6 +154,18 @@ def test_measures_are_those_of_the_keyframes(episode):
     assert first(found, "brake", "on") == [f.braking for f in keyframes].index(True)
     (text,) = found.fixed["care/outcome"]["TextDocument:text"]
     assert f"| detection_distance_m | {row['detection_distance_m']} |" in text
+
+
+def test_measures_of_a_play_are_those_of_its_keyframes(play):
+    _, played, found = play
+    assert found.numbers("care/measures/found") == [f.objects_found for f in played.keyframes]
+    assert found.numbers("care/measures/objects") == [f.objects for f in played.keyframes]
+    paid = [found.numbers(f"care/budget/{SHARES[n]}") for n in (EXPLOITATION, RESERVE, FLOOR)]
+    assert np.sum(paid, axis=0) == pytest.approx([100.0] * len(played.keyframes))
+    (event,) = [text for row in found.rows["care/events"].values() for text in row["TextLog:text"]]
+    assert event.startswith("pedestrian ")
+    (text,) = found.fixed["care/outcome"]["TextDocument:text"]
+    assert f"| overall_recall | {played.row['overall_recall']} |" in text
 
 
 def first(found, name, state):
@@ -304,7 +336,7 @@ def test_who_is_in_view_from_the_start_has_an_event(tmp_path, read):
         env.reset(seed=0)
         rig = env.unwrapped.rig
         episode = file.episode("agent", env.unwrapped.loop)
-        watcher = EpisodeWatcher(env.unwrapped.loop, 0.5)
+        watcher = Watcher(env.unwrapped.loop, 0.5)
         situation = watcher.situation()
         episode.look(env.unwrapped.loop)
         env.step(np.zeros(rig.grid.shape, np.float32))

@@ -21,14 +21,11 @@ from care_sim.core.actions import SHARES
 from care_sim.core.arrays import Floats
 from care_sim.core.grid import Cells
 from care_sim.core.types import CLASSES, Action, Tracks
-from care_sim.envs.closed_loop import ClosedLoopEnv
-from care_sim.envs.open_loop import OpenLoopEnv
 from care_sim.envs.wrappers.watching import Watching, numbered
 from care_sim.loops.closed_loop import ClosedLoop
-from care_sim.loops.film_watcher import WatchedScene
 from care_sim.loops.open_loop import OpenLoop
 from care_sim.loops.records import Keyframe
-from care_sim.loops.watcher import WatchedKeyframe
+from care_sim.loops.watcher import Watched
 from care_sim.policies.base import Policy
 
 _UNITS_NOTE = (
@@ -84,9 +81,6 @@ class ExportScans(Watching):
     ```
     """
 
-    watches = "a loop"
-    kinds = (ClosedLoopEnv, OpenLoopEnv)
-
     def __init__(
         self,
         env: gymnasium.Env[Any, Action],
@@ -106,7 +100,7 @@ class ExportScans(Watching):
         self._folder.mkdir(parents=True, exist_ok=True)
         self._describe(None)
 
-    def keep(self, watched: WatchedKeyframe | WatchedScene) -> None:
+    def keep(self, watched: Watched) -> None:
         """Write the two files of a keyframe."""
         stem = f"{watched.record.index:03d}"
         cells, points = watched.returned(self._inner.rig.grid)
@@ -144,10 +138,9 @@ class ExportScans(Watching):
                 raise OSError(errno.EIO, reason, str(file))
 
 
-def described(watched: WatchedKeyframe | WatchedScene) -> dict[str, Any]:
+def described(watched: Watched) -> dict[str, Any]:
     """What stood around a scan, as plain data; see `ExportScans`."""
     situation, record = watched.situation, watched.record
-    assert record.fired is not None
     sensor = situation.sensor
     told = {
         "keyframe": record.index,
@@ -156,14 +149,14 @@ def described(watched: WatchedKeyframe | WatchedScene) -> dict[str, Any]:
         "ego": situation.ego.tolist(),
         "bodies": _bodies(watched),
         "tracks": _tracks(situation.belief.tracks),
-        "fired": record.fired.tolist(),
+        "fired": watched.fired.tolist(),
     }
     if isinstance(record, Keyframe):
         told |= {name: getattr(record, name) for name in ("detected", "braking", "speed_mps")}
     return told
 
 
-def _bodies(watched: WatchedKeyframe | WatchedScene) -> list[dict[str, Any]]:
+def _bodies(watched: Watched) -> list[dict[str, Any]]:
     situation, record = watched.situation, watched.record
     classes = [None if label is None else CLASSES[label] for label in situation.labels]
     told = zip(situation.names, classes, situation.bodies, strict=True)

@@ -12,15 +12,14 @@ from care_sim.base.checks import check_path
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.extras import import_rerun
 from care_sim.core.types import Action
-from care_sim.envs.closed_loop import ClosedLoopEnv
-from care_sim.envs.open_loop import OpenLoopEnv
 from care_sim.envs.wrappers.watching import Watching, numbered
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.open_loop import OpenLoop
+from care_sim.loops.watcher import Watched
 from care_sim.policies.base import Policy
 
 if TYPE_CHECKING:
-    from care_sim.viewer.recording.recording import RecordedEpisode, RecordedScene, Recording
+    from care_sim.viewer.recording.recording import RecordedEpisode, Recording
 
 
 def _recording_class() -> "type[Recording]":
@@ -77,9 +76,6 @@ class RecordRerun(Watching):
     ```
     """
 
-    watches = "a loop"
-    kinds = (ClosedLoopEnv, OpenLoopEnv)
-
     def __init__(
         self,
         env: gymnasium.Env[Any, Action],
@@ -95,7 +91,7 @@ class RecordRerun(Watching):
         self._path = Path(fspath(path)) if isinstance(path, str | PathLike) else None
         self._recording = None if isinstance(path, str | PathLike) else path
         self._name = name or (policy.name if policy is not None else "") or "agent"
-        self._episode: RecordedEpisode | RecordedScene | None = None
+        self._episode: RecordedEpisode | None = None
 
     def begin(self, loop: ClosedLoop | OpenLoop, episode: int) -> None:
         """Open the file of this episode, or its lane in a file that was given."""
@@ -111,7 +107,7 @@ class RecordRerun(Watching):
         if self._episode is not None:
             self._episode.look(loop)
 
-    def keep(self, watched: Any) -> None:
+    def keep(self, watched: Watched) -> None:
         """Log the keyframe."""
         if self._episode is not None:
             self._episode.keep(watched)

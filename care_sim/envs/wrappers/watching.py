@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium
 
@@ -11,8 +11,7 @@ from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.types import Action
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.envs.open_loop import OpenLoopEnv
-from care_sim.loops.film_watcher import FilmWatcher
-from care_sim.loops.watcher import EpisodeWatcher
+from care_sim.loops.watcher import Watched, Watcher
 from care_sim.policies.base import Policy
 
 
@@ -23,19 +22,14 @@ class Watching(gymnasium.Wrapper[Any, Action, Any, Action], ABC):
     shares of exploitation and reserve are known. Of raw actions it is only known what was chosen
     and what the floor filled up.
 
-    Raises InvalidInput for an environment that is none of those that it `watches`.
+    Raises InvalidInput for an environment that is no loop of CARE-Sim.
     """
-
-    watches: ClassVar[str] = "the closed loop"
-    """Which loops of CARE-Sim."""
-    kinds: ClassVar[tuple[type[gymnasium.Env[Any, Any]], ...]] = (ClosedLoopEnv,)
-    """Their environments."""
 
     def __init__(self, env: gymnasium.Env[Any, Action], policy: Policy | None = None):
         inner = getattr(env, "unwrapped", None)
         name = type(self).__name__
-        if not (isinstance(env, gymnasium.Env) and isinstance(inner, self.kinds)):
-            raise InvalidInput(f"{name} watches {self.watches} of CARE-Sim, got {shown(env)}")
+        if not (isinstance(env, gymnasium.Env) and isinstance(inner, ClosedLoopEnv | OpenLoopEnv)):
+            raise InvalidInput(f"{name} watches a loop of CARE-Sim, got {shown(env)}")
         if not isinstance(policy, Policy | None):
             raise InvalidInput(
                 f"policy of {name} must be a care_sim.Policy or None, got {shown(policy)}"
@@ -43,7 +37,7 @@ class Watching(gymnasium.Wrapper[Any, Action, Any, Action], ABC):
         super().__init__(env)
         self._inner: Any = inner
         self._policy = policy
-        self._watcher: Any = None
+        self._watcher: Watcher | None = None
         self._begun = False
         self._episodes = 0
 
@@ -55,7 +49,7 @@ class Watching(gymnasium.Wrapper[Any, Action, Any, Action], ABC):
         """A keyframe is about to be played."""
 
     @abstractmethod
-    def keep(self, watched: Any) -> None:
+    def keep(self, watched: Watched) -> None:
         """A keyframe was played."""
 
     @abstractmethod
@@ -71,8 +65,7 @@ class Watching(gymnasium.Wrapper[Any, Action, Any, Action], ABC):
         """Begin an episode. One that was left before its end is closed as it is."""
         self._leave(None)
         answer = super().reset(seed=seed, options=options)
-        watcher = FilmWatcher if isinstance(self._inner, OpenLoopEnv) else EpisodeWatcher
-        self._watcher = watcher(self._inner.loop, self._inner.conditions.camera_confidence)
+        self._watcher = Watcher(self._inner.loop, self._inner.conditions.camera_confidence)
         return answer
 
     def step(self, action: Action) -> tuple[Any, Any, bool, bool, dict[str, Any]]:

@@ -14,12 +14,14 @@ from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.open_loop import OpenLoop
 from care_sim.loops.records import Keyframe
 from care_sim.loops.scene_records import SceneKeyframe
+from care_sim.loops.watcher import Watched
 from care_sim.study.run_config import Row
+from care_sim.viewer.palette import BACKGROUND, DETECTED, HIT, State
 from care_sim.viewer.pictures.clip_files import check_clip, write_clip
-from care_sim.viewer.pictures.drawing import BACKGROUND, Colour, font
-from care_sim.viewer.pictures.keyframe import draw_keyframe
-from care_sim.viewer.pictures.scene_from_above import draw_plan
-from care_sim.viewer.pictures.sought import DETECTED, HIT
+from care_sim.viewer.pictures.drawing import plate
+from care_sim.viewer.pictures.episode_view import episode_view
+from care_sim.viewer.pictures.keyframe import View, draw_keyframe, draw_panel
+from care_sim.viewer.pictures.scene_view import scene_view
 
 _LAST_PICTURE_S = 2.5
 """Seconds for which the last picture stays."""
@@ -27,33 +29,28 @@ _GAP = 8
 _OUTCOME_TOP = 32
 """Pixel row of the outcome: in the sky of the chase view, above everything that moves."""
 
-Draw = Callable[[str, Any, Sequence[Any]], Image.Image]
-"""Draws where a loop, closed or open, stands after its keyframes so far, under the name of its
-policy.
-"""
 
-
-def draw_whole(_name: str, loop: ClosedLoop, frames: Sequence[Keyframe]) -> Image.Image:
-    """The picture of an episode on its own."""
-    return Image.fromarray(draw_keyframe(loop, frames[-1]))
-
-
-def draw_scene(_name: str, loop: OpenLoop, frames: Sequence[SceneKeyframe]) -> Image.Image:
-    """The picture of a play of the open loop on its own."""
-    return Image.fromarray(draw_plan(loop, frames[-1]))
+def view_of(
+    loop: ClosedLoop | OpenLoop, frames: Sequence[Any], watched: Watched | None = None
+) -> View:
+    """What is shown after the keyframes `frames` of a loop, the last of which may be `watched`."""
+    if isinstance(loop, OpenLoop):
+        return scene_view(loop, frames, watched)
+    return episode_view(loop, frames)
 
 
 class Clip:
-    """Episodes side by side in one clip at `path`, drawn by `draw`; without a path it does nothing.
+    """One episode, or with `panels` several side by side, in one clip at `path`; without a path it
+    does nothing.
 
     The clip begins `start` seconds after the episodes do. Raises InvalidInput for a negative start
     or a start without a path, for a folder and for an ending that no clip has, MissingExtra for one
     whose library is not installed.
     """
 
-    def __init__(self, path: Path | None, draw: Draw = draw_whole, start: float | None = None):
+    def __init__(self, path: Path | None, start: float | None = None, panels: bool = False):
         self._path = path
-        self._draw = draw
+        self._panels = panels
         self._start = start or 0.0
         self._films: list[list[Image.Image]] = []
         if start is not None:
@@ -74,7 +71,8 @@ class Clip:
                 # Episodes of one clip have the same keyframe, because they meet the same world.
                 self._keyframe_s = loop.rig.keyframe_s
                 frames.append(frame)
-                film.append(self._draw(name, loop, frames))
+                view = view_of(loop, frames)
+                film.append(draw_panel(name, view) if self._panels else draw_keyframe(view))
 
         return watch
 
@@ -102,25 +100,21 @@ class Clip:
         return bool(films)
 
 
-def outcome_words(row: Row) -> tuple[str, Colour]:
+def outcome_words(row: Row) -> State:
     """Return how a closed-loop episode ended, in words, and the colour of that outcome."""
     if row["collision"]:
         hit = f"collision at {3.6 * row['impact_speed_mps']:.0f} km/h"
-        return (hit if row["hit_at_front"] else f"hit by {row['hit_kind']}"), HIT.colour
+        return State(hit if row["hit_at_front"] else f"hit by {row['hit_kind']}", HIT.colour)
     clearance = row["clearance_m"]
     # Without a clearance the actor never came into view.
     clear = "no collision" if clearance is None else f"clear by {clearance:.1f} m"
-    return clear, DETECTED.colour
+    return State(clear, DETECTED.colour)
 
 
 def _write_outcome(picture: Image.Image, row: Row) -> None:
     text, colour = outcome_words(row)
-    draw = ImageDraw.Draw(picture)
     size = picture.width // 14
-    middle = picture.width / 2, _OUTCOME_TOP + size
-    left, top, right, bottom = draw.textbbox(middle, text, font(size), anchor="mm")
-    draw.rounded_rectangle((left - 12, top - 8, right + 12, bottom + 8), 8, colour)
-    draw.text(middle, text, BACKGROUND, font(size), anchor="mm")
+    plate(ImageDraw.Draw(picture), (picture.width / 2, _OUTCOME_TOP + size), text, colour, size)
 
 
 def _side_by_side(films: Sequence[Sequence[Image.Image]]) -> Iterator[Image.Image]:

@@ -1,6 +1,8 @@
-"""The timeline of one episode, for a terminal."""
+"""The timeline of one episode of either loop, for a terminal."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TypeVar
 
 from rich.console import Console
 from rich.table import Table
@@ -8,9 +10,13 @@ from rich.text import Text
 
 from care_sim.base.errors import printable
 from care_sim.driving.drivers import brake_delay_s
+from care_sim.evaluation.recall import CENSORED_AT, SceneOutcome
 from care_sim.loops.records import DriveOutcome, Keyframe
+from care_sim.loops.scene_records import SceneKeyframe
 from care_sim.study.episode_config import EpisodeConfig
+from care_sim.study.play_config import PlayConfig
 from care_sim.study.run_config import Row
+from care_sim.study.scene_trace import PlayedScene
 
 _COLUMNS = (
     "time\ns",
@@ -32,40 +38,110 @@ _LABELS = {
     "min_distance_m": "min_distance_m (ego centre to actor centre)",
     "clearance_m": "clearance_m (hull to hull)",
 }
+_SCENE_COLUMNS = ("time\ns", "objects\nin range", "found", "new", "found\nat once", "rays\nfired")
+_SCENE_LEGEND = (
+    "new: objects that newly enter the 50 m around the car: first sightings.\nKeyframes without "
+    "one are left out."
+)
+SCENE_LABELS = {
+    "first_sightings": "first sightings",
+    "first_sighting_recall": "found at once %",
+    "ttfd_keyframes": "TTFD keyframes",
+    "object_frames": "object frames",
+    "overall_recall": "found %",
+}
+"""How the fields of `SceneOutcome` are told."""
+_Frame = TypeVar("_Frame")
 
 
-def print_timeline(
-    config: EpisodeConfig, row: Row, keyframes: Sequence[Keyframe], console: Console
-) -> None:
-    """Print an episode where something changes in it, then its outcome."""
-    table = Table(
-        title=Text(printable(config.label), "table.title"),
-        title_justify="left",
-        box=None,
-        padding=(0, 1, 0, 0),
-    )
-    for number, column in enumerate(_COLUMNS):
-        table.add_column(column, justify="right" if number < 5 else "left", no_wrap=True)
-    for frame in eventful(keyframes):
-        table.add_row(*(_cells(frame) if frame else ["..."]))
-    console.print(table)
-    console.print(_LEGEND.format(delay=brake_delay_s(config)), markup=False)
-    for name in _told(row):
-        console.print(f"{_LABELS.get(name, name):44} {text(row[name])}")
-    for number, encounter in enumerate(row.get("encounters", ()), 1):
-        line = f"encounter {number}: {encounter_text(encounter, keyframes)}"
-        console.print(line, markup=False)
-    console.print(f"{'episode_hash':44} {row['episode_hash']}")
-    console.print(f"{'wall_s':44} {row['wall_s']:.1f}")
+@dataclass(frozen=True)
+class Timeline:
+    """What is told of an episode."""
+
+    title: str
+    columns: tuple[str, ...]
+    words: int
+    """How many of the columns, the last ones, hold words."""
+    lines: list[tuple[str, ...] | None]
+    """One per keyframe that is told, None where some are left out."""
+    legend: str
+    events: list[str]
+    row: Row
+    """Of the results."""
+    outcome: dict[str, str]
+    """The outcome as people read it, by its labels."""
+
+    def print(self, console: Console) -> None:
+        """Print the keyframes, what happened, then the outcome."""
+        title = Text(printable(self.title), "table.title")
+        table = Table(title=title, title_justify="left", box=None, padding=(0, 1, 0, 0))
+        for number, column in enumerate(self.columns):
+            numeric = number < len(self.columns) - self.words
+            table.add_column(column, justify="right" if numeric else "left", no_wrap=True)
+        for line in self.lines:
+            table.add_row(*(line or ["..."]))
+        console.print(table)
+        for text in (self.legend, *self.events):
+            console.print(text, markup=False)
+        ending = {"episode_hash": self.row["episode_hash"], "wall_s": f"{self.row['wall_s']:.1f}"}
+        told = self.outcome | ending
+        width = max(len(label) for label in told)
+        for label, value in told.items():
+            console.print(f"{label:{width}}  {value}")
 
 
-def _told(row: Row) -> list[str]:
-    """The columns that are shown: what the seed drew, and the outcome, of a drive the whole one
-    but for its encounters.
-    """
+def episode_timeline(config: EpisodeConfig, row: Row, keyframes: Sequence[Keyframe]) -> Timeline:
+    """That of an episode of the closed loop, where something changes in it."""
+    states = [(f.in_view, f.detected, f.braking, f.impact_speed_mps is not None) for f in keyframes]
+    # A change, and the keyframe before it.
+    changes = [n for n in range(1, len(states)) if states[n] != states[n - 1]]
+    frames = with_gaps(keyframes, [*changes, *(n - 1 for n in changes)])
+    encounters = enumerate(row.get("encounters", ()), 1)
+    # What the seed drew, and the outcome, of a drive the whole one but for its encounters.
     drawn = [name for name in row if name.startswith("drawn.")]
-    outcome = [name for name in DriveOutcome.__dataclass_fields__ if name != "encounters"]
-    return [*drawn, *(name for name in outcome if name in row)]
+    told = [*drawn, *(name for name in DriveOutcome.__dataclass_fields__ if name != "encounters")]
+    return Timeline(
+        config.label,
+        _COLUMNS,
+        3,
+        [_cells(frame) if frame else None for frame in frames],
+        _LEGEND.format(delay=brake_delay_s(config)),
+        [f"encounter {number}: {encounter_text(each, keyframes)}" for number, each in encounters],
+        row,
+        {_LABELS.get(name, name): text(row[name]) for name in told if name in row},
+    )
+
+
+def scene_timeline(config: PlayConfig, played: PlayedScene) -> Timeline:
+    """That of a play of the open loop, where somebody appears in it, and who was found when."""
+    row, keyframes, score = played
+    frames = with_gaps(keyframes, [n for n, frame in enumerate(keyframes) if frame.entries])
+    return Timeline(
+        config.label,
+        _SCENE_COLUMNS,
+        0,
+        [_scene_cells(frame) if frame else None for frame in frames],
+        _SCENE_LEGEND,
+        [
+            f"{keyframes[event['keyframe']].time_s:5.1f} s  {event['class']} "
+            f"{event['object']}, {event['range_m']:.1f} m: {_found(event['ttfd'])}"
+            for event in score.event_rows()
+        ],
+        row,
+        {SCENE_LABELS[name]: outcome_text(row, name) for name in SceneOutcome.__dataclass_fields__},
+    )
+
+
+def with_gaps(keyframes: Sequence[_Frame], events: Iterable[int]) -> list[_Frame | None]:
+    """First and last keyframe and those with the numbers of `events`; None for every run left out,
+    however long it is.
+    """
+    # The intersection drops the ends of an episode without keyframes.
+    kept = sorted({0, len(keyframes) - 1, *events} & set(range(len(keyframes))))
+    shown: list[_Frame | None] = []
+    for before, n in zip([-1, *kept], kept, strict=False):
+        shown += [keyframes[n]] if n == before + 1 else [None, keyframes[n]]
+    return shown
 
 
 def encounter_text(encounter: Row, keyframes: Sequence[Keyframe]) -> str:
@@ -91,21 +167,6 @@ def encounter_text(encounter: Row, keyframes: Sequence[Keyframe]) -> str:
     return f"{who}: {'; '.join(told)}"
 
 
-def eventful(keyframes: Sequence[Keyframe]) -> list[Keyframe | None]:
-    """First and last keyframe and those about a change of state; None for every run left out."""
-    states = [(f.in_view, f.detected, f.braking, f.impact_speed_mps is not None) for f in keyframes]
-    last = len(states) - 1
-    # A change, the keyframe before it, and both ends of the episode. The intersection drops what
-    # lies outside.
-    changes = [n for n in range(1, last + 1) if states[n] != states[n - 1]]
-    kept = sorted({0, last, *changes, *(n - 1 for n in changes)} & set(range(last + 1)))
-    shown: list[Keyframe | None] = []
-    for before, n in zip([-1, *kept], kept, strict=False):
-        # A gap between two kept keyframes is one line of dots, however long it is.
-        shown += [keyframes[n]] if n == before + 1 else [None, keyframes[n]]
-    return shown
-
-
 def _cells(frame: Keyframe) -> tuple[str, ...]:
     numbers = (frame.time_s, frame.speed_mps, frame.distance_m, frame.clearance_m)
     flags = (frame.in_view, frame.detected, frame.braking)
@@ -114,6 +175,28 @@ def _cells(frame: Keyframe) -> tuple[str, ...]:
         str(len(frame.fired)),
         *("yes" if flag else "" for flag in flags),
     )
+
+
+def _scene_cells(frame: SceneKeyframe) -> tuple[str, ...]:
+    fired = 0 if frame.fired is None else len(frame.fired)
+    counts = (frame.objects, frame.objects_found, frame.entries, frame.entries_found, fired)
+    return (f"{frame.time_s:.1f}", *map(str, counts))
+
+
+def _found(ttfd: int) -> str:
+    if ttfd == CENSORED_AT:
+        return f"not found within {CENSORED_AT} keyframes"
+    if not ttfd:
+        return "found at once"
+    return f"found {ttfd} keyframe{'s' if ttfd > 1 else ''} later"
+
+
+def outcome_text(row: Row, name: str) -> str:
+    """A field of the outcome of a play as people read it: recalls in percent."""
+    value = row[name]
+    if value is not None and name.endswith("recall"):
+        return f"{100 * value:.1f}"
+    return text(value)
 
 
 def text(value: bool | int | float | None) -> str:

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 from care_sim.reports.page.played_rows import config_of, play_config_of
 from care_sim.reports.page.replay import Replay, replayed
-from care_sim.reports.page.scene_replay import replayed_scene
 from care_sim.sources.scenes import Source
 from care_sim.study.episode_play import result_or_reason
 from care_sim.study.executors import ExecutorFactory, processes
@@ -119,9 +118,7 @@ def follow(
 
 
 def _replay_of(row: Row, source: Source | None) -> Replay:
-    if in_open_loop(row):
-        return replayed_scene(play_config_of(row, source))
-    return replayed(config_of(row))
+    return replayed(play_config_of(row, source) if in_open_loop(row) else config_of(row))
 
 
 def _ending(future: Future[Replay | str]) -> Replay | str:

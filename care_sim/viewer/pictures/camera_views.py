@@ -6,68 +6,66 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from care_sim.core.arrays import Mask
-from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.residual import explained
 from care_sim.core.types import CLASSES
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.sensors.annotated import NO_OBJECT
+from care_sim.viewer import palette
 from care_sim.viewer.pictures import drawing
-from care_sim.viewer.pictures.drawing import FAINT_INK, INK
 from care_sim.viewer.pictures.furnished_world import photograph
+from care_sim.viewer.pictures.keyframe import BELOW_SIZE, PICTURE_WIDTH
 from care_sim.viewer.pictures.labels import Labels
 from care_sim.world.bullet import BulletWorld
 
-EXPLAINED_COLOUR = (90, 220, 255)
-UNEXPLAINED_COLOUR = (255, 170, 40)
-FALSE_COLOUR = (255, 105, 180)
-ROW_HEIGHT = 140
+_ROW_HEIGHT = 140
 """Of a row of cameras with its words, pixels."""
-ALONE_SIZE = (352, 180)
+_ALONE_SIZE = (352, 180)
 """Of the picture of a single camera, at the most: the grid is drawn beside it."""
+PICTURES_TOP = 30
 _BEHIND_RAD = np.deg2rad(170.0)
 _AHEAD_RAD = np.deg2rad(10.0)
 
 
-def take_pictures(scene: BulletWorld, loop: ClosedLoop, width: int) -> list[Image.Image]:
+def cameras_picture(scene: BulletWorld, loop: ClosedLoop) -> Image.Image:
     """What every camera sees, with its detections: those that a forecast explains in one colour,
     the others in another, and in a third, crossed out, those that show nothing.
 
-    That of a single camera is as large as the camera's, within `ALONE_SIZE`, and the classes stand
-    beside the boxes. Several share `width` pixels and have no room for words. They come in the
-    sequence of the grid's columns in a picture: behind, left, ahead, right.
+    The picture of a single camera is as large as the camera's, within a picture of `BELOW_SIZE`,
+    and the classes stand beside the boxes. Several share the width of a whole picture and have no
+    room for words. They come in the sequence of the grid's columns in a picture: behind, left,
+    ahead, right.
     """
     cameras = loop.rig.cameras
     known = explained(loop.belief.detections, loop.belief.tracks, loop.rig)
-    if len(cameras) == 1:
-        camera = cameras[0]
-        scale = min(1.0, ALONE_SIZE[0] / camera.width, ALONE_SIZE[1] / camera.height)
-        return [_picture(scene, loop, known, 0, round(scale * camera.width))]
-    share = width // len(cameras)
-    return [_picture(scene, loop, known, number, share) for number in _from_left(cameras)]
-
-
-def paste_pictures(
-    canvas: Image.Image, pictures: list[Image.Image], cameras: tuple[PinholeCamera, ...], top: int
-) -> None:
-    """Lay the pictures of `take_pictures` and what their colours mean below `top`."""
-    draw = ImageDraw.Draw(canvas)
-    row = len(pictures) > 1
-    words = (
-        (20, "Cameras:" if row else "Front camera:", INK),
-        (124, "explained by a track", EXPLAINED_COLOUR),
-        (264, "new", UNEXPLAINED_COLOUR),
-        (304, "false", FALSE_COLOUR),
+    row = len(cameras) > 1
+    canvas = Image.new(
+        "RGB", (PICTURE_WIDTH, _ROW_HEIGHT) if row else BELOW_SIZE, palette.BACKGROUND
     )
-    for x, text, colour in words:
-        draw.text((x, top + 8), text, colour, drawing.font(14))
+    draw = ImageDraw.Draw(canvas)
+    for x, text, colour in (
+        (20, "Cameras:" if row else "Front camera:", palette.INK),
+        (124, "explained by a track", palette.EXPLAINED_COLOUR),
+        (264, "new", palette.UNEXPLAINED_COLOUR),
+        (304, "false", palette.FALSE_COLOUR),
+    ):
+        draw.text((x, 8), text, colour, drawing.font(14))
     if not row:
-        canvas.paste(pictures[0], (20, top + 30))
-        return
-    for place, (picture, number) in enumerate(zip(pictures, _from_left(cameras), strict=True)):
-        left = place * (canvas.width // len(pictures))
-        canvas.paste(picture, (left, top + 30))
-        at = (left + picture.width / 2, top + 32 + picture.height)
-        draw.text(at, _towards(cameras[number].yaw), FAINT_INK, drawing.font(13), anchor="ma")
+        (camera,) = cameras
+        scale = min(1.0, _ALONE_SIZE[0] / camera.width, _ALONE_SIZE[1] / camera.height)
+        alone = _picture(scene, loop, known, 0, round(scale * camera.width))
+        canvas.paste(alone, (20, PICTURES_TOP))
+        return canvas
+    share = PICTURE_WIDTH // len(cameras)
+    # By where they look.
+    from_left = sorted(range(len(cameras)), key=lambda number: -cameras[number].yaw)
+    for place, number in enumerate(from_left):
+        picture = _picture(scene, loop, known, number, share)
+        canvas.paste(picture, (place * share, PICTURES_TOP))
+        at = (place * share + share / 2, PICTURES_TOP + picture.height + 2)
+        draw.text(
+            at, _towards(cameras[number].yaw), palette.FAINT_INK, drawing.font(13), anchor="ma"
+        )
+    return canvas
 
 
 def _picture(
@@ -80,39 +78,30 @@ def _picture(
     picture = photograph(scene, small, loop.sensor)
     seen = loop.belief.detections
     (own,) = np.nonzero(seen.cameras == number)
-    marks = [
-        ((scale * seen.boxes[row]).tolist(), CLASSES[seen.classes[row]], _colour(loop, known, row))
-        for row in own.tolist()
-    ]
+    boxes = scale * seen.boxes
     draw, alone = ImageDraw.Draw(picture), len(loop.rig.cameras) == 1
-    for (left, top, right, bottom), _, colour in marks:
+    for row in own.tolist():
+        left, top, right, bottom = boxes[row].tolist()
+        colour = _colour(loop, known, row)
         draw.rectangle((left, top, right, bottom), outline=colour, width=2 if alone else 1)
-        if colour == FALSE_COLOUR:
+        if colour == palette.FALSE_COLOUR:
             draw.line((left, top, right, bottom), colour)
             draw.line((left, bottom, right, top), colour)
     labels = Labels(draw)
     # The highest are the nearest, whose names keep their places.
-    for (left, top, right, _), name, colour in sorted(marks, key=_height, reverse=True):
-        if alone:
-            labels.over(((left + right) / 2, top), name, colour, 11)
+    heights = boxes[own, 3] - boxes[own, 1]
+    for row in own[np.argsort(-heights, kind="stable")].tolist() if alone else ():
+        left, top, right, _ = boxes[row].tolist()
+        name = CLASSES[seen.classes[row]]
+        labels.over(((left + right) / 2, top), name, _colour(loop, known, row), 11)
     return picture
 
 
-def _colour(loop: ClosedLoop, known: Mask, row: int) -> drawing.Colour:
+def _colour(loop: ClosedLoop, known: Mask, row: int) -> palette.Colour:
     """That of a detection: a false box is told, whether a track explains it or not."""
     if loop.detected_bodies[row] == NO_OBJECT:
-        return FALSE_COLOUR
-    return EXPLAINED_COLOUR if known[row] else UNEXPLAINED_COLOUR
-
-
-def _height(mark: tuple[list[float], str, drawing.Colour]) -> float:
-    (_, top, _, bottom), _, _ = mark
-    return bottom - top
-
-
-def _from_left(cameras: tuple[PinholeCamera, ...]) -> list[int]:
-    """The numbers of cameras by where they look: behind, left, ahead, right."""
-    return sorted(range(len(cameras)), key=lambda number: -cameras[number].yaw)
+        return palette.FALSE_COLOUR
+    return palette.EXPLAINED_COLOUR if known[row] else palette.UNEXPLAINED_COLOUR
 
 
 def _towards(yaw: float) -> str:

@@ -9,14 +9,8 @@ from care_sim.core.arrays import Floats
 from care_sim.core.boxes import BOX_EDGES, box_corners
 from care_sim.core.grid_stack import Grid
 from care_sim.core.pinhole import NEAR_M, PinholeCamera
+from care_sim.viewer import palette
 
-Colour = tuple[int, int, int]
-
-INK = (235, 237, 240)
-FAINT_INK = (150, 155, 162)
-BACKGROUND = (24, 26, 30)
-NOT_FIRED_COLOUR = (44, 47, 53)
-NO_RETURN_COLOUR = (112, 116, 124)
 _RANGE_COLOURS = colormaps["plasma_r"]
 
 
@@ -25,8 +19,34 @@ def font(size: int) -> ImageFont.ImageFont | ImageFont.FreeTypeFont:
     return ImageFont.load_default(size)
 
 
+def plate(
+    draw: ImageDraw.ImageDraw,
+    at: tuple[float, float],
+    text: str,
+    colour: palette.Colour,
+    size: int,
+    anchor: str = "mm",
+) -> None:
+    """Text in the background's colour on a plate of `colour`, its `anchor` at a pixel."""
+    left, top, right, bottom = draw.textbbox(at, text, font(size), anchor=anchor)
+    draw.rounded_rectangle((left - 10, top - 8, right + 10, bottom + 8), 7, colour)
+    draw.text(at, text, palette.BACKGROUND, font(size), anchor=anchor)
+
+
+def key(draw: ImageDraw.ImageDraw, at: tuple[int, int], colour: palette.Colour, words: str) -> int:
+    """What a colour means: a patch of it and words. Gives the column where the next may begin."""
+    x, y = at
+    draw.rectangle((x, y, x + 14, y + 12), colour)
+    draw.text((x + 20, y - 2), words, palette.FAINT_INK, font(13))
+    return round(x + 44 + draw.textlength(words, font(13)))
+
+
 def wireframe(
-    draw: ImageDraw.ImageDraw, camera: PinholeCamera, box: Floats, colour: Colour, width: int
+    draw: ImageDraw.ImageDraw,
+    camera: PinholeCamera,
+    box: Floats,
+    colour: palette.Colour,
+    width: int,
 ) -> None:
     """The edges of a sensor-frame box (7,) that lie wholly before the camera."""
     pixels, depth = camera.project(box_corners(box[None])[0])
@@ -42,13 +62,6 @@ def point_above(camera: PinholeCamera, box: Floats) -> tuple[float, float] | Non
     return (float(pixel[0]), float(pixel[1])) if inside else None
 
 
-def grid_picture(grid: Grid, ranges: NDArray[np.floating]) -> Image.Image:
-    """The scan (E, n) of the grid, or of some of its columns, as the car sees it: its left is left.
-    A pixel a cell.
-    """
-    return cells_picture(scan_colours(grid, ranges))
-
-
 def cells_picture(colours: NDArray[np.uint8]) -> Image.Image:
     """Cells with colours (E, n, 3) as the car sees them: its left is left. A pixel a cell."""
     # Columns run counter-clockwise, so that the right comes first.
@@ -57,10 +70,10 @@ def cells_picture(colours: NDArray[np.uint8]) -> Image.Image:
 
 def scan_colours(grid: Grid, ranges: NDArray[np.floating]) -> NDArray[np.uint8]:
     """(E, n, 3) colours of the cells of a scan (E, n), by range."""
-    colours = np.full((*ranges.shape, 3), NOT_FIRED_COLOUR, np.uint8)
+    colours = np.full((*ranges.shape, 3), palette.NOT_FIRED_COLOUR, np.uint8)
     fired = ranges > 0
     returned = fired & (ranges < grid.range_m)
-    colours[fired] = NO_RETURN_COLOUR
+    colours[fired] = palette.NO_RETURN_COLOUR
     colours[returned] = range_colours(ranges[returned] / grid.range_m)
     return colours
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image
 
 from care_sim.core.frames import Frame
@@ -15,12 +16,6 @@ from care_sim.loops.watcher import way_ahead
 from care_sim.world.bodies import BodyKind, Part, Triple
 from care_sim.world.bullet import BulletWorld
 from care_sim.world.world import World
-
-CHASE_SIZE = (960, 460)
-CHASE_CAMERA = PinholeCamera(
-    *CHASE_SIZE, np.deg2rad(80.0), (-10.0, 0.0, 3.6), 0.0, np.deg2rad(-16.0)
-)
-"""Behind the car and above it, in the frame of the LiDAR; low enough for a strip of sky."""
 
 METRE_MARKS = (10.0, 20.0, 30.0, 40.0)
 """Distances ahead of the LiDAR at which the path carries a bar, metres."""
@@ -38,6 +33,9 @@ _ASPHALT = (0.36, 0.36, 0.38)
 _PATH = (0.47, 0.47, 0.5)
 _BAR = (0.8, 0.8, 0.78)
 _SKY = (128, 147, 166)
+"""Dark enough for words."""
+_ROAD = (85, 85, 90)
+"""The asphalt, as it is painted."""
 _NOTHING = 255
 """What the renderer paints where no body is."""
 
@@ -61,10 +59,17 @@ def furnished(world: World) -> Iterator[BulletWorld]:
 
 
 def photograph(scene: BulletWorld, camera: PinholeCamera, sensor: Frame) -> Image.Image:
-    """What a camera on a sensor at the frame `sensor` sees, under a sky dark enough for words."""
-    view = scene.colours(camera, sensor).copy()
-    view[(view == _NOTHING).all(axis=2)] = _SKY
-    return Image.fromarray(view)
+    """What a camera on a sensor at the frame `sensor` sees, with sky and road behind it."""
+    view = scene.colours(camera, sensor)
+    empty = (view == _NOTHING).all(axis=2)
+    return Image.fromarray(np.where(empty[..., None], backdrop(camera), view))
+
+
+def backdrop(camera: PinholeCamera) -> NDArray[np.uint8]:
+    """(H, W, 3) sky above the middle of the picture, road below."""
+    picture = np.full((camera.height, camera.width, 3), _ROAD, np.uint8)
+    picture[: camera.height // 2] = _SKY
+    return picture
 
 
 def add_car(scene: BulletWorld, world: World, sensor_x: float, guarded_m: float) -> None:

@@ -2,7 +2,8 @@
 
 from PIL import ImageDraw
 
-from care_sim.viewer.pictures.drawing import BACKGROUND, Colour, font
+from care_sim.viewer.palette import BACKGROUND, Colour
+from care_sim.viewer.pictures.drawing import font
 
 _Area = tuple[float, float, float, float]
 """Left, top, right, bottom, pixels."""

@@ -1,6 +1,6 @@
 """A lane of a recording: the entities of one episode, all below its name."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -35,20 +35,22 @@ class Lane:
         """Log at the present keyframe."""
         self._stream.log(entity_path(self.name, entity), *content)
 
-    def log_list(self, entity: str, count: int, make: Callable[[], Sequence[Any]]) -> None:
-        """Log a list of `count` things at the present keyframe, made by `make`."""
+    def log_list(self, entity: str, count: int, *content: Any) -> None:
+        """Log a list of `count` things at the present keyframe."""
         # An empty list is logged once, to clear what stood there, and then no more.
         if count or self._counts.get(entity) != 0:
-            self.log(entity, *make())
+            self.log(entity, *content)
         self._counts[entity] = count
 
     def log_curve(
-        self, entity: str, keyframes: Sequence[int], times_s: Sequence[float], values: Floats
+        self, entity: str, keyframes: Sequence[tuple[int, float]], values: Floats
     ) -> None:
-        """Log one number per keyframe, `values` (n,), at once: it costs as much as logging one."""
+        """Log one number per keyframe, `values` (n,), at once: it costs as much as logging one.
+        `keyframes` are their numbers and times in seconds.
+        """
         times = (
-            rr.TimeColumn(KEYFRAME, sequence=keyframes),
-            rr.TimeColumn(SECONDS, duration=times_s),
+            rr.TimeColumn(KEYFRAME, sequence=[number for number, _ in keyframes]),
+            rr.TimeColumn(SECONDS, duration=[time_s for _, time_s in keyframes]),
         )
         self._stream.send_columns(
             entity_path(self.name, entity), times, rr.Scalars.columns(scalars=values)

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import rerun.blueprint as rrb
 
+from care_sim.viewer.palette import BACKGROUND
 from care_sim.viewer.recording.entities import ABOUT_ENTITY, SECONDS
 from care_sim.viewer.recording.lane import entity_path
 
@@ -11,7 +12,15 @@ _EYE_M = (-11.0, 0.0, 6.0)
 """Where the chase view looks from: behind the car and above it, in the sensor frame."""
 _TARGET_M = (12.0, 0.0, -1.0)
 """Where it looks to."""
-_DARK = (24, 26, 30)
+_CLOSED_LOOP = {
+    "Who is seen, who brakes": (rrb.StateTimelineView, "states/**"),
+    "Speed, m/s": (rrb.TimeSeriesView, "measures/speed"),
+    "Clearance, m": (rrb.TimeSeriesView, "measures/clearance"),
+}
+_OPEN_LOOP = {
+    "Objects within 50 m, and found": (rrb.TimeSeriesView, "measures/objects", "measures/found")
+}
+"""Views of the curves and states, by their titles: their kinds, and what they show of each lane."""
 _GRID_TITLE = (
     "fired: blue exploitation, orange reserve, grey floor, green chosen by a raw action, purple "
     "along in a window"
@@ -20,7 +29,10 @@ _GRID_TITLE = (
 
 def blueprint(lanes: Sequence[str], open_loop: bool = False) -> rrb.Blueprint:
     """The views of one episode, or of several side by side."""
-    curves = _scene_curves(lanes) if open_loop else [_states(lanes), *_plots(lanes)]
+    curves = [
+        view(contents=[entity_path(lane, entity) for lane in lanes for entity in shown], name=title)
+        for title, (view, *shown) in (_OPEN_LOOP if open_loop else _CLOSED_LOOP).items()
+    ]
     story = _one(lanes[0], curves) if len(lanes) == 1 else _several(lanes, curves)
     time = rrb.TimePanel(state="collapsed", timeline=SECONDS, play_state="playing", loop_mode="all")
     panels = rrb.BlueprintPanel(state="collapsed"), rrb.SelectionPanel(state="collapsed"), time
@@ -65,7 +77,7 @@ def _chase(lane: str) -> rrb.Spatial3DView:
             f"- {entity_path(lane, 'world/lidar/camera/**')}",
         ],
         name=f"{lane}: the street",
-        background=_DARK,
+        background=BACKGROUND,
         line_grid=False,
         eye_controls=rrb.EyeControls3D(position=_EYE_M, look_target=_TARGET_M, eye_up=(0, 0, 1)),
     )
@@ -78,24 +90,3 @@ def _camera(lane: str) -> rrb.Spatial2DView:
 
 def _grid(lane: str) -> rrb.Spatial2DView:
     return rrb.Spatial2DView(origin=entity_path(lane, "grid"), name=f"{lane}: {_GRID_TITLE}")
-
-
-def _states(lanes: Sequence[str]) -> rrb.StateTimelineView:
-    return rrb.StateTimelineView(
-        contents=[entity_path(lane, "states/**") for lane in lanes], name="Who is seen, who brakes"
-    )
-
-
-def _plots(lanes: Sequence[str]) -> list[rrb.TimeSeriesView]:
-    return [
-        rrb.TimeSeriesView(
-            contents=[entity_path(lane, f"measures/{name}") for lane in lanes], name=title
-        )
-        for name, title in (("speed", "Speed, m/s"), ("clearance", "Clearance, m"))
-    ]
-
-
-def _scene_curves(lanes: Sequence[str]) -> list[rrb.TimeSeriesView]:
-    names = [f"measures/{name}" for name in ("objects", "found")]
-    contents = [entity_path(lane, name) for lane in lanes for name in names]
-    return [rrb.TimeSeriesView(contents=contents, name="Objects within 50 m, and found")]

@@ -6,50 +6,45 @@ from itertools import compress
 
 import numpy as np
 import rerun as rr
-from numpy.typing import NDArray
 from PIL import Image
 
 from care_sim.core.actions import SHARES
-from care_sim.core.arrays import Floats
+from care_sim.core.arrays import Floats, Mask
 from care_sim.core.grid import Cells
 from care_sim.core.grid_stack import Grid
-from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.residual import wedges
-from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES, ImageDetections
 from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.loops.open_loop import OpenLoop
 from care_sim.loops.watcher import TrueSituation, Watched
-from care_sim.viewer.recording import entities
+from care_sim.viewer import palette
+from care_sim.viewer.pictures.furnished_world import backdrop, photograph
+from care_sim.viewer.recording.entities import ROW_PIXELS
 from care_sim.viewer.recording.lane import THIN, Lane
 
 _CAMERA = "world/lidar/camera"
 _BOX_COLOURS = {
-    "explained": entities.EXPLAINED_RGB,
-    "residual": entities.RESIDUAL_RGB,
-    "missed": entities.MISSED_RGB,
+    "explained": palette.EXPLAINED_COLOUR,
+    "residual": palette.UNEXPLAINED_COLOUR,
+    "missed": palette.MISSED_COLOUR,
 }
 _OUTLINE_COLOURS = {
-    "hulls": entities.EGO_RGB,
-    "wedges/explained": entities.EXPLAINED_RGB,
-    "wedges/residual": entities.RESIDUAL_RGB,
+    "hulls": palette.EGO_COLOUR,
+    "wedges/explained": palette.EXPLAINED_COLOUR,
+    "wedges/residual": palette.UNEXPLAINED_COLOUR,
 }
-
-
-_SKY = (186, 203, 218)
-_ROAD = (58, 60, 65)
-_NOTHING = 255
-"""What the renderer paints where no body is."""
 _QUALITY = 80
 """Of a JPEG, out of 100: a recording stays small."""
 
 
 class PictureLog:
-    """Logs the camera's picture and the picture of the grid."""
+    """Logs the camera's picture, of which a film keeps none, and the picture of the grid."""
 
-    def __init__(self, lane: Lane, rig: Rig):
+    def __init__(self, lane: Lane, loop: ClosedLoop | OpenLoop):
         self._lane = lane
-        self._rig = rig
-        camera = rig.cameras[0]
+        self._rig = loop.rig
+        self._photo: Image.Image | None = None
+        camera = loop.rig.cameras[0]
         place = rr.Transform3D(translation=camera.position, mat3x3=camera.axes.T)
         lens = rr.Pinhole(
             focal_length=camera.focal,
@@ -59,11 +54,8 @@ class PictureLog:
             image_plane_distance=1.0,
         )
         lane.fix(_CAMERA, place, lens)
-        shares = [
-            (n, name, colour)
-            for n, (name, colour) in enumerate(zip(SHARES, entities.SHARE_COLOURS, strict=True))
-        ]
-        lane.fix("grid", rr.AnnotationContext(shares))
+        shares = zip(range(len(SHARES)), SHARES, palette.SHARE_COLOURS.tolist(), strict=True)
+        lane.fix("grid", rr.AnnotationContext([*shares]))
         for kind, colour in _BOX_COLOURS.items():
             # Explained ones stand side by side, so that their names would overlap.
             names = rr.Points2D.from_fields(
@@ -75,53 +67,51 @@ class PictureLog:
         for entity, colour in _OUTLINE_COLOURS.items():
             lane.fix(f"grid/{entity}", rr.Boxes2D.from_fields(colors=[colour], radii=[THIN]))
 
-    def fix_photo(self, photo: bytes) -> None:
-        """A JPEG that stands for the camera's picture at every keyframe."""
-        self._lane.fix(_CAMERA, rr.EncodedImage(contents=photo, media_type="image/jpeg"))
+        if isinstance(loop, OpenLoop):
+            # Detections are drawn on it, at every keyframe.
+            lane.fix(_CAMERA, _encoded(Image.fromarray(backdrop(camera))))
 
-    def log(self, watched: Watched, photo: bytes = b"") -> None:
-        """A keyframe and the JPEG of its camera, if it has one of its own."""
-        if photo:
-            self._lane.log(_CAMERA, rr.EncodedImage(contents=photo, media_type="image/jpeg"))
+    def look(self, loop: ClosedLoop | OpenLoop) -> None:
+        """Take the camera's picture of the keyframe that is about to be played."""
+        if isinstance(loop, ClosedLoop):
+            camera = loop.rig.cameras[0]
+            self._photo = photograph(loop.world.bullet, camera, loop.sensor)
+
+    def log(self, watched: Watched) -> None:
+        """A keyframe, with the camera's picture if there is one."""
+        if self._photo is not None:
+            self._lane.log(_CAMERA, _encoded(self._photo))
         self._log_detections(watched.situation)
         self._log_grid(watched)
 
     def _log_detections(self, situation: TrueSituation) -> None:
         seen = situation.belief.detections
-        names = [
-            f"false {name}" if false else name
-            for name, false in zip(_names(seen), situation.false, strict=True)
-        ]
-        # The picture is that of the first camera.
-        own = seen.cameras == 0
-        for kind, known in (("explained", situation.known), ("residual", ~situation.known)):
-            chosen = own & known
-            self._log_named(kind, seen.boxes[chosen], list(compress(names, chosen)))
+        kinds = ["false " if false else "" for false in situation.false]
+        self._log_named("explained", seen, kinds, situation.known)
+        self._log_named("residual", seen, kinds, ~situation.known)
         missed = situation.missed
-        own = missed.cameras == 0
-        self._log_named(
-            "missed",
-            missed.boxes[own],
-            list(compress([f"missed {name}" for name in _names(missed)], own)),
-        )
+        self._log_named("missed", missed, ["missed "] * len(missed), np.ones(len(missed), bool))
 
-    def _log_named(self, kind: str, boxes: Floats, names: list[str]) -> None:
+    def _log_named(
+        self, entity: str, seen: ImageDetections, kinds: Sequence[str], chosen: Mask
+    ) -> None:
         """Log boxes, and their names as those of points below them, since the viewer breaks names
         of boxes into lines.
         """
+        # The picture is that of the first camera.
+        rows = np.flatnonzero(chosen & (seen.cameras == 0)).tolist()
+        names = [kinds[row] + CLASSES[seen.classes[row]] for row in rows]
+        boxes = seen.boxes[rows]
         below = np.column_stack([boxes[:, [0, 2]].mean(axis=1), boxes[:, 3]])
-        self._lane.log_list(
-            f"{_CAMERA}/{kind}",
-            len(boxes),
-            lambda: (_boxes(boxes), rr.Points2D(below, labels=names)),
-        )
+        points = rr.Points2D(below, labels=names)
+        self._lane.log_list(f"{_CAMERA}/{entity}", len(rows), _boxes(boxes), points)
 
     def _log_grid(self, watched: Watched) -> None:
         belief = watched.situation.belief
         known = watched.situation.known
         rig = self._rig
-        # Left is left, as in the pictures of `care_sim.viewer.pictures.drawing.grid_picture`.
-        cells = np.repeat(watched.shares[:, ::-1], entities.ROW_PIXELS, axis=0)
+        # Left is left, as in the pictures of `care_sim.viewer.pictures.drawing.cells_picture`.
+        cells = np.repeat(watched.shares[:, ::-1], ROW_PIXELS, axis=0)
         self._lane.log("grid/cells", rr.SegmentationImage(cells))
         sectors = wedges(belief.detections, rig)
         for entity, chosen in (
@@ -129,47 +119,18 @@ class PictureLog:
             ("wedges/explained", list(compress(sectors, known))),
             ("wedges/residual", list(compress(sectors, ~known))),
         ):
-            self._log_outlines(f"grid/{entity}", outlines(chosen, rig.grid))
-
-    def _log_outlines(self, entity: str, lines: Floats) -> None:
-        self._lane.log_list(entity, len(lines), lambda: [_boxes(lines)])
+            lines = outlines(chosen, rig.grid)
+            self._lane.log_list(f"grid/{entity}", len(lines), _boxes(lines))
 
 
 def _boxes(boxes: Floats) -> rr.Boxes2D:
     return rr.Boxes2D(array=boxes, array_format=rr.Box2DFormat.XYXY)
 
 
-def _names(detections: ImageDetections) -> list[str]:
-    return [CLASSES[number] for number in detections.classes]
-
-
-def photograph(loop: ClosedLoop) -> bytes:
-    """A JPEG of what the camera shows now, small enough to keep, with sky and road behind it."""
-    camera = loop.rig.cameras[0]
-    picture = loop.world.bullet.colours(camera, loop.sensor)
-    # The renderer leaves white where no body is.
-    shown = _backdrop(camera)
-    empty = (picture == _NOTHING).all(axis=2)
-    np.copyto(shown, picture, where=~empty[..., None])
-    return _jpeg(shown)
-
-
-def empty_photo(camera: PinholeCamera) -> bytes:
-    """A JPEG for a camera of which a film keeps no picture: its detections are drawn on it."""
-    return _jpeg(_backdrop(camera))
-
-
-def _backdrop(camera: PinholeCamera) -> NDArray[np.uint8]:
-    """(H, W, 3) sky above the middle of the picture, road below."""
-    backdrop = np.full((camera.height, camera.width, 3), _ROAD, np.uint8)
-    backdrop[: camera.height // 2] = _SKY
-    return backdrop
-
-
-def _jpeg(picture: NDArray[np.uint8]) -> bytes:
+def _encoded(picture: Image.Image) -> rr.EncodedImage:
     file = BytesIO()
-    Image.fromarray(picture).save(file, "JPEG", quality=_QUALITY)
-    return file.getvalue()
+    picture.save(file, "JPEG", quality=_QUALITY)
+    return rr.EncodedImage(contents=file.getvalue(), media_type="image/jpeg")
 
 
 def outlines(sectors: Sequence[Cells], grid: Grid) -> Floats:
@@ -195,6 +156,6 @@ def _cell_boxes(cells: Cells, grid: Grid) -> list[tuple[float, ...]]:
     columns = cells[: np.searchsorted(cells, (top + 1) * grid.columns)] % grid.columns
     runs = np.split(columns, np.flatnonzero(np.diff(columns) > 1) + 1)
     # The picture has the last column at its left.
-    upper = top * entities.ROW_PIXELS
-    lower = bottom * entities.ROW_PIXELS
+    upper = top * ROW_PIXELS
+    lower = bottom * ROW_PIXELS
     return [(grid.columns - 1 - run[-1], upper, grid.columns - run[0], lower) for run in runs]

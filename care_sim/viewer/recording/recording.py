@@ -10,27 +10,26 @@ import rerun as rr
 
 from care_sim.base.errors import InvalidInput, printable, unknown
 from care_sim.base.files import RERUN, replacing
-from care_sim.core.rig import Rig
 from care_sim.loops.closed_loop import ClosedLoop
-from care_sim.loops.film_watcher import WatchedScene
 from care_sim.loops.open_loop import OpenLoop
-from care_sim.loops.watcher import WatchedKeyframe
-from care_sim.viewer.recording.entities import (
-    ABOUT_ENTITY,
-    ENTITIES,
-    FOUND_RGB,
-    LANES,
-    NO_CLASS,
-    NOT_FOUND_RGB,
-    SCENE_ENTITIES,
-    about,
-)
-from care_sim.viewer.recording.found_log import FoundLog
+from care_sim.loops.watcher import Watched
+from care_sim.viewer.palette import Colour
+from care_sim.viewer.recording.entities import ABOUT_ENTITY, about, entities_of
 from care_sim.viewer.recording.lane import Lane
 from care_sim.viewer.recording.layout import blueprint
 from care_sim.viewer.recording.measure_log import MeasureLog
-from care_sim.viewer.recording.picture_log import PictureLog, empty_photo, photograph
+from care_sim.viewer.recording.picture_log import PictureLog
 from care_sim.viewer.recording.space_log import SpaceLog
+
+_LANES = (
+    (170, 225, 110),
+    (230, 120, 200),
+    (240, 200, 70),
+    (130, 160, 255),
+    (255, 120, 90),
+    (225, 225, 225),
+)
+"""Colours of the curves of episodes that are played side by side."""
 
 
 @contextmanager
@@ -68,20 +67,15 @@ class Recording(AbstractContextManager["Recording"]):
             self._stream.send_blueprint(blueprint(self._lanes, open_loop), make_active=False)
         self._file.callback(self._write)
         self._stream.send_recording_name(printable(path.stem))
-        told = about(SCENE_ENTITIES if open_loop else ENTITIES)
-        self._stream.log(
-            ABOUT_ENTITY, rr.TextDocument(told, media_type=rr.MediaType.MARKDOWN), static=True
-        )
+        page = rr.TextDocument(about(entities_of(open_loop)), media_type=rr.MediaType.MARKDOWN)
+        self._stream.log(ABOUT_ENTITY, page, static=True)
 
-    def episode(self, name: str, loop: ClosedLoop | OpenLoop) -> "RecordedEpisode | RecordedScene":
+    def episode(self, name: str, loop: ClosedLoop | OpenLoop) -> "RecordedEpisode":
         """Begin the lane `name`. Raises InvalidInput for a name that is none of `lanes`."""
         if name not in self._lanes:
             raise unknown("lane", name, self._lanes)
-        colour = LANES[self._lanes.index(name) % len(LANES)]
-        lane = Lane(self._stream, name)
-        if isinstance(loop, OpenLoop):
-            return RecordedScene(lane, loop.rig, colour)
-        return RecordedEpisode(lane, loop.rig, loop.guarded_m, colour)
+        colour = _LANES[self._lanes.index(name) % len(_LANES)]
+        return RecordedEpisode(Lane(self._stream, name), loop, colour)
 
     def __exit__(self, *_: object) -> None:
         self.close()
@@ -96,55 +90,24 @@ class Recording(AbstractContextManager["Recording"]):
 
 
 class RecordedEpisode:
-    """Logs one episode, keyframe by keyframe."""
+    """Logs one episode, keyframe by keyframe, of either loop."""
 
-    def __init__(self, lane: Lane, rig: Rig, guarded_m: float, colour: tuple[int, int, int]):
+    def __init__(self, lane: Lane, loop: ClosedLoop | OpenLoop, colour: Colour):
         self._lane = lane
-        self._space = SpaceLog(lane, rig, guarded_m)
-        self._pictures = PictureLog(lane, rig)
-        self._curves = MeasureLog(lane, rig.budget, colour)
-        self._photo = b""
+        # A film has no driver, who would guard a strip.
+        guarded_m = loop.guarded_m if isinstance(loop, ClosedLoop) else 0.0
+        self._space = SpaceLog(lane, loop.rig, guarded_m)
+        self._pictures = PictureLog(lane, loop)
+        self._curves = MeasureLog(lane, loop.rig.budget, colour)
 
-    def look(self, loop: ClosedLoop) -> None:
+    def look(self, loop: ClosedLoop | OpenLoop) -> None:
         """Take the camera's picture of the keyframe that is about to be played."""
-        self._photo = photograph(loop)
+        self._pictures.look(loop)
 
-    def keep(self, watched: WatchedKeyframe) -> None:
+    def keep(self, watched: Watched) -> None:
         """Log a keyframe that was played."""
-        frame = watched.record
-        self._lane.at(frame.index, frame.time_s)
-        state = "detected" if frame.detected else "in view" if frame.in_view else "out of view"
-        self._space.log(watched, state)
-        self._pictures.log(watched, self._photo)
-        self._curves.log(watched, state)
-
-    def end(self, outcome: Mapping[str, Any] | None) -> None:
-        """Log how it ended."""
-        self._curves.end(outcome)
-
-
-class RecordedScene:
-    """Logs one play of the open loop, keyframe by keyframe."""
-
-    def __init__(self, lane: Lane, rig: Rig, colour: tuple[int, int, int]):
-        self._lane = lane
-        self._space = SpaceLog(lane, rig, guarded_m=0.0)
-        self._pictures = PictureLog(lane, rig)
-        self._pictures.fix_photo(empty_photo(rig.cameras[0]))
-        self._curves = FoundLog(lane, rig.budget, colour)
-
-    def look(self, _loop: OpenLoop) -> None:
-        """Nothing: a film keeps no pictures."""
-
-    def keep(self, watched: WatchedScene) -> None:
-        """Log a keyframe that was played."""
-        record = watched.record
-        self._lane.at(record.index, record.time_s)
-        colours = [
-            FOUND_RGB if found else NOT_FOUND_RGB if scored else NO_CLASS
-            for found, scored in zip(record.found, record.scored, strict=True)
-        ]
-        self._space.log(watched, "", colours)
+        self._lane.at(watched.record.index, watched.record.time_s)
+        self._space.log(watched)
         self._pictures.log(watched)
         self._curves.log(watched)
 

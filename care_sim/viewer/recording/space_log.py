@@ -1,7 +1,6 @@
 """What is logged in space: bodies, the car and its path, returns, tracks, wedges."""
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 import rerun as rr
@@ -11,15 +10,23 @@ from care_sim.core.arrays import Floats
 from care_sim.core.residual import wedge_rays
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES
+from care_sim.loops.records import Keyframe
 from care_sim.loops.watcher import WAY_M, TrueSituation, Watched
-from care_sim.viewer.recording import entities
+from care_sim.viewer import palette
+from care_sim.viewer.recording.entities import MOST_POINTS, WEDGE_M
 from care_sim.viewer.recording.lane import THIN, Lane, box_batch
+from care_sim.viewer.recording.measure_log import actor_state
 
 _OVERLAP = 1.3
 """By how much longer than their share the pieces of a bending strip are: no cracks show."""
 _CORNERS = (1, 2, 4, 3)
 """Places of the corners of an image box among its rays, one after the other around it."""
-_SHARE_COLOURS = np.array(entities.SHARE_COLOURS, np.uint8)
+_PATH_COLOUR = (46, 54, 68)
+_BODY_COLOURS: dict[int | None, palette.Colour] = dict(
+    enumerate([(88, 142, 212), (196, 154, 92), (206, 112, 178), (146, 190, 92), (240, 200, 70)])
+)
+"""By place in `CLASSES`."""
+_NO_CLASS = (120, 124, 132)
 _GLASSY = FillMode.TransparentFillMajorWireframe
 """Bodies are drawn so that one can look through them at what they hide."""
 _MARGIN_M = 0.15
@@ -36,44 +43,34 @@ class SpaceLog:
         self._rig = rig
         self._guarded_m = guarded_m
         self._driven: list[Floats] = []
-        lane.fix("world", rr.ViewCoordinates.FLU)
-
+        solid, lines = FillMode.Solid, rr.LineStrips3D.from_fields
         # What stays as it is for the whole episode; places follow with every keyframe.
-        lane.fix(
-            "world/ego", rr.Boxes3D.from_fields(colors=[entities.EGO_RGB], fill_mode=FillMode.Solid)
-        )
+        for entity, look in {
+            "": rr.ViewCoordinates.FLU,
+            "/ego": rr.Boxes3D.from_fields(colors=[palette.EGO_COLOUR], fill_mode=solid),
+            "/bodies": rr.Boxes3D.from_fields(show_labels=False, fill_mode=_GLASSY),
+            "/driven": lines(colors=[palette.EGO_COLOUR], radii=[THIN]),
+            "/lidar/returns": rr.Points3D.from_fields(radii=[2 * THIN]),
+            "/lidar/tracks": rr.Boxes3D.from_fields(show_labels=False),
+            "/lidar/velocities": rr.Arrows3D.from_fields(
+                colors=[palette.EXPLAINED_COLOUR], radii=[0.08]
+            ),
+            "/lidar/wedges/residual": lines(
+                colors=[(*palette.UNEXPLAINED_COLOUR, 200)], radii=[THIN]
+            ),
+            "/lidar/wedges/explained": lines(
+                colors=[(*palette.EXPLAINED_COLOUR, 50)], radii=[THIN]
+            ),
+        }.items():
+            lane.fix(f"world{entity}", look)
         if guarded_m:
-            lane.fix(
-                "world/lidar/path",
-                rr.Boxes3D.from_fields(colors=[entities.PATH_RGB], fill_mode=FillMode.Solid),
-            )
-        lane.fix("world/bodies", rr.Boxes3D.from_fields(show_labels=False, fill_mode=_GLASSY))
-        lane.fix(
-            "world/driven", rr.LineStrips3D.from_fields(colors=[entities.EGO_RGB], radii=[THIN])
-        )
-        lane.fix("world/lidar/returns", rr.Points3D.from_fields(radii=[2 * THIN]))
-        lane.fix("world/lidar/tracks", rr.Boxes3D.from_fields(show_labels=False))
-        lane.fix(
-            "world/lidar/velocities",
-            rr.Arrows3D.from_fields(colors=[entities.EXPLAINED_RGB], radii=[0.08]),
-        )
-        for kind, colour in (
-            ("residual", (*entities.RESIDUAL_RGB, 200)),
-            ("explained", (*entities.EXPLAINED_RGB, 50)),
-        ):
-            lane.fix(
-                f"world/lidar/wedges/{kind}",
-                rr.LineStrips3D.from_fields(colors=[colour], radii=[THIN]),
-            )
+            path = rr.Boxes3D.from_fields(colors=[_PATH_COLOUR], fill_mode=solid)
+            lane.fix("world/lidar/path", path)
 
-    def log(
-        self, watched: Watched, state: str, colours: Sequence[tuple[int, int, int]] = ()
-    ) -> None:
-        """A keyframe, with the state of the first-sighting actor, and the colours of the bodies
-        where they are not those of their classes.
-        """
+    def log(self, watched: Watched) -> None:
+        """A keyframe."""
         situation = watched.situation
-        self._log_bodies(situation, state, colours)
+        self._log_bodies(watched)
         self._log_ego(situation)
         self._log_returns(watched)
         self._log_tracks(situation)
@@ -82,26 +79,22 @@ class SpaceLog:
                 kind, wedge_rays(situation.belief.detections, self._rig)[chosen][:, _CORNERS]
             )
 
-    def _log_bodies(
-        self, situation: TrueSituation, state: str, colours: Sequence[tuple[int, int, int]]
-    ) -> None:
-        colours = colours or [
-            entities.NO_CLASS if label is None else entities.BODY_COLOURS[CLASSES[label]]
-            for label in situation.labels
-        ]
+    def _log_bodies(self, watched: Watched) -> None:
+        situation, record = watched.situation, watched.record
+        if isinstance(record, Keyframe):
+            colours = [_BODY_COLOURS.get(label, _NO_CLASS) for label in situation.labels]
+        else:
+            colours = [palette.found_colour(record, row) for row in range(len(situation.bodies))]
         self._lane.log(
             "world/bodies", box_batch(situation.bodies, colors=colours, labels=situation.names)
         )
         # A box around the first-sighting actor, in the colour of its state.
-        if situation.target is not None:
-            around = situation.bodies[[situation.target]] + np.array(
-                [0, 0, 0, *[2 * _MARGIN_M] * 3, 0]
-            )
-            text = [f"{situation.names[situation.target]}: {state}"]
-            self._lane.log(
-                "world/first_sighting",
-                box_batch(around, colors=entities.ACTOR_COLOURS[state], labels=text),
-            )
+        if situation.target is not None and isinstance(record, Keyframe):
+            around = situation.bodies[[situation.target]] + [0, 0, 0, *[2 * _MARGIN_M] * 3, 0]
+            state = actor_state(record)
+            text = [f"{situation.names[situation.target]}: {state.words}"]
+            box = box_batch(around, colors=state.colour, labels=text)
+            self._lane.log("world/first_sighting", box)
 
     def _log_ego(self, situation: TrueSituation) -> None:
         self._lane.log("world/ego", box_batch(situation.ego[None]))
@@ -131,29 +124,27 @@ class SpaceLog:
     def _log_returns(self, watched: Watched) -> None:
         cells, points = watched.returned(self._rig.grid)
         # Every nth return, so that there are at most MOST_POINTS.
-        step = math.ceil(len(cells) / entities.MOST_POINTS) or 1
-        colours = _SHARE_COLOURS[watched.shares.ravel()[cells[::step]]]
+        step = math.ceil(len(cells) / MOST_POINTS) or 1
+        colours = palette.SHARE_COLOURS[watched.shares.ravel()[cells[::step]]]
         self._lane.log("world/lidar/returns", rr.Points3D(points[::step], colors=colours))
 
     def _log_tracks(self, situation: TrueSituation) -> None:
         tracks = situation.belief.tracks
         colours = [
-            entities.COASTING_RGB if misses else entities.EXPLAINED_RGB for misses in tracks.misses
+            palette.COASTING_COLOUR if misses else palette.EXPLAINED_COLOUR
+            for misses in tracks.misses
         ]
         names = [CLASSES[label] for label in tracks.classes]
+        boxes = box_batch(tracks.boxes, colors=colours, labels=names)
         moves = np.column_stack([tracks.velocities, np.zeros(len(tracks))])
-        for entity, make in (
-            ("tracks", lambda: [box_batch(tracks.boxes, colors=colours, labels=names)]),
-            ("velocities", lambda: [rr.Arrows3D(vectors=moves, origins=tracks.boxes[:, :3])]),
-        ):
-            self._lane.log_list(f"world/lidar/{entity}", len(tracks), make)
+        arrows = rr.Arrows3D(vectors=moves, origins=tracks.boxes[:, :3])
+        self._lane.log_list("world/lidar/tracks", len(tracks), boxes)
+        self._lane.log_list("world/lidar/velocities", len(tracks), arrows)
 
     def _log_wedges(self, kind: str, rays: Floats) -> None:
-        ends = entities.WEDGE_M * rays / np.linalg.norm(rays, axis=-1, keepdims=True)
+        ends = WEDGE_M * rays / np.linalg.norm(rays, axis=-1, keepdims=True)
         strips = [strip for corners in ends for strip in _pyramid(corners)]
-        self._lane.log_list(
-            f"world/lidar/wedges/{kind}", len(strips), lambda: [rr.LineStrips3D(strips)]
-        )
+        self._lane.log_list(f"world/lidar/wedges/{kind}", len(strips), rr.LineStrips3D(strips))
 
 
 def _pyramid(corners: Floats) -> list[Floats]:

@@ -46,11 +46,6 @@ def test_what_is_not_watched_is_refused(watcher, tmp_path):
         watcher(make("CartPole-v1"), tmp_path / "out.rrd")
 
 
-def test_who_watches_the_closed_loop_alone_refuses_the_open_one():
-    with pytest.raises(care_sim.InvalidInput, match="watches the closed loop of CARE-Sim"):
-        Kept(make("CARE-Street-v0"))
-
-
 def test_it_goes_around_and_under_wrappers_that_change_the_action(watcher, tmp_path):
     for name, env in (
         ("around.rrd", watcher(SectorReserve(make()), tmp_path / "around.rrd")),

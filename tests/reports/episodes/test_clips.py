@@ -20,10 +20,10 @@ from care_sim.policies.paper.care import Care
 from care_sim.reports.episodes.clips import Clip, outcome_words
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.episode_play import run_episode, trace
-from care_sim.viewer.pictures import comparison as panel
-from care_sim.viewer.pictures import keyframe as picture
+from care_sim.viewer.palette import DETECTED, HIT
 from care_sim.viewer.pictures.clip_files import ENDINGS, write_clip
-from care_sim.viewer.pictures.sought import DETECTED, HIT
+from care_sim.viewer.pictures.episode_view import verdict
+from care_sim.viewer.pictures.keyframe import PANEL_WIDTH, PICTURE_WIDTH
 
 SIZE = (64, 48)
 COLOURS = [(200, 30, 30), (30, 200, 30), (30, 30, 200)]
@@ -81,7 +81,7 @@ def test_filming_leaves_the_episode_as_it_was(tmp_path):
     film.write()
     assert filmed["episode_hash"] == trace(config)[0]["episode_hash"]
     with Image.open(tmp_path / "clip.png") as clip:
-        assert (clip.n_frames, clip.size) == (3, (picture.PICTURE_WIDTH, picture.PICTURE_HEIGHT))
+        assert (clip.n_frames, clip.size) == (3, (PICTURE_WIDTH, 720))
 
 
 def test_a_folder_is_no_clip_and_what_was_there_stays_until_the_new_one_is_whole(tmp_path):
@@ -121,7 +121,7 @@ def test_a_policy_that_fails_takes_no_other_with_it(tmp_path, monkeypatch, capsy
     assert "RuntimeError: no idea" in err
     with Image.open(tmp_path / "clip.png") as clip:
         assert clip.n_frames == 4
-        assert clip.width > 3 * panel.COMPARISON_WIDTH
+        assert clip.width > 3 * PANEL_WIDTH
 
 
 def test_what_was_played_is_printed_when_the_rest_is_interrupted(monkeypatch, capsys):
@@ -158,10 +158,7 @@ def test_episodes_side_by_side_end_together(tmp_path, capsys):
         pictures = [np.asarray(frame.convert("RGB")) for frame in ImageSequence.Iterator(clip)]
     assert len(pictures) == 4
     left, right = zip(
-        *(
-            (each[:, : panel.COMPARISON_WIDTH], each[:, -panel.COMPARISON_WIDTH :])
-            for each in pictures
-        ),
+        *((each[:, :PANEL_WIDTH], each[:, -PANEL_WIDTH:]) for each in pictures),
         strict=True,
     )
     assert np.array_equal(left[1], left[3])
@@ -245,22 +242,21 @@ def keyframes(*states, distance_m=20.0):
     ]
 
 
-def test_the_verdict_of_a_panel():
-    hidden, seen, found = (False, False), (True, False), (True, True)
-    assert panel.verdict_text(keyframes(hidden), 0.1)[0] == "not in view yet"
-    assert (
-        panel.verdict_text(keyframes(hidden, seen, seen), 0.1)[0]
-        == "in view for 0.2 s, not detected"
-    )
-    late = panel.verdict_text(keyframes(hidden, seen, seen, found, found), 0.1)
-    assert late == (
-        "detected at 17.0 m, 0.2 s after coming into view; clearance 14.0 m",
-        DETECTED.colour,
-    )
-    assert (
-        panel.verdict_text(keyframes(hidden, found), 0.1)[0]
-        == "detected at 19.0 m; clearance 17.0 m"
-    )
+@pytest.mark.parametrize(
+    ("states", "words"),
+    [
+        (["hidden"], "not in view yet"),
+        (["hidden", "seen", "seen"], "in view for 0.2 s, not detected"),
+        (["hidden", "found"], "detected at 19.0 m; clearance 17.0 m"),
+        (
+            ["hidden", "seen", "seen", "found", "found"],
+            "detected at 17.0 m, 0.2 s after coming into view; clearance 14.0 m",
+        ),
+    ],
+)
+def test_the_verdict_of_a_panel(states, words):
+    told = {"hidden": (False, False), "seen": (True, False), "found": (True, True)}
+    assert verdict(keyframes(*map(told.get, states)), 0.1).words == words
 
 
 def test_gymnasiums_wrapper_records_a_video(tmp_path):
@@ -275,4 +271,4 @@ def test_gymnasiums_wrapper_records_a_video(tmp_path):
     env.close()
     frames = frames_of(tmp_path / "videos" / "rl-video-episode-0.mp4")
     assert len(frames) == 4
-    assert frames[0].shape == (picture.PICTURE_HEIGHT, picture.PICTURE_WIDTH, 3)
+    assert frames[0].shape == (720, PICTURE_WIDTH, 3)

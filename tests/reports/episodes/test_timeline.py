@@ -1,10 +1,20 @@
 import io
+import re
 from types import SimpleNamespace
 
 from rich.console import Console
 
-from care_sim.reports.episodes.timeline import encounter_text, eventful, print_timeline
+from care_sim.loops.records import Keyframe
+from care_sim.reports.episodes.timeline import (
+    encounter_text,
+    episode_timeline,
+    scene_timeline,
+    with_gaps,
+)
+from care_sim.sources.named import source_of
 from care_sim.study.episode_config import EpisodeConfig
+from care_sim.study.play_config import play_grid
+from care_sim.study.scene_trace import trace_scene
 from tests.helpers.made_rows import row
 
 ENCOUNTER = {
@@ -28,25 +38,46 @@ def printed(config, **outcome):
     """The outcome that is printed of an episode without keyframes, by its labels."""
     told = {"episode_hash": "0", "wall_s": 1.0, **outcome}
     terminal = io.StringIO()
-    print_timeline(config, row(config, 9.0, **told), [], Console(file=terminal, width=200))
+    timeline = episode_timeline(config, row(config, 9.0, **told), [])
+    timeline.print(Console(file=terminal, width=200))
     return terminal.getvalue()
 
 
 def frame(number, braking):
-    return SimpleNamespace(
-        index=number, in_view=False, detected=False, braking=braking, impact_speed_mps=None
-    )
+    return Keyframe(number, float(number), (), False, False, braking, 8.0, 30.0, 30.0, 28.0, None)
 
 
 def test_only_the_keyframes_about_a_change_are_shown():
+    config = EpisodeConfig("ncap", "care")
     frames = [frame(n, braking=n >= 5) for n in range(10)]
-    assert [f and f.index for f in eventful(frames)] == [0, None, 4, 5, None, 9]
-    assert eventful(frames[:1]) == frames[:1]
+    lines = episode_timeline(config, {}, frames).lines
+    assert [line and line[0] for line in lines] == ["0.0", None, "4.0", "5.0", None, "9.0"]
+    assert lines[2] == ("4.0", "8.0", "30.0", "28.0", "0", "", "", "")
+    assert lines[3][-1] == "yes"
+
+
+def test_of_a_play_only_the_keyframes_at_which_somebody_appears_are_shown(drive):
+    source = source_of(f"argoverse2:{drive}")
+    (config,) = play_grid(source, source.scenes(), ["full"], [1.0])
+    timeline = scene_timeline(config, trace_scene(config, config.film()))
+    # A person appears after 2.5 s.
+    assert [line and line[0] for line in timeline.lines] == ["0.0", None, "2.5", None, "4.5"]
+    assert timeline.lines[2][3:5] == ("1", "1")
+    (event,) = timeline.events
+    assert event.startswith("  2.5 s  pedestrian ")
+    assert event.endswith(" m: found at once")
+    assert timeline.outcome["found at once %"] == "100.0"
+
+
+def test_a_run_that_is_left_out_is_one_gap_however_long_it_is():
+    assert with_gaps("abcdef", [4]) == ["a", None, "e", "f"]
+    assert with_gaps("a", [0, -1]) == ["a"]
+    assert with_gaps("", []) == []
 
 
 def test_what_the_seed_drew_is_printed_with_the_outcome():
     text = printed(EpisodeConfig("ncap", "care"), **{"drawn.test": "CPTA-50"})
-    assert "drawn.test" + 35 * " " + "CPTA-50" in text
+    assert re.search("^drawn.test +CPTA-50$", text, re.M)
     assert "hit_kind" not in text
 
 

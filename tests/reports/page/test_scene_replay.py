@@ -11,7 +11,7 @@ from care_sim.evaluation.recall import CENSORED_AT
 from care_sim.reports.page.episodes import Episode, episodes_to_watch, played_again
 from care_sim.reports.page.listing import episode_groups, replay_data
 from care_sim.reports.page.played_rows import play_config_of
-from care_sim.reports.page.scene_replay import replayed_scene
+from care_sim.reports.page.replay import replayed
 from care_sim.sources.named import source_of
 from care_sim.study.play_config import play_grid
 from care_sim.study.rows.reading import with_tags
@@ -36,7 +36,7 @@ def rows(plays):
 
 @pytest.fixture(scope="module")
 def replay(plays):
-    return replayed_scene(plays[0])
+    return replayed(plays[0])
 
 
 @pytest.fixture(scope="module")
@@ -136,7 +136,7 @@ def test_what_returns_and_nobody_annotated_is_a_wall(short_streets):
     source = source_of("streets")
     (config,) = play_grid(source, source.scenes()[:1], ["history"], [0.03])
     film = config.film()
-    walls = np.array(replayed_scene(config).bodies[0]["squares"])
+    walls = np.array(replayed(config).bodies[0]["squares"])
     assert len(walls) == len(np.unique(walls, axis=0)) > 50
     assert (walls % 50 == 0).all()
     # All of them lie within the reach of the LiDAR, and none in the lane of the car.

@@ -5,12 +5,8 @@ import numpy as np
 import pytest
 
 from care_sim.sensors.annotated import NO_OBJECT
-from care_sim.viewer.pictures.camera_views import (
-    EXPLAINED_COLOUR,
-    FALSE_COLOUR,
-    UNEXPLAINED_COLOUR,
-    take_pictures,
-)
+from care_sim.viewer.palette import EXPLAINED_COLOUR, FALSE_COLOUR, UNEXPLAINED_COLOUR
+from care_sim.viewer.pictures.camera_views import PICTURES_TOP, cameras_picture
 from care_sim.viewer.pictures.furnished_world import furnished
 from care_sim.viewer.pictures.keyframe import PICTURE_WIDTH
 
@@ -29,11 +25,9 @@ def loop():
 @pytest.fixture(scope="module")
 def pictures(loop):
     with furnished(loop.world) as scene:
-        return [np.asarray(picture) for picture in take_pictures(scene, loop, PICTURE_WIDTH)]
-
-
-def test_every_camera_has_its_share_of_the_width(loop, pictures):
-    assert [picture.shape for picture in pictures] == [(90, 160, 3)] * len(loop.rig.cameras)
+        row = np.asarray(cameras_picture(scene, loop))[PICTURES_TOP : PICTURES_TOP + 90]
+    assert row.shape == (90, PICTURE_WIDTH, 3)
+    return np.split(row, len(loop.rig.cameras), axis=1)
 
 
 def test_they_come_as_the_columns_of_the_grid_do_and_show_their_own_boxes(loop, pictures):
@@ -49,22 +43,21 @@ def test_they_come_as_the_columns_of_the_grid_do_and_show_their_own_boxes(loop, 
         assert not np.any(np.all(picture == EXPLAINED_COLOUR, axis=-1))
 
 
-def test_a_false_box_has_a_colour_of_its_own_and_a_cross(loop):
+def test_a_false_box_has_a_colour_of_its_own_and_a_cross(pictures):
     with gymnasium.make("CARE-Dense-v0", disable_env_checker=True, false_positive_rate=3.0) as env:
         env.reset(seed=0)
         own = env.unwrapped.loop
         false = own.detected_bodies == NO_OBJECT
         assert 0 < false.sum() < len(false)
         with furnished(own.world) as scene:
-            (picture,) = (np.asarray(each) for each in take_pictures(scene, own, PICTURE_WIDTH))
-    scale = picture.shape[1] / own.rig.cameras[0].width
+            picture = np.asarray(cameras_picture(scene, own))[PICTURES_TOP:, 20:]
+    # The picture is 320 x 180 pixels.
+    scale = 320 / own.rig.cameras[0].width
     shown = np.all(picture == FALSE_COLOUR, axis=-1)
     for box in scale * own.belief.detections.boxes[false]:
         left, top, right, bottom = np.clip(box.round().astype(int), 0, None)
         assert shown[top : bottom + 1, left : right + 1].sum() >= bottom - top
-    with furnished(loop.world) as scene:
-        for each in take_pictures(scene, loop, PICTURE_WIDTH):
-            assert not np.any(np.all(np.asarray(each) == FALSE_COLOUR, axis=-1))
+    assert not any(np.any(np.all(each == FALSE_COLOUR, axis=-1)) for each in pictures)
 
 
 def test_the_sky_is_darker_than_the_words_on_it(pictures):

@@ -1,6 +1,7 @@
-"""The picture of a keyframe: it shows what happened, and taking it changes nothing."""
+"""The picture of a keyframe of either loop shows what happened, and taking it changes nothing."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import gymnasium
 import numpy as np
@@ -11,22 +12,26 @@ import care_sim
 from care_sim.core.grid import AngularGrid
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.envs import CLOSED_LOOP
+from care_sim.viewer import palette
 from care_sim.viewer.pictures import drawing
-from care_sim.viewer.pictures.camera_views import EXPLAINED_COLOUR
-from care_sim.viewer.pictures.comparison import draw_panel
+from care_sim.viewer.pictures.episode_view import episode_view
 from care_sim.viewer.pictures.keyframe import (
-    BRAKING_COLOUR,
-    GRID_LEFT,
-    PANELS_TOP,
-    PICTURE_HEIGHT,
+    BELOW_SIZE,
+    CELLS_SIZE,
+    CELLS_TOP,
+    PANEL_WIDTH,
     PICTURE_WIDTH,
-    SURROUND_HEIGHT,
     directions,
-    draw_grid,
+    draw_cells,
     draw_keyframe,
+    draw_panel,
 )
-from care_sim.viewer.pictures.sought import DETECTED, IN_VIEW, OUT_OF_VIEW
+from care_sim.viewer.pictures.scene_view import scene_view
 from tests.helpers.lidars import CORNERS, STACK
+
+HEIGHT = 720
+SURROUND_HEIGHT = 860
+"""Of a rig with several cameras, whose row takes more room."""
 
 
 def make(name, **arguments):
@@ -38,17 +43,42 @@ def shows(picture, colour, at_least=20):
     return np.all(picture == colour, axis=-1).sum() >= at_least
 
 
-def play(name, keyframes, *, draw):
-    env, policy = make(name, render_mode="rgb_array" if draw else None)
-    observation, _ = env.reset(seed=0)
-    seen = [observation]
-    for _ in range(keyframes):
-        if draw:
-            env.render()
+@pytest.fixture(params=[*CLOSED_LOOP, "CARE-Replay-v0"])
+def world(request, drive):
+    """Name and arguments of an environment of either loop."""
+    source = {"source": f"argoverse2:{drive}"} if request.param == "CARE-Replay-v0" else {}
+    return request.param, source
+
+
+def play(world, draw):
+    """Observations and pictures of three keyframes, from before the first scan on."""
+    name, source = world
+    env, policy = make(name, render_mode="rgb_array" if draw else None, **source)
+    # A seed with which the drive has somebody who hides, too.
+    observation, _ = env.reset(seed=3)
+    seen, pictures = [observation], [env.render()]
+    for _ in range(3):
         observation, *_ = env.step(policy(observation))
         seen.append(observation)
+        pictures.append(env.render())
+    assert not draw or np.array_equal(env.render(), pictures[-1])
     env.close()
-    return seen
+    return seen, pictures, len(env.unwrapped.rig.cameras)
+
+
+def test_it_has_one_size_before_and_after_the_first_scan_and_changes_no_observation(world):
+    seen, pictures, cameras = play(world, draw=True)
+    film = world[0] == "CARE-Replay-v0"
+    height = SURROUND_HEIGHT if cameras > 1 and not film else HEIGHT
+    for picture in pictures:
+        assert picture.shape == (height, PICTURE_WIDTH, 3)
+        assert picture.dtype == np.uint8
+    assert all(np.any(one != later) for one, later in pairwise(pictures))
+    # Nothing hides the vehicle of a cut-in of UN Regulation 157.
+    state = palette.IN_VIEW if "R157" in world[0] else palette.OUT_OF_VIEW
+    assert shows(pictures[0], palette.NOT_FOUND_COLOUR if film else state.colour)
+    for plain, drawn in zip(play(world, draw=False)[0], seen, strict=True):
+        assert all(np.array_equal(plain[key], drawn[key]) for key in plain)
 
 
 @pytest.fixture(scope="module")
@@ -62,49 +92,39 @@ def dense():
         assert not terminated
         assert not truncated
         frame = env.unwrapped.keyframes[-1]
-    yield env
+    yield env.unwrapped
     env.close()
-
-
-@pytest.mark.parametrize("name", CLOSED_LOOP)
-def test_it_has_one_size_before_and_after_the_first_scan(name):
-    env, policy = make(name, render_mode="rgb_array")
-    # A seed with which the drive has somebody who hides, too.
-    observation, _ = env.reset(seed=3)
-    before = env.render()
-    env.step(policy(observation))
-    after = env.render()
-    env.close()
-    height = SURROUND_HEIGHT if len(env.unwrapped.rig.cameras) > 1 else PICTURE_HEIGHT
-    for picture in (before, after):
-        assert picture.shape == (height, PICTURE_WIDTH, 3)
-        assert picture.dtype == np.uint8
-    assert np.any(before != after)
-    # Nothing hides the vehicle of a cut-in of UN Regulation 157.
-    assert shows(before, IN_VIEW.colour if "R157" in name else OUT_OF_VIEW.colour)
-
-
-def test_rendering_changes_no_observation():
-    for plain, drawn in zip(
-        play("CARE-Dense-v0", 6, draw=False), play("CARE-Dense-v0", 6, draw=True), strict=True
-    ):
-        assert all(np.array_equal(plain[key], drawn[key]) for key in plain)
-
-
-def test_the_same_keyframe_gives_the_same_picture(dense):
-    assert np.array_equal(dense.render(), dense.render())
 
 
 def test_it_says_what_happened(dense):
     picture = dense.render()
-    assert shows(picture, BRAKING_COLOUR, 1000)
-    assert shows(picture, DETECTED.colour, 50)
-    assert shows(picture, EXPLAINED_COLOUR, 500)
-    loop = dense.unwrapped.loop
-    frame = dense.unwrapped.keyframes[-1]
-    calm = draw_keyframe(loop, replace(frame, braking=False, detected=False))
-    assert not shows(calm, BRAKING_COLOUR)
-    assert not shows(calm, DETECTED.colour)
+    assert shows(picture, palette.BRAKING_COLOUR, 1000)
+    assert shows(picture, palette.DETECTED.colour, 50)
+    assert shows(picture, palette.EXPLAINED_COLOUR, 500)
+    frame = dense.keyframes[-1]
+    calm = np.asarray(
+        draw_keyframe(episode_view(dense.loop, [replace(frame, braking=False, detected=False)]))
+    )
+    assert not shows(calm, palette.BRAKING_COLOUR)
+    assert not shows(calm, palette.DETECTED.colour)
+
+
+def test_a_panel_of_either_loop_is_as_wide_and_has_an_even_height(dense, drive):
+    """Film needs even sizes."""
+    name, source = "CARE-Replay-v0", {"source": f"argoverse2:{drive}"}
+    with gymnasium.make(name, disable_env_checker=True, **source) as env:
+        env.reset(seed=0)
+        env.step(np.ones(env.action_space.shape, np.float32))
+        inner = env.unwrapped
+        panels = [
+            draw_panel("care", scene_view(inner.loop, [inner.last])),
+            draw_panel("care", episode_view(dense.loop, dense.keyframes)),
+        ]
+    for panel in panels:
+        assert panel.width == PANEL_WIDTH
+        assert panel.height % 2 == 0
+        # The line at the bottom is as green as what is found.
+        assert shows(np.asarray(panel)[-30:], palette.FOUND_COLOUR) == (panel is panels[1])
 
 
 def test_the_grid_shows_the_left_on_the_left_and_colours_returns():
@@ -113,11 +133,13 @@ def test_the_grid_shows_the_left_on_the_left_and_colours_returns():
     left, right = 6, 1
     ranges[0, left] = grid.range_m
     ranges[1, right] = 10.0
-    picture = np.asarray(drawing.fitted(drawing.grid_picture(grid, ranges), (8, 6)))
+    picture = np.asarray(
+        drawing.fitted(drawing.cells_picture(drawing.scan_colours(grid, ranges)), (8, 6))
+    )
     assert picture.shape == (6, 8, 3)
-    assert tuple(picture[0, 1]) == drawing.NO_RETURN_COLOUR
+    assert tuple(picture[0, 1]) == palette.NO_RETURN_COLOUR
     assert tuple(picture[5, 6]) == tuple(drawing.range_colours(np.array([0.2]))[0])
-    assert tuple(picture[5, 1]) == drawing.NOT_FIRED_COLOUR
+    assert tuple(picture[5, 1]) == palette.NOT_FIRED_COLOUR
 
 
 def test_points_behind_the_camera_are_not_marked():
@@ -130,10 +152,12 @@ def test_a_picture_of_more_cells_than_pixels_averages_them():
     grid = AngularGrid(columns=4, rows=2)
     ranges = np.zeros(grid.shape)
     ranges[:, :2] = grid.range_m
-    picture = np.asarray(drawing.fitted(drawing.grid_picture(grid, ranges), (2, 4)))
+    picture = np.asarray(
+        drawing.fitted(drawing.cells_picture(drawing.scan_colours(grid, ranges)), (2, 4))
+    )
     assert [tuple(pixel) for pixel in picture[0]] == [
-        drawing.NOT_FIRED_COLOUR,
-        drawing.NO_RETURN_COLOUR,
+        palette.NOT_FIRED_COLOUR,
+        palette.NO_RETURN_COLOUR,
     ]
     assert (picture == picture[0]).all()
 
@@ -144,43 +168,37 @@ def test_a_setting_with_another_sensor_is_drawn_within_the_picture():
         env.reset(seed=0)
         env.step(np.ones(env.action_space.shape, np.float32))
         picture = env.render()
-        panel = draw_panel("care", env.unwrapped.loop, env.unwrapped.keyframes)
-    assert picture.shape == (PICTURE_HEIGHT, PICTURE_WIDTH, 3)
+    assert picture.shape == (HEIGHT, PICTURE_WIDTH, 3)
     # Between the camera's picture and the grid, and to the right of it, nothing is drawn.
-    background = np.array(drawing.BACKGROUND)
-    assert (picture[PANELS_TOP + 44 : -30, 376 : GRID_LEFT - 2] == background).all()
-    assert (picture[PANELS_TOP + 44 : -30, GRID_LEFT + 514 :] == background).all()
-    assert panel.size == (512, 508)
+    background = np.array(palette.BACKGROUND)
+    left, right = BELOW_SIZE[0], BELOW_SIZE[0] + CELLS_SIZE[0]
+    assert (picture[500 + CELLS_TOP : -50, 376:left] == background).all()
+    assert (picture[500 + CELLS_TOP : -50, right:] == background).all()
 
 
 def test_several_lidars_are_drawn_one_below_the_other_within_the_room_of_one():
     """All cells of the third have returned; of the second none was fired."""
-    canvas = Image.new("RGB", (PICTURE_WIDTH, PICTURE_HEIGHT), drawing.BACKGROUND)
+    canvas = Image.new("RGB", (CELLS_SIZE[0], 220), palette.BACKGROUND)
     ranges = np.zeros(STACK.shape)
     ranges[:8] = STACK.range_m
     ranges[12:] = 10.0
-    draw_grid(canvas, (GRID_LEFT, PANELS_TOP), STACK, ranges)
-    picture = np.asarray(canvas)
-    assert (picture[:, : GRID_LEFT - 2] == drawing.BACKGROUND).all()
-    colours = [tuple(pixel) for pixel in picture[PANELS_TOP + 44 :, GRID_LEFT + 256]]
+    end = draw_cells(canvas, (0, 0), STACK, drawing.scan_colours(STACK, ranges))
+    colours = [tuple(pixel) for pixel in np.asarray(canvas)[CELLS_TOP:, 256]]
     near = tuple(drawing.range_colours(np.array([10 / 80]))[0])
-    where = [colours.index(one) for one in (drawing.NO_RETURN_COLOUR, near)]
+    where = [colours.index(one) for one in (palette.NO_RETURN_COLOUR, near)]
     between = colours[where[0] : where[1]]
-    assert drawing.NOT_FIRED_COLOUR in between
-    assert where[1] < 128
+    assert palette.NOT_FIRED_COLOUR in between
+    assert where[1] < CELLS_SIZE[1]
+    assert end <= CELLS_TOP + CELLS_SIZE[1] + 26
     # One that goes all round names its ends, and the others what lies in their view.
     assert [name for _, name in directions(STACK.grids[1])] == ["left", "ahead"]
 
 
-def test_a_panel_of_several_lidars_shows_what_each_has_ahead():
-    with gymnasium.make("CARE-Dense-v0", sensor=CORNERS, budget=1.0) as env:
+def test_several_lidars_are_named_in_a_picture():
+    with gymnasium.make("CARE-Dense-v0", sensor=CORNERS, render_mode="rgb_array") as env:
         env.reset(seed=0)
         env.step(np.ones(env.action_space.shape, np.float32))
-        panel = draw_panel("care", env.unwrapped.loop, env.unwrapped.keyframes)
-    # Four pixels of background lie between two of them.
-    column = [tuple(pixel) for pixel in np.asarray(panel)[378:474, 300]]
-    assert panel.size == (512, 508)
-    assert column.count((0, 0, 0)) + column.count(drawing.BACKGROUND) == 8
+        assert env.render().shape == (HEIGHT, PICTURE_WIDTH, 3)
 
 
 @pytest.mark.parametrize("heading", [-np.pi, np.pi])

@@ -1,0 +1,64 @@
+"""Colours of pictures and recordings, the same in both: red, green, blue."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from care_sim.loops.scene_records import SceneKeyframe
+
+Colour = tuple[int, int, int]
+
+INK = (235, 237, 240)
+FAINT_INK = (150, 155, 162)
+BACKGROUND = (24, 26, 30)
+NOT_FIRED_COLOUR = (44, 47, 53)
+NO_RETURN_COLOUR = (112, 116, 124)
+
+EXPLAINED_COLOUR = (90, 220, 255)
+UNEXPLAINED_COLOUR = (255, 170, 40)
+FALSE_COLOUR = (255, 105, 180)
+"""Of the camera's boxes: a forecast explains them, none does, they show nothing."""
+MISSED_COLOUR = (255, 80, 120)
+"""Of what a camera without its faults would have given besides."""
+COASTING_COLOUR = (120, 140, 190)
+"""Of a track that the last scan missed, whose box is its forecast."""
+BRAKING_COLOUR = (255, 80, 70)
+EGO_COLOUR = (200, 204, 212)
+
+FOUND_COLOUR = (80, 230, 110)
+NOT_FOUND_COLOUR = (255, 120, 60)
+UNSCORED_COLOUR = (95, 100, 108)
+"""Of annotated objects, the last of those beyond the range that is scored."""
+
+SHARE_COLOURS = np.array(
+    [
+        NOT_FIRED_COLOUR,
+        (80, 200, 255),
+        (255, 150, 30),
+        (112, 116, 132),
+        (170, 225, 110),
+        (150, 120, 170),
+    ],
+    np.uint8,
+)
+"""Of cells and their returns, by place in `care_sim.core.actions.SHARES`."""
+
+
+def found_colour(keyframe: SceneKeyframe, row: int) -> Colour:
+    """That of an annotated object, by how it stands with it."""
+    if keyframe.found[row]:
+        return FOUND_COLOUR
+    return NOT_FOUND_COLOUR if keyframe.scored[row] else UNSCORED_COLOUR
+
+
+class State(NamedTuple):
+    """How it stands with somebody: words and their colour."""
+
+    words: str
+    colour: Colour
+
+
+OUT_OF_VIEW = State("out of view", (225, 225, 225))
+IN_VIEW = State("in view", (255, 170, 40))
+DETECTED = State("detected", FOUND_COLOUR)
+HIT = State("hit", BRAKING_COLOUR)

@@ -1,0 +1,183 @@
+"""What pictures show of the closed loop: the street from behind the car, with boxes, and what the
+cameras see.
+"""
+
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+from PIL import Image, ImageDraw
+
+from care_sim.core.boxes import planar_ranges
+from care_sim.core.frames import Frame
+from care_sim.core.pinhole import PinholeCamera
+from care_sim.core.types import CLASSES
+from care_sim.evaluation.metrics import outcome
+from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.loops.records import Keyframe
+from care_sim.loops.watcher import sought, way_ahead
+from care_sim.viewer import palette
+from care_sim.viewer.palette import State
+from care_sim.viewer.pictures import drawing
+from care_sim.viewer.pictures.camera_views import cameras_picture
+from care_sim.viewer.pictures.furnished_world import METRE_MARKS, add_car, furnished, photograph
+from care_sim.viewer.pictures.keyframe import PANEL_WIDTH, PICTURE_WIDTH, Scenery, View
+from care_sim.viewer.pictures.labels import Labels
+from care_sim.world.world import Actor
+
+CHASE_CAMERA = PinholeCamera(
+    PICTURE_WIDTH, 460, np.deg2rad(80.0), (-10.0, 0.0, 3.6), 0.0, np.deg2rad(-16.0)
+)
+"""Behind the car and above it, in the frame of the LiDAR; low enough for a strip of sky."""
+_PANEL_CAMERA = PinholeCamera(
+    PANEL_WIDTH, 320, np.deg2rad(52.0), (-11.0, 0.0, 3.8), 0.0, np.deg2rad(-11.0)
+)
+BOXES_MEAN = "boxes: tracks, faint when the last scan missed them"
+
+
+def episode_view(loop: ClosedLoop, frames: Sequence[Keyframe]) -> View:
+    """The present state of `loop` after the keyframes `frames`, and the scan of the last of them.
+
+    The street has tracks as wireframes, arrows at whom the episode is about and at whom the car
+    hit, and on the ground the strip the controller guards. Below are the cameras with their
+    detections. The episode is left as it was.
+    """
+    frame = frames[-1] if frames else None
+    return View(
+        rig=loop.rig,
+        time_s=loop.world.time,
+        progress=f"{loop.world.ego_motion.speed:.1f} m/s",
+        braking=frame is not None and frame.braking,
+        contact=contact_text(loop, frame) if frame else None,
+        aside=_clearance(loop, frame) if frame else "",
+        verdict=verdict(frames, loop.rig.keyframe_s),
+        fired=frame.fired if frame else None,
+        ranges=loop.belief.ranges,
+        shares=None,
+        is_moment=frame is not None and frame.braking,
+        scenery=partial(_scenery, loop, frame),
+    )
+
+
+def _clearance(loop: ClosedLoop, frame: Keyframe) -> str:
+    target = loop.world.first_sighting
+    if target is None or not np.isfinite(frame.clearance_m):
+        return ""
+    return f"clearance to {target.name} {frame.clearance_m:.1f} m"
+
+
+def verdict(frames: Sequence[Keyframe], keyframe_s: float) -> State:
+    """Whether the first-sighting actor is detected so far, since when and how far away."""
+    seen = next((frame.time_s for frame in frames if frame.in_view), None)
+    found = next((frame.time_s for frame in frames if frame.detected), None)
+    if found is None:
+        if seen is None:
+            return State("not in view yet", palette.FAINT_INK)
+        so_long_s = frames[-1].time_s - seen + keyframe_s
+        return State(f"in view for {so_long_s:.1f} s, not detected", palette.IN_VIEW.colour)
+    so_far = outcome(frames)
+    delay_s = 0.0 if seen is None else found - seen
+    after = f", {delay_s:.1f} s after coming into view" if delay_s > 0 else ""
+    clearance = "" if so_far.clearance_m is None else f"; clearance {so_far.clearance_m:.1f} m"
+    words = f"detected at {so_far.detection_distance_m:.1f} m{after}{clearance}"
+    return State(words, palette.DETECTED.colour)
+
+
+def _scenery(loop: ClosedLoop, frame: Keyframe | None, whole: bool) -> Scenery:
+    camera = CHASE_CAMERA if whole else _PANEL_CAMERA
+    with furnished(loop.world) as scene:
+        # The cameras do not see the car that carries them, nor the marks on the ground.
+        below = cameras_picture(scene, loop) if whole else None
+        add_car(scene, loop.world, loop.rig.sensor_x_m, loop.guarded_m)
+        street = photograph(scene, camera, loop.sensor)
+    labels = _mark_street(street, camera, loop, frame)
+    # Numbers stand beside the bars, 1.6 m to the left, on the ground.
+    for metres in METRE_MARKS:
+        bar = Frame.mounted(way_ahead(loop.world, loop.rig.sensor_x_m, metres), (0.0, 1.6, 0.0))
+        (ground,) = loop.sensor.boxes_to_local(np.array([[bar.x, bar.y, *[0.0] * 5]]))
+        if at := drawing.point_above(camera, ground):
+            labels.beside(at, f"{metres:.0f} m", palette.INK, 12)
+    return Scenery(street, below)
+
+
+def _mark_street(
+    street: Image.Image, camera: PinholeCamera, loop: ClosedLoop, frame: Keyframe | None
+) -> Labels:
+    """Tracks as wireframes with their classes, those that the last scan missed faint, arrows at
+    whom the episode is about, and in a corner what the boxes mean. Gives the labels, for more.
+    """
+    draw, tracks = ImageDraw.Draw(street), loop.belief.tracks
+    marks = [
+        (
+            box,
+            CLASSES[number],
+            misses,
+            palette.COASTING_COLOUR if misses else palette.EXPLAINED_COLOUR,
+        )
+        for box, number, misses in zip(tracks.boxes, tracks.classes, tracks.misses, strict=True)
+    ]
+    # Tracks come nearest first: the nearest is drawn last, over the others, and named first.
+    for box, _, misses, colour in reversed(marks):
+        drawing.wireframe(draw, camera, box, colour, 1 if misses else 2)
+    labels = Labels(draw)
+    mark_sought(labels, camera, loop, frame)
+    # Before the tracks, whose names leave room for it.
+    labels.over((0, street.height), BOXES_MEAN, palette.EXPLAINED_COLOUR)
+    for box, name, _, colour in marks:
+        if at := drawing.point_above(camera, box):
+            labels.over(at, name, colour)
+    return labels
+
+
+def mark_sought(
+    labels: Labels, camera: PinholeCamera, loop: ClosedLoop, frame: Keyframe | None
+) -> None:
+    """An arrow at everybody whom the episode is about, and at whom the car hit.
+
+    Whom a drive lets the ego meet has one within the range of the LiDAR: further down the street
+    arrows would lie on one another. `frame` is the keyframe before, None before the first.
+    """
+    actors = sought(loop.world)
+    hit = _hit_actor(loop, frame)
+    if hit and hit not in actors:
+        actors.append(hit)
+    boxes = loop.sensor.boxes_to_local(loop.world.boxes(actors))
+    for actor, box, away in zip(actors, boxes, planar_ranges(boxes).tolist(), strict=True):
+        if loop.world.meetings and away > loop.rig.grid.range_m:
+            continue
+        state = palette.HIT if actor is hit else _state(loop, frame, actor)
+        if at := drawing.point_above(camera, box):
+            labels.arrow(at, f"{actor.name}: {state.words}", state.colour)
+
+
+def contact_text(loop: ClosedLoop, frame: Keyframe) -> str | None:
+    """Whom the car hit in a keyframe, and how fast it was, or who hit the car; None without a
+    contact.
+    """
+    hit = _hit_actor(loop, frame)
+    if hit is None or frame.impact is None:
+        return None
+    if not frame.impact.at_front:
+        return f"HIT BY {hit.name}"
+    return f"HIT {hit.name} at {frame.impact.speed_mps:.1f} m/s"
+
+
+def _hit_actor(loop: ClosedLoop, frame: Keyframe | None) -> Actor | None:
+    if frame is None or frame.impact is None:
+        return None
+    return next(actor for actor in loop.world.actors if actor.body == frame.impact.body)
+
+
+def _state(loop: ClosedLoop, frame: Keyframe | None, actor: Actor) -> State:
+    if frame is not None and _is_detected(loop, frame, actor):
+        return palette.DETECTED
+    return palette.IN_VIEW if loop.shows(actor.body) else palette.OUT_OF_VIEW
+
+
+def _is_detected(loop: ClosedLoop, frame: Keyframe, actor: Actor) -> bool:
+    if not loop.world.meetings:
+        return frame.detected
+    return any(
+        sight.detected and one.body == actor.body
+        for one, sight in zip(loop.world.meetings, frame.sights, strict=True)
+    )

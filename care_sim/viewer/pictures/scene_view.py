@@ -1,0 +1,219 @@
+"""What pictures show of the open loop: the scene from above, the car driving to the right, with who
+is found, and where it is known what the policy knew.
+"""
+
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+from PIL import Image, ImageDraw
+
+from care_sim.core.arrays import Floats
+from care_sim.core.boxes import box_corners, planar_ranges
+from care_sim.core.residual import wedge_rays
+from care_sim.core.rig import Rig
+from care_sim.evaluation.sightings import RANGE_M
+from care_sim.loops.open_loop import OpenLoop
+from care_sim.loops.scene_records import SceneKeyframe
+from care_sim.loops.watcher import TrueSituation, Watched, returned
+from care_sim.viewer import palette
+from care_sim.viewer.palette import State
+from care_sim.viewer.pictures import drawing
+from care_sim.viewer.pictures.keyframe import BELOW_SIZE, PANEL_WIDTH, PICTURE_WIDTH, Scenery, View
+from care_sim.viewer.pictures.labels import Labels
+from care_sim.world.bodies import CATALOGUE
+
+MAP_HEIGHT = 460
+_PIXELS_PER_M = MAP_HEIGHT / (2 * RANGE_M + 4)
+_RINGS = (10.0, 20.0, 30.0, 40.0, RANGE_M)
+"""Radii of the range rings, metres."""
+_CAR = np.array([0.0, 0.0, 0.0, *CATALOGUE["ego"].size, 0.0])
+_AROUND = np.array([0.0, 0.0, 0.0, 1.8, 1.8, 0.0, 0.0])
+"""What a box gains in length and width for its second line."""
+_RING_COLOUR = (52, 56, 63)
+RETURN_COLOUR = (172, 176, 184)
+TRACK_COLOUR = (205, 160, 255)
+_AHEAD_S = 1.0
+"""For how long the line of a forecast shows where it goes."""
+_DOT = 3
+"""Radius of a forecast, pixels."""
+_CLEAR = 10
+"""Pixels from the middle of a box to its name."""
+_DIMMED = 0.45
+"""What is left of the colour of a wedge: a scene has many of them."""
+_SIDES = [7, 8]
+"""Among the rays of an image box, those through the points of its left and right edge where its
+azimuth is extreme.
+"""
+_LINE = 18
+"""Height of a line of the legend, pixels."""
+_OBJECTS = (
+    State("found", palette.FOUND_COLOUR),
+    State("not found", palette.NOT_FOUND_COLOUR),
+    State("beyond 50 m", palette.UNSCORED_COLOUR),
+    State("double line: its first sighting", palette.INK),
+)
+_SCAN = (State("small dots: returns", RETURN_COLOUR),)
+_KNOWN = (
+    State("small dots: returns, by their share of the budget", palette.FAINT_INK),
+    State("dot: forecast of a track, hollow: missed", TRACK_COLOUR),
+    State("with a line to where it is in a second", TRACK_COLOUR),
+    State("camera box, explained by a track", palette.EXPLAINED_COLOUR),
+    State("camera box, new", palette.UNEXPLAINED_COLOUR),
+    State("camera box, false", palette.FALSE_COLOUR),
+)
+
+
+def scene_view(
+    loop: OpenLoop, frames: Sequence[SceneKeyframe], watched: Watched | None = None
+) -> View:
+    """The last of the keyframes `frames`, which `loop` has just played, or is about to play first.
+
+    The map has the annotated objects, which are found, not found, or beyond the range that is
+    scored; those that appear have a double line. It has the returns of the fired cells. Where the
+    keyframe was `watched`, those that appear have a name, and the map has what was known when the
+    cells were chosen: the forecasts of tracks, and where the camera's detections lie, which have no
+    depth. The episode is left as it was.
+    """
+    last = frames[-1]
+    entries = sum(frame.entries for frame in frames)
+    found = sum(frame.entries_found for frame in frames)
+    told = State(
+        f"{found} of {entries} first sightings found at once",
+        palette.FOUND_COLOUR if found == entries else palette.NOT_FOUND_COLOUR,
+    )
+    return View(
+        rig=loop.rig,
+        time_s=last.time_s,
+        progress=f"{last.objects_found} of {last.objects} objects found",
+        braking=False,
+        contact=None,
+        aside=loop.film.name[:28],
+        verdict=told if entries else State("no first sighting yet", palette.FAINT_INK),
+        fired=last.fired,
+        ranges=loop.last_ranges,
+        shares=watched.shares if watched else None,
+        is_moment=bool(last.entries),
+        scenery=partial(_scenery, loop, last, watched),
+    )
+
+
+def _scenery(
+    loop: OpenLoop, keyframe: SceneKeyframe, watched: Watched | None, whole: bool
+) -> Scenery:
+    legend = _OBJECTS + (_KNOWN if watched else _SCAN)
+    picture = Image.new(
+        "RGB", (PICTURE_WIDTH if whole else PANEL_WIDTH, MAP_HEIGHT), palette.BACKGROUND
+    )
+    street = Map(picture)
+    street.draw_rings()
+    if watched:
+        _draw_wedges(street, loop.rig, watched.situation)
+    _draw_returns(street, loop, watched)
+    _draw_objects(street, loop.film.shots[keyframe.index].annotations.boxes, keyframe)
+    if watched:
+        _draw_tracks(street, watched.situation)
+        _name_sightings(street, watched.situation, keyframe)
+    if not whole:
+        _write_legend(street.draw, (8, MAP_HEIGHT - _LINE * len(legend)), legend)
+        return Scenery(picture, None)
+    below = Image.new("RGB", BELOW_SIZE, palette.BACKGROUND)
+    draw = ImageDraw.Draw(below)
+    draw.text((20, 8), "From above, driving to the right:", palette.INK, drawing.font(14))
+    _write_legend(draw, (20, 34), legend)
+    return Scenery(picture, below)
+
+
+class Map:
+    """A picture of the ground from above, the car in its middle."""
+
+    def __init__(self, picture: Image.Image):
+        self.draw = ImageDraw.Draw(picture)
+        self._middle = np.array(picture.size) / 2
+
+    def pixels(self, places: Floats) -> Floats:
+        """(n, 2) pixels of places (n, 2) in the sensor frame: ahead is right, left is up."""
+        on_map: Floats = self._middle + places * [_PIXELS_PER_M, -_PIXELS_PER_M]
+        return on_map
+
+    def draw_box(self, box: Floats, colour: palette.Colour, width: int) -> None:
+        """The outline of a box (7,)."""
+        corners = self.pixels(box_corners(box[None])[0, :4, :2])
+        self.draw.polygon(corners.ravel().tolist(), outline=colour, width=width)
+
+    def draw_rings(self) -> None:
+        """The rings of range around the car."""
+        for metres in _RINGS:
+            ends = self.pixels(np.array([[-metres, metres], [metres, -metres]]))
+            (left, top), (right, bottom) = ends.tolist()
+            self.draw.ellipse((left, top, right, bottom), outline=_RING_COLOUR)
+            at, words = (right - 4, (top + bottom) / 2), f"{metres:.0f} m"
+            self.draw.text(at, words, palette.FAINT_INK, drawing.font(11), anchor="rm")
+
+
+def _draw_returns(street: Map, loop: OpenLoop, watched: Watched | None) -> None:
+    cells, points = returned(loop.last_ranges, loop.rig.grid)
+    shares = watched.shares.ravel()[cells].tolist() if watched else [None] * len(cells)
+    for (x, y), share in zip(street.pixels(points[:, :2]), shares, strict=True):
+        colour = RETURN_COLOUR if share is None else tuple(palette.SHARE_COLOURS[share].tolist())
+        street.draw.rectangle((x, y, x + 1, y + 1), colour)
+
+
+def _draw_objects(street: Map, boxes: Floats, keyframe: SceneKeyframe) -> None:
+    """The car, and the annotated boxes (n, 7) in the colours of how it stands with them; those that
+    appear have a second line.
+    """
+    street.draw_box(_CAR, palette.INK, 2)
+    for row, box in enumerate(boxes):
+        colour = palette.found_colour(keyframe, row)
+        street.draw_box(box, colour, 2)
+        if keyframe.appearing[row]:
+            street.draw_box(box + _AROUND, colour, 1)
+
+
+def _draw_wedges(street: Map, rig: Rig, situation: TrueSituation) -> None:
+    """The rays through the left and right of every image box, as far as objects are scored."""
+    rays = wedge_rays(situation.belief.detections, rig)
+    for nine, known, false in zip(rays, situation.known, situation.false, strict=True):
+        colour = (
+            palette.FALSE_COLOUR
+            if false
+            else palette.EXPLAINED_COLOUR
+            if known
+            else palette.UNEXPLAINED_COLOUR
+        )
+        dimmed = tuple(round(_DIMMED * part) for part in colour)
+        for x, y, _ in nine[_SIDES]:
+            line = street.pixels(np.array([[0.0, 0.0], [x, y]]) * RANGE_M / np.hypot(x, y))
+            street.draw.line(line.ravel().tolist(), dimmed)
+
+
+def _draw_tracks(street: Map, situation: TrueSituation) -> None:
+    """A dot at the centre of every forecast, hollow where the last scan missed the track, and a
+    line to where it would be in a second, over ground.
+    """
+    tracks = situation.belief.tracks
+    centres = tracks.boxes[:, :2]
+    ends = street.pixels(centres + _AHEAD_S * tracks.velocities)
+    for (x, y), end, misses in zip(street.pixels(centres), ends, tracks.misses, strict=True):
+        street.draw.line((x, y, *end.tolist()), TRACK_COLOUR)
+        dot = (x - _DOT, y - _DOT, x + _DOT, y + _DOT)
+        street.draw.ellipse(dot, None if misses else TRACK_COLOUR, TRACK_COLOUR)
+
+
+def _name_sightings(street: Map, situation: TrueSituation, keyframe: SceneKeyframe) -> None:
+    """Who appears, the nearest first, whose name keeps its place: a person is a few pixels large.
+    A film has no names: they hide who else is there.
+    """
+    labels = Labels(street.draw)
+    boxes = situation.sensor.boxes_to_local(situation.bodies)
+    for row in np.argsort(planar_ranges(boxes), kind="stable").tolist():
+        if keyframe.appearing[row]:
+            x, y = street.pixels(boxes[row, :2]).tolist()
+            words = f"{situation.names[row]} appears"
+            labels.over((x, y - _CLEAR), words, palette.found_colour(keyframe, row))
+
+
+def _write_legend(draw: ImageDraw.ImageDraw, at: tuple[int, int], legend: Sequence[State]) -> None:
+    for row, (words, colour) in enumerate(legend):
+        draw.text((at[0], at[1] + _LINE * row), words, colour, drawing.font(13))
