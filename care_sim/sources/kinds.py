@@ -50,7 +50,8 @@ def recordings_in(
     folder = os.path.expanduser(folder)
     is_file = os.path.isfile(folder) and folder.endswith(kind.suffixes)
     if not (os.path.isdir(folder) or is_file):
-        raise InvalidInput(f"source {name}:{folder}: {folder} is no folder")
+        files = "".join(f" and no {suffix} file" for suffix in kind.suffixes)
+        raise InvalidInput(f"source {name}:{folder}: {folder} is no folder{files}")
     given = {name: value for name, value in options.items() if value is not None}
     for option in given:
         if option not in {field.name for field in fields(kind)}:

@@ -143,6 +143,7 @@ _OF_SOME_PLAYS = {
     "empty_boxes": as_optional(FLAG),
     "points": as_optional(TEXT),
     "reference": as_optional(TEXT),
+    "topics": as_optional(TEXT),
     "presence": as_optional(TEXT),
 } | {name: CONDITION_COLUMNS[name] for name in COLUMNS_WHERE_CHANGED if name in OF_BOTH_LOOPS}
 _PLAYS = Schema(

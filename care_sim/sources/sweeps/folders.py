@@ -44,7 +44,7 @@ def _sweep_files(folder: Path) -> list[Path]:
     kinds = sorted({path.suffix for path in found})
     if len(kinds) != 1:
         raise InvalidInput(
-            f"{folder}: sweeps of one kind are asked for, {', '.join(READERS)}, got "
+            f"{folder}: sweeps must be files of one kind, {', '.join(READERS)}, got "
             f"{' and '.join(kinds) or 'none'}"
         )
     return found
@@ -67,7 +67,7 @@ def _times(folder: Path, sweeps: list[Path]) -> Floats:
         is_time = whole.isdecimal() and (part.isdecimal() if point else True)
         if not is_time or not (point or float(whole[:40]) >= _LEAST_NAME):
             raise InvalidInput(
-                f"{sweep}: its name is no time in nanoseconds or microseconds since 1970 or in "
+                f"{sweep}: its name is no time: nano-, micro- or milliseconds since 1970, or "
                 f"seconds with a decimal point; write {TIMES_FILE} with the columns file and time"
             )
     return in_seconds(np.array([float(sweep.stem[:40]) for sweep in sweeps]))

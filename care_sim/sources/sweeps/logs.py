@@ -104,7 +104,7 @@ def _check_times(source: str, times: Floats) -> None:
 
 
 def _check_drive(source: str, poses: Floats) -> None:
-    """Raise InvalidInput for a car that is too fast, or drives sideways."""
+    """Raise InvalidInput for a car that is too fast, or drives sideways or backwards."""
     # Over half a second, so that centimetres of noise between dense poses are no speed.
     times = poses[:, 0]
     rows = np.unique(np.searchsorted(times, np.arange(times[0], times[-1], SWEEPS_KEYFRAME_S)))
@@ -117,8 +117,8 @@ def _check_drive(source: str, poses: Floats) -> None:
     drives = np.hypot(x, y) > 1.0
     if drives.any():
         yaws = Rotation.from_quat(poses[rows[:-1], 4:]).as_euler("ZYX")[:, 0]
-        # Backwards is no fault.
-        aside = np.abs((np.arctan2(y, x) - yaws + np.pi / 2) % np.pi - np.pi / 2)
+        # Backwards for a while is no fault: the median counts.
+        aside = np.abs((np.arctan2(y, x) - yaws + np.pi) % (2 * np.pi) - np.pi)
         off = float(np.median(aside[drives]))
         if off > ASIDE:
             raise InvalidInput(

@@ -100,7 +100,7 @@ def _npy(path: Path) -> Floats:
     # Mapped: an array that says it has billions of numbers is refused by the file's length.
     array = np.asarray(np.lib.format.open_memmap(path, mode="r"))
     if array.ndim != 2 or array.shape[1] < 3 or array.dtype.kind not in "fiu":
-        raise ValueError(f"numbers (n, 3 or more) are asked for, got {array.dtype} {array.shape}")
+        raise ValueError(f"must be numbers (n, 3 or more), got {array.dtype} {array.shape}")
     return array[:, :3].astype(float)
 
 
@@ -125,7 +125,7 @@ def _bin(path: Path) -> Floats:
                 rings = rows[:, 4] if count == 5 else np.zeros(1)
                 if ((rings >= 0) & (rings < RINGS) & (rings == np.rint(rings))).all():
                     return rows[:, :3].astype(float)
-    raise ValueError("float32 x, y, z, intensity and perhaps a whole ring are asked for")
+    raise ValueError("must hold float32 x, y, z, intensity and perhaps a whole ring")
 
 
 READERS: dict[str, Callable[[Path], Floats]] = {

@@ -34,14 +34,14 @@ class Sweeps(Recordings):
       z up) in a fixed world: columns time, x, y, z (metres), and yaw (radians) or qx, qy, qz, qw.
       Times are of the same clock as the sweeps'. A single row is a car that stands.
     - `camera_boxes.json`, if any: what a 2D detector reported
-      (`care_sim.sources.sweeps.camera_boxes`). Without it CARE has no residual: it fires as
-      history does.
+      (`care_sim.sources.sweeps.camera_boxes`); beside `drive.mcap` it is `drive.camera_boxes.json`.
+      Without it CARE has no residual: it fires as history does.
 
-    The folder is a scene, or its sub-folders and MCAP files are scenes. `sensor.toml` in it, or
-    the option `sensor`, is the set-up: rows and reach of the LiDAR, its height (`position_m`) and
-    the cameras. The default is `hdl-32e`. Points are in the LiDAR's axes, x ahead, y left, z up.
-    Where x is to the right and y ahead, turn them, or give the set-up `yaw_deg = -90`; what was
-    learned does not fit that grid.
+    The folder is a scene, or its sub-folders and MCAP files are scenes. The option `sensor`, else
+    `sensor.toml` in the folder or beside it, is the set-up: rows and reach of the LiDAR, its height
+    (`position_m`) and the cameras. The default is `hdl-32e`. Points are in the LiDAR's axes, x
+    ahead, y left, z up. Where x is to the right and y ahead, turn them, or give the set-up
+    `yaw_deg = -90`; what was learned does not fit that grid.
 
     Keyframes are 0.5 s apart. The detector `reference` gets all points of a keyframe. What it
     detects and tracks becomes the annotations, and a cluster that appears within range is a first
@@ -72,7 +72,7 @@ class Sweeps(Recordings):
         folders = self._folders()
         check_known(f"scene in {self.folder}", scene, folders)
         place = folders[scene]
-        boxes = place / BOXES_FILE
+        boxes = self._boxes_of(place)
         return film_of_log(
             log_of_bag(place, self.topics) if is_bag(place) else log_of_folder(place),
             sensor_setup(self.setup),
@@ -84,21 +84,29 @@ class Sweeps(Recordings):
         """The bag, or the scene's own files."""
         folder = self._folders().get(scene, self.folder / scene)
         if is_bag(folder):
-            return [folder]
+            return [folder, self._boxes_of(folder)]
         sweeps = sorted((folder / SWEEPS_FOLDER).glob("*"))
-        return [*sweeps, *(folder / name for name in (POSES_FILE, TIMES_FILE, BOXES_FILE))]
+        return [*sweeps, folder / POSES_FILE, folder / TIMES_FILE, self._boxes_of(folder)]
 
     @property
     def setup(self) -> str | SensorSetup:
         """The option, else the file in the folder, else the default."""
-        own = (self.folder.parent if self.folder.is_file() else self.folder) / SETUP_FILE
-        usual = str(own) if own.exists() else DEFAULT_SETUP
+        # In the folder that is named, or beside it where that is a scene.
+        folder = Path(os.path.abspath(self.folder))
+        own = [place / SETUP_FILE for place in (folder, folder.parent)]
+        usual = next((str(path) for path in own if path.exists()), DEFAULT_SETUP)
         given = self.sensor if self.sensor is not None else usual
         return given if isinstance(given, SensorSetup) else os.fspath(given)
 
     def columns(self) -> dict[str, Any]:
-        """The reference where it is not the usual one."""
-        return {} if self.reference == CLUSTER else {"reference": self.reference}
+        """The reference where it is not the usual one, and the topics where they are named."""
+        told = {} if self.reference == CLUSTER else {"reference": self.reference}
+        return told | ({"topics": " ".join(self.topics)} if self.topics else {})
+
+    @staticmethod
+    def _boxes_of(place: Path) -> Path:
+        """Return the file of camera boxes: in the folder, or beside a file."""
+        return place.with_suffix(f".{BOXES_FILE}") if place.is_file() else place / BOXES_FILE
 
     def _folders(self) -> dict[str, Path]:
         """Return the folder of every scene."""

@@ -39,7 +39,7 @@ def columns_of(path: Path, table: Any, names: Sequence[str]) -> Floats:
     for name in names:
         if table.column_names.count(name) != 1:
             known = ", ".join(table.column_names)[:200]
-            raise InvalidInput(f"{path}: one column {name} is asked for, got {known}")
+            raise InvalidInput(f"{path}: must have one column {name}, has {known}")
         try:
             columns.append(table[name].cast(pyarrow.float64(), safe=False).to_numpy())
         except (ValueError, pyarrow.ArrowException) as error:

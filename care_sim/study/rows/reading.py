@@ -29,6 +29,7 @@ READ_WITH = {
     "empty_boxes": None,
     "points": None,
     "reference": CLUSTER,
+    "topics": None,
 }
 """Columns that tell how a recording is read, and what they hold where it is the usual way."""
 _USUAL_PLAY = (

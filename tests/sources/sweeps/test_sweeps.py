@@ -123,6 +123,9 @@ def test_a_set_up_in_the_folder_says_rows_and_height(tmp_path, folder):
     film = film_of(own)
     assert film.grid.rows == 16
     assert film.sensor_height_m == 2.14
+    # It may lie beside the scene, too.
+    (own / "sensor.toml").rename(tmp_path / "sensor.toml")
+    assert film_of(own).grid.rows == 16
     # An option comes first.
     other = tmp_path / "other.toml"
     other.write_text(text + "position_m = [-0.445, 0, 1.84]\n")
@@ -155,7 +158,7 @@ def test_a_car_that_stands_has_a_single_pose(tmp_path):
 def test_poses_between_sweeps_are_interpolated(tmp_path):
     own = write_log(tmp_path / "drive")
     turn = ["time,x,y,z,yaw"] + [
-        f"{START_NS * 1e-9 + t:.6f},{6 * t:.6f},0,0,{3 + 0.2 * t - 6.283185 * (t > 0.75):.6f}"
+        f"{START_NS * 1e-9 + t:.6f},{-6 * t:.6f},0,0,{3 + 0.2 * t - 6.283185 * (t > 0.75):.6f}"
         for t in (0, 0.7, 1.4, 2.1, 2.8, 3.5, 4.2)
     ]
     (own / "poses.csv").write_text("\n".join(turn))
