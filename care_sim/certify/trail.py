@@ -12,10 +12,10 @@ import gymnasium
 import numpy as np
 
 from care_sim.base.portable_hash import portable_bytes
+from care_sim.certify.design import Drawn
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.evaluation.metrics import outcome
 from care_sim.loops.closed_loop import ClosedLoop
-from care_sim.measure.certify.design import Drawn
 
 CONFIGURATION = "configuration"
 OUTCOME = "outcome"
@@ -49,9 +49,6 @@ STAGE_BYTES = 3
 class Trail(gymnasium.Wrapper[Any, Any, Any, Any]):
     """Plays one episode of the list, whatever `reset` is told, and keeps its trail. Steps after the
     end have no effect.
-
-    An exception ends the episode and is kept. Raised in a process of a vector, it would leave the
-    others waiting.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], episode: Drawn):
@@ -62,18 +59,13 @@ class Trail(gymnasium.Wrapper[Any, Any, Any, Any]):
         self._keyframes = 0
         self._gained = _Gained()
         self._observation: Any = None
-        self._failure = ""
         self.over = False
         """Whether the trail is whole."""
 
     @property
-    def played(self) -> bytes | str:
-        """The trail: `DIGEST_BYTES` of the hash over all, then `STAGE_BYTES` per stage; or in one
-        line why there is none.
-        """
-        if not self.over:
-            return "it did not come to its end"
-        return self._failure or self._content.digest()[:DIGEST_BYTES] + bytes(self._stages)
+    def played(self) -> bytes:
+        """The trail: `DIGEST_BYTES` of the hash over all, then `STAGE_BYTES` per stage."""
+        return self._content.digest()[:DIGEST_BYTES] + bytes(self._stages)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -91,11 +83,7 @@ class Trail(gymnasium.Wrapper[Any, Any, Any, Any]):
         different budgets.
         """
         if not self.over:
-            try:
-                self._play(action)
-            except Exception as error:
-                self._failure = " ".join(f"{type(error).__name__}: {error}".split())
-                self.over = True
+            self._play(action)
         return self._observation, 0.0, False, False, {}
 
     def _play(self, action: Any) -> None:

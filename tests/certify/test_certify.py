@@ -1,40 +1,45 @@
-"""The certificate: no mode changes an episode, and a break is named where it is."""
+"""The certificate: no way of playing changes an episode, and a break is named where it is."""
 
+import json
+import os
+import subprocess
 import sys
+from contextlib import closing
 from dataclasses import replace
+from functools import partial
 
 import gymnasium
 import numpy as np
 import pytest
+from gymnasium.vector import AsyncVectorEnv
 
 from care_sim.base.errors import InvalidInput, MissingExtra
-from care_sim.core.firing import free_cells
-from care_sim.core.types import Scan, Tracks
-from care_sim.driving.braking import BrakingController
-from care_sim.loops.needless import NeedlessBraking
-from care_sim.measure.certify import design, playing, published, run
-from care_sim.measure.certify.design import (
+from care_sim.certify import design, published
+from care_sim.certify.design import (
+    ALONE,
     AS_LISTED,
     CERTIFIED_EPISODES,
     CERTIFIED_POLICIES,
     CLOSED,
     DRIVE,
-    MODES,
     REPLAY,
     STREET,
+    VECTOR,
     drawn,
 )
-from care_sim.measure.certify.drive import write_drive
-from care_sim.measure.certify.modes import in_turns, play_in_mode
-from care_sim.measure.certify.playing import (
+from care_sim.certify.drive import write_drive
+from care_sim.certify.playing import (
     FARTHEST,
     attempt,
+    begun,
+    certified_env,
     episode_batches,
+    play_alone,
+    play_in_vector,
     playable_here,
     trails_of,
 )
-from care_sim.measure.certify.run import CertifyConfig
-from care_sim.measure.certify.trail import (
+from care_sim.certify.trail import (
     CONFIGURATION,
     DIGEST_BYTES,
     OUTCOME,
@@ -42,9 +47,16 @@ from care_sim.measure.certify.trail import (
     TRAIL_STAGES,
     first_difference,
 )
-from care_sim.measure.certify.verdict import verdict_of
+from care_sim.certify.verdict import verdict_of
+from care_sim.commands import certify
+from care_sim.commands.certify import Certify
+from care_sim.core.firing import free_cells
+from care_sim.core.types import Scan, Tracks
+from care_sim.driving.braking import BrakingController
+from care_sim.loops.needless import NeedlessBraking
 from care_sim.perception.tracker import TrackMemory
 from care_sim.policies import make_policy
+from care_sim.policies.makers import is_privileged, maker
 from care_sim.sensors.camera import CameraDetector
 from care_sim.sensors.lidar import Lidar
 from care_sim.sensors.recorded_lidar import RecordedLidar
@@ -64,43 +76,97 @@ def of(episodes, count):
 
 
 def alone(episode, source=""):
-    (trail,) = in_turns([episode], source)
-    assert isinstance(trail, bytes), trail
+    (trail,) = play_alone([episode], source)
     return trail
 
 
+def in_processes(make_vector, episodes, source):
+    """The trails of episodes in a vector whose environments are in processes of their own; the
+    policies choose in this one, for the rigs of twins.
+    """
+    makers = [partial(certified_env, episode, source) for episode in episodes]
+    twins = [make() for make in makers]
+    policies = [begun(episode, twin) for episode, twin in zip(episodes, twins, strict=True)]
+    with closing(make_vector(makers)) as vector:
+        # One of Stable-Baselines3 gives no infos.
+        begin = vector.reset()
+        observations = begin[0] if isinstance(begin, tuple) else begin
+        for _ in range(max(episode.keyframes for episode in episodes)):
+            seen = [
+                {name: rows[n] for name, rows in observations.items()} for n in range(len(twins))
+            ]
+            chosen = np.stack([policy(one) for policy, one in zip(policies, seen, strict=True)])
+            observations = vector.step(chosen)[0]
+        trails = list(vector.get_attr("played"))
+    for twin in twins:
+        twin.close()
+    return trails
+
+
+def of_gymnasium(makers):
+    return AsyncVectorEnv(makers, context="fork")
+
+
+def of_stable_baselines3(makers):
+    vectors = pytest.importorskip("stable_baselines3.common.vec_env")
+    return vectors.SubprocVecEnv(makers, start_method="fork")
+
+
 def test_no_mode_changes_a_trail(source):
-    together = [one for one in CLOSED if one != DRIVE]
-    closed = of([e for e in LIST if e.environment in together and e.mode == "async"], 4)
+    together = [e for e in LIST if e.environment in {*CLOSED} - {DRIVE}]
+    closed = of([e for e in together if not is_privileged(maker(e.policy))], 4)
     trails = [alone(episode) for episode in closed]
-    assert {mode: play_in_mode(mode, closed, source) for mode in MODES} == dict.fromkeys(
-        MODES, trails
+    assert trails == [published.read()[episode.number] for episode in closed]
+    assert play_in_vector(closed, source) == trails
+    assert in_processes(of_gymnasium, closed, source) == trails
+    assert in_processes(of_stable_baselines3, closed, source) == trails
+
+
+ASKED = """
+import json, sys
+from care_sim.certify.design import drawn
+from care_sim.certify.playing import play_alone
+numbers, source = json.load(sys.stdin)
+print(json.dumps([trail.hex() for trail in play_alone([drawn(n) for n in numbers], source)]))
+"""
+
+
+@pytest.mark.parametrize("seed", ["1", "2"])
+def test_no_hash_seed_changes_a_trail(seed, source):
+    """An episode of every policy; each run of the certificate has seeds of its own."""
+    able = [e for e in LIST if e.environment != STREET and e.keyframes <= 6]
+    numbers = [*{episode.policy: episode.number for episode in able}.values()]
+    done = subprocess.run(
+        [sys.executable, "-c", ASKED],
+        input=json.dumps([numbers, source]),
+        env=os.environ | {"PYTHONHASHSEED": seed},
+        capture_output=True,
+        text=True,
+        check=True,
     )
+    known = published.read()
+    assert json.loads(done.stdout) == [known[number].hex() for number in numbers]
 
 
 def test_drives_play_in_vectors_of_their_own():
     drives = of([e for e in LIST if e.environment == DRIVE and e.policy not in AS_LISTED], 2)
-    trails = [alone(episode) for episode in drives]
-    assert play_in_mode("sync", drives, "") == play_in_mode("async", drives, "") == trails
+    assert play_in_vector(drives, "") == [alone(episode) for episode in drives]
     batches = [{e.environment for e in batch} for batch in episode_batches(LIST)]
     assert {DRIVE} in batches
     assert not any(DRIVE in batch and len(batch) > 1 for batch in batches)
 
 
 def test_recordings_and_privileged_policies_play_in_vectors_too(source):
-    recorded = of([e for e in LIST if e.environment == REPLAY and e.mode == "subprocess"], 2)
-    trails = [alone(episode, source) for episode in recorded]
-    assert (
-        play_in_mode("async", recorded, source) == play_in_mode("sync", recorded, source) == trails
-    )
+    recorded = of([e for e in LIST if e.environment == REPLAY], 2)
+    assert play_in_vector(recorded, source) == [alone(episode, source) for episode in recorded]
     beyond = replace(recorded[0], policy="history-oracle", keyframes=40)
-    assert play_in_mode("sync", [beyond], source) == [alone(beyond, source)]
+    assert play_in_vector([beyond], source) == [alone(beyond, source)]
     privileged = of(
         # A drive has six cameras, and no vector holds it beside another world.
         [e for e in LIST if e.policy == "history-oracle" and e.environment in {*CLOSED} - {DRIVE}],
         3,
     )
-    assert play_in_mode("sync", privileged, source) == [alone(episode) for episode in privileged]
+    assert play_in_vector(privileged, source) == [alone(episode) for episode in privileged]
 
 
 def test_batches_hold_every_episode_once_and_a_street_together():
@@ -111,10 +177,11 @@ def test_batches_hold_every_episode_once_and_a_street_together():
     assert len(streets) == len(design.STREETS)
 
 
-def test_an_episode_that_fails_is_told_and_leaves_the_others(source, monkeypatch):
-    good, bad = of([e for e in LIST if e.environment in CLOSED], 2)
+@pytest.mark.parametrize("mode", [ALONE, VECTOR])
+def test_an_episode_that_fails_is_told_and_leaves_the_others(mode, source):
+    good, bad = of([e for e in LIST if e.environment in {*CLOSED} - {DRIVE}], 2)
     broken = replace(bad, policy="nobody")
-    found = attempt([replace(good, mode="sync"), replace(broken, mode="sync")], source)
+    found = attempt([replace(good, mode=mode), replace(broken, mode=mode)], source)
     assert found[good.number] == alone(good)
     assert "nobody" in found[bad.number]
     verdict = verdict_of(found | {0: found[bad.number]}, [found[good.number]] * 1000)
@@ -122,32 +189,25 @@ def test_an_episode_that_fails_is_told_and_leaves_the_others(source, monkeypatch
     assert verdict.hash is None
 
 
-@pytest.mark.parametrize(("module", "extra"), [("open3d", "open3d"), ("stable_baselines3", "rl")])
-def test_what_needs_an_extra_that_is_missing_is_left_out_and_told(
-    module, extra, monkeypatch, capsys
-):
-    able, lines = playable_here(LIST)
-    assert (able, lines) == (LIST, [])
-    monkeypatch.setitem(sys.modules, module, None)
-    monkeypatch.setattr(playing, "find_spec", lambda name: None if name == module else name)
-    able, (line,) = playable_here(LIST)
+def test_what_needs_an_extra_that_is_missing_is_left_out_and_told(monkeypatch, capsys):
+    assert playable_here(LIST) == (LIST, "")
+    monkeypatch.setitem(sys.modules, "open3d", None)
+    able, line = playable_here(LIST)
     missing = len(LIST) - len(able)
     assert line.startswith(f"{missing} of {CERTIFIED_EPISODES:,} not played: ")
-    assert f"extra '{extra}'" in line
+    assert "extra 'open3d'" in line
     trails = [bytes([n % 256]) * (DIGEST_BYTES + 2) for n in range(len(LIST))]
-    monkeypatch.setattr(
-        run, "_played", lambda numbers, _workers: {number: trails[number] for number in numbers}
-    )
-    monkeypatch.setattr(run, "read", lambda: trails)
-    assert run.run_certify(CertifyConfig(workers=1)) == 0
+    monkeypatch.setattr(certify, "trails_of", lambda numbers, *_: {n: trails[n] for n in numbers})
+    monkeypatch.setattr(certify, "read", lambda: trails)
+    assert Certify(workers=1)() == 0
     told = capsys.readouterr()
-    assert told.err.splitlines() == [f"care-sim: {line}"]
+    assert f"care-sim: {line}" in told.err.splitlines()
     left = published.combined([trails[episode.number] for episode in able])
     assert told.out == f"{len(able):,} of {CERTIFIED_EPISODES:,} episodes: {left}, as published\n"
     lacking = next(one.number for one in LIST if one not in able)
-    for config in (CertifyConfig(episode=lacking), CertifyConfig(every=True, write=True)):
-        with pytest.raises(MissingExtra, match=f"extra '{extra}'"):
-            run.run_certify(config)
+    for command in (Certify(episode=lacking), Certify(every=True, write=True)):
+        with pytest.raises(MissingExtra, match="extra 'open3d'"):
+            command()
 
 
 def test_what_is_said_to_need_no_extra_plays_without(monkeypatch):
@@ -159,6 +219,22 @@ def test_what_is_said_to_need_no_extra_plays_without(monkeypatch):
         alone(episode)
 
 
+def test_a_list_is_published_whole_or_not_at_all(monkeypatch, capsys):
+    written = []
+    monkeypatch.setattr(certify, "write", written.append)
+    trails = {n: bytes([n % 256]) * (DIGEST_BYTES + 2) for n in range(design.ALL_EPISODES)}
+    monkeypatch.setattr(certify, "trails_of", lambda *_: trails | {7: "it broke"})
+    assert Certify(every=True, write=True)() == 1
+    assert capsys.readouterr().out == "nothing is written: episode 7 was not played: it broke\n"
+    assert written == []
+    monkeypatch.setattr(certify, "trails_of", lambda *_: trails)
+    assert Certify(every=True, write=True)() == 0
+    assert written == [[*trails.values()]]
+    for wrong in ({"write": True}, {"episode": 3, "every": True}, {"episode": design.ALL_EPISODES}):
+        with pytest.raises(InvalidInput):
+            Certify(**wrong)
+
+
 MADE = replace(
     drawn(0),
     environment="CARE-Dense-v0",
@@ -166,7 +242,7 @@ MADE = replace(
     policy="care",
     seed=3,
     keyframes=5,
-    mode="single",
+    mode=ALONE,
 )
 
 
@@ -243,7 +319,7 @@ def a_brake_that_is_said_to_be_on(monkeypatch):
 
 
 def another_outcome(monkeypatch):
-    from care_sim.measure.certify import trail
+    from care_sim.certify import trail
 
     judge = trail.outcome
     monkeypatch.setattr(
@@ -357,11 +433,11 @@ def test_a_missing_or_damaged_list_is_one_line(tmp_path):
 @pytest.mark.smoke
 def test_some_of_the_list_goes_as_published():
     """A short form of the certificate; `care-sim certify` is the whole."""
-    short = [
-        episode for episode in LIST if episode.environment != STREET and episode.keyframes <= 12
-    ]
+    short = [one for one in LIST if one.environment != STREET and one.keyframes <= 12]
     here, _ = playable_here(short)
-    chosen = [one.number for mode in MODES for one in [e for e in here if e.mode == mode][:5]]
+    chosen = [
+        one.number for mode in (ALONE, VECTOR) for one in [e for e in here if e.mode == mode][:14]
+    ]
     verdict = verdict_of(trails_of(chosen, 1), published.read())
     assert verdict.as_published, "\n".join(verdict.lines())
 

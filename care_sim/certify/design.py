@@ -1,8 +1,8 @@
 """The list of episodes: what the episode of a number is made of.
 
 Everything is drawn independently, so that the first `CERTIFIED_EPISODES` hold every pair of an
-environment, a policy, a fault, a setting, a driver and a mode that can meet. The order of the draws
-is a part of the list.
+environment, a policy, a fault, a setting and a driver that can meet. The order of the draws is a
+part of the list.
 
 The open loop detects with the paper's proxy. The detector `cluster` fits the road by iteration,
 which ends a little differently on another processor.
@@ -13,9 +13,7 @@ from functools import cache
 from random import Random
 from typing import Any
 
-from care_sim.policies import maker
-from care_sim.policies.makers import is_privileged
-
+ALL_EPISODES = 10_000
 CERTIFIED_EPISODES = 3_050
 """What is played unless more is asked for. With 32 policies the last pair meets in number 3,020."""
 
@@ -81,14 +79,10 @@ AS_LISTED: dict[str, dict[str, Any]] = {
 keyframe, as many as they have seeds.
 """
 
-SINGLE, INTERLEAVED, SYNC, ASYNC, SUBPROCESS, HASH_SEED = MODES = (
-    "single", "interleaved", "sync", "async", "subprocess", "hash-seed",
-)  # fmt: skip
-"""How an episode is played: alone; in turns with others in one process; in Gymnasium's vectors; in
-the subprocesses of Stable-Baselines3; in an interpreter with another hash seed. No mode may change
-an episode.
+ALONE, VECTOR = "alone", "vector"
+"""How an episode is played: by itself, or in one of Gymnasium's vectors with others. Neither may
+change it: no trail holds the mode. Other processes and other hash seeds are played by the tests.
 """
-_IN_OTHER_PROCESSES = (ASYNC, SUBPROCESS)
 
 _BUDGETS = (0.01, 0.03, 0.05, 0.1, 0.2, 0.35)
 CERTIFIED_FAULTS: dict[str, dict[str, Any]] = {
@@ -211,19 +205,5 @@ def drawn(number: int) -> Drawn:
         # One that `seed-finder` knows, where it plays.
         seed = rng.randrange(_KNOWN_SEEDS if policy == "seed-finder" else 1000)
     keyframes = rng.choice(_CLOSED_KEYFRAMES if closed else _OPEN_KEYFRAMES)
-    mode = rng.choice(modes(environment, policy))
+    mode = rng.choice((ALONE, VECTOR))
     return Drawn(number, environment, tuple(arguments.items()), policy, seed, keyframes, mode)
-
-
-def modes(environment: str, policy: str) -> list[str]:
-    """The modes in which such an episode can be played; those that begin quickly stand several
-    times.
-    """
-    # Truth does not travel between processes, and every interpreter makes a street anew.
-    apart = _IN_OTHER_PROCESSES if is_privileged(maker(policy)) else ()
-    elsewhere = (HASH_SEED,) if environment == STREET else ()
-    return [
-        mode
-        for mode in (SINGLE, SINGLE, SINGLE, INTERLEAVED, *MODES)
-        if mode not in (*apart, *elsewhere)
-    ]

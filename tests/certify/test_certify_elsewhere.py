@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from care_sim.measure.certify import published
-from care_sim.measure.certify.design import STREET, drawn
-from care_sim.measure.certify.drive import write_drive
-from care_sim.measure.certify.modes import in_turns
-from care_sim.measure.certify.trail import first_difference
+from care_sim.certify import published
+from care_sim.certify.design import STREET, drawn
+from care_sim.certify.drive import write_drive
+from care_sim.certify.playing import play_alone
+from care_sim.certify.trail import first_difference
 from tests.helpers.places import ROOT
 from tests.helpers.processor_features import reduced
 
@@ -26,7 +26,7 @@ differ by more than last bits."""
 
 def played(folder):
     source = write_drive(Path(folder))
-    return {n: in_turns([drawn(n)], source)[0] for n in NUMBERS}
+    return dict(zip(NUMBERS, play_alone([drawn(n) for n in NUMBERS], source), strict=True))
 
 
 @pytest.mark.slow
@@ -35,7 +35,7 @@ def test_a_processor_of_fewer_features_plays_most_episodes_as_published(tmp_path
     `care-sim certify` plays every episode of the list.
     """
     line = (
-        "import json; from tests.measure.certify import test_certify_elsewhere as t; "
+        "import json; from tests.certify import test_certify_elsewhere as t; "
         f"trails = t.played({str(tmp_path / 'there')!r}); "
         "print(json.dumps({n: trail.hex() for n, trail in trails.items()}))"
     )

@@ -5,13 +5,8 @@ left out for a reason.
 from dataclasses import fields
 from itertools import combinations, product
 
-from care_sim.core.conditions import DEFAULTS, LOCALISATION, CameraFaults, LidarFaults
-from care_sim.core.return_settings import RETURN_SETTINGS
-from care_sim.envs import IDS
-from care_sim.envs.closed_loop import ClosedLoopEnv
-from care_sim.envs.scenes import ReplayEnv, StreetEnv
-from care_sim.envs.sensing import arguments_of
-from care_sim.measure.certify.design import (
+from care_sim.certify.design import (
+    ALONE,
     CERTIFIED_DRIVERS,
     CERTIFIED_EPISODES,
     CERTIFIED_FAULTS,
@@ -20,15 +15,21 @@ from care_sim.measure.certify.design import (
     CERTIFIED_WORLDS,
     CLOSED,
     DRAWN_TEST,
-    MODES,
     REPLAY,
     STREET,
+    VECTOR,
     drawn,
-    modes,
 )
+from care_sim.core.conditions import DEFAULTS, LOCALISATION, CameraFaults, LidarFaults
+from care_sim.core.return_settings import RETURN_SETTINGS
+from care_sim.envs import IDS
+from care_sim.envs.closed_loop import ClosedLoopEnv
+from care_sim.envs.scenes import ReplayEnv, StreetEnv
+from care_sim.envs.sensing import arguments_of
 from care_sim.policies import BUILT_IN
 from care_sim.scenarios import make_scenario
 
+MODES = (ALONE, VECTOR)
 LIST = [drawn(number) for number in range(CERTIFIED_EPISODES)]
 OF_EVERY_WORLD = {
     name
@@ -63,16 +64,10 @@ LEFT_OUT = {
 
 
 def test_the_episodes_that_are_played_hold_every_pair_that_can_meet():
+    environments = {*CLOSED, STREET, REPLAY}
     met = [(e.environment, e.policy, e.mode, {name for name, _ in e.arguments}) for e in LIST]
-    assert {(e, p) for e, p, _, _ in met} == set(
-        product({*CLOSED, STREET, REPLAY}, CERTIFIED_POLICIES)
-    )
-    possible = {
-        (e, m)
-        for e, p in product({*CLOSED, STREET, REPLAY}, CERTIFIED_POLICIES)
-        for m in modes(e, p)
-    }
-    assert {(e, m) for e, _, m, _ in met} == possible
+    assert {(e, p) for e, p, _, _ in met} == set(product(environments, CERTIFIED_POLICIES))
+    assert {(e, m) for e, _, m, _ in met} == set(product(environments, MODES))
     parameters = {name for world in CERTIFIED_WORLDS.values() for one in world for name in one}
     assert {(p, n) for _, p, _, given in met for n in given} >= set(
         product(CERTIFIED_POLICIES, {*OF_EVERY_WORLD, *DRAWN_TEST})
@@ -81,7 +76,7 @@ def test_the_episodes_that_are_played_hold_every_pair_that_can_meet():
         product(MODES, {*OF_EVERY_WORLD, *parameters})
     )
     faults = {name for one in CERTIFIED_FAULTS.values() for name in one}
-    together = {pair for _, _, _, given in met for pair in combinations(sorted(given), 2)}
+    together = {pair for *_, given in met for pair in combinations(sorted(given), 2)}
     assert together >= set(combinations(sorted(faults), 2))
 
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from care_sim.base.errors import InvalidInput
-from care_sim.measure.certify.trail import DIGEST_BYTES
+from care_sim.certify.trail import DIGEST_BYTES
 from care_sim.study.rows.parquet import read_rows, write_columns
 
 FILE = Path(__file__).with_name("published.parquet")

@@ -39,61 +39,30 @@ def _boxes(sweep: int) -> list[dict[str, Any]]:
     """What stands and moves at a sweep, in the frame of the car."""
     # The car drives 0.5 m per sweep, so that what stands still comes nearer by as much.
     ahead = 30.0 - 0.5 * sweep
-    seen = [
-        _box(sweep, "BOX_TRUCK", "van", (ahead, -4.0, 0.9), (6.0, 2.2, 2.6)),
-        _box(sweep, "REGULAR_VEHICLE", "parked", (ahead + 9.0, -4.2, 0.42), (4.4, 1.9, 1.5)),
-        _box(
-            sweep, "REGULAR_VEHICLE", "parked behind", (ahead + 15.5, -4.1, 0.42), (4.2, 1.8, 1.5)
-        ),
-        _box(sweep, "BUS", "oncoming", (ahead + 25.0 - 0.6 * sweep, 3.7, 1.2), (11.0, 2.6, 3.2)),
+    bus_ahead = ahead + 25.0 - 0.6 * sweep
+    person_y, bicycle_y = -4.0 + 0.13 * (sweep - 20), 6.0 - 0.3 * (sweep - 30)
+    bodies: list[tuple[str, str, tuple[float, ...], tuple[float, ...], dict[str, float]]] = [
+        ("BOX_TRUCK", "van", (ahead, -4.0, 0.9), (6.0, 2.2, 2.6), _AHEAD),
+        ("REGULAR_VEHICLE", "parked", (ahead + 9.0, -4.2, 0.42), (4.4, 1.9, 1.5), _AHEAD),
+        ("REGULAR_VEHICLE", "parked behind", (ahead + 15.5, -4.1, 0.42), (4.2, 1.8, 1.5), _AHEAD),
+        ("BUS", "oncoming", (bus_ahead, 3.7, 1.2), (11.0, 2.6, 3.2), _AHEAD),
+        ("PEDESTRIAN", "person", (ahead + 5.0, person_y, 0.6), (0.6, 0.7, 1.8), _ACROSS),
+        ("BICYCLE", "bicycle", (ahead + 12.0, bicycle_y, 0.4), (1.8, 0.6, 1.4), _ACROSS),
     ]
-    if sweep >= 20:
-        seen.append(
-            _box(
-                sweep,
-                "PEDESTRIAN",
-                "person",
-                (ahead + 5.0, -4.0 + 0.13 * (sweep - 20), 0.6),
-                (0.6, 0.7, 1.8),
-                _ACROSS,
-            )
-        )
-    if sweep >= 30:
-        seen.append(
-            _box(
-                sweep,
-                "BICYCLE",
-                "bicycle",
-                (ahead + 12.0, 6.0 - 0.3 * (sweep - 30), 0.4),
-                (1.8, 0.6, 1.4),
-                _ACROSS,
-            )
-        )
-    return seen
-
-
-def _box(
-    sweep: int,
-    category: str,
-    track: str,
-    place: tuple[float, ...],
-    size: tuple[float, ...],
-    turn: dict[str, float] = _AHEAD,
-) -> dict[str, Any]:
-    numbers = dict(
-        zip(
-            ("tx_m", "ty_m", "tz_m", "length_m", "width_m", "height_m"),
-            (*place, *size),
-            strict=True,
-        )
-    )
-    record = {
-        "timestamp_ns": _stamp(sweep),
-        "track_uuid": track,
-        "category": category,
-        "num_interior_pts": 10,
-    }
-    return record | numbers | turn
+    begins = {"person": 20, "bicycle": 30}
+    return [
+        {
+            "timestamp_ns": _stamp(sweep),
+            "track_uuid": track,
+            "category": category,
+            "num_interior_pts": 10,
+            **dict(zip(("tx_m", "ty_m", "tz_m"), place, strict=True)),
+            **dict(zip(("length_m", "width_m", "height_m"), size, strict=True)),
+            **turn,
+        }
+        for category, track, place, size, turn in bodies
+        if sweep >= begins.get(track, 0)
+    ]
 
 
 def _stamp(sweep: int) -> int:
