@@ -77,11 +77,12 @@ class Certify:
 
 def _publish(found: Trails) -> int:
     """Publish what was played, unless some of it was not."""
-    trails = [trail for _, trail in sorted(found.items()) if isinstance(trail, bytes)]
-    if len(trails) < len(found):
-        number = min(number for number, trail in found.items() if isinstance(trail, str))
-        print(f"nothing is written: episode {number} was not played: {found[number]}")
+    failures = {number: trail for number, trail in found.items() if isinstance(trail, str)}
+    if failures:
+        first = min(failures)
+        print(f"nothing is written: episode {first} was not played: {failures[first]}")
         return 1
+    trails = [trail for _, trail in sorted(found.items()) if isinstance(trail, bytes)]
     write(trails)
     print(f"{len(trails):,} episodes: {combined(trails)}, published")
     return 0

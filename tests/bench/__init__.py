@@ -1,1 +1,1 @@
-"""How fast the simulator is on this machine, beside known engines and environments: `make bench`."""
+"""How fast the simulator is here, beside known engines and environments: `make bench`."""

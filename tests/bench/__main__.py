@@ -182,7 +182,7 @@ def lines(report):
         what = f"scan of {name}, {told['rays']} rays, {told['bodies']} bodies"
         yield spread(what, "ms", figures["scan_ms"])
         if name != REFERENCE:
-            yield f"  {figures['same_body']:.1%} of its rays meet the same body as those of {REFERENCE}"
+            yield f"  {figures['same_body']:.1%} of its rays meet the same body as in {REFERENCE}"
     for name in ("memory", "batch_memory"):
         yield f"{name}: " + ", ".join(f"{key} {value:.0f}" for key, value in report[name].items())
     yield "the paper's {episodes:.0f} episodes, two workers: {seconds:.1f} s".format(

@@ -160,6 +160,6 @@ def growth_figure(report):
     panels[0].set_ylabel("a scan, poses included (ms)")
     panels[0].legend(frameon=False, fontsize=8)
     scan, processor = report["scans"], report["machine"]["processor"]
-    title = f"{scan['bodies']} bodies and {scan['rays']} rays unless the axis says otherwise. {processor}"
+    title = f"{scan['bodies']} bodies and {scan['rays']} rays unless told otherwise. {processor}"
     figure.suptitle(title, x=0.01, ha="left", fontsize=8)
     return figure

@@ -55,8 +55,8 @@ from care_sim.core.types import Scan, Tracks
 from care_sim.driving.braking import BrakingController
 from care_sim.loops.needless import NeedlessBraking
 from care_sim.perception.tracker import TrackMemory
-from care_sim.policies import make_policy
-from care_sim.policies.makers import is_privileged, maker
+from care_sim.policies import make_policy, maker
+from care_sim.policies.makers import is_privileged
 from care_sim.sensors.camera import CameraDetector
 from care_sim.sensors.lidar import Lidar
 from care_sim.sensors.recorded_lidar import RecordedLidar
