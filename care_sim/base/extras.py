@@ -55,24 +55,6 @@ def import_torch() -> ModuleType:
     return _import("torch", "PyTorch", "rl")
 
 
-def import_mujoco() -> ModuleType:
-    """MuJoCo. Raises MissingExtra with the extra to install."""
-    return _import("mujoco", "MuJoCo", "bench")
-
-
-def import_panda_gym() -> ModuleType:
-    """panda-gym, whose environments are then registered. Raises MissingExtra with the extra."""
-    return _import("panda_gym", "panda-gym", "bench")
-
-
-def import_envpool() -> ModuleType:
-    """EnvPool, which no extra brings. Raises MissingExtra with what to install."""
-    try:
-        return import_module("envpool")
-    except ImportError as error:
-        raise MissingExtra(f"EnvPool is not installed: pip install envpool ({error})") from error
-
-
 def import_imageio_ffmpeg() -> ModuleType:
     """FFmpeg, as imageio-ffmpeg brings it. Raises MissingExtra with the extra to install."""
     return _import("imageio_ffmpeg", "A film as MP4", "video")
