@@ -17,7 +17,7 @@ OPEN3D_PACKAGES = "libusb-1.0-0 libegl1 libgl1 libx11-6 libudev1 libidn2-0"
 """Debian packages with the system libraries that Open3D loads."""
 _HOME = Path(__file__).parents[2]
 """The clone, or the folder of all installed packages."""
-STANDARD_OUTPUT, STANDARD_ERROR = 1, 2
+STANDARD_ERROR = 2
 
 
 def missing_extra(what: str, extra: str, error: ImportError | None = None) -> MissingExtra:

@@ -11,7 +11,7 @@ from gymnasium import spaces
 from gymnasium.utils.performance import benchmark_init, benchmark_step, benchmark_vector_step
 from gymnasium.vector import AsyncVectorEnv
 
-from care_sim.base.extras import STANDARD_OUTPUT, silenced
+from care_sim.base.extras import silenced
 from care_sim.base.processes import following, starting
 from care_sim.core.conditions import DEFAULTS
 from care_sim.envs import ENVIRONMENT_IDS
@@ -23,6 +23,7 @@ from care_sim.study.executors import processes
 from care_sim.study.run_config import in_batches
 from tests.bench.settings import EPISODE, MAIN
 
+STANDARD_OUTPUT = 1
 DRIVING = "highway-fast-v0"
 REACHING = "PandaReach-v3"
 """Known environments, under random actions: highway-env's driving without sensors, and panda-gym's
