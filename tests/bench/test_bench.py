@@ -31,14 +31,18 @@ from tests.bench.environments import DRIVE, DRIVING, REACHING, makers, worker_me
 from tests.bench.scans import GROWTH, REFERENCE, agreement, drawn_cells
 from tests.bench.settings import MAIN, Settings
 from tests.bench.vectors import ENVPOOL, PPO, RECIPE, WORLDS, batch_memory, row
-from tests.helpers.places import ROOT
 
-PUBLISHED = json.loads((ROOT / "results" / "bench.json").read_text())
 TINY = ["--seconds", "0.01", "--repeats", "2", "--samples", "3", "--resets", "3", "--seeds", "0"]
 RIG = Rig(cameras=(FRONT_CAMERA,))
 BUS = CATALOGUE["bus"]
 AHEAD, LEFT, BEHIND = 256, 384, 0
 """Columns of the grid whose rays point along x, y and -x, but for half a column."""
+
+
+@pytest.fixture(scope="module")
+def known(published):
+    """The published figures."""
+    return json.loads((published / "bench.json").read_text())
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +54,7 @@ def measured(tmp_path_factory):
 
 
 @pytest.mark.slow
-def test_everything_is_measured_in_every_round(measured):
+def test_everything_is_measured_in_every_round(measured, known):
     left_out = {line.partition(":")[0] for line in measured["skipped"]}
     assert {*CLOSED_LOOP, DRIVE, DRIVING, REACHING} <= {*measured["speed"], *left_out}
     assert {PPO, ENVPOOL} <= {*measured["batches"], *left_out}
@@ -65,12 +69,12 @@ def test_everything_is_measured_in_every_round(measured):
         assert set(curves["ms"]) == set(measured["scans"]["engines"])
         assert all(len(ms) == len(values) and min(ms) > 0 for ms in curves["ms"].values())
     # The published file holds what earlier versions measured besides.
-    assert set(measured) == set(PUBLISHED) - {"stages", "targets"}
-    assert set(PUBLISHED["ratios"]) <= set(measured["ratios"])
+    assert set(measured) == set(known) - {"stages", "targets"}
+    assert set(known["ratios"]) <= set(measured["ratios"])
 
 
-def test_ratios_are_those_that_are_published():
-    assert ratios(PUBLISHED) == pytest.approx(PUBLISHED["ratios"])
+def test_ratios_are_those_that_are_published(known):
+    assert ratios(known) == pytest.approx(known["ratios"])
 
 
 def test_what_is_not_installed_is_left_out_in_one_line(monkeypatch, grid):
@@ -89,14 +93,13 @@ def test_what_is_not_installed_is_left_out_in_one_line(monkeypatch, grid):
 
 
 @pytest.mark.speed
-def test_no_ratio_has_fallen_behind_the_published_ones():
+def test_no_ratio_has_fallen_behind_the_published_ones(known):
     """Ratios of medians within one run, so that the machine's speed does not matter. A third is
     what sharing it with others may cost one side, for a while: behind is what is in each of three
     runs. Two processes, or threads, need two free cores, which a test does not have: of the worlds
     on two threads stand those on one, by the core.
     """
-    published = PUBLISHED["ratios"]
-    compared = {name for name in published if not name.startswith(BY_THE_CLOCK)}
+    compared = {name for name in known["ratios"] if not name.startswith(BY_THE_CLOCK)}
     assert len(compared) == 12
     behind = {}
     for _ in range(3):
@@ -104,9 +107,9 @@ def test_no_ratio_has_fallen_behind_the_published_ones():
         found = bench_report(settings)["ratios"]
         assert compared <= set(found)
         behind = {
-            name: (found[name], published[name])
+            name: (found[name], known["ratios"][name])
             for name in compared
-            if found[name] < published[name] * 2 / 3
+            if found[name] < known["ratios"][name] * 2 / 3
         }
         compared = set(behind)
         if not behind:

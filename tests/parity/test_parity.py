@@ -17,7 +17,6 @@ from care_sim.sensors.engines import ENGINES
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.world.bodies import CATALOGUE
 from tests.helpers.lidars import CORNERS
-from tests.helpers.places import ROOT
 from tests.parity import episodes as parity_episodes
 from tests.parity.__main__ import RANDOM, agree, main, parity_figure, unexplained
 from tests.parity.engines import Engines, decided_by_a_micrometre
@@ -169,14 +168,11 @@ def test_the_counts_are_printed_and_written(tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_keyframes_are_counted_as_published():
-    """Those of the first seed of the dense street; in the published file they stand with four
-    more, and the rays that are listed with none.
-    """
-    published = json.loads((ROOT / "results" / "parity.json").read_text())
+def test_keyframes_are_counted_as_published(published):
+    known = json.loads((published / "parity.json").read_text())
     rays, pictures = parity_episodes.keyframes("dense", 5, lambda done: None)
-    assert rays.figures() == published["scans"]["dense"]
-    assert vars(pictures) == published["pictures"]["dense"]
+    assert rays.figures() == known["scans"]["dense"]
+    assert vars(pictures) == known["pictures"]["dense"]
 
 
 class Shifted:
