@@ -257,4 +257,7 @@ def test_the_belief_of_a_choice_is_one_that_an_environment_could_show(seed):
     known = explained(belief.detections, belief.tracks, RIG)
     assert known.any()
     assert not known.all()
-    assert np.count_nonzero(Care(RIG)(shown)) == RIG.budget
+
+
+def test_the_policy_spends_the_budget_on_it():
+    assert np.count_nonzero(Care(RIG)(observation(RIG, 0))) == RIG.budget
