@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from care_sim.core.frames import Frame
 from care_sim.sensors.engines import ENGINES
 from care_sim.sensors.engines.bullet import Bullet
 from care_sim.world.bodies import BodyKind, Part
@@ -25,6 +24,8 @@ SAME_RANGE_M = 0.001
 GRAZE_M = 1e-6
 """A ray this close to where the answer changes grazes an edge."""
 MM = 1000.0
+METRES_TO_MM = np.array([MM, MM, MM, 1.0, 1.0, 1.0, 1.0])
+"""For a pose: a position and a quaternion."""
 EXACT = "bullet in millimetres"
 SIDES = np.array([side for side in product((-1.0, 0.0, 1.0), repeat=3) if any(side)])
 NUDGES = GRAZE_M * Rotation.from_rotvec((0.3, 0.5, 0.7)).apply(
@@ -67,10 +68,11 @@ class Exact(Bullet):
         if self.count != len(known.poses):
             self.close()
             self._copy(known)
-        for copied, body in enumerate(self.bodies, 1):
-            pose = known.poses[body]
-            self.copy.move(copied, far(Frame.turned_by(Rotation.from_quat(pose[3:]), pose[:3])))
-        ranges, ids = self.rays.cast(far(sensor), cells)
+        poses = self.copy.primitives.poses.copy()
+        poses[1 : len(self.bodies) + 1] = known.poses[self.bodies] * METRES_TO_MM
+        far = replace(sensor, x=MM * sensor.x, y=MM * sensor.y, z=MM * sensor.z)
+        with self.copy.placed(poses):
+            ranges, ids = self.rays.cast(far, cells)
         return ranges / MM, self.names[ids]
 
     def _copy(self, known):
@@ -109,11 +111,6 @@ def exact_engine():
         del ENGINES[EXACT]
         for engine in made:
             engine.close()
-
-
-def far(frame):
-    """A frame in millimetres."""
-    return replace(frame, x=MM * frame.x, y=MM * frame.y, z=MM * frame.z)
 
 
 def same(one, other):
