@@ -6,6 +6,8 @@
 # make dist       build the sdist, and the wheel from it, in dist/
 # make test-installed   install that wheel in an environment of its own, run the sdist's tests with it
 # make test-extras   install that wheel with one extra after the other, each alone, and use it; EXTRAS="page video"
+# make bench      measure speed beside other engines and environments; ARGS="--seconds 0.3 --repeats 1" is short
+# make parity     hold the engine `fast` against Bullet, ray by ray; ARGS="--scenes 1000 --episodes 1" is short
 # make test-speed   hold the ratios of speed to the published ones; nothing else may run meanwhile
 # make docs       build the documentation's site into build/site
 # make check      format, lint, types, tests
@@ -62,7 +64,7 @@ endef
 IS_FIT := "import ensurepip, sys; print('yes' if (3, 11) <= sys.version_info < (3, 14) else 'no')"
 comma := ,
 
-.PHONY: setup reproduce smoke test test-installed test-extras test-speed dist check docs lint torture official official-precision test-official clean
+.PHONY: setup reproduce smoke test test-installed test-extras bench parity test-speed dist check docs lint torture official official-precision test-official clean
 
 setup: $(VENV)/.installed
 
@@ -114,6 +116,9 @@ test-installed: dist
 
 test-extras: dist
 	$(BIN)/python -m tests.extras_alone $$(echo dist/*.whl) constraints.txt $(EXTRAS)
+
+bench parity: $(VENV)/.developing
+	$(BIN)/python -m tests.$@ $(ARGS)
 
 test-speed: $(VENV)/.developing
 	$(BIN)/python -m pytest -m speed

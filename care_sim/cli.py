@@ -211,6 +211,8 @@ def parsed_command(arguments: Sequence[str]) -> Callable[[], int]:
     named = arguments[0] if arguments else "--help"
     if named in _ASKED:
         return partial(_told, _ASKED[named]())
+    if named in _MOVED:
+        raise InvalidInput(f"`care-sim {named}` is `{_MOVED[named]}` now, in a clone")
     if named.startswith("-"):
         raise InvalidInput(
             f"{shown(named)} is no option of care-sim; `care-sim` tells the commands"
@@ -252,6 +254,8 @@ _ASKED: dict[str, Callable[[], str]] = {
     "--version": _version,
 }
 """What is printed where no command is named."""
+_MOVED = {"bench": "make bench", "parity": "make parity"}
+"""Commands of earlier versions that measure the software itself."""
 
 
 def _told(text: str) -> int:

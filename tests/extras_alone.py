@@ -56,7 +56,6 @@ USES = {
         "care-sim sweep --scenarios cutin --seeds 1 --out study",
         "care-sim report study -o page.html",
     ],
-    "bench": ["care-sim bench --seconds 0.01 --repeats 1 --samples 3 --resets 3 --seeds 0"],
     "video": [f"care-sim run dense {SHORT} --video a.mp4"],
     "cluster": ["python cluster.py"],
     "minari": [

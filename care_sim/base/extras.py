@@ -17,7 +17,7 @@ OPEN3D_PACKAGES = "libusb-1.0-0 libegl1 libgl1 libx11-6 libudev1 libidn2-0"
 """Debian packages with the system libraries that Open3D loads."""
 _HOME = Path(__file__).parents[2]
 """The clone, or the folder of all installed packages."""
-STANDARD_OUTPUT, STANDARD_ERROR = 1, 2
+STANDARD_ERROR = 2
 
 
 def missing_extra(what: str, extra: str, error: ImportError | None = None) -> MissingExtra:
@@ -53,24 +53,6 @@ def import_open3d() -> ModuleType:
 def import_torch() -> ModuleType:
     """PyTorch. Raises MissingExtra with the extra to install."""
     return _import("torch", "PyTorch", "rl")
-
-
-def import_mujoco() -> ModuleType:
-    """MuJoCo. Raises MissingExtra with the extra to install."""
-    return _import("mujoco", "MuJoCo", "bench")
-
-
-def import_panda_gym() -> ModuleType:
-    """panda-gym, whose environments are then registered. Raises MissingExtra with the extra."""
-    return _import("panda_gym", "panda-gym", "bench")
-
-
-def import_envpool() -> ModuleType:
-    """EnvPool, which no extra brings. Raises MissingExtra with what to install."""
-    try:
-        return import_module("envpool")
-    except ImportError as error:
-        raise MissingExtra(f"EnvPool is not installed: pip install envpool ({error})") from error
 
 
 def import_imageio_ffmpeg() -> ModuleType:

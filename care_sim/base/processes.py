@@ -8,7 +8,6 @@ import signal
 import sys
 import tempfile
 import threading
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from multiprocessing import resource_tracker, util
@@ -117,21 +116,6 @@ def flush_output() -> None:
     """Write out what was printed, since a process that is killed does not."""
     with suppress(Exception):  # whatever foreign code has put there
         sys.stdout.flush()
-
-
-def end_with_starter(starter: int) -> None:
-    """End this process, which the process `starter` started, as soon as that is gone."""
-    threading.Thread(
-        target=_end_without, args=[starter], name="end with starter", daemon=True
-    ).start()
-
-
-def _end_without(starter: int) -> None:
-    # A process whose starter is gone gets another parent. That is no signal either, so it is looked
-    # at from time to time.
-    while os.getppid() == starter:
-        time.sleep(LOOK_S)
-    os._exit(1)
 
 
 def _end_after(parent: "multiprocessing.process.BaseProcess") -> None:

@@ -94,7 +94,7 @@ GROUPS = {
             "realism", "Realism", "Tell which orders of policies a real car's sensing keeps."
         ),
         "vehicle": CommandEntry(
-            "vehicle", "Vehicle", "Play late evidence, a failing camera, a wrong pose; time it."
+            "vehicle", "Vehicle", "Play late evidence, a failing camera, a wrong pose."
         ),
     },
     "Learn": {
@@ -133,12 +133,6 @@ GROUPS = {
     "Is this installation sound?": {
         "certify": CommandEntry(
             "certify", "Certify", "Play published episodes and say whether they go as published."
-        ),
-        "parity": CommandEntry(
-            "parity", "Parity", "Hold the engine `fast` against Bullet, ray by ray."
-        ),
-        "bench": CommandEntry(
-            "bench", "Bench", "Measure speed, beside other engines and environments."
         ),
     },
 }

@@ -60,9 +60,9 @@ def test_workers_and_threads_keep_to_the_affinity():
         "import gymnasium, care_sim\n"
         "from care_sim.commands.sweep import Sweep\n"
         "import care_sim.envs.vector.env as vector\n"
-        "from care_sim.measure.certify.run import CertifyConfig\n"
+        "from care_sim.commands.certify import Certify\n"
         "from care_sim.study.provenance import machine\n"
-        "print(Sweep().workers, CertifyConfig().workers, vector.CORES, machine()['cores'])\n"
+        "print(Sweep().workers, Certify().workers, vector.CORES, machine()['cores'])\n"
     )
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert ran.stdout.split() == ["1"] * 4

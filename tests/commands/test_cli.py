@@ -194,8 +194,6 @@ def test_seeds_of_several_splits_are_no_study(command, capsys, tmp_path, monkeyp
         "run dartout --video",
         "run dartout --record",
         "compare dartout --record",
-        "bench --out",
-        "parity --out",
         "train learned-scorer --out",
         "train learned-sets --out",
         "train detector --out",
@@ -406,7 +404,6 @@ def test_the_list_of_commands_says_what_each_command_says_of_itself():
         ("run dense --seed abc", "--seed: must be a whole number, got 'abc'"),
         ("run dense --camera-latency 1.5", "--camera-latency: must be a whole number, got '1.5'"),
         ("certify --episode abc", "--episode: must be a whole number, got 'abc'"),
-        ("bench --seconds x", "--seconds: must be a number, got 'x'"),
         ("sweep --seeds 1 a", "--seeds: must be a whole number, got 'a'"),
         ("sweep --budgets 0.1 x", "--budgets: must be a number, got 'x'"),
         ("sweep --budgets 10%", "--budgets: must be a number, got '10%': write 0.1 for 10%"),
@@ -585,8 +582,10 @@ def test_no_picture_when_the_car_never_brakes(capsys, tmp_path):
         (["run", "dense", "--export", "a" * 300], "path must be a path"),
         (["protocol", "--scenes", "9" * 5000], "scenes"),
         (["sweep", "--workers", str(10**30)], "workers"),
-        (["bench", "--seconds", "inf"], "seconds"),
-        (["parity", "--scenes", str(2**70)], "scenes"),
+        (["sweep", "--budgets", "inf"], "budget"),
+        (["run", "dense", "--seed", str(2**70)], "seed"),
+        (["bench", "--seconds", "3"], "`care-sim bench` is `make bench` now"),
+        (["parity"], "`care-sim parity` is `make parity` now"),
     ],
 )
 def test_absurd_input_is_one_line_and_exit_code_2(arguments, named, capsys, tmp_path, monkeypatch):
@@ -751,9 +750,9 @@ def test_the_trace_of_a_fault_in_code_of_ones_own_is_shown_where_it_is_wanted(
         ("PYTHONIOENCODING=ascii {} policies > /dev/null", 0, ""),
         ("PYTHONIOENCODING=ascii {} view x --x", 2, "care-sim: Unrecognized options: --x\n"),
         (
-            "PYTHONIOENCODING=ascii {} bench --seconds 0",
+            "PYTHONIOENCODING=ascii {} certify --workers 0",
             2,
-            "care-sim: seconds must lie in [0.001, 3600], got 0.0\n",
+            "care-sim: workers must be a whole number >= 1 and <= 1024, got 0\n",
         ),
     ],
 )

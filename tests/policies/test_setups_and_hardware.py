@@ -6,11 +6,11 @@ import pytest
 
 import care_sim
 from care_sim.base.errors import InvalidInput
+from care_sim.certify.design import AS_LISTED
 from care_sim.core.firing.listing import HARDWARE
 from care_sim.core.grid import AngularGrid
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.sensor_setup import SensorSetup
-from care_sim.measure.certify.design import AS_LISTED
 from care_sim.policies import BUILT_IN
 from tests.helpers.lidars import CORNERS
 from tests.helpers.played_keyframes import played

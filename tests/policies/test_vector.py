@@ -11,6 +11,7 @@ from gymnasium.vector import SyncVectorEnv
 
 import care_sim
 from care_sim.base.errors import InvalidInput
+from care_sim.certify.design import AS_LISTED
 from care_sim.core.cell_order import CELL_ORDERS
 from care_sim.core.cell_sets import CellSets
 from care_sim.core.grid import AngularGrid
@@ -18,7 +19,6 @@ from care_sim.core.grid_stack import GridStack
 from care_sim.core.types import Demand
 from care_sim.core.world_sets import WorldSets
 from care_sim.envs.sensing import sensing
-from care_sim.measure.certify.design import AS_LISTED
 from care_sim.policies import BUILT_IN
 from care_sim.policies.base import FixedPolicy, PrivilegedPolicy, RowPolicy
 from care_sim.policies.paper.care import Care

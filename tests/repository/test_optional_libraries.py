@@ -29,10 +29,7 @@ MODULE_OF = {
 """Where a distribution's module has another name."""
 BESIDE = {"dask": {"distributed"}, "jinja2": {"markupsafe"}, "torchrl": {"tensordict"}}
 """Modules that come with another."""
-OF_NO_EXTRA = {"envpool"}
-"""What `care-sim bench` measures where somebody has installed it."""
 NEED_LIBRARIES = (
-    "care_sim.measure.bench.answered_at_once",
     "care_sim.reports.page.",
     "care_sim.training.detector_",
     "care_sim.training.networks",
@@ -59,7 +56,7 @@ def brought(extra):
     return names.union(*(BESIDE.get(name, ()) for name in names))
 
 
-OPTIONAL = set().union(*map(brought, EXTRAS)) | OF_NO_EXTRA
+OPTIONAL = set().union(*map(brought, EXTRAS))
 
 
 def named_by(node):

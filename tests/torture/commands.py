@@ -64,10 +64,8 @@ def prepare(name):
     if first == "train":
         import sb3_contrib  # noqa: F401
         import stable_baselines3  # noqa: F401
-    if first in ("bench", "parity", "certify"):
-        import care_sim.measure.bench.run
-        import care_sim.measure.certify.run
-        import care_sim.measure.parity.run  # noqa: F401
+    if first == "certify":
+        import care_sim.commands.certify  # noqa: F401
     if "--record" in text:
         import rerun  # noqa: F401
     if "--cluster" in text:

@@ -154,7 +154,6 @@ WRITER_LINES = {
     "scans": (["run", "dartout", "--export", "scans", *SHORT], "scans"),
     "page": (["report", "results", "-o", "x.html", "--episodes", "0"], "x.html"),
     "report": (["report", "results"], "results/episodes.parquet"),
-    "curves": (["parity", "--scenes", "5", "--episodes", "0", "--out", "x.json"], "x.json"),
 }
 WRITER_LINES_BY_LINE = {tuple(line): product for line, product in WRITER_LINES.values()}
 WRITERS = {
@@ -168,7 +167,6 @@ WRITERS = {
     "scans": 2,
     "page": 2,
     "report": 1,
-    "curves": 1,
 }
 REMADE = {"tables.md", "tables.tex", "ballast"}
 """Files that a report makes again."""

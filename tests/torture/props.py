@@ -40,7 +40,7 @@ class Inline(Executor):
 @contextmanager
 def inline(seconds=PLAYS_S):
     """Studies play in this process, for so long."""
-    from care_sim.measure.certify.playing import trails_of
+    from care_sim.certify.playing import trails_of
     from care_sim.reports.page.build import write_page
     from care_sim.study import executors
 

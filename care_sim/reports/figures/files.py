@@ -10,7 +10,7 @@ from matplotlib.axis import Tick
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from care_sim.base.errors import InvalidInput, printable, printable_lines
+from care_sim.base.errors import printable, printable_lines
 from care_sim.base.files import PNG, SVG, check_output, replacing
 
 FORMATS = (".png", ".svg")
@@ -61,15 +61,6 @@ def check_figure(stem: Path) -> None:
     """Raise what `care_sim.base.files.check_output` does where `save` could not write a figure."""
     check_output(stem.with_suffix(".png"), PNG)
     check_output(stem.with_suffix(".svg"), SVG)
-
-
-def check_beside(out: Path) -> None:
-    """Raise what `check_figure` does, and InvalidInput where the figure that is drawn beside a file
-    for JSON would take its place.
-    """
-    if out.suffix in FORMATS:
-        raise InvalidInput(f"out must be a file for JSON, got {out}; the figure is drawn beside it")
-    check_figure(out)
 
 
 def remove_others(folder: Path, names: Iterable[str], kept: Container[str]) -> None:

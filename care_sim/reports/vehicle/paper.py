@@ -7,9 +7,6 @@ EVIDENCE_AGES_S = ("0.11 to 0.14", "0.42")
 ENTRIES_ALIKE = "37 of 37"
 STANDING_KEYFRAMES = "570"
 STANDING_GUARD_M = "4.00"
-COMPUTE_P99_MS = 97.9
-"""Of the perception path; what it holds is in `COMPUTE`."""
-COMPUTE_BUDGET_MS = 100.0
 
 EVIDENCE = (
     "The reserve uses the newest camera frame at or before each decision, rotating wedge "
@@ -19,9 +16,4 @@ EVIDENCE = (
 GUARD = (
     "At standstill the guard equaled k_safe s_0 = 4.00 m on all 570 keyframes, and the margin of "
     "Eq. 4 kept the net release near zero, the intended conservative behavior."
-)
-COMPUTE = (
-    "In the garage session the perception path had a steady-state compute p99 of 97.9 ms against a "
-    "100 ms budget over 1,000 frames; the 2D stage used synthetic inputs because the camera "
-    "recorded no images; acquisition and transport lie outside the boundary."
 )

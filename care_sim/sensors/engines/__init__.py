@@ -1,7 +1,7 @@
 """Engines: who answers which body a ray hits, how far away, and which body a pixel shows.
 
 `bullet` is the reference. `fast` is compiled and gives the same answers within the differences that
-`care-sim parity` measures.
+`make parity` measures.
 """
 
 from collections.abc import Callable

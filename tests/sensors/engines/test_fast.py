@@ -8,21 +8,13 @@ import pytest
 
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
-from care_sim.measure.parity.answers import Millimetres
-from care_sim.measure.parity.random_scenes import random_scenes
-from care_sim.measure.parity.verdicts import (
-    GRAZING,
-    LOST,
-    SAME,
-    TOLERANCE,
-    UNEXPLAINED,
-    Engines,
-    compare,
-)
 from care_sim.sensors.engines import ENGINES
 from care_sim.sensors.engines.fast import Fast
 from care_sim.world.bodies import CATALOGUE, BodyKind, Part
 from care_sim.world.bullet import NO_BODY, BulletWorld
+from tests.parity.engines import Engines
+from tests.parity.rays import GRAZING, LOST, SAME, TOLERANCE, UNEXPLAINED, compare
+from tests.parity.scenes import random_scenes
 
 COARSE = AngularGrid(columns=180, rows=24)
 SENSOR = Frame(0.0, 0.0, 1.84, 0.0)
@@ -63,12 +55,12 @@ def assert_parity(kinds, frames, sensor, lost=0):
     """Every cell of a grid answered as Bullet does, asked in millimetres, but for rays that graze
     or that it lost.
     """
-    with closing(BulletWorld()) as world, closing(Millimetres(kinds, COARSE)) as exact:
+    with closing(BulletWorld()) as world:
         for kind, frame in zip(kinds, frames, strict=True):
             world.add(kind, frame)
-        exact.place(frames)
-        engines = Engines(ENGINES["fast"](world, COARSE), ENGINES["bullet"](world, COARSE), exact)
-        compared = compare(engines, sensor, rays())
+        engines = Engines.of(world, COARSE)
+        with closing(engines.exact):
+            compared = compare(engines, sensor, rays())
     assert not np.any(compared.on_exact == UNEXPLAINED)
     assert np.sum(compared.on_exact == LOST) <= lost
     assert np.isin(1, compared.fast[1])

@@ -1,0 +1,5 @@
+"""`care-sim certify`: whether this machine plays a list of episodes as it was published.
+
+The list is in `design`, how it is played in `playing`, what of an episode is hashed in `trail`. The
+published trails are `published.parquet`, which `published` reads.
+"""

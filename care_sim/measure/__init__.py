@@ -1,1 +1,0 @@
-"""What holds speed, engines and machines to account."""

@@ -1,1 +1,0 @@
-"""How fast the benchmark is on this machine: `care-sim bench`."""

@@ -1,1 +1,0 @@
-"""Casters of rays beside each other."""

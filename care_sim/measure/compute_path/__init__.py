@@ -1,1 +1,0 @@
-"""How long the car's software takes at a keyframe, stage by stage: `care-sim vehicle`."""

@@ -1,1 +1,0 @@
-"""Whether the engine `fast` answers as Bullet does: `care-sim parity`."""

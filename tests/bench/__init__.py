@@ -1,0 +1,1 @@
+"""How fast the simulator is here, beside known engines and environments: `make bench`."""

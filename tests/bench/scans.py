@@ -1,0 +1,165 @@
+"""Scans of the same rays at the same moving bodies by every engine, and how their time grows."""
+
+import time
+from contextlib import ExitStack
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
+
+from care_sim.core.allocation import budget_cells
+from care_sim.core.grid import AngularGrid
+from tests.bench.casters import SENSOR, casters, moving_bodies
+from tests.bench.settings import EPISODE
+
+BODIES = 30
+"""Bodies of the scan that is published."""
+REFERENCE = "bullet"
+"""The engine whose answers the others are compared with."""
+SAME_RANGE_M = 0.001
+GROWTH = {
+    "budget": (0.01, 0.03, 0.1, 0.3, 1.0),
+    "bodies": (1, 3, 10, 30, 100, 300),
+    "grid": ((512, 32), (1024, 64), (2048, 128)),
+}
+"""Along each axis, the other two are as in the published scan."""
+AXES = {
+    "budget": "budget (share of cells fired)",
+    "bodies": "bodies",
+    "grid": "grid (columns x rows), same rays",
+}
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
+"""From the palette of Okabe and Ito (2008), safe for the colour-blind."""
+
+
+def scans(settings):
+    """The figures of every engine, and what is left out in one line each.
+
+    Medians of every round in ms: `poses_ms` to move all bodies, `cast_ms` to answer the rays,
+    `scan_ms` for both. `rays_per_s` of the scan. `same_body` and `same_range` are the shares of the
+    rays that are answered as Bullet answers them.
+    """
+    grid = AngularGrid()
+    bodies = moving_bodies(BODIES, EPISODE.seed)
+    cells = drawn_cells(grid, budget_cells(EPISODE.budget, grid.size))
+    with ExitStack() as opened:
+        made, skipped = casters(bodies.kinds, grid, opened)
+        answers = agreement(made, bodies, cells)
+        rounds = [laps(made, bodies, cells, settings.samples) for _ in range(settings.repeats)]
+    engines = {}
+    for name in made:
+        seconds = np.median([times[name] for times in rounds], axis=1)
+        poses, cast, both = (1e3 * seconds.T).tolist()
+        engines[name] = {
+            "poses_ms": poses,
+            "cast_ms": cast,
+            "scan_ms": both,
+            "rays_per_s": (len(cells) / seconds[:, 2]).tolist(),
+            **answers[name],
+        }
+    return {"rays": len(cells), "bodies": BODIES, "engines": engines}, skipped
+
+
+def drawn_cells(grid, number):
+    """`number` of the grid's cells, ascending."""
+    return np.sort(np.random.default_rng(EPISODE.seed).permutation(grid.size)[:number])
+
+
+def agreement(made, bodies, cells):
+    """How far every engine answers as Bullet does, over bodies that have moved."""
+    # The second scan is of bodies that have moved. Both warm the engines up for what is timed next.
+    answers = {}
+    for name, caster in made.items():
+        for number in range(2):
+            caster.place(bodies.at(number))
+            answers[name] = caster.cast(SENSOR, cells)
+    ranges, ids = answers[REFERENCE]
+    return {
+        name: {
+            "same_body": float(np.mean(others == ids)),
+            "same_range": float(np.mean(np.isclose(found, ranges, rtol=0, atol=SAME_RANGE_M))),
+        }
+        for name, (found, others) in answers.items()
+    }
+
+
+def laps(made, bodies, cells, samples):
+    """(samples, 3) seconds of poses, cast and both, of every engine."""
+    # The engines take turns, scan by scan: what else the machine does falls on all alike.
+    times = {name: np.empty((samples, 3)) for name in made}
+    for number in range(samples):
+        poses = bodies.at(number)
+        for name, caster in made.items():
+            started = time.perf_counter()
+            caster.place(poses)
+            placed = time.perf_counter()
+            caster.cast(SENSOR, cells)
+            ended = time.perf_counter()
+            times[name][number] = placed - started, ended - placed, ended - started
+    return times
+
+
+def growth(settings):
+    """Of every axis its `values` (of the grid, cells), `labels` for people and, for every engine,
+    `ms`: the median time of a scan with poses.
+
+    Every round goes through all points, so that what else the machine does falls on all alike. A
+    point has a tenth of the samples.
+    """
+    rounds = [
+        {
+            axis: [_point(settings, axis, value) for value in values]
+            for axis, values in GROWTH.items()
+        }
+        for _ in range(settings.repeats)
+    ]
+    curves = {}
+    for axis, values in GROWTH.items():
+        times = {
+            name: np.median([[p[name] for p in told[axis]] for told in rounds], axis=0).tolist()
+            for name in rounds[0][axis][0]
+        }
+        curves[axis] = {
+            "values": [*values],
+            "labels": [str(value) for value in values],
+            "ms": times,
+        }
+    curves["budget"]["labels"] = [f"{budget:.0%}" for budget in GROWTH["budget"]]
+    curves["grid"]["labels"] = [f"{columns} x {rows}" for columns, rows in GROWTH["grid"]]
+    curves["grid"]["values"] = [columns * rows for columns, rows in GROWTH["grid"]]
+    return curves
+
+
+def _point(settings, axis, value):
+    """Milliseconds of a scan by every engine; the first scan, which warms up, does not count."""
+    grid = AngularGrid(*value) if axis == "grid" else AngularGrid()
+    budget = value if axis == "budget" else EPISODE.budget
+    bodies = moving_bodies(value if axis == "bodies" else BODIES, EPISODE.seed)
+    cells = drawn_cells(grid, budget_cells(budget, AngularGrid().size))
+    with ExitStack() as opened:
+        made, _ = casters(bodies.kinds, grid, opened)
+        times = laps(made, bodies, cells, 1 - (-settings.samples // 10))
+    return {name: 1e3 * float(np.median(seconds[1:, 2])) for name, seconds in times.items()}
+
+
+def growth_figure(report):
+    """One panel per axis and one line per engine; both scales are logarithmic."""
+    figure = Figure(figsize=(10.0, 3.4), layout="constrained")
+    panels = figure.subplots(1, len(AXES), sharey=True)
+    for axes, (name, label) in zip(panels, AXES.items(), strict=True):
+        curve = report["growth"][name]
+        styles = zip(curve["ms"].items(), COLOURS, "osD^", strict=False)
+        for (engine, ms), colour, marker in styles:
+            line = {"marker": marker, "color": colour, "label": engine, "markersize": 4}
+            axes.loglog(curve["values"], ms, **line)
+        axes.grid(which="major", linewidth=0.4, alpha=0.5)
+        axes.set_xticks(curve["values"], curve["labels"])
+        axes.xaxis.set_minor_locator(NullLocator())
+        axes.set_xlabel(label)
+    panels[0].yaxis.set_major_formatter("{x:g}")
+    panels[0].set_ylabel("a scan, poses included (ms)")
+    panels[0].legend(frameon=False, fontsize=8)
+    scan, processor = report["scans"], report["machine"]["processor"]
+    title = f"{scan['bodies']} bodies and {scan['rays']} rays unless told otherwise. {processor}"
+    figure.suptitle(title, x=0.01, ha="left", fontsize=8)
+    return figure

@@ -1,0 +1,187 @@
+"""Steps per second and memory of many worlds at once, on threads, in processes, inside a learner;
+and of EnvPool's driving beside them, where it is installed.
+"""
+
+import threading
+import time
+from contextlib import closing
+from functools import partial
+from itertools import cycle, product
+
+import gymnasium
+import numpy as np
+
+from care_sim.base.errors import MissingExtra
+from care_sim.base.extras import import_torch
+from care_sim.policies import make_policy
+from care_sim.study.executors import processes
+from care_sim.training.algorithms import algorithm, make_learner
+from care_sim.training.config import PpoConfig
+from care_sim.training.environments import side_by_side
+from tests.bench.environments import grown_memory
+from tests.bench.settings import EPISODE, MAIN, by_name
+
+WORLDS = 64
+THREADS = {1: "one thread", 2: "two threads"}
+PROCESSES = f"{WORLDS} worlds, two processes"
+"""Half of the worlds in each, with a vector and a policy of its own, on one thread."""
+ENVPOOL = "EnvPool HighwayFast-v0"
+"""highway-env's driving in C++: 20 vehicles in three lanes, five of them told as numbers; a step is
+a second of 5 world steps; no LiDAR, no camera, no tracker, no policy.
+"""
+RECIPE = PpoConfig(budget=(0.03, 0.05, 0.1, 0.2, 0.35))
+"""How the shipped `ppo-dense` was trained."""
+PPO = f"PPO of Stable-Baselines3, {RECIPE.environments} worlds of {', '.join(RECIPE.env)}"
+
+
+def row(threads, scoring_info=True):
+    """Name of the row of so many threads."""
+    told = "" if scoring_info else ", scoring_info=False"
+    return f"{WORLDS} worlds, {THREADS[threads]}{told}"
+
+
+def batches(settings):
+    """By row `steps_per_s` of all worlds together, and `steps_per_cpu_s`, steps per second that any
+    thread had a core; and in one line each what is left out.
+
+    The policy chooses for all worlds, observations are handed out at every step, and episodes that
+    are over begin anew. All rows are measured in every round. Not to be called on one core.
+    """
+    makers = {row(n, told): partial(_ours, n, told) for told, n in product((True, False), THREADS)}
+    skipped = []
+    try:
+        import envpool  # noqa: F401
+    except ImportError as error:
+        skipped = [f"{ENVPOOL}: {error}"]
+    else:
+        makers[ENVPOOL] = _envpool
+    # An episode that nobody times: what is compiled late, is compiled in it.
+    for told in (True, False):
+        speed_of(partial(_ours, 1, told, worlds=2), 0.0)
+    with processes(2) as pool:
+        rounds = [
+            {name: speed_of(make, settings.seconds) for name, make in makers.items()}
+            | {PROCESSES: speed_of_two(pool, settings.seconds)}
+            for _ in range(settings.repeats)
+        ]
+    return {name: by_name([one[name] for one in rounds]) for name in rounds[0]}, skipped
+
+
+def speed_of(make, seconds):
+    """Steps of a vector; `make` gives it and what acts in it."""
+    vector, act = make()
+    with closing(vector):
+        observations, _ = vector.reset(seed=EPISODE.seed)
+        started, worked = time.perf_counter(), time.process_time()
+        steps = 0
+        over, begun = np.zeros((2, vector.num_envs), np.bool_)
+        # However short the time, every world begins another episode, at the step after its last:
+        # resets are a part of the figure, and worlds that began together are over together.
+        while time.perf_counter() < started + seconds or not begun.all():
+            begun |= over
+            observations, _, terminated, truncated, _ = vector.step(act(observations))
+            over = terminated | truncated
+            steps += len(over)
+        taken, work = time.perf_counter() - started, time.process_time() - worked
+    return {"steps_per_s": steps / taken, "steps_per_cpu_s": steps / work}
+
+
+def speed_of_two(pool, seconds):
+    """Steps of two processes together."""
+    halves = [pool.submit(_speed_of_half, seconds) for _ in range(2)]
+    first, second = (half.result() for half in halves)
+    return {
+        "steps_per_s": first["steps_per_s"] + second["steps_per_s"],
+        "steps_per_cpu_s": (first["steps_per_cpu_s"] + second["steps_per_cpu_s"]) / 2,
+    }
+
+
+def _speed_of_half(seconds):
+    # An episode that nobody times comes first. The same worlds are played by both processes, so
+    # that both are timed at the same time but for a moment.
+    make = partial(_ours, 1, worlds=WORLDS // 2)
+    speed_of(make, 0.0)
+    return speed_of(make, seconds)
+
+
+def _ours(threads, scoring_info=True, worlds=WORLDS):
+    vector = gymnasium.make_vec(
+        f"care_sim:{MAIN}",
+        num_envs=worlds,
+        vectorization_mode="vector_entry_point",
+        threads=threads,
+        budget=EPISODE.budget,
+        scoring_info=scoring_info,
+        copy=False,
+    )
+    return vector, make_policy(EPISODE.policy, vector)
+
+
+def _envpool():
+    import envpool
+
+    vector = envpool.make_gymnasium(
+        "HighwayFast-v0", num_envs=WORLDS, num_threads=2, seed=EPISODE.seed
+    )
+    # Drawn beforehand: the time of drawing is not that of the environment.
+    rng = np.random.default_rng(EPISODE.seed)
+    choices = vector.single_action_space.n
+    drawn = cycle(rng.integers(choices, size=(1000, WORLDS), dtype=np.int32))
+    return vector, lambda _observations: next(drawn)
+
+
+def batch_memory(settings):
+    """Peak memory in MB of a process that plays one batch on two threads, with its policy; see
+    `grown_memory`. `threads_left` is how many threads are there still when the environment is
+    closed.
+    """
+    with processes(1) as pool:
+        return pool.submit(_batch_resets, settings.resets).result()
+
+
+def _batch_resets(resets):
+    threads = threading.active_count()
+    rounds = -(-resets // WORLDS)
+    vector, policy = _ours(threads=2)
+
+    def begin(number):
+        observations, _ = vector.reset(seed=EPISODE.seed + number * WORLDS)
+        policy.reset()
+        vector.step(policy(observations))
+
+    with closing(vector):
+        memory = grown_memory(begin, rounds)
+    left = float(threading.active_count() - threads)
+    return {"resets": float(rounds * WORLDS), **memory, "threads_left": left}
+
+
+def learning(settings):
+    """The row `PPO`: steps of the environments, in every round, while PPO learns from them by
+    `RECIPE`; where it is not installed no row, and why in one line.
+
+    A round is whole rollouts with their updates. Not to be called on one core.
+    """
+    try:
+        algorithm(RECIPE.algorithm)
+    except MissingExtra as missing:
+        return {}, [f"{PPO}: {missing}"]
+    # In a process of its own, since PyTorch keeps its threads.
+    with processes(1) as pool:
+        return {PPO: pool.submit(_learn, settings).result()}, []
+
+
+def _learn(settings):
+    import_torch().set_num_threads(RECIPE.threads)
+    rounds = []
+    with closing(side_by_side(RECIPE)) as envs:
+        learner = make_learner(RECIPE, envs)
+        # The first rollout warms up.
+        learner.learn(1)
+        for _ in range(settings.repeats):
+            before = learner.num_timesteps
+            started, worked = time.perf_counter(), time.process_time()
+            while (taken := time.perf_counter() - started) < settings.seconds:
+                learner.learn(1, reset_num_timesteps=False)
+            steps, work = learner.num_timesteps - before, time.process_time() - worked
+            rounds.append({"steps_per_s": steps / taken, "steps_per_cpu_s": steps / work})
+    return by_name(rounds)

@@ -1,0 +1,1 @@
+"""Whether the engine `fast` answers as Bullet does: `make parity`."""
