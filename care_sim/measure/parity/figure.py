@@ -8,7 +8,6 @@ from matplotlib.figure import Figure
 from care_sim.measure.parity.tally import GROUPS, REFERENCE_NAMES
 from care_sim.measure.parity.verdicts import SAME, VERDICTS
 from care_sim.reports.figures.files import default_style
-from care_sim.reports.figures.styles import bare_axes
 
 _STYLES = dict(zip(REFERENCE_NAMES, (("#0072B2", "o"), ("#D55E00", "D")), strict=True))
 """Of the palette of Okabe and Ito (2008), safe for the colour-blind."""
@@ -59,5 +58,5 @@ def _draw(axes: Axes, scans: list[dict[str, Any]]) -> None:
             label=f"than {reference}",
             clip_on=False,
         )
-    bare_axes(axes, "0.93", "both")
+    axes.grid(axis="both")
     axes.set_xlim(0, 1e6)

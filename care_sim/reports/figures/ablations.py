@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from care_sim.base.errors import counted, percent
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL
 from care_sim.reports.cells import StudyCells
-from care_sim.reports.figures.styles import bare_axes
+from care_sim.reports.figures.styles import BLUE, CALM
 from care_sim.reports.formatting import ShownDifference
 from care_sim.reports.protocol.ablations import AblationPlays
 from care_sim.reports.protocol.paper_ablations import NEAR_FIELD
@@ -31,7 +31,7 @@ _PANEL_INCHES = 1.9
 _NAMES_INCHES = 3.2
 """Room for what is varied, on the left."""
 _MARKS = "blue: told from zero, as in the tables; open: a bound, for some are never detected"
-_DIFFERENT, _ALIKE = "#0072B2", "0.6"
+_DIFFERENT, _ALIKE = BLUE, CALM
 """Colours of a difference that is told from zero, and of any other."""
 
 
@@ -134,7 +134,7 @@ def _figure(
 
 def _draw(axes: Axes, lines: Sequence[_Line], panel: int) -> None:
     """The differences of a panel with their intervals, and zero as a line."""
-    axes.axvline(0.0, color="0.5", linewidth=0.8)
+    axes.axvline(0.0, color=CALM, linewidth=0.8)
     for height, line in enumerate(lines):
         difference = line.differences[panel] if line.differences else None
         if difference is None:
@@ -143,10 +143,9 @@ def _draw(axes: Axes, lines: Sequence[_Line], panel: int) -> None:
         if (ends := difference.interval) is not None:
             axes.plot([ends.low, ends.high], [height, height], color=colour, linewidth=1.5)
         # A difference to an actor that was never detected is a bound.
-        inside = "white" if difference.bound else colour
+        inside = "none" if difference.bound else colour
         axes.plot(
             [difference.mean], [height], "o", color=colour, markerfacecolor=inside, markersize=4
         )
-    axes.tick_params(axis="x", labelsize=8)
     axes.tick_params(axis="y", length=0)
-    bare_axes(axes, "0.93", "both")
+    axes.grid(axis="x")

@@ -18,15 +18,15 @@ from care_sim.base.errors import percent
 from care_sim.reports.controls import is_control
 from care_sim.reports.figures.styles import CALM, INK, colours
 from care_sim.reports.formatting import MARKS, marked, tag_notes
-from care_sim.study.run_config import REFERENCE
+from care_sim.study.run_config import FULL, REFERENCE
 
 FULL_SCAN = "full scan"
 MOST_NAMED = 7
 """Curves and lines of a panel that have a name and a colour."""
-_FIRST = (REFERENCE, "history", "all-camera")
+_FIRST = (REFERENCE, "history", "all-camera", FULL_SCAN, FULL)
 _RULE = (
-    f"named: {', '.join(_FIRST)}, the best control, then the best by their mean over the panel; "
-    "grey: all others"
+    f"named: {', '.join(_FIRST[:4])}, the best control, then the best by their mean over the "
+    "panel; grey: all others"
 )
 _HOLLOW = "hollow, at 0: not detected"
 _PAPER = "diamonds, dotted line: what the paper reports"
@@ -49,7 +49,7 @@ class Panel:
     """The curves of one panel over its ticks.
 
     `heights` of every curve: None where it was not played, nan where it has no median. `places` of
-    the ticks on a logarithmic axis; without them the ticks stand side by side. `lines` go across
+    the ticks on a logarithmic axis; without them the ticks are side by side. `lines` go across
     the panel by name. `ends` are the two ends of an interval at every tick. `paper` holds
     what the paper reports of a curve, tick by tick, and of the full scan at the first tick.
     """
@@ -63,6 +63,7 @@ class Panel:
     ends: Mapping[str, Sequence[tuple[float, float] | None]] = field(default_factory=dict)
     paper: Mapping[str, Heights] = field(default_factory=dict)
     unit: str = ""
+    less_is_better: bool = False
 
     @classmethod
     def by_budget(cls, title: str, budgets: Sequence[float], **rest: Any) -> "Panel":
@@ -78,7 +79,7 @@ class Panel:
             for name, heights in self.heights.items()
             if (played := [height for height in heights if height is not None])
         }
-        ranked = sorted(means, key=lambda name: -means[name])
+        ranked = sorted(means, key=lambda name: means[name], reverse=not self.less_is_better)
         ranked.sort(key=lambda name: bool({*tags.get(name, ())} & {*MARKS}))
         control = next((name for name in ranked if is_control(tags.get(name, ()))), REFERENCE)
         first = [name for name in (*_FIRST, control) if name in means]
@@ -194,9 +195,7 @@ def _draw_ends(
                 axes.vlines(place, *ends, color=hues[name], linewidth=1.2, zorder=2)
 
 
-def _draw_paper(
-    axes: Axes, panel: Panel, places: Sequence[float], hues: Mapping[str, str]
-) -> None:
+def _draw_paper(axes: Axes, panel: Panel, places: Sequence[float], hues: Mapping[str, str]) -> None:
     for name, heights in panel.paper.items():
         known = [(x, y) for x, y in zip(places, heights, strict=False) if y is not None]
         if name == FULL_SCAN:

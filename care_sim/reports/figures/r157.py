@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from care_sim.base.errors import percent
 from care_sim.core.arrays import Floats
-from care_sim.reports.figures.styles import bare_axes
+from care_sim.reports.figures.styles import INK
 from care_sim.reports.formatting import marked
 from care_sim.reports.tables.r157 import cut_in_rows
 from care_sim.scenarios.r157.grid import EGO_KPH, LATERAL_MPS, CutInCase
@@ -48,7 +48,7 @@ def r157_figures(rows: Sequence[Row]) -> dict[str, Figure]:
             axes.set_title(f"{marked(policy, study.tags[policy])}, {own}", loc="left", fontsize=9)
             for (mps, style), gaps in boundaries.items():
                 label = f"a careful human prevents above, car at {mps:g} m/s across"
-                axes.plot(_LINE_KPH, gaps, style, color="0.3", linewidth=1, label=label)
+                axes.plot(_LINE_KPH, gaps, style, color=INK, linewidth=1, label=label)
             _draw(axes, study.of(policy, budget))
     for axes in panels[-1]:
         axes.set_xlabel("relative speed (km/h)", fontsize=8)
@@ -73,11 +73,10 @@ def _draw(axes: Axes, rows: Sequence[Row]) -> None:
         vmin=0,
         vmax=100,
         s=24,
-        edgecolors="0.3",
+        edgecolors=INK,
         linewidths=0.4,
     )
-    bare_axes(axes, "0.93", "both")
-    axes.tick_params(labelsize=8)
+    axes.grid(axis="x")
 
 
 def boundary_m(relative_kph: Floats, lateral_mps: float) -> Floats:

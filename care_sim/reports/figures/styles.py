@@ -40,6 +40,8 @@ STYLE = {
 """Settings of Matplotlib in which every figure departs from the defaults."""
 _COLOURS = {
     "full": INK,
+    "full scan": INK,
+    "best control": "#8F6A4E",
     "history": YELLOW,
     "all-camera": ORANGE,
     "care": BLUE,
