@@ -10,58 +10,46 @@ from matplotlib.patches import Rectangle
 
 from care_sim.base.errors import counted, percent
 from care_sim.reports.contrasts import GATE_M
-from care_sim.reports.figures.maps import draw_map
+from care_sim.reports.figures.maps import Map, maps_figure
 from care_sim.reports.figures.styles import INK
 from care_sim.reports.formatting import mean
-from care_sim.reports.table import Bold
 from care_sim.reports.tables.crowding import COLLAPSE_M, Crowd
 from care_sim.study.run_config import Row
 
 CROWDING_FIGURE = "crowding"
+_NOTE = (
+    f"bold: the interval excludes 0; asterisk: and at least {GATE_M} m; frame: all-camera "
+    "collapsed; ≤: at most, where all-camera missed somebody; ~: where both did"
+)
 
 
 def crowding_figures(rows: Sequence[Row]) -> dict[str, Figure]:
     """Mean paired difference in first detection, all-camera minus CARE, in metres: one number per
     cell.
-
-    Bold where the interval excludes zero, an asterisk where the gate is met too, a frame where all-
-    camera has collapsed.
     """
     crowd = Crowd(rows)
-    size = max(1.6 + 0.8 * len(crowd.budgets), 6.0), 1.5 + 0.34 * len(crowd.counts)
-    figure = Figure(figsize=size, layout="constrained")
-    axes = figure.add_subplot()
     counts = crowd.counts[::-1]
     gaps = [[crowd.gap(n, budget) for budget in crowd.budgets] for n in counts]
     values = np.array([[np.nan if gap is None else gap.mean for gap in line] for line in gaps])
     # Symmetric about zero, so that the sign of a difference is its colour. At least as wide as a
     # collapse, so that small differences look small.
     widest = max(float(np.nanmax(np.abs(values), initial=0.0)), COLLAPSE_M)
-    texts = [[*map(mean, line)] for line in gaps]
-    image = draw_map(
-        axes,
-        values,
+    seeds = counted(len({row["seed"] for row in rows}), "seed")
+    figure = maps_figure(
+        f"dense, {seeds}: first detection of all-camera minus care (m)",
+        [[Map("", values, [[*map(mean, line)] for line in gaps])]],
         [*map(str, counts)],
         [*map(percent, crowd.budgets)],
-        texts,
-        [[isinstance(text, Bold) for text in line] for line in texts],
+        _NOTE,
         cmap="PuOr",
         vmin=-widest,
         vmax=widest,
     )
+    (axes,) = figure.axes
+    axes.set(xlabel="budget (share of cells fired)", ylabel="standing vehicles")
     for column, budget in enumerate(crowd.budgets):
         for vehicles in crowd.collapsed(budget):
             # Cells of a map are centred on whole numbers.
             corner = column - 0.5, counts.index(vehicles) - 0.5
             axes.add_patch(Rectangle(corner, 1.0, 1.0, fill=False, edgecolor=INK, linewidth=1.4))
-    axes.set(xlabel="budget (share of cells fired)", ylabel="standing vehicles")
-    seeds = counted(len({row["seed"] for row in rows}), "seed")
-    axes.set_title(
-        f"dense, {seeds}. Bold: interval without zero; asterisk: and at least {GATE_M} m\n"
-        "frame: all-camera collapsed; ≤: at most, where it never detected somebody; ~: where both "
-        "did not",
-        loc="left",
-        fontsize=8,
-    )
-    figure.colorbar(image, label="all-camera minus care, first detection (m)")
     return {CROWDING_FIGURE: figure}

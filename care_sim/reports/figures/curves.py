@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from textwrap import wrap
+from textwrap import fill, wrap
 from typing import Any, Literal
 
 import numpy as np
@@ -18,16 +18,12 @@ from care_sim.base.errors import percent
 from care_sim.reports.controls import is_control
 from care_sim.reports.figures.styles import CALM, INK, colours
 from care_sim.reports.formatting import MARKS, marked, tag_notes
-from care_sim.study.run_config import FULL, REFERENCE
+from care_sim.study.run_config import REFERENCE
 
 FULL_SCAN = "full scan"
 MOST_NAMED = 7
 """Curves and lines of a panel that have a name and a colour."""
-_FIRST = (REFERENCE, "history", "all-camera", FULL_SCAN, FULL)
-_RULE = (
-    f"named: {', '.join(_FIRST[:4])}, the best control, then the best by their mean over the "
-    "panel; grey: all others"
-)
+_FIRST = (REFERENCE, "history", "all-camera", FULL_SCAN)
 _HOLLOW = "hollow, at 0: not detected"
 _PAPER = "diamonds, dotted line: what the paper reports"
 _NAME_POINTS = 8
@@ -37,7 +33,7 @@ _SIZES = {1: (6.5, 3.6), 2: (4.6, 3.3)}
 _NARROW = (3.4, 2.4)
 """Width and height in inches of a panel with its names, by the number of panels, and of more."""
 _NOTE_INCHES = 0.17
-_INCH_LETTERS = 13
+_INCH_LETTERS = 12
 """Letters of a note on an inch."""
 
 Tags = Mapping[str, tuple[str, ...]]
@@ -106,13 +102,17 @@ def curves_figure(
     below = [line for note in said for line in wrap(note, int(_INCH_LETTERS * width))]
     size = (width, height * lines + 0.4 + _NOTE_INCHES * len(below))
     figure = Figure(figsize=size, layout="constrained")
-    grid = figure.subplots(lines, columns, squeeze=False, sharey=share).ravel().tolist()
-    named = [_draw(axes, panel, tags) for axes, panel in zip(grid, panels, strict=False)]
+    # Ticks below each other are named once.
+    alike = len({tuple(panel.ticks) for panel in panels}) == 1 and len(panels) == lines * columns
+    across = figure.subplots(lines, columns, squeeze=False, sharex=alike, sharey=share)
+    grid = across.ravel().tolist()
+    hues = colours(dict.fromkeys(name for panel in panels for name in panel.heights))
+    named = [_draw(axes, panel, tags, hues) for axes, panel in zip(grid, panels, strict=False)]
     for axes in grid[len(panels) :]:
         axes.set_axis_off()
     for axes in grid[: len(panels)] if from_zero else ():
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
-    figure.suptitle(title, x=0.01, ha="left")
+    figure.suptitle(fill(title, int(_INCH_LETTERS * width)), x=0.01, ha="left")
     figure.supxlabel("\n".join(below), fontsize=9)
     name_ends(figure, dict(zip(grid, named, strict=False)))
     return figure
@@ -122,18 +122,23 @@ def _on_marks(panels: Sequence[Panel], tags: Tags) -> list[str]:
     """What the marks of these panels mean."""
     curves = [(name, panel.heights[name]) for panel in panels for name in panel.named(tags)]
     heights = [height for _, own in curves for height in own if height is not None]
+    known = {name for panel in panels for name in (*panel.heights, *panel.lines)}
+    control = ["the best control"] if any(is_control(own) for own in tags.values()) else []
+    always = ", ".join([*(name for name in _FIRST if name in known), *control])
+    rule = f"named: {always}, and the best by their mean over the panel; grey: all others"
     return [
-        *([_RULE] if any(len(each.heights) > len(each.named(tags)) for each in panels) else []),
+        *([rule] if any(len(each.heights) > len(each.named(tags)) for each in panels) else []),
         *([_HOLLOW] if any(map(math.isnan, heights)) else []),
         *([_PAPER] if any(panel.paper for panel in panels) else []),
         *tag_notes(tags.get(name, ()) for name, _ in curves),
     ]
 
 
-def _draw(axes: Axes, panel: Panel, tags: Tags) -> dict[str, tuple[float, str]]:
+def _draw(
+    axes: Axes, panel: Panel, tags: Tags, hues: Mapping[str, str]
+) -> dict[str, tuple[float, str]]:
     """Draw a panel; the right ends of its named curves, each with its colour."""
     named = panel.named(tags)
-    hues = colours(panel.heights)
     ends = {name: (height, INK) for name, height in panel.lines.items()}
     for name, height in panel.lines.items():
         axes.axhline(height, color=INK, linestyle="--", linewidth=1.2, label=name, zorder=1)
@@ -217,8 +222,9 @@ def name_ends(figure: Figure, ends: Mapping[Axes, Mapping[str, tuple[float, str]
     for axes, own in names.items():
         heights = {name: axes.transData.transform(name.xy)[1] * points for name in own}
         upwards = sorted(own, key=lambda name: heights[name])
-        top = axes.get_window_extent().y1 * points
-        moved = apart([heights[name] for name in upwards], _LINE_SPACING * _NAME_POINTS, top)
+        box = axes.get_window_extent()
+        least = _LINE_SPACING * _NAME_POINTS
+        moved = apart([heights[name] for name in upwards], least, box.y0 * points, box.y1 * points)
         for name, place in zip(upwards, moved, strict=True):
             name.set_position((4, place - heights[name]))
 
@@ -230,14 +236,14 @@ def _name(axes: Axes, name: str, end: tuple[float, str]) -> Annotation:
     return axes.annotate(name, (1.0, height), (4, 0), **across, **look)
 
 
-def apart(heights: Sequence[float], least: float, top: float) -> list[float]:
-    """Ascending heights, moved so that each stands at least `least` above the one before and none
-    above `top`.
+def apart(heights: Sequence[float], least: float, low: float, high: float) -> list[float]:
+    """Ascending heights, moved as little as can be so that each is at least `least` above the one
+    before and all are between `low` and `high`, where there is room.
     """
-    places: list[float] = []
-    for height in heights:
-        places.append(max([height, *(below + least for below in places[-1:])]))
-    # What was moved up beyond the top moves down again, and takes those below it along.
-    for n in reversed(range(len(places))):
-        places[n] = min(places[n], places[n + 1] - least if n + 1 < len(places) else top)
-    return places
+    from scipy.optimize import isotonic_regression
+
+    steps = least * np.arange(len(heights))
+    moved = isotonic_regression(np.array(heights) - steps).x + steps
+    moved = np.maximum(moved, low + steps)
+    # The highest stays below the top, and those below it have room for the ones above.
+    return np.minimum(moved, high - steps[::-1]).tolist()

@@ -1,7 +1,7 @@
 """The figures of the fault study: what a measure does as every fault grows."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -9,16 +9,11 @@ from matplotlib.figure import Figure
 
 from care_sim.base.errors import counted
 from care_sim.reports.cells import Cell, StudyCells
-from care_sim.reports.figures.curves import Heights, Panel, curves_figure
+from care_sim.reports.figures.curves import FULL_SCAN, Panel, curves_figure
 from care_sim.reports.tables.faults import policies_of
 from care_sim.study.designs.faults import FAULT_PLACES, FAULTS, faults_alone
 from care_sim.study.designs.variants import Place
-from care_sim.study.run_config import Row
-
-_FLAT = 0.02
-"""A panel in which no curve moves by more than this share of the largest value of the figure shows
-nothing but its level.
-"""
+from care_sim.study.run_config import FULL, Row
 
 
 @dataclass(frozen=True)
@@ -48,8 +43,6 @@ MEASURES = (
         lambda cell: cell.clearance.median if cell.clearance else None,
     ),
 )
-Curves = Mapping[str, Heights]
-"""Of each policy its value at every strength; None was not played, nan has no median."""
 FAULT_FIGURES = tuple(
     f"faults-{place.scenario}-{measure.name}" for place in FAULT_PLACES for measure in MEASURES
 )
@@ -64,12 +57,12 @@ def fault_figures(rows: Sequence[Row]) -> dict[str, Figure]:
 
 
 def _figure(study: StudyCells, place: Place, measure: CurveMeasure) -> Figure:
-    panels = {
-        fault.title: Panel(
+    panels = [
+        Panel(
             fault.title,
             [level.label for level in fault.levels],
             {
-                policy: [
+                FULL_SCAN if policy == FULL else policy: [
                     measure.value(study.cell(level.key(place, policy))) for level in fault.levels
                 ]
                 for policy in policies_of(study)
@@ -77,41 +70,6 @@ def _figure(study: StudyCells, place: Place, measure: CurveMeasure) -> Figure:
             unit=fault.unit,
         )
         for fault in FAULTS
-    }
-    flat = flat_faults({title: panel.heights for title, panel in panels.items()})
-    return curves_figure(
-        f"{place}, {counted(len({row['seed'] for row in study.rows}), 'seed')}: {measure.label}",
-        [panel for title, panel in panels.items() if title not in flat],
-        study.tags,
-        [flat_line(flat)] if flat else [],
-        share=True,
-    )
-
-
-def flat_faults(curves: Mapping[str, Curves]) -> list[str]:
-    """The titles of the faults, of the curves of each, that move no curve of a figure. Where that
-    is so of all, the first is left out of them: it shows the levels.
-    """
-    heights = [height for own in curves.values() for each in own.values() for height in each]
-    known = [height for height in heights if height is not None and not math.isnan(height)]
-    least = _FLAT * max(known, default=0.0)
-    flat = [
-        title
-        for title, own in curves.items()
-        if not any(_moves(heights, least) for heights in own.values())
     ]
-    return flat if len(flat) < len(curves) else flat[1:]
-
-
-def flat_line(flat: Sequence[str]) -> str:
-    """The line in the place of panels that would be flat."""
-    return f"Moving no curve by more than {_FLAT:.0%} of the largest value: {', '.join(flat)}."
-
-
-def _moves(heights: Heights, least: float) -> bool:
-    played = [height for height in heights if height is not None]
-    found = [height for height in played if not math.isnan(height)]
-    # A median that is lost at some strength moves to where nobody is detected.
-    if len(found) not in (0, len(played)):
-        return True
-    return bool(found) and max(found) - min(found) > least
+    seeds = counted(len({row["seed"] for row in study.rows}), "seed")
+    return curves_figure(f"{place}, {seeds}: {measure.label}", panels, study.tags, share=True)

@@ -47,7 +47,7 @@ _COLOURS = {
     "care": BLUE,
     "care-sbf": GREEN,
     "care-priority": "#3B93C4",
-    "care-sightlines": "#B0567D",
+    "care-sightlines": "#9B59D0",
     "care-spread": "#5B82C2",
     "care-sector": "#C2478A",
     "uncertainty": "#B5679A",
@@ -63,7 +63,7 @@ _COLOURS = {
     "ppo": "#AF5BAF",
     "ppo-dartout": "#B3543C",
 }
-_SPARE = (GREEN, "#7468C0", "#C2478A", "#96862A", "#2E9587", "#B3543C")
+_SPARE = (GREEN, "#7468C0", "#C2478A", "#96862A", "#2E9587", "#B3543C", "#3B93C4", "#8A8A22")
 
 
 def colours(policies: Iterable[str]) -> dict[str, str]:
