@@ -13,7 +13,6 @@ from care_sim.study.run_config import FULL, Row
 
 BUDGET_FIGURES = ("{world}-budget",)
 """Every figure that a sweep can draw of a scenario."""
-_NOTE = "budget (share of cells fired); bars: quartiles of the first curve named"
 
 
 def sweep_figures(rows: Sequence[Row]) -> dict[str, Figure]:
@@ -64,7 +63,8 @@ def _figure(world: str, cells: Sequence[Cell]) -> Figure:
     counts = sorted({cell.episodes for cell in cells})
     most = counted(counts[-1], "seed")
     seeds = most if len(counts) == 1 else f"{counts[0]} to {most}"
-    return curves_figure(f"{world}: {seeds} a point", [panel], tags, [_NOTE])
+    notes = ["budget (share of cells fired)"]
+    return curves_figure(f"{world}: {seeds} a point", [panel], tags, notes, bars="quartiles")
 
 
 def _ends(found: Quartiles) -> tuple[float, float] | None:

@@ -90,15 +90,18 @@ def curves_figure(
     columns: int = 3,
     share: bool | Literal["row"] = False,
     from_zero: bool = True,
+    bars: str = "",
 ) -> Figure:
     """All panels, `columns` of them side by side; `share` whether they have one scale. `tags` of
-    the policies among the curves, `notes` below the panels.
+    the policies among the curves, `notes` below the panels. `bars` says what `ends` are.
     """
     columns = min(columns, len(panels))
     lines = math.ceil(len(panels) / columns)
     width, height = _SIZES.get(len(panels), _NARROW)
     width *= columns
-    said = [*notes, *_on_marks(panels, tags)]
+    leaders = dict.fromkeys(name for panel in panels for name in _with_bars(panel, tags))
+    drawn = [f"bars: {bars} of {' and '.join(leaders)}"] if leaders else []
+    said = [*notes, *drawn, *_on_marks(panels, tags)]
     below = [line for note in said for line in wrap(note, int(_INCH_LETTERS * width))]
     size = (width, height * lines + 0.4 + _NOTE_INCHES * len(below))
     figure = Figure(figsize=size, layout="constrained")
@@ -150,7 +153,10 @@ def _draw(
             ends[label] = _curve(axes, played, hues[name], label), hues[name]
         elif played:
             _curve(axes, played, CALM, label, named=False)
-    _draw_ends(axes, panel, places, [name for name in named if name in panel.ends], hues)
+    for name in _with_bars(panel, tags):
+        for place, pair in zip(places, panel.ends[name], strict=True):
+            if pair is not None:
+                axes.vlines(place, *pair, color=hues[name], linewidth=1.2, zorder=2)
     _draw_paper(axes, panel, places, {FULL_SCAN: INK} | {name: hues[name] for name in named})
     if panel.places:
         axes.set_xscale("log")
@@ -186,18 +192,9 @@ def _curve(
     return drawn[-1]
 
 
-def _draw_ends(
-    axes: Axes,
-    panel: Panel,
-    places: Sequence[float],
-    named: Sequence[str],
-    hues: Mapping[str, str],
-) -> None:
-    """Bars of the first curve alone: those of seven would hide each other."""
-    for name in named[:1]:
-        for place, ends in zip(places, panel.ends[name], strict=True):
-            if ends is not None:
-                axes.vlines(place, *ends, color=hues[name], linewidth=1.2, zorder=2)
+def _with_bars(panel: Panel, tags: Tags) -> list[str]:
+    """The first curve named, if any: bars of seven would hide each other."""
+    return [name for name in panel.named(tags) if name in panel.ends][:1]
 
 
 def _draw_paper(axes: Axes, panel: Panel, places: Sequence[float], hues: Mapping[str, str]) -> None:

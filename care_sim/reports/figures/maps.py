@@ -61,8 +61,9 @@ def maps_figure(
         axes.set_yticks(range(len(lines)), lines)
         axes.tick_params(length=0, labelsize=7)
         if max(map(len, columns)) > _TURNED:
-            axes.tick_params(axis="x", labelrotation=60)
-        axes.spines[:].set_visible(False)
+            for label in axes.get_xticklabels():
+                label.set(rotation=60, ha="right", rotation_mode="anchor")
+        axes.spines[:].set(visible=True, linewidth=0.4)
         axes.grid(False)
         axes.set_title(each.title, loc="left", fontsize=8)
     wide = int(_INCH_LETTERS * size[0])

@@ -93,6 +93,5 @@ def control_figure(plays: SettingPlays, measures: Sequence[OverControl]) -> Figu
         for measure in measures
     ]
     tags = {policy: plays.tags[policy] for policy in measures[0].differences}
-    bars = f"{_UNIT}; bars: 95% interval of the first curve named"
-    notes = [bars, named_controls(plays, measures)]
-    return curves_figure(plays.title, panels, tags, notes)
+    notes = [_UNIT, named_controls(plays, measures)]
+    return curves_figure(plays.title, panels, tags, notes, bars="95% intervals")
