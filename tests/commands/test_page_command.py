@@ -1,7 +1,5 @@
 """`care-sim report FOLDER -o FILE`: what it writes, and the one line it says where it cannot."""
 
-import sys
-
 import pytest
 
 from care_sim.cli import main

@@ -16,6 +16,7 @@ from matplotlib.text import Annotation
 
 from care_sim.base.errors import percent
 from care_sim.reports.controls import is_control
+from care_sim.reports.figures.files import texts_as_they_are
 from care_sim.reports.figures.styles import CALM, INK, colours
 from care_sim.reports.formatting import MARKS, marked, tag_notes
 from care_sim.study.run_config import REFERENCE
@@ -35,6 +36,8 @@ _NARROW = (3.4, 2.4)
 _NOTE_INCHES = 0.17
 _INCH_LETTERS = 12
 """Letters of a note on an inch."""
+_TURNED = 6
+"""Letters of a tick above which ticks are turned."""
 
 Tags = Mapping[str, tuple[str, ...]]
 Heights = Sequence[float | None]
@@ -158,17 +161,20 @@ def _draw(
             if pair is not None:
                 axes.vlines(place, *pair, color=hues[name], linewidth=1.2, zorder=2)
     _draw_paper(axes, panel, places, {FULL_SCAN: INK} | {name: hues[name] for name in named})
+    _set_axes(axes, panel, places)
+    return ends
+
+
+def _set_axes(axes: Axes, panel: Panel, places: Sequence[float]) -> None:
     if panel.places:
         axes.set_xscale("log")
     axes.set_xticks(places, panel.ticks)
     axes.minorticks_off()
-    if max(map(len, panel.ticks)) > 6:
-        axes.tick_params(axis="x", labelrotation=35)
+    if max(map(len, panel.ticks)) > _TURNED:
         for tick in axes.get_xticklabels():
-            tick.set(ha="right", rotation_mode="anchor")
+            tick.set(rotation=35, ha="right", rotation_mode="anchor")
     axes.set(ylabel=panel.label, xlabel=panel.unit)
     axes.set_title(panel.title, loc="left")
-    return ends
 
 
 def _curve(
@@ -213,7 +219,8 @@ def name_ends(figure: Figure, ends: Mapping[Axes, Mapping[str, tuple[float, str]
     """
     names = {axes: [*map(partial(_name, axes), own, own.values())] for axes, own in ends.items()}
     # Heights on paper are known once the names have taken their room.
-    figure.draw_without_rendering()
+    with texts_as_they_are(figure):
+        figure.draw_without_rendering()
     figure.set_layout_engine("none")
     points = _INCH_POINTS / figure.dpi
     for axes, own in names.items():

@@ -61,8 +61,8 @@ def maps_figure(
         axes.set_yticks(range(len(lines)), lines)
         axes.tick_params(length=0, labelsize=7)
         if max(map(len, columns)) > _TURNED:
-            for label in axes.get_xticklabels():
-                label.set(rotation=60, ha="right", rotation_mode="anchor")
+            for tick in axes.get_xticklabels():
+                tick.set(rotation=60, ha="right", rotation_mode="anchor")
         axes.spines[:].set(visible=True, linewidth=0.4)
         axes.grid(False)
         axes.set_title(each.title, loc="left", fontsize=8)
