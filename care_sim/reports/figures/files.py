@@ -19,7 +19,7 @@ from care_sim.reports.figures.styles import STYLE
 FORMATS = (".png", ".svg")
 """Endings of the two files of a figure."""
 _NO_METADATA = dict.fromkeys(("Creator", "Date", "Format", "Type"))
-_UNUSED_ID = re.compile(r' id="[A-Za-z0-9_]+_\d+"')
+_UNUSED_ID = re.compile(r' id="[A-Za-z0-9_.]+_\d+"')
 """Matplotlib counts its groups anew in every figure, and nothing refers to them."""
 
 

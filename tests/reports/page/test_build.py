@@ -24,7 +24,7 @@ def test_what_cannot_be_drawn_fails_before_an_episode_is_played(tmp_path, monkey
     def broken(_rows):
         raise InvalidInput("no figure of these rows")
 
-    monkeypatch.setitem(studies.STUDIES, "sweep", replace(STUDIES["sweep"], figures=broken))
+    monkeypatch.setitem(STUDIES, "sweep", replace(STUDIES["sweep"], figures=broken))
     write_rows(STUDY, tmp_path / "episodes.parquet")
     with pytest.raises(InvalidInput, match="no figure"):
         write_page(
