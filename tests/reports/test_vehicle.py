@@ -6,7 +6,7 @@ import pytest
 
 from care_sim.evaluation.censoring import Bound
 from care_sim.reports.contrasts import AVOIDED, DETECTION, contrast, contrast_of_cases
-from care_sim.reports.figures.vehicle import VEHICLE_FIGURE, vehicle_figures
+from care_sim.reports.figures.faults import VEHICLE_FIGURE, vehicle_figures
 from care_sim.reports.studies import STUDIES
 from care_sim.reports.vehicle.evidence_tables import compensation_table, evidence_table
 from care_sim.reports.vehicle.fallback_tables import cost_tables, fallback_table

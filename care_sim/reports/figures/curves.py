@@ -235,9 +235,9 @@ def name_ends(figure: Figure, ends: Mapping[Axes, Mapping[str, tuple[float, str]
 
 def _name(axes: Axes, name: str, end: tuple[float, str]) -> Annotation:
     height, colour = end
-    across = {"xycoords": axes.get_yaxis_transform(), "textcoords": "offset points"}
-    look = {"va": "center", "size": _NAME_POINTS, "color": colour, "annotation_clip": False}
-    return axes.annotate(name, (1.0, height), (4, 0), **across, **look)
+    look: dict[str, Any] = {"va": "center", "size": _NAME_POINTS, "color": colour}
+    look |= {"xycoords": axes.get_yaxis_transform(), "textcoords": "offset points"}
+    return axes.annotate(name, (1.0, height), (4, 0), annotation_clip=False, **look)
 
 
 def apart(heights: Sequence[float], least: float, low: float, high: float) -> list[float]:
@@ -250,4 +250,4 @@ def apart(heights: Sequence[float], least: float, low: float, high: float) -> li
     moved = isotonic_regression(np.array(heights) - steps).x + steps
     moved = np.maximum(moved, low + steps)
     # The highest stays below the top, and those below it have room for the ones above.
-    return np.minimum(moved, high - steps[::-1]).tolist()
+    return [float(place) for place in np.minimum(moved, high - steps[::-1])]

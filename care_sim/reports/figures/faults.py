@@ -1,4 +1,6 @@
-"""The figures of the fault study: what a measure does as every fault grows."""
+"""Figures of what errors do: faults as they grow, and the vehicle study's late boxes in turns and
+errors of the pose.
+"""
 
 import math
 from collections.abc import Callable, Sequence
@@ -11,9 +13,17 @@ from care_sim.base.errors import counted
 from care_sim.reports.cells import Cell, StudyCells
 from care_sim.reports.figures.curves import FULL_SCAN, Panel, curves_figure
 from care_sim.reports.tables.faults import policies_of
+from care_sim.reports.vehicle.rows import VehicleRows, mean_over_forecasts, total
 from care_sim.study.designs.faults import FAULT_PLACES, FAULTS, faults_alone
 from care_sim.study.designs.variants import Place
-from care_sim.study.run_config import FULL, Row
+from care_sim.study.designs.vehicle import (
+    EVIDENCE_GROUPS,
+    EVIDENCE_LEVELS,
+    POSE_GROUPS,
+    POSE_LEVELS,
+    is_late,
+)
+from care_sim.study.run_config import FULL, REFERENCE, Row
 
 
 @dataclass(frozen=True)
@@ -73,3 +83,40 @@ def _figure(study: StudyCells, place: Place, measure: CurveMeasure) -> Figure:
     ]
     seeds = counted(len({row["seed"] for row in study.rows}), "seed")
     return curves_figure(f"{place}, {seeds}: {measure.label}", panels, study.tags, share=True)
+
+
+VEHICLE_FIGURE = "vehicle"
+
+
+def vehicle_figures(rows: Sequence[Row]) -> dict[str, Figure]:
+    """Two panels, by name."""
+    study = VehicleRows(rows)
+    late = [level for level in EVIDENCE_LEVELS if is_late(level)]
+    held = {
+        f"{group.name}: {how}": [
+            _share(study.of(group, level, REFERENCE), column) for level in late
+        ]
+        for group in EVIDENCE_GROUPS
+        for column, how in (("turned_held", "compensated"), ("unturned_held", "without"))
+    }
+    off = {
+        group.name: [
+            mean_over_forecasts(study.of(group, level, REFERENCE), "forecast_error_m")
+            for level in POSE_LEVELS
+        ]
+        for group in POSE_GROUPS
+    }
+    panels = [
+        Panel(title, [level.label for level in levels], heights)
+        for title, levels, heights in (
+            ("late boxes in turns whose wedge holds their object (%)", late, held),
+            ("mean error of the forecasts (m)", POSE_LEVELS, off),
+        )
+    ]
+    return {VEHICLE_FIGURE: curves_figure("", panels, {})}
+
+
+def _share(rows: Sequence[Row], column: str) -> float | None:
+    """In per cent of the boxes in turns; None without any."""
+    turned = total(rows, "turned_boxes")
+    return 100.0 * total(rows, column) / turned if turned else None

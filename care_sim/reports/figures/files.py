@@ -6,6 +6,7 @@ from collections.abc import Container, Iterable, Iterator
 from contextlib import contextmanager
 from io import StringIO
 from pathlib import Path
+from typing import Any
 
 from matplotlib import rc_context, rcdefaults, rcParams
 from matplotlib.axis import Tick
@@ -52,7 +53,7 @@ def svg_text(figure: Figure, name: str) -> str:
     """
     drawn = StringIO()
     # Ids within an SVG are random without a salt.
-    salt = {"svg.hashsalt": printable(name)}
+    salt: dict[Any, Any] = {"svg.hashsalt": printable(name)}
     with default_style(), rc_context(salt), texts_as_they_are(figure):
         figure.savefig(drawn, format="svg", transparent=True, metadata=_NO_METADATA)
     return _UNUSED_ID.sub("", drawn.getvalue())

@@ -52,8 +52,8 @@ def maps_figure(
         0.8 + _SLANT * below + (_PANEL_INCHES[1] + height * len(lines)) * len(maps),
     )
     figure = Figure(figsize=size, layout="constrained")
-    shape = {"sharex": True, "sharey": True, "squeeze": False}
-    panels = figure.subplots(len(maps), len(maps[0]), **shape)
+    shape = len(maps), len(maps[0])
+    panels = figure.subplots(*shape, sharex=True, sharey=True, squeeze=False)
     for axes, each in zip(panels.ravel(), chain(*maps), strict=True):
         image = axes.imshow(each.values, aspect="auto", **colours)
         _write(axes, each, image)
@@ -79,7 +79,7 @@ def _write(axes: Axes, drawn: Map, image: Any) -> None:
     for line, column in product(*map(range, drawn.values.shape)) if drawn.texts else ():
         text, value = drawn.texts[line][column], drawn.values[line, column]
         pale = float(np.dot(to_rgb(image.to_rgba(value)), _LUMINANCE)) > _PALE
-        look = {
+        look: dict[str, Any] = {
             "color": INK if np.isnan(value) else "black" if pale else "white",
             "weight": "bold" if isinstance(text, Bold) else "normal",
         }

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from itertools import cycle
+from typing import Any
 
 INK = "#757575"
 """Of texts and axes: a grey with a contrast of 4.5 to white and to black alike."""
@@ -11,7 +12,7 @@ BLUE, ORANGE, GREEN, YELLOW = "#0072B2", "#D55E00", "#00946B", "#C28100"
 """From the palette of Okabe and Ito (2008), safe for the colour-blind; two are darkened, so that
 names in these colours are read on white, too.
 """
-STYLE = {
+STYLE: dict[Any, Any] = {
     "axes.axisbelow": True,
     "axes.edgecolor": INK,
     "axes.grid": True,

@@ -7,11 +7,13 @@ import sys
 import numpy as np
 import pytest
 
-from care_sim.reports.figures.ablations import ablation_figures, open_ablation_figures
-from care_sim.reports.figures.budget import sweep_figures
-from care_sim.reports.figures.crowding import crowding_figures
+from care_sim.reports.figures.budget import firing_figures, sweep_figures
+from care_sim.reports.figures.differences import (
+    ablation_figures,
+    crowding_figures,
+    open_ablation_figures,
+)
 from care_sim.reports.figures.files import remove_others, save, svg_text
-from care_sim.reports.figures.firing import firing_figures
 from care_sim.reports.figures.order import open_order_figures, order_figures
 from care_sim.reports.figures.validate import validation_figures
 from care_sim.study.designs.ablations import ablation_study

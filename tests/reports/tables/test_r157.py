@@ -1,7 +1,7 @@
 import numpy as np
 
 from care_sim.reports.collisions import CollisionRows
-from care_sim.reports.figures.r157 import r157_figures
+from care_sim.reports.figures.standards import r157_figures
 from care_sim.reports.table import Bold
 from care_sim.reports.tables.r157 import cut_in_rows, r157_tables
 from tests.helpers.drawn import ticks

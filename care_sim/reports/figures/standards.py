@@ -1,4 +1,6 @@
-"""The figure of the Euro NCAP tests: a map of the score of every test at every speed."""
+"""Figures of the standard tests: maps of what every policy avoids in the Euro NCAP tests and in the
+cut-ins of UN Regulation 157.
+"""
 
 from collections.abc import Sequence
 
@@ -9,8 +11,12 @@ from care_sim.base.errors import counted, percent
 from care_sim.core.arrays import Floats
 from care_sim.evaluation.ncap_score import BEST_SCORE
 from care_sim.reports.figures.maps import Map, maps_figure
+from care_sim.reports.formatting import marked
 from care_sim.reports.ncap import Contender, NcapRows
-from care_sim.study.run_config import Row
+from care_sim.reports.tables.r157 import cut_in_rows
+from care_sim.study.designs.r157 import case_of
+from care_sim.study.rows.reading import is_avoided
+from care_sim.study.run_config import FULL, Row
 
 NCAP_FIGURE = "ncap"
 
@@ -52,3 +58,40 @@ def _map(results: NcapRows, contender: Contender) -> Map:
     means: Floats = np.full(sums.shape[1:], np.nan)
     np.divide(sums[0], sums[1], out=means, where=sums[1] > 0)
     return Map(f"{results.marked(contender[0])}, {percent(contender[1])}", means)
+
+
+R157_FIGURE = "r157-avoided"
+
+
+def r157_figures(rows: Sequence[Row]) -> dict[str, Figure]:
+    """Share of the preventable cases avoided, one row of maps per budget and one map per policy;
+    each cell is a relative speed and a gap, whatever the other speeds.
+    """
+    study = cut_in_rows(rows)
+    cases = [case_of(row) for row in rows]
+    gaps = sorted({case.gap_m for case in cases}, reverse=True)
+    speeds = sorted({case.relative_kph for case in cases})
+
+    def map_of(policy: str, budget: float) -> Map:
+        avoided: dict[tuple[float, float], list[bool]] = {}
+        for row in study.of(policy, budget):
+            case = case_of(row)
+            avoided.setdefault((case.gap_m, case.relative_kph), []).append(is_avoided(row))
+        shares = [
+            [100 * float(np.mean(avoided.get((gap, speed), np.nan))) for speed in speeds]
+            for gap in gaps
+        ]
+        own = "every cell" if policy == FULL else percent(budget)
+        return Map(f"{marked(policy, study.tags[policy])}, {own}", np.array(shares))
+
+    figure = maps_figure(
+        "gap (m) by relative speed (km/h); empty: no case that a careful human prevents",
+        [[map_of(policy, budget) for policy in study.policies] for budget in study.budgets],
+        [f"{gap:g}" for gap in gaps],
+        [f"{speed:g}" for speed in speeds],
+        unit="preventable cases avoided (%)",
+        cmap="cividis",
+        vmin=0,
+        vmax=100,
+    )
+    return {R157_FIGURE: figure}
