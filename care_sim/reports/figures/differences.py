@@ -73,7 +73,7 @@ OPEN_ABLATION_FIGURE = "ablations-open-loop"
 _ABLATION_NOTE = "bold: the interval excludes 0; ≤, ≥: a bound, for some are never detected"
 
 
-def ablation_ablation_map(rows: Sequence[Row]) -> dict[str, Figure]:
+def ablation_figures(rows: Sequence[Row]) -> dict[str, Figure]:
     """Paired differences of the first detection in metres, one column per scenario and budget."""
     study = StudyCells(rows)
 
@@ -88,7 +88,7 @@ def ablation_ablation_map(rows: Sequence[Row]) -> dict[str, Figure]:
     )
 
 
-def open_ablation_ablation_map(rows: Sequence[Row]) -> dict[str, Figure]:
+def open_ablation_figures(rows: Sequence[Row]) -> dict[str, Figure]:
     """Paired differences of recalls in points, one column per budget and measure."""
     study = AblationPlays(rows)
     columns = [
