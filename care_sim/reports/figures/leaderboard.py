@@ -1,36 +1,52 @@
-"""Figures of the leaderboard: every score as a bar with its interval, with the parts that make it
-or alone.
+"""Figures of the leaderboard: every score with its interval, with the parts that make it or as a
+bar chart.
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from care_sim.base.errors import percent
 from care_sim.reports.figures.files import default_style
-from care_sim.reports.figures.styles import BLUE, GREEN, INK, ORANGE, YELLOW
+from care_sim.reports.figures.styles import BLUE, INK, ORANGE, YELLOW
 from care_sim.reports.leaderboard import names_in, ranked
 from care_sim.study.benchmark.result import BenchmarkResult
 from care_sim.study.benchmark.tasks import BENCHMARK_BUDGET
 
 LEADERBOARD_FIGURE = "leaderboard"
-_PARTS = {"drives": (ORANGE, "v"), "tests": (GREEN, "s"), "streets": (INK, "^")}
+_PARTS = {"drives": (ORANGE, "v"), "tests": (YELLOW, "s"), "streets": (BLUE, "^")}
 _CAMERA, _NO_CAMERA = BLUE, YELLOW
-_BAR_INCHES = 0.36
+_LINE_INCHES, _BAR_INCHES = 0.26, 0.36
 
 
 @default_style()
 def leaderboard_figure(results: Sequence[BenchmarkResult]) -> Figure:
-    """Draw the score of every result as `score_chart` does, and the parts of each as markers."""
-    figure = score_chart(results)
-    (axes,) = figure.axes
+    """A line for every result, the highest score on top: its score, and the parts that make it."""
+    # Lines are counted from below.
     upwards = ranked(results)[::-1]
+    lines = range(len(upwards))
+    figure = Figure(figsize=(8.0, 1.4 + _LINE_INCHES * len(upwards)), layout="constrained")
+    axes = figure.subplots()
     for part in results[0].parts:
         colour, marker = _PARTS[part]
         shares = [result.part_score(part) for result in upwards]
-        axes.scatter(shares, range(len(upwards)), s=24, color=colour, marker=marker, label=part)
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside upper left", ncols=3)
+        axes.scatter(shares, lines, s=22, color=colour, marker=marker, label=part, zorder=3)
+    scores = [result.score() for result in upwards]
+    means = [score.mean for score in scores]
+    ends = [
+        [max(score.mean - score.low, 0.0) for score in scores],
+        [max(score.high - score.mean, 0.0) for score in scores],
+    ]
+    look: dict[str, Any] = {"color": INK, "capsize": 3, "label": "score, 95% interval"}
+    axes.errorbar(means, lines, xerr=ends, fmt="o", **look)
+    axes.set_yticks(lines, names_in(upwards))
+    axes.set_ylim(-0.6, len(upwards) - 0.4)
+    axes.set_xlim(-2, 102)
+    axes.set_xlabel("% of what a full scan reaches")
+    axes.grid(axis="x")
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside upper left", ncols=4)
     return figure
 
 
