@@ -76,6 +76,7 @@ def test_what_is_not_detected_is_hollow_at_0():
     figure = drawn(PANEL)
     (hollow,) = (line for line in figure.axes[0].lines if line.get_markerfacecolor() == "none")
     assert (list(hollow.get_xdata()), list(hollow.get_ydata())) == ([0.2], [0.0])
+    assert heights(figure.axes[0])["all-camera"] == [2.0, 0.0]
     assert hollow.get_color() == colours(["all-camera"])["all-camera"]
     assert "hollow, at 0: not detected" in figure.get_supxlabel()
     assert "hollow" not in drawn(Panel("", ("a",), {"care": [1.0]})).get_supxlabel()

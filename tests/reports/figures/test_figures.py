@@ -85,6 +85,8 @@ def test_a_sweep_has_the_medians_by_budget_and_quartiles_of_care():
     assert shown["care"][1] == 15.0
     assert ticks(axes) == ["3%", "10%"]
     assert {*shown} == {"full scan", "care", "all-camera", "history"}
+    bars = [drawn.get_segments()[0][:, 1].tolist() for drawn in axes.collections]
+    assert bars == [[16.0, 18.0], [15.0, 15.0]]
     assert "bars: quartiles of care" in figure.get_supxlabel()
     assert sweep_figures(STUDY) == {}, "one budget makes no curve"
 
