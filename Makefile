@@ -5,7 +5,7 @@
 # make test       set up with the development tools, run every test (26 minutes)
 # make dist       build the sdist, and the wheel from it, in dist/
 # make test-installed   install that wheel in an environment of its own, run the sdist's tests with it
-# make test-extras   install that wheel with one extra after the other, each alone, and use it; EXTRAS="page video"
+# make test-extras   install that wheel with one extra after the other, each alone, and use it; EXTRAS="viewer video"
 # make bench      measure speed beside other engines and environments; ARGS="--seconds 0.3 --repeats 1" is short
 # make parity     hold the engine `fast` against Bullet, ray by ray; ARGS="--scenes 1000 --episodes 1" is short
 # make test-speed   hold the ratios of speed to the published ones; nothing else may run meanwhile

@@ -1,5 +1,5 @@
 """Install the wheel with one extra after the other, each in an environment of its own, and do what
-the extra is for: `make test-extras`, or `make test-extras EXTRAS="page video"`.
+the extra is for: `make test-extras`, or `make test-extras EXTRAS="viewer video"`.
 """
 
 import subprocess
@@ -52,10 +52,6 @@ USES = {
     ],
     "torchrl": ["python vector.py"],
     "viewer": [f"care-sim run dense {SHORT} --record a.rrd"],
-    "page": [
-        "care-sim sweep --scenarios cutin --seeds 1 --out study",
-        "care-sim report study -o page.html",
-    ],
     "video": [f"care-sim run dense {SHORT} --video a.mp4"],
     "cluster": ["python cluster.py"],
     "minari": [

@@ -76,18 +76,6 @@ def import_rosbags() -> tuple[ModuleType, ModuleType]:
     return import_module("rosbags.highlevel"), import_module("rosbags.typesys")
 
 
-def vega_bundle() -> str:
-    """Vega, Vega-Lite and Vega-Embed as one script. Raises MissingExtra with the extra."""
-    bundle: str = _import("vl_convert", "A page", "page").javascript_bundle()
-    return bundle
-
-
-def check_page() -> None:
-    """Raise MissingExtra where a library is missing that makes pages."""
-    for module in ("altair", "jinja2", "vl_convert"):
-        _import(module, "A page", "page")
-
-
 def _import(module: str, name: str, extra: str) -> ModuleType:
     """A module of an `extra`, which a user knows as `name`."""
     try:

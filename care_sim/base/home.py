@@ -1,6 +1,6 @@
 """Settle a folder for caches where the user has no home folder, or one that cannot be written.
 
-Numba, Matplotlib and Altair keep caches below the home folder. Without one they fail, warn at every
+Numba and Matplotlib keep caches below the home folder. Without one they fail, warn at every
 start, or make a folder named `~`. A container that runs under a foreign user number is such a case.
 Importing this module settles it.
 """

@@ -9,7 +9,6 @@ import tyro
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.checks import LARGEST_INTEGER
 from care_sim.base.errors import InvalidInput, counted, print_lines, report_problems
-from care_sim.base.extras import check_page
 from care_sim.commands.shared.play_options import SourceOptions
 from care_sim.commands.shared.study_command import FAILED, console
 from care_sim.reports.report import (
@@ -33,9 +32,7 @@ class PrintReport(SourceOptions):
     folder: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER")]
     """The --out of an earlier study."""
     page: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
-    """HTML file for the page, which needs no other file; the folder is left as it is (extra
-    'page').
-    """
+    """HTML file for the page, which needs no other file; the folder is left as it is."""
     minus: str | None = None
     """Print this policy less each of the others, with intervals, in place of the tables; the folder
     is left as it is. Of one with parameters the whole name in the tables."""
@@ -83,9 +80,7 @@ class PrintReport(SourceOptions):
         return 0
 
     def _write(self, path: Path) -> int:
-        check_page()
-        # Imported here because it imports Jinja and Altair, which the extra 'page' brings: tables
-        # and figures need neither.
+        # Imported here because it imports Jinja: tables and figures do not need it.
         from care_sim.reports.page.build import write_page
 
         source = None if self.source is None else self.source_named(self.source)

@@ -7,17 +7,26 @@ from matplotlib.figure import Figure
 
 from care_sim.base.errors import unknown
 from care_sim.reports import captions, closings
-from care_sim.reports.figures.ablations import (
+from care_sim.reports.figures.budget import (
+    BUDGET_FIGURES,
+    FIRING_FIGURE,
+    firing_figures,
+    sweep_figures,
+)
+from care_sim.reports.figures.differences import (
     ABLATION_FIGURE,
+    CROWDING_FIGURE,
     OPEN_ABLATION_FIGURE,
     ablation_figures,
+    crowding_figures,
     open_ablation_figures,
 )
-from care_sim.reports.figures.budget import BUDGET_FIGURES, sweep_figures
-from care_sim.reports.figures.crowding import CROWDING_FIGURE, crowding_figures
-from care_sim.reports.figures.faults import FAULT_FIGURES, fault_figures
-from care_sim.reports.figures.firing import FIRING_FIGURE, firing_figures
-from care_sim.reports.figures.ncap import NCAP_FIGURE, ncap_figures
+from care_sim.reports.figures.faults import (
+    FAULT_FIGURES,
+    VEHICLE_FIGURE,
+    fault_figures,
+    vehicle_figures,
+)
 from care_sim.reports.figures.order import (
     OPEN_ORDER_FIGURE,
     ORDER_FIGURE,
@@ -25,15 +34,14 @@ from care_sim.reports.figures.order import (
     order_figures,
 )
 from care_sim.reports.figures.protocol import PROTOCOL_FIGURES, protocol_figures
-from care_sim.reports.figures.r157 import R157_FIGURE, r157_figures
 from care_sim.reports.figures.realism import (
     OPEN_REALISM_FIGURE,
     REALISM_FIGURE,
     open_realism_figures,
     realism_figures,
 )
+from care_sim.reports.figures.standards import NCAP_FIGURE, R157_FIGURE, ncap_figures, r157_figures
 from care_sim.reports.figures.validate import VALIDATION_FIGURE, validation_figures
-from care_sim.reports.figures.vehicle import VEHICLE_FIGURE, vehicle_figures
 from care_sim.reports.mechanism.tables import mechanism_closing, mechanism_tables
 from care_sim.reports.protocol import ablations as open_ablations
 from care_sim.reports.protocol import firing as open_firing

@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 
 from care_sim.base.errors import percent
 from care_sim.core.arrays import Floats
-from care_sim.policies import tags_of
+from care_sim.reports.figures.curves import name_ends
 from care_sim.reports.figures.files import default_style
-from care_sim.reports.figures.styles import FULL_STYLE, styles
+from care_sim.reports.figures.styles import colours
 from care_sim.training.aggregates import interquartile_mean, performance_profile
 from care_sim.training.curves import TrainingRun, recipe_name, scores_at, shared_steps
 from care_sim.training.episodes import LEARNER
@@ -36,7 +36,7 @@ def curves_figure(groups: Sequence[Sequence[TrainingRun]]) -> Figure:
     rows = 1 + any(run.episodes for runs in groups for run in runs)
     figure = Figure(figsize=(1.2 + 4.6 * len(groups), 3.9 * rows), layout="constrained")
     panels = figure.subplots(rows, len(groups), squeeze=False)
-    # Panels of one unit have one scale, so that heights compare; lines are named once it is fixed.
+    # Panels of one unit have one scale, so that heights compare.
     scales: dict[str, Axes] = {}
     for axes, runs in zip(panels[0], groups, strict=True):
         unit = runs[0].unit
@@ -45,28 +45,27 @@ def curves_figure(groups: Sequence[Sequence[TrainingRun]]) -> Figure:
         scales.setdefault(unit, axes)
         _draw(axes, runs)
         axes.set_ylabel(unit)
-    for axes, runs in zip(panels[0], groups, strict=True):
-        _name_lines(axes, runs)
     for axes, runs in zip(panels[1:].ravel(), groups, strict=rows > 1):
         _draw_profiles(axes, runs)
+    name_ends(figure, {axes: _ends(runs) for axes, runs in zip(panels[0], groups, strict=True)})
     return figure
 
 
 def _draw(axes: Axes, runs: Sequence[TrainingRun]) -> None:
     config = runs[0].config
     learner = config["algorithm"]
-    colours = _colours((*runs[0].marks, learner))
+    hues = colours((*runs[0].marks, learner))
     for name, height in _heights(runs).items():
-        axes.axhline(height, color=colours[name], linestyle="--", linewidth=1.1, zorder=1)
+        axes.axhline(height, color=hues[name], linestyle="--", linewidth=1.1, zorder=1)
     for run in runs:
         axes.plot(
             run.steps,
             [_middle(scores) for scores in run.scores],
-            color=colours[learner],
+            color=hues[learner],
             linewidth=0.9,
             alpha=0.5 if len(runs) > 1 else 1.0,
         )
-    _all_seeds(axes, runs, colours[learner])
+    _all_seeds(axes, runs, hues[learner])
     # A run is evaluated before its first step too, so the last step may be 0.
     axes.set_xlim(0, max(1, *(run.steps[-1] for run in runs)))
     # Metres are never below 0; a score is where a learner falls behind `random`.
@@ -90,8 +89,6 @@ def _describe(axes: Axes, config: Mapping[str, Any], seeds: int) -> None:
         f"a point is the mean of {config['episodes']} validation episodes at {played}"
     )
     axes.xaxis.set_major_formatter(lambda steps, _: f"{steps / 1000:g}")
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.grid(axis="y", color="0.92")
 
 
 def _all_seeds(axes: Axes, runs: Sequence[TrainingRun], colour: str) -> None:
@@ -115,7 +112,7 @@ def _draw_profiles(axes: Axes, runs: Sequence[TrainingRun]) -> None:
     if not played:
         axes.set_axis_off()
         return
-    colours = _colours((*runs[0].rules, learner))
+    hues = colours((*runs[0].rules, learner))
     every = np.concatenate([scores.ravel() for scores in played.values()])
     levels = np.linspace(every.min(), every.max(), _LEVELS)
     for name, scores in played.items():
@@ -123,15 +120,14 @@ def _draw_profiles(axes: Axes, runs: Sequence[TrainingRun]) -> None:
         style: dict[str, Any] = (
             {"linewidth": 2.2} if name == learner else {"linewidth": 1.1, "linestyle": "--"}
         )
-        axes.plot(levels, [one.value for one in profile], color=colours[name], label=name, **style)
+        axes.plot(levels, [one.value for one in profile], color=hues[name], label=name, **style)
         if len(scores) > 1:
             low, high = ([getattr(one, end) for one in profile] for end in ("low", "high"))
-            axes.fill_between(levels, low, high, color=colours[name], alpha=0.15, linewidth=0)
+            axes.fill_between(levels, low, high, color=hues[name], alpha=0.15, linewidth=0)
     axes.set_ylabel("share of episodes above")
     unit = "return" if len(runs[0].tasks) > 1 else runs[0].unit
     axes.set_xlabel(f"{unit}, after {shared[-1]:,} steps" if same else unit)
-    axes.legend(frameon=False, fontsize=9)
-    axes.spines[["top", "right"]].set_visible(False)
+    axes.legend()
 
 
 def _middle(scores: Floats) -> float:
@@ -144,42 +140,8 @@ def _heights(runs: Sequence[TrainingRun]) -> dict[str, float]:
     return {name: _middle(scores) for name, scores in runs[0].marks.items()}
 
 
-def _colours(names: Sequence[str]) -> dict[str, str]:
-    drawn = styles((name, tags_of(name)) for name in names) | {"full": FULL_STYLE}
-    return {name: style.colour for name, style in drawn.items()}
-
-
-def _name_lines(axes: Axes, runs: Sequence[TrainingRun]) -> None:
-    """Names right of the axes, moved apart where lines lie close."""
+def _ends(runs: Sequence[TrainingRun]) -> dict[str, tuple[float, str]]:
+    """The right ends of the learner's curve and of the lines, with their colours."""
     last = float(np.mean([_middle(run.scores[-1]) for run in runs]))
     heights = _heights(runs) | {runs[0].config["algorithm"]: last}
-    colours = _colours([*heights])
-    low, high = axes.get_ylim()
-    ordered = sorted(heights, key=lambda name: heights[name])
-    # A line of text is about 5.5% of the axis high.
-    places = apart([heights[name] for name in ordered], (high - low) * 0.055, high)
-    for name, place in zip(ordered, places, strict=True):
-        axes.annotate(
-            name,
-            (1.0, place),
-            (6, 0),
-            xycoords=axes.get_yaxis_transform(),
-            textcoords="offset points",
-            va="center",
-            size=9,
-            color=colours[name],
-            annotation_clip=False,
-        )
-
-
-def apart(heights: Sequence[float], least: float, top: float) -> list[float]:
-    """Ascending heights, moved so that each stands at least `least` above the one before and none
-    above `top`.
-    """
-    places: list[float] = []
-    for height in heights:
-        places.append(max([height, *(below + least for below in places[-1:])]))
-    # What was moved up beyond the top moves down again, and takes those below it along.
-    for n in reversed(range(len(places))):
-        places[n] = min(places[n], places[n + 1] - least if n + 1 < len(places) else top)
-    return places
+    return {name: (heights[name], colour) for name, colour in colours(heights).items()}

@@ -33,7 +33,7 @@ def test_a_missing_extra_is_named(monkeypatch):
 
 def test_an_installed_wheel_needs_no_clone(tmp_path, monkeypatch):
     monkeypatch.setattr(extras, "_HOME", tmp_path)
-    assert install_command("page") == "pip install 'care-sim[page]'"
+    assert install_command("video") == "pip install 'care-sim[video]'"
 
 
 def test_open3d_where_it_is_installed():

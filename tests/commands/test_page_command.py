@@ -1,7 +1,5 @@
 """`care-sim report FOLDER -o FILE`: what it writes, and the one line it says where it cannot."""
 
-import sys
-
 import pytest
 
 from care_sim.cli import main
@@ -131,11 +129,3 @@ def test_a_folder_in_the_place_of_the_page_is_one_line(results, tmp_path, capsys
     code, _, err = report(capsys, results, "-o", tmp_path)
     assert (code, err.count("\n")) == (2, 1)
     assert "is a folder, a file is wanted" in err
-
-
-@pytest.mark.parametrize("library", ["altair", "jinja2", "vl_convert"])
-def test_a_missing_library_names_the_extra(library, results, tmp_path, capsys, monkeypatch):
-    monkeypatch.setitem(sys.modules, library, None)
-    code, _, err = report(capsys, results, "-o", tmp_path / "report.html")
-    assert (code, err.count("\n")) == (2, 1)
-    assert "needs the extra 'page': pip install -c constraints.txt -e '.[page]'" in err

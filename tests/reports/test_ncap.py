@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.reports.figures.ncap import ncap_figure
+from care_sim.reports.figures.standards import ncap_figures
 from care_sim.reports.ncap import Line, NcapRows, impact_of, overall
 from care_sim.reports.table import Bold
 from care_sim.reports.tables.ncap import ncap_tables
@@ -135,7 +135,7 @@ def test_lines_without_cars_that_hide_count_in_both_readings():
 
 def test_the_figure_has_a_panel_for_every_policy_and_budget():
     more = [*MADE, *study(played("care", "CPNA-25", [20.0] * 5, ego=40.0, budget=0.1))]
-    figure = ncap_figure(more)
+    figure = ncap_figures(more)["ncap"]
     panels = [axes for axes in figure.axes if axes.images and axes.get_title(loc="left")]
     titles = [axes.get_title(loc="left") for axes in panels]
     assert titles == ["full, 100%", "care, 3%", "fan, 3%", "full, 100%", "care, 10%", "fan, 10%"]
@@ -153,4 +153,4 @@ def test_a_study_without_controls_care_or_a_full_scan_has_its_tables():
     assert table.rows[-1] == ("in all", "1/0/0 5.00")
     full = study(played("full", "CPNA-25", [None]))
     assert ncap_tables(full)[0].rows[0] == ("budget 100%",)
-    assert ncap_figure(full).axes
+    assert ncap_figures(full)["ncap"].axes

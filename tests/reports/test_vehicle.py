@@ -6,7 +6,7 @@ import pytest
 
 from care_sim.evaluation.censoring import Bound
 from care_sim.reports.contrasts import AVOIDED, DETECTION, contrast, contrast_of_cases
-from care_sim.reports.figures.vehicle import VEHICLE_FIGURE, vehicle_figures
+from care_sim.reports.figures.faults import VEHICLE_FIGURE, vehicle_figures
 from care_sim.reports.studies import STUDIES
 from care_sim.reports.vehicle.evidence_tables import compensation_table, evidence_table
 from care_sim.reports.vehicle.fallback_tables import cost_tables, fallback_table
@@ -208,8 +208,8 @@ def test_a_part_of_the_study_has_its_tables_and_its_figure(rows):
 def test_the_figure_shows_every_late_level(rows):
     held, errors = vehicle_figures(rows)[VEHICLE_FIGURE].axes
     late = [level.label for level in EVIDENCE_LEVELS if "late" in level.label]
-    assert [text.get_text() for text in held.get_yticklabels()] == late
+    assert [text.get_text() for text in held.get_xticklabels()] == late
     compensated, without, *_ = held.get_lines()
-    assert set(compensated.get_xdata()) == {90.0}
-    assert set(without.get_xdata()) == {50.0}
-    assert errors.get_lines()[0].get_xdata().max() == 1.0
+    assert set(compensated.get_ydata()) == {90.0}
+    assert set(without.get_ydata()) == {50.0}
+    assert errors.get_lines()[0].get_ydata().max() == 1.0

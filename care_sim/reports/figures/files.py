@@ -1,44 +1,62 @@
 """Files of figures: written as PNG and SVG, removed when another study takes their folder."""
 
+import re
 import warnings
 from collections.abc import Container, Iterable, Iterator
 from contextlib import contextmanager
+from io import StringIO
 from pathlib import Path
+from typing import Any
 
-from matplotlib import rc_context, rcdefaults
+from matplotlib import rc_context, rcdefaults, rcParams
 from matplotlib.axis import Tick
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from care_sim.base.errors import printable, printable_lines
 from care_sim.base.files import PNG, SVG, check_output, replacing
+from care_sim.reports.figures.styles import STYLE
 
 FORMATS = (".png", ".svg")
 """Endings of the two files of a figure."""
+_NO_METADATA = dict.fromkeys(("Creator", "Date", "Format", "Type"))
+_UNUSED_ID = re.compile(r' id="[A-Za-z0-9_.]+_\d+"')
+"""Matplotlib counts its groups anew in every figure, and nothing refers to them."""
 
 
 @contextmanager
 def default_style() -> Iterator[None]:
-    """Draw with Matplotlib's own defaults, whatever the user's settings are. Every function that
-    makes a figure runs within it.
+    """Draw in the style of the project, whatever the user's settings are. Every function that makes
+    a figure runs within it.
     """
     with rc_context():
         rcdefaults()
+        rcParams.update(STYLE)
         yield
 
 
 def save(figure: Figure, stem: Path) -> None:
-    """Write a figure as PNG and SVG, with its texts as they are."""
+    """Write a figure as PNG, on white, and as SVG, on a transparent ground, with its texts as they
+    are.
+    """
+    drawing = svg_text(figure, stem.name)
     with default_style(), texts_as_they_are(figure):
         with replacing(stem.with_suffix(".png")) as unfinished:
             figure.savefig(unfinished, dpi=200)
-        # Ids within an SVG are random without a salt, and it holds the date. Neither may make a new
-        # file of the same figure.
-        with (
-            rc_context({"svg.hashsalt": printable(stem.name)}),
-            replacing(stem.with_suffix(".svg")) as unfinished,
-        ):
-            figure.savefig(unfinished, metadata={"Date": None})
+        with replacing(stem.with_suffix(".svg")) as unfinished:
+            unfinished.write_text(drawing, encoding="utf-8")
+
+
+def svg_text(figure: Figure, name: str) -> str:
+    """The SVG of a figure of this name, the same text for the same figure. Several of them can
+    stand in one page.
+    """
+    drawn = StringIO()
+    # Ids within an SVG are random without a salt.
+    salt: dict[Any, Any] = {"svg.hashsalt": printable(name)}
+    with default_style(), rc_context(salt), texts_as_they_are(figure):
+        figure.savefig(drawn, format="svg", transparent=True, metadata=_NO_METADATA)
+    return _UNUSED_ID.sub("", drawn.getvalue())
 
 
 @contextmanager

@@ -1,11 +1,13 @@
 """The figure of realism: a map of what becomes of every headline order under every condition."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
-from matplotlib.axes import Axes
+import numpy as np
+from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch, Rectangle
+from matplotlib.patches import Patch
 
+from care_sim.reports.figures.maps import Map, maps_figure
 from care_sim.reports.formatting import signed
 from care_sim.reports.realism.episodes import RealismEpisodes
 from care_sim.reports.realism.orders import Order, Verdict
@@ -23,9 +25,6 @@ _COLOURS = {
     Verdict.ARISES: "#CC79A7",
 }
 """From the palette of Okabe and Ito (2008), safe for the colour-blind."""
-_CELL_INCHES = 0.55, 0.24
-_NAMES_INCHES = 2.6, 2.6
-"""Room for the names of conditions on the left and for those of orders below."""
 
 
 def realism_figures(rows: Sequence[Row]) -> dict[str, Figure]:
@@ -39,51 +38,32 @@ def open_realism_figures(rows: Sequence[Row]) -> dict[str, Figure]:
 
 
 def _figures(name: str, study: RealismStudy) -> dict[str, Figure]:
-    played = {measure: orders for measure, orders in study.orders().items() if orders}
-    return {name: _figure(study, played)} if played else {}
-
-
-def _figure(study: RealismStudy, by_measure: Mapping[str, Sequence[Order]]) -> Figure:
-    across = max(map(len, by_measure.values()))
-    width, height = _CELL_INCHES
-    left, below = _NAMES_INCHES
-    down = len(by_measure) * len(study.conditions)
-    figure = Figure(
-        figsize=(max(left + width * across, 7.0), below + 0.4 + height * down),
-        layout="constrained",
+    by_measure = {measure: orders for measure, orders in study.orders().items() if orders}
+    if not by_measure:
+        return {}
+    conditions = [condition.label for condition in study.conditions]
+    figure = maps_figure(
+        f"{study.title}: first policy minus second, {study.unit}",
+        [[_map(measure, conditions, orders)] for measure, orders in by_measure.items()],
+        conditions,
+        [order.label for order in next(iter(by_measure.values()))],
+        cmap=ListedColormap([*_COLOURS.values()]),
+        vmin=-0.5,
+        vmax=len(_COLOURS) - 0.5,
     )
-    panels = figure.subplots(len(by_measure), 1, sharex=True, squeeze=False)[:, 0]
-    for axes, (measure, orders) in zip(panels, by_measure.items(), strict=True):
-        _draw(axes, study, orders)
-        axes.set_title(measure, loc="left", fontsize=8)
-    labels = [order.label for order in next(iter(by_measure.values()))]
-    panels[-1].set_xticks(range(len(labels)), labels, rotation=60, ha="right", fontsize=7)
-    title = f"{study.title}: first policy minus second, {study.unit}"
-    figure.suptitle(title, x=0.01, ha="left", fontsize=9)
-    figure.legend(
-        [Patch(color=colour) for colour in _COLOURS.values()],
-        [*_COLOURS],
-        loc="outside lower left",
-        ncols=len(_COLOURS),
-        frameon=False,
-        fontsize=8,
-    )
-    return figure
+    keys = [Patch(color=colour, label=verdict) for verdict, colour in _COLOURS.items()]
+    figure.legend(handles=keys, loc="outside lower left", ncols=len(keys), fontsize=8)
+    return {name: figure}
 
 
-def _draw(axes: Axes, study: RealismStudy, orders: Sequence[Order]) -> None:
-    labels = [condition.label for condition in study.conditions]
-    for row, condition in enumerate(labels):
+def _map(measure: str, conditions: Sequence[str], orders: Sequence[Order]) -> Map:
+    """The verdicts by their numbers, and the differences as texts."""
+    kinds = np.full((len(conditions), len(orders)), np.nan)
+    texts = [[""] * len(orders) for _ in conditions]
+    for line, condition in enumerate(conditions):
         for column, order in enumerate(orders):
             if standing := order.standings.get(condition):
-                verdict = order.verdict(condition)
-                colour = _COLOURS[verdict] if verdict else "white"
-                corner = column - 0.48, row - 0.48
-                axes.add_patch(Rectangle(corner, 0.96, 0.96, color=colour, linewidth=0))
-                text = signed(standing.difference)
-                axes.text(column, row, text, ha="center", va="center", fontsize=6)
-    axes.set_xlim(-0.5, len(orders) - 0.5)
-    axes.set_ylim(len(labels) - 0.5, -0.5)
-    axes.set_yticks(range(len(labels)), labels, fontsize=7)
-    axes.tick_params(length=0)
-    axes.spines[:].set_visible(False)
+                texts[line][column] = signed(standing.difference)
+                if verdict := order.verdict(condition):
+                    kinds[line, column] = [*_COLOURS].index(verdict)
+    return Map(measure, kinds, texts)

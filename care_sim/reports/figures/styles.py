@@ -1,118 +1,74 @@
-"""Colours, markers and lines of policies, the same in every figure."""
+"""The one style of all figures: readable on a light and on a dark page, on a transparent ground."""
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable
 from itertools import cycle
-from typing import Literal, NamedTuple
+from typing import Any
 
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-
-from care_sim.reports.formatting import MARKS
-
-
-@dataclass(frozen=True)
-class Style:
-    """How a policy is drawn."""
-
-    colour: str
-    marker: str
-    line: str = "-"
-
-
-_KNOWN = {
-    "history": ("#E69F00", "s"),
-    "history-uniform": ("#882255", "<"),
-    "all-camera": ("#D55E00", "v"),
-    "care": ("#0072B2", "o"),
-    "care-sbf": ("#009E73", "D"),
-    "care-priority": ("#56B4E9", "^"),
-    "uncertainty": ("#CC79A7", "P"),
-    "beam-reduce": ("#332288", ">"),
-    "random": ("#999933", "X"),
-    "learned-scorer": ("#117733", "p"),
-    "learned-sets": ("#1B7837", "3"),
-    "ppo": ("#AA4499", "h"),
-    "ppo-dartout": ("#661100", "*"),
-    "care-sightlines": ("#000000", "d"),
-    "care-spread": ("#6699CC", "H"),
-    "care-sector": ("#AA3377", "1"),
-    "rows": ("#CC6677", "x"),
-    "place": ("#44AA99", "+"),
-    "place-hulls": ("#BB5566", "2"),
-    "fan": ("#BBAA33", "8"),
-}
-"""From the palettes of Okabe and Ito (2008) and of Tol (2021), both safe for the colour-blind. No
-two have one marker. `rows`, `place`, `place-hulls` and `care-sector` have thin ones, since
-Matplotlib has too few to fill; a closed loop, whose figures leave markers open, plays `fan`.
+INK = "#757575"
+"""Of texts and axes: a grey with a contrast of 4.5 to white and to black alike."""
+CALM = "#999999"
+"""Of curves that only give the background."""
+BLUE, ORANGE, GREEN, YELLOW = "#0072B2", "#D55E00", "#00946B", "#C28100"
+"""From the palette of Okabe and Ito (2008), safe for the colour-blind; two are darkened, so that
+names in these colours are read on white, too.
 """
-_SPARE = ("#88CCEE", "#DDCC77", "#EE8866", "#AAAA00", "#77AADD")
-_GREYS = ("0.3", "0.45", "0.6")
-_MARKERS = ("H", "8", "d", "s", "^")
-FULL_STYLE = Style("0.35", "_", "--")
+STYLE: dict[Any, Any] = {
+    "axes.axisbelow": True,
+    "axes.edgecolor": INK,
+    "axes.grid": True,
+    "axes.grid.axis": "y",
+    "axes.labelcolor": INK,
+    "axes.labelsize": 9,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.titlecolor": INK,
+    "axes.titlelocation": "left",
+    "axes.titlesize": 9,
+    "figure.titlesize": 10,
+    "grid.alpha": 0.25,
+    "grid.color": INK,
+    "legend.fontsize": 9,
+    "legend.frameon": False,
+    "legend.labelcolor": INK,
+    # Texts of an SVG stay texts: they can be searched, and take a third of the space.
+    "svg.fonttype": "none",
+    "text.color": INK,
+    "xtick.color": INK,
+    "xtick.labelsize": 8,
+    "ytick.color": INK,
+    "ytick.labelsize": 8,
+}
+"""Settings of Matplotlib in which every figure departs from the defaults."""
+_COLOURS = {
+    "full": INK,
+    "full scan": INK,
+    "best control": "#8F6A4E",
+    "history": YELLOW,
+    "all-camera": ORANGE,
+    "care": BLUE,
+    "care-sbf": GREEN,
+    "care-priority": "#3B93C4",
+    "care-sightlines": "#9B59D0",
+    "care-spread": "#5B82C2",
+    "care-sector": "#C2478A",
+    "uncertainty": "#B5679A",
+    "history-uniform": "#A8506F",
+    "beam-reduce": "#7468C0",
+    "random": "#8A8A22",
+    "rows": "#C05A6B",
+    "place": "#2E9587",
+    "place-hulls": "#B45565",
+    "fan": "#96862A",
+    "learned-scorer": "#2E8B4A",
+    "learned-sets": "#3C8F3C",
+    "ppo": "#AF5BAF",
+    "ppo-dartout": "#B3543C",
+}
+_SPARE = (GREEN, "#7468C0", "#C2478A", "#96862A", "#2E9587", "#B3543C", "#3B93C4", "#8A8A22")
 
 
-APART = "policies are drawn a little apart sideways, so that equal points stay visible"
-_LEGEND_LINE_INCHES = 0.204
-_LEGEND_FRAME_INCHES = 0.35
-
-
-class Dodge(NamedTuple):
-    """How far the curves of policies are moved apart sideways, so that equal ones stay visible.
-
-    Shares of a budget: between `neighbours`, and from the first policy to the last at most `total`.
-    """
-
-    neighbours: float
-    total: float
-
-    def factor(self, number: int, count: int) -> float:
-        """The factor on the budgets of policy `number` of `count`; 1 for the one in the middle."""
-        # Budgets stand on a logarithmic axis, where equal factors are equal distances.
-        return 1 + min(self.neighbours, self.total / count) * (number - (count - 1) / 2)
-
-
-CLOSED_LOOP_DODGE = Dodge(0.03, 0.24)
-OPEN_LOOP_DODGE = Dodge(0.025, 0.1)
-
-
-def bare_axes(axes: Axes, grid: str, lines: Literal["both", "y"] = "y") -> None:
-    """Axes without a frame above and on the right, with a pale grid behind what is drawn."""
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.grid(axis=lines, color=grid)
-    axes.set_axisbelow(True)
-
-
-def name_outside(figure: Figure, panels: Sequence[Axes]) -> None:
-    """A legend right of the panels with everything that any of them names, once; a figure that is
-    too low for it grows.
-    """
-    named = {
-        label: handle
-        for axes in panels
-        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
-    }
-    figure.legend(
-        named.values(), named.keys(), loc="outside right upper", frameon=False, fontsize=9
-    )
-    needed = _LEGEND_FRAME_INCHES + _LEGEND_LINE_INCHES * len(named)
-    figure.set_figheight(max(figure.get_figheight(), needed))
-
-
-def styles(policies: Iterable[tuple[str, tuple[str, ...]]]) -> dict[str, Style]:
-    """A style for every policy, given with its tags. Policies that no car can have are grey and
-    dashed, controls dotted.
-    """
+def colours(policies: Iterable[str]) -> dict[str, str]:
+    """The colour of every policy, the same in every figure."""
     # Policies of others get what is left, in their order; so the same study has the same colours.
     spare = cycle(_SPARE)
-    greys = cycle(_GREYS)
-    markers = cycle(_MARKERS)
-    made = {}
-    for policy, tags in policies:
-        if any(tag in tags for tag in MARKS):
-            # Grey and dashed, so that nobody takes them for contenders.
-            made[policy] = Style(next(greys), next(markers), "--")
-        else:
-            colour, marker = _KNOWN.get(policy) or (next(spare), next(markers))
-            made[policy] = Style(colour, marker, ":" if "control" in tags else "-")
-    return made
+    return {policy: _COLOURS.get(policy) or next(spare) for policy in policies}

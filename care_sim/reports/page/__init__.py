@@ -1,3 +1,3 @@
-"""A folder of results as one web page that needs nothing else: tables, charts, episodes, where they
-come from.
+"""A folder of results as one web page that needs nothing else: tables, figures, episodes, and where
+they come from.
 """

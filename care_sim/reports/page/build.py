@@ -1,9 +1,10 @@
 """Builds the page of a folder of results."""
 
 import json
+import re
 import sys
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -14,18 +15,13 @@ from markupsafe import Markup
 
 import care_sim
 from care_sim.base.errors import InvalidInput, counted, printable_lines
-from care_sim.base.extras import vega_bundle
 from care_sim.base.files import HTML, replacing
 from care_sim.evaluation.recall import CENSORED_AT
 from care_sim.evaluation.sightings import RANGE_M
 from care_sim.reports.captions import caption
-from care_sim.reports.page.budget_charts import budget_charts
-from care_sim.reports.page.chart import Chart
-from care_sim.reports.page.crowding_charts import crowding_charts
+from care_sim.reports.figures.files import default_style, svg_text
 from care_sim.reports.page.episodes import Episode, episodes_to_watch, played_again
-from care_sim.reports.page.fault_charts import fault_charts
 from care_sim.reports.page.listing import episode_groups, replay_data
-from care_sim.reports.page.protocol_charts import protocol_charts
 from care_sim.reports.page.provenance import Provenance, provenance_of
 from care_sim.reports.page.tables import blocks, least_ems
 from care_sim.reports.report import read_results
@@ -36,23 +32,17 @@ from care_sim.study.executors import ExecutorFactory, processes
 from care_sim.study.results_formats import EPISODES, PLAYS, VEHICLE
 from care_sim.study.run_config import Row
 
-CHARTS: dict[str, Callable[[Sequence[Row]], list[Chart]]] = {
-    "sweep": budget_charts,
-    "paper": budget_charts,
-    "faults": fault_charts,
-    "crowding": crowding_charts,
-    "protocol": protocol_charts,
-}
-"""The interactive charts of the studies that have any."""
 WATCHED = (EPISODES, VEHICLE, PLAYS)
 """What can be played again to be watched. A row of the mechanism is no play by itself."""
+_STYLE_ELEMENT = re.compile(r"<style.*?</style>", re.DOTALL)
 
 
 @dataclass(frozen=True)
 class Findings:
     """What a study makes of its rows."""
 
-    charts: Sequence[Chart]
+    drawings: Mapping[str, str]
+    """The SVG of every figure by name."""
     tables: Sequence[Table]
     reading: str
     """How to read the tables."""
@@ -60,10 +50,12 @@ class Findings:
 
     @classmethod
     def of(cls, study: Study, rows: Sequence[Row]) -> "Findings":
-        """Charts, tables and sentences."""
-        charts = CHARTS.get(study.name, _no_charts)(rows)
+        """Figures, tables and sentences."""
+        with default_style():
+            figures = study.figures(rows)
+        drawings = {name: svg_text(figure, name) for name, figure in figures.items()}
         tables = [table.without_empty_columns() for table in study.tables(rows)]
-        return cls(charts, tables, caption(study.caption, tables), study.closing(rows))
+        return cls(drawings, tables, caption(study.caption, tables), study.closing(rows))
 
 
 @dataclass(frozen=True)
@@ -84,16 +76,12 @@ class Page:
 
     def html(self) -> str:
         """The page as one file."""
-        charts = self.findings.charts
         return str(
             _template().render(
                 page=self,
                 title=self.study.title,
                 version=care_sim.__version__,
-                charts=charts,
-                specs=_embedded([chart.spec for chart in charts]),
-                # A page without charts needs no Vega.
-                vega=Markup(vega_bundle()) if charts else "",
+                drawings={name: _inline(svg) for name, svg in self.findings.drawings.items()},
                 tables=[(table, blocks(table), least_ems(table)) for table in self.findings.tables],
                 reading=self.findings.reading,
                 closing=self.findings.closing,
@@ -184,10 +172,6 @@ def write_page(
     return page
 
 
-def _no_charts(_rows: Sequence[Row]) -> list[Chart]:
-    return []
-
-
 def _template() -> Any:
     # StrictUndefined: a name that is misspelt in the template raises and is not left empty.
     loader = PackageLoader("care_sim.reports.page", "assets")
@@ -209,6 +193,11 @@ def _asset(name: str) -> Markup:
         .joinpath("assets", name)
         .read_text(encoding="utf-8")
     )
+
+
+def _inline(svg: str) -> Markup:
+    """An SVG as an element of a page, without its head, and without its style, which is global."""
+    return Markup(_STYLE_ELEMENT.sub("", svg[svg.index("<svg") :]))
 
 
 def _embedded(data: Any) -> Markup:

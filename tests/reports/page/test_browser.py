@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image, ImageColor
 
-from care_sim.reports.figures.styles import styles
+from care_sim.reports.figures.styles import colours
 from care_sim.reports.page.build import write_page
 from care_sim.reports.page.story import packed
 from care_sim.reports.page.tables import least_ems
@@ -28,8 +28,8 @@ from tests.helpers import made_plays
 from tests.helpers.made_rows import CROWD, STUDY, row, rows
 
 MOST_BYTES = 5e6
-DRAWN = "!document.querySelector('.plot:not([data-drawn])')"
-READY = f"{DRAWN} && !!document.querySelector('#views figure')"
+OPEN = "document.readyState === 'complete'"
+READY = f"{OPEN} && !!document.querySelector('#views figure')"
 
 # How fast the browser is here: the milliseconds in which it parses three times 7 MB of JSON.
 PARSING = """(() => {
@@ -49,14 +49,16 @@ def opened(chromium):
     """
     pages, troubles, requests = [], [], []
 
-    def open_file(path, ready=DRAWN, **context):
-        page = chromium.new_context(**context).new_page()
+    def open_file(path, ready=OPEN, **context):
+        # Playwright waits for functions by `eval`, which the page's own policy forbids.
+        page = chromium.new_context(**{"bypass_csp": True} | context).new_page()
         page.on("console", lambda message: troubles.append(message.text))
         page.on("pageerror", lambda error: troubles.append(str(error)))
         page.on("request", lambda request: requests.append(request.url))
         page.goto(path.as_uri())
-        page.wait_for_function(ready)
         pages.append(path.as_uri())
+        if ready:
+            page.wait_for_function(ready)
         return page
 
     yield open_file
@@ -87,6 +89,14 @@ def played(tmp_path_factory):
     rows = with_added_columns([run_episode(config) for config in configs])
     rows[0] |= {"detection_distance_m": 1.25, "episode_hash": "0"}
     return written(tmp_path_factory.mktemp("played"), rows, "sweep", most=5), rows
+
+
+def test_a_page_keeps_to_its_own_policy(opened, played):
+    page = opened(played[0], None, bypass_csp=False)
+    page.wait_for_selector("#views figure")
+    page.locator("table.sortable th button").first.click()
+    assert page.locator("[aria-sort]").count() == 1
+    assert page.locator(".plot svg text").count() > 5
 
 
 def test_a_page_says_what_was_played(opened, played):
@@ -183,17 +193,6 @@ def test_what_was_never_detected_is_the_least_of_a_column(opened, tmp_path):
     never = ["not detected"] * 3
     assert sorted_by_a_click() == [*never, "7.0", "8.0", "9.0"]
     assert sorted_by_a_click() == ["9.0", "8.0", "7.0", *never]
-
-
-def test_a_chart_is_drawn_and_a_name_in_its_legend_chosen(opened, played):
-    page = opened(played[0], READY)
-    marks = page.locator(".plot svg .mark-symbol.role-mark path")
-    assert marks.count() == 4
-    page.locator(".plot svg .role-legend-symbol path").first.click()
-    page.wait_for_function(
-        "[...document.querySelectorAll('.plot .mark-symbol.role-mark path')]"
-        ".filter(e => Number(e.getAttribute('opacity')) < 0.5).length === 2"
-    )
 
 
 def test_an_episode_plays_to_its_end(opened, played):
@@ -311,44 +310,31 @@ def test_a_page_fits_a_phone_and_reads_in_any_light(scheme, opened, played):
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_a_chart_follows_the_page_into_the_dark_and_back_onto_paper(scheme, opened, played):
+def test_a_figure_is_read_on_a_light_and_a_dark_page_and_on_paper(scheme, opened, played):
     page = opened(played[0], READY, color_scheme=scheme)
-    plot = page.locator(".plot[data-drawn]").first
+    plot = page.locator(".plot").first
 
     def look():
         return plot.evaluate(
             """each => ({
-              card: getComputedStyle(each).backgroundColor,
               text: getComputedStyle(each.querySelector("text")).fill,
+              name: getComputedStyle([...each.querySelectorAll("text")].find(
+                (one) => one.textContent === "care")).fill,
               paper: getComputedStyle(document.body).backgroundColor,
-              edge: getComputedStyle(each.querySelector(".mark-line path")).filter,
-              grid: getComputedStyle(each.querySelector(".role-axis-grid line")).filter,
             })"""
         )
 
+    care = f"rgb{ImageColor.getrgb(colours(['care'])['care'])}"
     shown = look()
-    assert shown["card"] == "rgba(0, 0, 0, 0)"
     assert contrast(shown["text"], shown["paper"]) > 7
-    # Dark colours keep their name, and are seen by a pale edge.
-    assert (shown["edge"] != "none") == (scheme == "dark")
-    assert shown["grid"] == "none"
+    assert shown["name"] == care
     page.emulate_media(media="print", color_scheme=scheme)
     printed = look()
     assert printed["paper"] == "rgb(255, 255, 255)"
     assert contrast(printed["text"], printed["paper"]) > 7
-
-
-def test_a_colour_names_the_same_policy_in_light_and_dark(opened, played):
-    drawn = styles([("history", ("causal",)), ("care", ("causal",))])
-    colours = {policy: style.colour for policy, style in drawn.items()}
-    for scheme in ("light", "dark"):
-        page = opened(played[0], READY, color_scheme=scheme)
-        picture = Image.open(BytesIO(page.locator(".plot[data-drawn]").first.screenshot())).convert(
-            "RGB"
-        )
-        shown = np.array(picture).reshape(-1, 3)
-        for policy, colour in colours.items():
-            assert (shown == ImageColor.getrgb(colour)).all(axis=1).sum() > 50, (scheme, policy)
+    picture = Image.open(BytesIO(plot.screenshot())).convert("RGB")
+    drawn = (np.array(picture).reshape(-1, 3) == ImageColor.getrgb(care)).all(axis=1)
+    assert drawn.sum() > 50
 
 
 def test_everything_is_open_in_print(opened, played):
@@ -400,19 +386,18 @@ STUDIES = {
     "paper": (STUDY + rows("care", [9.0, None], budget=0.1), "Collisions: 0 in 22 episodes", 1),
     "crowding": (CROWD, "standing vehicles", 1),
     "faults": (FAULTY, "Where the order of policies changes", 6),
-    "ablate": (ABLATED, "Collisions: 0 in 12 episodes", 0),
-    "order": (ORDERED, "First detection by order of cells", 0),
-    "protocol": (PLAYED, "None was played again", 3),
+    "ablate": (ABLATED, "Collisions: 0 in 12 episodes", 1),
+    "order": (ORDERED, "First detection by order of cells", 1),
+    "protocol": (PLAYED, "None was played again", 2),
 }
 
 
 @pytest.mark.parametrize("study", STUDIES)
 def test_every_study_has_a_page(study, opened, tmp_path):
-    made, says, charts = STUDIES[study]
+    made, says, figures = STUDIES[study]
     page = opened(written(tmp_path, made, study))
     assert says.lower() in page.inner_text("body").lower()
-    drawn = page.locator(".plot > svg, .plot > div > svg")
-    assert drawn.count() == charts
+    assert page.locator(".plot > svg").count() == figures
     assert page.locator("#origin td").count() > 3
 
 
@@ -426,7 +411,7 @@ def test_text_from_outside_is_text(opened, tmp_path):
     page = opened(written(tmp_path, [{"tags": "causal"} | each for each in made], "sweep"))
     assert page.locator("#evil").count() == 0
     assert evil in page.inner_text("#tables")
-    assert evil in page.inner_html("#charts svg").replace("&lt;", "<").replace("&gt;", ">")
+    assert evil in page.inner_html("#figures svg").replace("&lt;", "<").replace("&gt;", ">")
 
 
 class OneSeed(ThreadPoolExecutor):

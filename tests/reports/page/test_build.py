@@ -1,33 +1,32 @@
 """What a page is made of, and in which order."""
 
 import re
+from dataclasses import replace
 from html import unescape
 
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.reports.page import build
-from care_sim.reports.page.budget_charts import budget_charts
-from care_sim.reports.page.build import CHARTS, write_page
-from care_sim.reports.page.crowding_charts import crowding_charts
+from care_sim.reports.page.build import write_page
 from care_sim.reports.report import StudyReport
 from care_sim.reports.studies import STUDIES
 from care_sim.study.rows.parquet import write_rows
-from tests.helpers.made_rows import CROWD, STUDY, rows
+from tests.helpers.made_rows import STUDY, rows
+
+SWEEP = [*STUDY, *rows("care", [9.0], budget=0.1)]
 
 
-def test_charts_are_those_of_studies_and_every_study_has_a_title():
-    assert {*CHARTS} <= {*STUDIES}
+def test_every_study_has_a_title():
     assert len({study.title for study in STUDIES.values()}) == len(STUDIES)
 
 
 def test_what_cannot_be_drawn_fails_before_an_episode_is_played(tmp_path, monkeypatch):
     def broken(_rows):
-        raise InvalidInput("no chart of these rows")
+        raise InvalidInput("no figure of these rows")
 
-    monkeypatch.setitem(build.CHARTS, "sweep", broken)
+    monkeypatch.setitem(STUDIES, "sweep", replace(STUDIES["sweep"], figures=broken))
     write_rows(STUDY, tmp_path / "episodes.parquet")
-    with pytest.raises(InvalidInput, match="no chart"):
+    with pytest.raises(InvalidInput, match="no figure"):
         write_page(
             tmp_path,
             tmp_path / "report.html",
@@ -39,13 +38,23 @@ def test_what_cannot_be_drawn_fails_before_an_episode_is_played(tmp_path, monkey
 
 def test_one_is_singular(tmp_path):
     once = rows("care", [9.0], budget=0.05) + rows("care", [9.0], budget=0.1)
-    (chart,) = budget_charts(once)
-    assert chart.title == "dense: first detection against the budget, 1 seed a point"
-    (chart,) = crowding_charts([row for row in CROWD if row["seed"] == 0])
-    assert chart.title.endswith("m, 1 seed")
-    write_rows(once[:1], tmp_path / "episodes.parquet")
+    write_rows(once, tmp_path / "episodes.parquet")
     write_page(tmp_path, tmp_path / "report.html", 0, 1)
-    assert "<small>1 configuration, 1 seed</small>" in (tmp_path / "report.html").read_text()
+    page = (tmp_path / "report.html").read_text()
+    assert "<small>2 configurations, 1 seed</small>" in page
+    assert ">dense: 1 seed a point</text>" in page
+
+
+def test_figures_of_a_page_share_no_id_and_bring_no_style(tmp_path):
+    both = [row | {"scenario": name} for row in SWEEP for name in ("dense", "dartout")]
+    write_rows(both, tmp_path / "episodes.parquet")
+    write_page(tmp_path, tmp_path / "report.html", 0, 1)
+    first, second = re.findall(r"<svg.*?</svg>", (tmp_path / "report.html").read_text(), re.DOTALL)
+    ids = [set(re.findall(r' id="(.*?)"', each)) for each in (first, second)]
+    assert all(ids)
+    assert not ids[0] & ids[1]
+    assert "<style" not in first
+    assert {*re.findall(r"url\(#(.*?)\)", first)} <= ids[0]
 
 
 def test_the_page_tells_how_to_read_its_tables_as_the_report_does(tmp_path):
@@ -66,9 +75,9 @@ def test_directions_and_control_codes_in_names_are_shown_as_escapes(tmp_path):
     page = (tmp_path / "report.html").read_text()
     assert not {"\u202e", "\u2066", "\x1b"} & {*page}
     assert "\\u001b" not in page
-    # In the tables and the list of episodes, then in the charts, and in the page's own heading.
-    assert "mine\\u202e\\x1b" in page
-    assert "mine\\\\u202e\\\\x1b" in page
+    # In the tables and the list of episodes, then in the figures, and in the page's own heading.
+    assert "<td>mine\\u202e\\x1b</td>" in page
+    assert ">mine\\u202e\\x1b</text>" in page
     assert "<b>runs\\u2066</b>" in page
 
 

@@ -7,7 +7,6 @@ import pytest
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL
 from care_sim.reports.controls import best_control, is_control
 from care_sim.reports.figures.protocol import protocol_figures
-from care_sim.reports.page.protocol_charts import protocol_charts
 from care_sim.reports.protocol.controls import RULE, control_at, controls, over_controls, rivals
 from care_sim.reports.protocol.rows import plays_by_setting
 from care_sim.reports.protocol.tables import protocol_tables
@@ -145,12 +144,8 @@ def test_bars_reach_from_end_to_end_of_the_intervals():
     assert low < mean - 1
     assert high > mean + 1
     first, _ = protocol_figures(UNEQUAL)["controls-streets"].axes
-    (bar,) = (line for line in first.lines if len({*line.get_xdata()}) == 1 < len(line.get_ydata()))
-    assert list(bar.get_ydata()) == pytest.approx([low, high])
-    pytest.importorskip("altair")
-    (chart,) = (each for each in protocol_charts(UNEQUAL) if "best control" in each.title)
-    value = chart.spec["data"]["values"][0]
-    assert (value["value"], value["low"], value["high"]) == pytest.approx((mean, low, high))
+    (bar,) = first.collections
+    assert bar.get_segments()[0][:, 1] == pytest.approx([low, high])
 
 
 def test_the_figure_has_the_control_at_zero_and_a_curve_a_policy():
@@ -164,27 +159,6 @@ def test_the_figure_has_the_control_at_zero_and_a_curve_a_policy():
     }
     (care,) = (line for line in overall.lines if line.get_label() == "care")
     assert list(care.get_ydata()) == pytest.approx([-30.0, -10.0])
-    said = " ".join(figure.get_supxlabel().split())
-    assert NAMED in said
-    assert RULE in said
+    assert NAMED in " ".join(figure.get_supxlabel().split())
     others = [line for line in overall.lines if line.get_color() != care.get_color()]
     assert care.zorder > max(line.zorder for line in others)
-
-
-def test_the_page_has_the_same_chart():
-    pytest.importorskip("altair")
-    (chart,) = (each for each in protocol_charts(ROWS) if "best control" in each.title)
-    assert NAMED in chart.notes[0]
-    values = chart.spec["data"]["values"]
-    assert [
-        (value["panel"], value["policy"], value["control"], pytest.approx(value["value"]))
-        for value in values
-        if value["policy"] == "care"
-    ] == [
-        ("first-sighting recall", "care", "place", 5.0),
-        ("first-sighting recall", "care", "rows", -5.0),
-        ("overall recall", "care", "rows", -30.0),
-        ("overall recall", "care", "rows", -10.0),
-    ]
-    assert values[0]["text"] == "+5.0 [5.0,5.0]"
-    assert not [each for each in protocol_charts(study(AT_20)[:24]) if "best" in each.title]

@@ -2,10 +2,11 @@ import pytest
 
 from care_sim.core.conditions import LOCALISATION, Sensing
 from care_sim.core.return_settings import RETURN_SETTINGS
-from care_sim.reports.figures.faults import FAULT_FIGURES, fault_figures, flat_faults
+from care_sim.reports.figures.faults import FAULT_FIGURES, fault_figures
 from care_sim.reports.table import Bold
 from care_sim.reports.tables.faults import StudyCells, fault_tables, order
 from care_sim.study.designs.faults import FAULT_PLACES, FAULTS, fault_study
+from tests.helpers.drawn import heights, titles
 from tests.helpers.made_rows import row
 
 SEEDS = range(5)
@@ -107,47 +108,11 @@ def test_a_figure_for_every_place_and_measure(rows):
     figures = fault_figures(rows)
     assert tuple(figures) == FAULT_FIGURES
     for figure in figures.values():
-        panels = [axes for axes in figure.axes if axes.get_title(loc="left")]
-        titles = [axes.get_title(loc="left") for axes in panels]
-        # Panels that would be flat are told in one line.
-        line = " ".join(figure.get_supxlabel().split())
-        told = line.removesuffix(".").partition("value: ")[2].split(", ")
-        assert sorted([*titles, *told]) == sorted(fault.title for fault in FAULTS)
-        assert all(len(axes.lines) >= 4 for axes in panels)
-        bottom, top = panels[0].get_ylim()
-        drawn = [height for axes in panels for line in axes.lines for height in line.get_ydata()]
-        assert all(bottom <= height <= top for height in drawn if height == height)
-        assert not any(axes.axison for axes in figure.axes if axes not in panels)
-        assert told
-    found = figures["faults-dartout-detection"]
-    shown = [axes.get_title(loc="left") for axes in found.axes if axes.axison]
-    assert shown == ["missed objects", "noise of the car's speed"]
-    missed = found.axes[0]
-    hollow = [
-        list(line.get_xdata()) for line in missed.lines if line.get_markerfacecolor() == "white"
-    ]
-    assert [5] in hollow
-
-
-@pytest.mark.parametrize(
-    ("heights", "is_flat"),
-    [
-        ([10.0, 10.1, 10.0], True),
-        ([10.0, 10.3, 10.0], False),
-        ([10.0, None, 10.0], True),
-        ([10.0, float("nan")], False),
-        ([float("nan"), float("nan")], True),
-        ([None, None], True),
-    ],
-)
-def test_a_panel_is_flat_where_no_curve_moves(heights, is_flat):
-    moving = {"care": [10.0, 0.0]}
-    flat = flat_faults({"one": moving, "other": {"care": [9.0, 9.0], "history": heights}})
-    assert flat == (["other"] if is_flat else [])
-
-
-def test_where_all_would_be_flat_the_first_shows_the_levels():
-    assert flat_faults({"one": {"care": [9.0, 9.0]}, "other": {"care": [9.0, 9.0]}}) == ["other"]
+        assert titles(figure) == [fault.title for fault in FAULTS]
+    missed = figures["faults-dartout-detection"].axes[0]
+    assert heights(missed)["care"] == [16.0, 16.0, 16.0, 11.0, 11.0, 0.0]
+    (hollow,) = (line for line in missed.lines if line.get_markerfacecolor() == "none")
+    assert list(hollow.get_xdata()) == [5]
 
 
 def test_a_further_policy_is_played_shown_and_ordered():

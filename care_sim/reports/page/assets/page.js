@@ -1,4 +1,4 @@
-// Sortable tables, charts that draw themselves when there is time, and everything opened for print.
+// Sortable tables, and everything opened for print.
 
 const read = (id) => JSON.parse(document.getElementById(id).textContent);
 
@@ -34,44 +34,6 @@ for (const table of document.querySelectorAll("table.sortable")) {
     }),
   );
 }
-
-function fitted(spec, width) {
-  // Panels side by side as far as there is room for them, else narrower ones below each other.
-  if (!spec.facet) return spec;
-  const axis = 60;
-  const frame = spec.resolve.scale.y === "independent" ? axis : 22;
-  const columns = Math.max(1, Math.min(spec.columns, Math.floor((width - axis) / (spec.spec.width + frame))));
-  const panel = Math.floor((width - axis) / columns) - frame;
-  return { ...spec, columns, spec: { ...spec.spec, width: Math.min(panel, 2 * spec.spec.width) } };
-}
-
-const ERRORS = 1; // what Vega logs
-
-async function draw(plot, specs) {
-  const width = plot.clientWidth;
-  const config = {
-    background: null,
-    font: "system-ui, sans-serif",
-    axis: { labelFontSize: 11, titleFontSize: 12, titleFontWeight: "normal" },
-    header: { labelFontSize: 12, labelFontWeight: "bold" },
-    legend: { orient: "bottom", columns: Math.max(1, Math.min(5, Math.floor(width / 150))), labelFontSize: 12, labelLimit: 200, symbolSize: 80, symbolStrokeWidth: 2 },
-    view: { stroke: null },
-  };
-  const theme = matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light";
-  const options = { renderer: "svg", actions: false, config, tooltip: { theme }, logLevel: ERRORS };
-  await vegaEmbed(plot, fitted(specs[Number(plot.dataset.chart)], width), options);
-  plot.dataset.drawn = "";
-}
-
-async function drawAll() {
-  const specs = read("specs");
-  for (const plot of document.querySelectorAll(".plot")) {
-    await draw(plot, specs);
-    await new Promise((next) => setTimeout(next));
-  }
-}
-
-if (document.querySelector(".plot")) requestAnimationFrame(() => setTimeout(drawAll));
 
 let opened = [];
 addEventListener("beforeprint", () => {
