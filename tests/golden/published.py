@@ -14,8 +14,6 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from care_sim.base.json_text import json_content
-from care_sim.measure.compute_path.report import compute_tables
 from care_sim.reports.leaderboard import leaderboard_table, leads_table
 from care_sim.reports.report import CONFIG, read_results
 from care_sim.reports.table import Table
@@ -28,7 +26,6 @@ from tests.golden.cells import Cell, cells
 from tests.helpers.places import PUBLISHED
 
 FILE = Path(__file__).with_name("published.parquet")
-COMPUTE_PATH = "compute-path.json"
 NOT_RECOMPUTED = {
     "judge-care": "its tables need every box of the detectors; the folder holds their counts",
     "judge-logs": "its tables need every box of the detectors; the folder holds their counts",
@@ -81,8 +78,6 @@ def _tables_of_rows(folder: Path) -> Iterator[Table]:
         minuend = "care" if "care" in policies else policies[0]
         for table in study.minus(rows, minuend):
             yield Table(f"--minus: {table.title}", table.columns, table.rows, names=table.names)
-    if (folder / COMPUTE_PATH).is_file():
-        yield from compute_tables(json_content(folder / COMPUTE_PATH))
 
 
 def read_golden() -> dict[str, list[Cell]]:
