@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from markdown_it import MarkdownIt
 from markupsafe import Markup
 
 import care_sim
@@ -18,7 +19,6 @@ from care_sim.base.extras import vega_bundle
 from care_sim.base.files import HTML, replacing
 from care_sim.evaluation.recall import CENSORED_AT
 from care_sim.evaluation.sightings import RANGE_M
-from care_sim.reports.captions import caption
 from care_sim.reports.page.budget_charts import budget_charts
 from care_sim.reports.page.chart import Chart
 from care_sim.reports.page.crowding_charts import crowding_charts
@@ -54,8 +54,6 @@ class Findings:
 
     charts: Sequence[Chart]
     tables: Sequence[Table]
-    reading: str
-    """How to read the tables."""
     closing: Sequence[str]
 
     @classmethod
@@ -63,7 +61,7 @@ class Findings:
         """Charts, tables and sentences."""
         charts = CHARTS.get(study.name, _no_charts)(rows)
         tables = [table.without_empty_columns() for table in study.tables(rows)]
-        return cls(charts, tables, caption(study.caption, tables), study.closing(rows))
+        return cls(charts, tables, study.closing(rows))
 
 
 @dataclass(frozen=True)
@@ -95,7 +93,7 @@ class Page:
                 # A page without charts needs no Vega.
                 vega=Markup(vega_bundle()) if charts else "",
                 tables=[(table, blocks(table), least_ems(table)) for table in self.findings.tables],
-                reading=self.findings.reading,
+                reading=Markup(MarkdownIt().enable("table").render(_asset("reading.md"))),
                 closing=self.findings.closing,
                 groups=episode_groups(self.rows, self.episodes) if self.listed else [],
                 replays=_embedded(replay_data(self.episodes)),
