@@ -56,7 +56,7 @@ from care_sim.reports.tables.ablations import ablation_tables
 from care_sim.reports.tables.crowding import crowding_tables
 from care_sim.reports.tables.faults import fault_tables
 from care_sim.reports.tables.firing import firing_tables
-from care_sim.reports.tables.ncap import ncap_tables
+from care_sim.reports.tables.ncap import ncap_headline, ncap_tables
 from care_sim.reports.tables.order import order_tables
 from care_sim.reports.tables.paper_statements import statement_tables
 from care_sim.reports.tables.r157 import r157_tables
@@ -176,6 +176,7 @@ _ALL = (
         closings.ncap_closing,
         (NCAP_FIGURE,),
         columns=_NCAP_COLUMNS,
+        headline=ncap_headline,
     ),
     Study(
         "order",

@@ -41,6 +41,9 @@ def shortened(table: Table, console: Console) -> Table:
     kept = len(table.rows)
     while kept > 1 and len(console.render_lines(shown.rich(), pad=False)) > MOST_LINES:
         kept -= 1
+        # A heading alone says nothing.
+        while len(table.rows[kept - 1]) == 1 and kept > 1:
+            kept -= 1
         note = f"{kept} of {len(table.rows)} rows; --verbose prints all."
         shown = replace(table, rows=table.rows[:kept], notes=(note,))
     return shown
