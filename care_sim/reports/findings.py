@@ -1,7 +1,8 @@
 """The best policy against the best control: at every budget, in both loops, one row of a table."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from care_sim.reports.table import Table, TableRow
 from care_sim.study.rows.reading import full_of, grouped, is_avoided, policy_of, tags_of_row
 from care_sim.study.run_config import FULL, REFERENCE, Row
 
+_SIGHTINGS = "first sightings, points"
 _CHOSEN = "Best policy and best control are chosen per budget on these results, which favours both."
 
 
@@ -79,14 +81,7 @@ def gate_tables(rows: Sequence[Row]) -> list[Table]:
     """CARE against history at the paper's budgets, in the settings of the paper."""
     pair = PolicyPair(REFERENCE, HISTORY, FIRST_SIGHTING)
     leads = [
-        Lead(
-            plays.setting.label,
-            budget,
-            "first sightings, points",
-            GATE_POINTS,
-            *pair.policies,
-            found,
-        )
+        Lead(plays.setting.label, budget, _SIGHTINGS, GATE_POINTS, REFERENCE, HISTORY, found)
         for plays in plays_by_setting(rows)
         # The gate was fixed for the plain setting, so that no fault is judged by it.
         if plays.setting.as_in_paper
@@ -182,10 +177,16 @@ def _leads_at(
             measure.gate,
             levels,
             tags,
-            lambda a, b, m=measure, c=compared: contrast(m, c[a], c[b]),
+            partial(_contrast, measure, compared),
         )
         if lead:
             yield lead
+
+
+def _contrast(
+    measure: Measure, compared: Mapping[str, Sequence[Row]], ours: str, theirs: str
+) -> ShownDifference | None:
+    return contrast(measure, compared[ours], compared[theirs])
 
 
 def _mean(measure: Measure, rows: Sequence[Row]) -> float | None:
@@ -207,7 +208,7 @@ def _lead_of_plays(plays: SettingPlays, budget: float) -> Lead | None:
     }
     return _lead(
         (plays.setting.label, budget),
-        "first sightings, points",
+        _SIGHTINGS,
         GATE_POINTS,
         levels,
         plays.tags,
@@ -225,13 +226,10 @@ def _lead(
 ) -> Lead | None:
     """The best that is no control against the best control; None where nobody is to compare."""
     known = {policy: level for policy, level in levels.items() if level is not None}
-    best = _highest(known, (policy for policy in known if not is_control(tags[policy])))
+    others = [policy for policy in known if not is_control(tags[policy])]
+    best = max(others, key=known.__getitem__, default=None)
     if best is None or len(known) < 2:
         return None
     control = best_control({p: at for p, at in known.items() if is_control(tags[p])})
     found = minus(best, control) if control else None
     return Lead(*place, measure, gate, best, control, found)
-
-
-def _highest(levels: Mapping[str, float], policies: Iterable[str]) -> str | None:
-    return max(policies, key=levels.__getitem__, default=None)

@@ -13,6 +13,7 @@ from care_sim.evaluation.collision_outcomes import CollisionOutcome, collision_o
 from care_sim.evaluation.ncap_score import score
 from care_sim.reports.contrasts import Contrast, Measure
 from care_sim.reports.controls import best_control, is_control
+from care_sim.reports.formatting import marked
 from care_sim.scenarios.ncap.forms import Ahead
 from care_sim.scenarios.ncap.table import TESTS
 from care_sim.study.designs.ncap import (
@@ -99,6 +100,10 @@ class NcapRows:
         own.
         """
         return policy, 1.0 if policy == FULL else budget
+
+    def marked(self, policy: str) -> str:
+        """A policy's name, with a mark when no car can have it."""
+        return marked(policy, self.tags[policy])
 
     def endings(self, contender: Contender, lines: Iterable[Line]) -> Counter[CollisionOutcome]:
         """How the episodes of some lines ended."""

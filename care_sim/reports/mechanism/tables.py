@@ -42,7 +42,7 @@ def _table(
     study: MechanismRows,
     what: str,
     columns: TableRow,
-    lines: list[TableRow],
+    lines: Sequence[TableRow],
     note: str = "",
     *quotes: str,
 ) -> Table:

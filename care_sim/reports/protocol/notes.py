@@ -25,7 +25,6 @@ def played(plays: SettingPlays) -> str:
         f"{counted(len(plays.scenes), 'scene')}, {total.events:,.0f} events"
         f"{f' ({kinds})' if kinds else ''}, {total.frames:,.0f} "
         f"object frames; {counted(max(seeds, default=0), 'floor seed')}."
-        f"{by_both_counts(plays.scenes.values())}"
     )
 
 
@@ -40,7 +39,7 @@ def by_both_counts(scenes: Collection[Row]) -> str:
     if any(row.get("presence") == VISIBLE for row in scenes):
         return f" Presence {ANNOTATED} does not count {emerging:,} of them."
     every = counts(scenes).events + emerging
-    return f" Presence {VISIBLE} counts {emerging:,} more events, {every:,.0f} in all."
+    return f" Presence {VISIBLE} counts {counted(emerging, 'more event')}, {every:,.0f} in all."
 
 
 def counts(scenes: Iterable[Row]) -> Tally:

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from care_sim.base.errors import percent
 from care_sim.evaluation.collision_outcomes import CollisionOutcome
 from care_sim.reports.controls import BEST_CONTROL
-from care_sim.reports.formatting import interval, marked, tag_notes
+from care_sim.reports.formatting import interval, tag_notes
 from care_sim.reports.ncap import READINGS, Line, NcapRows, overall
 from care_sim.reports.table import Table, TableRow
 from care_sim.study.run_config import FULL, REFERENCE, Row
@@ -31,7 +31,7 @@ def _endings(results: NcapRows, each_test: bool) -> Table:
         for label, held in tests:
             entries = (_entry(results, policy, budget, held) for policy in results.policies)
             lines.append((label, *entries))
-    columns = ("test", *(marked(policy, results.tags[policy]) for policy in results.policies))
+    columns = ("test", *map(results.marked, results.policies))
     title = "Euro NCAP tests: avoided/mitigated/hit, and score"
     return Table(title, columns, tuple(lines), tag_notes(results.tags.values()))
 
@@ -83,5 +83,5 @@ def _differences(
                 else None
                 for budget, other in against.items()
             )
-            lines.append((marked(policy, results.tags[policy]), *map(interval, found)))
+            lines.append((results.marked(policy), *map(interval, found)))
     return lines

@@ -183,6 +183,7 @@ def _forecasts(_group: Group, _level: Variant, rows: Sequence[Row]) -> TableRow:
 
 def _pose(study: VehicleRows, group: Group) -> Table:
     """First detections and collisions by policy and error of the pose."""
+    played: list[tuple[str, str, Sequence[Variant]]]
     played = [(study.marked(each), each, POSE_LEVELS) for each in study.further(POSE_POLICIES)]
     played += [
         (f"care-sbf, {rules.label}", "care-sbf",
