@@ -158,12 +158,12 @@ def print_minus(rows: Sequence[Row], console: Console, study: Study, policy: str
 def next_steps(folder: Path, study: Study, rows: Sequence[Row] = ()) -> list[str]:
     """The lines that end a study: where its results are, and three commands to go on with."""
     names = study.figures_of(rows)
-    figures = sorted({path.name for name in names for path in folder.glob(f"{name}.png")})
+    figures = {path.name for name in names for path in folder.glob(f"{name}.png")}
+    beside = f" and {counted(len(figures), 'figure')}" if figures else ""
     report = shlex.join(["care-sim", "report", str(folder)])
-    beside = f", figures {', '.join(figures)}" if figures else ""
     return [
         *([f"Not all of it: {how_far(folder)}"] if (folder / UNFINISHED).is_file() else []),
-        f"Results: {folder} (tables {TABLES}{beside})",
+        f"Results are in {folder}: {TABLES}{beside}",
         "Next:",
         f"  {report} --verbose",
         f"  {report} -o {shlex.quote(str(folder / PAGE))}",

@@ -75,7 +75,8 @@ class Table:
         marks = [
             meaning
             for pattern, meaning in _MARKS.items()
-            if meaning[0] not in told and any(re.search(pattern, entry) for entry in entries)
+            if re.split("[:,]", meaning)[0] not in told
+            and any(re.search(pattern, entry) for entry in entries)
         ]
         # Bold words mean something else, which their own tables explain.
         if any(isinstance(entry, Bold) and _DIFFERENCE.fullmatch(entry) for entry in entries):

@@ -51,7 +51,7 @@ def lines(rows):
         # No control was played.
         ({"care": 16.0}, ("", "", "", ""), 0),
         # No car can have the oracle.
-        ({"care": 16.0, "history-oracle": 20.0, "fan": 12.0}, ("fan", "+4.0*", "[4.0,4.0]", "yes"), 1),
+        ({"care": 16.0, "history-oracle": 20.0}, ("", "", "", ""), 0),
     ],
 )  # fmt: skip
 def test_the_best_stands_beside_the_best_control(distances, line, sign):

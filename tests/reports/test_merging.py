@@ -42,7 +42,7 @@ def merge(capsys, *arguments):
 
 def test_policies_of_two_folders_are_compared_and_regret_is_worked_out(tmp_path, capsys):
     ours, theirs = folder(tmp_path / "ours", OURS), folder(tmp_path / "theirs", [*THEIRS, *FULL])
-    code, out, err = merge(capsys, ours, theirs, "--out", tmp_path / "both")
+    code, out, err = merge(capsys, ours, theirs, "--out", tmp_path / "both", "--verbose")
     assert (code, err) == (0, "")
     assert "dense: care minus each policy" in out
     assert read_results(tmp_path / "both")[1].name == "sweep"
@@ -95,7 +95,7 @@ def test_tables_are_printed_where_nothing_can_be_written(tmp_path, capsys, monke
     error = PermissionError(13, "Permission denied", str(held / "tables.md"))
     monkeypatch.setattr(StudyReport, "write", Mock(side_effect=error))
     code, out, err = report(capsys, held)
-    assert "dense: care minus each policy" in out
+    assert "First detection: median, m" in out
     assert f"care-sim: tables and figures in {held} are not written anew: " in err
     assert (code, err.count("\n")) == (1, 1)
 

@@ -49,7 +49,8 @@ def terminal(table, width=80, **options):
 def test_the_marks_of_a_table_are_explained_below_it_in_one_line(entry, told):
     table = Table("t", ("a", "b"), (("x", entry),), ("A note.",))
     assert table.lines == (("A note.", told) if told else ("A note.",))
-    assert all(line in text for line in table.lines for text in (terminal(table), latex(table)))
+    assert all(line in terminal(table) for line in table.lines)
+    assert all(escaped(line) in latex(table) for line in table.lines)
     if told and told.startswith("†"):
         assert Table("t", ("a",), ((entry,), (entry,)), ("† knows it.",)).lines == ("† knows it.",)
 
@@ -61,7 +62,7 @@ def test_a_table_has_bold_type_headings_and_notes_in_all_three_forms():
     assert r"\textbf{+5.0* [4.0,6.0]}" in latex(TABLE)
     assert "| *First, m* |  |  |" in TABLE.markdown()
     assert r"\multicolumn{3}{l}{\emph{First, m}} \\" in latex(TABLE)
-    assert terminal(TABLE).splitlines() == [
+    assert terminal(TABLE, 200).splitlines() == [
         "a_b: 5% & more",
         "policy 3%               ",
         "First, m",

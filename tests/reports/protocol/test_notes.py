@@ -67,7 +67,7 @@ def test_the_closing_counts_events_by_both_presences_where_the_rows_do():
         return told
 
     assert closing() == (
-        "Scenes: 6, with 120 first sightings and 1,200 object frames in 240 keyframes; plays: 36."
+        "Scenes: 6, with 120 first sightings and 1,200 object frames in 240 keyframes; plays: 108."
     )
     assert closing(emerging=2).endswith(". Presence visible counts 12 more events, 132 in all.")
     visible = closing(emerging=2, presence="visible")
