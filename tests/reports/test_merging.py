@@ -140,13 +140,6 @@ def test_a_folder_that_nothing_links_is_told_though_others_share_a_task(tmp_path
     assert merged([tmp_path / "both", later]).apart == []
 
 
-def test_policies_of_different_worlds_are_told(tmp_path, capsys):
-    ours = folder(tmp_path / "ours", OURS)
-    theirs = folder(tmp_path / "theirs", rows("history", [4.0, None, 5.0]))
-    err = merge(capsys, ours, theirs, "--out", tmp_path / "both")[2]
-    assert "not all policies were played in the same worlds" in err
-
-
 def test_columns_come_in_one_order_and_of_one_type(tmp_path):
     one = [row | {"policy.b": 2, "policy.x": 1, "own": math.nan} for row in OURS]
     other = [row | {"policy.x": 1, "policy.b": 2, "own": math.nan} for row in OURS]
@@ -211,12 +204,3 @@ def test_what_not_all_folders_hold_of_a_play_is_left_out(tmp_path, played):
     merged([ours, theirs]).write(tmp_path / "both")
     assert not (tmp_path / "both" / "events.parquet").exists()
     assert len(read_results(tmp_path / "both")[0]) == 2
-
-
-def test_events_of_another_study_are_told(tmp_path, played):
-    ours, theirs = plays(tmp_path / "ours", [played["care"]]), tmp_path / "theirs"
-    plays(theirs, [played["history"]])
-    table = pq.read_table(theirs / "events.parquet")
-    pq.write_table(table.slice(1), theirs / "events.parquet")
-    with pytest.raises(InvalidInput, match=r"the two files are not of one study"):
-        merged([ours, theirs])

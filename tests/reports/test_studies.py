@@ -138,19 +138,6 @@ def test_a_file_changes_nothing_in_the_tables(tmp_path):
         assert name == "paper" or all(all(line[:3]) for table in tables for line in table.rows)
 
 
-def test_no_study_is_left_out_above():
-    """Studies of the open loop have plays for episodes, and their own tests."""
-    plays = {
-        "protocol",
-        "mechanism",
-        "order-open-loop",
-        "ablate-open-loop",
-        "firing-open-loop",
-        "realism-open-loop",
-    }
-    assert {*EPISODES, *plays} == set(STUDIES)
-
-
 def test_a_study_leaves_its_name_and_its_columns_in_the_folder(tmp_path):
     short = (("vehicles", 1), ("duration_s", 0.2))
     configs = grid(["dense"], ["random", "full"], [0.1], [0], scenario_parameters=short)

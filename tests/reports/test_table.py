@@ -77,10 +77,6 @@ def test_a_table_has_bold_type_headings_and_notes_in_all_three_forms():
     )
 
 
-def test_a_terminal_leaves_out_columns_of_files():
-    assert "3%" not in terminal(Table("t", ("a", "3%"), (("x", "y"),), files_only=("3%",)))
-
-
 def test_a_narrow_terminal_breaks_entries_and_loses_none():
     columns = ("policy", *(f"column {n}" for n in range(6)))
     rows = (("A long heading of the rows below it",), ("care", *(f"{n}1/22/33" for n in range(6))))

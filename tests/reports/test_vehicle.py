@@ -7,7 +7,6 @@ import pytest
 from care_sim.evaluation.censoring import Bound
 from care_sim.reports.contrasts import AVOIDED, DETECTION, contrast, contrast_of_cases
 from care_sim.reports.figures.vehicle import VEHICLE_FIGURE, vehicle_figures
-from care_sim.reports.studies import STUDIES
 from care_sim.reports.vehicle.rows import outcome
 from care_sim.reports.vehicle.tables import vehicle_tables
 from care_sim.study.designs.vehicle import (
@@ -15,7 +14,6 @@ from care_sim.study.designs.vehicle import (
     DENSE,
     DRIVES,
     EVIDENCE_LEVELS,
-    POSE_LEVELS,
     TURNS,
     vehicle_study,
 )
@@ -174,13 +172,6 @@ def test_forecasts_and_what_is_released_are_means(tables):
     assert block(tables["forecasts"], DENSE.name)["exact pose"][-2:] == ("", "")
 
 
-def test_every_policy_and_rule_has_a_line_under_an_error_of_the_pose(tables):
-    table = tables["pose"]
-    names = [line[0] for line in table.rows]
-    assert names == ["care", "history", "care-sbf, sigma_pos 0", "care-sbf, sigma_pos 0.4 m"]
-    assert all(len(line) == 1 + len(POSE_LEVELS) and all(line) for line in table.rows)
-
-
 def test_the_guard_is_told_beside_the_papers(tables, rows):
     (here, paper) = tables["guard"].rows
     assert here == ("here", f"{3 * len(rows):,}", "4.00 to 4.00")
@@ -196,13 +187,6 @@ def test_without_a_forecast_or_a_picture_there_is_no_number():
     assert lines["exact pose"] == ("", "", "", "", "0.0", "0.0", "", "")
     assert len(bare["fallback"].rows) == 1
     assert bare["guard"].rows[0] == ("here", "0", "")
-
-
-def test_a_part_of_the_study_has_its_tables_and_its_figure(rows):
-    few = [row for row in rows if row["scenario"] == "dense" and row["policy"] == "history"]
-    assert all(table.title for table in STUDIES["vehicle"].tables(few))
-    (figure,) = vehicle_figures(few).values()
-    assert figure.axes
 
 
 def test_the_figure_shows_every_late_level(rows):

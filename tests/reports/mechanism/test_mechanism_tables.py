@@ -147,11 +147,6 @@ def test_the_reasons_add_up_to_the_misses(events):
     assert sum(study.misses("mine").values()) == missed <= study.found_by_full("mine")
 
 
-def test_a_scene_without_its_full_scan_counts_for_no_reason():
-    (line, _) = tables(ROWS[:2])["why first sightings were missed that the full scan finds"].rows
-    assert line[1:3] == ("0", "0")
-
-
 def test_the_rows_survive_their_file(tmp_path):
     write_rows(ROWS, tmp_path / MECHANISM.file, "mechanism", schema=MECHANISM.schema)
     read = read_rows(tmp_path / MECHANISM.file, MECHANISM.schema)
