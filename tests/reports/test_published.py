@@ -16,14 +16,18 @@ FOLDERS = ("crowding", "faults", "ncap", "r157", "validate-drive-factors", "vehi
 
 
 def numbers(markdown):
-    """How often every entry with a number stands in a row of this name below this heading."""
+    """How often every entry with a number stands under a column and heading, in a row of a name."""
     found = Counter()
-    heading = ""
+    columns = heading = ""
     for line in markdown.splitlines():
-        if line.startswith("| ") and not line.startswith("| ---"):
+        if not line.startswith("| "):
+            columns = ""
+        elif not line.startswith("| ---"):
             first, *rest = (entry.strip() for entry in line.strip("|").split("|"))
+            columns = columns or rest
             heading = heading if any(rest) else first
-            found.update((heading, first, entry) for entry in rest if re.search(r"\d", entry))
+            entries = zip(columns, rest, strict=True)
+            found.update((heading, first, *each) for each in entries if re.search(r"\d", each[1]))
     return found
 
 

@@ -94,6 +94,12 @@ def test_the_shared_belief_beside_the_paper():
     ]
 
 
+def test_an_entry_that_the_full_scan_misses_too_is_none_that_a_reserve_would_win():
+    rows = [each | {"ttfds": (0, 0, 6)} if each is ROWS[2] else each for each in ROWS]
+    belief = tables(rows)["on the belief of care"].rows
+    assert [line[1] for line in belief[-2:]] == ["100.0% of 1", "0"]
+
+
 def test_allocations_on_it():
     assert tables()["allocations on the belief of care"].rows == (
         ("care", "", "", "", "40 [0, 50] (5)", "7 [7, 7] (1)"),
