@@ -121,7 +121,9 @@ def print_report(
     if verbose:
         tables = study.tables(rows)
     else:
-        first = [study.headline(rows)] if study.headline else study.tables(rows)[:1]
+        headline = study.headline(rows) if study.headline else None
+        # Full scans alone have no levels by budget.
+        first = [headline] if headline and headline.rows else study.tables(rows)[:1]
         tables = [shortened(table, console) for table in first]
     for table in tables:
         console.print(table.rich())

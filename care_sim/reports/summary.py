@@ -14,7 +14,14 @@ from care_sim.reports.formatting import median
 from care_sim.reports.protocol.formatting import written
 from care_sim.reports.protocol.rows import HISTORY, plays_by_setting
 from care_sim.reports.table import Table, TableRow
-from care_sim.study.rows.reading import detections, full_of, grouped, policy_of, tags_of_row
+from care_sim.study.rows.reading import (
+    detection,
+    detections,
+    full_of,
+    grouped,
+    policy_of,
+    tags_of_row,
+)
 from care_sim.study.run_config import FULL, REFERENCE, Row
 
 MOST_LINES = 15
@@ -59,16 +66,26 @@ def medians(rows: Sequence[Row]) -> Table:
     for setting in plain or settings:
         full = median(quartiles(detections(full_of(groups, setting) or ())))
         for budget in sorted({at for of, p, at in groups if of == setting and p != FULL}):
-            line = _Line(setting.label, budget, full)
-            for policy in tags:
-                if own := groups.get((setting, policy, budget)):
-                    found = detections(own)
-                    line.texts[policy] = median(quartiles(found))
-                    if is_control(tags[policy]):
-                        values = [reading.value for reading in found]
-                        line.controls[policy] = float(np.mean(values)) if values else None
-            lines.append(line)
+            own = {policy: groups.get((setting, policy, budget), []) for policy in tags}
+            texts = {p: median(quartiles(detections(held))) for p, held in own.items() if held}
+            controls = {p: own[p] for p in texts if is_control(tags[p])}
+            lines.append(_Line(setting.label, budget, full, texts, _means(controls)))
     return _table("First detection: median, m", lines, tags)
+
+
+def _means(controls: Mapping[str, Sequence[Row]]) -> dict[str, float | None]:
+    """Mean first detections on the seeds that all controls have: a control that lacks a seed with a
+    late actor would win by that.
+    """
+    distances = {
+        policy: {row["seed"]: found.value for row in rows if (found := detection(row)) is not None}
+        for policy, rows in controls.items()
+    }
+    seeds = sorted(set.intersection(*map(set, distances.values()))) if distances else []
+    return {
+        policy: float(np.mean([by[seed] for seed in seeds])) if seeds else None
+        for policy, by in distances.items()
+    }
 
 
 def recalls(rows: Sequence[Row]) -> Table:
