@@ -102,7 +102,7 @@ def vega_bundle() -> str:
 
 def check_page() -> None:
     """Raise MissingExtra where a library is missing that makes pages."""
-    for module in ("altair", "jinja2", "vl_convert"):
+    for module in ("altair", "jinja2", "markdown_it", "vl_convert"):
         _import(module, "A page", "page")
 
 

@@ -24,6 +24,7 @@ MODULE_OF = {
     "open3d_cpu": "open3d",
     "pillow": "PIL",
     "rerun_sdk": "rerun",
+    "markdown_it_py": "markdown_it",
     "vl_convert_python": "vl_convert",
 }
 """Where a distribution's module has another name."""
