@@ -1,7 +1,7 @@
 """The best policy against the best control: at every budget, in both loops, one row of a table."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -20,7 +20,9 @@ from care_sim.reports.contrasts import (
 from care_sim.reports.controls import BEST_CONTROL, best_control, is_control
 from care_sim.reports.formatting import MARKS, ShownDifference, emphasised, ends, signed
 from care_sim.reports.protocol.differences import PolicyPair
+from care_sim.reports.protocol.notes import papers
 from care_sim.reports.protocol.paper import PAPER_BUDGETS
+from care_sim.reports.protocol.quotes import GATE
 from care_sim.reports.protocol.rows import HISTORY, SettingPlays, plays_by_setting
 from care_sim.reports.table import Table, TableRow
 from care_sim.study.rows.reading import full_of, grouped, is_avoided, policy_of, tags_of_row
@@ -88,7 +90,8 @@ def gate_tables(rows: Sequence[Row]) -> list[Table]:
         for budget in plays.budgets
         if budget in PAPER_BUDGETS and (found := pair.measured(plays, budget))
     ]
-    return _table("CARE against history: the paper's gate of five points", "policy", "minus", leads)
+    made = _table("CARE against history: the paper's gate of five points", "policy", "minus", leads)
+    return [replace(table, quotes=papers((GATE,))) for table in made]
 
 
 def ties(leads: Sequence[Lead]) -> list[str]:
