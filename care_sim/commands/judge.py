@@ -171,7 +171,7 @@ class Judge(PlayOptions):
                 self._write_samples(name, [one.reported for one in own])
             self._write_samples(_TRUTH, [one.true for one in scenes[self._names[0]]])
         for table in tables:
-            console().print(table.rich(self.out / _TABLES))
+            console().print(table.rich())
         figure = f"Figure: {self.out / DETECTORS_FIGURE}.png"
         print_lines(f"Tables: {self.out / _TABLES}", figure)
 

@@ -123,7 +123,7 @@ class Leaderboard:
         shown = [*tables, *(table for table in by_part if table)]
         write_text(page, _page([table.markdown() for table in shown]))
         for table in tables:
-            console().print(table.rich(page))
+            console().print(table.rich())
         # Sealed results have a control of their own, which nobody has published.
         if self.minus == CONTROL.name and any(
             self.minus not in names_in(own) for own in sets.values() if own[0].sealed is None

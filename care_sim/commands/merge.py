@@ -10,7 +10,7 @@ import tyro
 from care_sim.base.errors import InvalidInput, counted, print_lines, report_problems
 from care_sim.commands.shared.study_command import DONE, console
 from care_sim.reports.merging import Merged, merged
-from care_sim.reports.report import print_report, where_it_lies
+from care_sim.reports.report import next_steps, print_report
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,6 +26,8 @@ class Merge:
     """The --out of earlier studies of one name, two at least."""
     out: Path = Path("runs/merge")
     """A folder that does not exist, or is empty."""
+    verbose: bool = False
+    """Print all tables."""
 
     def __call__(self) -> int:
         """Run it."""
@@ -35,8 +37,8 @@ class Merge:
             raise InvalidInput(f"{self.out} is there already and not empty: give another --out")
         whole = merged(self.folders)
         whole.write(self.out)
-        print_report(whole.rows, console(), whole.study, whole.left_out, self.out)
-        print_lines(*where_it_lies(self.out, whole.study, whole.rows))
+        print_report(whole.rows, console(), whole.study, whole.left_out, verbose=self.verbose)
+        print_lines(*next_steps(self.out, whole.study, whole.rows))
         if whole.twice:
             alike = counted(whole.twice, whole.study.results.task)
             print(f"Alike in two of the folders, and kept once: {alike}")

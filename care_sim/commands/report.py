@@ -13,10 +13,10 @@ from care_sim.commands.shared.play_options import SourceOptions
 from care_sim.commands.shared.study_command import FAILED, console
 from care_sim.reports.report import (
     StudyReport,
+    next_steps,
     print_minus,
     print_report,
     read_results,
-    where_it_lies,
 )
 from care_sim.study.executors import MOST_WORKERS, WORKERS
 
@@ -36,6 +36,8 @@ class PrintReport(SourceOptions):
     minus: str | None = None
     """Print this policy less each of the others, with intervals, in place of the tables; the folder
     is left as it is. Of one with parameters the whole name in the tables."""
+    verbose: bool = False
+    """Print all tables."""
     episodes: int = bounded(40, 0, LARGEST_INTEGER)
     """At most this many episodes are played again for the page, seed by seed; 0 for none. They take
     as long as they did in the study."""
@@ -72,11 +74,11 @@ class PrintReport(SourceOptions):
         try:
             report.write(self.folder)
         except (OSError, InvalidInput) as error:
-            print_report(rows, console(), study, left_out)
+            print_report(rows, console(), study, left_out, verbose=self.verbose)
             report_problems([f"tables and figures in {self.folder} are not written anew: {error}"])
             return FAILED
-        print_report(rows, console(), study, left_out, self.folder)
-        print_lines(*where_it_lies(self.folder, study, rows))
+        print_report(rows, console(), study, left_out, verbose=self.verbose)
+        print_lines(*next_steps(self.folder, study, rows))
         return 0
 
     def _write(self, path: Path) -> int:

@@ -3,26 +3,14 @@
 from collections.abc import Sequence
 
 from care_sim.base.errors import counted
-from care_sim.reports.findings.closed_loop import sweep_findings
-from care_sim.reports.findings.open_loop import protocol_findings
+from care_sim.reports.findings import leads_of_episodes, leads_of_plays, ties
 from care_sim.reports.protocol.closing import protocol_closing
 from care_sim.reports.tables import order, validate
-from care_sim.reports.tables.paper_statements import statements
+from care_sim.reports.tables.paper_statements import in_short
 from care_sim.study.designs.faults import common_conditions
-from care_sim.study.designs.paper import NO_COLLISION
 from care_sim.study.rows.reading import setting_of, stops_for_nothing
 from care_sim.study.rows.settings import Setting
 from care_sim.study.run_config import FULL, Row
-
-_BESIDE_PAPER = (
-    "Beside the paper, distances as medians in metres; why some differ stands in "
-    "results/paper-closed-loop.md:"
-)
-
-_NEEDLESS = (
-    "with a brake for nothing before the actor was in view: they count as not detected and not "
-    "avoided."
-)
 
 
 def collisions(rows: Sequence[Row]) -> str:
@@ -33,9 +21,9 @@ def collisions(rows: Sequence[Row]) -> str:
     needless = sum(map(stops_for_nothing, rows))
     return (
         f"Collisions: {sum(row['collision'] for row in rows)} in {counted(len(rows), 'episode')}"
-        + (f"; in {hit_by} of them another body ran into the car" if hit_by else "")
+        + (f"; in {hit_by} another body ran into the car" if hit_by else "")
+        + (f"; {counted(needless, 'stop')} for nothing, which avoid none" if needless else "")
         + "."
-        + (f" {counted(needless, 'episode')} {_NEEDLESS}" if needless else "")
     )
 
 
@@ -45,34 +33,27 @@ def episodes_closing(rows: Sequence[Row]) -> list[str]:
 
 
 def sweep_closing(rows: Sequence[Row]) -> list[str]:
-    """Who leads where, and collisions."""
-    return [*sweep_findings(rows), collisions(rows)]
+    """How often a control ties, and collisions."""
+    return [*ties(leads_of_episodes(rows)), collisions(rows)]
 
 
 def paper_closing(rows: Sequence[Row]) -> list[str]:
-    """Who leads where nothing fails, and what the paper says beside what was measured."""
-    said = [*map(str, statements(rows))]
-    return [
-        *sweep_findings(rows, conditions=False),
-        f'{collisions(rows)} Paper: "{NO_COLLISION}"',
-        *([_BESIDE_PAPER] if said else []),
-        *said,
-    ]
+    """How often a control ties where nothing fails, and which of the paper's statements hold."""
+    return [*ties(leads_of_episodes(rows, conditions=False)), *in_short(rows), collisions(rows)]
 
 
 def first_sighting_closing(rows: Sequence[Row]) -> list[str]:
-    """Who leads where, the size of the study and the paper's gate."""
-    # Both may say what an interval over events is.
-    return [*dict.fromkeys([*protocol_findings(rows), *protocol_closing(rows)])]
+    """How often a control ties, and the size of the study."""
+    return [*ties(leads_of_plays(rows)), *protocol_closing(rows)]
 
 
 def validation_closing(rows: Sequence[Row]) -> list[str]:
-    """The verdicts on the worlds."""
+    """Which worlds discriminate."""
     return [collisions(rows), *validate.validation_closing(rows)]
 
 
 def order_closing(rows: Sequence[Row]) -> list[str]:
-    """What hangs on the order of cells."""
+    """Which statements depend on the order of cells."""
     return [collisions(rows), *order.order_closing(rows)]
 
 

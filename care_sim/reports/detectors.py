@@ -23,9 +23,8 @@ Judged = Mapping[str, Sequence[JudgedScene]]
 FEWEST_SCENES = 5
 """For an interval: of fewer every other resample is one of a handful."""
 _NOTES = (
-    "Shares in percent; right is a box within 2 m of an object of its class that no surer one has "
-    "(paper, Remark 1). Objects without a return count, too.",
-    "Time: CPU time of full scans on one core, median.",
+    "Percent. Right: within 2 m of an object of its class that no surer box has.",
+    "* the least score from which it is as precise as all that {} reports.",
 )
 
 
@@ -81,13 +80,7 @@ def _overall(
             f"recall minus {against}",
         ),
         tuple(rows),
-        (
-            *_NOTES,
-            f"* the least score from which on it is at least as precise as all that {against} "
-            "reports, read off these scenes; minus: percentage points, with a 95% interval over "
-            "scenes, paired, of five scenes or more, for that score. Calibration error: of all "
-            "that is reported.",
-        ),
+        (_NOTES[0], _NOTES[1].format(against)),
     )  # fmt: skip
 
 
@@ -115,12 +108,8 @@ def _by_class(
                 entries += [_percent(same.recall), _percent(same.precision)] if same else ["-", "-"]
             rows.append((name, "*", *entries))
     columns = [f"{name}, {what}" for name in CLASSES for what in ("recall", "precision")]
-    note = (
-        f"* in each class from the least score on from which it is as precise as {against} there."
-    )
-    return Table(
-        "By class", ("detector", "score from", *columns), tuple(rows), (*_NOTES[:1], note), names=2
-    )
+    notes = (_NOTES[0], f"{_NOTES[1].format(against)[:-1]}, class by class.")
+    return Table("By class", ("detector", "score from", *columns), tuple(rows), notes, names=2)
 
 
 def _shares(found: Counts, scans: int) -> Iterator[str]:

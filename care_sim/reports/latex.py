@@ -41,7 +41,7 @@ def paragraph(text: str) -> str:
 
 def latex(table: Table) -> str:
     """The table as a float with a caption; its notes and quotes stand in the caption."""
-    caption = " ".join([f"{table.title}.", *table.notes, *table.quotes])
+    caption = " ".join([f"{table.title}.", *table.lines, *table.quotes])
     columns = len(table.columns)
     lines = [
         "\\begin{table}[tbp]",

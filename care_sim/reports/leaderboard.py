@@ -16,29 +16,9 @@ CONTROL = Entry("place")
 """A map of the places where things first appeared on 20 other streets; it has no camera and no
 tracks. Of the controls it was the best on the training seeds of the drives and on the published
 streets, before there was a benchmark."""
-_SCORE = (
-    "Score: of what a full scan reaches in the same worlds, the share that the policy reaches with "
-    "1% of the cells, in percent: the mean of collisions avoided in drives, collisions avoided in "
-    "Euro NCAP tests, and first sightings found at once on streets, with a camera that errs as "
-    "YOLOX was measured to. In brackets the 95% interval over worlds."
-)
-_MINUS = "Minus {}: points over {}, paired by world; bold where the interval excludes zero."
-_OF_CONTROL = f"the control {CONTROL.name}, a fixed map without a camera"
-_IDEAL = "Ideal camera: the score with a camera that reports whatever shows enough pixels."
-_UNRANKED = "No number: no policy that a car can have."
-_AS_TOLD = "As the files say{}: care-sim leaderboard --verify plays a tenth of a file again."
-_LEADS_BY_PART = (
-    "Points, paired by world; bold where the interval excludes zero. The score weighs its parts "
-    "alike, a convention on which it hangs who leads of two that are ahead in one part each."
-)
-_IN_HINDSIGHT = (
-    "Who is first is chosen by the very results that are compared, which favours the first; the "
-    "number of comparisons is not corrected for."
-)
-_TRIAL = (
-    "Only the tenth of the worlds that --quick plays: a trial, and no leaderboard. So few worlds "
-    "may all end alike by chance, and then the interval has no width."
-)
+_AS_TOLD = "As the files say{}; care-sim leaderboard --verify plays a tenth of a file again."
+_TRIAL = "A trial with the tenth of the worlds that --quick plays: no leaderboard."
+_IN_HINDSIGHT = "Points, paired by world. The first is chosen by these results, which favours it."
 
 
 def leaderboard_table(results: Sequence[BenchmarkResult], minus: str = CONTROL.name) -> Table:
@@ -53,8 +33,7 @@ def leaderboard_table(results: Sequence[BenchmarkResult], minus: str = CONTROL.n
     leads = () if control is None else (f"minus {minus}",)
     # The leads are the widest: at 80 characters all but they stand side by side.
     columns = ("", "policy", "score", *results[0].parts, "ideal camera", *leads)
-    notes = notes_on(results, minus if leads else "")
-    return Table(title(results), columns, rows, notes, whole=("", "score"), names=2)
+    return Table(title(results), columns, rows, _notes(results), whole=("", "score"), names=2)
 
 
 def leads_table(results: Sequence[BenchmarkResult], minus: str) -> Table | None:
@@ -73,10 +52,9 @@ def leads_table(results: Sequence[BenchmarkResult], minus: str) -> Table | None:
         for name, each in named
         if each is not control
     )
-    trial = (_TRIAL,) if control.quick else ()
     columns = ("policy", *control.parts, "score, ideal camera")
     title_of_leads = f"{title(results)}: minus {minus}, part by part"
-    return Table(title_of_leads, columns, rows, (*trial, _LEADS_BY_PART, _IN_HINDSIGHT))
+    return Table(title_of_leads, columns, rows, (_TRIAL if control.quick else _IN_HINDSIGHT,))
 
 
 def _named(
@@ -118,20 +96,14 @@ def title(results: Sequence[BenchmarkResult]) -> str:
     return f"CARE-Sim benchmark {BENCHMARK_VERSION}: {counted(worlds, 'world')}, {of}"
 
 
-def notes_on(results: Sequence[BenchmarkResult], minus: str) -> tuple[str, ...]:
-    """What the columns and marks mean; without `minus` there are no leads."""
-    over = _OF_CONTROL if minus == CONTROL.name else minus
-    leads = (_MINUS.format(minus, over),) if minus else ()
-    beyond = (_UNRANKED,) if any(map(is_beyond, results)) else ()
-    trial = (_TRIAL,) if results[0].quick else ()
+def _notes(results: Sequence[BenchmarkResult]) -> tuple[str, ...]:
+    """Who vouches for the numbers, and what the marks mean."""
     codes = {*filter(None, map(code_of, results))}
     processors = {*filter(None, map(processor_of, results))}
     made = [f"by {len(codes)} versions of the code"] if len(codes) > 1 else []
     made += [f"on {len(processors)} kinds of processor"] if len(processors) > 1 else []
     told = _AS_TOLD.format(f", played {' '.join(made)}" if made else "")
-    tags = tag_notes(each.tags for each in results)
-    # What limits the numbers comes first: a terminal has room for three lines.
-    return (*trial, told, _SCORE, *leads, _IDEAL, *beyond, *tags)
+    return _TRIAL if results[0].quick else told, *tag_notes(each.tags for each in results)
 
 
 def is_beyond(result: BenchmarkResult) -> bool:
@@ -145,23 +117,13 @@ def _line(
     return (
         number,
         name,
-        _with_ends(result.score()),
+        f"{result.score().mean:.1f} {bounds(result.score(), 1)}",
         *(f"{result.part_score(part):.1f}" for part in result.parts),
         f"{result.score(IDEAL).mean:.1f}",
-        *(() if control is None else (_lead(result, control),)),
+        *(() if control is None else ("" if result is control else _shown(result.lead(control)),)),
     )
-
-
-def _lead(result: BenchmarkResult, control: BenchmarkResult) -> str:
-    if result is control:
-        return ""
-    return _shown(result.lead(control))
 
 
 def _shown(lead: Interval) -> str:
     text = f"{lead.mean:+z.1f} {bounds(lead, 1)}"
     return Bold(text) if lead.low > 0 or lead.high < 0 else text
-
-
-def _with_ends(interval: Interval) -> str:
-    return f"{interval.mean:.1f} {bounds(interval, 1)}"

@@ -4,7 +4,6 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from care_sim.evaluation.collision_outcomes import CollisionOutcome, collision_o
 from care_sim.evaluation.ncap_score import score
 from care_sim.reports.contrasts import Contrast, Measure
 from care_sim.reports.controls import best_control, is_control
-from care_sim.reports.formatting import marked, tag_notes
+from care_sim.reports.formatting import marked
 from care_sim.scenarios.ncap.forms import Ahead
 from care_sim.scenarios.ncap.table import TESTS
 from care_sim.study.designs.ncap import (
@@ -76,22 +75,25 @@ class NcapRows:
     """The rows of a study, by policy and budget."""
 
     def __init__(self, rows: Sequence[Row]):
-        self.rows = rows
         self.tags = {policy_of(row): tags_of_row(row) for row in rows}
         self.budgets = sorted({row["budget"] for row in rows if row["policy"] != FULL})
-        lines = {_line(row) for row in rows}
         order = {name: number for number, name in enumerate(TESTS)}
-        self.lines = sorted(lines, key=lambda line: (order[line.test], line.reported is False))
-
-    @property
-    def policies(self) -> list[str]:
-        """Their names, the full scan first."""
-        return sorted(self.tags, key=lambda name: name != FULL)
-
-    @property
-    def speeds(self) -> list[float]:
+        self.lines = sorted(
+            {_line(row) for row in rows},
+            key=lambda line: (order[line.test], line.reported is False),
+        )
+        # The full scan first.
+        self.policies = sorted(self.tags, key=lambda name: name != FULL)
+        self.speeds = sorted({row[SPEED_COLUMN] for row in rows})
         """The ego's speeds, km/h."""
-        return sorted({row[SPEED_COLUMN] for row in self.rows})
+        self._endings: dict[Contender, list[tuple[Line, CollisionOutcome]]] = {}
+        self._scores: dict[Contender, dict[tuple[int, Case], float]] = {}
+        for row in rows:
+            contender = policy_of(row), row["budget"]
+            ending = _line(row), collision_outcome(*impact_of(row))
+            self._endings.setdefault(contender, []).append(ending)
+            scores = self._scores.setdefault(contender, {})
+            scores[row["seed"], _case(row)] = score(*impact_of(row))
 
     def contender(self, policy: str, budget: float) -> Contender:
         """What was played of a policy beside others at a budget: the full scan has one of its
@@ -99,11 +101,14 @@ class NcapRows:
         """
         return policy, 1.0 if policy == FULL else budget
 
+    def marked(self, policy: str) -> str:
+        """A policy's name, with a mark when no car can have it."""
+        return marked(policy, self.tags[policy])
+
     def endings(self, contender: Contender, lines: Iterable[Line]) -> Counter[CollisionOutcome]:
         """How the episodes of some lines ended."""
         held = set(lines)
-        own = self._rows.get(contender, [])
-        return Counter(collision_outcome(*impact_of(row)) for row in own if _line(row) in held)
+        return Counter(end for line, end in self._endings.get(contender, ()) if line in held)
 
     def scores(self, contender: Contender, lines: Iterable[Line]) -> Scores:
         """The scores of some lines."""
@@ -121,21 +126,19 @@ class NcapRows:
         played = {line.reported for line in self.lines} - {None}
         return [reading for reading in READINGS if reading in played] or [True]
 
-    def best_control(self, budget: float, lines: Iterable[Line]) -> str | None:
+    def best_control(self, budget: float, lines: Sequence[Line]) -> str | None:
         """The control of the best score at a budget."""
-        held = list(lines)
         controls = [name for name in self.policies if is_control(self.tags[name])]
-        scores = {name: self.scores((name, budget), held) for name in controls}
+        scores = {name: self.scores((name, budget), lines) for name in controls}
         return best_control({n: overall(own) for n, own in scores.items() if own})
 
     def difference(
-        self, ours: Contender, theirs: Contender, lines: Iterable[Line]
+        self, ours: Contender, theirs: Contender, lines: Sequence[Line]
     ) -> Contrast | None:
         """The score of one contender less that of another, paired by seed; None without shared
         seeds.
         """
-        held = list(lines)
-        a, b = self.scores(ours, held), self.scores(theirs, held)
+        a, b = self.scores(ours, lines), self.scores(theirs, lines)
         # In the order of the rows, so that sums have the same last bits.
         shared = [key for key in a if key in b]
         seeds = sorted({seed for seed, _ in shared})
@@ -149,28 +152,6 @@ class NcapRows:
             for one in (a, b)
         ]
         return Contrast(_SCORE, difference(*pairs))
-
-    def marked(self, policy: str) -> str:
-        """A policy's name, with a mark when no car can have it."""
-        return marked(policy, self.tags[policy])
-
-    def notes(self) -> tuple[str, ...]:
-        """What the marks mean."""
-        return tag_notes(self.tags.values())
-
-    @cached_property
-    def _rows(self) -> dict[Contender, list[Row]]:
-        groups: dict[Contender, list[Row]] = {}
-        for row in self.rows:
-            groups.setdefault((policy_of(row), row["budget"]), []).append(row)
-        return groups
-
-    @cached_property
-    def _scores(self) -> dict[Contender, Scores]:
-        return {
-            contender: {(row["seed"], _case(row)): score(*impact_of(row)) for row in rows}
-            for contender, rows in self._rows.items()
-        }
 
 
 def overall(scores: Scores) -> float:

@@ -1,5 +1,5 @@
-"""The paper's statements under every order of cells: the verdict on each, and which of them hang on
-the order.
+"""The paper's statements under every order of cells: the verdict on each, and which of them depend
+on the order.
 """
 
 from collections.abc import Mapping
@@ -18,7 +18,6 @@ class Verdict(NamedTuple):
 
 Verdicts = Mapping[str, Mapping[str, Verdict]]
 """By order, then by statement."""
-_RULE = f"Bold: another verdict than under {BASE_ORDER}."
 
 
 def verdict_tables(title: str, verdicts: Verdicts, played: str) -> list[Table]:
@@ -28,44 +27,39 @@ def verdict_tables(title: str, verdicts: Verdicts, played: str) -> list[Table]:
     statements = list(dict.fromkeys(text for found in verdicts.values() for text in found))
     if not statements:
         return []
-    columns = ("statement", *verdicts)
     usual = verdicts.get(BASE_ORDER, {})
-    words = [
-        (text, *(_word(found.get(text), usual.get(text)) for found in verdicts.values()))
-        for text in statements
-    ]
-    measured = [
-        (text, *(found[text].measured if text in found else "" for found in verdicts.values()))
-        for text in statements
-    ]
+    words: list[tuple[str, ...]] = []
+    measured: list[tuple[str, ...]] = []
+    for text in statements:
+        found = [own.get(text, Verdict("", "")) for own in verdicts.values()]
+        known = usual.get(text)
+        words.append(
+            (
+                text,
+                *(
+                    Bold(each.word) if known and each.word not in ("", known.word) else each.word
+                    for each in found
+                ),
+            )
+        )
+        measured.append((text, *(each.measured for each in found)))
+    columns = ("statement", *verdicts)
+    rule = f"Bold: another verdict than under {BASE_ORDER}."
     return [
-        Table(title, columns, tuple(words), (_RULE, played), whole=tuple(verdicts)),
+        Table(title, columns, tuple(words), (rule, played), whole=tuple(verdicts)),
         Table(f"{title}, what was measured", columns, tuple(measured), (played,), terminal=False),
     ]
 
 
-def _word(found: Verdict | None, usual: Verdict | None) -> str:
-    if found is None:
-        return ""
-    return found.word if usual is None or found.word == usual.word else Bold(found.word)
-
-
 def on_mirrored_order(verdicts: Verdicts) -> list[str]:
-    """How many statements keep their verdict where rows are numbered from the bottom, and which do
-    not; nothing where one of the two orders was not played.
+    """How many statements keep their verdict where rows are numbered from the bottom; nothing where
+    one of the two orders was not played.
     """
-    if not (verdicts.get(BASE_ORDER) and verdicts.get(MIRRORED_ORDER)):
+    down, up = verdicts.get(BASE_ORDER), verdicts.get(MIRRORED_ORDER)
+    if not (down and up):
         return []
-    down = verdicts[BASE_ORDER]
-    up = verdicts[MIRRORED_ORDER]
-    changed = [
-        f"{text} ({found.word}, then {up[text].word})"
-        for text, found in down.items()
-        if text in up and up[text].word != found.word
-    ]
-    kept = len(down) - len(changed)
-    others = f"; with another: {'; '.join(changed)}" if changed else ""
+    kept = sum(text not in up or up[text].word == found.word for text, found in down.items())
     return [
-        f"Of the paper's {len(down)} statements, {kept} have the same verdict under {BASE_ORDER} "
-        f"and under {MIRRORED_ORDER}{others}."
+        f"The paper: {kept} of {len(down)} statements have the same verdict under {BASE_ORDER} "
+        f"and {MIRRORED_ORDER}."
     ]

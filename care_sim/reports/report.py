@@ -12,12 +12,12 @@ from rich.console import Console
 from care_sim.base.errors import InvalidInput, counted, printable, unknown
 from care_sim.base.files import write_text
 from care_sim.base.json_text import json_content
-from care_sim.reports.captions import caption
 from care_sim.reports.figures.files import default_style, remove_others, save
 from care_sim.reports.latex import PREAMBLE, latex, paragraph
 from care_sim.reports.studies import STUDIES, SWEEP, study_of
 from care_sim.reports.study import Study
-from care_sim.reports.table import brief, unmarked
+from care_sim.reports.summary import shortened
+from care_sim.reports.table import unmarked
 from care_sim.study.results_formats import results_format_in
 from care_sim.study.row_checks import RowChecks
 from care_sim.study.rows.parquet import read_notes, read_rows, read_table
@@ -26,8 +26,9 @@ from care_sim.study.run_config import FULL, Row
 from care_sim.study.unfinished import UNFINISHED, how_far
 
 TABLES = "tables.md"
-"""Name of the file in a folder of results that holds all tables and how to read them."""
+"""Name of the file in a folder of results that holds all tables."""
 CONFIG = "config.json"
+_READING = "[How to read the tables](../../docs/reading.md)\n"
 PAGE = "report.html"
 """Name of a page where none is given."""
 
@@ -79,12 +80,11 @@ class StudyReport:
         with default_style():
             figures = study.figures(rows)
         closing = _closing(rows, study, left_out)
-        reading = caption(study.caption, tables)
-        pages = [f"{reading}\n", *(table.markdown() for table in tables)]
+        pages = [_READING, *(table.markdown() for table in tables)]
         if closing:
             sentences = "".join(f"- {unmarked(sentence)}\n" for sentence in closing)
             pages.append(f"## Statements\n\n{sentences}")
-        texts = [PREAMBLE, paragraph(reading), *map(latex, tables), *map(paragraph, closing)]
+        texts = [PREAMBLE, *map(latex, tables), *map(paragraph, closing)]
         return cls({TABLES: "\n".join(pages), "tables.tex": "\n".join(texts)}, figures)
 
     def write(self, folder: Path) -> None:
@@ -114,17 +114,20 @@ def print_report(
     console: Console,
     study: Study = SWEEP,
     left_out: Sequence[str] = (),
-    folder: Path | None = None,
+    *,
+    verbose: bool = False,
 ) -> None:
-    """Print the tables, how to read them, and the closing sentences. Where `folder` holds the
-    report, what explains them is three lines, and where the rest of it stands.
-    """
-    rest = folder / TABLES if folder else None
-    shown = [table for table in study.tables(rows) if table.terminal]
-    for table in shown:
-        console.print(table.rich(rest))
+    """Print the headline of a study and its closing sentences; all tables where it is `verbose`."""
+    if verbose:
+        tables = study.tables(rows)
+    else:
+        headline = study.headline(rows) if study.headline else None
+        # Full scans alone have no levels by budget.
+        first = [headline] if headline and headline.rows else study.tables(rows)[:1]
+        tables = [shortened(table, console) for table in first]
+    for table in tables:
+        console.print(table.rich())
         console.print()
-    console.print(brief([caption(study.caption, shown)], console.width, rest), markup=False)
     for sentence in _closing(rows, study, left_out):
         console.print(sentence, markup=False)
 
@@ -150,24 +153,23 @@ def print_minus(rows: Sequence[Row], console: Console, study: Study, policy: str
     if not tables:
         raise InvalidInput(f"there is nothing that {policy} can be compared with in these results")
     for table in tables:
-        console.print(table.rich(None))
+        console.print(table.rich())
         console.print()
 
 
-def where_it_lies(folder: Path, study: Study, rows: Sequence[Row] = ()) -> list[str]:
-    """The lines that end a study: its folder, tables, figures of its rows, and how to make its
-    page.
-    """
-    report = shlex.join(["care-sim", "report", str(folder)])
+def next_steps(folder: Path, study: Study, rows: Sequence[Row] = ()) -> list[str]:
+    """The lines that end a study: where its results are, and three commands to go on with."""
     names = study.figures_of(rows)
-    figures = sorted({path.name for name in names for path in folder.glob(f"{name}.png")})
+    figures = {path.name for name in names for path in folder.glob(f"{name}.png")}
+    beside = f" and {counted(len(figures), 'figure')}" if figures else ""
+    report = shlex.join(["care-sim", "report", str(folder)])
     return [
-        f"Results are in {folder}",
-        f"Tables: {folder / TABLES}",
-        *([f"Figures: {', '.join(figures)}"] if figures else []),
         *([f"Not all of it: {how_far(folder)}"] if (folder / UNFINISHED).is_file() else []),
-        *([f"One policy minus each other: {report} --minus POLICY"] if study.minus else []),
-        f"To make its page: {report} -o {shlex.quote(str(folder / PAGE))}",
+        f"Results are in {folder}: {TABLES}{beside}",
+        "Next:",
+        f"  {report} --verbose",
+        f"  {report} -o {shlex.quote(str(folder / PAGE))}",
+        f"  {report} --minus POLICY" if study.minus else "  care-sim run dense --policy care",
     ]
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from care_sim.base.errors import unknown
-from care_sim.reports import captions, closings
+from care_sim.reports import closings
 from care_sim.reports.figures.budget import (
     BUDGET_FIGURES,
     FIRING_FIGURE,
@@ -42,6 +42,12 @@ from care_sim.reports.figures.realism import (
 )
 from care_sim.reports.figures.standards import NCAP_FIGURE, R157_FIGURE, ncap_figures, r157_figures
 from care_sim.reports.figures.validate import VALIDATION_FIGURE, validation_figures
+from care_sim.reports.findings import (
+    gate_tables,
+    leads_of_episodes,
+    leads_of_plays,
+    leads_tables,
+)
 from care_sim.reports.mechanism.tables import mechanism_closing, mechanism_tables
 from care_sim.reports.protocol import ablations as open_ablations
 from care_sim.reports.protocol import firing as open_firing
@@ -52,12 +58,15 @@ from care_sim.reports.protocol.tables import protocol_tables
 from care_sim.reports.realism import episodes as realism
 from care_sim.reports.realism import plays as open_realism
 from care_sim.reports.study import Study
+from care_sim.reports.summary import medians, recalls
+from care_sim.reports.table import Table
 from care_sim.reports.tables.ablations import ablation_tables
 from care_sim.reports.tables.crowding import crowding_tables
 from care_sim.reports.tables.faults import fault_tables
 from care_sim.reports.tables.firing import firing_tables
-from care_sim.reports.tables.ncap import ncap_tables
+from care_sim.reports.tables.ncap import ncap_headline, ncap_tables
 from care_sim.reports.tables.order import order_tables
+from care_sim.reports.tables.paper_statements import statement_tables
 from care_sim.reports.tables.r157 import r157_tables
 from care_sim.reports.tables.sweep import sweep_minus, sweep_tables
 from care_sim.reports.tables.validate import validation_tables
@@ -80,6 +89,19 @@ def _no_figures(_rows: Sequence[Row]) -> dict[str, Figure]:
     return {}
 
 
+def _sweep_tables(rows: Sequence[Row]) -> list[Table]:
+    return [*leads_tables(leads_of_episodes(rows)), *sweep_tables(rows)]
+
+
+def _paper_tables(rows: Sequence[Row]) -> list[Table]:
+    leads = leads_of_episodes(rows, conditions=False)
+    return [*leads_tables(leads), *statement_tables(rows), *sweep_tables(rows)]
+
+
+def _protocol_tables(rows: Sequence[Row]) -> list[Table]:
+    return [*leads_tables(leads_of_plays(rows)), *gate_tables(rows), *protocol_tables(rows)]
+
+
 _ORDER_COLUMNS = {"cell_order": TEXT}
 _CASE_COLUMNS = {name: TEXT if name.endswith(("kind", "side")) else SUM for name in CASE_COLUMNS}
 _NCAP_COLUMNS = {
@@ -94,20 +116,22 @@ _ALL = (
     Study(
         "sweep",
         "Sweep of the closed loop",
-        sweep_tables,
+        _sweep_tables,
         sweep_figures,
         closings.sweep_closing,
         BUDGET_FIGURES,
         minus=sweep_minus,
+        headline=medians,
     ),
     Study(
         "paper",
         "The paper's closed-loop study",
-        sweep_tables,
+        _paper_tables,
         sweep_figures,
         closings.paper_closing,
         BUDGET_FIGURES,
         minus=sweep_minus,
+        headline=medians,
     ),
     Study(
         "crowding",
@@ -125,7 +149,6 @@ _ALL = (
         r157_figures,
         closings.episodes_closing,
         (R157_FIGURE,),
-        captions.R157_CAPTION,
         columns=_CASE_COLUMNS,
     ),
     Study(
@@ -151,7 +174,6 @@ _ALL = (
         vehicle_figures,
         closings.episodes_closing,
         (VEHICLE_FIGURE,),
-        captions.VEHICLE_CAPTION,
         VEHICLE,
     ),
     Study(
@@ -161,8 +183,8 @@ _ALL = (
         ncap_figures,
         closings.ncap_closing,
         (NCAP_FIGURE,),
-        captions.NCAP_CAPTION,
         columns=_NCAP_COLUMNS,
+        headline=ncap_headline,
     ),
     Study(
         "order",
@@ -188,7 +210,6 @@ _ALL = (
         realism_figures,
         realism.realism_closing,
         (REALISM_FIGURE,),
-        captions.REALISM_CAPTION,
     ),
     Study(
         "validate",
@@ -197,7 +218,6 @@ _ALL = (
         validation_figures,
         closings.validation_closing,
         (VALIDATION_FIGURE,),
-        captions.VALIDATION_CAPTION,
     ),
     Study(
         "order-open-loop",
@@ -206,7 +226,6 @@ _ALL = (
         open_order_figures,
         open_order.order_closing,
         (OPEN_ORDER_FIGURE,),
-        captions.PROTOCOL_CAPTION,
         PLAYS,
         _ORDER_COLUMNS,
     ),
@@ -217,7 +236,6 @@ _ALL = (
         _no_figures,
         protocol_closing,
         (),
-        captions.PROTOCOL_CAPTION,
         PLAYS,
     ),
     Study(
@@ -227,7 +245,6 @@ _ALL = (
         open_realism_figures,
         open_realism.realism_closing,
         (OPEN_REALISM_FIGURE,),
-        captions.OPEN_REALISM_CAPTION,
         PLAYS,
     ),
     Study(
@@ -237,19 +254,18 @@ _ALL = (
         open_ablation_figures,
         open_ablations.ablation_closing,
         (OPEN_ABLATION_FIGURE,),
-        captions.PROTOCOL_CAPTION,
         PLAYS,
     ),
     Study(
         "protocol",
         "First sightings in the open loop",
-        protocol_tables,
+        _protocol_tables,
         protocol_figures,
         closings.first_sighting_closing,
         PROTOCOL_FIGURES,
-        captions.PROTOCOL_CAPTION,
         PLAYS,
         minus=protocol_minus,
+        headline=recalls,
     ),
     Study(
         "mechanism",
@@ -258,7 +274,6 @@ _ALL = (
         _no_figures,
         mechanism_closing,
         (),
-        captions.MECHANISM_CAPTION,
         MECHANISM,
     ),
 )

@@ -1,11 +1,10 @@
-"""A study as it is shown: its tables and figures, what is said around them, the columns read."""
+"""A study as it is shown: its tables and figures, the sentences after them, the columns read."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from matplotlib.figure import Figure
 
-from care_sim.reports import captions
 from care_sim.reports.table import Table
 from care_sim.scenarios import SCENARIOS
 from care_sim.study.results_formats import EPISODES, ResultsFormat
@@ -21,9 +20,10 @@ class Study:
 
     `title` names it to readers. `closing` are sentences after the tables. `figure_names` are all
     figures that the study can draw, as patterns in which {world} stands for a scenario or source,
-    and a * for any text. `caption` says how to read its tables. `results` is what it plays.
-    `columns` are further columns that its tables read: those that a row may leave empty may be
-    missing where all rows do. `minus` makes tables of one policy less every other.
+    and a * for any text. `results` is what it plays. `columns` are further columns that its tables
+    read: those that a row may leave empty may be missing where all rows do. `minus` makes tables
+    of one policy less every other. `headline` is the table that ends the study on a terminal; the
+    first of its tables if None.
     """
 
     name: str
@@ -32,10 +32,10 @@ class Study:
     figures: Callable[[Sequence[Row]], dict[str, Figure]]
     closing: Callable[[Sequence[Row]], list[str]]
     figure_names: tuple[str, ...]
-    caption: tuple[captions.Remark, ...] = captions.EPISODES_CAPTION
     results: ResultsFormat = EPISODES
     columns: Mapping[str, Column] = field(default_factory=dict)
     minus: Callable[[Sequence[Row], str], list[Table]] | None = None
+    headline: Callable[[Sequence[Row]], Table] | None = None
 
     def figures_of(self, rows: Sequence[Row] = ()) -> list[str]:
         """The figures that it can draw of the built-in worlds and those of the rows, as patterns in

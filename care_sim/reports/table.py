@@ -1,31 +1,35 @@
-"""A table of text, and how it looks on a terminal and in Markdown; `care_sim.reports.latex` sets it
-in LaTeX.
+"""A table of text, for a file in Markdown and for a terminal; `care_sim.reports.latex` sets it in
+LaTeX.
 """
 
 import re
-import textwrap
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
-from rich.cells import cell_len
-from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
+from rich.console import Console, ConsoleOptions, RenderResult
+from rich.segment import Segment
 from rich.table import Table as RichTable
 from rich.text import Text
 
 from care_sim.base.errors import printable
-from care_sim.reports.marks import marks_in_short
 
 TableRow = tuple[str, ...]
-_MARKS = re.compile(r"[\\`*|~]|(?<!\w)_|_(?!\w)|<(?=[A-Za-z/!?])|&(?=#?\w+;)|(?<=\])\(")
+_MARKDOWN = re.compile(r"[\\`*|~]|(?<!\w)_|_(?!\w)|<(?=[A-Za-z/!?])|&(?=#?\w+;)|(?<=\])\(")
 """What Markdown reads as marks, tags, entities or links. An underscore within a word is none."""
-
-_SENTENCE = 24
-"""Characters of a column from which on a terminal breaks its entries."""
-_NOTE_LINES = 3
-"""Lines of notes that a terminal shows under a table, at the most."""
-_CUT = " ... "
-_SENTENCE_END = re.compile(r"(?<=\.) (?=[A-Z≤≥~†‡§])")
+_NUMBER = r"[≤≥~]?[+-]\d[\d.]*"
+_DIFFERENCE = re.compile(rf"{_NUMBER}\*?°?( .*)?")
+_MARKS = {
+    rf"{_NUMBER}\*": "*: reaches the gate",
+    r"[≤≥~][+-]?\d": "≤, ≥, ~: a bound, since actors were missed",
+    r"\d.*°": "°: interval over events",
+    r"\bn\.d\.": "n.d.: not detected",
+    "†": "†: knows the truth",
+    "‡": "‡: saw the full scan first",
+    "§": "§: looks the episode up",
+}
+"""Meanings of marks, by the pattern of an entry that has the mark."""
+_HEADING = "\N{BOX DRAWINGS LIGHT QUADRUPLE DASH HORIZONTAL}"
+"""Stands in a terminal's grid for the row of a heading."""
+_BOLD = "Bold: the interval excludes 0"
 
 
 class Bold(str):
@@ -38,11 +42,10 @@ class Bold(str):
 class Table:
     """Entries of text under a title, with notes below.
 
-    A row of one entry is a heading for the rows after it. A terminal shows no `quotes`, not the
-    columns named in `files_only`, no empty columns, and nothing of a table without `terminal`; of
-    the columns in `whole` it breaks only the headings. Where it is too narrow the table goes on
-    below itself, with its first `names` columns again. Names in its texts may be anybody's: control
-    codes are shown as escapes.
+    A row of one entry is a heading for the rows after it. A terminal leaves out the `quotes`, the
+    columns named in `files_only` and empty columns, and breaks no entry of the columns in `whole`.
+    A page folds a table without `terminal`: details. The first `names` columns name the rows.
+    Names in texts may be anybody's: control codes are shown as escapes.
     """
 
     title: str
@@ -60,29 +63,37 @@ class Table:
         # that no output can forget it.
         object.__setattr__(self, "title", printable(self.title))
         object.__setattr__(self, "rows", tuple(map(_shown, self.rows)))
+        object.__setattr__(self, "notes", tuple(filter(None, self.notes)))
         for name in ("columns", "notes", "quotes", "files_only", "whole"):
             object.__setattr__(self, name, _shown(getattr(self, name)))
 
-    def rich(self, rest: Path | None = None) -> "TerminalTable":
-        """For a terminal; of notes longer than three lines the first ones, and that `rest` holds
-        them all.
-        """
-        return TerminalTable(self, rest)
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """The notes, then the meanings of the marks in the entries that no note explains."""
+        told = " ".join(self.notes)
+        entries = [entry for row in self.rows for entry in row]
+        marks = [
+            meaning
+            for pattern, meaning in _MARKS.items()
+            if re.split("[:,]", meaning)[0] not in told
+            and any(re.search(pattern, entry) for entry in entries)
+        ]
+        # Bold words mean something else, which their own tables explain.
+        if any(isinstance(entry, Bold) and _DIFFERENCE.fullmatch(entry) for entry in entries):
+            marks.insert(0, _BOLD)
+        return (*self.notes, f"{'; '.join(marks)}.") if marks else self.notes
+
+    def rich(self) -> "TerminalTable":
+        """For a terminal."""
+        return TerminalTable(self)
 
     def markdown(self) -> str:
         """For a file."""
-        heading = tuple(map(unmarked, self.columns))
-        rule = tuple("---" for _ in self.columns)
-        body = "\n".join(
-            "| " + " | ".join(line) + " |"
-            for line in [heading, rule, *map(self._markdown_row, self.rows)]
-        )
-        return (
-            "\n\n".join(
-                [f"## {unmarked(self.title)}", body, *map(unmarked, (*self.notes, *self.quotes))]
-            )
-            + "\n"
-        )
+        rows = [tuple(map(unmarked, self.columns)), tuple("---" for _ in self.columns)]
+        rows += map(self._markdown_row, self.rows)
+        body = "\n".join(f"| {' | '.join(row)} |" for row in rows)
+        texts = [f"## {unmarked(self.title)}", body, *map(unmarked, (*self.lines, *self.quotes))]
+        return "\n\n".join(texts) + "\n"
 
     def without_empty_columns(self) -> "Table":
         """The same without the columns in which nothing stands; those of names stay."""
@@ -105,159 +116,38 @@ class Table:
 
 @dataclass(frozen=True)
 class TerminalTable:
-    """A table as a terminal shows it, whatever its width."""
+    """A table as a terminal shows it."""
 
     table: Table
-    rest: Path | None = None
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        yield Text(self.table.title, style="italic")
-        parts = self._parts(options.max_width)
-        for number, columns in enumerate(parts):
-            if number:
-                yield Text()
-            rows = self._told_in(columns) if len(parts) > 1 else self.table.rows
-            yield from self._part(columns, rows, options.max_width)
-        told = brief(self.table.notes, options.max_width, self.rest)
-        for words in (told, self._marks(told)):
-            if words:
-                yield Text(words, style="dim")
-
-    def _marks(self, told: str) -> str:
-        """What the marks mean of the entries that are shown, where the text does not say it."""
-        columns = [n for n in range(len(self.table.columns)) if self._is_shown(n)]
-        entries = [entry for n in columns for entry in self.table.entries(n)]
-        return marks_in_short(entries, [e for e in entries if isinstance(e, Bold)], told)
-
-    def _parts(self, width: int) -> list[list[int]]:
-        """The columns that stand side by side, part by part."""
         table = self.table
-        names = [n for n in range(table.names) if self._is_shown(n)]
-        parts: list[list[int]] = [[]]
-        for block in self._blocks():
-            beside = [*names, *parts[-1], *block]
-            if parts[-1] and sum(map(self._width, beside)) > width:
-                parts.append([])
-            parts[-1] += block
-        return [[*names, *part] for part in parts]
-
-    def _is_shown(self, column: int) -> bool:
-        table = self.table
-        return table.columns[column] not in table.files_only and any(table.entries(column))
-
-    def _blocks(self) -> list[list[int]]:
-        """The columns behind the names, together those that are not parted: a heading that comes
-        again, such as `difference`, says something beside the one before it alone.
-        """
-        columns = self.table.columns
-        blocks: list[list[int]] = []
-        for n in range(self.table.names, len(columns)):
-            if blocks and columns.count(columns[n]) > 1:
-                blocks[-1].append(n)
-            else:
-                blocks.append([n])
-        return [shown for block in blocks if (shown := [n for n in block if self._is_shown(n)])]
-
-    def _width(self, column: int) -> int:
-        """Characters of a column and the space after it: entries of sentences are broken."""
-        name = self.table.columns[column]
-        entries = self.table.entries(column)
-        longest = max(map(cell_len, entries), default=0)
-        words = name.split()
-        if name not in self.table.whole and longest > _SENTENCE:
-            longest = _SENTENCE
-            words += [word for entry in entries for word in entry.split()]
-        return 1 + max([longest, *map(cell_len, words)])
-
-    def _widths(self, columns: Sequence[int], width: int) -> list[int]:
-        """The widths of columns that stand side by side: what is left goes to broken entries, then
-        to broken headings.
-        """
-        table = self.table
-        widths = [self._width(n) for n in columns]
-        left = width - sum(widths)
-        entries = [max(map(cell_len, table.entries(n)), default=0) for n in columns]
-        headings = [
-            0 if table.columns[n] in table.whole else cell_len(table.columns[n]) for n in columns
+        shown = [
+            n
+            for n, name in enumerate(table.columns)
+            if name not in table.files_only and any(table.entries(n))
         ]
-        for wanted in (entries, headings):
-            for place, longest in enumerate(wanted):
-                more = min(max(longest + 1 - widths[place], 0), max(left, 0))
-                widths[place] += more
-                left -= more
-        return widths
-
-    def _told_in(self, columns: Sequence[int]) -> list[TableRow]:
-        """The rows of which these columns tell something, under their headings."""
-        told: list[TableRow] = []
-        heading: TableRow | None = None
-        for row in self.table.rows:
-            if len(row) == 1:
-                heading = row
-            elif any(row[n] for n in columns if n >= self.table.names):
-                told += [heading, row] if heading else [row]
-                heading = None
-        return told
-
-    def _part(
-        self, columns: Sequence[int], rows: Sequence[TableRow], width: int
-    ) -> Iterator[RenderableType]:
-        """Columns side by side. Headings of rows span them, and part the rows in several tables of
-        the same widths.
-        """
-        if columns:
-            yield self._block(columns, width, show_header=True)
-        block = self._block(columns, width)
-        for row in rows:
-            if len(row) == 1:
-                if block.row_count:
-                    yield block
-                yield _styled(row[0], heading=True)
-                block = self._block(columns, width)
+        grid = RichTable(box=None, padding=(0, 1, 0, 0), header_style="")
+        for n in shown:
+            grid.add_column(Text(table.columns[n]), overflow="fold")
+        for row in table.rows:
+            cells = [_HEADING] if len(row) == 1 else [Text(row[n], _style(row[n])) for n in shown]
+            grid.add_row(*cells)
+        headings = (row[0] for row in table.rows if len(row) == 1)
+        yield Text(table.title, "italic")
+        for line in console.render_lines(grid, options, pad=False):
+            # Rich has no cells that span columns: a heading takes the line of its row.
+            if "".join(segment.text for segment in line).strip() == _HEADING:
+                yield Text(next(headings), "italic")
             else:
-                block.add_row(*(_styled(row[n], heading=False) for n in columns))
-        if block.row_count:
-            yield block
-
-    def _block(self, columns: Sequence[int], width: int, show_header: bool = False) -> RichTable:
-        block = RichTable(box=None, padding=(0, 1, 0, 0), show_header=show_header)
-        widths = self._widths(columns, width)
-        fits = sum(widths) <= width
-        for n, wide in zip(columns, widths, strict=True):
-            name = self.table.columns[n]
-            # One word per line keeps columns narrow whose entries must not break.
-            whole = name in self.table.whole
-            block.add_column(
-                Text(name.replace(" ", "\n") if whole else name),
-                no_wrap=whole and fits,
-                overflow="fold",
-                vertical="bottom" if show_header else "top",
-                width=wide - 1 if fits else None,
-            )
-        return block
-
-
-def brief(texts: Sequence[str], width: int, rest: Path | None) -> str:
-    """The texts in lines of `width`. Where they take more than three and `rest` holds them all, the
-    first sentences of them, and that it does.
-    """
-    whole = textwrap.wrap(" ".join(texts), width)
-    if rest is None or len(whole) <= _NOTE_LINES:
-        return "\n".join(whole)
-    # A folder may have a name that leaves a line no room for anything else.
-    names = [f"More: {printable(str(path))}" for path in (rest, rest.name)]
-    more = next((name for name in names if len(name) <= width - len(_CUT)), "")
-    sentences = _SENTENCE_END.split(" ".join(texts))
-    for count in range(len(sentences) - 1, 0, -1):
-        lines = textwrap.wrap(" ".join([*sentences[:count], more]), width)
-        if len(lines) <= _NOTE_LINES:
-            return "\n".join(lines)
-    return textwrap.fill(sentences[0], width, max_lines=_NOTE_LINES, placeholder=f"{_CUT}{more}")
+                yield from [*line, Segment.line()]
+        for note in table.lines:
+            yield Text(note, "dim")
 
 
 def unmarked(text: str) -> str:
     """The text with what Markdown would read as marks taken literally."""
-    return _MARKS.sub(r"\\\g<0>", text)
+    return _MARKDOWN.sub(r"\\\g<0>", text)
 
 
 def _shown(texts: TableRow) -> TableRow:
@@ -265,5 +155,5 @@ def _shown(texts: TableRow) -> TableRow:
     return tuple(text if text.isprintable() else type(text)(printable(text)) for text in texts)
 
 
-def _styled(entry: str, heading: bool) -> Text:
-    return Text(entry, style="italic" if heading else "bold" if isinstance(entry, Bold) else "")
+def _style(entry: str) -> str:
+    return "bold" if isinstance(entry, Bold) else ""

@@ -1,5 +1,5 @@
-"""What the rows of a validation say of a world: who was chosen, who leads whom, and whether the
-world discriminates.
+"""The rows of a validation by world: who was chosen, who leads whom, and whether the world
+discriminates.
 """
 
 from collections.abc import Iterable, Sequence
@@ -8,10 +8,9 @@ from itertools import combinations
 
 import numpy as np
 
-from care_sim.base.errors import counted, percent
 from care_sim.evaluation.censoring import FEWEST_PAIRS
 from care_sim.reports.contrasts import AVOIDED, DETECTION, Contrast, contrast, preventable
-from care_sim.reports.controls import is_control
+from care_sim.reports.controls import BEST_CONTROL, is_control
 from care_sim.study.designs.validate import CAMERA_POLICIES, is_training
 from care_sim.study.rows.reading import detections, is_avoided, setting_of, tags_of_row
 from care_sim.study.rows.settings import Setting
@@ -19,6 +18,9 @@ from care_sim.study.run_config import FULL, Row
 
 _Cells = dict[tuple[str, float], list[Row]]
 """The rows of every policy at every budget."""
+BEST_CAMERA = "best camera policy"
+HINDSIGHT = "control in hindsight"
+"""The best control by the very test seeds it is then compared on: a choice in its favour."""
 SEPARATED = ("care", "all-camera", "history")
 """The paper's reserves, of which each pair has to be told apart."""
 
@@ -52,7 +54,7 @@ class WorldPlays:
     """The rows of a validation of one world, by policy and budget.
 
     The choices are by training seeds and everything else is of test seeds, the choice in hindsight
-    included.
+    included. A policy is named by itself or by a role: `BEST_CAMERA`, `BEST_CONTROL`, `HINDSIGHT`.
     """
 
     def __init__(self, setting: Setting, rows: Sequence[Row]):
@@ -62,94 +64,56 @@ class WorldPlays:
         self.budgets = sorted({row["budget"] for row in rows if row["policy"] != FULL})
         self._training = _by_cell(row for row in rows if is_training(row))
         self._test = _by_cell(self.test_rows)
+        self._controls = [name for name, tags in self.tags.items() if is_control(tags)]
 
-    def played(self, policy: str, budget: float) -> list[Row]:
-        """The test rows of a policy at a budget; the full scan has one budget."""
-        return self._test.get((policy, 1.0 if policy == FULL else budget), [])
-
-    def best_camera(self, budget: float) -> str | None:
-        """The best policy with a camera, by the training seeds."""
-        return _best(self._training, CAMERA_POLICIES, budget)
+    def named(self, role: str, budget: float) -> str | None:
+        """The policy of a role at a budget; None where nobody was played to choose from."""
+        choices = {
+            BEST_CAMERA: (self._training, CAMERA_POLICIES),
+            BEST_CONTROL: (self._training, self._controls),
+            HINDSIGHT: (self._test, self._controls),
+        }
+        return _best(*choices[role], budget) if role in choices else role
 
     def best_control(self, budget: float) -> str | None:
         """The best control that a car can have, by the training seeds."""
-        return _best(self._training, self._controls, budget)
+        return self.named(BEST_CONTROL, budget)
 
-    def hindsight_control(self, budget: float) -> str | None:
-        """The best control that a car can have, by the very test seeds it is then compared on: a
-        choice in its favour.
-        """
-        return _best(self._test, self._controls, budget)
+    def played(self, role: str, budget: float) -> list[Row]:
+        """The test rows of a policy at a budget; the full scan has one budget."""
+        policy = self.named(role, budget)
+        return self._test.get((policy, 1.0 if policy == FULL else budget), []) if policy else []
 
-    def lead(self, ours: str | None, theirs: str | None, budget: float) -> Lead:
-        """What one policy has over another at a budget; nothing where one of them is None."""
-        a, b = (self.played(policy, budget) if policy else [] for policy in (ours, theirs))
-        full = self.played(FULL, budget)
+    def lead(self, ours: str, theirs: str, budget: float) -> Lead:
+        """What one policy has over another at a budget."""
+        a, b, full = (self.played(role, budget) for role in (ours, theirs, FULL))
         avoided = contrast(AVOIDED, preventable(full, a), preventable(full, b))
         return Lead(contrast(DETECTION, a, b), avoided)
 
-    def camera_lead(self, budget: float) -> Lead:
-        """What the best policy with a camera has over the best control."""
-        return self.lead(self.best_camera(budget), self.best_control(budget), budget)
+    def answers(self, budget: float) -> tuple[bool, bool, bool]:
+        """Whether the best camera policy leads the best control, whether the full scan does, and
+        whether each two of `SEPARATED` are apart. A world discriminates where all three are so.
+        """
+        return (
+            self.lead(BEST_CAMERA, BEST_CONTROL, budget).leads,
+            self.lead(FULL, BEST_CONTROL, budget).leads,
+            all(self.lead(*pair, budget).is_told for pair in combinations(SEPARATED, 2)),
+        )
 
-    def hindsight_lead(self, budget: float) -> Lead:
-        """What the best policy with a camera has over the best control in hindsight."""
-        return self.lead(self.best_camera(budget), self.hindsight_control(budget), budget)
-
-    def full_lead(self, budget: float) -> Lead:
-        """What the full scan has over the best control: all that there is to win."""
-        return self.lead(FULL, self.best_control(budget), budget)
-
-    def separations(self, budget: float) -> dict[tuple[str, str], Lead]:
-        """What each of `SEPARATED` has over those after it."""
-        return {pair: self.lead(*pair, budget) for pair in combinations(SEPARATED, 2)}
-
-    def failings(self, budget: float) -> list[str]:
-        """Why the world does not discriminate at a budget; nothing where it does."""
-        found = []
-        camera, control = self.best_camera(budget), self.best_control(budget)
-        if camera is None or control is None:
-            return ["nobody was chosen on training seeds"]
-        if not self.camera_lead(budget).leads:
-            found.append(f"{camera} does not lead {control}")
-        if not self.full_lead(budget).leads:
-            found.append("a full scan leaves nothing to win")
-        tied = [
-            " and ".join(pair)
-            for pair, lead in self.separations(budget).items()
-            if not lead.is_told
-        ]
-        if tied:
-            found.append(f"{', '.join(tied)} are not told apart")
-        return found
+    @property
+    def discriminates_at(self) -> list[float]:
+        """The budgets at which the world discriminates."""
+        return [budget for budget in self.budgets if all(self.answers(budget))]
 
     @property
     def has_too_few(self) -> bool:
         """Whether there are too few test seeds for any difference to count."""
-        return self._test_seeds < FEWEST_PAIRS
-
-    @property
-    def verdict(self) -> str:
-        """Whether the world discriminates, in one sentence; nothing is said on too few seeds."""
-        if self.has_too_few:
-            return (
-                f"{self.setting.label}: no verdict on {counted(self._test_seeds, 'test seed')}, it "
-                f"takes {FEWEST_PAIRS}."
-            )
-        failings = {budget: self.failings(budget) for budget in self.budgets}
-        passed = [percent(budget) for budget, found in failings.items() if not found]
-        if passed:
-            return f"{self.setting.label}: discriminates at {', '.join(passed)}."
-        because = "; ".join(
-            f"at {percent(budget)} {', '.join(found)}" for budget, found in failings.items()
-        )
-        return f"{self.setting.label}: does not discriminate, because {because}."
+        return len({row["seed"] for row in self.test_rows}) < FEWEST_PAIRS
 
     @property
     def ran_into(self) -> str:
-        """On how many test seeds a body runs into the car of the full scan; empty where none does.
-
-        Such a world cannot be won by seeing more.
+        """On how many test seeds a body runs into the car of the full scan, which body and how
+        fast; empty where none does. Seeing more does not avoid that.
         """
         full = {row["seed"]: row for row in self.test_rows if row["policy"] == FULL}
         hit = [row for row in full.values() if row.get("hit_at_front") is False]
@@ -158,20 +122,8 @@ class WorldPlays:
         kinds = ", ".join(sorted({row["hit_kind"] for row in hit}))
         # Older files lack the column.
         speeds = [row["closing_speed_mps"] for row in hit if row.get("closing_speed_mps")]
-        fastest = f", closing at up to {max(speeds):.1f} m/s" if speeds else ""
-        return (
-            f"{self.setting.label}: on {len(hit)} of {counted(len(full), 'test seed')} a body "
-            f"({kinds}) runs into the car of the full scan{fastest}. Seeing more does not avoid "
-            "that."
-        )
-
-    @property
-    def _test_seeds(self) -> int:
-        return len({row["seed"] for row in self.test_rows})
-
-    @property
-    def _controls(self) -> list[str]:
-        return [name for name, tags in self.tags.items() if is_control(tags)]
+        fastest = f" up to {max(speeds):.1f} m/s" if speeds else ""
+        return f"{len(hit)}/{len(full)} {kinds}{fastest}"
 
 
 def played_worlds(rows: Sequence[Row]) -> list[WorldPlays]:

@@ -41,10 +41,12 @@ def played(here, folder):
 def test_a_study_goes_on_in_its_folder_and_another_beside_it(here, sweep):
     out, err = sweep("--scenarios dartout --seeds 1")
     assert err.startswith("Results go to runs/sweep: 1 episode\n")
-    assert "Results are in runs/sweep\nTables: runs/sweep/tables.md\n" in out
+    assert "Results are in runs/sweep: tables.md\n" in out
     assert out.endswith(
-        "One policy minus each other: care-sim report runs/sweep --minus POLICY\n"
-        "To make its page: care-sim report runs/sweep -o runs/sweep/report.html\n"
+        "Next:\n"
+        "  care-sim report runs/sweep --verbose\n"
+        "  care-sim report runs/sweep -o runs/sweep/report.html\n"
+        "  care-sim report runs/sweep --minus POLICY\n"
     )
 
     _, err = sweep("--scenarios dense --seeds 1")

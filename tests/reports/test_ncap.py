@@ -5,7 +5,7 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.reports.figures.standards import ncap_figures
-from care_sim.reports.ncap import Line, NcapRows, impact_of, overall
+from care_sim.reports.ncap import NcapRows, impact_of, overall
 from care_sim.reports.table import Bold
 from care_sim.reports.tables.ncap import ncap_tables
 from care_sim.study.designs.ncap import NcapCase
@@ -125,12 +125,6 @@ def test_a_test_that_nobody_knows_is_one_line():
     (one,) = played("care", "CPNA-25", [None])
     with pytest.raises(InvalidInput, match="unknown test 'CPXX'"):
         impact_of({**one, "scenario.test": "CPXX"})
-
-
-def test_lines_without_cars_that_hide_count_in_both_readings():
-    assert Line("CPNA-25", None).holds(True)
-    assert Line("CPNA-25", None).holds(False)
-    assert not Line("CPNCO-50", True).holds(False)
 
 
 def test_the_figure_has_a_panel_for_every_policy_and_budget():

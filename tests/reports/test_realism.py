@@ -1,12 +1,10 @@
 """Orders under realistic conditions, on rows made by hand."""
 
 import pytest
-from rich.console import Console
 
 from care_sim.reports.page.build import Findings
 from care_sim.reports.realism import episodes, plays
 from care_sim.reports.realism.orders import Order, Standing, Verdict, changes, of_plays
-from care_sim.reports.report import StudyReport, print_report
 from care_sim.reports.studies import STUDIES
 from care_sim.reports.table import Bold
 from care_sim.study.designs.realism import (
@@ -139,14 +137,11 @@ def test_fewer_than_five_seeds_carry_no_verdict():
     ]
 
 
-def test_one_seed_has_no_interval_and_no_note_on_a_table_that_is_not_shown(capsys):
+def test_one_seed_has_no_interval():
     one = [each for each in ROWS if each["seed"] % 100 == 0 and each["scenario"] == "dense"]
     first, *others = episodes.realism_tables(one)
     assert lines(first)["range 40 m"]["dense, 3%: care : history"] == "+6.0"
     assert not any("[" in entry for table in others for line in table.rows for entry in line)
-    print_report(one, Console(width=80), STUDIES["realism"])
-    assert "Orders:" not in capsys.readouterr().out
-    assert "Orders:" in StudyReport.of(one, STUDIES["realism"]).texts["tables.md"]
 
 
 def test_policies_that_join_in_are_set_beside_care():
@@ -169,8 +164,7 @@ def test_the_closing_counts_verdicts():
 
 
 def test_a_page_and_a_map_are_made_of_the_same_rows():
-    findings = Findings.of(STUDIES["realism"], STREETS)
-    assert "No verdict of fewer than five pairs" in findings.reading
+    assert Findings.of(STUDIES["realism"], STREETS).tables
     (figure,) = STUDIES["realism"].figures(STREETS).values()
     texts = [text.get_text() for text in figure.axes[0].texts]
     assert texts[0] == "+6.0*"

@@ -2,12 +2,11 @@
 
 from care_sim.evaluation.collision_outcomes import CollisionOutcome
 from care_sim.reports.cells import summarise
-from care_sim.reports.closings import collisions, validation_closing
+from care_sim.reports.closings import collisions
 from care_sim.reports.contrasts import AVOIDED, contrast, preventable
 from care_sim.reports.ncap import impact_of
 from care_sim.reports.tables.r157 import cut_in_rows
 from tests.helpers.made_rows import cut_ins, rows
-from tests.helpers.made_worlds import TELLING, TRAINING, world
 from tests.reports.test_ncap import played
 
 STOPPED = {"braked_before_view": True}
@@ -35,20 +34,6 @@ def test_stops_for_nothing_and_who_ran_into_the_car_are_counted():
     hit_by = {"collision": True, "hit_at_front": False}
     study = [*rows("care", [9.0, 9.0], changes=STOPPED), *rows("full", [9.0], changes=hit_by)]
     assert collisions(study) == (
-        "Collisions: 1 in 3 episodes; in 1 of them another body ran into the car. 2 episodes with "
-        "a brake for nothing before the actor was in view: they count as not detected and not "
-        "avoided."
+        "Collisions: 1 in 3 episodes; in 1 another body ran into the car; 2 stops for nothing, "
+        "which avoid none."
     )
-
-
-def test_a_validation_says_on_how_many_seeds_a_full_scan_is_run_into():
-    who = {"hit_kind": "van", "hit_at_front": False, "closing_speed_mps": 6.25}
-    study = [
-        one | who if one["policy"] == "full" and one["collision"] else one
-        for one in world(TELLING, TRAINING)
-    ]
-    assert validation_closing(study)[-1] == (
-        "dartout: on 1 of 6 test seeds a body (van) runs into the car of the full scan, closing at "
-        "up to 6.2 m/s. Seeing more does not avoid that."
-    )
-    assert validation_closing(world(TELLING, TRAINING))[-1].startswith("dartout: discriminates")

@@ -1,10 +1,11 @@
 """Who is chosen, who leads whom, and whether a world discriminates, on rows made by hand."""
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from care_sim.reports.validation import played_worlds
+from care_sim.reports.controls import BEST_CONTROL
+from care_sim.reports.table import Bold
+from care_sim.reports.tables.validate import validation_closing, validation_tables
+from care_sim.reports.validation import BEST_CAMERA, HINDSIGHT, played_worlds
 from tests.helpers.made_worlds import (
     MIRRORED,
     SATURATED,
@@ -22,6 +23,10 @@ def only(rows):
     return played
 
 
+def camera_lead(rows):
+    return only(rows).lead(BEST_CAMERA, BEST_CONTROL, 0.03)
+
+
 def test_each_world_stands_alone_the_unchanged_one_first():
     plain, mirrored = played_worlds(STUDY)
     assert plain.setting.label == "dartout"
@@ -37,29 +42,23 @@ def test_fewest_collisions_are_the_best_and_then_the_earliest_detection():
     ]
     rows = [each | {"tags": "causal+control"} for each in rows]
     assert only(rows).best_control(0.03) == "rows"
-
-
-def test_a_stop_for_nothing_counts_as_a_collision_where_the_best_is_chosen():
     rows = [*cell("rows", [9.0] * 5, training=True), *cell("fan", [14.0] * 5, training=True)]
     assert only(rows).best_control(0.03) == "fan"
+    # A stop for nothing counts as a collision.
     rows[-1]["braked_before_view"] = True
     assert only(rows).best_control(0.03) == "rows"
 
 
-def test_the_choice_hangs_on_training_seeds_alone_and_the_memoriser_is_no_control():
-    """On the test seeds `fan` is better than `rows`, and `seed-finder` than both."""
+def test_the_choice_depends_on_training_seeds_alone_and_in_hindsight_on_test_seeds():
+    """On the test seeds `fan` is better than `rows`, and `seed-finder`, no control, than both."""
     played = only(world(TELLING, TRAINING))
-    assert played.best_control(0.03) == "rows"
-    assert played.best_camera(0.03) == "care"
+    roles = (BEST_CAMERA, BEST_CONTROL, HINDSIGHT)
+    assert [played.named(role, 0.03) for role in roles] == ["care", "rows", "fan"]
+    assert played.lead(BEST_CAMERA, HINDSIGHT, 0.03).avoided.mean == pytest.approx(0.0)
     assert only(world(TELLING, {})).best_control(0.03) is None
-
-
-def test_the_choice_in_hindsight_hangs_on_test_seeds_alone_and_leaves_the_verdict():
-    played = only(world(TELLING, TRAINING))
-    assert played.hindsight_control(0.03) == "fan"
-    assert played.hindsight_lead(0.03).avoided.mean == pytest.approx(0.0)
-    assert played.failings(0.03) == []
-    assert only(world({}, TRAINING)).hindsight_control(0.03) is None
+    assert only(world({}, TRAINING)).named(HINDSIGHT, 0.03) is None
+    # Without training nobody is chosen, and nobody leads.
+    assert only(world(TELLING, {})).answers(0.03) == (False, False, True)
 
 
 def test_a_control_that_lacks_a_bad_seed_does_not_win_by_that():
@@ -72,7 +71,7 @@ def test_a_control_that_lacks_a_bad_seed_does_not_win_by_that():
 
 def test_collisions_count_where_the_full_scan_avoids_them():
     """The full scan hits somebody on the last of six seeds, `rows` on the last four."""
-    lead = only(world(TELLING, TRAINING)).camera_lead(0.03)
+    lead = camera_lead(world(TELLING, TRAINING))
     assert lead.avoided.mean == pytest.approx(100 * 3 / 5)
     assert lead.avoided.difference.pairs == 5
     assert lead.detection.mean == pytest.approx(5.0)
@@ -81,9 +80,8 @@ def test_collisions_count_where_the_full_scan_avoids_them():
 
 def test_a_lead_in_one_measure_is_none_where_the_other_counts_against_it():
     test = {"full": (16.0, 0), "care": (15.0, 0), "rows": (10.0, 0)}
-    assert only(world(test, TRAINING)).camera_lead(0.03).leads
-    worse = test | {"care": (15.0, 6)}
-    lead = only(world(worse, TRAINING)).camera_lead(0.03)
+    assert camera_lead(world(test, TRAINING)).leads
+    lead = camera_lead(world(test | {"care": (15.0, 6)}, TRAINING))
     assert lead.is_told
     assert not lead.leads
 
@@ -91,7 +89,7 @@ def test_a_lead_in_one_measure_is_none_where_the_other_counts_against_it():
 @pytest.mark.parametrize(("distance", "leads"), [(12.4, False), (12.5, True)])
 def test_the_gate_is_two_and_a_half_metres(distance, leads):
     test = {"full": (16.0, 0), "care": (distance, 0), "rows": (10.0, 0)}
-    assert only(world(test, TRAINING)).camera_lead(0.03).leads is leads
+    assert camera_lead(world(test, TRAINING)).leads is leads
 
 
 @pytest.mark.parametrize(("hits", "leads"), [(1, False), (2, False), (5, True)])
@@ -103,61 +101,70 @@ def test_collisions_need_an_interval_without_zero(hits, leads):
         *cell("care", [10.0] * 20),
         *cell("rows", [10.0] * 20, hits),
     ]
-    assert only(rows).camera_lead(0.03).leads is leads
-
-
-def test_a_saturated_world_does_not_discriminate_and_the_reasons_are_named():
-    assert only(world(SATURATED, TRAINING)).verdict == (
-        "dartout: does not discriminate, because at 3% care does not lead rows, a full scan leaves "
-        "nothing to win, care and all-camera are not told apart."
-    )
-
-
-def test_a_world_that_tells_all_apart_discriminates_at_its_budgets():
-    saturated = {policy: level for policy, level in SATURATED.items() if policy != "full"}
-    telling = only(
-        [
-            *world(TELLING, TRAINING, parameters=MIRRORED),
-            *world(saturated, TRAINING, parameters=MIRRORED, budget=0.1),
-        ]
-    )
-    assert telling.failings(0.03) == []
-    assert len(telling.failings(0.1)) == 3
-    assert telling.verdict == "dartout, mirrored drawn: discriminates at 3%."
+    assert camera_lead(rows).leads is leads
 
 
 @pytest.mark.parametrize(
-    ("changed", "reason"),
+    ("changed", "answers"),
     [
-        ({"rows": (13.0, 1)}, "care does not lead rows"),
-        ({"full": (10.0, 4)}, "a full scan leaves nothing to win"),
-        ({"all-camera": (15.0, 1)}, "care and all-camera are not told apart"),
-        ({"all-camera": (5.0, 6)}, "all-camera and history are not told apart"),
+        ({}, (True, True, True)),
+        ({"rows": (13.0, 1)}, (False, True, True)),
+        ({"full": (10.0, 4)}, (True, False, True)),
+        ({"all-camera": (15.0, 1)}, (True, True, False)),
+        ({"all-camera": (5.0, 6)}, (True, True, False)),
+        # Two are apart whichever of them is ahead.
+        ({"full": (19.0, 1), "history": (18.5, 1)}, (True, True, True)),
     ],
 )
-def test_each_question_can_fail_alone(changed, reason):
-    """Whoever becomes as good or bad as another is named, and nobody else."""
-    assert only(world(TELLING | changed, TRAINING)).failings(0.03) == [reason]
+def test_each_question_can_fail_alone(changed, answers):
+    played = only(world(TELLING | changed, TRAINING))
+    assert played.answers(0.03) == answers
+    assert played.discriminates_at == ([0.03] if all(answers) else [])
 
 
-@pytest.mark.parametrize(("seeds", "verdict"), [(4, "no verdict"), (5, "discriminates at 3%")])
-def test_there_is_no_verdict_below_five_test_seeds(seeds, verdict):
+def tables():
+    return {table.title: table for table in validation_tables(STUDY)}
+
+
+def test_a_line_per_budget_says_who_was_chosen_and_answers_the_questions():
+    verdicts = tables()["Does the world discriminate?"]
+    assert verdicts.rows == (
+        ("dartout",),
+        ("3%", "care", "rows", "fan", "no", "+0.0", "+0", "no", "no", "no"),
+        ("dartout, mirrored drawn",),
+        ("3%", "care", "rows", "fan", "yes", "+5.0*", "+60*", "yes", "yes", "yes"),
+    )
+    assert isinstance(verdicts.rows[3][-1], Bold)
+    # CARE hits on 1 seed of 6, `fan` too, `rows` on 4.
+    hits = ("1/6", "1/6", "1/6", "4/6", "1/6", "3/6", "1/6", "6/6", "6/6", "1/6")
+    assert tables()["Who is hit?"].rows[3] == ("3%", *hits, "")
+
+
+def test_the_full_scan_loses_what_it_never_detects_and_is_run_into():
+    rows = [*world({}, TRAINING), *cell("full", [16.0, None, 16.0, 16.0, 16.0], 1)]
+    rows += cell("care", [9.0] * 5)
+    assert validation_tables(rows)[1].rows[1][1:3] == ("2/5", "1/5")
+    who = {"hit_kind": "van", "hit_at_front": False, "closing_speed_mps": 6.25}
+    hit = [r | who if r["policy"] == "full" and r["collision"] else r for r in rows]
+    assert validation_tables(hit)[1].rows[1][-1] == "1/5 van up to 6.2 m/s"
+
+
+def test_the_closing_names_the_seeds_and_the_worlds_that_discriminate():
+    seeds = "6 test seeds from 0 to 5 and 6 training seeds from 10000 to 10005"
+    assert validation_closing(STUDY) == [
+        f"Played: {seeds}.",
+        "Worlds that discriminate: 1 of 2: dartout, mirrored drawn at 3%.",
+    ]
+    saturated = {policy: level for policy, level in SATURATED.items() if policy != "full"}
+    both = [
+        *world(TELLING, TRAINING, parameters=MIRRORED),
+        *world(saturated, TRAINING, parameters=MIRRORED, budget=0.1),
+    ]
+    assert validation_closing(both)[1].endswith("1 of 1: dartout, mirrored drawn at 3%.")
+
+
+@pytest.mark.parametrize(("seeds", "answer"), [(4, "too few"), (5, "yes")])
+def test_there_is_no_verdict_below_five_test_seeds(seeds, answer):
     rows = [each for each in world(TELLING, TRAINING) if not seeds <= each["seed"] < SEEDS]
-    assert only(rows).verdict.startswith(f"dartout: {verdict}")
-
-
-def test_two_are_apart_whichever_of_them_is_ahead():
-    test = TELLING | {"full": (19.0, 1), "history": (18.5, 1)}
-    assert only(world(test, TRAINING)).failings(0.03) == []
-
-
-def test_without_training_nobody_is_chosen():
-    assert only(world(TELLING, {})).failings(0.03) == ["nobody was chosen on training seeds"]
-
-
-@settings(max_examples=15, deadline=None)
-@given(st.permutations(range(len(STUDY))))
-def test_the_sequence_of_rows_within_a_world_decides_nothing(order):
-    shuffled = [STUDY[n] for n in order]
-    by_name = {played.setting.label: played.verdict for played in played_worlds(shuffled)}
-    assert by_name == {played.setting.label: played.verdict for played in played_worlds(STUDY)}
+    assert validation_tables(rows)[0].rows[1][-1] == answer
+    assert ("too few" in validation_closing(rows)[0]) == (seeds < 5)

@@ -7,22 +7,16 @@ import pytest
 from care_sim.evaluation.censoring import Bound
 from care_sim.reports.contrasts import AVOIDED, DETECTION, contrast, contrast_of_cases
 from care_sim.reports.figures.faults import VEHICLE_FIGURE, vehicle_figures
-from care_sim.reports.studies import STUDIES
-from care_sim.reports.vehicle.evidence_tables import compensation_table, evidence_table
-from care_sim.reports.vehicle.fallback_tables import cost_tables, fallback_table
-from care_sim.reports.vehicle.pose_tables import forecast_table, guard_table, pose_tables
-from care_sim.reports.vehicle.rows import VehicleRows, outcome
+from care_sim.reports.vehicle.rows import outcome
+from care_sim.reports.vehicle.tables import vehicle_tables
 from care_sim.study.designs.vehicle import (
     BLACKOUTS,
     DENSE,
     DRIVES,
     EVIDENCE_LEVELS,
-    POSE_LEVELS,
     TURNS,
     vehicle_study,
 )
-from care_sim.study.results_formats import VEHICLE
-from care_sim.study.rows.parquet import read_rows, write_rows
 from tests.helpers.made_rows import vehicle_row
 
 SEEDS = range(5)
@@ -78,9 +72,19 @@ def rows():
     ]
 
 
+NAMES = (
+    "evidence", "compensation", "fallback", "cost", "cost in the dart-out", "cost in drives",
+    "forecasts", "pose in drives", "pose", "guard",
+)  # fmt: skip
+
+
 @pytest.fixture(scope="module")
-def study(rows):
-    return VehicleRows(rows)
+def tables(rows):
+    return named(rows)
+
+
+def named(rows):
+    return dict(zip(NAMES, vehicle_tables(rows), strict=True))
 
 
 def block(table, group):
@@ -94,15 +98,15 @@ def block(table, group):
     return lines
 
 
-def test_ages_are_those_of_all_keyframes_and_shares_those_of_all_boxes(study):
-    lines = block(evidence_table(study), TURNS.name)
+def test_ages_are_those_of_all_keyframes_and_shares_those_of_all_boxes(tables):
+    lines = block(tables["evidence"], TURNS.name)
     # 19 of 20 pictures are 0.42 s old, one is 1 s old.
     assert lines["0.42 s late"] == ("0.45", "0.45", "25.0%", "90.0%", "50.0%")
     assert lines["newest picture"] == ("0.05", "0.05", "0.0%", "", "")
 
 
-def test_compensation_is_paired_by_case_and_seed_and_resampled_by_case(study):
-    lines = block(compensation_table(study), TURNS.name)
+def test_compensation_is_paired_by_case_and_seed_and_resampled_by_case(tables):
+    lines = block(tables["compensation"], TURNS.name)
     worlds = len(TURNS.places) * len(SEEDS)
     care, without, *others, metres, points = lines["0.42 s late"]
     assert (care, without) == (f"16.0, 0/{worlds}", f"16.0, {3 * len(SEEDS)}/{worlds}")
@@ -142,8 +146,8 @@ def test_a_median_of_some_episodes_tells_of_how_many():
     assert outcome([nobody]) == "- (0), 0/1"
 
 
-def test_a_camera_that_is_away_leaves_one_policy(study):
-    table = fallback_table(study)
+def test_a_camera_that_is_away_leaves_one_policy(tables):
+    table = tables["fallback"]
     lines = {line[0]: line[1:] for line in table.rows}
     times = BLACKOUTS[DENSE][1].label
     alike = ("50 of 50", "10 of 10", "2 [2, 2] (5)", "30 [30, 30] (5)")
@@ -153,56 +157,36 @@ def test_a_camera_that_is_away_leaves_one_policy(study):
     assert lines["(paper)"] == ("", "37 of 37", "1 to 5", "117 to 123", "")
 
 
-def test_the_cost_is_the_camera_on_less_the_camera_away(study):
-    table = cost_tables(study)[0]
+def test_the_cost_is_the_camera_on_less_the_camera_away(tables):
+    table = tables["cost"]
     assert table.title.startswith(DENSE.name)
     (care, *_) = table.rows
     assert care == ("care", "16.0, 0/5", "12.0, 0/5", "12.0, 0/5", "+4.0* [4.0,4.0]", "+0 [0,0]")
 
 
-def test_forecasts_and_what_is_released_are_means(study):
-    lines = block(forecast_table(study), DRIVES.name)
+def test_forecasts_and_what_is_released_are_means(tables):
+    lines = block(tables["forecasts"], DRIVES.name)
     told = ("50.0%", "75.0%", "10.0", "1.0", "50%", "30.0%")
     assert lines["exact pose"] == ("0.00", "0.00", *told)
     assert lines["0.4 m, anew"] == ("1.00", "2.00", *told)
-    assert block(forecast_table(study), DENSE.name)["exact pose"][-2:] == ("", "")
+    assert block(tables["forecasts"], DENSE.name)["exact pose"][-2:] == ("", "")
 
 
-def test_every_policy_and_rule_has_a_line_under_an_error_of_the_pose(study):
-    table = pose_tables(study)[1]
-    names = [line[0] for line in table.rows]
-    assert names == ["care", "history", "care-sbf, sigma_pos 0", "care-sbf, sigma_pos 0.4 m"]
-    assert all(len(line) == 1 + len(POSE_LEVELS) and all(line) for line in table.rows)
-
-
-def test_the_guard_is_told_beside_the_papers(study, rows):
-    (here, paper) = guard_table(study).rows
+def test_the_guard_is_told_beside_the_papers(tables, rows):
+    (here, paper) = tables["guard"].rows
     assert here == ("here", f"{3 * len(rows):,}", "4.00 to 4.00")
     assert paper == ("(paper)", "570", "4.00")
     off = [*rows, rows[0] | {"standing_guard_most_m": 4.2}]
-    assert guard_table(VehicleRows(off)).rows[0][2] == "4.00 to 4.20"
-
-
-def test_a_file_changes_nothing_in_the_tables(rows, tmp_path):
-    write_rows(rows, tmp_path / VEHICLE.file, "vehicle", schema=VEHICLE.schema)
-    read = read_rows(tmp_path / VEHICLE.file, STUDIES["vehicle"].schema)
-    assert STUDIES["vehicle"].tables(read) == STUDIES["vehicle"].tables(rows)
+    assert named(off)["guard"].rows[0][2] == "4.00 to 4.20"
 
 
 def test_without_a_forecast_or_a_picture_there_is_no_number():
-    bare = VehicleRows([vehicle_row(config, 9.0) for config in vehicle_study([0])])
-    assert block(evidence_table(bare), TURNS.name)["0.42 s late"] == ("", "", "", "", "")
-    lines = block(forecast_table(bare), DENSE.name)
+    bare = named([vehicle_row(config, 9.0) for config in vehicle_study([0])])
+    assert block(bare["evidence"], TURNS.name)["0.42 s late"] == ("", "", "", "", "")
+    lines = block(bare["forecasts"], DENSE.name)
     assert lines["exact pose"] == ("", "", "", "", "0.0", "0.0", "", "")
-    assert len(fallback_table(bare).rows) == 1
-    assert guard_table(bare).rows[0] == ("here", "0", "")
-
-
-def test_a_part_of_the_study_has_its_tables_and_its_figure(rows):
-    few = [row for row in rows if row["scenario"] == "dense" and row["policy"] == "history"]
-    assert all(table.title for table in STUDIES["vehicle"].tables(few))
-    (figure,) = vehicle_figures(few).values()
-    assert figure.axes
+    assert len(bare["fallback"].rows) == 1
+    assert bare["guard"].rows[0] == ("here", "0", "")
 
 
 def test_the_figure_shows_every_late_level(rows):

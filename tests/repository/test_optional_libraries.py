@@ -24,6 +24,7 @@ MODULE_OF = {
     "open3d_cpu": "open3d",
     "pillow": "PIL",
     "rerun_sdk": "rerun",
+    "markdown_it_py": "markdown_it",
 }
 """Where a distribution's module has another name."""
 BESIDE = {"dask": {"distributed"}, "jinja2": {"markupsafe"}, "torchrl": {"tensordict"}}

@@ -8,7 +8,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.commands.shared.command_line import command_line
 from care_sim.commands.shared.run_study import run_study
 from care_sim.commands.sweep import Sweep
-from care_sim.reports.report import read_results, where_it_lies
+from care_sim.reports.report import next_steps, read_results
 from care_sim.reports.studies import SWEEP
 from care_sim.study.episode_config import grid
 from care_sim.study.journal import JOURNAL, Journal
@@ -58,7 +58,7 @@ def test_rows_of_other_options_do_not_count(tmp_path, monkeypatch):
     assert "2 of 3 episodes are played; to go on: again" in how_far(tmp_path)
     # Results of before are shown, with a line that not all is there.
     assert len(read_results(tmp_path)[0]) == 1
-    (line,) = (one for one in where_it_lies(tmp_path, SWEEP) if one.startswith("Not all of it"))
+    (line,) = (one for one in next_steps(tmp_path, SWEEP) if one.startswith("Not all of it"))
     assert "2 of 3" in line
 
 

@@ -12,7 +12,7 @@ from care_sim.base.errors import print_lines, report_problems
 from care_sim.commands.shared.command_line import command_line
 from care_sim.commands.shared.default_folder import free_folder
 from care_sim.commands.shared.run_study import run_study, summary
-from care_sim.reports.report import print_report, read_results, where_it_lies
+from care_sim.reports.report import next_steps, print_report, read_results
 from care_sim.reports.studies import STUDIES
 from care_sim.study import executors
 from care_sim.study.executors import MOST_WORKERS, WORKERS
@@ -44,6 +44,9 @@ class StudyCommand:
     now: its tables, figures and Parquet files are replaced at the end; its journal stays. Episodes
     never replace the plays of a protocol, nor plays episodes: their files have other names."""
 
+    verbose: bool = False
+    """Print all tables."""
+
     def __post_init__(self) -> None:
         check_fields(self)
 
@@ -68,8 +71,8 @@ class StudyCommand:
         # What is printed is read back from the folder, as `care-sim report` would print it.
         if len(failures) < len(configs):
             rows, _, missing = read_results(out)
-            print_report(rows, console(), STUDIES[study], missing, out)
-            print_lines(*where_it_lies(out, STUDIES[study], rows))
+            print_report(rows, console(), STUDIES[study], missing, verbose=self.verbose)
+            print_lines(*next_steps(out, STUDIES[study], rows))
         report_problems(
             [
                 *(f"failed: {line}" for line in summary(failures, STUDIES[study].results.unit)),

@@ -82,19 +82,8 @@ class MechanismRows:
 
     def reserve_use(self) -> ReserveUse:
         """Sums over the keyframes of the shared belief."""
-        return sum(
-            (
-                ReserveUse(
-                    row["keyframes"],
-                    row["filled"],
-                    row["filled_rho"],
-                    row["explained_cells"],
-                    row["untaken_cells"],
-                )
-                for row in self._of(self.driver)
-            ),
-            ReserveUse(),
-        )
+        names = ("keyframes", "filled", "filled_rho", "explained_cells", "untaken_cells")
+        return ReserveUse(*self._sums(self.driver, names))
 
     def entries(self) -> NewEntries:
         """The events of the shared belief, of the scenes that the full scan has too."""
@@ -108,26 +97,16 @@ class MechanismRows:
 
     def difference(self, policy: str) -> AllocationDifference:
         """How often the policy would fire otherwise than the driver on its belief."""
-        return sum(
-            (
-                AllocationDifference(
-                    row["keyframes"], row["differing_keyframes"], row["differing_cells"]
-                )
-                for row in self._of(policy)
-            ),
-            AllocationDifference(),
-        )
+        names = ("keyframes", "differing_keyframes", "differing_cells")
+        return AllocationDifference(*self._sums(policy, names))
 
     def received(self, policy: str) -> tuple[Integers, Mask]:
         """(e,) cells that the policy would fire at each event of the shared belief, and whether it
         appears inside coverage; of the scenes that driver and policy have.
         """
-        pairs = [
-            (row["received"], driving["covered"])
-            for row, driving in self._pairs(policy, self.driver)
-        ]
-        cells = [cell for received, _ in pairs for cell in received]
-        covered = [mark for _, marks in pairs for mark in marks]
+        pairs = [*self._pairs(policy, self.driver)]
+        cells = [cell for row, _ in pairs for cell in row["received"]]
+        covered = [mark for _, driving in pairs for mark in driving["covered"]]
         return np.array(cells, np.int64), np.array(covered, bool)
 
     def order(self, first: str, second: str) -> DetectionOrder:
@@ -162,6 +141,9 @@ class MechanismRows:
                 if reason and delay == 0:
                     counts[reason] += 1
         return counts
+
+    def _sums(self, policy: str, names: Sequence[str]) -> list[int]:
+        return [sum(row[name] for row in self._of(policy)) for name in names]
 
     def _of(self, policy: str) -> Iterator[Row]:
         return (self._rows[policy, scene] for scene in self.scenes if (policy, scene) in self._rows)

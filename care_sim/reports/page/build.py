@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from markdown_it import MarkdownIt
 from markupsafe import Markup
 
 import care_sim
@@ -18,7 +19,6 @@ from care_sim.base.errors import InvalidInput, counted, printable_lines
 from care_sim.base.files import HTML, replacing
 from care_sim.evaluation.recall import CENSORED_AT
 from care_sim.evaluation.sightings import RANGE_M
-from care_sim.reports.captions import caption
 from care_sim.reports.figures.files import default_style, svg_text
 from care_sim.reports.page.episodes import Episode, episodes_to_watch, played_again
 from care_sim.reports.page.listing import episode_groups, replay_data
@@ -44,8 +44,6 @@ class Findings:
     drawings: Mapping[str, str]
     """The SVG of every figure by name."""
     tables: Sequence[Table]
-    reading: str
-    """How to read the tables."""
     closing: Sequence[str]
 
     @classmethod
@@ -55,7 +53,7 @@ class Findings:
             figures = study.figures(rows)
         drawings = {name: svg_text(figure, name) for name, figure in figures.items()}
         tables = [table.without_empty_columns() for table in study.tables(rows)]
-        return cls(drawings, tables, caption(study.caption, tables), study.closing(rows))
+        return cls(drawings, tables, study.closing(rows))
 
 
 @dataclass(frozen=True)
@@ -83,7 +81,7 @@ class Page:
                 version=care_sim.__version__,
                 drawings={name: _inline(svg) for name, svg in self.findings.drawings.items()},
                 tables=[(table, blocks(table), least_ems(table)) for table in self.findings.tables],
-                reading=self.findings.reading,
+                reading=Markup(MarkdownIt().enable("table").render(_asset("reading.md"))),
                 closing=self.findings.closing,
                 groups=episode_groups(self.rows, self.episodes) if self.listed else [],
                 replays=_embedded(replay_data(self.episodes)),

@@ -2,7 +2,7 @@
 grows.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from care_sim.base.errors import percent
 from care_sim.reports.cells import StudyCells
@@ -64,73 +64,52 @@ class Crowd:
 
 
 def crowding_tables(rows: Sequence[Row]) -> list[Table]:
-    """Tables of how much less all-camera, and every further policy, has than CARE, by standing
-    vehicles and budget: differences, intervals, and the medians behind them.
+    """How much less all-camera, and every further policy, has than CARE, by standing vehicles and
+    budget: differences, intervals, and the medians behind them.
     """
     crowd = Crowd(rows)
-    gaps = [
-        _gaps_table(crowd, other, intervals)
-        for other in crowd.others
-        for intervals in (False, True)
-    ]
-    return [*gaps, _medians_table(crowd)]
-
-
-def _gaps_table(crowd: Crowd, other: str, intervals: bool) -> Table:
-    entry, more = (interval, ", with intervals") if intervals else (mean, "")
-    lines = [
-        (str(n), *(entry(crowd.gap(n, budget, other)) for budget in crowd.budgets))
-        for n in crowd.counts
-    ]
-    title = f"{_TITLE}first detection of {crowd.study.marked(other)} minus care, m{more}"
-    notes = (
-        (_collapse_note(crowd),)
-        # The note on collapses belongs to the one table that shows them.
-        if other == "all-camera" and not intervals
-        else crowd.study.notes([other])
-    )
-    return Table(
-        title,
-        ("vehicles", *map(percent, crowd.budgets)),
-        tuple(lines),
-        notes,
-        terminal=not intervals,
-    )
-
-
-def _medians_table(crowd: Crowd) -> Table:
+    made: list[Table] = []
+    for other in crowd.others:
+        title = f"first detection of {crowd.study.marked(other)} minus care, m"
+        gaps = {n: [crowd.gap(n, budget, other) for budget in crowd.budgets] for n in crowd.counts}
+        means = {n: map(mean, own) for n, own in gaps.items()}
+        intervals = {n: map(interval, own) for n, own in gaps.items()}
+        collapses = _collapses(crowd) if other == "all-camera" else ""
+        made.append(_table(crowd, title, means, (collapses,)))
+        made.append(_table(crowd, f"{title}, with intervals", intervals, terminal=False))
     policies = ["care", *crowd.others]
-    lines = [
-        (
-            str(n),
-            *(_medians(crowd, n, policies, budget) for budget in crowd.budgets),
+    medians = {
+        n: (
+            # Several medians share an entry, which has no room for words.
+            *(
+                "/".join(crowd.median(n, p, budget) for p in policies).replace(
+                    "not detected", "n.d."
+                )
+                for budget in crowd.budgets
+            ),
             crowd.median(n, "full", 1.0),
         )
         for n in crowd.counts
-    ]
-    title = f"{_TITLE}median first detection, {'/'.join(map(crowd.study.marked, policies))}, m"
-    columns = ("vehicles", *map(percent, crowd.budgets), "full")
-    return Table(
-        title,
-        columns,
-        tuple(lines),
-        ("n.d.: not detected.", *crowd.study.notes(policies)),
-        terminal=False,
-    )
+    }
+    title = f"median first detection, {'/'.join(map(crowd.study.marked, policies))}, m"
+    return [*made, _table(crowd, title, medians, crowd.study.notes(policies), ("full",), False)]
 
 
-def _medians(crowd: Crowd, vehicles: int, policies: Sequence[str], budget: float) -> str:
-    medians = (crowd.median(vehicles, policy, budget) for policy in policies)
-    # Several medians share an entry, which has no room for words.
-    return "/".join(medians).replace("not detected", "n.d.")
+def _table(
+    crowd: Crowd,
+    title: str,
+    entries: Mapping[int, Iterable[str]],
+    notes: tuple[str, ...] = (),
+    further: tuple[str, ...] = (),
+    terminal: bool = True,
+) -> Table:
+    """Vehicles by budgets, and `further` columns."""
+    lines = tuple((str(n), *own) for n, own in entries.items())
+    columns = ("vehicles", *map(percent, crowd.budgets), *further)
+    return Table(f"{_TITLE}{title}", columns, lines, notes, terminal=terminal)
 
 
-def _collapse_note(crowd: Crowd) -> str:
-    found = [(percent(budget), crowd.collapsed(budget)) for budget in crowd.budgets]
-    listed = "; ".join(
-        f"{budget}: {', '.join(map(str, counts)) or 'none'}" for budget, counts in found
-    )
-    return (
-        f"All-camera has collapsed (at least {COLLAPSE_M:.0f} m later than care on average, "
-        f"interval without zero), by budget, at these numbers of vehicles: {listed}."
-    )
+def _collapses(crowd: Crowd) -> str:
+    found = ((budget, crowd.collapsed(budget)) for budget in crowd.budgets)
+    listed = "; ".join(f"{percent(b)}: {', '.join(map(str, n))}" for b, n in found if n)
+    return f"All-camera at least {COLLAPSE_M:.0f} m later, interval without 0: {listed or 'never'}."

@@ -94,6 +94,12 @@ def test_the_shared_belief_beside_the_paper():
     ]
 
 
+def test_an_entry_that_the_full_scan_misses_too_is_none_that_a_reserve_would_win():
+    rows = [each | {"ttfds": (0, 0, 6)} if each is ROWS[2] else each for each in ROWS]
+    belief = tables(rows)["on the belief of care"].rows
+    assert [line[1] for line in belief[-2:]] == ["100.0% of 1", "0"]
+
+
 def test_allocations_on_it():
     assert tables()["allocations on the belief of care"].rows == (
         ("care", "", "", "", "40 [0, 50] (5)", "7 [7, 7] (1)"),
@@ -145,11 +151,6 @@ def test_the_reasons_add_up_to_the_misses(events):
     study = MechanismRows(rows)
     missed = sum(late > 0 and found == 0 for late, found in zip(delays, full, strict=True))
     assert sum(study.misses("mine").values()) == missed <= study.found_by_full("mine")
-
-
-def test_a_scene_without_its_full_scan_counts_for_no_reason():
-    (line, _) = tables(ROWS[:2])["why first sightings were missed that the full scan finds"].rows
-    assert line[1:3] == ("0", "0")
 
 
 def test_the_rows_survive_their_file(tmp_path):

@@ -36,7 +36,7 @@ def test_recall_and_its_share_of_the_full_scans_by_entry():
         "beyond, 36 events",
     ]
     assert table.rows[6] == ("history-oracle †", *["14.3 (33 [33,33])"] * 3)
-    assert table.notes[0].startswith("Levels in %; in brackets: of full. Of full: recall in % of")
+    assert table.notes[0].startswith("Levels in %; in brackets: of full.")
     assert ENTRY_NOTE in table.notes
     assert any(note.startswith("†") for note in table.notes)
 

@@ -61,11 +61,11 @@ def test_the_papers_statements_are_judged_under_every_order():
 
 
 def test_the_closing_counts_verdicts_that_both_numberings_share():
-    sentence = order_closing(ROWS)[-1]
-    assert sentence.startswith("Of the paper's 4 statements, 0 have the same verdict")
-    assert f"{CLAIM} (met, then undecided)" in sentence
+    assert order_closing(ROWS)[-1] == (
+        "The paper: 0 of 4 statements have the same verdict under rows-down and rows-up."
+    )
     alike = [*study(DOWN, cell_order="rows-down"), *study(DOWN, cell_order="rows-up"), *UNORDERED]
-    assert order_closing(alike)[-1].startswith("Of the paper's 12 statements, 12 have the same")
+    assert order_closing(alike)[-1].startswith("The paper: 12 of 12 statements have the same")
 
 
 def test_budgets_of_which_the_paper_says_nothing_have_no_statements():

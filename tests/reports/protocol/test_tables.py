@@ -6,7 +6,7 @@ from rich.console import Console
 
 from care_sim.evaluation.bootstrap import Interval
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL
-from care_sim.reports.protocol.closing import protocol_closing
+from care_sim.reports.findings import gate_tables
 from care_sim.reports.protocol.differences import MeasuredDifference
 from care_sim.reports.protocol.formatting import claims_of_paper, judged, verdict
 from care_sim.reports.protocol.paper import (
@@ -199,7 +199,7 @@ def test_a_scene_without_a_play_is_out_of_that_policys_contrasts_and_counted():
         if (row["scene"], row["policy"], row["budget"]) != ("scene 001", "mine", 0.2)
     ]
     shown = tables(lacking)
-    note = "Left out where a play is missing, of 6 scenes: mine 1 at 20%."
+    note = "Scenes without a play, left out: mine 1 at 20%."
     assert note in shown["care minus each policy"].notes
     assert note in shown["levels"].notes
     lines = {(line[0], line[1]): line[-1] for line in shown["levels"].rows}
@@ -219,9 +219,8 @@ def test_statements_are_judged_at_the_papers_budgets():
     overall = {line[0]: line for line in block(table, "Overall recall")}
     assert overall["care minus history"][5:] == ("-10.0 not met (+0.6)", "[-10.0,-10.0]")
     assert overall["care minus all-camera"][1] == "+0.0 undecided (-0.13)"
-    assert table.notes[0] == "Of 27, each budget counted: 20 met, 1 not met, 6 undecided."
-    assert any(
-        "not played: uncertainty, beam-reduce, learned-scorer" in note for note in table.notes
+    assert table.notes[0].endswith(
+        "27 verdicts, the paper's difference in brackets: 20 met, 1 not met, 6 undecided."
     )
     assert "the paper's statements" not in tables(study(FOUND, budgets=(0.05,)))
     assert "the paper's statements" not in tables(study(FOUND, reserve_fraction=0.5))
@@ -418,26 +417,16 @@ def test_one_policy_without_care_has_levels_and_strata():
     assert list(tables(study({"full": (8, 8)}))) == ["levels"]
 
 
-def test_the_closing_counts_and_holds_the_gain_against_the_papers_gate():
-    size, gate = protocol_closing(ROWS)
-    assert size == (
-        "Scenes: 6, with 120 first sightings and 1,200 object frames in 240 keyframes; plays: 276."
-    )
-    assert gate.endswith(
-        "Here, generated streets, detector returns: +10.0 [10.0,10.0] at 10% (met), +10.0 "
-        "[10.0,10.0] at 20% (met), +10.0 [10.0,10.0] at 35% (met)."
-    )
-    small = protocol_closing(study({"care": (5, 5), "history": (4, 5)}, events=25, budgets=(0.1,)))
-    assert small[1].endswith("+4.0 [4.0,4.0] at 10% (not met).")
-    assert len(protocol_closing(study({"care": (5, 5)}))) == 1
-
-
-def test_the_gate_is_held_to_the_papers_budgets():
-    both = {"care": (6, 5), "history": (4, 6)}
-    assert protocol_closing(study(both, budgets=(0.05, 0.1)))[1].endswith(
-        "returns: +10.0 [10.0,10.0] at 10% (met)."
-    )
-    assert len(protocol_closing(study(both, budgets=(0.05,)))) == 1
+def test_the_gain_is_held_against_the_papers_gate_at_the_papers_budgets():
+    (gate,) = gate_tables(ROWS)
+    assert [line[1:] for line in gate.rows] == [
+        (budget, "first sightings, points", "care", "history", "+10.0", "[10.0,10.0]", "yes")
+        for budget in ("10%", "20%", "35%")
+    ]
+    (small,) = gate_tables(study({"care": (5, 5), "history": (4, 5)}, events=25, budgets=(0.1,)))
+    assert small.rows[0][-3:] == ("+4.0", "[4.0,4.0]", "no")
+    assert gate_tables(study({"care": (5, 5)})) == []
+    assert gate_tables(study({"care": (6, 5), "history": (4, 6)}, budgets=(0.05,))) == []
 
 
 def test_a_file_changes_nothing_in_the_tables(tmp_path):
@@ -451,15 +440,15 @@ def test_a_file_changes_nothing_in_the_tables(tmp_path):
 def test_the_study_is_shown_in_three_forms(tmp_path, capsys):
     protocol = STUDIES["protocol"]
     write_report(ROWS, tmp_path, protocol)
-    print_report(ROWS, Console(width=100), protocol)
+    print_report(ROWS, Console(width=100), protocol, verbose=True)
     printed, markdown, latex = (
         capsys.readouterr().out,
         *((tmp_path / name).read_text() for name in ("tables.md", "tables.tex")),
     )
-    assert all("First-sighting recall: share of" in text for text in (printed, markdown, latex))
-    assert "by stratum" not in printed
-    assert all(f"## {table.title}\n" in markdown for table in protocol_tables(ROWS))
-    assert latex.count(r"\begin{table}") == len(protocol_tables(ROWS))
+    tables = protocol.tables(ROWS)
+    assert all(table.title in printed for table in tables)
+    assert all(f"## {table.title}\n" in markdown for table in tables)
+    assert latex.count(r"\begin{table}") == len(tables)
     assert max(map(len, printed.splitlines())) <= 100
 
 

@@ -12,7 +12,7 @@ def test_the_tables_give_difference_interval_and_medians():
     assert intervals.rows[2] == ("9", "-7.0* [-7.0,-7.0]")
     assert medians.rows[2] == ("9", "15.0/8.0", "15.0")
     assert medians.rows[3] == ("12", "15.0/n.d.", "15.0")
-    assert gaps.notes[0].endswith("3%: 9, 12.")
+    assert gaps.notes[0].endswith("interval without 0: 3%: 9, 12.")
 
 
 def test_a_collapse_needs_three_metres_and_an_interval_without_zero():

@@ -3,7 +3,8 @@
 import pytest
 
 from care_sim.reports.closings import paper_closing
-from care_sim.reports.tables.paper_statements import statements
+from care_sim.reports.table import Bold
+from care_sim.reports.tables.paper_statements import statement_tables, statements
 from care_sim.study.designs.paper import paper_study
 from tests.helpers.made_rows import as_in_the_paper
 
@@ -30,10 +31,13 @@ def changed(where, **values):
     return [row | values if where.items() <= row.items() else row for row in STUDY]
 
 
-def test_it_is_said_that_what_stands_beside_the_paper_are_medians():
-    told = paper_closing(STUDY)
-    assert "distances as medians in metres" in told[-13]
-    assert not any("medians" in line for line in paper_closing(STUDY[:10]))
+def test_the_closing_counts_what_holds_and_names_what_does_not():
+    assert "The paper: 12 of 12 statements hold." in paper_closing(STUDY)
+    late = changed(DARTOUT | {"policy": "history"}, braked=True)
+    told = "The paper: 11 of 12 statements hold. Not: dart-out 10%: history brakes in 3 of 5"
+    assert any(line.startswith(told) for line in paper_closing(late))
+    assert not any("paper" in line for line in paper_closing(STUDY[:10]))
+    assert statement_tables(STUDY[:10]) == []
 
 
 def test_the_papers_own_figures_agree_with_every_statement():
@@ -83,18 +87,17 @@ def test_each_statement_can_differ(where, values, text):
 
 
 def test_both_sides_are_shown():
-    texts = [str(statement) for statement in statements(STUDY)]
-    assert (
-        "agrees: dense 3%: all-camera detects at least 3 m later than care. Paper: 10.3 against "
-        "15.1. " in texts[6]
-    )
-    assert texts[6].endswith("Here: 10.3 against 15.1.")
+    (table,) = statement_tables(STUDY)
+    late = "dense 3%: all-camera detects at least 3 m later than care"
+    assert table.rows[6] == (late, "10.3 against 15.1", "10.3 against 15.1", "agrees")
+    (differs,) = statement_tables(changed(DARTOUT | {"policy": "history"}, braked=True))
+    assert isinstance(differs.rows[3][3], Bold)
 
 
 def test_an_undetected_median_ranks_last_and_is_said():
     missed = changed(DARTOUT | {"policy": "history"}, **MISSED)
     assert differing(missed) == []
-    assert "Here: not detected against 15.1." in str(statements(missed)[2])
+    assert statements(missed)[2].measured == "not detected against 15.1"
 
 
 def test_a_part_of_the_study_makes_no_statement():

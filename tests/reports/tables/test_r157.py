@@ -2,7 +2,6 @@ import numpy as np
 
 from care_sim.reports.collisions import CollisionRows
 from care_sim.reports.figures.standards import r157_figures
-from care_sim.reports.table import Bold
 from care_sim.reports.tables.r157 import cut_in_rows, r157_tables
 from tests.helpers.drawn import ticks
 from tests.helpers.made_rows import CUT_INS, cut_ins
@@ -21,14 +20,6 @@ def test_outcomes_of_every_policy_with_differences_of_pairs():
     assert stride[2:6] == ("50.0%", "2", "0", "40")
     assert full[:6] == ("full", *care[1:6])
     assert (care_3[2], full_3[6]) == ("75.0%", "+25 [0,75]")
-
-
-def test_five_pairs_make_an_interval_that_counts_bold():
-    worse = [*cut_ins("history", [50.0] * 4), *cut_ins("care", [None] * 4)]
-    more = [row | {"seed": row["seed"] + 2} for row in worse]
-    table, _ = r157_tables([*worse, *more])
-    assert table.rows[1][6] == Bold("-100* [-100,-100]")
-    assert isinstance(table.rows[1][6], Bold)
 
 
 def test_avoided_by_the_speed_of_the_ego():
@@ -53,9 +44,6 @@ def test_the_best_control_is_chosen_on_what_all_controls_have():
     assert CollisionRows(rows, lambda row: 1.0).best_control(0.01) == "fan"
 
 
-def test_the_driver_stands_in_the_title():
-    table, _ = r157_tables(cut_ins("care", [None] * 4, driver="careful-human"))
-    assert "driver careful-human" in table.title
 
 
 def test_a_panel_for_every_policy_and_budget_coloured_by_what_was_avoided():

@@ -1,3 +1,0 @@
-"""What a study showed, in plain words: at every budget who leads, and whether a control does as
-well.
-"""
