@@ -15,7 +15,7 @@ from care_sim.base.files import JSON, check_output
 from care_sim.commands.shared.run_study import summary
 from care_sim.commands.shared.selection import check_values, playable, policy_parameters
 from care_sim.commands.shared.study_command import DONE, FAILED, console
-from care_sim.core.cell_order import AS_DEMANDED
+from care_sim.core.defaults import AS_DEMANDED
 from care_sim.policies import tags_of
 from care_sim.policies.isolation import isolated_policies
 from care_sim.reports.leaderboard import leaderboard_table

@@ -24,7 +24,6 @@ from care_sim.base.errors import InvalidInput, one_line
 from care_sim.base.extras import missing_extra
 from care_sim.base.limits import check_workers
 from care_sim.base.processes import end_group_with_work, end_with_parent, starting
-from care_sim.policies.isolation import are_isolated, isolate_policies
 
 if TYPE_CHECKING:
     from dask.distributed import Client
@@ -89,6 +88,10 @@ class Processes(ProcessPoolExecutor):
     """
 
     def __init__(self, workers: int, context: BaseContext):
+        # Imported here because the room of policies loads SciPy and Numba, and options of commands
+        # name the number of workers.
+        from care_sim.policies.isolation import are_isolated
+
         with starting():
             super().__init__(workers, context, _begin, (are_isolated(),))
 
@@ -108,6 +111,8 @@ def _begin(isolates: bool) -> None:
     end_with_parent()
     end_group_with_work()
     if isolates:
+        from care_sim.policies.isolation import isolate_policies
+
         isolate_policies()
 
 

@@ -13,7 +13,8 @@ from scipy.ndimage import gaussian_filter
 
 from care_sim.base.errors import print_lines
 from care_sim.base.files import ZIP, check_output
-from care_sim.core.grid import AZIMUTH_MARGIN, ELEVATION_MARGIN, AngularGrid, Cells
+from care_sim.core.defaults import AZIMUTH_MARGIN, ELEVATION_MARGIN
+from care_sim.core.grid import AngularGrid, Cells
 from care_sim.envs.open_loop import FilmEnv
 from care_sim.loops.film import Film
 from care_sim.policies.learned.weights import Card, save_weights

@@ -275,7 +275,7 @@ class Grammar:
 
     def _names(self, name):
         """What fits an option of this name; thrice, so that it is drawn more often."""
-        from care_sim.core.cell_order import CELL_ORDERS
+        from care_sim.core.defaults import CELL_ORDERS
         from care_sim.core.driver_settings import DRIVERS
         from care_sim.core.firing.listing import HARDWARE
         from care_sim.policies import policy_names

@@ -4,7 +4,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.firing.listing import CELLS, HARDWARE, hardware_of, settled
+from care_sim.core.defaults import CELLS
+from care_sim.core.firing.listing import HARDWARE, hardware_of, settled
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.sensors.setups import DEFAULT_SETUP, sensor_setup
 from care_sim.sources.scenes import Scene, Source

@@ -9,7 +9,8 @@ from typing import NamedTuple
 from care_sim.base.errors import InvalidInput
 from care_sim.base.seed_ranges import split_of
 from care_sim.core.conditions import YOLOX_CAMERA
-from care_sim.core.firing.listing import CELLS, HARDWARE, settled
+from care_sim.core.defaults import CELLS
+from care_sim.core.firing.listing import HARDWARE, settled
 from care_sim.scenarios.ncap.table import TESTS
 from care_sim.sources.scenes import Scene, Source
 from care_sim.study.designs.ncap import NCAP_STEP_KPH, NcapCase, ncap_cases
