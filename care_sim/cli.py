@@ -6,9 +6,9 @@ import io
 import os
 import shutil
 import sys
-from collections.abc import Callable, Sequence
-from functools import partial
-from typing import Any, NoReturn
+from collections.abc import Sequence
+from difflib import get_close_matches
+from typing import NoReturn
 
 import care_sim
 from care_sim.base import interrupts
@@ -20,14 +20,15 @@ from care_sim.base.errors import (
     error_line,
     is_own_fault,
     one_line,
+    report_problems,
     shortened,
     shown,
+    unknown,
 )
 from care_sim.base.foreign_code import foreign_place
 from care_sim.base.limits import limit_in
-from care_sim.commands.entries import COMMANDS, GROUPS
-from care_sim.commands.shared.hints import ways_on
-from care_sim.commands.shared.parsing import chosen_command, option_helps
+from care_sim.commands.parsing import print_completion, read_options
+from care_sim.commands.table import COMMANDS, FAMILIES, GROUPS, RENAMED
 
 _FAILED = 1
 _BAD_INPUT = 2
@@ -37,43 +38,23 @@ _UNREAD = 141
 """The exit code where nobody reads the output: what a shell gives for SIGPIPE, 128 + 13."""
 _DEBUG = "--debug"
 
-_ABOUT = (
-    "Benchmark for adaptive LiDAR sensing: the closed loop, and first sightings in the open loop."
-)
 _USAGE = """usage: care-sim COMMAND [options]
 
 Benchmark for adaptive LiDAR sensing: a policy decides which cells fire."""
-_WAYS_ON = """care-sim COMMAND --help tells its options, --help-all the conditions, too.
-care-sim --version tells the version.
-Begin with: care-sim run dartout"""
+_WAYS_ON = """care-sim COMMAND --help lists its options, --help-all explains the conditions, too.
+care-sim --version prints the version. care-sim --tyro-print-completion SHELL prints a
+script by which bash, zsh or fish completes. Begin with: care-sim run dartout"""
+_COMPLETION = "--tyro-print-completion"
 _NEW_OBJECTS = 100_000
 """After how many the garbage collector looks at them; Python's default is 700."""
 _NARROWEST = 20
 """Columns of a terminal for which help is laid out, at the least."""
 
-_STUDIES = (
-    "benchmark",
-    "reproduce",
-    "sweep",
-    "ablate",
-    "order",
-    "firing",
-    "realism",
-    "faults",
-    "vehicle",
-    "crowding",
-    "ncap",
-    "r157",
-    "validate",
-    "protocol",
-    "mechanism",
-)
-_AGENTS = ("train ppo", "train sac", "train recurrent-ppo")
+_FINISHED_STAYS = "; what is finished is kept, the same command resumes"
+_LEARNED_STAYS = "; what is learned is kept, the same command with --resume resumes"
 _KEPT = {
-    **dict.fromkeys(_STUDIES, "; what is finished is kept, the same command goes on from there"),
-    **dict.fromkeys(
-        _AGENTS, "; what is learned is kept, the same command with --resume goes on from there"
-    ),
+    **dict.fromkeys(("benchmark", *GROUPS["Studies"]), _FINISHED_STAYS),
+    **dict.fromkeys(("train ppo", "train sac", "train recurrent-ppo"), _LEARNED_STAYS),
 }
 """What is added to "interrupted" for commands that keep what they have finished."""
 
@@ -109,8 +90,8 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
             _end_with(error, trace=_DEBUG in given or bool(os.environ.get("CARE_SIM_DEBUG")))
         if alone:
             interrupts.end_in_silence()
-        command = " ".join(arguments[: 2 if arguments[:1] == ["train"] else 1])
-        _complain(f"interrupted{_KEPT.get(command, '')}", interrupts.INTERRUPTED)
+        kept = next((_KEPT[name] for name in _named(arguments) if name in _KEPT), "")
+        _complain(f"interrupted{kept}", interrupts.INTERRUPTED)
     finally:
         if alone:
             interrupts.end_in_silence()
@@ -186,7 +167,15 @@ def _finished(arguments: list[str]) -> int:
     """Run the command and write out all that it printed; returns its exit code."""
     _check_texts(arguments)
     try:
-        return int(parsed_command(arguments)())
+        first = arguments[0] if arguments else "--help"
+        if first == _COMPLETION:
+            print_completion(arguments)
+        if (text := _told(first, arguments[1:])) is not None:
+            print(text)
+            return 0
+        name, rest = chosen_command(arguments)
+        options = read_options(COMMANDS[name].options_class(), f"care-sim {name}", rest)
+        return int(COMMANDS[name].function()(options))
     finally:
         sys.stdout.flush()
 
@@ -206,66 +195,67 @@ def _check_texts(arguments: list[str]) -> None:
             raise InvalidInput(f"no text: {shown(argument)}")
 
 
-def parsed_command(arguments: Sequence[str]) -> Callable[[], int]:
-    """The command that the arguments name, with its options. Raises InvalidInput, in one line."""
-    named = arguments[0] if arguments else "--help"
-    if named in _ASKED:
-        return partial(_told, _ASKED[named]())
-    if named.startswith("-"):
-        raise InvalidInput(
-            f"{shown(named)} is no option of care-sim; `care-sim` tells the commands"
-        )
-    # The learners are commands of their own; their help lists them alone.
-    if named == "train":
-        commands, prog = COMMANDS[named].loaded(), "care-sim train"
-        about, arguments = COMMANDS[named].about, arguments[1:]
-    else:
-        # For names that are mistyped, what the list says of each command is enough.
-        commands = {name: _described(command.about) for name, command in COMMANDS.items()}
-        prog, about = "care-sim", _ABOUT
-        if named in COMMANDS:
-            commands[named] = COMMANDS[named].loaded()
-    try:
-        return chosen_command(commands, prog, about, arguments)
-    except InvalidInput as error:
-        asked = commands.get(arguments[0]) if arguments else None
-        options = option_helps(asked) if isinstance(asked, type) else {}
-        raise InvalidInput(f"{error}{ways_on(str(error), options, named)}") from None
+def _told(first: str, rest: Sequence[str]) -> str | None:
+    """What is printed where no command runs; None where one does."""
+    if first in ("-h", "--help"):
+        return _overview()
+    if first == "--version":
+        return f"care-sim {care_sim.__version__}"
+    if first in FAMILIES and rest[:1] in ([], ["-h"], ["--help"]):
+        return _family(first)
+    return None
+
+
+def chosen_command(arguments: Sequence[str]) -> tuple[str, Sequence[str]]:
+    """The name of the command that the arguments name, and the words after it. A line says what an
+    old name is now. Raises InvalidInput for another name.
+    """
+    first = arguments[0]
+    if first.startswith("-"):
+        raise InvalidInput(f"{shown(first)} is no option of care-sim; `care-sim` lists commands")
+    for count, name in enumerate(_named(arguments), 1):
+        if name in COMMANDS:
+            return name, arguments[count:]
+    if (now := _now(arguments)) is not None:
+        report_problems([f"`care-sim {first}` is now `care-sim {now}`"])
+        return chosen_command([*now.split(), *arguments[1:]])
+    if first in FAMILIES:
+        below = [name.split()[1] for name in COMMANDS if name.startswith(f"{first} ")]
+        raise unknown(f"command after {first}", arguments[1], below)
+    names = {*FAMILIES, *(name.split()[0] for name in COMMANDS)}
+    old = get_close_matches(first, RENAMED, 1)
+    raise unknown("command", first, names, f"perhaps `{RENAMED[old[0]]}`" if old else "")
+
+
+def _now(arguments: Sequence[str]) -> str | None:
+    """What an old name is now; None for a name that was none."""
+    # `export` had one form, which began with its options.
+    if arguments[0] == "export" and arguments[1].startswith("-"):
+        return "export nuscenes"
+    return RENAMED.get(arguments[0])
+
+
+def _named(arguments: Sequence[str]) -> list[str]:
+    """The commands that the first word, and the first two, may mean."""
+    words = [word.replace("_", "-") for word in arguments[:2]]
+    return [" ".join(words[:count]) for count in range(1, len(words) + 1)]
 
 
 def _overview() -> str:
     """Every command in its group, a line each."""
-    groups = [
-        "\n".join([title, *(f"  {name:13}{each.about}" for name, each in group.items())])
-        for title, group in GROUPS.items()
-    ]
+    groups = []
+    for title, group in GROUPS.items():
+        abouts = {name.split()[0]: command.about for name, command in group.items()}
+        lines = [f"  {name:13}{FAMILIES.get(name, about)}" for name, about in abouts.items()]
+        groups.append("\n".join([title, *lines]))
     return "\n\n".join([_USAGE, *groups, _WAYS_ON])
 
 
-def _version() -> str:
-    return f"care-sim {care_sim.__version__}"
-
-
-_ASKED: dict[str, Callable[[], str]] = {
-    "-h": _overview,
-    "--help": _overview,
-    "--version": _version,
-}
-"""What is printed where no command is named."""
-
-
-def _told(text: str) -> int:
-    print(text)
-    return 0
-
-
-def _described(about: str) -> Callable[..., Any]:
-    """A command that does nothing, with the line that help shows of it."""
-
-    def command() -> None: ...
-
-    command.__doc__ = about
-    return command
+def _family(first: str) -> str:
+    """Every command behind a first word, a line each."""
+    own = {name: each for name, each in COMMANDS.items() if name.startswith(f"{first} ")}
+    lines = [f"  {name.split()[1]:16}{command.about}" for name, command in own.items()]
+    return "\n".join([f"usage: care-sim {first} NAME [options]", "", *lines])
 
 
 def _complain(message: str, code: int = _BAD_INPUT) -> NoReturn:

@@ -1,97 +1,83 @@
-"""`care-sim policies`, `agents`, `detectors`, `sensors`, `scenarios` and `sources`: what can be
-named.
-"""
+"""`care-sim list`: what can be named."""
 
 import inspect
 import shutil
 import textwrap
-from dataclasses import Field, dataclass, fields
+from collections.abc import Callable
+from dataclasses import Field, fields
 from typing import Any
 
 from care_sim.base.bounds import allowed
 from care_sim.base.errors import InvalidInput, printable
 from care_sim.base.plugins import package_of
 from care_sim.base.scenario_names import is_environment_id
+from care_sim.commands.options.watching import List
 from care_sim.perception.detectors import detector_lines
 from care_sim.policies.listing import policy_paragraphs
 from care_sim.scenarios import PLUGINS, SCENARIOS, scenario_class, scenario_names
 from care_sim.scenarios.base import Scenario
+from care_sim.sensors.engines import ENGINES
 from care_sim.sensors.setups import setup_lines
 from care_sim.sources.installed import SOURCES
 from care_sim.sources.recordings import Recordings
 from care_sim.training.agents import shipped_agents
 
 
-@dataclass(frozen=True)
-class Policies:
-    """List the policies: tags, parameters, sources."""
-
-    def __call__(self) -> int:
-        """Run it."""
-        print(*policy_paragraphs(), sep="\n")
-        return 0
+def show(options: List) -> int:
+    """Print the list."""
+    _LISTS[options.kind]()
+    return 0
 
 
-@dataclass(frozen=True)
-class Agents:
-    """List the trained agents of the package."""
-
-    def __call__(self) -> int:
-        """Run it."""
-        for agent in shipped_agents():
-            policy, *told = agent.columns.items()
-            print(policy[1], *(f"    {name}: {value}" for name, value in told if value), sep="\n")
-        return 0
+def _print_policies() -> None:
+    print(*policy_paragraphs(), sep="\n")
 
 
-@dataclass(frozen=True)
-class Detectors:
-    """List the detectors."""
-
-    def __call__(self) -> int:
-        """Run it."""
-        print(*map(_wrapped, detector_lines()), sep="\n")
-        return 0
+def _print_agents() -> None:
+    for agent in shipped_agents():
+        policy, *told = agent.columns.items()
+        print(policy[1], *(f"    {name}: {value}" for name, value in told if value), sep="\n")
 
 
-@dataclass(frozen=True)
-class Sensors:
-    """List the sensor set-ups."""
-
-    def __call__(self) -> int:
-        """Run it."""
-        print(*map(_wrapped, setup_lines()), sep="\n")
-        return 0
+def _print_scenarios() -> None:
+    for name in scenario_names():
+        print(*map(_wrapped, map(printable, _scenario_lines(name))), "", sep="\n")
+    for _, reason in PLUGINS.refusals():
+        print(_wrapped(printable(reason)))
 
 
+def _print_sources() -> None:
+    for name in SOURCES.names():
+        print(*map(_wrapped, map(printable, _source_lines(name))), "", sep="\n")
+    for _, reason in SOURCES.refusals():
+        print(_wrapped(printable(reason)))
+
+
+def _print_detectors() -> None:
+    print(*map(_wrapped, detector_lines()), sep="\n")
+
+
+def _print_sensors() -> None:
+    print(*map(_wrapped, setup_lines()), sep="\n")
+
+
+def _print_engines() -> None:
+    for name, make in ENGINES.items():
+        about = (inspect.getdoc(make) or "").partition("\n\n")[0]
+        print(_wrapped(f"{name:12} {' '.join(about.split())}"))
+
+
+_LISTS: dict[str, Callable[[], None]] = {
+    "policies": _print_policies,
+    "agents": _print_agents,
+    "scenarios": _print_scenarios,
+    "sources": _print_sources,
+    "detectors": _print_detectors,
+    "sensors": _print_sensors,
+    "engines": _print_engines,
+}
 _ZERO = {"speed_kph": "0 is drawn", "target_kph": "0 is the protocol's"}
 """What 0 stands for, of parameters in which it is no number."""
-
-
-@dataclass(frozen=True)
-class Scenarios:
-    """List the scenarios and their parameters."""
-
-    def __call__(self) -> int:
-        """Run it."""
-        for name in scenario_names():
-            print(*map(_wrapped, map(printable, _scenario_lines(name))), "", sep="\n")
-        for _, reason in PLUGINS.refusals():
-            print(_wrapped(printable(reason)))
-        return 0
-
-
-@dataclass(frozen=True)
-class Sources:
-    """List the sources of scenes for the open loop."""
-
-    def __call__(self) -> int:
-        """Run it."""
-        for name in SOURCES.names():
-            print(*map(_wrapped, map(printable, _source_lines(name))), "", sep="\n")
-        for _, reason in SOURCES.refusals():
-            print(_wrapped(printable(reason)))
-        return 0
 
 
 def _source_lines(name: str) -> list[str]:
