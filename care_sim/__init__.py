@@ -17,7 +17,7 @@ import care_sim.base.home  # noqa: F401
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from care_sim.base.errors import InvalidInput, MissingExtra
+from care_sim.base.errors import InvalidInput, MissingExtra, unknown
 from care_sim.envs import register_all
 
 if TYPE_CHECKING:
@@ -68,10 +68,34 @@ __all__ = [
     "allocate",
     "film_of_boxes",
     "make_policy",
+    "names",
     "policy_names",
 ]
 
 register_all()
+
+
+_NAMES = {
+    "policies": "policies:policy_names",
+    "scenarios": "scenarios:scenario_names",
+    "sensors": "sensors.setups:setup_names",
+    "detectors": "perception.detectors:detector_names",
+    "sources": "sources.installed:source_names",
+    "engines": "sensors.engines:engine_names",
+    "agents": "training.agents:agent_names",
+}
+
+
+def names(kind: str) -> list[str]:
+    """What can be named: policies, scenarios, sensors, detectors, sources, engines or agents, the
+    built-in ones and those of installed packages. Raises InvalidInput for another kind.
+
+    `care-sim list KIND` shows what each is.
+    """
+    if kind not in _NAMES:
+        raise unknown("kind", kind, _NAMES)
+    module, function = _NAMES[kind].split(":")
+    return list(getattr(import_module(f"care_sim.{module}"), function)())
 
 
 def __getattr__(name: str) -> object:

@@ -27,7 +27,6 @@ from care_sim.base.errors import (
 )
 from care_sim.base.foreign_code import foreign_place
 from care_sim.base.limits import limit_in
-from care_sim.commands.parsing import print_completion, read_options
 from care_sim.commands.table import COMMANDS, FAMILIES, GROUPS, RENAMED
 
 _FAILED = 1
@@ -168,11 +167,14 @@ def _finished(arguments: list[str]) -> int:
     _check_texts(arguments)
     try:
         first = arguments[0] if arguments else "--help"
-        if first == _COMPLETION:
-            print_completion(arguments)
         if (text := _told(first, arguments[1:])) is not None:
             print(text)
             return 0
+        # Imported here because tyro takes a third of the time of `care-sim --help`.
+        from care_sim.commands.parsing import print_completion, read_options
+
+        if first == _COMPLETION:
+            print_completion(arguments)
         name, rest = chosen_command(arguments)
         options = read_options(COMMANDS[name].options_class(), f"care-sim {name}", rest)
         return int(COMMANDS[name].function()(options))

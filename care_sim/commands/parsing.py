@@ -1,16 +1,15 @@
 """Reads the options of a command with tyro; a mistake becomes one line."""
 
-import functools
 import inspect
-import operator
 import os
 import re
 import shutil
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import MISSING, Field, fields, is_dataclass
 from difflib import get_close_matches
-from typing import Annotated, Any, NoReturn, get_type_hints
+from functools import partial
+from typing import Annotated, Any, NoReturn, Union, get_type_hints
 
 import docstring_parser
 import tyro
@@ -48,29 +47,26 @@ def read_options(kind: Any, prog: str, arguments: Sequence[str]) -> Any:
     # Sixty conditions, each of several lines, would hide the few options that a command is about.
     brief = _HELP_ALL not in words and not {*_HELPS}.isdisjoint(words)
     words = [_HELPS[1] if word == _HELP_ALL else word for word in words]
-    with _errors.on_parse_error(functools.partial(_refuse, kind)):
-        default = _recipe(kind, words) if issubclass(kind, Learner) else MISSING_NONPROP
+    with _errors.on_parse_error(partial(_refuse, kind)):
         return tyro.cli(
             kind,
             prog=prog,
             description=_description(kind, brief),
             args=words,
-            default=default,
-            registry=_registry(brief),
+            registry=_registry(brief, _recipe(kind, words) if issubclass(kind, Learner) else {}),
         )
 
 
-def _registry(brief: bool) -> ConstructorRegistry:
+def _registry(brief: bool, defaults: Mapping[str, Any]) -> ConstructorRegistry:
     registry = ConstructorRegistry()
-    registry.struct_rule(functools.partial(_explained, brief=brief))
+    registry.struct_rule(partial(_explained, brief=brief, defaults=defaults))
     return registry
 
 
-def _recipe(kind: type[Learner], words: Sequence[str]) -> Learner:
-    """A learner with the defaults of the environment that the words name."""
+def _recipe(kind: type[Learner], words: Sequence[str]) -> Mapping[str, Any]:
+    """The defaults of a learner in the environment that the words name."""
     named, _ = tyro.cli(Recipe, args=words, return_unknown_args=True, add_help=False)
-    table = read_hyperparameters(kind.kind, named.env, named.hyperparameters, named.drawn)
-    return kind(env=named.env, drawn=named.drawn, **table.values)
+    return read_hyperparameters(kind.kind, named.env, named.hyperparameters, named.drawn).values
 
 
 def _description(kind: type, brief: bool) -> str:
@@ -88,9 +84,12 @@ def _description(kind: type, brief: bool) -> str:
     return f"{about}\n\n{textwrap.fill(told, columns, break_on_hyphens=False)}"
 
 
-def _explained(asked: StructTypeInfo, brief: bool) -> StructConstructorSpec | None:
+def _explained(
+    asked: StructTypeInfo, brief: bool, defaults: Mapping[str, Any]
+) -> StructConstructorSpec | None:
     """The fields of options as tyro takes them, the lines of their docstrings joined, since a
-    terminal breaks them elsewhere; with `brief` without the conditions.
+    terminal breaks them elsewhere; with `brief` without the conditions. `defaults` replace those
+    of the class.
     """
     if not (is_dataclass(asked.type) and asked.type.__module__.startswith("care_sim.")):
         return None
@@ -103,7 +102,7 @@ def _explained(asked: StructTypeInfo, brief: bool) -> StructConstructorSpec | No
             StructFieldSpec(
                 field.name,
                 _HIDDEN[types[field.name]] if is_hidden else types[field.name],
-                _default_of(field, asked.default),
+                defaults.get(field.name, _default_of(field, asked.default)),
                 told.get(field.name, ""),
             )
             for field in fields(asked.type)
@@ -186,15 +185,17 @@ def print_completion(arguments: Sequence[str]) -> NoReturn:
         kind = Annotated[command.options_class(), _subcommand(second or first)]
         families.setdefault(first, []).append(kind)
     kinds = [
-        own[0] if len(own) == 1 else Annotated[tuple(own), _subcommand(first)]
+        own[0] if len(own) == 1 else Annotated[_union(own), _subcommand(first)]
         for first, own in families.items()
     ]
-    tyro.cli(_union(kinds), prog="care-sim", args=arguments, registry=_registry(brief=False))
+    tyro.cli(
+        _union(kinds), prog="care-sim", args=arguments, registry=_registry(brief=False, defaults={})
+    )
     raise AssertionError("tyro exits once it has printed the script")
 
 
 def _union(kinds: Sequence[Any]) -> Any:
-    return functools.reduce(operator.or_, kinds)
+    return Union[tuple(kinds)]  # noqa: UP007 (annotated kinds have no operator)
 
 
 def _subcommand(name: str) -> Any:

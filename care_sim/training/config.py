@@ -5,7 +5,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
+from typing import Any, ClassVar, Literal, get_args
 
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.checks import LARGEST_INTEGER, check_known
@@ -13,10 +13,8 @@ from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.seed_ranges import TRAINING, VALIDATION
 from care_sim.core.defaults import HEAVIEST
 from care_sim.core.grid_rays import MOST_COLUMNS, MOST_ROWS
+from care_sim.core.wrapping import Wrapping
 from care_sim.study.parameters import parameters
-
-if TYPE_CHECKING:
-    from care_sim.policies.learned.wrapping import Wrapping
 
 Part = Literal["pictures", "place", "tracks", "faults"]
 """What can be left out (`care_sim.training.ablations`)."""
@@ -108,11 +106,8 @@ class AgentConfig:
         _ = self.wrapping, [self.arguments(name) for name in self.env]
 
     @property
-    def wrapping(self) -> "Wrapping":
+    def wrapping(self) -> Wrapping:
         """The wrappers. Raises InvalidInput for numbers that do not fit each other."""
-        # Imported here because the room of policies loads SciPy and Numba.
-        from care_sim.policies.learned.wrapping import Wrapping
-
         return Wrapping(self.action, self.azimuths, self.elevations, self.columns, self.rows)
 
     def arguments(self, env: str) -> dict[str, Any]:

@@ -10,14 +10,14 @@ from importlib.util import find_spec
 
 import numpy as np
 import pytest
+from care_sim.commands.shared.end_of_training import end_of_training
 
 import care_sim
 from care_sim.base.errors import InvalidInput, MissingExtra
 from care_sim.base.seed_ranges import TRAINING, VALIDATION
 from care_sim.cli import main, parsed_command
-from care_sim.commands.shared.end_of_training import end_of_training
+from care_sim.core.wrapping import Wrapping
 from care_sim.policies.learned.weights import load_weights
-from care_sim.policies.learned.wrapping import Wrapping
 from care_sim.scenarios import PLUGINS
 from care_sim.study import provenance
 from care_sim.training.algorithms import algorithm
