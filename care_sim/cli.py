@@ -25,16 +25,11 @@ from care_sim.base.errors import (
     shown,
     unknown,
 )
+from care_sim.base.exit_codes import BAD_INPUT, FAILED, INTERRUPTED, UNEXPECTED, UNREAD
 from care_sim.base.foreign_code import foreign_place
 from care_sim.base.limits import limit_in
 from care_sim.commands.table import COMMANDS, FAMILIES, GROUPS, RENAMED
 
-_FAILED = 1
-_BAD_INPUT = 2
-_UNEXPECTED = 70
-"""The exit code of a fault in the software: `EX_SOFTWARE` of BSD."""
-_UNREAD = 141
-"""The exit code where nobody reads the output: what a shell gives for SIGPIPE, 128 + 13."""
 _DEBUG = "--debug"
 
 _USAGE = """usage: care-sim COMMAND [options]
@@ -90,7 +85,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         if alone:
             interrupts.end_in_silence()
         kept = next((_KEPT[name] for name in _named(arguments) if name in _KEPT), "")
-        _complain(f"interrupted{kept}", interrupts.INTERRUPTED)
+        _complain(f"interrupted{kept}", INTERRUPTED)
     finally:
         if alone:
             interrupts.end_in_silence()
@@ -113,15 +108,15 @@ def _end_with(error: BaseException, trace: bool) -> NoReturn:
         own = is_own_fault(error)
         if own and trace:
             raise error
-        _complain(str(error), _FAILED if own else _BAD_INPUT)
+        _complain(str(error), FAILED if own else BAD_INPUT)
     if isinstance(error, BrokenPipeError):
         _leave_output()
-        sys.exit(_UNREAD)
+        sys.exit(UNREAD)
     if foreign_place(error) and not trace:
-        _complain(error_line(error), _FAILED)
+        _complain(error_line(error), FAILED)
     if (limit := limit_in(error)) and not trace:
         _leave_output()
-        _complain(limit, _FAILED)
+        _complain(limit, FAILED)
     if isinstance(error, OSError):
         _leave_output()
         _complain(f"{error.filename}: {error.strerror}" if error.filename else str(error))
@@ -130,7 +125,7 @@ def _end_with(error: BaseException, trace: bool) -> NoReturn:
     _complain(
         f"unexpected {error_line(error)}; please report it, with the trace that {_DEBUG} "
         "(or CARE_SIM_DEBUG=1) shows",
-        _UNEXPECTED,
+        UNEXPECTED,
     )
 
 
@@ -260,7 +255,7 @@ def _family(first: str) -> str:
     return "\n".join([f"usage: care-sim {first} NAME [options]", "", *lines])
 
 
-def _complain(message: str, code: int = _BAD_INPUT) -> NoReturn:
+def _complain(message: str, code: int = BAD_INPUT) -> NoReturn:
     with contextlib.suppress(OSError):  # the terminal may be what is gone
         print(f"care-sim: {shortened(one_line(message), LONGEST)}", file=sys.stderr)
     sys.exit(code)

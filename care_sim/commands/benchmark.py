@@ -5,10 +5,11 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from care_sim.base.console import TableConsole
 from care_sim.base.errors import BrokenPolicy, InvalidInput, print_lines, report_problems
+from care_sim.base.exit_codes import DONE, FAILED
 from care_sim.base.files import JSON, check_output
 from care_sim.commands.options.results import Benchmark
-from care_sim.commands.shared.play_study import DONE, FAILED, console
 from care_sim.commands.shared.run_study import summary
 from care_sim.commands.shared.selection import check_values, policy_parameters, some_playable
 from care_sim.policies import tags_of
@@ -50,7 +51,7 @@ def benchmark(options: Benchmark) -> int:
     for result in results:
         result.write(_file(options, result.entry))
     if results:
-        console().print(leaderboard_table(results).rich())
+        TableConsole().print(leaderboard_table(results).rich())
         print_lines(*(f"Result: {_file(options, result.entry)}" for result in results))
     failed = [f"failed: {line}" for line in summary(player.failures, "plays")]
     report_problems([*failed, *left_out])

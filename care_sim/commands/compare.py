@@ -8,7 +8,9 @@ from functools import partial
 from pathlib import Path
 from typing import cast
 
+from care_sim.base.console import TableConsole
 from care_sim.base.errors import report_problems
+from care_sim.base.exit_codes import DONE, FAILED
 from care_sim.commands.options.watching import Compare
 from care_sim.commands.shared.one_scene import (
     finish_files,
@@ -17,7 +19,6 @@ from care_sim.commands.shared.one_scene import (
     scene_plays,
     scene_source,
 )
-from care_sim.commands.shared.play_study import DONE, FAILED, console
 from care_sim.commands.shared.selection import arguments_of, some_playable
 from care_sim.envs.wrappers.record_rerun import RecordRerun, recording
 from care_sim.loops.film import Film
@@ -114,7 +115,7 @@ def _report(configs: Sequence[AnyConfig], answers: Sequence[Row | str]) -> list[
     told = [*zip(configs, answers, strict=False)]
     rows = [(config, row) for config, row in told if not isinstance(row, str)]
     if rows:
-        console().print(_outcome_table(rows).rich())
+        TableConsole().print(_outcome_table(rows).rich())
     failures = [
         f"failed: {config.label}: {reason}" for config, reason in told if isinstance(reason, str)
     ]

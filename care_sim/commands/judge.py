@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from care_sim.base.console import TableConsole
 from care_sim.base.errors import InvalidInput, print_lines, report_problems
+from care_sim.base.exit_codes import DONE, FAILED
 from care_sim.base.files import JSON, check_no_link, check_output, write_text
 from care_sim.commands.options.results import Judge
-from care_sim.commands.shared.play_study import DONE, FAILED, console
 from care_sim.commands.shared.selection import check_values, common_of, source_named
 from care_sim.evaluation.detector_quality import Counts, SceneBoxes, counts, curve, reliability
 from care_sim.perception.detectors import PROXY, check_detector
@@ -131,7 +132,7 @@ def _tell(
             _write_samples(options, name, [one.reported for one in own])
         _write_samples(options, _TRUTH, [one.true for one in scenes[_names(options)[0]]])
     for table in tables:
-        console().print(table.rich(options.out / _TABLES))
+        TableConsole().print(table.rich(options.out / _TABLES))
     figure = f"Figure: {options.out / DETECTORS_FIGURE}.png"
     print_lines(f"Tables: {options.out / _TABLES}", figure)
 

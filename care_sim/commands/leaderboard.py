@@ -8,6 +8,7 @@ from random import SystemRandom
 from tempfile import TemporaryDirectory
 
 from care_sim.base.checks import check_known
+from care_sim.base.console import TableConsole
 from care_sim.base.errors import (
     InvalidInput,
     MissingExtra,
@@ -16,10 +17,10 @@ from care_sim.base.errors import (
     report_problems,
     unknown,
 )
+from care_sim.base.exit_codes import DONE, FAILED
 from care_sim.base.files import check_output, told_if_replaced, write_text
 from care_sim.base.json_text import json_content
 from care_sim.commands.options.results import Leaderboard
-from care_sim.commands.shared.play_study import DONE, FAILED, console
 from care_sim.policies.isolation import isolated_policies
 from care_sim.reports.figures.files import FORMATS, check_figure, save
 from care_sim.reports.figures.leaderboard import (
@@ -81,7 +82,7 @@ def _show(options: Leaderboard, results: Sequence[BenchmarkResult]) -> None:
     shown = [*tables, *(table for table in by_part if table)]
     write_text(page, _page([table.markdown() for table in shown]))
     for table in tables:
-        console().print(table.rich(page))
+        TableConsole().print(table.rich(page))
     # Sealed results have a control of their own, which nobody has published.
     if options.minus == CONTROL.name and any(
         options.minus not in names_in(own) for own in sets.values() if own[0].sealed is None

@@ -3,10 +3,11 @@
 from collections.abc import Iterator
 from pathlib import Path
 
+from care_sim.base.console import TableConsole
 from care_sim.base.errors import InvalidInput, counted, print_lines, report_problems
+from care_sim.base.exit_codes import DONE, FAILED
 from care_sim.base.extras import check_page
 from care_sim.commands.options.results import Report
-from care_sim.commands.shared.play_study import DONE, FAILED, console
 from care_sim.commands.shared.selection import source_named
 from care_sim.reports.merging import Merged, merged
 from care_sim.reports.report import (
@@ -27,7 +28,7 @@ def report(options: Report) -> int:
     (folder,) = options.folders
     if options.minus is not None:
         rows, study, left_out = read_results(folder)
-        print_minus(rows, console(), study, options.minus)
+        print_minus(rows, TableConsole(), study, options.minus)
         report_problems([f"left out: {what}" for what in left_out])
         return DONE
     return _print(folder) if options.page is None else _write(options, folder, options.page)
@@ -39,10 +40,10 @@ def _print(folder: Path) -> int:
     try:
         made.write(folder)
     except (OSError, InvalidInput) as error:
-        print_report(rows, console(), study, left_out)
+        print_report(rows, TableConsole(), study, left_out)
         report_problems([f"tables and figures in {folder} are not written anew: {error}"])
         return FAILED
-    print_report(rows, console(), study, left_out, folder)
+    print_report(rows, TableConsole(), study, left_out, folder)
     print_lines(*where_it_lies(folder, study, rows))
     return DONE
 
@@ -68,7 +69,7 @@ def _merge(options: Report) -> int:
         raise InvalidInput(f"{out} is there already and not empty: give another --out")
     whole = merged(options.folders)
     whole.write(out)
-    print_report(whole.rows, console(), whole.study, whole.left_out, out)
+    print_report(whole.rows, TableConsole(), whole.study, whole.left_out, out)
     print_lines(*where_it_lies(out, whole.study, whole.rows))
     if whole.twice:
         alike = counted(whole.twice, whole.study.results.task)

@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from care_sim.base.console import TableConsole
 from care_sim.base.errors import InvalidInput, report_problems
 from care_sim.base.extras import import_rerun
 from care_sim.commands.options.watching import Run, View
@@ -16,7 +17,6 @@ from care_sim.commands.shared.one_scene import (
     scene_plays,
     scene_source,
 )
-from care_sim.commands.shared.play_study import console
 from care_sim.commands.shared.selection import arguments_of
 from care_sim.commands.view import view
 from care_sim.envs.wrappers.export_scans import ExportScans
@@ -65,7 +65,7 @@ def run(options: Run) -> int:
 
     played = trace(config, photographer, film.episode(policy), wrap=wrap)
     film.show_outcome(played[0])
-    print_timeline(config, *played, console())
+    print_timeline(config, *played, TableConsole())
     photographer.report()
     finish_files(options.record, film, options.video)
     return 0
@@ -84,7 +84,7 @@ def _play_scene(options: Run, policy: str, budget: float, given: dict[str, Any])
         return photographer.watching(_watched(options, env, policy), policy)
 
     played = trace_scene(config, config.film(), film.episode(policy), wrap=wrap)
-    print_scene_timeline(config, played, console())
+    print_scene_timeline(config, played, TableConsole())
     photographer.report()
     finish_files(options.record, film, options.video)
     return 0

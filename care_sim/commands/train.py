@@ -4,11 +4,11 @@ import shlex
 from collections.abc import Iterator
 from dataclasses import fields
 
+from care_sim.base.console import TableConsole
 from care_sim.base.errors import InvalidInput, print_lines
 from care_sim.base.files import told_if_replaced
 from care_sim.commands.options.learning import Curves, Learner
 from care_sim.commands.shared.agent_play import AgentPlay
-from care_sim.commands.shared.play_study import console
 from care_sim.reports.figures.files import check_figure, save
 from care_sim.training.agents import Agent
 from care_sim.training.closing import how_to_play
@@ -76,6 +76,6 @@ def curves(options: Curves) -> int:
     table = curves_table(groups)
     told = told_if_replaced(options.out.with_suffix(".png"))
     save(curves_figure(groups), options.out)
-    console().print(table.rich())
+    TableConsole().print(table.rich())
     print_lines(f"Figure: {told}")
     return 0

@@ -10,6 +10,7 @@ import sys
 from urllib.parse import quote
 
 from care_sim.base.errors import InvalidInput
+from care_sim.base.exit_codes import FAILED
 from care_sim.base.extras import import_rerun
 from care_sim.base.files import RERUN
 from care_sim.commands.options.watching import View
@@ -30,7 +31,6 @@ sys.exit(main())
 failed. Its input is a pipe of this process and ends with it, however that happens: then the viewer
 and its children end too.
 """
-_FAILED = 1
 
 
 def view(options: View) -> int:
@@ -48,7 +48,7 @@ def view(options: View) -> int:
             "care-sim: the viewer failed; with --web a browser shows the recording",
             file=sys.stderr,
         )
-        return _FAILED
+        return FAILED
     # The page of the viewer asks its own server for the data, which has a port of its own.
     data, pages = _free_ports(2)
     source = quote(f"rerun+http://{_HERE}:{data}/proxy", safe="")

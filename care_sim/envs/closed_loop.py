@@ -31,7 +31,6 @@ from care_sim.sensors.box_pool import EMPTY_POOL, BoxPool
 from care_sim.sensors.camera_profiles import invents_boxes
 from care_sim.sensors.engines import check_engine
 from care_sim.sensors.setups import DEFAULT_SETUP, Sensor, sensor_setup
-from care_sim.viewer.pictures.keyframe import draw_keyframe
 from care_sim.world.world import WORLD_STEP_S, World, whole_steps
 
 KEYFRAME_S = 0.1
@@ -274,6 +273,9 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         """A picture (H, W, 3) of the last keyframe: chase view, camera, fired cells."""
         if self.render_mode is None:
             return None
+        # Imported here because most environments draw nothing.
+        from care_sim.viewer.pictures.keyframe import draw_keyframe
+
         return draw_keyframe(self.loop, self.keyframes[-1] if self.keyframes else None)
 
     def close(self) -> None:

@@ -28,7 +28,6 @@ from care_sim.loops.scene_records import SceneKeyframe
 from care_sim.loops.seeds import SensorSeeds
 from care_sim.perception import matching
 from care_sim.perception.detectors import PROXY
-from care_sim.viewer.pictures.scene_from_above import draw_plan
 
 UNFILMED = ("camera_rotation_sigma_deg", "camera_position_sigma_m", "engine")
 """Conditions that a film cannot take on once it is made."""
@@ -181,6 +180,9 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
 
         It shows who was found, what returned and what fired.
         """
+        # Imported here because most environments draw nothing.
+        from care_sim.viewer.pictures.scene_from_above import draw_plan
+
         if self.render_mode is None:
             return None
         if self.keyframes:

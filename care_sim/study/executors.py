@@ -19,7 +19,6 @@ from multiprocessing import get_context
 from multiprocessing.context import BaseContext
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
-from care_sim.base.cores import CORES
 from care_sim.base.errors import InvalidInput, one_line
 from care_sim.base.extras import missing_extra
 from care_sim.base.limits import check_workers
@@ -28,18 +27,13 @@ from care_sim.base.processes import end_group_with_work, end_with_parent, starti
 if TYPE_CHECKING:
     from dask.distributed import Client
 
+_ANSWER_TIMEOUT_S = 10.0
+"""How long a scheduler may take to answer."""
 P = ParamSpec("P")
 T = TypeVar("T")
 
 ExecutorFactory = Callable[[int], Executor]
 """Makes an executor of so many workers; any executor of `concurrent.futures` will do."""
-
-MOST_WORKERS = 1024
-"""Most worker processes; each takes about 100 MB."""
-WORKERS = min(CORES, MOST_WORKERS)
-"""Workers unless another number is asked for."""
-_ANSWER_TIMEOUT_S = 10.0
-"""How long a scheduler may take to answer."""
 
 
 class ClusterLost(OSError):
@@ -60,6 +54,8 @@ def processes(workers: int) -> Executor:
             "care_sim.envs.closed_loop",
             "care_sim.world.lane_driver",
             "care_sim.study.scene_play",
+            "scipy.optimize",
+            "scipy.spatial.transform",
         ]
     )
     return Processes(workers, context)

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from care_sim.base.errors import InvalidInput, print_lines, report_problems
+from care_sim.base.exit_codes import FAILED
 from care_sim.base.extras import import_torch
 from care_sim.base.files import ZIP, check_output
 from care_sim.base.seed_ranges import TRAINING, VALIDATION
@@ -56,8 +57,6 @@ RISING = 0.05
 CURVE_STEPS = 250
 """Steps between two points of the curve that the card tells, after which the weights are written,
 too."""
-FAILED = 1
-"""The exit code where the process that plays died."""
 CALIBRATING = range(VALIDATION, VALIDATION + 24)
 HELD_OUT = range(VALIDATION + 24, VALIDATION + 48)
 """Seeds of plays that nothing is learned from: those that scores are fitted to, and those by which

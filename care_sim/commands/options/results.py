@@ -8,10 +8,10 @@ import tyro
 
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.checks import LARGEST_INTEGER
+from care_sim.base.cores import MOST_WORKERS, WORKERS
 from care_sim.base.errors import InvalidInput
 from care_sim.commands.options.shared import EpisodeOptions, Flag, PlayOptions, SourceOptions
 from care_sim.core.defaults import AS_DEMANDED
-from care_sim.study.executors import MOST_WORKERS, WORKERS
 
 CONTROL = "place"
 """The entry of the leaderboard over which leads are measured."""

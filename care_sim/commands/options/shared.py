@@ -8,10 +8,10 @@ from typing import Annotated, Any
 import tyro
 
 from care_sim.base.bounds import bounded, check_fields
+from care_sim.base.cores import MOST_WORKERS, WORKERS
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.seed_ranges import CALIBRATION, split_of
 from care_sim.core.conditions import ClosedLoopConditions, Conditions
-from care_sim.study.executors import MOST_WORKERS, WORKERS
 from care_sim.study.parameters import parameters
 
 Flag = tyro.conf.FlagCreatePairsOff

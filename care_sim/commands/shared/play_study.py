@@ -4,10 +4,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from rich.console import Console
-
 from care_sim.base.console import TableConsole
 from care_sim.base.errors import print_lines, report_problems
+from care_sim.base.exit_codes import DONE, FAILED
 from care_sim.commands.options.shared import StudyOptions
 from care_sim.commands.shared.command_line import command_line
 from care_sim.commands.shared.folder_checks import free_folder
@@ -16,9 +15,6 @@ from care_sim.reports.report import print_report, read_results, where_it_lies
 from care_sim.reports.studies import STUDIES
 from care_sim.study import executors
 from care_sim.study.run_config import RunConfig
-
-DONE = 0
-FAILED = 1
 
 
 def folder_of(options: StudyOptions, study: str, configs: Sequence[RunConfig], name: str) -> Path:
@@ -47,13 +43,8 @@ def play_study(
     # What is printed is read back from the folder, as `care-sim report` would print it.
     if len(failures) < len(configs):
         rows, _, missing = read_results(out)
-        print_report(rows, console(), STUDIES[study], missing, out)
+        print_report(rows, TableConsole(), STUDIES[study], missing, out)
         print_lines(*where_it_lies(out, STUDIES[study], rows))
     unit = STUDIES[study].results.unit
     report_problems([*(f"failed: {line}" for line in summary(failures, unit)), *left_out])
     return FAILED if failures or left_out else DONE
-
-
-def console() -> Console:
-    """Where tables are printed: as wide as the terminal, and 80 columns where there is none."""
-    return TableConsole()

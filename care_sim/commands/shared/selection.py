@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,10 +18,10 @@ from care_sim.commands.options.shared import EpisodeOptions, PlayOptions, Source
 from care_sim.core.conditions import DEFAULTS
 from care_sim.policies import check_policy, contenders
 from care_sim.scenarios import PLUGINS, SCENARIOS, make_scenario, scenario_names
-from care_sim.sources.installed import SOURCES
-from care_sim.sources.named import source_of
-from care_sim.sources.scenes import Source
 from care_sim.study.parameters import Parameters, parameters
+
+if TYPE_CHECKING:
+    from care_sim.sources.scenes import Source
 
 _ALL = "all"
 """The name that stands for every known one."""
@@ -166,8 +166,12 @@ def common_of(options: PlayOptions, policies: Sequence[str]) -> dict[str, Any]:
     }
 
 
-def source_named(options: SourceOptions, text: str) -> Source:
+def source_named(options: SourceOptions, text: str) -> "Source":
     """The source that a text and the options name. Raises InvalidInput if there is none."""
+    # Imported here because the kinds of recordings load SciPy and PyArrow.
+    from care_sim.sources.installed import SOURCES
+    from care_sim.sources.named import source_of
+
     # If two sources have one name, a line says which plays.
     kind = text.partition(":")[0]
     report_problems([line for one, line in SOURCES.refusals() if one.name == kind])

@@ -7,7 +7,9 @@ from dataclasses import replace
 from functools import partial
 
 from care_sim.base.checks import check_known
+from care_sim.base.console import TableConsole
 from care_sim.base.errors import InvalidInput
+from care_sim.base.exit_codes import DONE
 from care_sim.base.files import JSON, check_output, write_text
 from care_sim.commands.options.further_studies import (
     R157,
@@ -19,7 +21,7 @@ from care_sim.commands.options.further_studies import (
 )
 from care_sim.commands.options.shared import seeds_of
 from care_sim.commands.options.studies import FixedStudy, Reproduce, Sweep
-from care_sim.commands.shared.play_study import DONE, console, folder_of, play_study
+from care_sim.commands.shared.play_study import folder_of, play_study
 from care_sim.commands.shared.selection import (
     arguments_of,
     buildable,
@@ -159,6 +161,6 @@ def vehicle(options: Vehicle) -> int:
     if options.frames and code == DONE:
         report = compute_report(options.frames, partial(print, "measuring", file=sys.stderr))
         for table in compute_tables(report):
-            console().print(table.rich())
+            TableConsole().print(table.rich())
         write_text(out / _TIMES, json.dumps(report, indent=1) + "\n")
     return code

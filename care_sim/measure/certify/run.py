@@ -10,12 +10,12 @@ import tyro
 
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.checks import check_whole
+from care_sim.base.cores import MOST_WORKERS, WORKERS
 from care_sim.base.errors import InvalidInput, MissingExtra, report_problems
 from care_sim.measure.certify.design import CERTIFIED_EPISODES, drawn
 from care_sim.measure.certify.playing import Trails, playable_here, trails_of
 from care_sim.measure.certify.published import combined, read, write
 from care_sim.measure.certify.verdict import verdict_of
-from care_sim.study.executors import MOST_WORKERS, WORKERS
 from care_sim.study.progress import ProgressLines, progress_bar
 
 _ALL_EPISODES = 10_000
