@@ -182,8 +182,8 @@ def print_completion(arguments: Sequence[str]) -> NoReturn:
     families: dict[str, list[Any]] = {}
     for name, command in COMMANDS.items():
         first, _, second = name.partition(" ")
-        kind = Annotated[command.options_class(), _subcommand(second or first)]
-        families.setdefault(first, []).append(kind)
+        kind: Any = command.options_class()
+        families.setdefault(first, []).append(Annotated[kind, _subcommand(second or first)])
     kinds = [
         own[0] if len(own) == 1 else Annotated[_union(own), _subcommand(first)]
         for first, own in families.items()

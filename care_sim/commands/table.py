@@ -189,7 +189,7 @@ GROUPS: dict[str, dict[str, Command]] = {
         ),
         "train curves": Command(
             f"{_OPTIONS}.learning:Curves",
-            "commands.train:curves",
+            "commands.curves:curves",
             "Draw the learning curves of training runs.",
         ),
     },

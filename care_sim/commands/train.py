@@ -1,21 +1,15 @@
-"""`care-sim train`: the learners, and the figure of learning curves."""
+"""`care-sim train ppo`, `sac` and `recurrent-ppo`."""
 
 import shlex
 from collections.abc import Iterator
 from dataclasses import fields
 
-from care_sim.base.console import TableConsole
-from care_sim.base.errors import InvalidInput, print_lines
-from care_sim.base.files import told_if_replaced
-from care_sim.commands.options.learning import Curves, Learner
+from care_sim.base.errors import print_lines
+from care_sim.commands.options.learning import Learner
 from care_sim.commands.shared.agent_play import AgentPlay
-from care_sim.reports.figures.files import check_figure, save
 from care_sim.training.agents import Agent
 from care_sim.training.closing import how_to_play
 from care_sim.training.config import AgentConfig
-from care_sim.training.curves import grouped_runs, read_run
-from care_sim.training.curves_figure import curves_figure
-from care_sim.training.curves_table import curves_table
 from care_sim.training.folder import CHECKPOINT, CURVE, RULES, WEIGHTS, read_curve, read_rules
 from care_sim.training.hyperparameters import read_hyperparameters
 from care_sim.training.run import train_agent
@@ -63,19 +57,3 @@ def end_of_training(config: AgentConfig) -> Iterator[str]:
     yield f"kept: the weights of that step, {out / WEIGHTS}"
     yield how_to_play("run", out)
     yield f"beside care: {AgentPlay(Agent.of_run(config, out / WEIGHTS)).study_line()}"
-
-
-def curves(options: Curves) -> int:
-    """Draw learning curves, and print their table."""
-    if not options.folders:
-        raise InvalidInput(
-            "curves needs the folder of a training run, the --out of `care-sim train`"
-        )
-    groups = grouped_runs(map(read_run, options.folders))
-    check_figure(options.out)
-    table = curves_table(groups)
-    told = told_if_replaced(options.out.with_suffix(".png"))
-    save(curves_figure(groups), options.out)
-    TableConsole().print(table.rich())
-    print_lines(f"Figure: {told}")
-    return 0

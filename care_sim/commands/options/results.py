@@ -10,7 +10,7 @@ from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.checks import LARGEST_INTEGER
 from care_sim.base.cores import MOST_WORKERS, WORKERS
 from care_sim.base.errors import InvalidInput
-from care_sim.commands.options.shared import EpisodeOptions, Flag, PlayOptions, SourceOptions
+from care_sim.commands.options.shared import EpisodeOptions, PlayOptions, SourceOptions
 from care_sim.core.defaults import AS_DEMANDED
 
 CONTROL = "place"
@@ -37,7 +37,7 @@ class Benchmark:
     rows-down, rows-up, columns, random, spread, core-spread."""
     name: str = ""
     """What you call the entry, for its line in tables, if one policy is played alone."""
-    quick: Flag[bool] = False
+    quick: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """The first tenth of the worlds alone: a trial, and no line of the leaderboard."""
     sealed: Path | None = None
     """For organisers of a competition: a file with a secret salt, which draws other worlds. The
@@ -62,11 +62,11 @@ class Leaderboard:
         tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER...")
     ] = ()
     """Folders with result files, or such files. Of two with one name and code the first counts."""
-    quick: Flag[bool] = False
+    quick: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """Compare on the tenth of the worlds that `benchmark --quick` plays: a trial."""
     minus: str = CONTROL
     """The entry over which the leads of all others are shown, by its name in the table."""
-    verify: Flag[bool] = False
+    verify: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """Play a random tenth of the episodes of every result again, instead of a table. Their policies
     must be installed here."""
     sealed: Path | None = None
@@ -170,9 +170,9 @@ class Judge(PlayOptions):
     """Processes that play at the same time."""
     out: Path = Path("runs/judge")
     """Folder of tables, figure and numbers."""
-    official: Flag[bool] = False
+    official: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """Write all boxes, too, in the form that the official nuScenes devkit scores."""
-    force: Flag[bool] = False
+    force: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """Replace what such a command wrote there."""
 
     def __post_init__(self) -> None:

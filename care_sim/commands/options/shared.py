@@ -14,11 +14,6 @@ from care_sim.base.seed_ranges import CALIBRATION, split_of
 from care_sim.core.conditions import ClosedLoopConditions, Conditions
 from care_sim.study.parameters import parameters
 
-Flag = tyro.conf.FlagCreatePairsOff
-"""A switch that is off unless its name is given."""
-Group = tyro.conf.OmitArgPrefixes
-"""Options with a heading of their own in help, written without its name."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class SensingOptions:
@@ -31,7 +26,9 @@ class SensingOptions:
     pillars (a learned one), torchscript, the name of an installed one, or MODULE:CLASS."""
     detector_parameters: tuple[str, ...] = ()
     """Parameters of the detector as NAME=VALUE, for example file=model.pt for torchscript."""
-    conditions: Group[ClosedLoopConditions] = field(default=ClosedLoopConditions())
+    conditions: Annotated[ClosedLoopConditions, tyro.conf.OmitArgPrefixes] = field(
+        default=ClosedLoopConditions()
+    )
     """How well the car senses, how it drives, and how it spends its budget."""
 
     def sensing(self) -> dict[str, Any]:
@@ -110,7 +107,7 @@ class PlayOptions(SourceOptions):
     policy_parameters: tuple[str, ...] = ()
     """Parameters of the policies as NAME=VALUE, for example k_safe=0 for care-sbf; for one of
     several policies as POLICY.NAME=VALUE, for example ppo.path=weights.npz."""
-    conditions: Group[Conditions] = field(default=Conditions())
+    conditions: Annotated[Conditions, tyro.conf.OmitArgPrefixes] = field(default=Conditions())
     """How well the car senses, and how it spends its budget."""
 
 
