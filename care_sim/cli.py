@@ -8,7 +8,7 @@ import shutil
 import sys
 from collections.abc import Sequence
 from difflib import get_close_matches
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import care_sim
 from care_sim.base import interrupts
@@ -28,7 +28,7 @@ from care_sim.base.errors import (
 from care_sim.base.exit_codes import BAD_INPUT, FAILED, INTERRUPTED, UNEXPECTED, UNREAD
 from care_sim.base.foreign_code import foreign_place
 from care_sim.base.limits import limit_in
-from care_sim.commands.table import COMMANDS, FAMILIES, GROUPS, RENAMED
+from care_sim.commands.table import COMMANDS, FAMILIES, GROUPS, RENAMED, Command
 
 _DEBUG = "--debug"
 
@@ -165,14 +165,8 @@ def _finished(arguments: list[str]) -> int:
         if (text := _told(first, arguments[1:])) is not None:
             print(text)
             return 0
-        # Imported here because tyro takes a third of the time of `care-sim --help`.
-        from care_sim.commands.parsing import print_completion, read_options
-
-        if first == _COMPLETION:
-            print_completion(arguments)
-        name, rest = chosen_command(arguments)
-        options = read_options(COMMANDS[name].options_class(), f"care-sim {name}", rest)
-        return int(COMMANDS[name].function()(options))
+        command, options = parsed_command(arguments)
+        return int(command.function()(options))
     finally:
         sys.stdout.flush()
 
@@ -192,6 +186,18 @@ def _check_texts(arguments: list[str]) -> None:
             raise InvalidInput(f"no text: {shown(argument)}")
 
 
+def parsed_command(arguments: Sequence[str]) -> tuple[Command, Any]:
+    """The command that the arguments name, and its options. Raises InvalidInput, in one line."""
+    # Imported here because tyro takes a third of the time of `care-sim --help`.
+    from care_sim.commands.parsing import print_completion, read_options
+
+    if arguments[0] == _COMPLETION:
+        print_completion(arguments)
+    name, rest = _chosen(arguments)
+    command = COMMANDS[name]
+    return command, read_options(command.options_class(), f"care-sim {name}", rest)
+
+
 def _told(first: str, rest: Sequence[str]) -> str | None:
     """What is printed where no command runs; None where one does."""
     if first in ("-h", "--help"):
@@ -203,7 +209,7 @@ def _told(first: str, rest: Sequence[str]) -> str | None:
     return None
 
 
-def chosen_command(arguments: Sequence[str]) -> tuple[str, Sequence[str]]:
+def _chosen(arguments: Sequence[str]) -> tuple[str, Sequence[str]]:
     """The name of the command that the arguments name, and the words after it. A line says what an
     old name is now. Raises InvalidInput for another name.
     """
@@ -215,7 +221,7 @@ def chosen_command(arguments: Sequence[str]) -> tuple[str, Sequence[str]]:
             return name, arguments[count:]
     if (now := _now(arguments)) is not None:
         report_problems([f"`care-sim {first}` is now `care-sim {now}`"])
-        return chosen_command([*now.split(), *arguments[1:]])
+        return _chosen([*now.split(), *arguments[1:]])
     if first in FAMILIES:
         below = [name.split()[1] for name in COMMANDS if name.startswith(f"{first} ")]
         raise unknown(f"command after {first}", arguments[1], below)

@@ -1,7 +1,7 @@
 """Options that several commands share: sensors and conditions, parameters, sources, seeds."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,6 +13,9 @@ from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.seed_ranges import CALIBRATION, split_of
 from care_sim.core.conditions import ClosedLoopConditions, Conditions
 from care_sim.study.parameters import parameters
+
+_CLOSED_LOOP, _BOTH_LOOPS = ClosedLoopConditions(), Conditions()
+"""The defaults."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,9 +29,7 @@ class SensingOptions:
     pillars (a learned one), torchscript, the name of an installed one, or MODULE:CLASS."""
     detector_parameters: tuple[str, ...] = ()
     """Parameters of the detector as NAME=VALUE, for example file=model.pt for torchscript."""
-    conditions: Annotated[ClosedLoopConditions, tyro.conf.OmitArgPrefixes] = field(
-        default=ClosedLoopConditions()
-    )
+    conditions: Annotated[ClosedLoopConditions, tyro.conf.OmitArgPrefixes] = _CLOSED_LOOP
     """How well the car senses, how it drives, and how it spends its budget."""
 
     def sensing(self) -> dict[str, Any]:
@@ -107,7 +108,7 @@ class PlayOptions(SourceOptions):
     policy_parameters: tuple[str, ...] = ()
     """Parameters of the policies as NAME=VALUE, for example k_safe=0 for care-sbf; for one of
     several policies as POLICY.NAME=VALUE, for example ppo.path=weights.npz."""
-    conditions: Annotated[Conditions, tyro.conf.OmitArgPrefixes] = field(default=Conditions())
+    conditions: Annotated[Conditions, tyro.conf.OmitArgPrefixes] = _BOTH_LOOPS
     """How well the car senses, and how it spends its budget."""
 
 
