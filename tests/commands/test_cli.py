@@ -149,7 +149,7 @@ def test_alone_it_shows_every_command_in_its_group_in_a_line_of_eighty_columns(c
             "unknown policy 'kare'; the nearest is care; known: all-camera, ",
         ),
         ("run dens", "unknown scenario 'dens'; the nearest is dense; known: "),
-        ("run moon", "; `care-sim scenarios` tells what each is"),
+        ("run moon", "; `care-sim list scenarios` tells what each is"),
         ("polices", "unknown command 'polices'; the nearest is policies; known: "),
     ],
 )

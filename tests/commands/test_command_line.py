@@ -42,7 +42,7 @@ def test_an_option_of_a_source_counts_as_given_if_it_is_a_number(given, told):
 def test_paths_are_told_as_a_shell_takes_them():
     command = parsed_command(["crowding", "--out", "a b"])
     assert command.out == Path("a b")
-    assert command_line(command) == "care-sim crowding --out 'a b'"
+    assert command_line(command) == "care-sim study crowding --out 'a b'"
 
 
 def test_a_home_folder_is_expanded_wherever_a_path_begins(monkeypatch, tmp_path):

@@ -1,4 +1,4 @@
-"""`care-sim ncap` and `care-sim faults` under conditions."""
+"""`care-sim study ncap` and `care-sim study faults` under conditions."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""`care-sim order` and `care-sim ablate`: each of one loop, and of the open one with --source."""
+"""`care-sim study order` and `care-sim study ablate`: each of one loop, and of the open one with --source."""
 
 from pathlib import Path
 

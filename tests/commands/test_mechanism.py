@@ -1,4 +1,4 @@
-"""`care-sim mechanism` over a hand-built drive."""
+"""`care-sim study mechanism` over a hand-built drive."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""`care-sim vehicle` around its study: when the software is timed, and that it can be written."""
+"""`care-sim study vehicle` around its study: when the software is timed, and that it can be written."""
 
 import json
 

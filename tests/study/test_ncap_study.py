@@ -1,4 +1,4 @@
-"""What `care-sim ncap` plays."""
+"""What `care-sim study ncap` plays."""
 
 from collections import Counter
 

@@ -122,7 +122,7 @@ def test_it_trains_keeps_and_goes_on(capsys, tmp_path):
     assert lines[2] == f"kept: the weights of that step, {out / 'weights.npz'}"
     assert load_weights(out / "weights.npz").card.steps == int(steps)
     play, beside = (line.partition(": ")[2] for line in lines[3:])
-    assert play == f"care-sim enjoy {out}"
+    assert play == f"care-sim run {out}"
     # It goes as it is told, and learns of the parameters of the training.
     assert beside == (
         "care-sim sweep --scenarios dense --policies care ppo --budgets 0.03 "

@@ -1,1 +1,1 @@
-"""How long the car's software takes at a keyframe, stage by stage: `care-sim vehicle`."""
+"""How long the car's software takes at a keyframe, stage by stage: `care-sim study vehicle`."""

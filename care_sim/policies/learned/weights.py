@@ -78,7 +78,7 @@ _HINTS = {
     "budget": "; those trained with several budgets fit any",
     "grid": (
         "; what was learned belongs to the cells of that grid: play the sensor set-up that has it, "
-        "or a policy that is not tagged `learned` in `care-sim policies`"
+        "or a policy that is not tagged `learned` in `care-sim list policies`"
     ),
 }
 """Why weights do not fit, and what does."""
