@@ -35,9 +35,9 @@ _DEBUG = "--debug"
 _USAGE = """usage: care-sim COMMAND [options]
 
 Benchmark for adaptive LiDAR sensing: a policy decides which cells fire."""
-_WAYS_ON = """care-sim COMMAND --help lists its options, --help-all explains the conditions, too.
-care-sim --version prints the version. care-sim --tyro-print-completion SHELL prints a
-script by which bash, zsh or fish completes. Begin with: care-sim run dartout"""
+_WAYS_ON = """care-sim COMMAND --help lists its options, --help-all the conditions, too.
+care-sim --version prints the version, --tyro-print-completion SHELL a script
+by which bash, zsh or fish completes. Begin with: care-sim run dartout"""
 _COMPLETION = "--tyro-print-completion"
 _NEW_OBJECTS = 100_000
 """After how many the garbage collector looks at them; Python's default is 700."""
@@ -191,6 +191,7 @@ def parsed_command(arguments: Sequence[str]) -> tuple[Command, Any]:
     # Imported here because tyro takes a third of the time of `care-sim --help`.
     from care_sim.commands.parsing import print_completion, read_options
 
+    arguments = _renamed(arguments)
     if arguments[0] == _COMPLETION:
         print_completion(arguments)
     name, rest = _chosen(arguments)
@@ -210,8 +211,8 @@ def _told(first: str, rest: Sequence[str]) -> str | None:
 
 
 def _chosen(arguments: Sequence[str]) -> tuple[str, Sequence[str]]:
-    """The name of the command that the arguments name, and the words after it. A line says what an
-    old name is now. Raises InvalidInput for another name.
+    """The name of the command that the arguments name, and the words after it. Raises InvalidInput
+    for another name.
     """
     first = arguments[0]
     if first.startswith("-"):
@@ -219,9 +220,6 @@ def _chosen(arguments: Sequence[str]) -> tuple[str, Sequence[str]]:
     for count, name in enumerate(_named(arguments), 1):
         if name in COMMANDS:
             return name, arguments[count:]
-    if (now := _now(arguments)) is not None:
-        report_problems([f"`care-sim {first}` is now `care-sim {now}`"])
-        return _chosen([*now.split(), *arguments[1:]])
     if first in FAMILIES:
         below = [name.split()[1] for name in COMMANDS if name.startswith(f"{first} ")]
         raise unknown(f"command after {first}", arguments[1], below)
@@ -230,12 +228,16 @@ def _chosen(arguments: Sequence[str]) -> tuple[str, Sequence[str]]:
     raise unknown("command", first, names, f"perhaps `{RENAMED[old[0]]}`" if old else "")
 
 
-def _now(arguments: Sequence[str]) -> str | None:
-    """What an old name is now; None for a name that was none."""
+def _renamed(arguments: Sequence[str]) -> Sequence[str]:
+    """The arguments with what an old name is now, which a line says."""
+    first, second = *arguments[:2], *[""] * (2 - len(arguments[:2]))
     # `export` had one form, which began with its options.
-    if arguments[0] == "export" and arguments[1].startswith("-"):
-        return "export nuscenes"
-    return RENAMED.get(arguments[0])
+    old_export = first == "export" and second.startswith("-")
+    now = "export nuscenes" if old_export else RENAMED.get(first)
+    if now is None:
+        return arguments
+    report_problems([f"`care-sim {first}` is now `care-sim {now}`"])
+    return [*now.split(), *arguments[1:]]
 
 
 def _named(arguments: Sequence[str]) -> list[str]:

@@ -3,8 +3,6 @@
 import inspect
 import os
 import re
-import shutil
-import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import MISSING, Field, fields, is_dataclass
 from difflib import get_close_matches
@@ -71,17 +69,11 @@ def _recipe(kind: type[Learner], words: Sequence[str]) -> Mapping[str, Any]:
 
 def _description(kind: type, brief: bool) -> str:
     about = inspect.getdoc(kind) or ""
-    names = [
-        name
-        for field in fields(kind)
-        if isinstance(field.default, Conditions)
-        for name in option_names(field.default)
-    ]
-    if not (brief and names):
+    conditions = [field.default for field in fields(kind) if isinstance(field.default, Conditions)]
+    if not (brief and conditions):
         return about
-    told = f"Conditions, which {_HELP_ALL} explains: {', '.join(names)}."
-    columns = shutil.get_terminal_size().columns
-    return f"{about}\n\n{textwrap.fill(told, columns, break_on_hyphens=False)}"
+    names = ", ".join(option_names(conditions[0]))
+    return f"{about}\n\nConditions, which {_HELP_ALL} explains: {names}."
 
 
 def _explained(

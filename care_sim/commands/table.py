@@ -197,7 +197,7 @@ GROUPS: dict[str, dict[str, Command]] = {
         "list": Command(
             f"{_WATCHING}:List",
             "commands.listings:show",
-            "List policies, agents, scenarios, sources, detectors, sensors, engines.",
+            "List policies, agents, scenarios, sources, sensors and more.",
         ),
         "certify": Command(
             "commands.certify:Certify",

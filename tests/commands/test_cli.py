@@ -9,15 +9,15 @@ from itertools import pairwise
 from unittest.mock import Mock
 
 import pytest
+from care_sim.commands.entries import COMMANDS, GROUPS
+from care_sim.commands.reproduce import Reproduce
+from care_sim.commands.shared.options import Options
+from care_sim.commands.shared.parsing import option_helps
 
 import care_sim
 from care_sim.base.errors import InvalidInput
 from care_sim.base.interrupts import SIGNALS
 from care_sim.cli import main
-from care_sim.commands.entries import COMMANDS, GROUPS
-from care_sim.commands.reproduce import Reproduce
-from care_sim.commands.shared.options import Options
-from care_sim.commands.shared.parsing import option_helps
 from care_sim.core.conditions import DEFAULTS
 from care_sim.policies import contenders
 from care_sim.scenarios import SCENARIOS
@@ -47,7 +47,7 @@ def test_a_host_that_calls_a_command_keeps_its_handlers_and_may_do_so_in_a_threa
         code, out, err = threads.submit(run, capsys, "detectors").result()
     assert (code, err) == (0, "")
     assert "cluster" in out
-    assert run(capsys, "detectors")[0] == 0
+    assert run(capsys, "list", "detectors")[0] == 0
     assert [signal.getsignal(number) for number in (*SIGNALS, signal.SIGALRM)] == before
     assert gc.get_threshold() == collector
 
@@ -64,14 +64,17 @@ def test_a_host_that_calls_a_command_keeps_its_handlers_and_may_do_so_in_a_threa
         (["run", "dense", "--policy", "best"], ["'best'", "care"]),
         (["run", "dense", "--bugdet", "1"], ["--bugdet", "--budget"]),
         (["run", "dense", "--budget", "x"], ["--budget", "'x'"]),
-        (["crowding", "--driver", "careful-human"], ["--driver is an option of care-sim sweep\n"]),
-        (["reproduce", "--no_floor"], ["--no_floor is an option of care-sim sweep and"]),
-        (["faults", "--camera-latency", "1"], ["camera_latency is a fault that grows"]),
         (
-            ["mechanism", "--floor-seeds", "2"],
+            ["study", "crowding", "--driver", "careful-human"],
+            ["--driver is an option of care-sim sweep\n"],
+        ),
+        (["reproduce", "--no_floor"], ["--no_floor is an option of care-sim sweep and"]),
+        (["study", "faults", "--camera-latency", "1"], ["camera_latency is a fault that grows"]),
+        (
+            ["study", "mechanism", "--floor-seeds", "2"],
             ["--floor-seeds is an option of care-sim protocol\n"],
         ),
-        (["ncap", "--wheels", "3"], ["Unrecognized options: --wheels, 3\n"]),
+        (["study", "ncap", "--wheels", "3"], ["Unrecognized options: --wheels, 3\n"]),
         (["run", "dense", "--budget", "0"], ["budget", "(0, 1]"]),
         (["run", "dense", "--budget", "1.5"], ["budget", "(0, 1]"]),
         (["run", "dense", "--camera-latency", "-1"], ["camera_latency", ">= 0"]),
@@ -92,13 +95,16 @@ def test_a_host_that_calls_a_command_keeps_its_handlers_and_may_do_so_in_a_threa
         (["sweep", "--seeds", "1001"], ["seeds", "from 1 to 1,000"]),
         (["sweep", "--budgets"], ["--budgets", "at least one"]),
         (["sweep", "--scenarios"], ["--scenarios", "at least one"]),
-        (["validate"], ["WORLD"]),
-        (["validate", "moon"], ["scenario 'moon'", "dartout"]),
-        (["validate", "cutin", "--seeds", "1000", "1001"], ["seeds of a test", "1,000", "1001"]),
-        (["validate", "cutin", "--training-seeds", "0"], ["training_seeds", ">= 1"]),
-        (["validate", "cutin", "--factors", "mirrored"], ["NAME=VALUE", "'mirrored'"]),
+        (["study", "validate"], ["WORLD"]),
+        (["study", "validate", "moon"], ["scenario 'moon'", "dartout"]),
         (
-            ["validate", "cutin", "--factors", "mirrored=half"],
+            ["study", "validate", "cutin", "--seeds", "1000", "1001"],
+            ["seeds of a test", "1,000", "1001"],
+        ),
+        (["study", "validate", "cutin", "--training-seeds", "0"], ["training_seeds", ">= 1"]),
+        (["study", "validate", "cutin", "--factors", "mirrored"], ["NAME=VALUE", "'mirrored'"]),
+        (
+            ["study", "validate", "cutin", "--factors", "mirrored=half"],
             ["mirrored of cutin 'half'", "drawn"],
         ),
         (["reproduce", "--workers", "0"], ["workers", ">= 1"]),
@@ -132,7 +138,7 @@ def test_alone_it_shows_every_command_in_its_group_in_a_line_of_eighty_columns(c
     ("arguments", "told"),
     [
         ("run dense --fog 50", "Unrecognized options: --fog, 50; --visibility-m tells of fog"),
-        ("crowding --fog 50", "--fog, 50; of care-sim sweep, --visibility-m tells of fog"),
+        ("study crowding --fog 50", "--fog, 50; of care-sim sweep, --visibility-m tells of fog"),
         ("run dense --weather x", "--visibility-m and --rain-mm-h tell of weather"),
         ("run dense --latency 2", "perhaps --camera-latency or --camera-latency-s"),
         ("run dense --bugdet 1", "perhaps --budget"),
@@ -163,17 +169,17 @@ def test_who_is_lost_is_told_a_way_on(arguments, told, capsys):
     "command",
     [
         ["sweep"],
-        ["ncap"],
-        ["r157"],
-        ["validate", "dartout"],
+        ["study", "ncap"],
+        ["study", "r157"],
+        ["study", "validate", "dartout"],
         ["reproduce"],
-        ["ablate"],
-        ["faults"],
-        ["crowding"],
-        ["order"],
-        ["firing"],
-        ["realism"],
-        ["vehicle"],
+        ["study", "ablate"],
+        ["study", "faults"],
+        ["study", "crowding"],
+        ["study", "order"],
+        ["study", "firing"],
+        ["study", "realism"],
+        ["study", "vehicle"],
     ],
     ids=lambda command: command[0],
 )
@@ -250,7 +256,7 @@ def test_an_unfinished_study_is_told_from_none(capsys, tmp_path):
 
 
 def test_the_detectors_are_listed_with_a_line_each(capsys):
-    code, out, _ = run(capsys, "detectors")
+    code, out, _ = run(capsys, "list", "detectors")
     assert code == 0
     first = [line for line in out.splitlines() if not line.startswith(" ")]
     assert [line.split()[0] for line in first] == [
@@ -271,7 +277,7 @@ def test_the_sources_are_listed_as_they_are_asked_for_and_a_broken_one_with_its_
     capsys, install
 ):
     install("ours", "import nowhere", SOURCES.group, torn="Torn")
-    code, out, err = run(capsys, "sources")
+    code, out, err = run(capsys, "list", "sources")
     assert (code, err) == (0, "")
     assert re.findall(r"^\S+", out, re.MULTILINE) == [
         "streets",
@@ -420,8 +426,8 @@ def test_what_is_no_number_is_told_in_plain_words(arguments, message, capsys):
 
 @pytest.mark.smoke
 def test_the_lists(capsys):
-    assert "care-sbf" in run(capsys, "policies")[1]
-    out = " ".join(run(capsys, "scenarios")[1].split())
+    assert "care-sbf" in run(capsys, "list", "policies")[1]
+    out = " ".join(run(capsys, "list", "scenarios")[1].split())
     assert "dartout" in out
     assert "vehicles=7" in out
     assert "ego_speed_mps=8.03,8.63 (0.5 to 60)" in out
@@ -441,7 +447,7 @@ def test_an_installed_policy_that_does_not_load_is_listed_with_the_reason(
         "[care_sim.policies]\ntorn = torn_policy:Torn\nzeta = care_sim:Policy\n"
     )
     monkeypatch.syspath_prepend(tmp_path)
-    code, out, _ = run(capsys, "policies")
+    code, out, _ = run(capsys, "list", "policies")
     assert code == 0
     assert "No module named 'torn_policy' [torn 1.5]" in out
     assert "zeta" in out
@@ -528,7 +534,7 @@ def test_a_name_that_a_terminal_would_obey_stays_on_its_line(capsys, tmp_path):
         sweep,
         sweep,
         ["report", odd],
-        ["merge", odd, odd, "--out", odd / "whole"],
+        ["report", odd, odd, "--out", odd / "whole"],
         ["run", "dartout", *SHORT, "--video", odd / "film.gif"],
     ):
         code, out, err = run(capsys, *command)
@@ -605,7 +611,7 @@ def test_a_fault_of_the_software_is_one_line_and_its_trace_is_to_be_had(fault, c
     fails = Mock(side_effect=fault("deep\ninside"))
     monkeypatch.delenv("CARE_SIM_DEBUG", raising=False)
     monkeypatch.setattr("care_sim.commands.listings.Scenarios.__call__", fails)
-    code, _, err = run(capsys, "scenarios")
+    code, _, err = run(capsys, "list", "scenarios")
     if fault is MemoryError:
         assert (code, "ulimit -v" in err) == (1, True)
     else:
@@ -614,10 +620,10 @@ def test_a_fault_of_the_software_is_one_line_and_its_trace_is_to_be_had(fault, c
         assert err.startswith(told)
     assert err.count("\n") == 1
     with pytest.raises(fault):
-        main(["scenarios", "--debug"])
+        main(["list", "scenarios", "--debug"])
     monkeypatch.setenv("CARE_SIM_DEBUG", "1")
     with pytest.raises(fault):
-        main(["scenarios"])
+        main(["list", "scenarios"])
 
 
 _FAULTY = """

@@ -6,12 +6,12 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
+from care_sim.commands.shared.options import Options
 
 from care_sim.base.errors import InvalidInput
 from care_sim.cli import main, parsed_command
 from care_sim.commands import enjoy
 from care_sim.commands.shared.agent_play import AgentPlay
-from care_sim.commands.shared.options import Options
 from care_sim.policies.learned.weights import load_weights, save_weights, shipped_weights
 from care_sim.training.agents import Agent, find_agent, shipped_agents
 from care_sim.training.config import SacConfig
@@ -52,18 +52,18 @@ def test_it_plays_where_the_agent_learned_and_with_its_conditions(capsys, mine):
     conditions = "--lidar-dropout 0.5 --scenario-parameters duration_s=0.5"
     wanted = hash_of(run(capsys, *line.split(), *conditions.split())[1])
     for named in (mine, path):
-        code, out, complaint = run(capsys, "enjoy", named, "--seed", 2)
+        code, out, complaint = run(capsys, "run", named, "--seed", 2)
         assert code == 0
         assert hash_of(out) == wanted
         assert complaint == "care-sim: played without what no command takes: keyframe_s\n"
     # What is given wins over what was learned with.
     given = ("--lidar-dropout", 0.1, *SHORT)
     other = [*line.split(), *given]
-    assert hash_of(run(capsys, "enjoy", mine, *given, "--seed", 2)[1]) == hash_of(
+    assert hash_of(run(capsys, "run", mine, *given, "--seed", 2)[1]) == hash_of(
         run(capsys, *other)[1]
     )
     # Elsewhere nothing of the training counts but the weights, and the budget.
-    away = run(capsys, "enjoy", path, "--scenario", "dense", *SHORT)
+    away = run(capsys, "run", path, "--scenario", "dense", *SHORT)
     line = ["run", "dense", "--policy", "ppo", "--budget", 0.05, *SHORT]
     there = run(capsys, *line, "--policy-parameters", f"path={path}")
     assert away[2] == there[2] == ""
@@ -89,11 +89,11 @@ def test_a_shipped_agent_plays_by_either_name_and_is_filmed(capsys, tmp_path):
     film = tmp_path / "film.gif"
     line = ["run", "dense", "--policy", "ppo", "--budget", 0.03, *SHORT]
     wanted = hash_of(run(capsys, *line)[1])
-    code, out, _ = run(capsys, "enjoy", "ppo", *SHORT, "--video", film)
+    code, out, _ = run(capsys, "run", "ppo", *SHORT, "--video", film)
     assert (code, hash_of(out)) == (0, wanted)
     assert out.endswith(f"Filmed in {film}\n")
     assert film.read_bytes().startswith(b"GIF8")
-    assert hash_of(run(capsys, "enjoy", "ppo-dense", *SHORT)[1]) == wanted
+    assert hash_of(run(capsys, "run", "ppo-dense", *SHORT)[1]) == wanted
 
 
 def test_the_viewer_opens_on_the_episode(capsys, monkeypatch, tmp_path):
@@ -107,7 +107,7 @@ def test_the_viewer_opens_on_the_episode(capsys, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(enjoy, "View", view)
     for more in ((), ("--record", "other.rrd")):
-        assert run(capsys, "enjoy", "ppo", *SHORT, "--view", *more)[0] == 0
+        assert run(capsys, "run", "ppo", *SHORT, "--view", *more)[0] == 0
     assert seen == [("runs/enjoy.rrd", b"RRF2"), ("other.rrd", b"RRF2")]
 
 
@@ -124,7 +124,7 @@ def test_every_agent_of_the_package_is_found_and_has_a_world():
 
 @pytest.mark.parametrize("agent", shipped_agents(), ids=lambda agent: agent.name)
 def test_every_agent_of_the_package_can_be_enjoyed(capsys, agent):
-    code, out, complaint = run(capsys, "enjoy", agent.name)
+    code, out, complaint = run(capsys, "run", agent.name)
     assert (code, complaint) == (0, "")
     assert hash_of(out)
 
@@ -189,7 +189,7 @@ def test_what_is_no_agent_is_told_in_one_line(capsys, tmp_path, monkeypatch, nam
     save_weights("placeless.npz", file.arrays, replace(file.card, scenario=None))
     learner = SimpleNamespace(save=lambda path: path.write_bytes(b"PK"))
     Folder(SacConfig(out=tmp_path / "sac")).begin(learner)
-    code, _, complaint = run(capsys, "enjoy", *named.split())
+    code, _, complaint = run(capsys, "run", *named.split())
     assert (code, complaint.count("\n")) == (2, 1)
     assert message in complaint
 

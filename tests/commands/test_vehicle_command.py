@@ -1,13 +1,13 @@
-"""`care-sim study vehicle` around its study: when the software is timed, and that it can be written."""
+"""`care-sim study vehicle`: when the software is timed, and that timings can be written."""
 
 import json
 
 import pytest
+from care_sim.commands.shared.study_command import DONE, FAILED
+from care_sim.commands.vehicle import Vehicle
 
 from care_sim.base.errors import InvalidInput
 from care_sim.commands import vehicle
-from care_sim.commands.shared.study_command import DONE, FAILED
-from care_sim.commands.vehicle import Vehicle
 from care_sim.measure.compute_path import report
 from care_sim.study.episode_config import grid
 

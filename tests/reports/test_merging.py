@@ -36,7 +36,7 @@ def folder(path, held, study="sweep", code="one"):
 def merge(capsys, *arguments):
     """Exit code, output and errors."""
     with pytest.raises(SystemExit) as end:
-        main(["merge", *map(str, arguments)])
+        main(["report", *map(str, arguments)])
     return end.value.code, *capsys.readouterr()
 
 

@@ -149,17 +149,9 @@ TINY = {
 }
 LONG = (
     "reproduce",
-    "ablate",
-    "order",
-    "firing",
-    "realism",
-    "faults",
-    "crowding",
-    "r157",
-    "vehicle",
-    "validate",
+    "sweep",
     "protocol",
-    "mechanism",
+    "study",
     "judge",
     "bench",
     "parity",
@@ -167,21 +159,17 @@ LONG = (
     "benchmark",
     "leaderboard",
     "train",
-    "sweep",
-    "ncap",
     "report",
     "export",
-    "collect",
 )
 """Commands that may take their time."""
 
 
 def commands():
     """Every command line that can begin, with the dataclass of its options."""
-    from care_sim.commands.entries import COMMANDS
+    from care_sim.commands.table import COMMANDS
 
-    found = {(name,): command.loaded() for name, command in COMMANDS.items() if name != "train"}
-    return found | {("train", name): kind for name, kind in COMMANDS["train"].loaded().items()}
+    return {tuple(name.split()): command.options_class() for name, command in COMMANDS.items()}
 
 
 def options(kind):

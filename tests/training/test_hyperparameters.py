@@ -41,7 +41,7 @@ def own(tmp_path):
 
 def asked(*line):
     """The command of `care-sim train`."""
-    return parsed_command(["train", *map(str, line)])
+    return parsed_command(["train", *map(str, line)])[1]
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -5,8 +5,7 @@ import sys
 import numpy as np
 import pytest
 
-from care_sim.commands.protocol import Protocol
-from care_sim.commands.sweep import Sweep
+from care_sim.commands.options.studies import Protocol, Sweep
 from care_sim.reports.figures.budget import sweep_figures
 from care_sim.reports.figures.crowding import crowding_figures
 from care_sim.reports.figures.files import remove_others, save
