@@ -1,13 +1,12 @@
 """`care-sim study order` and `ablate`: each of one loop, and of the open one with --source."""
 
-from pathlib import Path
-
 import pytest
-from care_sim.commands.ablate import Ablate
-from care_sim.commands.order import Order
 
 from care_sim.base.errors import InvalidInput
 from care_sim.cli import main
+from care_sim.commands.options.further_studies import Ablate
+from care_sim.commands.shared.selection import named_after
+from care_sim.commands.studies.either_loop import ablate
 from care_sim.core.return_settings import RETURN_SETTINGS
 from care_sim.reports.report import read_results
 from care_sim.study.designs.ablations import OPEN_ABLATIONS
@@ -74,18 +73,14 @@ def test_an_option_of_the_other_loop_is_refused(given, told, capsys):
     assert told in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("command", [Order, Ablate])
-def test_every_loop_has_a_folder_of_its_own(command):
-    name = command.__name__.lower()
-    assert command().name_of(name) == name
-    assert command(source="nuscenes:data").name_of(name) == f"{name}-nuscenes"
-    mine = command(source="streets", out=Path("mine"))
-    assert mine.folder(name, [], name) == Path("mine")
+def test_every_source_has_a_folder_of_its_own():
+    assert named_after("order", "nuscenes:data") == "order-nuscenes"
+    assert named_after("validate", "mine:Mine") == "validate-mine"
 
 
 def test_the_orders_of_a_log_are_played_and_reported_again(logs, tmp_path, capsys):
     out = tmp_path / "out"
-    asked = ("order", "--source", logs, "--policies", "history", "care", "full")
+    asked = ("study", "order", "--source", logs, "--policies", "history", "care", "full")
     asked = (*asked, "--budgets", 0.03, 0.1, "--workers", 1, "--out", out)
     assert run(*asked) == 0
     rows, study, _ = read_results(out)
@@ -175,4 +170,4 @@ def test_the_full_scan_alone_cannot_show_an_order(logs, tmp_path):
 
 def test_no_scene_outside_the_quarter_is_played(logs):
     with pytest.raises(InvalidInput, match="unknown scene 'other'"):
-        Ablate(source=logs, scenes=("other",))()
+        ablate(Ablate(source=logs, scenes=("other",)))

@@ -6,12 +6,13 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
-from care_sim.commands.shared.options import Options
 
 from care_sim.base.errors import InvalidInput
 from care_sim.cli import main, parsed_command
-from care_sim.commands import enjoy
+from care_sim.commands import run as run_command
+from care_sim.commands.options.shared import EpisodeOptions
 from care_sim.commands.shared.agent_play import AgentPlay
+from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.policies.learned.weights import load_weights, save_weights, shipped_weights
 from care_sim.training.agents import Agent, find_agent, shipped_agents
 from care_sim.training.config import SacConfig
@@ -82,7 +83,7 @@ def test_of_several_environments_the_first_counts_and_its_own_parameter_wins(min
     assert dict(agent.env_parameters) == {"speed_kph": 0, "scoring_info": True}
     play = AgentPlay(agent)
     assert play.left_out() == ["scoring_info"]
-    assert play.options(Options()).scenario_parameters == ("speed_kph=0",)
+    assert play.options(EpisodeOptions())["scenario_parameters"] == ("speed_kph=0",)
 
 
 def test_a_shipped_agent_plays_by_either_name_and_is_filmed(capsys, tmp_path):
@@ -100,15 +101,15 @@ def test_the_viewer_opens_on_the_episode(capsys, monkeypatch, tmp_path):
     pytest.importorskip("rerun")
     seen = []
 
-    def view(file):
-        seen.append((str(file), file.read_bytes()[:4]))
-        return lambda: 0
+    def view(options):
+        seen.append((str(options.file), options.file.read_bytes()[:4]))
+        return 0
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(enjoy, "View", view)
+    monkeypatch.setattr(run_command, "view", view)
     for more in ((), ("--record", "other.rrd")):
         assert run(capsys, "run", "ppo", *SHORT, "--view", *more)[0] == 0
-    assert seen == [("runs/enjoy.rrd", b"RRF2"), ("other.rrd", b"RRF2")]
+    assert seen == [("runs/run.rrd", b"RRF2"), ("other.rrd", b"RRF2")]
 
 
 def test_every_agent_of_the_package_is_found_and_has_a_world():
@@ -119,7 +120,7 @@ def test_every_agent_of_the_package_is_found_and_has_a_world():
     assert worlds["learned-scorer"] == "street"
     for name in names:
         line = shlex.split(AgentPlay(find_agent(name)).study_line())
-        assert name in parsed_command(line[1:]).policies
+        assert name in parsed_command(line[1:])[1].policies
 
 
 @pytest.mark.parametrize("agent", shipped_agents(), ids=lambda agent: agent.name)
@@ -163,7 +164,8 @@ def test_a_recorded_scene_is_played_as_it_was_learned():
     given = (("source", "argoverse2:logs"), ("scene", "one"), ("min_returns", 2))
     play = AgentPlay(Agent("ppo", None, "CARE-Replay-v0", 0.1, given))
     assert (play.world, play.scene) == ("argoverse2:logs", {"scene": "one"})
-    assert play.options(Options()) == Options(min_returns=2)
+    told = EpisodeOptions(**play.options(EpisodeOptions()))
+    assert told == EpisodeOptions(conditions=ClosedLoopConditions(min_returns=2))
 
 
 @pytest.mark.parametrize(
