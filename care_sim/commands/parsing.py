@@ -64,6 +64,9 @@ def _registry(brief: bool, defaults: Mapping[str, Any]) -> ConstructorRegistry:
 def _recipe(kind: type[Learner], words: Sequence[str]) -> Mapping[str, Any]:
     """The defaults of a learner in the environment that the words name."""
     named, _ = tyro.cli(Recipe, args=words, return_unknown_args=True, add_help=False)
+    # A file that is missing is named when the command runs, as that of any other option.
+    if named.hyperparameters is not None and not named.hyperparameters.exists():
+        return {}
     return read_hyperparameters(kind.kind, named.env, named.hyperparameters, named.drawn).values
 
 

@@ -16,7 +16,7 @@ from care_sim.commands.shared.command_line import command_line
         "sweep --seeds 7 7 --scenarios dense --no-floor --out 'my runs/x y' --workers 1",
         "sweep --false-negative-rates 0.1 0.2 --scenario-parameters vehicles=7 gap_m=0.8,1.2",
         "sweep --camera-latency-s 0.12 --firing tiles:4x8 --lidar-dead-rows 3 4 --force",
-        "validate dense --budgets 0.1 --factors mirrored=drawn ego_speed_mps=12.2,12.8",
+        "study validate dense --budgets 0.1 --factors mirrored=drawn ego_speed_mps=12.2,12.8",
         "study ablate --source streets --scenes 3 --budgets 0.03",
         "reproduce --also",
         "study ncap --tests CPNCO-50 --step-kph 5 --lidar-stated-range-m 40 --visibility-m 50",

@@ -29,14 +29,14 @@ def test_tests_of_euro_ncap_are_played_and_told_under_conditions(tmp_path, capsy
 
 def test_without_conditions_nothing_is_said_of_them():
     rows = [row(config, 9.0) for config in fault_study([0])]
-    assert STUDIES["study", "faults"].closing(rows) == [f"Collisions: 0 in {len(rows)} episodes."]
+    assert STUDIES["faults"].closing(rows) == [f"Collisions: 0 in {len(rows)} episodes."]
     assert Ncap().sensing().items() >= DEFAULTS.items()
 
 
 def test_faults_under_conditions_have_the_same_tables_and_say_which():
     def tables(**common):
         rows = [row(config, 10.0 + len(config.policy)) for config in fault_study([0], **common)]
-        return STUDIES["study", "faults"].tables(rows), STUDIES["study", "faults"].closing(rows)[1:]
+        return STUDIES["faults"].tables(rows), STUDIES["faults"].closing(rows)[1:]
 
     plain, nothing = tables()
     under, said = tables(**LATE)

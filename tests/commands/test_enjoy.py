@@ -171,9 +171,10 @@ def test_a_recorded_scene_is_played_as_it_was_learned():
 @pytest.mark.parametrize(
     ("named", "message"),
     [
+        ("nobody", "unknown scenario 'nobody'; known: "),
         (
-            "nobody",
-            "unknown agent 'nobody'; known: learned-scorer, learned-sets, place, ppo, ppo-dartout",
+            "no/body",
+            "unknown agent 'no/body'; known: learned-scorer, learned-sets, place, ppo, ppo-dartout",
         ),
         (".", "holds no agent: no weights.npz"),
         ("torn.npz", "weights torn.npz: no .npz of weights of care-sim train, or damaged"),
