@@ -109,7 +109,7 @@ def test_the_hardware_of_a_log_is_played_and_reported_again(logs, tmp_path, caps
     assert study.name == "firing-open-loop"
     assert len(rows) == len(FIRINGS) * 2 + 1
     # Free cells are the default, and the default has nothing in the column.
-    assert {row["study", "firing"] for row in rows if row["policy"] == "care"} == {
+    assert {row["firing"] for row in rows if row["policy"] == "care"} == {
         None,
         *FIRINGS[1:],
     }
