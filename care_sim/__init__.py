@@ -14,21 +14,43 @@ import care_sim.base.limits
 import care_sim.base.home  # noqa: F401
 
 # isort: split
-from importlib.metadata import version
+from importlib import import_module
 from typing import TYPE_CHECKING
 
-from care_sim.base.errors import InvalidInput, MissingExtra
-from care_sim.core.allocation import allocate
-from care_sim.core.belief import Belief
-from care_sim.core.grid import AngularGrid
-from care_sim.core.rig import Rig
-from care_sim.core.sensor_setup import SensorSetup
-from care_sim.core.types import CLASSES, Demand, Detections, ImageDetections, Tracks
+from care_sim.base.errors import InvalidInput, MissingExtra, unknown
 from care_sim.envs import register_all
-from care_sim.policies import make_policy, policy_names
-from care_sim.policies.base import Policy, PrivilegedPolicy
 
-__version__ = version("care-sim")
+if TYPE_CHECKING:
+    from care_sim.core.allocation import allocate
+    from care_sim.core.belief import Belief
+    from care_sim.core.grid import AngularGrid
+    from care_sim.core.rig import Rig
+    from care_sim.core.sensor_setup import SensorSetup
+    from care_sim.core.types import CLASSES, Demand, Detections, ImageDetections, Tracks
+    from care_sim.policies import make_policy, policy_names
+    from care_sim.policies.base import Policy, PrivilegedPolicy
+    from care_sim.sources.box_films import film_of_boxes
+
+    __version__: str
+
+_PLACES = {
+    "CLASSES": "core.types",
+    "AngularGrid": "core.grid",
+    "Belief": "core.belief",
+    "Demand": "core.types",
+    "Detections": "core.types",
+    "ImageDetections": "core.types",
+    "Policy": "policies.base",
+    "PrivilegedPolicy": "policies.base",
+    "Rig": "core.rig",
+    "SensorSetup": "core.sensor_setup",
+    "Tracks": "core.types",
+    "allocate": "core.allocation",
+    "film_of_boxes": "sources.box_films",
+    "make_policy": "policies",
+    "policy_names": "policies",
+}
+"""Where each name is. It is imported when it is used: NumPy, SciPy and Numba take a second."""
 __all__ = [
     "CLASSES",
     "AngularGrid",
@@ -46,19 +68,46 @@ __all__ = [
     "allocate",
     "film_of_boxes",
     "make_policy",
+    "names",
     "policy_names",
 ]
 
 register_all()
 
-if TYPE_CHECKING:
-    from care_sim.sources.box_films import film_of_boxes
-else:
 
-    def __getattr__(name: str) -> object:
-        """Load the simulator only for users that make films."""
-        if name == "film_of_boxes":
-            from care_sim.sources.box_films import film_of_boxes
+_NAMES = {
+    "policies": "policies:policy_names",
+    "scenarios": "scenarios:scenario_names",
+    "sensors": "sensors.setups:setup_names",
+    "detectors": "perception.detectors:detector_names",
+    "sources": "sources.installed:source_names",
+    "engines": "sensors.engines:engine_names",
+    "agents": "training.agents:agent_names",
+}
 
-            return film_of_boxes
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+def names(kind: str) -> list[str]:
+    """What can be named: policies, scenarios, sensors, detectors, sources, engines or agents, the
+    built-in ones and those of installed packages. Raises InvalidInput for another kind.
+
+    `care-sim list KIND` shows what each is.
+    """
+    if kind not in _NAMES:
+        raise unknown("kind", kind, _NAMES)
+    module, function = _NAMES[kind].split(":")
+    return list(getattr(import_module(f"care_sim.{module}"), function)())
+
+
+def __getattr__(name: str) -> object:
+    """Import what is asked for: a public name, or a room such as `care_sim.core`."""
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("care-sim")
+    if name in _PLACES:
+        return getattr(import_module(f"care_sim.{_PLACES[name]}"), name)
+    if name in ("core", "policies", "perception"):
+        # With all that make_policy needs, such as `care_sim.core.allocation`.
+        import_module("care_sim.policies")
+        return import_module(f"care_sim.{name}")
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -6,8 +6,8 @@ import io
 import os
 import shutil
 import sys
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Sequence
+from difflib import get_close_matches
 from typing import Any, NoReturn
 
 import care_sim
@@ -20,60 +20,35 @@ from care_sim.base.errors import (
     error_line,
     is_own_fault,
     one_line,
+    report_problems,
     shortened,
     shown,
+    unknown,
 )
+from care_sim.base.exit_codes import BAD_INPUT, FAILED, INTERRUPTED, UNEXPECTED, UNREAD
 from care_sim.base.foreign_code import foreign_place
 from care_sim.base.limits import limit_in
-from care_sim.commands.entries import COMMANDS, GROUPS
-from care_sim.commands.shared.hints import ways_on
-from care_sim.commands.shared.parsing import chosen_command, option_helps
+from care_sim.commands.table import COMMANDS, FAMILIES, GROUPS, MOVED, RENAMED, Command
 
-_FAILED = 1
-_BAD_INPUT = 2
-_UNEXPECTED = 70
-"""The exit code of a fault in the software: `EX_SOFTWARE` of BSD."""
-_UNREAD = 141
-"""The exit code where nobody reads the output: what a shell gives for SIGPIPE, 128 + 13."""
 _DEBUG = "--debug"
 
-_ABOUT = (
-    "Benchmark for adaptive LiDAR sensing: the closed loop, and first sightings in the open loop."
-)
 _USAGE = """usage: care-sim COMMAND [options]
 
 Benchmark for adaptive LiDAR sensing: a policy decides which cells fire."""
-_WAYS_ON = """care-sim COMMAND --help tells its options, --help-all the conditions, too.
-care-sim --version tells the version.
-Begin with: care-sim run dartout"""
+_WAYS_ON = """care-sim COMMAND --help lists its options, --help-all the conditions, too.
+care-sim --version prints the version, --tyro-print-completion SHELL a script
+by which bash, zsh or fish completes. Begin with: care-sim run dartout"""
+_COMPLETION = "--tyro-print-completion"
 _NEW_OBJECTS = 100_000
 """After how many the garbage collector looks at them; Python's default is 700."""
 _NARROWEST = 20
 """Columns of a terminal for which help is laid out, at the least."""
 
-_STUDIES = (
-    "benchmark",
-    "reproduce",
-    "sweep",
-    "ablate",
-    "order",
-    "firing",
-    "realism",
-    "faults",
-    "vehicle",
-    "crowding",
-    "ncap",
-    "r157",
-    "validate",
-    "protocol",
-    "mechanism",
-)
-_AGENTS = ("train ppo", "train sac", "train recurrent-ppo")
+_FINISHED_STAYS = "; what is finished is kept, the same command resumes"
+_LEARNED_STAYS = "; what is learned is kept, the same command with --resume resumes"
 _KEPT = {
-    **dict.fromkeys(_STUDIES, "; what is finished is kept, the same command goes on from there"),
-    **dict.fromkeys(
-        _AGENTS, "; what is learned is kept, the same command with --resume goes on from there"
-    ),
+    **dict.fromkeys(("benchmark", *GROUPS["Studies"]), _FINISHED_STAYS),
+    **dict.fromkeys(("train ppo", "train sac", "train recurrent-ppo"), _LEARNED_STAYS),
 }
 """What is added to "interrupted" for commands that keep what they have finished."""
 
@@ -109,8 +84,8 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
             _end_with(error, trace=_DEBUG in given or bool(os.environ.get("CARE_SIM_DEBUG")))
         if alone:
             interrupts.end_in_silence()
-        command = " ".join(arguments[: 2 if arguments[:1] == ["train"] else 1])
-        _complain(f"interrupted{_KEPT.get(command, '')}", interrupts.INTERRUPTED)
+        kept = next((_KEPT[name] for name in _named(arguments) if name in _KEPT), "")
+        _complain(f"interrupted{kept}", INTERRUPTED)
     finally:
         if alone:
             interrupts.end_in_silence()
@@ -133,15 +108,15 @@ def _end_with(error: BaseException, trace: bool) -> NoReturn:
         own = is_own_fault(error)
         if own and trace:
             raise error
-        _complain(str(error), _FAILED if own else _BAD_INPUT)
+        _complain(str(error), FAILED if own else BAD_INPUT)
     if isinstance(error, BrokenPipeError):
         _leave_output()
-        sys.exit(_UNREAD)
+        sys.exit(UNREAD)
     if foreign_place(error) and not trace:
-        _complain(error_line(error), _FAILED)
+        _complain(error_line(error), FAILED)
     if (limit := limit_in(error)) and not trace:
         _leave_output()
-        _complain(limit, _FAILED)
+        _complain(limit, FAILED)
     if isinstance(error, OSError):
         _leave_output()
         _complain(f"{error.filename}: {error.strerror}" if error.filename else str(error))
@@ -150,7 +125,7 @@ def _end_with(error: BaseException, trace: bool) -> NoReturn:
     _complain(
         f"unexpected {error_line(error)}; please report it, with the trace that {_DEBUG} "
         "(or CARE_SIM_DEBUG=1) shows",
-        _UNEXPECTED,
+        UNEXPECTED,
     )
 
 
@@ -186,7 +161,12 @@ def _finished(arguments: list[str]) -> int:
     """Run the command and write out all that it printed; returns its exit code."""
     _check_texts(arguments)
     try:
-        return int(parsed_command(arguments)())
+        first = arguments[0] if arguments else "--help"
+        if (text := _told(first, arguments[1:])) is not None:
+            print(text)
+            return 0
+        command, options = parsed_command(arguments)
+        return int(command.function()(options))
     finally:
         sys.stdout.flush()
 
@@ -206,73 +186,86 @@ def _check_texts(arguments: list[str]) -> None:
             raise InvalidInput(f"no text: {shown(argument)}")
 
 
-def parsed_command(arguments: Sequence[str]) -> Callable[[], int]:
-    """The command that the arguments name, with its options. Raises InvalidInput, in one line."""
-    named = arguments[0] if arguments else "--help"
-    if named in _ASKED:
-        return partial(_told, _ASKED[named]())
-    if named in _MOVED:
-        raise InvalidInput(f"`care-sim {named}` is `{_MOVED[named]}` now, in a clone")
-    if named.startswith("-"):
-        raise InvalidInput(
-            f"{shown(named)} is no option of care-sim; `care-sim` tells the commands"
-        )
-    # The learners are commands of their own; their help lists them alone.
-    if named == "train":
-        commands, prog = COMMANDS[named].loaded(), "care-sim train"
-        about, arguments = COMMANDS[named].about, arguments[1:]
-    else:
-        # For names that are mistyped, what the list says of each command is enough.
-        commands = {name: _described(command.about) for name, command in COMMANDS.items()}
-        prog, about = "care-sim", _ABOUT
-        if named in COMMANDS:
-            commands[named] = COMMANDS[named].loaded()
-    try:
-        return chosen_command(commands, prog, about, arguments)
-    except InvalidInput as error:
-        asked = commands.get(arguments[0]) if arguments else None
-        options = option_helps(asked) if isinstance(asked, type) else {}
-        raise InvalidInput(f"{error}{ways_on(str(error), options, named)}") from None
+def parsed_command(arguments: Sequence[str]) -> tuple[Command, Any]:
+    """The command that the arguments name, and its options. Raises InvalidInput, in one line."""
+    # Imported here because tyro takes a third of the time of `care-sim --help`.
+    from care_sim.commands.parsing import print_completion, read_options
+
+    arguments = _renamed(arguments)
+    if arguments[0] == _COMPLETION:
+        print_completion(arguments)
+    name, rest = _chosen(arguments)
+    command = COMMANDS[name]
+    return command, read_options(command.options_class(), f"care-sim {name}", rest)
+
+
+def _told(first: str, rest: Sequence[str]) -> str | None:
+    """What is printed where no command runs; None where one does."""
+    if first in ("-h", "--help"):
+        return _overview()
+    if first == "--version":
+        return f"care-sim {care_sim.__version__}"
+    if first in FAMILIES and rest[:1] in ([], ["-h"], ["--help"]):
+        return _family(first)
+    return None
+
+
+def _chosen(arguments: Sequence[str]) -> tuple[str, Sequence[str]]:
+    """The name of the command that the arguments name, and the words after it. Raises InvalidInput
+    for another name.
+    """
+    first = arguments[0]
+    if first.startswith("-"):
+        raise InvalidInput(f"{shown(first)} is no option of care-sim; `care-sim` lists commands")
+    for count, name in enumerate(_named(arguments), 1):
+        if name in COMMANDS:
+            return name, arguments[count:]
+    if first in MOVED:
+        raise InvalidInput(f"`care-sim {first}` is `{MOVED[first]}` now, in a clone")
+    if first in FAMILIES:
+        below = [name.split()[1] for name in COMMANDS if name.startswith(f"{first} ")]
+        raise unknown(f"command after {first}", arguments[1], below)
+    names = {*FAMILIES, *(name.split()[0] for name in COMMANDS)}
+    old = get_close_matches(first, RENAMED, 1)
+    raise unknown("command", first, names, f"perhaps `{RENAMED[old[0]]}`" if old else "")
+
+
+def _renamed(arguments: Sequence[str]) -> Sequence[str]:
+    """The arguments with what an old name is now, which a line says."""
+    first, second = *arguments[:2], *[""] * (2 - len(arguments[:2]))
+    # `export` had one form, which began with its options.
+    old_export = first == "export" and second.startswith("-")
+    now = "export nuscenes" if old_export else RENAMED.get(first)
+    if now is None:
+        return arguments
+    report_problems([f"`care-sim {first}` is now `care-sim {now}`"])
+    return [*now.split(), *arguments[1:]]
+
+
+def _named(arguments: Sequence[str]) -> list[str]:
+    """The commands that the first word, and the first two, may mean."""
+    words = [word.replace("_", "-") for word in arguments[:2]]
+    return [" ".join(words[:count]) for count in range(1, len(words) + 1)]
 
 
 def _overview() -> str:
     """Every command in its group, a line each."""
-    groups = [
-        "\n".join([title, *(f"  {name:13}{each.about}" for name, each in group.items())])
-        for title, group in GROUPS.items()
-    ]
+    groups = []
+    for title, group in GROUPS.items():
+        abouts = {name.split()[0]: command.about for name, command in group.items()}
+        lines = [f"  {name:13}{FAMILIES.get(name, about)}" for name, about in abouts.items()]
+        groups.append("\n".join([title, *lines]))
     return "\n\n".join([_USAGE, *groups, _WAYS_ON])
 
 
-def _version() -> str:
-    return f"care-sim {care_sim.__version__}"
+def _family(first: str) -> str:
+    """Every command behind a first word, a line each."""
+    own = {name: each for name, each in COMMANDS.items() if name.startswith(f"{first} ")}
+    lines = [f"  {name.split()[1]:16}{command.about}" for name, command in own.items()]
+    return "\n".join([f"usage: care-sim {first} NAME [options]", "", *lines])
 
 
-_ASKED: dict[str, Callable[[], str]] = {
-    "-h": _overview,
-    "--help": _overview,
-    "--version": _version,
-}
-"""What is printed where no command is named."""
-_MOVED = {"bench": "make bench", "parity": "make parity"}
-"""Commands of earlier versions that measure the software itself."""
-
-
-def _told(text: str) -> int:
-    print(text)
-    return 0
-
-
-def _described(about: str) -> Callable[..., Any]:
-    """A command that does nothing, with the line that help shows of it."""
-
-    def command() -> None: ...
-
-    command.__doc__ = about
-    return command
-
-
-def _complain(message: str, code: int = _BAD_INPUT) -> NoReturn:
+def _complain(message: str, code: int = BAD_INPUT) -> NoReturn:
     with contextlib.suppress(OSError):  # the terminal may be what is gone
         print(f"care-sim: {shortened(one_line(message), LONGEST)}", file=sys.stderr)
     sys.exit(code)

@@ -55,7 +55,7 @@ USES = {
     "video": [f"care-sim run dense {SHORT} --video a.mp4"],
     "cluster": ["python cluster.py"],
     "minari": [
-        f"care-sim collect dense {SHORT} --episodes 2 --dataset care-sim/tried-v0",
+        f"care-sim export minari dense {SHORT} --episodes 2 --dataset care-sim/tried-v0",
         "minari list local",
     ],
     "rosbags": ["python bag.py"],

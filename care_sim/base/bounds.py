@@ -87,3 +87,10 @@ def _check_name(name: str, value: Any, known: tuple[str, ...] | None) -> None:
         raise InvalidInput(f"{name} must be a name, got {shown(value)}")
     if known is not None:
         check_known(name, value, known)
+
+
+def option_text(value: object) -> str:
+    """A default as it is given on a command line; numbers to two decimals."""
+    if isinstance(value, tuple):
+        return ",".join(map(option_text, value))
+    return str(round(value, 2)) if isinstance(value, float) else repr(value)

@@ -57,3 +57,7 @@ def _quota(folder: Path, version: int) -> tuple[int, int]:
 
 CORES = usable_cores()
 """Cores that this process may use, as counted when the package was imported."""
+MOST_WORKERS = 1024
+"""Most worker processes; each takes about 100 MB."""
+WORKERS = min(CORES, MOST_WORKERS)
+"""Workers unless another number is asked for."""

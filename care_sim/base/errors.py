@@ -19,10 +19,10 @@ _SAID = 300
 """Characters that a message quotes of an error."""
 _LISTINGS = {
     "command": "care-sim",
-    "policy": "care-sim policies",
-    "scenario": "care-sim scenarios",
-    "source": "care-sim sources",
-    "detector": "care-sim detectors",
+    "policy": "care-sim list policies",
+    "scenario": "care-sim list scenarios",
+    "source": "care-sim list sources",
+    "detector": "care-sim list detectors",
 }
 """The commands that list things of a kind."""
 

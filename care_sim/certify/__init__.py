@@ -3,3 +3,7 @@
 The list is in `design`, how it is played in `playing`, what of an episode is hashed in `trail`. The
 published trails are `published.parquet`, which `published` reads.
 """
+
+ALL_EPISODES = 10_000
+CERTIFIED_EPISODES = 3_050
+"""What is played unless more is asked for. With 32 policies the last pair meets in number 3,020."""

@@ -1,5 +1,6 @@
 """`care-sim certify`: whether episodes go on this machine as published."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -7,13 +8,9 @@ import tyro
 
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.checks import check_whole
+from care_sim.base.cores import MOST_WORKERS, WORKERS
 from care_sim.base.errors import InvalidInput, MissingExtra, report_problems
-from care_sim.certify.design import ALL_EPISODES, CERTIFIED_EPISODES, drawn
-from care_sim.certify.playing import Trails, playable_here, trails_of
-from care_sim.certify.published import combined, read, write
-from care_sim.certify.verdict import verdict_of
-from care_sim.study.executors import MOST_WORKERS, WORKERS
-from care_sim.study.progress import shown_progress
+from care_sim.certify import ALL_EPISODES, CERTIFIED_EPISODES
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,6 +47,13 @@ class Certify:
 
         Raises MissingExtra where none can be played, or not all that are to be published.
         """
+        # Imported here because the help of the command needs no simulator.
+        from care_sim.certify.design import drawn
+        from care_sim.certify.playing import playable_here, trails_of
+        from care_sim.certify.published import read
+        from care_sim.certify.verdict import verdict_of
+        from care_sim.study.progress import shown_progress
+
         published = [] if self.write else read()
         if self.numbers[-1] >= len(published) and not self.write:
             raise InvalidInput(f"the published list has {len(published):,} episodes")
@@ -75,8 +79,10 @@ class Certify:
         return list(range(ALL_EPISODES if self.every else CERTIFIED_EPISODES))
 
 
-def _publish(found: Trails) -> int:
+def _publish(found: Mapping[int, bytes | str]) -> int:
     """Publish what was played, unless some of it was not."""
+    from care_sim.certify.published import combined, write
+
     failures = {number: trail for number, trail in found.items() if isinstance(trail, str)}
     if failures:
         first = min(failures)

@@ -4,19 +4,22 @@ recording or a film.
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, cast
+from typing import cast
 
-import tyro
-
-from care_sim.base.errors import InvalidInput, report_problems
-from care_sim.commands.shared.one_scene import SceneOptions, is_source, scene_plays
-from care_sim.commands.shared.options import DEFAULT_OPTIONS, Options
-from care_sim.commands.shared.selection import playable
-from care_sim.commands.shared.study_command import DONE, FAILED, console
-from care_sim.commands.shared.written_files import finish_files
+from care_sim.base.console import TableConsole
+from care_sim.base.errors import report_problems
+from care_sim.base.exit_codes import DONE, FAILED
+from care_sim.commands.options.watching import Compare
+from care_sim.commands.shared.one_scene import (
+    finish_files,
+    is_source,
+    scene_of,
+    scene_plays,
+    scene_source,
+)
+from care_sim.commands.shared.selection import arguments_of, some_playable
 from care_sim.envs.wrappers.record_rerun import RecordRerun, recording
 from care_sim.loops.film import Film
 from care_sim.reports.episodes.clips import Clip
@@ -48,56 +51,24 @@ _OF_COLLISIONS = {
 _OF_STOPS_FOR_NOTHING = {"braked_before_view": "braked for nothing"}
 
 
-@dataclass(frozen=True, kw_only=True)
-class Compare(SceneOptions):
-    """Play one seed under several policies, side by side."""
+def compare(options: Compare) -> int:
+    """Play one seed under several policies, and print their outcomes."""
+    common = arguments_of(options, options.policies)
+    if is_source(options.scenario):
+        source = scene_source(options, options.scenario, options.sensor)
+        scene = scene_of(options, source, options.seed)
 
-    scenario: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCENARIO")]
-    """dartout, dense, cutin, ncap, r157, drive, that of an installed package, or MODULE:CLASS;
-    `care-sim scenarios` lists their parameters. For the open loop street, argoverse2:FOLDER,
-    nuscenes:FOLDER, kitti:FOLDER, sweeps:FOLDER, boreas, or another of `care-sim sources`.
-    """
-    policies: tuple[str, ...] = ("history", "care")
-    """Names of `care-sim policies`; `all` stands for all but the controls. `full` always runs with
-    budget 1.0."""
-    budget: float = 0.1
-    """Share of the cells that may fire at a keyframe, above 0 and at most 1."""
-    seed: int = 0
-    """Seed of scenario, camera faults, noise and floor, the same for every policy."""
-    record: Path | None = None
-    """File (.rrd) for a recording of all episodes, side by side; `care-sim view FILE` plays it
-    (extra 'viewer').
-    """
-    video: Path | None = None
-    """File for a film of all episodes, side by side: MP4 (extra 'video'), or animated GIF, WebP or
-    PNG, by its ending.
-    """
-    video_start: float | None = None
-    """Start the film this many seconds after the episodes start."""
-    conditions: Annotated[Options, tyro.conf.arg(name="")] = DEFAULT_OPTIONS
-    """Further conditions."""
+        def made(names: Sequence[str]) -> Sequence[AnyConfig]:
+            return scene_plays(source, scene, names, options.budget, common)
+    else:
+        options.check_unused()
 
-    def __call__(self) -> int:
-        """Run it."""
-        common = self.conditions.arguments(self.policies)
+        def made(names: Sequence[str]) -> Sequence[AnyConfig]:
+            return grid([options.scenario], names, [options.budget], [options.seed], **common)
 
-        made = self._plays(common) if is_source(self.scenario) else self._episodes(common)
-        policies, left_out = playable(self.policies, lambda name: made([name]))
-        if not policies:
-            raise InvalidInput("none of the policies can be played")
-        failures = play_side_by_side(made(policies), self.record, self.video, self.video_start)
-        return FAILED if left_out or failures else DONE
-
-    def _episodes(self, common: dict[str, Any]) -> Callable[[Sequence[str]], list[EpisodeConfig]]:
-        """What makes the episodes of policies, in the closed loop."""
-        self.check_unused()
-        return lambda names: grid([self.scenario], names, [self.budget], [self.seed], **common)
-
-    def _plays(self, common: dict[str, Any]) -> Callable[[Sequence[str]], list[PlayConfig]]:
-        """What makes the plays of policies, in a scene of the open loop."""
-        source = self.source(self.scenario, self.conditions.sensor)
-        scene = self.scene_of(source, self.seed)
-        return lambda names: scene_plays(source, scene, names, self.budget, common)
+    policies, left_out = some_playable(options.policies, lambda name: made([name]))
+    failures = play_side_by_side(made(policies), options.record, options.video, options.video_start)
+    return FAILED if left_out or failures else DONE
 
 
 def play_side_by_side(
@@ -140,7 +111,7 @@ def _report(configs: Sequence[AnyConfig], answers: Sequence[Row | str]) -> list[
     told = [*zip(configs, answers, strict=False)]
     rows = [(config, row) for config, row in told if not isinstance(row, str)]
     if rows:
-        console().print(_outcome_table(rows).rich())
+        TableConsole().print(_outcome_table(rows).rich())
     failures = [
         f"failed: {config.label}: {reason}" for config, reason in told if isinstance(reason, str)
     ]

@@ -1,87 +1,79 @@
-"""`care-sim export`: a policy's detections on nuScenes scenes, for the official devkit to score."""
+"""`care-sim export`: data for other programs. A policy's detections on nuScenes scenes, for the
+official devkit to score; its episodes as a Minari dataset, for offline learning.
+"""
 
+import inspect
 import json
+import shutil
 import sys
-from dataclasses import dataclass
+import warnings
+from collections.abc import Generator, Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-import tyro
 from rich.console import Console
 from rich.progress import track
 
 import care_sim
-from care_sim.base.errors import InvalidInput, print_lines
+from care_sim.base.errors import InvalidInput, counted, print_lines, shown
+from care_sim.base.extras import import_minari
 from care_sim.base.files import JSON, replacing
-from care_sim.commands.shared.play_options import PlayOptions
+from care_sim.base.seed_ranges import training_seeds
+from care_sim.commands.options.results import ExportMinari, ExportNuScenes
+from care_sim.commands.shared.selection import arguments_of, common_of, source_named
 from care_sim.sources.nuscenes.recordings import NuScenes
 from care_sim.sources.nuscenes.results_form import MODALITIES, result_boxes
 from care_sim.sources.nuscenes.table_files import JsonRow
+from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.play_config import PlayConfig, play_grid
 from care_sim.study.scene_play import play_through_film
 
+_T = TypeVar("_T")
 
-@dataclass(frozen=True, kw_only=True)
-class Export(PlayOptions):
-    """Write a policy's detections for the official nuScenes devkit.
 
-    Play a policy over nuScenes scenes and write its detections in the results form of the
-    official devkit.
-    """
+def export_nuscenes(options: ExportNuScenes) -> int:
+    """Write a policy's detections in the form of the official nuScenes devkit."""
+    # All that is asked for is checked before the file is begun.
+    configs = _configs(options)
+    with replacing(options.out, JSON) as unfinished:
+        results: dict[str, list[JsonRow]] = {}
+        for config in _shown(configs, "scenes"):
+            results |= _scene_results(config)
+        unfinished.write_text(
+            json.dumps({"meta": _meta(options, configs[0]), "results": results}), encoding="utf-8"
+        )
+    count = sum(map(len, results.values()))
+    samples = f"{len(results)} samples of {len(configs)} scenes"
+    print_lines(f"{count} boxes in {samples} are in {options.out}")
+    if not count:
+        print("care-sim: the official devkit refuses results without a box", file=sys.stderr)
+    return 0
 
-    source: str = tyro.MISSING
-    """nuscenes:FOLDER, the folder of a nuScenes v1.0 database."""
-    policy: str = "care"
-    """`care-sim policies` lists them. `full` always runs with budget 1.0."""
-    budget: float = 0.1
-    """Share of the cells that may fire at a keyframe, above 0 and at most 1."""
-    out: Path
-    """The results file, JSON."""
 
-    def __call__(self) -> int:
-        """Run it."""
-        # All that is asked for is checked before the file is begun.
-        configs = self._configs()
-        with replacing(self.out, JSON) as unfinished:
-            shown = track(
-                configs, "scenes", console=Console(stderr=True), disable=not sys.stderr.isatty()
-            )
-            results = {
-                token: boxes for config in shown for token, boxes in _scene_results(config).items()
-            }
-            unfinished.write_text(
-                json.dumps({"meta": self._meta(configs[0]), "results": results}), encoding="utf-8"
-            )
-        count = sum(map(len, results.values()))
-        samples = f"{len(results)} samples of {len(configs)} scenes"
-        print_lines(f"{count} boxes in {samples} are in {self.out}")
-        if not count:
-            print("care-sim: the official devkit refuses results without a box", file=sys.stderr)
-        return 0
-
-    def _configs(self) -> list[PlayConfig]:
-        """One play per scene of the split: the devkit wants results for each of its samples."""
-        if self.source.partition(":")[0] != NuScenes.kind:
-            raise InvalidInput(
-                "source must be nuscenes:FOLDER, whose samples the official form names, got "
-                f"{self.source!r}"
-            )
-
-        # One floor and one latency: results are of one way to play, whereas a study has several.
-        source = self.scene_source()
-        common = self.common([self.policy])
-        floors = [common.pop("floor_seed")]
-        latencies = [common.pop("camera_latency")]
-        return play_grid(
-            source, source.scenes(), [self.policy], [self.budget], floors, latencies, **common
+def _configs(options: ExportNuScenes) -> list[PlayConfig]:
+    """One play per scene of the split: the devkit wants results for each of its samples."""
+    if options.source.partition(":")[0] != NuScenes.kind:
+        raise InvalidInput(
+            "source must be nuscenes:FOLDER, whose samples the official form names, got "
+            f"{options.source!r}"
         )
 
-    def _meta(self, config: PlayConfig) -> dict[str, Any]:
-        """What the form asks about the origin of results, and under `care_sim` what made them."""
-        # The scene is left out: this is said once of all scenes.
-        own = {"version": care_sim.__version__, "split": self.split or "val", **config.row()}
-        del own["scene"]
-        return MODALITIES | {"care_sim": own}
+    # One floor and one latency: results are of one way to play, whereas a study has several.
+    source = source_named(options, options.source)
+    common = common_of(options, [options.policy])
+    floors = [common.pop("floor_seed")]
+    latencies = [common.pop("camera_latency")]
+    return play_grid(
+        source, source.scenes(), [options.policy], [options.budget], floors, latencies, **common
+    )
+
+
+def _meta(options: ExportNuScenes, config: PlayConfig) -> dict[str, Any]:
+    """What the form asks about the origin of results, and under `care_sim` what made them."""
+    # The scene is left out: this is said once of all scenes.
+    own = {"version": care_sim.__version__, "split": options.split or "val", **config.row()}
+    del own["scene"]
+    return MODALITIES | {"care_sim": own}
 
 
 def _scene_results(config: PlayConfig) -> dict[str, list[JsonRow]]:
@@ -92,3 +84,96 @@ def _scene_results(config: PlayConfig) -> dict[str, list[JsonRow]]:
         shot.token: result_boxes(shot, record.detections, record.velocities)
         for shot, record in shots
     }
+
+
+def export_minari(options: ExportMinari) -> int:
+    """Write a policy's episodes as a Minari dataset."""
+    minari = import_minari()
+    folder = _folder(options.dataset)
+    policies, seeds = [options.policy], training_seeds(options.episodes)
+    given = arguments_of(options, policies)
+    configs = grid([options.scenario], policies, [options.budget], seeds, **given)
+    returns: list[float] = []
+    shown_configs = _shown(configs, "episodes")
+    with configs[0].make_env() as env, warnings.catch_warnings():
+        # Minari asks for an author, an e-mail and a link, which are the publisher's to give.
+        warnings.filterwarnings("ignore", category=UserWarning, module="minari")
+        episodes = _played(env, shown_configs, returns)
+        try:
+            dataset = minari.create_dataset_from_buffers(
+                options.dataset,
+                episodes,
+                env,
+                algorithm_name=options.policy,
+                description=f"{options.policy} in {options.scenario}, budget {configs[0].budget:g}",
+                requirements=[f"care-sim=={care_sim.__version__}"],
+                # Compressed, unlike Minari's HDF5 and Arrow: an action is 64 KB, mostly zeros.
+                data_format="parquet",
+            )
+        except BaseException:
+            # Minari makes the folder before it asks for the first episode. Until then, the
+            # folder may be another process's.
+            if inspect.getgeneratorstate(episodes) != inspect.GEN_CREATED:
+                shutil.rmtree(folder, ignore_errors=True)
+            raise
+    mean = sum(returns) / len(returns)
+    print_lines(
+        f"{counted(dataset.total_episodes, 'episode')}, {dataset.total_steps} steps, mean "
+        f"return {mean:.2f}, in {folder}: minari.load_dataset({options.dataset!r})"
+    )
+    return 0
+
+
+def _folder(dataset: str) -> Path:
+    """Return the folder of a new dataset. Raises InvalidInput for an invalid id or an existing
+    dataset.
+    """
+    from minari.dataset.minari_dataset import DATASET_ID_RE
+    from minari.storage import get_dataset_path
+
+    if not (match := DATASET_ID_RE.fullmatch(dataset)) or match["version"] is None:
+        raise InvalidInput(
+            "dataset must be NAMESPACE/NAME-vNUMBER, the namespace of at least two characters, for "
+            f"example care-sim/dense/care-v0, got {shown(dataset)}"
+        )
+    folder: Path = get_dataset_path(dataset)
+    if folder.exists():
+        raise InvalidInput(
+            f"dataset {dataset} is there already: name another version, or remove {folder}"
+        )
+    return folder
+
+
+def _played(
+    env: Any, configs: Iterable[EpisodeConfig], returns: list[float]
+) -> Generator[Any, None, None]:
+    """Yield episodes as Minari's buffers, and add their returns to `returns`."""
+    from minari.data_collector import EpisodeBuffer
+
+    for number, config in enumerate(configs):
+        policy = config.make_policy(env)
+        observation, _ = env.reset(seed=config.seed)
+        policy.reset()
+        observations, steps, over = [observation], [], False
+        while not over:
+            action = policy(observation)
+            observation, reward, terminated, truncated, _ = env.step(action)
+            observations.append(observation)
+            steps.append((action, reward, terminated, truncated))
+            over = terminated or truncated
+        actions, rewards, terminations, truncations = map(list, zip(*steps, strict=True))
+        returns.append(sum(rewards))
+        yield EpisodeBuffer(
+            id=number,
+            seed=config.seed,
+            observations={key: [each[key] for each in observations] for key in observation},
+            actions=actions,
+            rewards=rewards,
+            terminations=terminations,
+            truncations=truncations,
+        )
+
+
+def _shown(tasks: Sequence[_T], unit: str) -> Iterable[_T]:
+    """The tasks, with their progress on a terminal."""
+    return track(tasks, unit, console=Console(stderr=True), disable=not sys.stderr.isatty())

@@ -3,16 +3,12 @@
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from random import SystemRandom
 from tempfile import TemporaryDirectory
-from typing import Annotated
 
-import tyro
-
-from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.checks import check_known
+from care_sim.base.console import TableConsole
 from care_sim.base.errors import (
     InvalidInput,
     MissingExtra,
@@ -21,9 +17,10 @@ from care_sim.base.errors import (
     report_problems,
     unknown,
 )
+from care_sim.base.exit_codes import DONE, FAILED
 from care_sim.base.files import check_output, told_if_replaced, write_text
 from care_sim.base.json_text import json_content
-from care_sim.commands.shared.study_command import DONE, FAILED, console
+from care_sim.commands.options.results import Leaderboard
 from care_sim.policies.isolation import isolated_policies
 from care_sim.reports.figures.files import FORMATS, check_figure, save
 from care_sim.reports.figures.leaderboard import (
@@ -39,138 +36,102 @@ from care_sim.study.benchmark.result import BenchmarkResult
 from care_sim.study.benchmark.result_file import is_result, read_result
 from care_sim.study.benchmark.screening import screened_worlds
 from care_sim.study.benchmark.worlds import Salt, World
-from care_sim.study.executors import MOST_WORKERS, WORKERS
 
 _TABLES, _TRIALS = Path("runs/leaderboard"), Path("runs/leaderboard-quick")
 
 
-@dataclass(frozen=True, kw_only=True)
-class Leaderboard:
-    """Put result files in one table, or verify them.
+def leaderboard(options: Leaderboard) -> int:
+    """Print the table of result files, or verify them."""
+    if options.chart:
+        check_known("ending of a chart", options.chart.suffix, FORMATS)
+    found, problems = _read(options.results)
+    if options.verify:
+        problems += _verified(options, found)
+    else:
+        kept, trials = _of_whole(found, options.quick)
+        problems += trials
+        if not kept:
+            raise _all_bad(problems)
+        _show(options, kept)
+    report_problems(problems)
+    return FAILED if problems else DONE
 
-    To verify one is to play a random tenth of its episodes again.
-    """
 
-    results: Annotated[
-        tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER...")
-    ] = ()
-    """Folders with result files, or such files. Of two with one name and code the first counts."""
-    quick: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
-    """Compare on the tenth of the worlds that `benchmark --quick` plays: a trial."""
-    minus: str = CONTROL.name
-    """The entry over which the leads of all others are told, by its name in the table."""
-    verify: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
-    """Play a random tenth of the episodes of every result again, in place of a table. Their
-    policies must be installed here."""
-    sealed: Path | None = None
-    """With --verify: the file with the salt of sealed results."""
-    out: Path | None = None
-    """Folder for the page and the figure; without it runs/leaderboard, and runs/leaderboard-quick
-    with --quick. A table that lies there is replaced, which is told."""
-    chart: Path | None = None
-    """PNG or SVG file for a bar chart of the scores alone; the other format is written beside
-    it."""
-    workers: int = bounded(WORKERS, 1, MOST_WORKERS)
-    """With --verify: processes that play at the same time."""
+def _show(options: Leaderboard, results: Sequence[BenchmarkResult]) -> None:
+    # One table for the published worlds, one for every sealed set.
+    sets: dict[object, list[BenchmarkResult]] = {}
+    for each in results:
+        sets.setdefault((each.sealed, each.worlds), []).append(each)
+    known = names_in(results)
+    # The control may be missing: then nobody's lead is told.
+    if options.minus != CONTROL.name and options.minus not in known:
+        raise unknown("entry", options.minus, known)
+    tables = [leaderboard_table(own, options.minus) for own in sets.values()]
+    folder = options.out or (_TRIALS if options.quick else _TABLES)
+    page = folder / f"{LEADERBOARD_FIGURE}.md"
+    check_output(page)
+    check_figure(folder / LEADERBOARD_FIGURE)
+    if options.chart:
+        check_figure(options.chart)
+    told = told_if_replaced(page)
+    first = next(iter(sets.values()))
+    save(leaderboard_figure(first), folder / LEADERBOARD_FIGURE)
+    if options.chart:
+        save(score_chart(first), options.chart.with_suffix(""))
+    by_part = [leads_table(own, options.minus) for own in sets.values()]
+    shown = [*tables, *(table for table in by_part if table)]
+    write_text(page, _page([table.markdown() for table in shown]))
+    for table in tables:
+        TableConsole().print(table.rich())
+    # Sealed results have a control of their own, which nobody has published.
+    if options.minus == CONTROL.name and any(
+        options.minus not in names_in(own) for own in sets.values() if own[0].sealed is None
+    ):
+        print(
+            f"no {options.minus} among these files: add a folder with its result for leads",
+            file=sys.stderr,
+        )
+    print_lines(f"Page: {told}")
+    if options.chart:
+        print_lines(f"Chart: {options.chart}")
 
-    def __post_init__(self) -> None:
-        check_fields(self)
-        if self.sealed and not self.verify:
-            raise InvalidInput("sealed is the salt of results that are verified: give verify too")
-        if self.chart:
-            check_known("ending of a chart", self.chart.suffix, FORMATS)
-        if self.verify and self.chart:
-            raise InvalidInput("chart is for a table, which verify does not make")
-        if self.verify and self.minus != CONTROL.name:
-            raise InvalidInput("minus is for a table, which verify does not make")
 
-    def __call__(self) -> int:
-        """Run it."""
-        found, problems = _read(self.results)
-        if self.verify:
-            problems += self._verified(found)
-        else:
-            kept, trials = _of_whole(found, self.quick)
-            problems += trials
-            if not kept:
-                raise _all_bad(problems)
-            self._show(kept)
-        report_problems(problems)
-        return FAILED if problems else DONE
-
-    def _show(self, results: Sequence[BenchmarkResult]) -> None:
-        # One table for the published worlds, one for every sealed set.
-        sets: dict[object, list[BenchmarkResult]] = {}
-        for each in results:
-            sets.setdefault((each.sealed, each.worlds), []).append(each)
-        known = names_in(results)
-        # The control may be missing: then nobody's lead is told.
-        if self.minus != CONTROL.name and self.minus not in known:
-            raise unknown("entry", self.minus, known)
-        tables = [leaderboard_table(own, self.minus) for own in sets.values()]
-        folder = self.out or (_TRIALS if self.quick else _TABLES)
-        page = folder / f"{LEADERBOARD_FIGURE}.md"
-        check_output(page)
-        check_figure(folder / LEADERBOARD_FIGURE)
-        if self.chart:
-            check_figure(self.chart)
-        told = told_if_replaced(page)
-        first = next(iter(sets.values()))
-        save(leaderboard_figure(first), folder / LEADERBOARD_FIGURE)
-        if self.chart:
-            save(score_chart(first), self.chart.with_suffix(""))
-        by_part = [leads_table(own, self.minus) for own in sets.values()]
-        shown = [*tables, *(table for table in by_part if table)]
-        write_text(page, _page([table.markdown() for table in shown]))
-        for table in tables:
-            console().print(table.rich())
-        # Sealed results have a control of their own, which nobody has published.
-        if self.minus == CONTROL.name and any(
-            self.minus not in names_in(own) for own in sets.values() if own[0].sealed is None
-        ):
-            print(
-                f"no {self.minus} among these files: add a folder with its result for leads",
-                file=sys.stderr,
+@isolated_policies()
+def _verified(options: Leaderboard, results: dict[Path, BenchmarkResult]) -> list[str]:
+    """Print how each result holds; a line for each that does not, or cannot be played."""
+    salt = Salt.read(options.sealed) if options.sealed else None
+    worlds: list[World] = []
+    if salt and any(result.sealed == salt.digest for result in results.values()):
+        # Which worlds count is worked out again, once for all results.
+        with _player(options) as player:
+            worlds = screened_worlds(player, salt)
+    problems = []
+    for path, result in results.items():
+        try:
+            with _player(options) as player:
+                replay = replayed(result, player, SystemRandom(), salt, worlds)
+        except (InvalidInput, MissingExtra) as error:
+            problems.append(f"{path} cannot be verified: {error}")
+            continue
+        if replay.holds:
+            print_lines(f"{path}: {_drawn(replay, result)} came out again as the file says")
+        if replay.detours:
+            print_lines(
+                f"{path}: of {_drawn(replay, result)} {replay.detours} reached as much with "
+                f"another hash; played {elsewhere(result)}"
             )
-        print_lines(f"Page: {told}")
-        if self.chart:
-            print_lines(f"Chart: {self.chart}")
+        problems += [f"{path}: {problem}" for problem in _told(replay, result)]
+    return problems
 
-    @isolated_policies()
-    def _verified(self, results: dict[Path, BenchmarkResult]) -> list[str]:
-        """Print how each result holds; a line for each that does not, or cannot be played."""
-        salt = Salt.read(self.sealed) if self.sealed else None
-        worlds: list[World] = []
-        if salt and any(result.sealed == salt.digest for result in results.values()):
-            # Which worlds count is worked out again, once for all results.
-            with self._player() as player:
-                worlds = screened_worlds(player, salt)
-        problems = []
-        for path, result in results.items():
-            try:
-                with self._player() as player:
-                    replay = replayed(result, player, SystemRandom(), salt, worlds)
-            except (InvalidInput, MissingExtra) as error:
-                problems.append(f"{path} cannot be verified: {error}")
-                continue
-            if replay.holds:
-                print_lines(f"{path}: {_drawn(replay, result)} came out again as the file says")
-            if replay.detours:
-                print_lines(
-                    f"{path}: of {_drawn(replay, result)} {replay.detours} reached as much with "
-                    f"another hash; played {elsewhere(result)}"
-                )
-            problems += [f"{path}: {problem}" for problem in _told(replay, result)]
-        return problems
 
-    @contextmanager
-    def _player(self) -> Iterator[Player]:
-        # A journal that lasts would answer with what was played before.
-        with (
-            TemporaryDirectory(prefix="care-sim-") as folder,
-            player_in(Path(folder), self.workers) as player,
-        ):
-            yield player
+@contextmanager
+def _player(options: Leaderboard) -> Iterator[Player]:
+    # A journal that lasts would answer with what was played before.
+    with (
+        TemporaryDirectory(prefix="care-sim-") as folder,
+        player_in(Path(folder), options.workers) as player,
+    ):
+        yield player
 
 
 def _told(replay: Replay, result: BenchmarkResult) -> list[str]:

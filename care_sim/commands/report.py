@@ -1,16 +1,14 @@
-"""`care-sim report`: the tables and figures of a folder of results again, or one web page."""
+"""`care-sim report`: the tables and figures of folders of results again, or one web page."""
 
-from dataclasses import dataclass
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated
 
-import tyro
-
-from care_sim.base.bounds import bounded, check_fields
-from care_sim.base.checks import LARGEST_INTEGER
+from care_sim.base.console import TableConsole
 from care_sim.base.errors import InvalidInput, counted, print_lines, report_problems
-from care_sim.commands.shared.play_options import SourceOptions
-from care_sim.commands.shared.study_command import FAILED, console
+from care_sim.base.exit_codes import DONE, FAILED
+from care_sim.commands.options.results import Report
+from care_sim.commands.shared.selection import source_named
+from care_sim.reports.merging import Merged, merged
 from care_sim.reports.report import (
     StudyReport,
     next_steps,
@@ -18,78 +16,76 @@ from care_sim.reports.report import (
     print_report,
     read_results,
 )
-from care_sim.study.executors import MOST_WORKERS, WORKERS
+
+_MERGED = Path("runs/merge")
 
 
-@dataclass(frozen=True, kw_only=True)
-class PrintReport(SourceOptions):
-    """Print a folder's tables and figures again, or make one page.
+def report(options: Report) -> int:
+    """Print tables and draw figures again, merge folders, or write a page."""
+    if len(options.folders) > 1:
+        return _merge(options)
+    (folder,) = options.folders
+    if options.minus is not None:
+        rows, study, left_out = read_results(folder)
+        print_minus(rows, TableConsole(), study, options.minus)
+        report_problems([f"left out: {what}" for what in left_out])
+        return DONE
+    if options.page is not None:
+        return _write(options, folder, options.page)
+    return _print(folder, options.verbose)
 
-    Print the tables of a folder of results and draw its figures again, or make one web page of
-    it all.
-    """
 
-    folder: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER")]
-    """The --out of an earlier study."""
-    page: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
-    """HTML file for the page, which needs no other file; the folder is left as it is."""
-    minus: str | None = None
-    """Print this policy less each of the others, with intervals, in place of the tables; the folder
-    is left as it is. Of one with parameters the whole name in the tables."""
-    verbose: bool = False
-    """Print all tables."""
-    episodes: int = bounded(40, 0, LARGEST_INTEGER)
-    """At most this many episodes are played again for the page, seed by seed; 0 for none. They take
-    as long as they did in the study."""
-    workers: int = bounded(WORKERS, 1, MOST_WORKERS)
-    """Processes that play them."""
-    source: str | None = None
-    """Where the recordings lie that a study of the open loop played, for its page:
-    argoverse2:FOLDER, nuscenes:FOLDER, kitti:FOLDER, sweeps:FOLDER, boreas, or a source of your
-    own. Streets need none."""
+def _print(folder: Path, verbose: bool) -> int:
+    rows, study, left_out = read_results(folder)
+    made = StudyReport.of(rows, study, left_out)
+    try:
+        made.write(folder)
+    except (OSError, InvalidInput) as error:
+        print_report(rows, TableConsole(), study, left_out, verbose=verbose)
+        report_problems([f"tables and figures in {folder} are not written anew: {error}"])
+        return FAILED
+    print_report(rows, TableConsole(), study, left_out, verbose=verbose)
+    print_lines(*next_steps(folder, study, rows))
+    return DONE
 
-    def __post_init__(self) -> None:
-        check_fields(self)
-        if self.source is None and (given := self.source_options()):
-            raise InvalidInput(f"--{given[0].replace('_', '-')} has no meaning without --source")
-        if self.source is not None and self.page is None:
-            raise InvalidInput("--source has no meaning without --page: nothing is played again")
-        if self.source is not None and not self.episodes:
-            raise InvalidInput("--source has no meaning with --episodes 0: nothing is played again")
-        if self.minus is not None and self.page is not None:
-            raise InvalidInput("--minus has no meaning with --page: a page draws its own pairs")
 
-    def __call__(self) -> int:
-        """Run it."""
-        if self.minus is not None:
-            rows, study, left_out = read_results(self.folder)
-            print_minus(rows, console(), study, self.minus)
-            report_problems([f"left out: {what}" for what in left_out])
-            return 0
-        return self._print() if self.page is None else self._write(self.page)
+def _write(options: Report, folder: Path, path: Path) -> int:
+    # Imported here because it imports Jinja: tables and figures do not need it.
+    from care_sim.reports.page.build import write_page
 
-    def _print(self) -> int:
-        rows, study, left_out = read_results(self.folder)
-        report = StudyReport.of(rows, study, left_out)
-        try:
-            report.write(self.folder)
-        except (OSError, InvalidInput) as error:
-            print_report(rows, console(), study, left_out, verbose=self.verbose)
-            report_problems([f"tables and figures in {self.folder} are not written anew: {error}"])
-            return FAILED
-        print_report(rows, console(), study, left_out, verbose=self.verbose)
-        print_lines(*next_steps(self.folder, study, rows))
-        return 0
+    source = None if options.source is None else source_named(options, options.source)
+    page = write_page(folder, path, options.episodes, options.workers, source=source)
+    report_problems(page.warnings)
+    size = f"{path.stat().st_size / 1e6:.1f} MB"
+    print_lines(f"{path}: {size}, {counted(page.watchable, 'episode')} to watch")
+    return DONE
 
-    def _write(self, path: Path) -> int:
-        # Imported here because it imports Jinja: tables and figures do not need it.
-        from care_sim.reports.page.build import write_page
 
-        source = None if self.source is None else self.source_named(self.source)
-        page = write_page(self.folder, path, self.episodes, self.workers, source=source)
-        report_problems(page.warnings)
-        print_lines(
-            f"{path}: {path.stat().st_size / 1e6:.1f} MB, {counted(page.watchable, 'episode')} to "
-            "watch"
+def _merge(options: Report) -> int:
+    """Put the rows of several folders of one study into a new folder, and report it."""
+    out = options.out or _MERGED
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise InvalidInput(f"{out} is there already and not empty: give another --out")
+    whole = merged(options.folders)
+    whole.write(out)
+    print_report(whole.rows, TableConsole(), whole.study, whole.left_out, verbose=options.verbose)
+    print_lines(*next_steps(out, whole.study, whole.rows))
+    if whole.twice:
+        alike = counted(whole.twice, whole.study.results.task)
+        print(f"Alike in two of the folders, and kept once: {alike}")
+    report_problems([*_doubts(whole)])
+    return DONE
+
+
+def _doubts(whole: Merged) -> Iterator[str]:
+    """What whoever reads the tables should know."""
+    for folder in whole.apart:
+        yield (
+            f"nothing shows that the worlds of {folder} are those of the others: other code played "
+            "it, and it has no task in common with them; play full in both"
         )
-        return 0
+    if whole.uneven:
+        yield (
+            "not all policies were played in the same worlds: levels are each one's own, "
+            "differences those of the worlds that two share"
+        )

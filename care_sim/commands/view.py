@@ -7,16 +7,13 @@ import signal
 import socket
 import subprocess
 import sys
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Annotated
 from urllib.parse import quote
 
-import tyro
-
 from care_sim.base.errors import InvalidInput
+from care_sim.base.exit_codes import FAILED
 from care_sim.base.extras import import_rerun
 from care_sim.base.files import RERUN
+from care_sim.commands.options.watching import View
 
 _HERE = "127.0.0.1"
 _VIEWER = """
@@ -34,51 +31,34 @@ sys.exit(main())
 failed. Its input is a pipe of this process and ends with it, however that happens: then the viewer
 and its children end too.
 """
-_FAILED = 1
 
 
-@dataclass(frozen=True, kw_only=True)
-class View:
-    """Open a recording in the Rerun viewer.
-
-    Open a recording of `run --record` or `compare --record` in the Rerun viewer (extra
-    'viewer').
-
-    The viewer needs no network. Where there is one, it looks for updates and counts its use, which
-    `rerun analytics disable` ends, and its page in a browser fetches a font.
-    """
-
-    file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
-    """The recording (.rrd)."""
-    web: bool = False
-    """Serve the recording to browsers of this machine instead. Ctrl-C ends it."""
-
-    def __call__(self) -> int:
-        """Run it."""
-        import_rerun()
-        if self.file.exists() and not self.file.is_file():
-            raise InvalidInput(f"{self.file} is no file, a recording is wanted")
-        with self.file.open("rb") as recording:
-            if recording.read(len(RERUN)) != RERUN:
-                raise InvalidInput(f"{self.file} is no recording of `care-sim run --record`")
-        if not self.web:
-            if not _rerun(str(self.file), "--port", "auto"):
-                return 0
-            print(
-                "care-sim: the viewer failed; with --web a browser shows the recording",
-                file=sys.stderr,
-            )
-            return _FAILED
-        # The page of the viewer asks its own server for the data, which has a port of its own.
-        data, pages = _free_ports(2)
-        source = quote(f"rerun+http://{_HERE}:{data}/proxy", safe="")
+def view(options: View) -> int:
+    """Open the viewer, or serve the recording to browsers."""
+    import_rerun()
+    if options.file.exists() and not options.file.is_file():
+        raise InvalidInput(f"{options.file} is no file, a recording is wanted")
+    with options.file.open("rb") as recording:
+        if recording.read(len(RERUN)) != RERUN:
+            raise InvalidInput(f"{options.file} is no recording of `care-sim run --record`")
+    if not options.web:
+        if not _rerun(str(options.file), "--port", "auto"):
+            return 0
         print(
-            f"Open http://{_HERE}:{pages}/?hide_welcome_screen&theme=dark&url={source} in a "
-            "browser; Ctrl-C ends it.",
-            flush=True,
+            "care-sim: the viewer failed; with --web a browser shows the recording",
+            file=sys.stderr,
         )
-        ports = ("--bind", _HERE, "--port", str(data), "--web-viewer-port", str(pages))
-        return _rerun(str(self.file), "--serve-web", *ports)
+        return FAILED
+    # The page of the viewer asks its own server for the data, which has a port of its own.
+    data, pages = _free_ports(2)
+    source = quote(f"rerun+http://{_HERE}:{data}/proxy", safe="")
+    print(
+        f"Open http://{_HERE}:{pages}/?hide_welcome_screen&theme=dark&url={source} in a "
+        "browser; Ctrl-C ends it.",
+        flush=True,
+    )
+    ports = ("--bind", _HERE, "--port", str(data), "--web-viewer-port", str(pages))
+    return _rerun(str(options.file), "--serve-web", *ports)
 
 
 def _rerun(*options: str) -> int:

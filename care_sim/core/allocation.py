@@ -17,8 +17,6 @@ from care_sim.core.cell_sets import CellSets, cell_indices
 from care_sim.core.grid import Cells
 from care_sim.core.types import Demand
 
-RESERVE_FRACTION = 0.3
-"""rho, the share of the budget kept for the reserve (paper, Remark 2)."""
 HIGHEST_CELL = 2**24
 """A thousand times the cells of the paper's grid."""
 

@@ -16,30 +16,9 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Integers
 from care_sim.core.cell_order_kernels import RANDOM, SetMargins, sort_sets
 from care_sim.core.cell_sets import CellSets
+from care_sim.core.defaults import CELL_ORDERS
 from care_sim.core.grid import Cells
 from care_sim.core.grid_stack import Grid
-
-AS_DEMANDED = "as-demanded"
-CELL_ORDERS = (
-    AS_DEMANDED,
-    "rows-down",
-    "rows-up",
-    "columns",
-    "random",
-    "spread",
-    "core-spread",
-)
-"""How the cells of a set can be listed:
-
-- `as-demanded`, as the policy lists them;
-- `rows-down`, row by row from the top, `rows-up`, from the bottom, both by ascending column;
-- `columns`, column by column from right to left, each from the top;
-- `random`, by one permutation of the grid, the same at every keyframe and for every policy;
-- `spread`, by a low-discrepancy sequence: any first few cells lie evenly over the set;
-- `core-spread`, first the set without the margins by which sets are dilated, then these margins,
-  both spread. A set narrower than the margins keeps its middle; on the first and last row of the
-  grid there is none. A set that was dilated by less loses as much all the same.
-"""
 
 
 def reordered(
@@ -49,8 +28,8 @@ def reordered(
     margins: SetMargins,
     most: int | None = None,
 ) -> CellSets:
-    """The same sets, the cells of each listed in an `order` of `CELL_ORDERS` but the first; only
-    the first `most` of each, if it is given.
+    """The same sets, the cells of each listed in an `order` of `care_sim.core.defaults.CELL_ORDERS`
+    but the first; only the first `most` of each, if it is given.
 
     A set lies on an arc of columns: from its first to its last, or, if it has cells on both sides
     of the seam at azimuth -pi, from the end of its widest gap. `columns` and the spread orders

@@ -15,11 +15,15 @@ from care_sim.base.bounds import bounded, check_fields, one_of
 from care_sim.base.checks import LARGEST_INTEGER, check_whole
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.times import LAST_BITS_S
-from care_sim.core.allocation import RESERVE_FRACTION
-from care_sim.core.cell_order import AS_DEMANDED, CELL_ORDERS
+from care_sim.core.defaults import (
+    AS_DEMANDED,
+    AZIMUTH_MARGIN,
+    CELL_ORDERS,
+    CELLS,
+    ELEVATION_MARGIN,
+    RESERVE_FRACTION,
+)
 from care_sim.core.driver_settings import DRIVER_SETTINGS, DriverSettings
-from care_sim.core.firing.listing import CELLS, most_shots, settled
-from care_sim.core.grid import AZIMUTH_MARGIN, ELEVATION_MARGIN
 from care_sim.core.grid_rays import MOST_COLUMNS, MOST_ROWS
 from care_sim.core.return_settings import RETURN_SETTINGS, FilmedReturns, ReturnSettings
 
@@ -189,11 +193,17 @@ class Conditions(Sensing):
     def __post_init__(self) -> None:
         super().__post_init__()
         # Conditions that mean the same must be equal: they are part of what identifies an episode.
-        object.__setattr__(self, "firing", settled(self.firing))
+        if self.firing != CELLS:
+            # Imported here because hardware needs grids, which load SciPy and Numba.
+            from care_sim.core.firing.listing import settled
+
+            object.__setattr__(self, "firing", settled(self.firing))
 
     @property
     def filmed(self) -> FilmedReturns:
         """How pulses return, as a film is made with it."""
+        from care_sim.core.firing.listing import most_shots
+
         told = {name: getattr(self, name) for name in RETURN_SETTINGS}
         told["lidar_crosstalk"] = RETURN_SETTINGS["lidar_crosstalk"]
         # Without strength, more shots return nothing else.

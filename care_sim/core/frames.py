@@ -4,13 +4,15 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 Pose = tuple[float, float, float]
 """x, y (metres, world frame) and heading (radians, from x towards y) of a body on the ground."""
@@ -86,7 +88,7 @@ class Frame:
         return cls(*mounted_at((x, y), turn, at), at[2], yaw)
 
     @classmethod
-    def turned_by(cls, rotation: Rotation, origin: Floats) -> "Frame":
+    def turned_by(cls, rotation: "Rotation", origin: Floats) -> "Frame":
         """The frame at `origin` (3,) whose axes are those of the world after `rotation`."""
         # The part of the frame's x axis that points down is the sine of its pitch.
         i, j, k, w = rotation.as_quat().tolist()
@@ -102,7 +104,7 @@ class Frame:
         x, y, z = origin.tolist()
         return cls(x, y, z, yaw, roll, pitch)
 
-    def holding(self, origin: Floats, rotation: Rotation | None = None) -> "Frame":
+    def holding(self, origin: Floats, rotation: "Rotation | None" = None) -> "Frame":
         """The world frame of what is fixed in this one at `origin` (3,), turned by `rotation`."""
         turn = self.rotation if rotation is None else self.rotation * rotation
         return Frame.turned_by(turn, self.origin + self.vectors_to_world(origin))
@@ -124,8 +126,10 @@ class Frame:
         return float(np.cos(-self.yaw)), float(np.sin(-self.yaw))
 
     @cached_property
-    def rotation(self) -> Rotation:
+    def rotation(self) -> "Rotation":
         """From the axes of this frame to those of the world."""
+        from scipy.spatial.transform import Rotation
+
         return Rotation.from_euler("ZYX", [self.yaw, self.pitch, self.roll])
 
     def vectors_to_world(self, vectors: Floats) -> Floats:

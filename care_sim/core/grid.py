@@ -18,6 +18,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.box_bounds import corner_bounds, level_bounds, tilted_bounds
 from care_sim.core.cell_sets import CellSets
+from care_sim.core.defaults import AZIMUTH_MARGIN, ELEVATION_MARGIN
 from care_sim.core.frames import Frame
 from care_sim.core.grid_kernels import GridSpacing, nearest_rows, rectangle_cells
 from care_sim.core.grid_rays import GridRays
@@ -26,10 +27,6 @@ Cells = NDArray[np.int64]
 Place = tuple[float, float, float]
 """x, y and z in metres."""
 
-AZIMUTH_MARGIN = 2
-"""Dilation of hulls and wedges, in columns (paper, Remark 2)."""
-ELEVATION_MARGIN = 1
-"""Dilation of hulls and wedges, in rows (paper, Remark 2)."""
 AT_LIDAR_M = 1.5
 """A camera within this of a LiDAR is taken to stand at it, as the paper's wedges do without a word
 on it: the six of nuScenes are 0.5 to 1.0 m from LIDAR_TOP."""

@@ -8,15 +8,17 @@ of rows are told.
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.checks import check_number
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.arrays import Floats
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 LEAST_VIEW = np.pi / 360
 """Radians, half a degree: the least horizontal field of view."""
@@ -147,8 +149,10 @@ class GridRays:
         return self.pitch != 0 or self.roll != 0
 
     @cached_property
-    def tilt(self) -> Rotation:
+    def tilt(self) -> "Rotation":
         """From the grid's own axes to those of the sensor frame."""
+        from scipy.spatial.transform import Rotation
+
         # Pitch and roll are about the LiDAR's own axes, and azimuths are counted from the car's.
         mount = Rotation.from_euler("ZYX", [self.heading, -self.pitch, self.roll])
         return mount * Rotation.from_euler("Z", -self.heading)

@@ -17,7 +17,8 @@ from care_sim.base.checks import check_number
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.cell_sets import CellSets
-from care_sim.core.grid import AZIMUTH_MARGIN, ELEVATION_MARGIN, AngularGrid, Cells, Head, Place
+from care_sim.core.defaults import AZIMUTH_MARGIN, ELEVATION_MARGIN
+from care_sim.core.grid import AngularGrid, Cells, Head, Place
 from care_sim.core.grid_rays import MOST_ROWS
 
 MOST_APART_M = 40.0

@@ -9,21 +9,23 @@ import numpy as np
 from care_sim.base.bounds import bounded, check_fields, one_of
 from care_sim.base.checks import check_whole
 from care_sim.base.errors import InvalidInput, shown
-from care_sim.core.allocation import RESERVE_FRACTION, budget_cells, stages_of
+from care_sim.core.allocation import budget_cells, stages_of
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.belief import Belief, Observation
-from care_sim.core.cell_order import AS_DEMANDED, CELL_ORDERS, reordered
+from care_sim.core.cell_order import reordered
 from care_sim.core.cell_order_kernels import SetMargins
 from care_sim.core.cell_sets import CellSets
-from care_sim.core.firing.base import Hardware
-from care_sim.core.firing.listing import CELLS, hardware_of, settled
-from care_sim.core.grid import (
-    AT_LIDAR_M,
+from care_sim.core.defaults import (
+    AS_DEMANDED,
     AZIMUTH_MARGIN,
+    CELL_ORDERS,
+    CELLS,
     ELEVATION_MARGIN,
-    AngularGrid,
-    Cells,
+    RESERVE_FRACTION,
 )
+from care_sim.core.firing.base import Hardware
+from care_sim.core.firing.listing import hardware_of, settled
+from care_sim.core.grid import AT_LIDAR_M, AngularGrid, Cells
 from care_sim.core.grid_rays import MOST_COLUMNS, MOST_ROWS
 from care_sim.core.grid_stack import Grid, GridStack
 from care_sim.core.pinhole import PinholeCamera, camera_models, checked_cameras

@@ -31,8 +31,6 @@ from care_sim.sensors.box_pool import EMPTY_POOL, BoxPool
 from care_sim.sensors.camera_profiles import invents_boxes
 from care_sim.sensors.engines import check_engine
 from care_sim.sensors.setups import DEFAULT_SETUP, Sensor, sensor_setup
-from care_sim.viewer.pictures.episode_view import episode_view
-from care_sim.viewer.pictures.keyframe import draw_keyframe
 from care_sim.world.world import WORLD_STEP_S, World, whole_steps
 
 KEYFRAME_S = 0.1
@@ -275,6 +273,10 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         """A picture (H, W, 3) of the last keyframe: chase view, camera, fired cells."""
         if self.render_mode is None:
             return None
+        # Imported here because most environments draw nothing.
+        from care_sim.viewer.pictures.episode_view import episode_view
+        from care_sim.viewer.pictures.keyframe import draw_keyframe
+
         return np.asarray(draw_keyframe(episode_view(self.loop, self.keyframes)))
 
     def close(self) -> None:

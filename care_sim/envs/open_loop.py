@@ -28,8 +28,6 @@ from care_sim.loops.scene_records import SceneKeyframe
 from care_sim.loops.seeds import SensorSeeds
 from care_sim.perception import matching
 from care_sim.perception.detectors import PROXY
-from care_sim.viewer.pictures.keyframe import draw_keyframe
-from care_sim.viewer.pictures.scene_view import scene_view
 
 UNFILMED = ("camera_rotation_sigma_deg", "camera_position_sigma_m", "engine")
 """Conditions that a film cannot take on once it is made."""
@@ -182,6 +180,10 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
 
         It shows who was found, what returned and what fired.
         """
+        # Imported here because most environments draw nothing.
+        from care_sim.viewer.pictures.keyframe import draw_keyframe
+        from care_sim.viewer.pictures.scene_view import scene_view
+
         if self.render_mode is None:
             return None
         if self.keyframes:

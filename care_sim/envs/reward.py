@@ -11,6 +11,7 @@ from care_sim.base.checks import check_known, check_number
 from care_sim.base.compiled import compiled
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.arrays import Floats
+from care_sim.core.defaults import HEAVIEST
 from care_sim.loops.records import Keyframe
 
 _Number = TypeVar("_Number", float, Floats)
@@ -27,9 +28,6 @@ REWARD_WEIGHTS: dict[str, float] = {
 }
 """Default weight of every term. `gain` is off, since the reward of these environments was published
 without it. It is then not measured, which would cost rays, and reads 0."""
-
-HEAVIEST = 1e6
-"""Returns stay small enough that sums of floats do not lose the other terms."""
 
 
 def weights(changes: Mapping[str, float] | None) -> dict[str, float]:

@@ -3,8 +3,6 @@
 """
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
-from scipy.spatial.distance import cdist
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats, Integers, Mask
@@ -49,6 +47,8 @@ def served_by(annotations: Annotations, detections: Detections) -> Integers:
 
 def _distances(annotations: Annotations, detections: Detections) -> Floats:
     """(n, m) planar metres between the centres, inf where the pair is no match."""
+    from scipy.spatial.distance import cdist
+
     distances = cdist(annotations.boxes[:, :2], detections.boxes[:, :2])
     matching = (distances <= MATCH_M) & (annotations.classes[:, None] == detections.classes)
     return np.where(matching, distances, np.inf)
@@ -56,6 +56,8 @@ def _distances(annotations: Annotations, detections: Detections) -> Floats:
 
 def _optimal(distances: Floats) -> tuple[Integers, Integers]:
     """Objects, and the detections that serve them."""
+    from scipy.optimize import linear_sum_assignment
+
     near = np.isfinite(distances)
     # Objects and detections without any match are left out first: the assignment grows with the
     # third power of their number.

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.frames import Frame, turned
@@ -97,6 +96,8 @@ def assigned(tracks: Floats, classes: Integers, seen: Floats, life: kernels.Rule
     The forecasts are a table of `care_sim.perception.track_kernels`. Detections have `classes` (n,)
     and stand at `seen` (n, 7) in the world.
     """
+    from scipy.optimize import linear_sum_assignment
+
     distances, possible, pairs, alone = kernels.possible_pairs(tracks, classes, seen, life)
     # Nearly always each can be one alone, and all pairs belong together.
     if alone:

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.special import ndtri
 
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.pinhole import PinholeCamera
@@ -25,6 +24,8 @@ def jittered(
     of its width and height. `draws` (n, 4) from 0 to 1 decide; 0.5 leaves a box as it is.
     `of_cameras` (n,) are places in `cameras`.
     """
+    from scipy.special import ndtri
+
     across, down, wider, higher = (ndtri(draws) * spreads).T
     sizes = boxes[:, 2:] - boxes[:, :2]
     middles = (boxes[:, :2] + boxes[:, 2:]) / 2 + sizes * np.column_stack([across, down])

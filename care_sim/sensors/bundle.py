@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from care_sim.core.grid import AngularGrid
 from care_sim.core.grid_stack import Grid
@@ -41,6 +40,8 @@ def _shifted(grid: AngularGrid, across: float, up: float) -> AngularGrid:
     """The grid turned to the left by `across` about its own axes, its rows raised by `up`,
     radians.
     """
+    from scipy.spatial.transform import Rotation
+
     raised = _raised(grid, up)
     turned = grid.heading + across
     if not grid.is_tilted:

@@ -38,6 +38,11 @@ SOURCES: Plugins[Recordings | Generated] = Plugins(
 )
 
 
+def source_names() -> list[str]:
+    """Names of sources: the built-in ones, then those of installed packages."""
+    return SOURCES.names()
+
+
 def means_source(place: str) -> bool:
     """Whether a place names a class of sources, even one with faults."""
     try:

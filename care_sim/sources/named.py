@@ -82,6 +82,6 @@ def _unknown(text: str) -> InvalidInput:
     known = [Streets.kind, *RECORDING_TEXTS, *SOURCES.names()[len(SOURCES.built_in) :]]
     known.append("MODULE:CLASS")
     return InvalidInput(
-        f"unknown source {text!r:.200}; known: {', '.join(known)}; `care-sim sources` tells what "
-        "each is"
+        f"unknown source {text!r:.200}; known: {', '.join(known)}; `care-sim list sources` tells "
+        "what each is"
     )

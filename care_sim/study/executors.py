@@ -19,28 +19,21 @@ from multiprocessing import get_context
 from multiprocessing.context import BaseContext
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
-from care_sim.base.cores import CORES
 from care_sim.base.errors import InvalidInput, one_line
 from care_sim.base.extras import missing_extra
 from care_sim.base.limits import check_workers
 from care_sim.base.processes import end_group_with_work, end_with_parent, starting
-from care_sim.policies.isolation import are_isolated, isolate_policies
 
 if TYPE_CHECKING:
     from dask.distributed import Client
 
+_ANSWER_TIMEOUT_S = 10.0
+"""How long a scheduler may take to answer."""
 P = ParamSpec("P")
 T = TypeVar("T")
 
 ExecutorFactory = Callable[[int], Executor]
 """Makes an executor of so many workers; any executor of `concurrent.futures` will do."""
-
-MOST_WORKERS = 1024
-"""Most worker processes; each takes about 100 MB."""
-WORKERS = min(CORES, MOST_WORKERS)
-"""Workers unless another number is asked for."""
-_ANSWER_TIMEOUT_S = 10.0
-"""How long a scheduler may take to answer."""
 
 
 class ClusterLost(OSError):
@@ -61,6 +54,8 @@ def processes(workers: int) -> Executor:
             "care_sim.envs.closed_loop",
             "care_sim.world.lane_driver",
             "care_sim.study.scene_play",
+            "scipy.optimize",
+            "scipy.spatial.transform",
         ]
     )
     return Processes(workers, context)
@@ -89,6 +84,10 @@ class Processes(ProcessPoolExecutor):
     """
 
     def __init__(self, workers: int, context: BaseContext):
+        # Imported here because the room of policies loads SciPy and Numba, and options of commands
+        # name the number of workers.
+        from care_sim.policies.isolation import are_isolated
+
         with starting():
             super().__init__(workers, context, _begin, (are_isolated(),))
 
@@ -108,6 +107,8 @@ def _begin(isolates: bool) -> None:
     end_with_parent()
     end_group_with_work()
     if isolates:
+        from care_sim.policies.isolation import isolate_policies
+
         isolate_policies()
 
 

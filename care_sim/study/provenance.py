@@ -17,7 +17,6 @@ from care_sim.perception.detectors import DETECTORS
 from care_sim.policies import POLICIES
 from care_sim.policies.isolation import are_isolated, policy_process
 from care_sim.scenarios import PLUGINS as SCENARIO_PLUGINS
-from care_sim.sources.installed import SOURCES, Installed
 from care_sim.sources.scenes import Source
 
 _LIBRARIES = (
@@ -83,6 +82,9 @@ def source_digests(source: Source) -> list[str | None]:
     """The same of a source, and what else decides its films: its options, and the files that they
     name. Nothing for a built-in source, whose rows tell it all.
     """
+    # Imported here because the kinds of recordings load SciPy and PyArrow.
+    from care_sim.sources.installed import SOURCES, Installed
+
     if not isinstance(source, Installed):
         return []
     named = [file_digest(path) for _, value in source.options for path in paths_in(value)]

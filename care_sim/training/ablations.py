@@ -14,14 +14,11 @@ and `nearness` stay: they show the last scan, hulls at which the allocator fired
 """
 
 from collections.abc import Collection
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.policies.learned.grid_features import CHANNELS
-
-Part = Literal["pictures", "place", "tracks", "faults"]
 
 
 def mixing(without: Collection[str]) -> NDArray[np.float32]:

@@ -1,7 +1,7 @@
 """Agents that were trained: those that come with the package, and those in folders and files."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -142,6 +142,19 @@ def shipped_agents() -> list[ShippedAgent]:
         for file in files
         if file.stem in acting
     ]
+
+
+def agent_names() -> list[str]:
+    """The names of agents that come with the package."""
+    return [agent.name for agent in shipped_agents()]
+
+
+def agent_lines() -> Iterator[str]:
+    """The policy of every shipped agent, and below it what its card says."""
+    for agent in shipped_agents():
+        policy, *told = agent.columns.items()
+        yield policy[1]
+        yield from (f"    {name}: {value}" for name, value in told if value)
 
 
 def _budget(card: Card) -> str:

@@ -11,12 +11,13 @@ from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.checks import LARGEST_INTEGER, check_known
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.seed_ranges import TRAINING, VALIDATION
+from care_sim.core.defaults import HEAVIEST
 from care_sim.core.grid_rays import MOST_COLUMNS, MOST_ROWS
-from care_sim.envs.reward import HEAVIEST
-from care_sim.policies.learned.wrapping import Wrapping
+from care_sim.core.wrapping import Wrapping
 from care_sim.study.parameters import parameters
-from care_sim.training.ablations import Part
 
+Part = Literal["pictures", "place", "tracks", "faults"]
+"""What can be left out (`care_sim.training.ablations`)."""
 HOW_LONG = ("steps", "out", "resume", "tensorboard", "threads", "processes")
 """Fields in which a resumed run may differ from the run before."""
 BEFORE: Mapping[str, Any] = {"drawn": False, "without": []}

@@ -11,16 +11,13 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor
 from contextlib import contextmanager
-from dataclasses import dataclass
 from itertools import islice
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from care_sim.base.bounds import bounded, check_fields
-from care_sim.base.checks import LARGEST_INTEGER
 from care_sim.base.errors import InvalidInput, print_lines, report_problems
+from care_sim.base.exit_codes import FAILED
 from care_sim.base.extras import import_torch
 from care_sim.base.files import ZIP, check_output
 from care_sim.base.seed_ranges import TRAINING, VALIDATION
@@ -35,6 +32,7 @@ from care_sim.training.closing import how_to_play
 from care_sim.training.detector_data import Example, play, within_plan
 from care_sim.training.detector_score import PLAIN, calibration_of, judged, scores_by_scan
 from care_sim.training.detector_targets import Targets, loss, targets_of
+from care_sim.training.weights_config import DetectorConfig
 
 if TYPE_CHECKING:
     from care_sim.training.detector_network import Learning
@@ -59,89 +57,72 @@ RISING = 0.05
 CURVE_STEPS = 250
 """Steps between two points of the curve that the card tells, after which the weights are written,
 too."""
-FAILED = 1
-"""The exit code where the process that plays died."""
 CALIBRATING = range(VALIDATION, VALIDATION + 24)
 HELD_OUT = range(VALIDATION + 24, VALIDATION + 48)
 """Seeds of plays that nothing is learned from: those that scores are fitted to, and those by which
 the card tells what was reached."""
 
 
-@dataclass(frozen=True)
-class TrainDetector:
-    """Train the detector `pillars` on generated streets and drives and write its weights; needs the
-    extra `rl`.
-    """
+def train_pillars(config: DetectorConfig) -> int:
+    """Train the detector and write its weights; returns the exit code of the command."""
+    torch = import_torch()
+    from care_sim.training.detector_network import Learning
 
-    out: Path
-    """File to write."""
-    seed: int = bounded(0, 0, LARGEST_INTEGER)
-    """Of the first weights and the order of the examples."""
-    steps: int = bounded(10_000, 1, 1_000_000)
-    """Batches of four scans that are learned from."""
+    check_output(config.out, ZIP)
+    started = time.perf_counter()
+    torch.manual_seed(config.seed)
+    network = Learning()
+    kept = 0
 
-    def __post_init__(self) -> None:
-        check_fields(self)
+    def keep(curve: list[float], steps: int) -> None:
+        nonlocal kept
+        _save(config, network, curve, steps, PLAIN)
+        kept = steps
 
-    def __call__(self) -> int:
-        """Run it."""
-        torch = import_torch()
-        from care_sim.training.detector_network import Learning
+    # Whatever ends the learning, or the check of it, what was learned until then is in the
+    # file.
+    try:
+        with one_thread(torch), _player() as executor:
+            waiting = _waiting(played(executor, TRAINING))
+            batches = _batches(*waiting, np.random.default_rng(config.seed))
+            with shown_progress(config.steps, "steps") as show:
+                curve = train_detector(torch, network, batches, config.steps, keep, show)
+            network.eval()
+            _say(f"checking on {len(CALIBRATING) + len(HELD_OUT)} further plays")
+            fitted, apart = (
+                [example for examples in executor.map(play, seeds) for example in examples]
+                for seeds in (CALIBRATING, HELD_OUT)
+            )
+            calibration = calibration_of(scores_by_scan(torch, network, fitted))
+            result = judged(scores_by_scan(torch, network, apart, calibration))
+    except BaseException as error:
+        if kept:
+            _say(f"{config.out} holds what {kept} steps have taught, not checked")
+        if isinstance(error, BrokenExecutor):
+            report_problems([f"{DIED} that plays what is learned from"])
+            return FAILED
+        raise
+    _save(config, network, curve, config.steps, calibration, result)
+    told = ", ".join(f"{name} {value:.3f}" for name, value in result.items())
+    print_lines(f"{config.out}: {told}; {time.perf_counter() - started:.0f} s")
+    file = f"file={config.out}"
+    print_lines(
+        how_to_play("run", "street", "--detector", "pillars", "--detector-parameters", file)
+    )
+    return 0
 
-        check_output(self.out, ZIP)
-        started = time.perf_counter()
-        torch.manual_seed(self.seed)
-        network = Learning()
-        kept = 0
 
-        def keep(curve: list[float], steps: int) -> None:
-            nonlocal kept
-            self._save(network, curve, steps, PLAIN)
-            kept = steps
-
-        # Whatever ends the learning, or the check of it, what was learned until then is in the
-        # file.
-        try:
-            with one_thread(torch), _player() as executor:
-                waiting = _waiting(played(executor, TRAINING))
-                batches = _batches(*waiting, np.random.default_rng(self.seed))
-                with shown_progress(self.steps, "steps") as show:
-                    curve = train_detector(torch, network, batches, self.steps, keep, show)
-                network.eval()
-                _say(f"checking on {len(CALIBRATING) + len(HELD_OUT)} further plays")
-                fitted, apart = (
-                    [example for examples in executor.map(play, seeds) for example in examples]
-                    for seeds in (CALIBRATING, HELD_OUT)
-                )
-                calibration = calibration_of(scores_by_scan(torch, network, fitted))
-                result = judged(scores_by_scan(torch, network, apart, calibration))
-        except BaseException as error:
-            if kept:
-                _say(f"{self.out} holds what {kept} steps have taught, not checked")
-            if isinstance(error, BrokenExecutor):
-                report_problems([f"{DIED} that plays what is learned from"])
-                return FAILED
-            raise
-        self._save(network, curve, self.steps, calibration, result)
-        told = ", ".join(f"{name} {value:.3f}" for name, value in result.items())
-        print_lines(f"{self.out}: {told}; {time.perf_counter() - started:.0f} s")
-        file = f"file={self.out}"
-        print_lines(
-            how_to_play("run", "street", "--detector", "pillars", "--detector-parameters", file)
-        )
-        return 0
-
-    def _save(
-        self,
-        network: "Learning",
-        curve: list[float],
-        steps: int,
-        calibration: Floats,
-        result: dict[str, float] | None = None,
-    ) -> None:
-        """Write what was learned in so many steps; without a `result` nobody has checked it."""
-        arrays = network.arrays() | {CALIBRATION: calibration.astype(np.float32)}
-        save_detector(self.out, arrays, _card(self, network, curve, steps, result))
+def _save(
+    config: DetectorConfig,
+    network: "Learning",
+    curve: list[float],
+    steps: int,
+    calibration: Floats,
+    result: dict[str, float] | None = None,
+) -> None:
+    """Write what was learned in so many steps; without a `result` nobody has checked it."""
+    arrays = network.arrays() | {CALIBRATION: calibration.astype(np.float32)}
+    save_detector(config.out, arrays, _card(config, network, curve, steps, result))
 
 
 def train_detector(
@@ -265,7 +246,7 @@ def turned_example(example: Example, rng: np.random.Generator) -> Example:
 
 
 def _card(
-    made: TrainDetector,
+    made: DetectorConfig,
     network: "Learning",
     curve: list[float],
     steps: int,

@@ -4,8 +4,6 @@ calibration's streets.
 
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +11,8 @@ from scipy.ndimage import gaussian_filter
 
 from care_sim.base.errors import print_lines
 from care_sim.base.files import ZIP, check_output
-from care_sim.core.grid import AZIMUTH_MARGIN, ELEVATION_MARGIN, AngularGrid, Cells
+from care_sim.core.defaults import AZIMUTH_MARGIN, ELEVATION_MARGIN
+from care_sim.core.grid import AngularGrid, Cells
 from care_sim.envs.open_loop import FilmEnv
 from care_sim.loops.film import Film
 from care_sim.policies.learned.weights import Card, save_weights
@@ -23,27 +22,21 @@ from care_sim.sources.street_films import street_film
 from care_sim.streets.street import CALIBRATION_SEEDS
 from care_sim.study.provenance import machine_line, package_versions
 from care_sim.training.closing import how_to_play
+from care_sim.training.weights_config import PlaceConfig
 
 
-@dataclass(frozen=True)
-class TrainPlace:
-    """Make the map of `place` from the 20 calibration streets and write it."""
-
-    out: Path
-    """File to write."""
-
-    def __call__(self) -> int:
-        """Run it."""
-        check_output(self.out, ZIP)
-        grid = AngularGrid()
-        found: list[Cells] = []
-        for number, seed in enumerate(CALIBRATION_SEEDS, 1):
-            told = f"calibration street {number} of {len(CALIBRATION_SEEDS)}"
-            print(told, end="\r", file=sys.stderr, flush=True)
-            found += first_returns(street_film(seed))
-        save_weights(self.out, {"sightings": sighting_map(found, grid)}, _card(grid, len(found)))
-        print_lines(f"{self.out}: {len(found)} first sightings", how_to_play("enjoy", self.out))
-        return 0
+def train_place(config: PlaceConfig) -> int:
+    """Make the map and write it; returns the exit code of the command."""
+    check_output(config.out, ZIP)
+    grid = AngularGrid()
+    found: list[Cells] = []
+    for number, seed in enumerate(CALIBRATION_SEEDS, 1):
+        told = f"calibration street {number} of {len(CALIBRATION_SEEDS)}"
+        print(told, end="\r", file=sys.stderr, flush=True)
+        found += first_returns(street_film(seed))
+    save_weights(config.out, {"sightings": sighting_map(found, grid)}, _card(grid, len(found)))
+    print_lines(f"{config.out}: {len(found)} first sightings", how_to_play("run", config.out))
+    return 0
 
 
 def first_returns(film: Film) -> Iterator[Cells]:

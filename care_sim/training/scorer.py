@@ -11,16 +11,12 @@ the same machine makes the same bytes.
 import sys
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.array_files import Arrays
-from care_sim.base.bounds import bounded, check_fields
-from care_sim.base.checks import LARGEST_INTEGER
 from care_sim.base.errors import print_lines
 from care_sim.base.extras import import_torch
 from care_sim.base.files import ZIP, check_output
@@ -46,6 +42,7 @@ from care_sim.training.scorer_data import (
     drawn_examples,
     examples,
 )
+from care_sim.training.weights_config import ScorerConfig
 
 HIDDEN_UNITS = 16
 """As many as score a keyframe within half a millisecond on one core."""
@@ -63,37 +60,18 @@ DRAWN_HELD_OUT: Mapping[str, int] = {"drive": 6, "ncap": 18, "street": 1}
 """Worlds of validation seeds, for the loss that the card tells."""
 
 
-@dataclass(frozen=True)
-class TrainScorer:
-    """Train `learned-scorer` on the 20 calibration streets, or in worlds that differ, and write its
-    weights; needs the extra `rl`.
-    """
-
-    out: Path
-    """File to write."""
-    seed: int = bounded(0, 0, LARGEST_INTEGER)
-    """Of the first weights and the order of the examples."""
-    steps: int = bounded(4000, 1, LARGEST_INTEGER)
-    """Batches that are learned from."""
-    drawn: bool = False
-    """Learn from drives, tests of Euro NCAP and streets of training seeds, with budgets and faults
-    of the camera drawn for every play, instead of from the calibration streets."""
-
-    def __post_init__(self) -> None:
-        check_fields(self)
-
-    def __call__(self) -> int:
-        """Run it."""
-        import_torch()
-        check_output(self.out, ZIP)
-        started = time.perf_counter()
-        data = _drawn() if self.drawn else _streets()
-        arrays, losses = train_scorer(data, self.seed, self.steps)
-        save_weights(self.out, arrays, _card(self, next(iter(data.values())), losses))
-        told = ", ".join(f"{name} {loss:.4f}" for name, loss in losses.items())
-        took = f"{time.perf_counter() - started:.0f} s"
-        print_lines(f"{self.out}: loss {told}; {took}", how_to_play("enjoy", self.out))
-        return 0
+def train_learned_scorer(config: ScorerConfig) -> int:
+    """Train the policy and write its weights; returns the exit code of the command."""
+    import_torch()
+    check_output(config.out, ZIP)
+    started = time.perf_counter()
+    data = _drawn() if config.drawn else _streets()
+    arrays, losses = train_scorer(data, config.seed, config.steps)
+    save_weights(config.out, arrays, _card(config, next(iter(data.values())), losses))
+    told = ", ".join(f"{name} {loss:.4f}" for name, loss in losses.items())
+    took = f"{time.perf_counter() - started:.0f} s"
+    print_lines(f"{config.out}: loss {told}; {took}", how_to_play("run", config.out))
+    return 0
 
 
 _STREETS = {"calibration": CALIBRATION_SEEDS, "held out": HELD_OUT}
@@ -190,7 +168,7 @@ def _drawn_worlds() -> dict[str, tuple[Mapping[str, int], int]]:
     return {"learned": (DRAWN, TRAINING), "held out": (DRAWN_HELD_OUT, VALIDATION)}
 
 
-def _card(made: TrainScorer, learned: Examples, losses: dict[str, float]) -> Card:
+def _card(made: ScorerConfig, learned: Examples, losses: dict[str, float]) -> Card:
     positive = int(learned.positive.sum())
     scenario, of, seeds = _told_of_drawn() if made.drawn else _told_of_streets()
     return Card(

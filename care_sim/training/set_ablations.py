@@ -17,14 +17,12 @@ form of any other, and acts as such.
 """
 
 from collections.abc import Collection
-from typing import Literal
 
 import numpy as np
 
 from care_sim.base.array_files import Arrays
 from care_sim.policies.learned.set_items import ITEM_INPUTS, STRIP_INPUTS
 
-Part = Literal["attention", "inputs", "place", "faults"]
 KIND = ("is a camera box", "explained")
 """The inputs that tell an item's kind."""
 

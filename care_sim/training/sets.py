@@ -9,12 +9,8 @@ same machine makes the same bytes.
 import sys
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import get_args
 
-from care_sim.base.bounds import bounded, check_fields
-from care_sim.base.checks import LARGEST_INTEGER, check_known
 from care_sim.base.errors import print_lines
 from care_sim.base.extras import import_torch
 from care_sim.base.files import ZIP, check_output
@@ -28,9 +24,9 @@ from care_sim.sensors.setups import DEFAULT_SETUP, sensor_setup
 from care_sim.study.provenance import machine_line, package_versions
 from care_sim.training.closing import how_to_play
 from care_sim.training.drawn_worlds import SCENARIOS, seeds_of_worlds
-from care_sim.training.set_ablations import Part
 from care_sim.training.sets_data import Example, play
 from care_sim.training.sets_network import learn, losses_of
+from care_sim.training.weights_config import SetsConfig
 
 ROUNDS: tuple[Mapping[str, int], ...] = (
     {"drive": 24, "ncap": 48, "street": 10},
@@ -41,61 +37,40 @@ HELD_OUT: Mapping[str, int] = {"drive": 4, "ncap": 8, "street": 2}
 """Worlds of validation seeds, played as in the second round; the card tells the loss on them."""
 
 
-@dataclass(frozen=True)
-class TrainSets:
-    """Train `learned-sets` on drives, tests of Euro NCAP and streets of training seeds and write
-    its weights; needs the extra `rl`.
-    """
-
-    out: Path
-    """File to write; from the end of the first round on it holds what is learned so far."""
-    seed: int = bounded(0, 0, LARGEST_INTEGER)
-    """Of the first weights and the order of the examples."""
-    steps: int = bounded(3000, 1, LARGEST_INTEGER)
-    """Batches that are learned from in each round."""
-    without: tuple[Part, ...] = ()
-    """What to leave out, to see what it is worth: what an item is told of the others; all that is
-    told of it but its kind; the map of places; faults of the camera."""
-
-    def __post_init__(self) -> None:
-        check_fields(self)
-        for part in self.without:
-            check_known("part to be without", part, get_args(Part))
-
-    def __call__(self) -> int:
-        """Run it."""
-        import_torch()
-        check_output(self.out, ZIP)
-        started = time.perf_counter()
-        places = place_count()
-        examples: list[Example] = []
-        first = TRAINING
-        rounds = 0
-        # Whatever ends the learning, what the rounds before have taught is in the file.
-        try:
-            for worlds in ROUNDS:
-                own = self.out if rounds else None
-                examples += gathered(worlds, first, own, "faults" not in self.without)
-                first += max(worlds.values())
-                arrays = learn(examples, places, self.seed, self.steps, self.without)
-                rounds += 1
-                save_weights(self.out, arrays, _card(self, examples, ROUNDS[:rounds]))
-            held_out = gathered(HELD_OUT, VALIDATION, self.out)
-        except BaseException:
-            if rounds:
-                told = f"{self.out} holds what {rounds} of {len(ROUNDS)} rounds have taught"
-                print_lines(told, file=sys.stderr)
-            raise
-        losses = {
-            f"loss per {what}, {name}": loss
-            for name, data in (("learned", examples), ("held out", held_out))
-            for what, loss in losses_of(arrays, data).items()
-        }
-        save_weights(self.out, arrays, _card(self, examples, ROUNDS, losses))
-        told = ", ".join(f"{name} {loss:.4f}" for name, loss in losses.items())
-        took = f"{time.perf_counter() - started:.0f} s"
-        print_lines(f"{self.out}: {told}; {took}", how_to_play("enjoy", self.out))
-        return 0
+def train_sets(config: SetsConfig) -> int:
+    """Train the policy and write its weights; returns the exit code of the command."""
+    import_torch()
+    check_output(config.out, ZIP)
+    started = time.perf_counter()
+    places = place_count()
+    examples: list[Example] = []
+    first = TRAINING
+    rounds = 0
+    # Whatever ends the learning, what the rounds before have taught is in the file.
+    try:
+        for worlds in ROUNDS:
+            own = config.out if rounds else None
+            examples += gathered(worlds, first, own, "faults" not in config.without)
+            first += max(worlds.values())
+            arrays = learn(examples, places, config.seed, config.steps, config.without)
+            rounds += 1
+            save_weights(config.out, arrays, _card(config, examples, ROUNDS[:rounds]))
+        held_out = gathered(HELD_OUT, VALIDATION, config.out)
+    except BaseException:
+        if rounds:
+            told = f"{config.out} holds what {rounds} of {len(ROUNDS)} rounds have taught"
+            print_lines(told, file=sys.stderr)
+        raise
+    losses = {
+        f"loss per {what}, {name}": loss
+        for name, data in (("learned", examples), ("held out", held_out))
+        for what, loss in losses_of(arrays, data).items()
+    }
+    save_weights(config.out, arrays, _card(config, examples, ROUNDS, losses))
+    told = ", ".join(f"{name} {loss:.4f}" for name, loss in losses.items())
+    took = f"{time.perf_counter() - started:.0f} s"
+    print_lines(f"{config.out}: {told}; {took}", how_to_play("run", config.out))
+    return 0
 
 
 def place_count() -> int:
@@ -114,7 +89,7 @@ def gathered(
 
 
 def _card(
-    made: TrainSets,
+    made: SetsConfig,
     examples: Sequence[Example],
     rounds: Sequence[Mapping[str, int]],
     losses: Mapping[str, float] | None = None,

@@ -4,7 +4,6 @@ import math
 from functools import cache, lru_cache
 
 import numpy as np
-from scipy.spatial import ConvexHull
 
 from care_sim.core.arrays import Floats, Integers
 from care_sim.world.bodies import Part
@@ -83,6 +82,8 @@ def _mesh(part: Part) -> Mesh:
 @lru_cache(maxsize=256)
 def polyhedron(shape: str, size: tuple[float, float, float]) -> Mesh:
     """Corners, faces and edges of a primitive about its centre; see `Polyhedra.tables`."""
+    from scipy.spatial import ConvexHull
+
     corners = _corners(shape, np.array(size))
     hull = ConvexHull(corners)
     # Qhull gives triangles. Those of one face have one equation, up to the last bits, and two

@@ -14,7 +14,7 @@ import care_sim
 from care_sim.base.bounds import allowed, bounded, check_fields, one_of
 from care_sim.base.checks import check_path, check_whole
 from care_sim.base.errors import InvalidInput, one_line, shown
-from care_sim.commands.shared.options import seeds_of
+from care_sim.commands.options.shared import seeds_of
 from care_sim.core.allocation import allocate
 from care_sim.core.belief import Belief
 from care_sim.core.conditions import ClosedLoopConditions

@@ -58,7 +58,7 @@ def test_workers_and_threads_keep_to_the_affinity():
     code = (
         "import os; os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})\n"
         "import gymnasium, care_sim\n"
-        "from care_sim.commands.sweep import Sweep\n"
+        "from care_sim.commands.options.studies import Sweep\n"
         "import care_sim.envs.vector.env as vector\n"
         "from care_sim.commands.certify import Certify\n"
         "from care_sim.study.provenance import machine\n"

@@ -33,7 +33,9 @@ def ended(arguments, prefix=(), limited=None):
 @pytest.mark.parametrize("size", [200_000_000, 500_000_000, 1_500_000_000])
 def test_too_little_memory(name, size):
     number = getattr(resource, f"RLIMIT_{name}")
-    code, err = ended(["policies"], limited=lambda: resource.setrlimit(number, (size, size)))
+    code, err = ended(
+        ["list", "policies"], limited=lambda: resource.setrlimit(number, (size, size))
+    )
     assert code == limits.FAILED
     command = {"AS": "ulimit -v", "DATA": "ulimit -d"}[name]
     (line,) = err.splitlines()
@@ -75,7 +77,7 @@ def test_memory_that_suffices(name, size, tmp_path):
 
 def test_too_few_files():
     code, err = ended(
-        ["policies"], limited=lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (9, 9))
+        ["list", "policies"], limited=lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (9, 9))
     )
     assert code == limits.FAILED
     assert re.fullmatch(
@@ -87,7 +89,9 @@ def test_too_few_files():
 @pytest.mark.skipif(os.geteuid() != 0 or not shutil.which("setpriv"), reason="needs another user")
 def test_too_few_processes():
     code, err = ended(
-        ["policies"], ANOTHER_USER, lambda: resource.setrlimit(resource.RLIMIT_NPROC, (1, 1))
+        ["list", "policies"],
+        ANOTHER_USER,
+        lambda: resource.setrlimit(resource.RLIMIT_NPROC, (1, 1)),
     )
     assert code == limits.FAILED
     (line,) = err.splitlines()

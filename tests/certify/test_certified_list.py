@@ -5,10 +5,10 @@ left out for a reason.
 from dataclasses import fields
 from itertools import combinations, product
 
+from care_sim.certify import CERTIFIED_EPISODES
 from care_sim.certify.design import (
     ALONE,
     CERTIFIED_DRIVERS,
-    CERTIFIED_EPISODES,
     CERTIFIED_FAULTS,
     CERTIFIED_POLICIES,
     CERTIFIED_SETTINGS,

@@ -14,11 +14,10 @@ import pytest
 from gymnasium.vector import AsyncVectorEnv
 
 from care_sim.base.errors import InvalidInput, MissingExtra
-from care_sim.certify import design, published
+from care_sim.certify import ALL_EPISODES, CERTIFIED_EPISODES, design, playing, published
 from care_sim.certify.design import (
     ALONE,
     AS_LISTED,
-    CERTIFIED_EPISODES,
     CERTIFIED_POLICIES,
     CLOSED,
     DRIVE,
@@ -48,7 +47,6 @@ from care_sim.certify.trail import (
     first_difference,
 )
 from care_sim.certify.verdict import verdict_of
-from care_sim.commands import certify
 from care_sim.commands.certify import Certify
 from care_sim.core.firing import free_cells
 from care_sim.core.types import Scan, Tracks
@@ -197,8 +195,8 @@ def test_what_needs_an_extra_that_is_missing_is_left_out_and_told(monkeypatch, c
     assert line.startswith(f"{missing} of {CERTIFIED_EPISODES:,} not played: ")
     assert "extra 'open3d'" in line
     trails = [bytes([n % 256]) * (DIGEST_BYTES + 2) for n in range(len(LIST))]
-    monkeypatch.setattr(certify, "trails_of", lambda numbers, *_: {n: trails[n] for n in numbers})
-    monkeypatch.setattr(certify, "read", lambda: trails)
+    monkeypatch.setattr(playing, "trails_of", lambda numbers, *_: {n: trails[n] for n in numbers})
+    monkeypatch.setattr(published, "read", lambda: trails)
     assert Certify(workers=1)() == 0
     told = capsys.readouterr()
     assert f"care-sim: {line}" in told.err.splitlines()
@@ -221,16 +219,16 @@ def test_what_is_said_to_need_no_extra_plays_without(monkeypatch):
 
 def test_a_list_is_published_whole_or_not_at_all(monkeypatch, capsys):
     written = []
-    monkeypatch.setattr(certify, "write", written.append)
-    trails = {n: bytes([n % 256]) * (DIGEST_BYTES + 2) for n in range(design.ALL_EPISODES)}
-    monkeypatch.setattr(certify, "trails_of", lambda *_: trails | {7: "it broke"})
+    monkeypatch.setattr(published, "write", written.append)
+    trails = {n: bytes([n % 256]) * (DIGEST_BYTES + 2) for n in range(ALL_EPISODES)}
+    monkeypatch.setattr(playing, "trails_of", lambda *_: trails | {7: "it broke"})
     assert Certify(every=True, write=True)() == 1
     assert capsys.readouterr().out == "nothing is written: episode 7 was not played: it broke\n"
     assert written == []
-    monkeypatch.setattr(certify, "trails_of", lambda *_: trails)
+    monkeypatch.setattr(playing, "trails_of", lambda *_: trails)
     assert Certify(every=True, write=True)() == 0
     assert written == [[*trails.values()]]
-    for wrong in ({"write": True}, {"episode": 3, "every": True}, {"episode": design.ALL_EPISODES}):
+    for wrong in ({"write": True}, {"episode": 3, "every": True}, {"episode": ALL_EPISODES}):
         with pytest.raises(InvalidInput):
             Certify(**wrong)
 

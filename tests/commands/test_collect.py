@@ -18,7 +18,9 @@ def folder(tmp_path, monkeypatch):
 def collect(capsys, *options, dataset=DATASET):
     """Exit code, output and error lines of the command."""
     with pytest.raises(SystemExit) as end:
-        main(["collect", "dense", "--dataset", dataset, "--episodes", "2", *SHORT, *options])
+        main(
+            ["export", "minari", "dense", "--dataset", dataset, "--episodes", "2", *SHORT, *options]
+        )
     return end.value.code, *capsys.readouterr()
 
 

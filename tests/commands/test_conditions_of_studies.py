@@ -1,10 +1,10 @@
-"""`care-sim ncap` and `care-sim faults` under conditions."""
+"""`care-sim study ncap` and `care-sim study faults` under conditions."""
 
 import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.cli import main
-from care_sim.commands.ncap import Ncap
+from care_sim.commands.options.further_studies import Ncap
 from care_sim.core.conditions import DEFAULTS
 from care_sim.reports.studies import STUDIES
 from care_sim.study.designs.faults import fault_study
@@ -15,7 +15,7 @@ LATE = {"camera_profile": "yolox", "lidar_sweep_s": 0.1}
 
 
 def test_tests_of_euro_ncap_are_played_and_told_under_conditions(tmp_path, capsys):
-    asked = "ncap --tests CPTAns-50 --seeds 1 --budgets 0.1 --policies care full --workers 1"
+    asked = "study ncap --tests CPTAns-50 --seeds 1 --budgets 0.1 --policies care full --workers 1"
     with pytest.raises(SystemExit) as end:
         main([*asked.split(), "--camera-profile", "yolox", "--out", f"{tmp_path}"])
     assert end.value.code == 0
@@ -30,7 +30,7 @@ def test_tests_of_euro_ncap_are_played_and_told_under_conditions(tmp_path, capsy
 def test_without_conditions_nothing_is_said_of_them():
     rows = [row(config, 9.0) for config in fault_study([0])]
     assert STUDIES["faults"].closing(rows) == [f"Collisions: 0 in {len(rows)} episodes."]
-    assert Ncap().conditions.sensing().items() >= DEFAULTS.items()
+    assert Ncap().sensing().items() >= DEFAULTS.items()
 
 
 def test_faults_under_conditions_have_the_same_tables_and_say_which():

@@ -79,7 +79,7 @@ def test_a_folder_that_is_given_is_that_one_or_none(here, sweep):
 
 
 def test_a_world_and_a_source_have_folders_of_their_own(monkeypatch, capsys, tmp_path):
-    from care_sim.commands.shared import study_command
+    from care_sim.commands.shared import play_study
 
     (tmp_path / "own_worlds").mkdir()
     (tmp_path / "own_worlds" / "street.py").write_text(
@@ -91,17 +91,17 @@ def test_a_world_and_a_source_have_folders_of_their_own(monkeypatch, capsys, tmp
         raise InterruptedError(arguments[1].name)
 
     for line, name in (
-        ("validate dense --seeds 1 --training-seeds 1 --budgets 0.1", "validate-dense"),
+        ("study validate dense --seeds 1 --training-seeds 1 --budgets 0.1", "validate-dense"),
         (
-            "validate own_worlds.street:Street --seeds 1 --training-seeds 1 --budgets 0.1",
+            "study validate own_worlds.street:Street --seeds 1 --training-seeds 1 --budgets 0.1",
             "validate-own_worlds.street",
         ),
         ("protocol --scenes 1 --policies history --budgets 0.1", "protocol-streets"),
-        ("mechanism --scenes 1", "mechanism-streets"),
-        ("ablate --source streets --scenes 1", "ablate-streets"),
+        ("study mechanism --scenes 1", "mechanism-streets"),
+        ("study ablate --source streets --scenes 1", "ablate-streets"),
         ("reproduce --seeds 1 --also", "reproduce"),
     ):
-        monkeypatch.setattr(study_command, "run_study", named)
+        monkeypatch.setattr(play_study, "run_study", named)
         with pytest.raises(SystemExit):
             main(line.split())
         # Who raises it here is no part of the package, and is told so.

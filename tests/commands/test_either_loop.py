@@ -1,13 +1,12 @@
-"""`care-sim order` and `care-sim ablate`: each of one loop, and of the open one with --source."""
-
-from pathlib import Path
+"""`care-sim study order` and `ablate`: each of one loop, and of the open one with --source."""
 
 import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.cli import main
-from care_sim.commands.ablate import Ablate
-from care_sim.commands.order import Order
+from care_sim.commands.options.further_studies import Ablate
+from care_sim.commands.shared.selection import named_after
+from care_sim.commands.studies.either_loop import ablate
 from care_sim.core.return_settings import RETURN_SETTINGS
 from care_sim.reports.report import read_results
 from care_sim.study.designs.ablations import OPEN_ABLATIONS
@@ -36,31 +35,37 @@ def written(folder):
 @pytest.mark.parametrize(
     ("given", "told"),
     [
-        ("order --scenes 4", "--scenes has no meaning without --source"),
-        ("order --budgets 0.1", "--budgets has no meaning without --source"),
-        ("order --floor-seeds 2", "--floor-seeds has no meaning without --source"),
-        ("order --source streets --also random", "--also has no meaning with --source"),
-        ("order --source streets --policies", "--policies needs at least one value"),
-        ("order --source moon", "unknown source 'moon'"),
-        ("firing --budgets 0.1", "--budgets has no meaning without --source"),
-        ("firing --source streets --also random", "--also has no meaning with --source"),
-        ("firing --sensor os1-64", "--sensor has no meaning without --source"),
-        ("firing --source streets --sensors os1-64", "--sensors has no meaning with --source"),
-        ("firing --sensors", "--sensors needs at least one value"),
-        ("firing --sensors os2", "unknown sensor 'os2'"),
-        ("realism --budgets 0.1", "--budgets has no meaning without --source"),
-        ("realism --source streets --seeds 3", "--seeds has no meaning with --source"),
-        ("realism --seeds 990 991", "got 990 of test and 1090 of calibration"),
-        ("realism --tables dense-3 --source streets", "--tables has no meaning with --source"),
+        ("study order --scenes 4", "--scenes has no meaning without --source"),
+        ("study order --budgets 0.1", "--budgets has no meaning without --source"),
+        ("study order --floor-seeds 2", "--floor-seeds has no meaning without --source"),
+        ("study order --source streets --also random", "--also has no meaning with --source"),
+        ("study order --source streets --policies", "--policies needs at least one value"),
+        ("study order --source moon", "unknown source 'moon'"),
+        ("study firing --budgets 0.1", "--budgets has no meaning without --source"),
+        ("study firing --source streets --also random", "--also has no meaning with --source"),
+        ("study firing --sensor os1-64", "--sensor has no meaning without --source"),
         (
-            "realism --tables dense",
+            "study firing --source streets --sensors os1-64",
+            "--sensors has no meaning with --source",
+        ),
+        ("study firing --sensors", "--sensors needs at least one value"),
+        ("study firing --sensors os2", "unknown sensor 'os2'"),
+        ("study realism --budgets 0.1", "--budgets has no meaning without --source"),
+        ("study realism --source streets --seeds 3", "--seeds has no meaning with --source"),
+        ("study realism --seeds 990 991", "got 990 of test and 1090 of calibration"),
+        (
+            "study realism --tables dense-3 --source streets",
+            "--tables has no meaning with --source",
+        ),
+        (
+            "study realism --tables dense",
             "unknown table 'dense'; the nearest is dense-5; known: cutin-10, dartout-10, ",
         ),
-        ("realism --tables", "--tables needs at least one value"),
-        ("ablate --split val", "--split has no meaning without --source"),
-        ("ablate --source streets --seeds 3", "--seeds has no meaning with --source"),
-        ("ablate --source streets --budgets", "--budgets needs at least one value"),
-        ("ablate --source streets --scenes street-0001", "unknown scene 'street-0001'"),
+        ("study realism --tables", "--tables needs at least one value"),
+        ("study ablate --split val", "--split has no meaning without --source"),
+        ("study ablate --source streets --seeds 3", "--seeds has no meaning with --source"),
+        ("study ablate --source streets --budgets", "--budgets needs at least one value"),
+        ("study ablate --source streets --scenes street-0001", "unknown scene 'street-0001'"),
     ],
 )
 def test_an_option_of_the_other_loop_is_refused(given, told, capsys):
@@ -68,18 +73,14 @@ def test_an_option_of_the_other_loop_is_refused(given, told, capsys):
     assert told in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("command", [Order, Ablate])
-def test_every_loop_has_a_folder_of_its_own(command):
-    name = command.__name__.lower()
-    assert command().name_of(name) == name
-    assert command(source="nuscenes:data").name_of(name) == f"{name}-nuscenes"
-    mine = command(source="streets", out=Path("mine"))
-    assert mine.folder(name, [], name) == Path("mine")
+def test_every_source_has_a_folder_of_its_own():
+    assert named_after("order", "nuscenes:data") == "order-nuscenes"
+    assert named_after("validate", "mine:Mine") == "validate-mine"
 
 
 def test_the_orders_of_a_log_are_played_and_reported_again(logs, tmp_path, capsys):
     out = tmp_path / "out"
-    asked = ("order", "--source", logs, "--policies", "history", "care", "full")
+    asked = ("study", "order", "--source", logs, "--policies", "history", "care", "full")
     asked = (*asked, "--budgets", 0.03, 0.1, "--workers", 1, "--out", out)
     assert run(*asked) == 0
     rows, study, _ = read_results(out)
@@ -108,7 +109,10 @@ def test_the_hardware_of_a_log_is_played_and_reported_again(logs, tmp_path, caps
     assert study.name == "firing-open-loop"
     assert len(rows) == len(FIRINGS) * 2 + 1
     # Free cells are the default, and the default has nothing in the column.
-    assert {row["firing"] for row in rows if row["policy"] == "care"} == {None, *FIRINGS[1:]}
+    assert {row["firing"] for row in rows if row["policy"] == "care"} == {
+        None,
+        *FIRINGS[1:],
+    }
     before = written(out)
     (out / "tables.md").unlink()
     assert run("report", out) == 0
@@ -166,4 +170,4 @@ def test_the_full_scan_alone_cannot_show_an_order(logs, tmp_path):
 
 def test_no_scene_outside_the_quarter_is_played(logs):
     with pytest.raises(InvalidInput, match="unknown scene 'other'"):
-        Ablate(source=logs, scenes=("other",))()
+        ablate(Ablate(source=logs, scenes=("other",)))

@@ -9,9 +9,10 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.cli import main, parsed_command
-from care_sim.commands import enjoy
+from care_sim.commands import run as run_command
+from care_sim.commands.options.shared import EpisodeOptions
 from care_sim.commands.shared.agent_play import AgentPlay
-from care_sim.commands.shared.options import Options
+from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.policies.learned.weights import load_weights, save_weights, shipped_weights
 from care_sim.training.agents import Agent, find_agent, shipped_agents
 from care_sim.training.config import SacConfig
@@ -52,18 +53,18 @@ def test_it_plays_where_the_agent_learned_and_with_its_conditions(capsys, mine):
     conditions = "--lidar-dropout 0.5 --scenario-parameters duration_s=0.5"
     wanted = hash_of(run(capsys, *line.split(), *conditions.split())[1])
     for named in (mine, path):
-        code, out, complaint = run(capsys, "enjoy", named, "--seed", 2)
+        code, out, complaint = run(capsys, "run", named, "--seed", 2)
         assert code == 0
         assert hash_of(out) == wanted
         assert complaint == "care-sim: played without what no command takes: keyframe_s\n"
     # What is given wins over what was learned with.
     given = ("--lidar-dropout", 0.1, *SHORT)
     other = [*line.split(), *given]
-    assert hash_of(run(capsys, "enjoy", mine, *given, "--seed", 2)[1]) == hash_of(
+    assert hash_of(run(capsys, "run", mine, *given, "--seed", 2)[1]) == hash_of(
         run(capsys, *other)[1]
     )
     # Elsewhere nothing of the training counts but the weights, and the budget.
-    away = run(capsys, "enjoy", path, "--scenario", "dense", *SHORT)
+    away = run(capsys, "run", path, "--scenario", "dense", *SHORT)
     line = ["run", "dense", "--policy", "ppo", "--budget", 0.05, *SHORT]
     there = run(capsys, *line, "--policy-parameters", f"path={path}")
     assert away[2] == there[2] == ""
@@ -82,33 +83,33 @@ def test_of_several_environments_the_first_counts_and_its_own_parameter_wins(min
     assert dict(agent.env_parameters) == {"speed_kph": 0, "scoring_info": True}
     play = AgentPlay(agent)
     assert play.left_out() == ["scoring_info"]
-    assert play.options(Options()).scenario_parameters == ("speed_kph=0",)
+    assert play.options(EpisodeOptions())["scenario_parameters"] == ("speed_kph=0",)
 
 
 def test_a_shipped_agent_plays_by_either_name_and_is_filmed(capsys, tmp_path):
     film = tmp_path / "film.gif"
     line = ["run", "dense", "--policy", "ppo", "--budget", 0.03, *SHORT]
     wanted = hash_of(run(capsys, *line)[1])
-    code, out, _ = run(capsys, "enjoy", "ppo", *SHORT, "--video", film)
+    code, out, _ = run(capsys, "run", "ppo", *SHORT, "--video", film)
     assert (code, hash_of(out)) == (0, wanted)
     assert out.endswith(f"Filmed in {film}\n")
     assert film.read_bytes().startswith(b"GIF8")
-    assert hash_of(run(capsys, "enjoy", "ppo-dense", *SHORT)[1]) == wanted
+    assert hash_of(run(capsys, "run", "ppo-dense", *SHORT)[1]) == wanted
 
 
 def test_the_viewer_opens_on_the_episode(capsys, monkeypatch, tmp_path):
     pytest.importorskip("rerun")
     seen = []
 
-    def view(file):
-        seen.append((str(file), file.read_bytes()[:4]))
-        return lambda: 0
+    def view(options):
+        seen.append((str(options.file), options.file.read_bytes()[:4]))
+        return 0
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(enjoy, "View", view)
+    monkeypatch.setattr(run_command, "view", view)
     for more in ((), ("--record", "other.rrd")):
-        assert run(capsys, "enjoy", "ppo", *SHORT, "--view", *more)[0] == 0
-    assert seen == [("runs/enjoy.rrd", b"RRF2"), ("other.rrd", b"RRF2")]
+        assert run(capsys, "run", "ppo", *SHORT, "--view", *more)[0] == 0
+    assert seen == [("runs/run.rrd", b"RRF2"), ("other.rrd", b"RRF2")]
 
 
 def test_every_agent_of_the_package_is_found_and_has_a_world():
@@ -119,12 +120,12 @@ def test_every_agent_of_the_package_is_found_and_has_a_world():
     assert worlds["learned-scorer"] == "street"
     for name in names:
         line = shlex.split(AgentPlay(find_agent(name)).study_line())
-        assert name in parsed_command(line[1:]).policies
+        assert name in parsed_command(line[1:])[1].policies
 
 
 @pytest.mark.parametrize("agent", shipped_agents(), ids=lambda agent: agent.name)
 def test_every_agent_of_the_package_can_be_enjoyed(capsys, agent):
-    code, out, complaint = run(capsys, "enjoy", agent.name)
+    code, out, complaint = run(capsys, "run", agent.name)
     assert (code, complaint) == (0, "")
     assert hash_of(out)
 
@@ -163,15 +164,17 @@ def test_a_recorded_scene_is_played_as_it_was_learned():
     given = (("source", "argoverse2:logs"), ("scene", "one"), ("min_returns", 2))
     play = AgentPlay(Agent("ppo", None, "CARE-Replay-v0", 0.1, given))
     assert (play.world, play.scene) == ("argoverse2:logs", {"scene": "one"})
-    assert play.options(Options()) == Options(min_returns=2)
+    told = EpisodeOptions(**play.options(EpisodeOptions()))
+    assert told == EpisodeOptions(conditions=ClosedLoopConditions(min_returns=2))
 
 
 @pytest.mark.parametrize(
     ("named", "message"),
     [
+        ("nobody", "unknown scenario 'nobody'; known: "),
         (
-            "nobody",
-            "unknown agent 'nobody'; known: learned-scorer, learned-sets, place, ppo, ppo-dartout",
+            "no/body",
+            "unknown agent 'no/body'; known: learned-scorer, learned-sets, place, ppo, ppo-dartout",
         ),
         (".", "holds no agent: no weights.npz"),
         ("torn.npz", "weights torn.npz: no .npz of weights of care-sim train, or damaged"),
@@ -189,7 +192,7 @@ def test_what_is_no_agent_is_told_in_one_line(capsys, tmp_path, monkeypatch, nam
     save_weights("placeless.npz", file.arrays, replace(file.card, scenario=None))
     learner = SimpleNamespace(save=lambda path: path.write_bytes(b"PK"))
     Folder(SacConfig(out=tmp_path / "sac")).begin(learner)
-    code, _, complaint = run(capsys, "enjoy", *named.split())
+    code, _, complaint = run(capsys, "run", *named.split())
     assert (code, complaint.count("\n")) == (2, 1)
     assert message in complaint
 

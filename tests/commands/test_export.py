@@ -22,7 +22,17 @@ def export(capsys, drive, out, *options):
     # The split that the drive holds whole, unless another is asked for.
     options = options if "--split" in options else ("--split", "mini_val", *options)
     with pytest.raises(SystemExit) as end:
-        main(["export", "--source", f"nuscenes:{drive}", "--out", str(out), *map(str, options)])
+        main(
+            [
+                "export",
+                "nuscenes",
+                "--source",
+                f"nuscenes:{drive}",
+                "--out",
+                str(out),
+                *map(str, options),
+            ]
+        )
     return end.value.code, *capsys.readouterr()
 
 

@@ -1,4 +1,4 @@
-"""`care-sim mechanism` over a hand-built drive."""
+"""`care-sim study mechanism` over a hand-built drive."""
 
 import pytest
 
@@ -9,7 +9,7 @@ from care_sim.study.rows.parquet import read_rows
 
 def run(*arguments):
     with pytest.raises(SystemExit) as end:
-        main(["mechanism", *arguments])
+        main(["study", "mechanism", *arguments])
     return end.value.code
 
 

@@ -7,7 +7,8 @@ from PIL import Image
 
 from care_sim.base.errors import InvalidInput
 from care_sim.cli import main
-from care_sim.commands.shared.one_scene import SceneOptions
+from care_sim.commands.options.watching import SceneOptions
+from care_sim.commands.shared.one_scene import scene_of
 from care_sim.sources.named import source_of
 from care_sim.sources.scenes import film_of
 from care_sim.study.play_config import play_grid
@@ -89,10 +90,10 @@ def test_a_source_of_a_single_street_has_no_other_seed(tmp_path, monkeypatch):
     )
     monkeypatch.syspath_prepend(tmp_path)
     source = source_of("onestreet:One")
-    assert SceneOptions().scene_of(source, 7).seed == 7
+    assert scene_of(SceneOptions(), source, 7).seed == 7
     with pytest.raises(InvalidInput, match=r"seed must be of a scene of onestreet:One.* got 3"):
-        SceneOptions().scene_of(source, 3)
-    assert SceneOptions(scene="one-0007").scene_of(source, 3).seed == 7
+        scene_of(SceneOptions(), source, 3)
+    assert scene_of(SceneOptions(scene="one-0007"), source, 3).seed == 7
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 import pytest
 
 from care_sim.cli import main
-from care_sim.commands.report import PrintReport
+from care_sim.commands.options.results import Report
 from care_sim.study.episode_config import grid
 from care_sim.study.episode_play import run_episode
 from care_sim.study.rows.parquet import write_rows
@@ -52,7 +52,7 @@ def test_few_episodes_are_played_again_and_how_to_get_all_is_told(tmp_path, caps
     assert (code, "1 episode to watch" in out) == (0, True)
     assert "playing 1 episode again to be watched (--episodes 2: all)\n" in err
     assert "playing 2 episodes again to be watched\n" in report(capsys, *made)[2]
-    assert PrintReport(folder=folder).episodes == 40
+    assert Report(folders=(folder,)).episodes == 40
 
 
 def test_a_page_takes_the_place_of_the_one_before(results, tmp_path, capsys):

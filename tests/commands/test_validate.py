@@ -1,4 +1,4 @@
-"""`care-sim validate`, from its arguments to a folder of results."""
+"""`care-sim study validate`, from its arguments to a folder of results."""
 
 import pytest
 

@@ -54,7 +54,9 @@ def scored(database, results, *options):
 
 def exported(database, out, *options):
     with pytest.raises(SystemExit) as end:
-        main(["export", "--source", f"nuscenes:{database}", "--out", str(out), *options])
+        main(
+            ["export", "nuscenes", "--source", f"nuscenes:{database}", "--out", str(out), *options]
+        )
     assert end.value.code == 0
     return out
 

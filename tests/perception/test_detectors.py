@@ -154,7 +154,7 @@ def test_a_broken_one_gets_one_line(installed, name, line):
             "yolo",
             {},
             "unknown detector 'yolo'; known: cluster, graded, pillars, returns, torchscript; "
-            "`care-sim detectors` tells what each is",
+            "`care-sim list detectors` tells what each is",
         ),
         (
             "returns",

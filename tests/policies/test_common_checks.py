@@ -11,7 +11,7 @@ import care_sim
 from care_sim.certify.design import AS_LISTED
 from care_sim.core.allocation import allocate
 from care_sim.core.belief import MAX_DETECTIONS, Belief
-from care_sim.core.cell_order import CELL_ORDERS
+from care_sim.core.defaults import CELL_ORDERS
 from care_sim.core.residual import camera_layers
 from care_sim.core.types import CLASSES, ImageDetections
 from care_sim.envs import IDS

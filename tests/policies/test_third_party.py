@@ -318,9 +318,9 @@ class Near:
 def test_nothing_of_a_policy_or_detector_reaches_the_terminal_but_text(install, capsys):
     install("loud", CONTROLS, **{"loud\x1b[1m": "Loud", "torn\x1b[1m": "Nowhere"})
     install("near_loud", CONTROLS, group="care_sim.detectors", near="Near")
-    for command in ("policies", "detectors"):
+    for kind in ("policies", "detectors"):
         with pytest.raises(SystemExit):
-            main([command])
+            main(["list", kind])
         out = capsys.readouterr().out
         assert all(line.isprintable() for line in out.splitlines())
         assert "\\x1b" in out or "\\x07" in out

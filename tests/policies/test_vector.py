@@ -12,8 +12,8 @@ from gymnasium.vector import SyncVectorEnv
 import care_sim
 from care_sim.base.errors import InvalidInput
 from care_sim.certify.design import AS_LISTED
-from care_sim.core.cell_order import CELL_ORDERS
 from care_sim.core.cell_sets import CellSets
+from care_sim.core.defaults import CELL_ORDERS
 from care_sim.core.grid import AngularGrid
 from care_sim.core.grid_stack import GridStack
 from care_sim.core.types import Demand

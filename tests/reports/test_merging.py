@@ -36,7 +36,7 @@ def folder(path, held, study="sweep", code="one"):
 def merge(capsys, *arguments):
     """Exit code, output and errors."""
     with pytest.raises(SystemExit) as end:
-        main(["merge", *map(str, arguments)])
+        main(["report", *map(str, arguments)])
     return end.value.code, *capsys.readouterr()
 
 
@@ -157,7 +157,8 @@ def test_nothing_is_written_over(tmp_path, capsys):
     ours, theirs = folder(tmp_path / "ours", OURS), folder(tmp_path / "theirs", THEIRS)
     code, _, err = merge(capsys, ours, theirs, "--out", ours)
     assert (code, err.endswith("is there already and not empty: give another --out\n")) == (2, True)
-    assert "two folders at least" in merge(capsys, ours)[2]
+    told = merge(capsys, ours, "--out", tmp_path / "out")[2]
+    assert "--out is for several folders; the report of one stays in it" in told
     assert len(read_results(ours)[0]) == 2
 
 

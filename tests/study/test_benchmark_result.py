@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.cell_order import CELL_ORDERS
+from care_sim.core.defaults import CELL_ORDERS
 from care_sim.policies import tags_of
 from care_sim.study.benchmark.made_by import is_of_this_code, made_by, own_code_of
 from care_sim.study.benchmark.replay import ONE_IN

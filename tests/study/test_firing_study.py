@@ -3,9 +3,9 @@ from collections import Counter
 from care_sim.core.grid import AngularGrid
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.sources.scenes import Scene, Streets
+from care_sim.study.designs.defaults import FIRING_POLICIES
 from care_sim.study.designs.firing import (
     FIRING_BUDGETS,
-    FIRING_POLICIES,
     FIRINGS,
     firing_plays,
     firing_study,

@@ -1,11 +1,12 @@
-"""What `care-sim ncap` plays."""
+"""What `care-sim study ncap` plays."""
 
 from collections import Counter
 
 import pytest
 
 from care_sim.scenarios.ncap.table import TESTS
-from care_sim.study.designs.ncap import NCAP_POLICIES, NcapCase, ncap_cases, ncap_study
+from care_sim.study.designs.defaults import NCAP_POLICIES
+from care_sim.study.designs.ncap import NcapCase, ncap_cases, ncap_study
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.episode_play import run_episode
 

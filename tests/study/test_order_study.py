@@ -2,7 +2,7 @@ from collections import Counter
 
 import pytest
 
-from care_sim.core.cell_order import AS_DEMANDED
+from care_sim.core.defaults import AS_DEMANDED
 from care_sim.sources.scenes import Scene, Streets
 from care_sim.study.designs.order import (
     ORDERS,

@@ -3,7 +3,8 @@ from collections import Counter
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.firing.listing import CELLS, HARDWARE, settled
+from care_sim.core.defaults import CELLS
+from care_sim.core.firing.listing import HARDWARE, settled
 from care_sim.reports.realism.episodes import realism_tables
 from care_sim.sources.named import source_of
 from care_sim.sources.scenes import Scene, Streets

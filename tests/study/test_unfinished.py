@@ -5,9 +5,9 @@ import json
 import pytest
 
 from care_sim.base.errors import InvalidInput
+from care_sim.commands.options.studies import Sweep
 from care_sim.commands.shared.command_line import command_line
 from care_sim.commands.shared.run_study import run_study
-from care_sim.commands.sweep import Sweep
 from care_sim.reports.report import next_steps, read_results
 from care_sim.reports.studies import SWEEP
 from care_sim.study.episode_config import grid

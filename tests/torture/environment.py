@@ -48,7 +48,7 @@ ALLOWED = {
 }
 """Python itself ends at once with any other value, and Numba warns with a traceback."""
 FOUND_CASES = (
-    ({"NUMBA_DISABLE_JIT": "1"}, ("policies",)),
+    ({"NUMBA_DISABLE_JIT": "1"}, ("list", "policies")),
     # Rerun raised NameError while it was imported.
     ({"RERUN_STRICT": " "}, ("run", "dartout", "--record", "out.rrd", *warm.TINY)),
 )

@@ -22,7 +22,7 @@ FILES = {
 }
 FOLDERS = (
     (*SWEEP, "--workers", "1", *SHORT, "--force", "--out"),
-    ("merge", "../results", "../results", "--out"),
+    ("report", "../results", "../results", "--out"),
     ("run", "dartout", *SHORT, "--export"),
 )
 OUTPUTS = (

@@ -148,37 +148,25 @@ TINY = {
 }
 LONG = (
     "reproduce",
-    "ablate",
-    "order",
-    "firing",
-    "realism",
-    "faults",
-    "crowding",
-    "r157",
-    "vehicle",
-    "validate",
+    "sweep",
     "protocol",
-    "mechanism",
+    "study",
     "judge",
     "certify",
     "benchmark",
     "leaderboard",
     "train",
-    "sweep",
-    "ncap",
     "report",
     "export",
-    "collect",
 )
 """Commands that may take their time."""
 
 
 def commands():
     """Every command line that can begin, with the dataclass of its options."""
-    from care_sim.commands.entries import COMMANDS
+    from care_sim.commands.table import COMMANDS
 
-    found = {(name,): command.loaded() for name, command in COMMANDS.items() if name != "train"}
-    return found | {("train", name): kind for name, kind in COMMANDS["train"].loaded().items()}
+    return {tuple(name.split()): command.options_class() for name, command in COMMANDS.items()}
 
 
 def options(kind):
@@ -272,7 +260,7 @@ class Grammar:
 
     def _names(self, name):
         """What fits an option of this name; thrice, so that it is drawn more often."""
-        from care_sim.core.cell_order import CELL_ORDERS
+        from care_sim.core.defaults import CELL_ORDERS
         from care_sim.core.driver_settings import DRIVERS
         from care_sim.core.firing.listing import HARDWARE
         from care_sim.policies import policy_names

@@ -31,7 +31,7 @@ HONEST = (signal.SIGXCPU, signal.SIGKILL)
 FOUND_CASES = (
     ("AS", 500_000_000, ("run", "dartout", *warm.TINY)),
     ("NPROC", 3, (*STUDY, *warm.TINY)),
-    ("NOFILE", 7, ("policies",)),
+    ("NOFILE", 7, ("list", "policies")),
 )
 
 prepare, FORKS = warm.prepare, warm.FORKS
@@ -44,7 +44,7 @@ def drawn(case):
     # Another user needs a process of its own, which takes seconds.
     name = "NPROC" if case.rng.random() < 0.02 else case.rng.choice((*SIZES,))
     if name == "NPROC":
-        line = case.rng.choice(((*STUDY, *warm.TINY), ("policies",)))
+        line = case.rng.choice(((*STUDY, *warm.TINY), ("list", "policies")))
         return name, case.rng.choice(PROCESSES), line
     around = case.rng.choice((1.0, 1.0, 0.9, 1.1))
     return name, int(case.rng.choice(SIZES[name]) * around), case.rng.choice(warm.LINES)

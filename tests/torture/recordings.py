@@ -41,7 +41,7 @@ def _judged(case, folder, source, refused=False, exporting=False, **options):
     if roll < 0.7 or options:
         ended = _replayed(source, **options)
     elif exporting and roll < 0.8:
-        ended = run(("export", "--source", source, "--out", "out.json"))
+        ended = run(("export", "nuscenes", "--source", source, "--out", "out.json"))
     else:
         line = ("protocol", "--source", source, "--scenes", "1", *ONE_POLICY, "--out", "out")
         ended = run(line)

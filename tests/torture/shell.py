@@ -37,11 +37,11 @@ SURROUNDINGS = (
     {"PYTHONOPTIMIZE": "2"},
 )
 LISTS = (
-    ["policies"],
-    ["agents"],
-    ["scenarios"],
-    ["detectors"],
-    ["sources"],
+    ["list", "policies"],
+    ["list", "agents"],
+    ["list", "scenarios"],
+    ["list", "detectors"],
+    ["list", "sources"],
     ["--help"],
     ["sweep", "--help"],
     ["report", "results"],

@@ -19,8 +19,8 @@ LINES = (
     ("run", "dartout", "--record", "out.rrd", *TINY),
     ("sweep", "--scenarios", "dartout", "--policies", "care", "--seeds", "1", *TINY),
     ("report", "results"),
-    ("policies",),
-    ("scenarios",),
+    ("list", "policies"),
+    ("list", "scenarios"),
     ("run", "--help"),
     ("--help",),
     ("--version",),
@@ -36,7 +36,7 @@ def prepare(_name):
     commands.prepare(Name("commands", FOUND, 0))
     props.template("results")
     for arguments in LINES:
-        if arguments[0] in ("policies", "scenarios"):
+        if arguments[0] == "list":
             props.care_sim(*arguments)
 
 

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
 from care_sim.cli import parsed_command
+from care_sim.commands.train import train
 from care_sim.envs import IDS
 from care_sim.policies.learned.weights import load_weights, shipped_weights
 from care_sim.training.config import PpoConfig, RecurrentPpoConfig, SacConfig
@@ -41,7 +42,7 @@ def own(tmp_path):
 
 def asked(*line):
     """The command of `care-sim train`."""
-    return parsed_command(["train", *map(str, line)])
+    return parsed_command(["train", *map(str, line)])[1]
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -173,7 +174,7 @@ def test_a_file_that_is_wrong_is_told_in_one_line(tmp_path, text, message):
 
 def test_a_file_that_is_not_there_is_told(tmp_path):
     with pytest.raises(InvalidInput, match=r"hyperparameters .*none.toml: no such file"):
-        asked("sac", "--hyperparameters", tmp_path / "none.toml")()
+        train(asked("sac", "--hyperparameters", tmp_path / "none.toml"))
 
 
 numbers = st.floats(1e-8, 1, allow_nan=False)

@@ -192,7 +192,7 @@ def test_the_command_writes_the_same_file_again_with_its_card(tmp_path, monkeypa
     assert len(card.result) == 4
     said = capsys.readouterr().out.splitlines()
     assert said[0].startswith(f"{one}: loss per items, learned")
-    assert said[1] == f"play it: care-sim enjoy {one}"
+    assert said[1] == f"play it: care-sim run {one}"
 
 
 def test_an_interrupt_keeps_what_the_first_round_has_taught(tmp_path, monkeypatch, capsys):

@@ -15,9 +15,9 @@ import care_sim
 from care_sim.base.errors import InvalidInput, MissingExtra
 from care_sim.base.seed_ranges import TRAINING, VALIDATION
 from care_sim.cli import main, parsed_command
-from care_sim.commands.shared.end_of_training import end_of_training
+from care_sim.commands.train import end_of_training
+from care_sim.core.wrapping import Wrapping
 from care_sim.policies.learned.weights import load_weights
-from care_sim.policies.learned.wrapping import Wrapping
 from care_sim.scenarios import PLUGINS
 from care_sim.study import provenance
 from care_sim.training.algorithms import algorithm
@@ -122,13 +122,13 @@ def test_it_trains_keeps_and_goes_on(capsys, tmp_path):
     assert lines[2] == f"kept: the weights of that step, {out / 'weights.npz'}"
     assert load_weights(out / "weights.npz").card.steps == int(steps)
     play, beside = (line.partition(": ")[2] for line in lines[3:])
-    assert play == f"care-sim enjoy {out}"
+    assert play == f"care-sim run {out}"
     # It goes as it is told, and learns of the parameters of the training.
     assert beside == (
         "care-sim sweep --scenarios dense --policies care ppo --budgets 0.03 "
         f"--scenario-parameters duration_s=1.0 --policy-parameters ppo.path={out / 'weights.npz'}"
     )
-    assert parsed_command(shlex.split(beside)[1:]).budgets == (0.03,)
+    assert parsed_command(shlex.split(beside)[1:])[1].budgets == (0.03,)
     code, played, complaint = care(capsys, *shlex.split(play)[1:], "--seed", "5")
     line = f"run dense --policy ppo --budget 0.03 --policy-parameters path={out / 'weights.npz'}"
     again = care(capsys, *line.split(), "--scenario-parameters", "duration_s=1.0", "--seed", 5)[1]

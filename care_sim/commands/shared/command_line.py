@@ -7,20 +7,22 @@ from typing import Any, get_args, get_type_hints
 
 import tyro
 
-from care_sim.commands.entries import COMMANDS
+from care_sim.commands.table import COMMANDS
 
 
 def command_line(command: object) -> str:
     """The line as a shell takes it: what departs from the defaults; empty for what is no command
     of `care-sim`.
     """
-    place = type(command).__module__, type(command).__name__
-    for name, entry in COMMANDS.items():
-        if place == (f"care_sim.commands.{entry.module}", entry.name):
+    place = f"{type(command).__module__}:{type(command).__name__}"
+    for name, each in COMMANDS.items():
+        if place == f"care_sim.{each.options}":
             # What is told by its place comes first: after an option that takes several values it
             # would be one of them.
             words = sorted(_words(command), key=lambda option: option[0].startswith("--"))
-            return shlex.join(["care-sim", name, *(word for option in words for word in option)])
+            return shlex.join(
+                ["care-sim", *name.split(), *(word for option in words for word in option)]
+            )
     return ""
 
 

@@ -1,22 +1,52 @@
-"""Whether a study may take a folder: what lies there already, and whether the new rows hold all of
-it.
-"""
+"""Which folder a study may take: what is there already, and whether the new rows hold all of it."""
 
+import sys
 from collections.abc import Collection, Sequence
 from pathlib import Path
 
-from care_sim.base.errors import InvalidInput, counted
+from care_sim.base.errors import InvalidInput, counted, print_lines
 from care_sim.reports.studies import SWEEP
 from care_sim.reports.study import Study
-from care_sim.study.journal import Finished, Journal
+from care_sim.study.journal import JOURNAL, Finished, Journal, is_written, read_journal
 from care_sim.study.results_formats import RESULTS_FORMATS
 from care_sim.study.row_identity import USUAL, asked_with, identity, row_label
 from care_sim.study.rows.parquet import read_notes, read_rows
 from care_sim.study.run_config import Row, RunConfig
 
+_RUNS = Path("runs")
 WAYS_OUT = "give another --out, or --force to replace it"
 _MOST_TOLD = 3
 """Differing parameters that a refusal names, at the most."""
+
+
+def free_folder(name: str, configs: Sequence[RunConfig], study: Study) -> Path:
+    """The first of runs/NAME, runs/NAME-2 and so on that the study may take: where nothing lies, or
+    only rows that are all asked for now, which it goes on with. A line says why another is not it.
+    """
+    folder, number = _RUNS / name, 1
+    first = reason = _why_not(folder, configs, study)
+    while reason:
+        number += 1
+        folder = _RUNS / f"{name}-{number}"
+        reason = _why_not(folder, configs, study)
+    if first:
+        print_lines(f"another folder is taken, because {first}", file=sys.stderr)
+    return folder
+
+
+def _why_not(folder: Path, configs: Sequence[RunConfig], study: Study) -> str:
+    """Why the study may not take the folder; empty where it may."""
+    if folder.is_file():
+        return f"{folder} is a file"
+    if is_written(folder / JOURNAL):
+        return f"another study writes to {folder} now"
+    try:
+        check_kind(folder, study)
+        check_results(folder, configs, study)
+        check_journal(folder, configs, read_journal(folder / JOURNAL), study)
+    except InvalidInput as error:
+        return str(error).removesuffix(f": {WAYS_OUT}")
+    return ""
 
 
 def check_kind(folder: Path, study: Study) -> None:

@@ -4,13 +4,16 @@ scenario.
 
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
+from pathlib import Path
 from typing import Any
 
 from care_sim.base.checks import check_known
-from care_sim.base.errors import InvalidInput
+from care_sim.base.errors import InvalidInput, print_lines
 from care_sim.base.plugins import is_place
+from care_sim.commands.options.watching import SceneOptions
 from care_sim.core.conditions import DEFAULTS, OF_BOTH_LOOPS, ClosedLoopConditions
+from care_sim.reports.episodes.clips import Clip
 from care_sim.sensors.setups import DEFAULT_SETUP
 from care_sim.sources.installed import SOURCES, means_source
 from care_sim.sources.named import source_name, source_of
@@ -22,69 +25,51 @@ _STREET = "street"
 """One of the generated streets, as `CARE-Street-v0` has them; `streets` says the same."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class SceneOptions:
-    """Which scene of a source is played."""
+def scene_source(options: SceneOptions, text: str, sensor: str) -> Source:
+    """The source that is named in the place of a scenario."""
+    named = Streets.kind if text == _STREET else text
+    given = None if sensor == DEFAULT_SETUP else sensor
+    topics = options.topics or None
+    return source_of(
+        named, split=options.split, version=options.version, sensor=given, topics=topics
+    )
 
-    scene: str | None = None
-    """Of a source of scenes: the name of the scene. Without it that of the seed on streets, of
-    recordings the first."""
-    split: str | None = None
-    """For streets: evaluation (150 scenes) or calibration (20). For nuScenes: val, all, or one of
-    splits.json.
+
+def scene_of(options: SceneOptions, source: Source, seed: int) -> Scene:
+    """The scene that is named, or else that of the seed. Raises InvalidInput where there is
+    none.
     """
-    version: str | None = None
-    """For nuScenes: the version, where the folder holds several."""
-    topics: tuple[str, ...] = ()
-    """For bags: the topics of points and poses, where there are several."""
+    scenes = {each.name: each for each in source.scenes()}
+    _check_scene(options, scenes)
+    chosen = next(iter(scenes.values())) if options.scene is None else scenes[options.scene]
+    # Of a recording the seed draws the faults and the floor alone; a street is its seed.
+    kind: Any = SOURCES.maker(source.kind)
+    if issubclass(kind, Recordings):
+        return chosen._replace(seed=seed)
+    if options.scene is not None:
+        # Of the seed that nobody gave there is nothing to say.
+        if seed not in (0, chosen.seed):
+            told = f"{chosen.name} is that of --scene, --seed {seed} changes nothing"
+            print(told, file=sys.stderr)
+        return chosen
+    seeds = {each.seed: each for each in scenes.values()}
+    if seed in seeds:
+        return seeds[seed]
+    told = f"{min(seeds)} to {max(seeds)}, got {seed}"
+    raise InvalidInput(f"seed must be of a scene of {source.kind}, {told}")
 
-    def check_unused(self) -> None:
-        """Raise InvalidInput where one is given, and no source is named."""
-        for field in fields(SceneOptions):
-            if getattr(self, field.name) not in (None, ()):
-                raise InvalidInput(f"--{field.name} has no meaning in the closed loop")
 
-    def source(self, text: str, sensor: str) -> Source:
-        """The source that is named in the place of a scenario."""
-        named = Streets.kind if text == _STREET else text
-        given = None if sensor == DEFAULT_SETUP else sensor
-        topics = self.topics or None
-        return source_of(named, split=self.split, version=self.version, sensor=given, topics=topics)
-
-    def scene_of(self, source: Source, seed: int) -> Scene:
-        """The scene that is named, or else that of the seed. Raises InvalidInput where there is
-        none.
-        """
-        scenes = {each.name: each for each in source.scenes()}
-        self._check_scene(scenes)
-        chosen = next(iter(scenes.values())) if self.scene is None else scenes[self.scene]
-        # Of a recording the seed draws the faults and the floor alone; a street is its seed.
-        kind: Any = SOURCES.maker(source.kind)
-        if issubclass(kind, Recordings):
-            return chosen._replace(seed=seed)
-        if self.scene is not None:
-            # Of the seed that nobody gave there is nothing to say.
-            if seed not in (0, chosen.seed):
-                told = f"{chosen.name} is that of --scene, --seed {seed} changes nothing"
-                print(told, file=sys.stderr)
-            return chosen
-        seeds = {each.seed: each for each in scenes.values()}
-        if seed in seeds:
-            return seeds[seed]
-        told = f"{min(seeds)} to {max(seeds)}, got {seed}"
-        raise InvalidInput(f"seed must be of a scene of {source.kind}, {told}")
-
-    def _check_scene(self, scenes: Mapping[str, Scene]) -> None:
-        if self.scene is None:
-            return
-        try:
-            check_known("scene", self.scene, scenes)
-        except InvalidInput as error:
-            # A number is meant for a seed, where scenes have each their own.
-            seeds = {str(each.seed) for each in scenes.values()}
-            is_seed = len(seeds) == len(scenes) and self.scene in seeds
-            hint = f"; --seed {self.scene} plays that of the seed" if is_seed else ""
-            raise InvalidInput(f"{error}{hint}") from None
+def _check_scene(options: SceneOptions, scenes: Mapping[str, Scene]) -> None:
+    if options.scene is None:
+        return
+    try:
+        check_known("scene", options.scene, scenes)
+    except InvalidInput as error:
+        # A number is meant for a seed, where scenes have each their own.
+        seeds = {str(each.seed) for each in scenes.values()}
+        is_seed = len(seeds) == len(scenes) and options.scene in seeds
+        hint = f"; --seed {options.scene} plays that of the seed" if is_seed else ""
+        raise InvalidInput(f"{error}{hint}") from None
 
 
 def is_source(text: str) -> bool:
@@ -112,3 +97,11 @@ def scene_plays(
             raise InvalidInput(f"--{option} has no meaning in the open loop")
     floors, latencies = (given.pop("floor_seed"),), (given.pop("camera_latency"),)
     return play_grid(source, [scene], policies, [budget], floors, latencies, **given)
+
+
+def finish_files(record: Path | None, film: Clip, video: Path | None) -> None:
+    """Write the film, and tell of it and of the recording, where there are any."""
+    if record is not None:
+        print_lines(f"Recorded in {record}: care-sim view {record}")
+    if film.write():
+        print_lines(f"Filmed in {video}")

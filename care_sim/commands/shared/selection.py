@@ -1,7 +1,8 @@
-"""What a command plays of what is named: scenarios, policies, values of a condition."""
+"""What a command plays of what is named: scenarios, policies, sources, values of a condition."""
 
 from collections.abc import Callable, Collection, Iterable, Sequence
-from typing import Any
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,10 +14,14 @@ from care_sim.base.errors import (
     report_problems,
 )
 from care_sim.base.scenario_names import scenario_of
+from care_sim.commands.options.shared import EpisodeOptions, PlayOptions, SourceOptions
 from care_sim.core.conditions import DEFAULTS
 from care_sim.policies import check_policy, contenders
 from care_sim.scenarios import PLUGINS, SCENARIOS, make_scenario, scenario_names
 from care_sim.study.parameters import Parameters, parameters
+
+if TYPE_CHECKING:
+    from care_sim.sources.scenes import Source
 
 _ALL = "all"
 """The name that stands for every known one."""
@@ -97,6 +102,16 @@ def playable(names: Sequence[str], make: Callable[[str], object]) -> tuple[list[
     return policies, left_out
 
 
+def some_playable(
+    names: Sequence[str], make: Callable[[str], object]
+) -> tuple[list[str], list[str]]:
+    """As `playable`. Raises InvalidInput if no policy is left, too."""
+    policies, left_out = playable(names, make)
+    if not policies:
+        raise InvalidInput("none of the policies can be played")
+    return policies, left_out
+
+
 def policy_parameters(texts: Sequence[str], policies: Sequence[str]) -> Parameters:
     """The parameters that are given as NAME=VALUE or POLICY.NAME=VALUE to the named `policies`.
 
@@ -127,3 +142,42 @@ def in_turn(several: Sequence[Any], name: str, common: dict[str, Any]) -> Sequen
     if several and one != DEFAULTS[name]:
         raise InvalidInput(f"give {name} one value or several, not both")
     return several or (one,)
+
+
+def arguments_of(options: EpisodeOptions, policies: Sequence[str]) -> dict[str, Any]:
+    """As arguments of `EpisodeConfig`, for studies that play these policies. Raises InvalidInput
+    for parameters of another policy.
+    """
+    return options.sensing() | {
+        "scenario_parameters": parameters(options.scenario_parameters),
+        "policy_parameters": policy_parameters(options.policy_parameters, policies),
+    }
+
+
+def common_of(options: PlayOptions, policies: Sequence[str]) -> dict[str, Any]:
+    """Conditions and parameters that all plays share, as fields of
+    `care_sim.study.play_config.PlayConfig`, for studies that play these policies. Raises
+    InvalidInput for parameters of another policy.
+    """
+    return asdict(options.conditions) | {
+        "detector": options.detector,
+        "detector_parameters": parameters(options.detector_parameters),
+        "policy_parameters": policy_parameters(options.policy_parameters, policies),
+    }
+
+
+def source_named(options: SourceOptions, text: str) -> "Source":
+    """The source that a text and the options name. Raises InvalidInput if there is none."""
+    # Imported here because the kinds of recordings load SciPy and PyArrow.
+    from care_sim.sources.installed import SOURCES
+    from care_sim.sources.named import source_of
+
+    # If two sources have one name, a line says which plays.
+    kind = text.partition(":")[0]
+    report_problems([line for one, line in SOURCES.refusals() if one.name == kind])
+    return source_of(text, **{name: getattr(options, name) for name in options.source_options()})
+
+
+def named_after(command: str, played: str) -> str:
+    """The name of a folder: a command and the kind of source, or world, that it plays."""
+    return f"{command}-{played.partition(':')[0]}"

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.defaults import CELLS
 from care_sim.core.firing.base import Floor, Hardware, ranked
 from care_sim.core.grid import Cells
 from care_sim.core.grid_stack import Grid
@@ -19,7 +20,7 @@ _DIGIT = 11
 class FreeCells(Hardware):
     """A sensor that aims every shot, in any order. The paper assumes it (Sec. 3)."""
 
-    name = "cells"
+    name = CELLS
     unit = "cell"
     product = "agile scanner that aims single shots"
     source = (

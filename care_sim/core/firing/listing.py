@@ -15,7 +15,6 @@ from care_sim.core.firing.whole_columns import WholeColumns
 from care_sim.core.firing.whole_rows import WholeRows
 from care_sim.core.grid_stack import Grid
 
-CELLS = FreeCells.name
 HARDWARE: dict[str, type[Hardware]] = {
     kind.name: kind
     for kind in (

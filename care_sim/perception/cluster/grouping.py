@@ -5,9 +5,6 @@ apart (1 m at 45 m), then need no bridging, only the columns, 0.012 rad apart, d
 """
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.grid_stack import Grid
@@ -34,6 +31,10 @@ def clusters_of(plan: Floats, grid: Grid) -> list[Integers]:
     is a core point, so no border point can fall to either of two clusters, and the order of the
     points does not matter. Clusters come in the order of their first points.
     """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
     if not len(plan):
         return []
     points = _even(plan, grid)

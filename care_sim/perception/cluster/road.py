@@ -3,7 +3,6 @@ the road is.
 """
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from care_sim.core.arrays import Floats, Mask
 
@@ -44,7 +43,10 @@ def road_plane(points: Floats, sensor_height_m: float) -> Floats:
         return np.asarray(design @ (level + _bounded(free)[0]) - low[:, 2])
 
     def jacobian(free: Floats) -> Floats:
+
         return np.asarray(design @ _bounded(free)[1])
+
+    from scipy.optimize import least_squares
 
     fit = least_squares(misses, np.zeros(3), jacobian, loss="cauchy", f_scale=ROUGHNESS_M)
     return level + _bounded(fit.x)[0]

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.core.belief import Observation
+from care_sim.core.wrapping import Wrapping
 from care_sim.policies.learned.grid_features import CHANNELS, EGO_INPUTS
 from care_sim.policies.learned.weights import Weights
-from care_sim.policies.learned.wrapping import Wrapping
 
 BLOCK_MARGIN = 1
 """Blocks seen beyond a sector on every side."""

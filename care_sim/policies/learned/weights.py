@@ -19,7 +19,7 @@ from care_sim.base.json_text import parsed_json
 from care_sim.core.grid import AngularGrid
 from care_sim.core.grid_stack import Grid, GridStack
 from care_sim.core.rig import Rig
-from care_sim.policies.learned.wrapping import Wrapping, wrapping_of_line
+from care_sim.core.wrapping import Wrapping, wrapping_of_line
 
 FORMAT = "care-sim weights 1"
 
@@ -78,7 +78,7 @@ _HINTS = {
     "budget": "; those trained with several budgets fit any",
     "grid": (
         "; what was learned belongs to the cells of that grid: play the sensor set-up that has it, "
-        "or a policy that is not tagged `learned` in `care-sim policies`"
+        "or a policy that is not tagged `learned` in `care-sim list policies`"
     ),
 }
 """Why weights do not fit, and what does."""

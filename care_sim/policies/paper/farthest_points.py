@@ -1,7 +1,6 @@
 """Farthest point sampling of the full scan: saves no sensing."""
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from care_sim.base.extras import import_open3d
 from care_sim.core.arrays import Floats
@@ -30,6 +29,8 @@ class FarthestPoints(MatchedFraction):
 
     def kept(self, cells: Cells, points: Floats, count: int) -> Cells:
         """The `count` cells whose points lie farthest from each other."""
+        from scipy.spatial import cKDTree
+
         if count == 0:
             return cells[:0]
         open3d = import_open3d()

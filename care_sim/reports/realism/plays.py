@@ -12,11 +12,11 @@ from care_sim.reports.protocol.formatting import written
 from care_sim.reports.realism.orders import Order, Standing, of_plays
 from care_sim.reports.realism.tables import tables_of, verdict_sentences
 from care_sim.reports.table import Table
+from care_sim.study.designs.defaults import FILM_POLICIES
 from care_sim.study.designs.realism import (
     FILM_CAMERA,
     FILM_CONDITIONS,
     FILM_PAIRS,
-    FILM_POLICIES,
     IDEAL,
     LATE_FILM_CAMERA,
 )

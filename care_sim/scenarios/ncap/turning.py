@@ -8,7 +8,6 @@ protocol's line; the protocol leads the middle of the front axle along it. Right
 from collections.abc import Callable
 
 import numpy as np
-from scipy.optimize import brentq
 
 from care_sim.scenarios.ncap.approach import run_up
 from care_sim.scenarios.ncap.forms import AcrossExit, Bend, Target
@@ -99,6 +98,8 @@ def _timed(bend: Bend, right: bool, ego: Ego, beyond: _Distance) -> Route:
 
 def _where(route: Route, beyond: _Distance) -> float:
     """Where along a route a distance comes to 0."""
+    from scipy.optimize import brentq
+
     return float(brentq(lambda along: beyond(route, along), 0.0, route.length + _BEYOND_M))
 
 

@@ -4,6 +4,7 @@
 `make parity` measures.
 """
 
+import inspect
 from collections.abc import Callable
 from typing import Protocol
 
@@ -61,3 +62,15 @@ def make_engine(name: str, world: BulletWorld, grid: Grid) -> Engine:
 def check_engine(name: str) -> None:
     """Raise InvalidInput for a name that is not an engine."""
     check_known("engine", name, ENGINES)
+
+
+def engine_lines() -> list[str]:
+    """One line per engine: its name and what it is."""
+    abouts = {name: inspect.getdoc(made) or "" for name, made in ENGINES.items()}
+    firsts = {name: about.partition("\n\n")[0] for name, about in abouts.items()}
+    return [f"{name:12} {' '.join(first.split())}" for name, first in firsts.items()]
+
+
+def engine_names() -> list[str]:
+    """The names of engines."""
+    return [*ENGINES]

@@ -10,7 +10,7 @@ from typing import Any
 from care_sim.base.checks import LARGEST_INTEGER
 from care_sim.base.errors import InvalidInput, counted, printable, shown
 from care_sim.base.json_text import json_content
-from care_sim.core.cell_order import CELL_ORDERS
+from care_sim.core.defaults import CELL_ORDERS
 from care_sim.policies import POLICIES, maker, tags_of
 from care_sim.policies.base import TAGS
 from care_sim.policies.makers import check_parameters

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.plugins import is_place
-from care_sim.core.cell_order import AS_DEMANDED
 from care_sim.core.conditions import YOLOX_CAMERA
+from care_sim.core.defaults import AS_DEMANDED
 from care_sim.sources.scenes import Scene, Streets
 from care_sim.streets.street import street_name
 from care_sim.study.benchmark.worlds import DRIVES, STREETS, TESTS, World

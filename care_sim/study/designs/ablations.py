@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
-from care_sim.core.cell_order import AS_DEMANDED, CELL_ORDERS
+from care_sim.core.defaults import AS_DEMANDED, CELL_ORDERS
 from care_sim.core.forgetting import ForgettingRules
 from care_sim.sources.scenes import Scene, Source
 from care_sim.study.designs.variants import USUAL_VARIANT, Place, Variant

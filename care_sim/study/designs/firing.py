@@ -4,10 +4,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.firing.listing import CELLS, HARDWARE, hardware_of, settled
+from care_sim.core.defaults import CELLS
+from care_sim.core.firing.listing import HARDWARE, hardware_of, settled
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.sensors.setups import DEFAULT_SETUP, sensor_setup
 from care_sim.sources.scenes import Scene, Source
+from care_sim.study.designs.defaults import FIRING_POLICIES
 from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.play_config import PlayConfig, play_grid
 from care_sim.study.run_config import FULL, Row
@@ -16,7 +18,6 @@ FIRINGS = tuple(map(settled, HARDWARE))
 """Every kind of hardware with its usual numbers."""
 AWARE = "care-units"
 """The policy that knows its hardware, with which the others are compared."""
-FIRING_POLICIES = ("care", "care-sightlines", AWARE, "rows", "place", FULL)
 FIRING_BUDGETS = (0.03, 0.05, 0.1)
 """A row of 32 is 3.1% of the cells: less than half of that buys none."""
 

@@ -6,13 +6,10 @@ from typing import Any
 
 from care_sim.scenarios.ncap.forms import Across, NcapTest
 from care_sim.scenarios.ncap.table import TESTS
+from care_sim.study.designs.defaults import NCAP_BUDGETS, NCAP_POLICIES, NCAP_STEP_KPH
 from care_sim.study.episode_config import EpisodeConfig, grid, of_cases
 from care_sim.study.parameters import Parameters
 
-NCAP_POLICIES = ("history", "all-camera", "care", "care-sightlines", "fan", "full")
-NCAP_BUDGETS = (0.01, 0.03, 0.1)
-NCAP_STEP_KPH = 10.0
-"""The steps of the protocol of 2026; that of 2023 goes by 5."""
 TEST_COLUMN = "scenario.test"
 SPEED_COLUMN = "scenario.speed_kph"
 TARGET_COLUMN = "scenario.target_kph"

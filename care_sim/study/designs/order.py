@@ -5,7 +5,7 @@ listed in, in the closed and in the open loop.
 from collections.abc import Iterable, Sequence
 from typing import TypeVar
 
-from care_sim.core.cell_order import AS_DEMANDED, CELL_ORDERS
+from care_sim.core.defaults import AS_DEMANDED, CELL_ORDERS
 from care_sim.policies import is_pattern
 from care_sim.sources.scenes import Scene, Source
 from care_sim.study.designs.paper import paper_study

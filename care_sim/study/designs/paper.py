@@ -8,7 +8,7 @@ from enum import Enum
 from functools import cache, partial
 from typing import NamedTuple
 
-from care_sim.core.cell_order import AS_DEMANDED
+from care_sim.core.defaults import AS_DEMANDED
 from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.rows.reading import Key, key_of
 

@@ -8,12 +8,10 @@ import numpy as np
 from care_sim.core.driver_settings import FIXED
 from care_sim.scenarios.r157.grid import CutInCase, kinds_in_turn
 from care_sim.scenarios.r157.preventable import preventable
+from care_sim.study.designs.defaults import R157_BUDGETS, R157_POLICIES
 from care_sim.study.episode_config import EpisodeConfig, grid, of_cases
 from care_sim.study.run_config import Row
 
-R157_POLICIES = ("history", "all-camera", "care", "fan", "full")
-R157_BUDGETS = (0.01, 0.03)
-"""At 3% a pattern that looks ahead finds as much as a camera (`docs/environments/r157.md`)."""
 CASE_COLUMNS = tuple(f"scenario.{name}" for name in CutInCase.__dataclass_fields__)
 """The columns of a case."""
 

@@ -9,10 +9,12 @@ from typing import NamedTuple
 from care_sim.base.errors import InvalidInput
 from care_sim.base.seed_ranges import split_of
 from care_sim.core.conditions import YOLOX_CAMERA
-from care_sim.core.firing.listing import CELLS, HARDWARE, settled
+from care_sim.core.defaults import CELLS
+from care_sim.core.firing.listing import HARDWARE, settled
 from care_sim.scenarios.ncap.table import TESTS
 from care_sim.sources.scenes import Scene, Source
-from care_sim.study.designs.ncap import NCAP_STEP_KPH, NcapCase, ncap_cases
+from care_sim.study.designs.defaults import NCAP_STEP_KPH
+from care_sim.study.designs.ncap import NcapCase, ncap_cases
 from care_sim.study.designs.variants import FilmPlace, Group, Place, Variant
 from care_sim.study.episode_config import EpisodeConfig, of_cases
 from care_sim.study.play_config import PlayConfig
@@ -157,8 +159,6 @@ HEADLINES = (
 )
 """The headline tables of the closed loop."""
 
-FILM_POLICIES = ("history", "all-camera", "care", "care-sightlines", "rows", "place", FULL)
-FILM_BUDGETS = (0.01, 0.03, 0.1)
 FILM_PAIRS: tuple[Pair, ...] = (
     ("care", "history"),
     ("care", "all-camera"),

@@ -1,7 +1,6 @@
 """Parts of pictures: boxes in space, the angular grid in colours, and what they are drawn with."""
 
 import numpy as np
-from matplotlib import colormaps
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
@@ -11,7 +10,8 @@ from care_sim.core.grid_stack import Grid
 from care_sim.core.pinhole import NEAR_M, PinholeCamera
 from care_sim.viewer import palette
 
-_RANGE_COLOURS = colormaps["plasma_r"]
+_RANGE_COLOURS = "plasma_r"
+"""Of Matplotlib."""
 
 
 def font(size: int) -> ImageFont.ImageFont | ImageFont.FreeTypeFont:
@@ -90,8 +90,9 @@ def fitted(picture: Image.Image, size: tuple[int, int]) -> Image.Image:
 
 def range_colours(shares: NDArray[np.floating]) -> NDArray[np.uint8]:
     """(..., 3) colours of ranges that are given as shares of the reach: near is bright."""
+    from matplotlib import colormaps
+
     # The ends of the scale are left out: they are too close to the background and to white.
-    colours: NDArray[np.uint8] = _RANGE_COLOURS(0.05 + 0.75 * np.asarray(shares), bytes=True)[
-        ..., :3
-    ]
+    scale = 0.05 + 0.75 * np.asarray(shares)
+    colours: NDArray[np.uint8] = colormaps[_RANGE_COLOURS](scale, bytes=True)[..., :3]
     return colours

@@ -13,6 +13,7 @@ import pytest
 import care_sim
 from care_sim.base.errors import InvalidInput
 from care_sim.core.grid import AngularGrid
+from care_sim.core.wrapping import Wrapping
 from care_sim.envs.wrappers.grid_observation import GridObservation
 from care_sim.envs.wrappers.sector_actions import SectorReserve, SectorScores
 from care_sim.policies.learned.grid_features import CHANNELS
@@ -24,7 +25,6 @@ from care_sim.policies.learned.weights import (
     save_weights,
     shipped_weights,
 )
-from care_sim.policies.learned.wrapping import Wrapping
 from care_sim.training.validation import ValidationScore, play, rule
 from tests.helpers.untrained import shapes, untrained
 

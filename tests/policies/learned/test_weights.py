@@ -19,13 +19,13 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
 from care_sim.core.sensor_setup import SensorSetup
+from care_sim.core.wrapping import Wrapping
 from care_sim.policies.learned.weights import (
     Card,
     load_weights,
     save_weights,
     shipped_weights,
 )
-from care_sim.policies.learned.wrapping import Wrapping
 
 ARRAYS = {"weight": np.arange(6, dtype=np.float32).reshape(2, 3), "bias": np.zeros(3, np.float32)}
 CARD = Card(

@@ -44,8 +44,6 @@ def test_the_best_control_is_chosen_on_what_all_controls_have():
     assert CollisionRows(rows, lambda row: 1.0).best_control(0.01) == "fan"
 
 
-
-
 def test_a_panel_for_every_policy_and_budget_coloured_by_what_was_avoided():
     figure = r157_figures(CUT_INS)["r157-avoided"]
     panels = [axes for axes in figure.axes if axes.get_title(loc="left")]

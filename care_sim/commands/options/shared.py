@@ -1,0 +1,154 @@
+"""Options that several commands share: sensors and conditions, parameters, sources, seeds."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Annotated, Any
+
+import tyro
+
+from care_sim.base.bounds import bounded, check_fields
+from care_sim.base.cores import MOST_WORKERS, WORKERS
+from care_sim.base.errors import InvalidInput, shown
+from care_sim.base.seed_ranges import CALIBRATION, split_of
+from care_sim.core.conditions import ClosedLoopConditions, Conditions
+from care_sim.study.parameters import parameters
+
+_CLOSED_LOOP, _BOTH_LOOPS = ClosedLoopConditions(), Conditions()
+"""The defaults."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SensingOptions:
+    """Sensors, detector and conditions of the closed loop, the same for all episodes."""
+
+    sensor: str = "hdl-32e"
+    """LiDAR and cameras: a name of `care-sim list sensors`, or a .toml file of a set-up."""
+    detector: str = "returns"
+    """returns (the paper's proxy), graded (the surer the more returns), cluster (a real one),
+    pillars (a learned one), torchscript, the name of an installed one, or MODULE:CLASS."""
+    detector_parameters: tuple[str, ...] = ()
+    """Parameters of the detector as NAME=VALUE, for example file=model.pt for torchscript."""
+    conditions: Annotated[ClosedLoopConditions, tyro.conf.OmitArgPrefixes] = _CLOSED_LOOP
+    """How well the car senses, how it drives, and how it spends its budget."""
+
+    def sensing(self) -> dict[str, Any]:
+        """As arguments of `EpisodeConfig`. Raises InvalidInput for parameters that are none."""
+        given = {each.name: getattr(self.conditions, each.name) for each in fields(self.conditions)}
+        return given | {
+            "sensor": self.sensor,
+            "detector": self.detector,
+            "detector_parameters": parameters(self.detector_parameters),
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class EpisodeOptions(SensingOptions):
+    """Everything that episodes share: sensing, and parameters of scenarios and policies."""
+
+    scenario_parameters: tuple[str, ...] = ()
+    """Physics of the scenario as NAME=VALUE, a range as NAME=LOW,HIGH, for example vehicles=7
+    gap_m=0.8,1.2; see `care-sim list scenarios`."""
+    policy_parameters: tuple[str, ...] = ()
+    """Parameters of the policies as NAME=VALUE, for example k_safe=0 for care-sbf; for one of
+    several policies as POLICY.NAME=VALUE, for example ppo.path=weights.npz."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SourceOptions:
+    """Which scenes a source has, and what their camera saw."""
+
+    split: str | None = None
+    """For streets: evaluation (150 scenes) or calibration (20). For nuScenes: train, val,
+    mini_train, mini_val, all, or one of splits.json."""
+    version: str | None = None
+    """For nuScenes: the version, if the folder holds several."""
+    sensor: str | None = None
+    """For streets, KITTI, Boreas and sweeps: LiDAR and cameras, a name of `care-sim list sensors`
+    or a .toml file of a set-up."""
+    camera_detections: Path | None = None
+    """For nuScenes: a file with the boxes of a camera detector, in nuScenes or COCO results
+    form."""
+    sweeps: int | None = None
+    """For nuScenes: sweeps that a detector gets at a keyframe, 1 unless given. 2 adds the sweep
+    before, fired by the mask of the keyframe before."""
+    camera_times: str | None = None
+    """For nuScenes: own (the default: each camera at the time of its picture) or sweep (all at the
+    time of the sweep)."""
+    empty_boxes: bool = False
+    """For nuScenes and Argoverse 2: annotate boxes without a recorded point, too."""
+    reference: Annotated[str | None, tyro.conf.arg(metavar="STR")] = None
+    """For sweeps: the detector that annotates them, cluster unless given."""
+    topics: tuple[str, ...] = ()
+    """For bags: the topics of points and poses, if there are several."""
+
+    def source_options(self) -> list[str]:
+        """The names of options that are given."""
+        given = {each.name: getattr(self, each.name) for each in fields(SourceOptions)}
+        # By identity: 0 is equal to False, and a number that somebody gave.
+        return [
+            name
+            for name, value in given.items()
+            if not (value is None or value is False or value == ())
+        ]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlayOptions(SourceOptions):
+    """Options that all plays of the open loop share."""
+
+    source: str = "streets"
+    """streets, argoverse2:FOLDER, nuscenes:FOLDER, kitti:FOLDER, sweeps:FOLDER, boreas, or a source
+    of your own: the name of an installed one or MODULE:CLASS, with :FOLDER for recordings."""
+    detector: str = "returns"
+    """returns (the paper's proxy), graded (the surer the more returns), cluster (a real one),
+    pillars (a learned one), torchscript, the name of an installed one, or MODULE:CLASS."""
+    detector_parameters: tuple[str, ...] = ()
+    """Parameters of the detector as NAME=VALUE, for example file=model.pt for torchscript."""
+    policy_parameters: tuple[str, ...] = ()
+    """Parameters of the policies as NAME=VALUE, for example k_safe=0 for care-sbf; for one of
+    several policies as POLICY.NAME=VALUE, for example ppo.path=weights.npz."""
+    conditions: Annotated[Conditions, tyro.conf.OmitArgPrefixes] = _BOTH_LOOPS
+    """How well the car senses, and how it spends its budget."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class StudyOptions:
+    """Options of every command that plays a study."""
+
+    workers: int = bounded(WORKERS, 1, MOST_WORKERS)
+    """Processes that play at the same time on this machine; a cluster plays as many tasks as it has
+    threads."""
+    cluster: str | None = None
+    """Address of a dask scheduler whose workers play instead, for example tcp://HOST:8786 (extra
+    'cluster')."""
+    out: Path | None = None
+    """Folder of the results; an interrupted study resumes there. Without this option it is in runs/
+    and has the name of the command: the first, such as runs/sweep and runs/sweep-2, that holds no
+    results of other options."""
+    force: bool = False
+    """Play into a folder that holds another study, finished or not, or rows that are not asked for
+    now. Its tables, figures and Parquet files are replaced at the end; its journal stays. Episodes
+    never replace the plays of a protocol, nor plays episodes: their files have other names."""
+    verbose: bool = False
+    """Print all tables."""
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+
+def seeds_of(numbers: Sequence[int]) -> Sequence[int]:
+    """The seeds that one number means (that many, from 0) or several numbers (these; twice the same
+    is that seed alone). Raises InvalidInput for a number below one or above that of the test seeds,
+    and for seeds of several splits (`care_sim.base.seed_ranges`).
+    """
+    if len(numbers) != 1:
+        split_of(numbers)
+        return numbers
+    if not 1 <= numbers[0] <= CALIBRATION:
+        raise InvalidInput(
+            f"seeds must be one number, a count from 1 to {CALIBRATION:,} (that many, from 0), or "
+            "a list of two or more seeds (7 7 is seed 7 alone), got the count "
+            f"{shown(numbers[0])}"
+        )
+    return range(numbers[0])

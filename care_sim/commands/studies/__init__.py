@@ -1,0 +1,1 @@
+"""What `care-sim study NAME`, `sweep`, `reproduce` and `protocol` play."""

@@ -1,0 +1,18 @@
+"""Policies and budgets of studies that options show and change. Nothing is imported here, so that
+help loads no simulator.
+"""
+
+NCAP_POLICIES = ("history", "all-camera", "care", "care-sightlines", "fan", "full")
+NCAP_BUDGETS = (0.01, 0.03, 0.1)
+NCAP_STEP_KPH = 10.0
+"""The steps of the protocol of 2026; that of 2023 goes by 5."""
+
+R157_POLICIES = ("history", "all-camera", "care", "fan", "full")
+R157_BUDGETS = (0.01, 0.03)
+"""At 3% a pattern that looks ahead finds as much as a camera (`docs/environments/r157.md`)."""
+
+FIRING_POLICIES = ("care", "care-sightlines", "care-units", "rows", "place", "full")
+
+FILM_POLICIES = ("history", "all-camera", "care", "care-sightlines", "rows", "place", "full")
+FILM_BUDGETS = (0.01, 0.03, 0.1)
+"""Of the study of realism, for first sightings."""
