@@ -8,9 +8,7 @@ from enum import StrEnum
 from typing import NamedTuple
 
 from care_sim.evaluation.censoring import FEWEST_PAIRS
-from care_sim.reports.contrasts import Contrast
-from care_sim.reports.formatting import ShownDifference
-from care_sim.reports.protocol.differences import MeasuredDifference
+from care_sim.reports.engine.contrasts import Contrast
 from care_sim.study.designs.realism import IDEAL, Pair
 
 
@@ -19,23 +17,14 @@ class Standing(NamedTuple):
     the difference excludes zero, else 0, and None of fewer pairs than carry a claim.
     """
 
-    difference: ShownDifference
+    difference: Contrast
     sign: int | None
 
 
-def of_episodes(contrast: Contrast | None) -> Standing | None:
-    """From a difference of the closed loop."""
-    if contrast is None:
-        return None
-    sign = contrast.excludes_zero * (1 if contrast.mean > 0 else -1)
-    return Standing(contrast, sign if contrast.difference.pairs >= FEWEST_PAIRS else None)
-
-
-def of_plays(difference: MeasuredDifference | None) -> Standing | None:
-    """From a difference of the open loop."""
-    if difference is None:
-        return None
-    return Standing(difference, None if difference.interval is None else difference.sign)
+def standing_of(contrast: Contrast) -> Standing:
+    """How the first of the two policies of a contrast stands to the second."""
+    enough = contrast.difference.pairs >= FEWEST_PAIRS
+    return Standing(contrast, contrast.sign if enough else None)
 
 
 class Verdict(StrEnum):

@@ -1,86 +1,35 @@
-"""The shape of the tables of realism, the same in both loops: the orders of the headline tables
-under every condition, those that change, and every policy's figures.
+"""The tables of realism, the same in both loops: the orders of the headline tables under every
+condition, those that change, and every policy's figures.
 """
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Protocol
 
-from care_sim.reports.formatting import ShownDifference, interval
+from care_sim.reports.formatting import interval, tag_notes
 from care_sim.reports.realism.orders import Order, Verdict, changes
+from care_sim.reports.realism.study import Block, RealismStudy
 from care_sim.reports.table import Table, TableRow
 from care_sim.study.designs.realism import IDEAL
-from care_sim.study.designs.variants import Variant
-
-_NAMES = ("policy",)
+from care_sim.study.run_config import Row
 
 
-class RealismStudy(Protocol):
-    """What was played of the study in one of the loops."""
-
-    @property
-    def title(self) -> str:
-        """Which loop."""
-        ...
-
-    @property
-    def unit(self) -> str:
-        """That of differences."""
-        ...
-
-    @property
-    def levels_told(self) -> str:
-        """What the figure of a policy is."""
-        ...
-
-    @property
-    def conditions(self) -> Sequence[Variant]:
-        """Those that were played."""
-        ...
-
-    @property
-    def cameras(self) -> Sequence[Variant]:
-        """Of those, the ones that change the camera alone."""
-        ...
-
-    def orders(self) -> Mapping[str, Sequence[Order]]:
-        """The orders by measure; the measure is empty where each headline table has its own."""
-        ...
-
-    def blocks(self) -> Mapping[str, Sequence[str]]:
-        """The policies of every block of levels, by its heading."""
-        ...
-
-    def level(self, block: str, condition: Variant, policy: str) -> str:
-        """The figure of a policy; empty where it was not played."""
-        ...
-
-    def change(self, block: str, condition: Variant, policy: str) -> ShownDifference | None:
-        """What the condition adds to the measure of a policy."""
-        ...
-
-    def marked(self, policy: str) -> str:
-        """A policy's name, with a mark when no car can have it."""
-        ...
-
-    def notes(self) -> tuple[str, ...]:
-        """What the marks mean."""
-        ...
-
-
-def tables_of(study: RealismStudy) -> list[Table]:
+def realism_tables(rows: Sequence[Row]) -> list[Table]:
     """The orders, those that change, the second column, and the figures under every condition."""
-    tables = [_orders(study), _changes(study), _second_column(study), _levels(study)]
+    study = RealismStudy(rows)
+    orders = study.orders()
+    tables = [
+        _orders(study, orders),
+        _changes(study, orders),
+        _second_column(study),
+        _levels(study),
+    ]
     return [table for table in tables if table.rows]
 
 
-def verdict_sentences(study: RealismStudy) -> list[str]:
+def verdict_sentences(rows: Sequence[Row]) -> list[str]:
     """How many orders hold, by measure."""
-    return [
-        sentence
-        for measure, orders in study.orders().items()
-        if (sentence := _counted(measure, orders))
-    ]
+    found = (_counted(measure, orders) for measure, orders in RealismStudy(rows).orders().items())
+    return [sentence for sentence in found if sentence]
 
 
 def _counted(measure: str, orders: Sequence[Order]) -> str:
@@ -102,8 +51,7 @@ def _counted(measure: str, orders: Sequence[Order]) -> str:
     )
 
 
-def _orders(study: RealismStudy) -> Table:
-    by_measure = study.orders()
+def _orders(study: RealismStudy, by_measure: Mapping[str, Sequence[Order]]) -> Table:
     first = next(iter(by_measure.values()), ())
     lines: list[TableRow] = []
     for measure, orders in by_measure.items():
@@ -129,9 +77,9 @@ def _entry(order: Order, condition: str) -> str:
     return type(text)(f"{text} {verdict}") if verdict else text
 
 
-def _changes(study: RealismStudy) -> Table:
+def _changes(study: RealismStudy, by_measure: Mapping[str, Sequence[Order]]) -> Table:
     lines: list[TableRow] = []
-    for measure, orders in study.orders().items():
+    for measure, orders in by_measure.items():
         found = [*changes(orders)]
         lines += [(measure,)] if measure and found else []
         lines += [
@@ -157,11 +105,11 @@ def _second_column(study: RealismStudy) -> Table:
     for camera in study.cameras:
         columns += [camera.label, f"change, {study.unit}"]
 
-    def entries(block: str, policy: str) -> Iterator[str]:
-        yield study.level(block, IDEAL, policy)
+    def entries(block: Block, policy: str) -> Iterator[str]:
+        yield block.level(IDEAL, policy)
         for camera in study.cameras:
-            yield study.level(block, camera, policy)
-            yield interval(study.change(block, camera, policy))
+            yield block.level(camera, policy)
+            yield interval(block.change(camera, policy))
 
     return _by_policy(
         study, f"the ideal and a realistic camera, {study.levels_told}", columns, entries
@@ -169,13 +117,13 @@ def _second_column(study: RealismStudy) -> Table:
 
 
 def _levels(study: RealismStudy) -> Table:
-    def entries(block: str, policy: str) -> Iterator[str]:
-        for condition in study.conditions:
-            yield study.level(block, condition, policy)
-
     columns = [condition.label for condition in study.conditions]
     return _by_policy(
-        study, f"every condition, {study.levels_told}", columns, entries, terminal=False
+        study,
+        f"every condition, {study.levels_told}",
+        columns,
+        lambda block, policy: (block.level(each, policy) for each in study.conditions),
+        terminal=False,
     )
 
 
@@ -183,18 +131,20 @@ def _by_policy(
     study: RealismStudy,
     title: str,
     columns: Sequence[str],
-    entries: Callable[[str, str], Iterator[str]],
+    entries: Callable[[Block, str], Iterator[str]],
     terminal: bool = True,
 ) -> Table:
     lines: list[TableRow] = []
-    for block, policies in study.blocks().items():
-        lines.append((block,))
-        lines += [(study.marked(policy), *entries(block, policy)) for policy in policies]
+    for block in study.blocks:
+        lines.append((block.name,))
+        lines += [
+            (study.frame.marked(policy), *entries(block, policy)) for policy in block.policies
+        ]
     return Table(
         f"{study.title}: {title}",
-        (*_NAMES, *columns),
+        ("policy", *columns),
         tuple(lines),
-        study.notes(),
-        whole=_NAMES,
+        tag_notes(study.frame.tags.values()),
+        whole=("policy",),
         terminal=terminal,
     )

@@ -1,10 +1,10 @@
 """First sightings by entry: plain, and as a share of what the full scan finds."""
 
 import pytest
+from care_sim.reports.protocol.entries import ENTRY_NOTE
 
 from care_sim.evaluation.sightings import RANGE_M
 from care_sim.evaluation.strata import ENTRIES, NEWCOMERS
-from care_sim.reports.protocol.entries import ENTRY_NOTE
 from care_sim.reports.protocol.rows import plays_by_setting
 from care_sim.reports.protocol.tables import protocol_tables
 from care_sim.reports.report import read_results

@@ -1,0 +1,99 @@
+"""How much more of a measure one cell has than another, and how sure that is."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from care_sim.evaluation.bootstrap import Interval
+from care_sim.evaluation.censoring import Bound, Difference
+
+OVER_EVENTS = "°"
+"""Stands behind a difference whose interval comes from events."""
+
+
+class Scale(Protocol):
+    """What a contrast needs of its measure."""
+
+    @property
+    def decimals(self) -> int:
+        """Decimals of the mean and of the interval's ends."""
+        ...
+
+    @property
+    def gate(self) -> float:
+        """The smallest mean difference that counts."""
+        ...
+
+    @property
+    def fewest_pairs(self) -> int:
+        """The least number of pairs that an interval is shown of."""
+        ...
+
+
+@dataclass(frozen=True)
+class Contrast:
+    """One cell minus another on the units that both have, in the unit of the measure.
+
+    The interval comes from resampling pairs of seeds or scenes, or `over_events` from resampling
+    the events of the scenes.
+    """
+
+    measure: Scale
+    difference: Difference
+    over_events: bool = False
+
+    @property
+    def mean(self) -> float:
+        """In the unit of the measure."""
+        return self.difference.interval.mean
+
+    @property
+    def interval(self) -> Interval | None:
+        """The interval of the mean; None of too few pairs."""
+        enough = self.difference.pairs >= self.measure.fewest_pairs
+        return self.difference.interval if enough else None
+
+    @property
+    def decimals(self) -> int:
+        """Decimals of the measure."""
+        return self.measure.decimals
+
+    @property
+    def bound(self) -> str:
+        """On which side of the mean the true difference may lie; tables print it before."""
+        return self.difference.bound
+
+    @property
+    def asterisk(self) -> str:
+        """An asterisk where the difference counts."""
+        return "*" if self.counts else ""
+
+    @property
+    def suffix(self) -> str:
+        """The mark of an interval over events."""
+        return OVER_EVENTS if self.over_events else ""
+
+    @property
+    def excludes_zero(self) -> bool:
+        """Whether the interval excludes zero, whatever the censored values were."""
+        return self.difference.excludes_zero
+
+    @property
+    def sign(self) -> int:
+        """1 or -1 where the interval excludes zero, else 0."""
+        return self.excludes_zero * (1 if self.mean > 0 else -1)
+
+    @property
+    def counts(self) -> bool:
+        """Whether the interval excludes zero and the mean difference reaches the gate, whatever the
+        censored values were.
+        """
+        # The cautious mean puts every censored distance where it speaks most against the
+        # difference.
+        return self.excludes_zero and abs(self.difference.cautious.mean) >= self.measure.gate
+
+
+def of_interval(
+    measure: Scale, interval: Interval, pairs: int, over_events: bool = False
+) -> Contrast:
+    """A contrast of a measure without censored values."""
+    return Contrast(measure, Difference(interval, Bound.EXACT, pairs, interval), over_events)
