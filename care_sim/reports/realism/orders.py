@@ -2,7 +2,7 @@
 ones.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import NamedTuple
@@ -20,24 +20,23 @@ class Standing(NamedTuple):
     difference: Contrast
     sign: int | None
 
-
-def standing_of(contrast: Contrast) -> Standing:
-    """How the first of the two policies of a contrast stands to the second."""
-    enough = contrast.difference.pairs >= FEWEST_PAIRS
-    return Standing(contrast, contrast.sign if enough else None)
+    @classmethod
+    def of(cls, contrast: Contrast) -> "Standing":
+        """From a contrast of the two."""
+        enough = contrast.difference.pairs >= FEWEST_PAIRS
+        return cls(contrast, contrast.sign if enough else None)
 
 
 class Verdict(StrEnum):
-    """What a condition makes of an order."""
+    """What a condition makes of an order: a lead that holds, is lost or flips; a tie that stays
+    tied, or from which a lead arises.
+    """
 
     HOLDS = "holds"
-    LOST = "lost"
     FLIPS = "flips"
-    TIED = "tied"
+    LOST = "lost"
     ARISES = "arises"
-
-
-CHANGED = (Verdict.FLIPS, Verdict.LOST, Verdict.ARISES)
+    TIED = "tied"
 
 
 @dataclass(frozen=True)
@@ -67,20 +66,3 @@ class Order:
         if not here:
             return Verdict.LOST
         return Verdict.HOLDS if here == before else Verdict.FLIPS
-
-
-class Change(NamedTuple):
-    """An order that is another under a condition."""
-
-    order: Order
-    condition: str
-    verdict: Verdict
-
-
-def changes(orders: Sequence[Order]) -> Iterator[Change]:
-    """Those that flip, those that are lost, then leads where there was a tie."""
-    for verdict in CHANGED:
-        for order in orders:
-            for condition in order.standings:
-                if order.verdict(condition) is verdict:
-                    yield Change(order, condition, verdict)

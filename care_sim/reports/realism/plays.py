@@ -1,15 +1,7 @@
 """Realism in the open loop under its former names, until every room uses the study."""
 
-from collections.abc import Sequence
-
-from care_sim.reports.protocol.closing import protocol_closing
+from care_sim.reports.protocol.closing import protocol_closing as realism_closing
 from care_sim.reports.realism.study import RealismStudy as RealismPlays
-from care_sim.reports.realism.tables import realism_tables, verdict_sentences
-from care_sim.study.run_config import Row
+from care_sim.reports.realism.tables import realism_tables
 
 __all__ = ["RealismPlays", "realism_closing", "realism_tables"]
-
-
-def realism_closing(rows: Sequence[Row]) -> list[str]:
-    """Size of the study, and how many orders hold."""
-    return [*protocol_closing(rows), *verdict_sentences(rows)]

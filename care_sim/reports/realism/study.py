@@ -15,7 +15,7 @@ from care_sim.reports.engine.measures import (
     Recall,
     Units,
 )
-from care_sim.reports.realism.orders import Order, standing_of
+from care_sim.reports.realism.orders import Order, Standing
 from care_sim.study.designs.realism import (
     CONDITIONS,
     FILM_CAMERA,
@@ -73,12 +73,11 @@ class Block:
     def order(self, pair: Pair, conditions: Sequence[Variant]) -> Order:
         """How the first policy stands to the second under every condition."""
         found = {
-            each.label: self.contrast(*(self.units(each, policy) for policy in pair))
+            each.label: Standing.of(contrast)
             for each in conditions
+            if (contrast := self.contrast(*(self.units(each, policy) for policy in pair)))
         }
-        return Order(
-            self.label, pair, {label: standing_of(one) for label, one in found.items() if one}
-        )
+        return Order(self.label, pair, found)
 
 
 class RealismStudy:

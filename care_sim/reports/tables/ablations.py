@@ -1,7 +1,8 @@
-"""The tables of the paper's ablations (Sec. 5.4), in either loop: one table per ablation."""
+"""The tables of the paper's ablations (Sec. 5.4), in either loop: one table per ablation, a column
+per level.
+"""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -38,9 +39,9 @@ from care_sim.study.rows.settings import Setting
 from care_sim.study.run_config import FULL, Row
 
 OPEN_MEASURES = {
-    "first sightings": Recall(FIRST_SIGHTING),
-    "below 20 m": Recall(OVERALL, NEAR_FIELD),
-    "overall": Recall(OVERALL),
+    "first sightings %": Recall(FIRST_SIGHTING),
+    "below 20 m %": Recall(OVERALL, NEAR_FIELD),
+    "overall %": Recall(OVERALL),
 }
 _RELEASED = (
     "Released: cells of the forecasts' full hulls that exploitation does not fire, mean over "
@@ -58,148 +59,124 @@ def ceiling(rows: Sequence[Row]) -> list[str]:
     """What the full scan finds of the films, in a sentence; nothing where it was not played."""
     study = AblationStudy(rows)
     key = USUAL_VARIANT.key(FilmPlace(study.source, 1.0), FULL)
-    units = {name: study.frame.units(measure, key) for name, measure in OPEN_MEASURES.items()}
-    levels = [f"{name} {level(OPEN_MEASURES[name], own)}%" for name, own in units.items() if own]
+    found = {
+        name: level(each, study.frame.units(each, key)) for name, each in study.measures.items()
+    }
+    levels = [f"{name.removesuffix(' %')} {value}%" for name, value in found.items() if value]
     return [f"The full scan finds: {', '.join(levels)}."] if levels else []
 
 
 class AblationStudy:
-    """The rows of the study, the ablations of their loop, and where each was played."""
+    """The rows of the study, the ablations and measures of their loop, and where they were
+    played.
+    """
 
     def __init__(self, rows: Sequence[Row]):
         self.frame = Frame(rows)
         self.source: str = rows[0].get("source", "")
         self.budgets = sorted({row["budget"] for row in rows if row["policy"] != FULL})
         self.ablations = OPEN_ABLATIONS if self.source else ABLATIONS
-        self.places: Sequence[Place | FilmPlace] = ABLATION_PLACES
         self.measures: dict[str, Measure | Recall] = {"first detection m": DETECTION}
+        self.places: Sequence[Place | FilmPlace] = ABLATION_PLACES
         if self.source:
+            self.measures = {**OPEN_MEASURES}
             self.places = [FilmPlace(self.source, budget) for budget in self.budgets]
-            self.measures = {f"{name} %": each for name, each in OPEN_MEASURES.items()}
-        own = {FULL} | {
-            name
-            for ablation in self.ablations
-            for name in (
-                ablation.policy,
-                *ablation.references,
-                *(each.policy for each in ablation.levels),
-            )
-        }
+        own = {FULL}
+        for each in self.ablations:
+            own |= {each.policy, *each.references, *(one.policy or FULL for one in each.levels)}
         self.joined = [policy for policy in self.frame.policies if policy not in own]
+
+    @property
+    def has_paper(self) -> bool:
+        """Whether the paper's figures stand beside those of these films."""
+        return Setting(self.source).has_paper
 
 
 def _table(study: AblationStudy, ablation: Ablation) -> Table:
-    beside = ablation.beside(study.joined)
-    blocks = [
-        _Block(study, ablation, place, name, (USUAL, *beside))
-        for place in study.places
-        for name in study.measures
+    usual = [
+        each.key(study.places[0], ablation.policy) for each in (USUAL_VARIANT, *ablation.levels)
     ]
-    columns = (
-        "level",
-        "value",
-        *(("released",) if study.source else ("quartiles m", "braked")),
-        "minus usual",
-        *(f"minus {study.frame.marked(policy)}" for policy in beside),
-    )
-    known = PUBLISHED_ON_ALL_LEVELS if Setting(study.source).has_paper else {}
-    together = [known[ablation.title]] if ablation.title in known else []
-    notes = [*([_RELEASED] if study.source else []), *ablation.notes]
+    names = [
+        f"{each.label} (usual)" if key == usual[0] else each.label
+        for each, key in zip(ablation.levels, usual[1:], strict=True)
+    ]
+    beside = ablation.beside(study.joined)
+    lines: list[TableRow] = []
+    for place in study.places:
+        for name in study.measures:
+            where = percent(place.budget) if study.source else str(place)
+            lines += [(f"{where}, {name}",), *_lines(study, ablation, place, name, beside)]
+    said = [PUBLISHED_ON_ALL_LEVELS.get(ablation.title)] if study.has_paper else []
+    said += [
+        claims.source
+        for change, claims in PUBLISHED_CHANGES.items()
+        if study.has_paper and change.title == ablation.title and claims.any_at(study.budgets)
+    ]
+    notes = " ".join([*([_RELEASED] if study.source else []), *ablation.notes])
     return Table(
         f"{ablation.policy}: {ablation.title}",
-        columns,
-        tuple(line for block in blocks for line in block.lines()),
-        (*([" ".join(notes)] if notes else []), *study.frame.notes(beside)),
-        papers([*together, *(claims.source for block in blocks for claims in block.said())]),
-        files_only=() if study.source else ("quartiles m", "braked"),
-        whole=columns[:4],
+        ("", *names),
+        tuple(lines),
+        (*([notes] if notes else []), *study.frame.notes(beside)),
+        papers(filter(None, said)),
     )
 
 
-@dataclass(frozen=True)
-class _Block:
-    """The levels of an ablation in a place by one measure, and these less the bases: the usual
-    level, or a policy under the conditions of the level.
+def _lines(
+    study: AblationStudy, ablation: Ablation, place: Place | FilmPlace, name: str, beside: list[str]
+) -> Iterator[TableRow]:
+    """The levels by one measure, and what they have over the usual level and over each reference;
+    under each line what the paper says of it.
     """
+    frame, measure = study.frame, study.measures[name]
+    keys = [each.key(place, ablation.policy) for each in ablation.levels]
+    yield (ablation.policy, *(level(measure, frame.units(measure, key)) for key in keys))
+    if not study.source:
+        yield ("quartiles", *(_quarters(frame.of(key)) for key in keys))
+        yield ("braked", *(level(BRAKED, frame.units(BRAKED, key)) for key in keys))
+    elif name == next(iter(study.measures)):
+        yield ("released", *(_released(frame.of(key)) for key in keys))
+        if study.has_paper and ablation.title == GUARD.title and place.budget in PUBLISHED_RELEASE:
+            release = rounded(PUBLISHED_RELEASE[place.budget])
+            yield (PAPER, *("" if each.parameters else release for each in ablation.levels))
+    for base in (USUAL, *beside):
+        bases = [_base(ablation, place, each, base) for each in ablation.levels]
+        # The usual level stands in every ablation, compared with nothing.
+        changes = [
+            "" if ours == theirs else interval(frame.contrast(measure, ours, theirs))
+            for ours, theirs in zip(keys, bases, strict=True)
+        ]
+        yield (f"minus {frame.marked(base)}", *changes)
+        claims = [_claims(study, ablation, name, each, base) for each in ablation.levels]
+        told = [claims_of_paper(each, [place.budget]) for each in claims]
+        if any(told):
+            yield (PAPER, *(entry[0] if entry else "" for entry in told))
 
-    study: AblationStudy
-    ablation: Ablation
-    place: Place | FilmPlace
-    name: str
-    bases: Sequence[str]
 
-    @property
-    def measure(self) -> Measure | Recall:
-        """What is compared."""
-        return self.study.measures[self.name]
+def _base(ablation: Ablation, place: Place | FilmPlace, each: Variant, base: str) -> Key:
+    if base == USUAL:
+        return USUAL_VARIANT.key(place, ablation.policy)
+    # The others feel the conditions of a level and not its parameters, which are the own ones of
+    # the policy.
+    return each.for_others().key(place, base)
 
-    def lines(self) -> Iterator[TableRow]:
-        """A heading, the levels, and under each what the paper says of it."""
-        where = percent(self.place.budget) if self.study.source else str(self.place)
-        yield (f"{where}, {self.name}",)
-        frame = self.study.frame
-        for each in self.ablation.levels:
-            ours = each.key(self.place, self.ablation.policy)
-            bases = [self._key(each, base) for base in self.bases]
-            yield (
-                # The usual level is played once and stands in every ablation, compared with
-                # nothing.
-                f"{each.label} (usual)" if ours == bases[0] else each.label,
-                level(self.measure, frame.units(self.measure, ours)),
-                *self._beside(ours),
-                *(
-                    "" if ours == base else interval(frame.contrast(self.measure, ours, base))
-                    for base in bases
-                ),
-            )
-            said = [self._of_paper(each, base) for base in self.bases]
-            release = self._published_release(each)
-            if any(said) or release:
-                yield (PAPER, "", release, *said)
 
-    def said(self) -> Iterator[Claims]:
-        """What the paper says of these levels at this budget."""
-        for each in self.ablation.levels:
-            for base in self.bases:
-                if (claims := self._claims(each, base)) and claims.at(self.place.budget):
-                    yield claims
+def _claims(
+    study: AblationStudy, ablation: Ablation, name: str, each: Variant, base: str
+) -> Claims | None:
+    measure = study.measures[name]
+    if not study.has_paper or not isinstance(measure, Recall):
+        return None
+    change = LevelChange(ablation.title, each.label, base, measure.ratio, measure.within)
+    return PUBLISHED_CHANGES.get(change)
 
-    def _key(self, each: Variant, base: str) -> Key:
-        if base == USUAL:
-            return USUAL_VARIANT.key(self.place, self.ablation.policy)
-        # The others feel the conditions of a level and not its parameters, which are the own ones
-        # of the policy.
-        return each.for_others().key(self.place, base)
 
-    def _beside(self, key: Key) -> tuple[str, ...]:
-        """What stands beside a level: in the open loop the released cells, under the first measure;
-        else the quartiles, and how many episodes braked.
-        """
-        rows = self.study.frame.of(key)
-        if not self.study.source:
-            found = quartiles([*DETECTION.units(rows).values()])
-            return quarters(found) if found else "", level(BRAKED, BRAKED.units(rows))
-        told = [row["released"] for row in rows if row.get("released") is not None]
-        first = self.name == next(iter(self.study.measures))
-        complete = first and told and len(told) == len(rows)
-        return (rounded(float(np.mean(told))) if complete else "",)
+def _quarters(rows: Sequence[Row]) -> str:
+    found = quartiles([*DETECTION.units(rows).values()])
+    return quarters(found) if found else ""
 
-    def _claims(self, each: Variant, base: str) -> Claims | None:
-        if not Setting(self.study.source).has_paper or not isinstance(self.measure, Recall):
-            return None
-        return PUBLISHED_CHANGES.get(
-            LevelChange(
-                self.ablation.title, each.label, base, self.measure.ratio, self.measure.within
-            )
-        )
 
-    def _of_paper(self, each: Variant, base: str) -> str:
-        entries = claims_of_paper(self._claims(each, base), [self.place.budget])
-        return entries[0] if entries else ""
-
-    def _published_release(self, each: Variant) -> str:
-        default = self.ablation.title == GUARD.title and not each.parameters
-        first = self.name == next(iter(self.study.measures))
-        if not (default and first and Setting(self.study.source).has_paper):
-            return ""
-        return rounded(PUBLISHED_RELEASE.get(self.place.budget))
+def _released(rows: Sequence[Row]) -> str:
+    """The mean over plays; empty where not all of them tell it."""
+    told = [row["released"] for row in rows if row.get("released") is not None]
+    return rounded(float(np.mean(told))) if told and len(told) == len(rows) else ""
