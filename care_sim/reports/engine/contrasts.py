@@ -1,32 +1,16 @@
 """How much more of a measure one cell has than another, and how sure that is."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from care_sim.evaluation.bootstrap import Interval
 from care_sim.evaluation.censoring import Bound, Difference
 
+if TYPE_CHECKING:
+    from care_sim.reports.engine.measures import Measure, Recall
+
 OVER_EVENTS = "°"
 """Stands behind a difference whose interval comes from events."""
-
-
-class Scale(Protocol):
-    """What a contrast needs of its measure."""
-
-    @property
-    def decimals(self) -> int:
-        """Decimals of the mean and of the interval's ends."""
-        ...
-
-    @property
-    def gate(self) -> float:
-        """The smallest mean difference that counts."""
-        ...
-
-    @property
-    def fewest_pairs(self) -> int:
-        """The least number of pairs that an interval is shown of."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -37,7 +21,7 @@ class Contrast:
     the events of the scenes.
     """
 
-    measure: Scale
+    measure: "Measure | Recall"
     difference: Difference
     over_events: bool = False
 
@@ -93,7 +77,7 @@ class Contrast:
 
 
 def of_interval(
-    measure: Scale, interval: Interval, pairs: int, over_events: bool = False
+    measure: "Recall", interval: Interval, pairs: int, over_events: bool = False
 ) -> Contrast:
     """A contrast of a measure without censored values."""
     return Contrast(measure, Difference(interval, Bound.EXACT, pairs, interval), over_events)

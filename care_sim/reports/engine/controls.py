@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping
 
 from care_sim.base.errors import percent
+from care_sim.reports.engine.measures import Measure, Recall, Units
 from care_sim.reports.formatting import MARKS
 
 BEST_CONTROL = "best control"
@@ -43,3 +44,18 @@ def best_control(levels: Mapping[str, float | None]) -> str | None:
     """The control of the highest level, of equal ones the first; None where no level is known."""
     known = {policy: level for policy, level in levels.items() if level is not None}
     return max(known, key=lambda policy: known[policy], default=None)
+
+
+def best_of(measure: Measure | Recall, found: Mapping[str, Units]) -> str | None:
+    """The control with the highest mean, given what was measured of each, over the units that all
+    of them have; None without one.
+    """
+    played = {policy: units for policy, units in found.items() if units}
+    # A control that lacks a hard seed or scene would win by that.
+    shared = set.intersection(*map(set, played.values())) if played else set()
+    return best_control(
+        {
+            policy: measure.mean({unit: units[unit] for unit in units if unit in shared})
+            for policy, units in played.items()
+        }
+    )

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from care_sim.evaluation.scene_contrasts import Ratio
 from care_sim.reports.engine.contrasts import Contrast
-from care_sim.reports.engine.controls import best_control, is_control
+from care_sim.reports.engine.controls import best_of, is_control
 from care_sim.reports.engine.frames import Frame
 from care_sim.reports.engine.measures import Measure, Recall, Units
 from care_sim.reports.formatting import marked, tag_notes
@@ -79,21 +79,9 @@ class Part:
         return self.frame.contrast(measure, *pair)
 
     def best_control(self, measure: Measure | Recall, budget: float) -> str | None:
-        """The control with the highest mean, over the units that all controls have at the budget;
-        None without one.
-        """
-        found = {
-            policy: units
-            for policy in self.controls
-            if (units := self.units(measure, policy, budget))
-        }
-        # A control that lacks a hard seed or scene would win by that.
-        shared = set.intersection(*map(set, found.values())) if found else set()
-        return best_control(
-            {
-                policy: measure.mean({unit: units[unit] for unit in units if unit in shared})
-                for policy, units in found.items()
-            }
+        """The best control of a measure at a budget; None without one."""
+        return best_of(
+            measure, {policy: self.units(measure, policy, budget) for policy in self.controls}
         )
 
     def over_control(self, measure: Measure | Recall, policies: Iterable[str]) -> OverControl:

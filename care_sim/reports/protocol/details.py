@@ -1,18 +1,19 @@
 """What CARE gains in thirds of the scenes by traffic, and how often allocations differ."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from care_sim.base.errors import percent
+from care_sim.evaluation.allocation_differences import AllocationDifference
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL
-from care_sim.evaluation.strata import SCENE_THIRDS
+from care_sim.evaluation.strata import SCENE_THIRDS, thirds
 from care_sim.reports.formatting import interval
 from care_sim.reports.protocol.formatting import PAPER, claims_of_paper, rounded
 from care_sim.reports.protocol.notes import papers
 from care_sim.reports.protocol.paper import ALLOCATION_SOURCE, PUBLISHED_ALLOCATIONS, claims_about
 from care_sim.reports.protocol.rows import SettingPlays
-from care_sim.reports.protocol.thirds import DENSE_LESS_SPARSE, RANKINGS, SceneThird
+from care_sim.reports.protocol.thirds import DENSE_LESS_SPARSE, RANKINGS, SceneThird, means
 from care_sim.reports.table import Table, TableRow
-from care_sim.study.run_config import REFERENCE
+from care_sim.study.run_config import REFERENCE, Row
 
 _RANKED = (
     "Scenes are ranked at each budget by CARE's plays there, means over keyframes and floor seeds."
@@ -56,12 +57,9 @@ def _ranking_lines(plays: SettingPlays, column: str) -> Iterator[TableRow]:
         yield (f"{name} third", *(_mean_count(plays, column, name, b) for b in plays.budgets))
     said = claims_about(plays.setting)
     for ratio in (OVERALL, FIRST_SIGHTING):
-        thirds = [
-            SceneThird(which, column, ratio)
-            for which in (*reversed(SCENE_THIRDS), DENSE_LESS_SPARSE)
-        ]
-        yield (thirds[0].heading,)
-        for third in thirds:
+        yield (SceneThird("", column, ratio).heading,)
+        for which in (*reversed(SCENE_THIRDS), DENSE_LESS_SPARSE):
+            third = SceneThird(which, column, ratio)
             yield (third.label, *(interval(third.measured(plays, b)) for b in plays.budgets))
             if entries := claims_of_paper(said.get(third), plays.budgets):
                 yield (PAPER, *entries)
@@ -69,8 +67,8 @@ def _ranking_lines(plays: SettingPlays, column: str) -> Iterator[TableRow]:
 
 def _mean_count(plays: SettingPlays, column: str, third: str, budget: float) -> str:
     # The mean over the scenes of the third, each of which is a mean over keyframes and floor seeds.
-    counts = plays.means(column, budget)
-    held = [counts[scene] for scene in plays.thirds(column, budget)[third]]
+    counts = means(plays, column, budget)
+    held = [counts[scene] for scene in thirds(counts)[third]]
     return f"{sum(held) / len(held):.1f}"
 
 
@@ -85,13 +83,7 @@ def allocation_tables(plays: SettingPlays) -> list[Table]:
     }
     lines: list[TableRow] = []
     for policy in others:
-        found = (plays.allocation_difference(policy, budget) for budget in plays.budgets)
-        entries = (
-            f"{100 * each.share:.0f}%, {each.cells_where_differing:.0f} cells"
-            if each.keyframes
-            else ""
-            for each in found
-        )
+        entries = (_differing(plays.rows(policy, budget)) for budget in plays.budgets)
         lines.append((plays.marked(policy), *entries))
         if policy in said:
             shares = (said[policy].get(budget) for budget in plays.budgets)
@@ -108,3 +100,14 @@ def allocation_tables(plays: SettingPlays) -> list[Table]:
             papers(ALLOCATION_SOURCE for _ in said),
         )
     ]
+
+
+def _differing(rows: Sequence[Row]) -> str:
+    """The share of keyframes with other cells than CARE's, and the mean number of cells there."""
+    columns = ("keyframes", "differing_keyframes", "differing_cells")
+    # Rows that older versions wrote do not tell it.
+    known = [row for row in rows if None not in (row[column] for column in columns)]
+    found = AllocationDifference(*(int(sum(row[column] for row in known)) for column in columns))
+    if not found.keyframes:
+        return ""
+    return f"{100 * found.share:.0f}%, {found.cells_where_differing:.0f} cells"

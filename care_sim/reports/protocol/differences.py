@@ -1,42 +1,17 @@
 """The differences of two policies that the protocol shows, and the paper gives."""
 
 from dataclasses import dataclass
-from typing import Protocol
 
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, TTFD, Ratio
 from care_sim.reports.engine.contrasts import OVER_EVENTS, Contrast
 from care_sim.reports.engine.measures import HEADINGS, Recall
 from care_sim.reports.protocol.rows import HISTORY, SettingPlays
+from care_sim.reports.protocol.thirds import SceneThird
 from care_sim.study.run_config import REFERENCE
 
 __all__ = ["HEADINGS", "OVER_EVENTS"]
 MeasuredDifference = Contrast
 RATIOS = (FIRST_SIGHTING, OVERALL, TTFD)
-
-
-class Comparison(Protocol):
-    """Anything that can be measured of a setting at a budget and set beside what the paper says of
-    it.
-    """
-
-    @property
-    def heading(self) -> str:
-        """What is measured."""
-        ...
-
-    @property
-    def label(self) -> str:
-        """What is compared."""
-        ...
-
-    @property
-    def policies(self) -> tuple[str, ...]:
-        """The policies that must have been played."""
-        ...
-
-    def measured(self, plays: SettingPlays, budget: float) -> Contrast | None:
-        """What was measured, None without plays."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -74,6 +49,10 @@ class PolicyPair:
     def measured(self, plays: SettingPlays, budget: float) -> Contrast | None:
         """Paired by scene, on the scenes that both policies have."""
         return plays.contrast(self.measure, *self.policies, budget)
+
+
+Comparison = PolicyPair | SceneThird
+"""What can be measured of a setting at a budget and set beside what the paper says of it."""
 
 
 def reference_pairs(

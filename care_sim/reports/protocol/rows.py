@@ -7,7 +7,6 @@ import numpy as np
 
 from care_sim.base.errors import counted
 from care_sim.core.arrays import Floats
-from care_sim.evaluation.allocation_differences import AllocationDifference
 from care_sim.evaluation.bootstrap import Interval, paired_difference
 from care_sim.evaluation.censoring import FEWEST_PAIRS
 from care_sim.evaluation.scene_contrasts import (
@@ -20,13 +19,13 @@ from care_sim.evaluation.scene_contrasts import (
     ratio_level,
     scene_share,
 )
-from care_sim.evaluation.strata import ENTRY, NEWCOMERS, thirds
+from care_sim.evaluation.strata import ENTRY, NEWCOMERS
 from care_sim.reports.engine.contrasts import Contrast, of_interval
 from care_sim.reports.engine.frames import Frame, by_floor_seed
 from care_sim.reports.engine.measures import Measure, Recall, tally_of
 from care_sim.reports.engine.parts import Part
 from care_sim.study.rows.settings import Setting
-from care_sim.study.run_config import FULL, REFERENCE, Row
+from care_sim.study.run_config import FULL, Row
 
 HISTORY = "history"
 """The policy that every other is compared with."""
@@ -118,33 +117,6 @@ class SettingPlays(Part):
         return np.array(
             [row["ttfds"] for row in self.rows(policy, budget) if row["scene"] == scene], float
         )
-
-    def thirds(self, column: str, budget: float) -> dict[str, list[str]]:
-        """Scenes ranked by what the reference held there (`tracks`, `explained`), cut in three."""
-        return thirds(self.means(column, budget))
-
-    def means(self, column: str, budget: float) -> dict[str, float]:
-        """A column of the reference by scene, averaged over floor seeds."""
-        values: dict[str, list[float]] = {scene: [] for scene in self.tallies(REFERENCE, budget)}
-        for row in self.rows(REFERENCE, budget):
-            # A scene that not all floor seeds have played is in no tally, and is left out here too.
-            if row["scene"] in values:
-                values[row["scene"]].append(row[column])
-        return {scene: float(np.mean(seeds)) for scene, seeds in values.items()}
-
-    def allocation_difference(self, policy: str, budget: float) -> AllocationDifference:
-        """How its allocations differ from those of the reference, over all plays for which that is
-        known.
-        """
-        columns = ("keyframes", "differing_keyframes", "differing_cells")
-        # Not known of the reference itself, of the full scan, and of rows that older versions
-        # wrote.
-        known = [
-            row
-            for row in self.rows(policy, budget)
-            if None not in (row[column] for column in columns)
-        ]
-        return AllocationDifference(*(int(sum(row[column] for row in known)) for column in columns))
 
     @cached_property
     def strata(self) -> dict[str, list[str]]:

@@ -2,7 +2,10 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from care_sim.evaluation.scene_contrasts import Ratio, among, contrast_gap
+from care_sim.evaluation.strata import thirds
 from care_sim.reports.engine.contrasts import Contrast, of_interval
 from care_sim.reports.engine.measures import HEADINGS, Recall
 from care_sim.reports.protocol.rows import SettingPlays
@@ -40,7 +43,7 @@ class SceneThird:
 
     def measured(self, plays: SettingPlays, budget: float) -> Contrast | None:
         """None with fewer than three scenes per third."""
-        groups = plays.thirds(self.ranked_by, budget)
+        groups = thirds(means(plays, self.ranked_by, budget))
         if sum(map(len, groups.values())) < FEWEST_SCENES:
             return None
         ours, theirs = (plays.tallies(policy, budget) for policy in self.policies)
@@ -51,8 +54,18 @@ class SceneThird:
             return measure.contrast(among(ours, groups[self.which]), theirs)
         dense, sparse = groups["dense"], groups["sparse"]
         gap = contrast_gap(self.ratio, ours, theirs, dense, sparse)
-        thirds = [measure.contrast(among(ours, some), theirs) for some in (dense, sparse)]
+        parts = [measure.contrast(among(ours, some), theirs) for some in (dense, sparse)]
         # Where one of the thirds has too few scenes for an interval of its own, that of the gap
         # says nothing.
-        fewest = min(third.difference.pairs if third else 0 for third in thirds)
+        fewest = min(part.difference.pairs if part else 0 for part in parts)
         return of_interval(measure, gap, fewest) if gap else None
+
+
+def means(plays: SettingPlays, column: str, budget: float) -> dict[str, float]:
+    """What CARE held in every scene (`tracks`, `explained`), averaged over floor seeds."""
+    values: dict[str, list[float]] = {scene: [] for scene in plays.tallies(REFERENCE, budget)}
+    for row in plays.rows(REFERENCE, budget):
+        # A scene that not all floor seeds have played is in no tally, and is left out here too.
+        if row["scene"] in values:
+            values[row["scene"]].append(row[column])
+    return {scene: float(np.mean(seeds)) for scene, seeds in values.items()}
