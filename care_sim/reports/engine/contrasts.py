@@ -77,7 +77,7 @@ class Contrast:
 
 
 def of_interval(
-    measure: "Recall", interval: Interval, pairs: int, over_events: bool = False
+    measure: "Measure | Recall", interval: Interval, pairs: int, over_events: bool = False
 ) -> Contrast:
     """A contrast of a measure without censored values."""
     return Contrast(measure, Difference(interval, Bound.EXACT, pairs, interval), over_events)

@@ -42,7 +42,7 @@ class PolicyPair:
         return f"{self.first} minus {self.second}"
 
     @property
-    def policies(self) -> tuple[str, ...]:
+    def policies(self) -> tuple[str, str]:
         """The two policies."""
         return self.first, self.second
 

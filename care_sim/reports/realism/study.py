@@ -1,20 +1,13 @@
 """The study of realism in either loop: what a headline table holds, under every condition."""
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 from care_sim.base.errors import percent
 from care_sim.reports.engine.contrasts import Contrast
 from care_sim.reports.engine.frames import Frame
 from care_sim.reports.engine.levels import level
-from care_sim.reports.engine.measures import (
-    AVOIDED,
-    DETECTION,
-    OPEN_LOOP,
-    Measure,
-    Recall,
-    Units,
-)
+from care_sim.reports.engine.measures import AVOIDED, DETECTION, OPEN_LOOP, Measure, Recall, Units
 from care_sim.reports.realism.orders import Order, Standing
 from care_sim.study.designs.realism import (
     CONDITIONS,
@@ -26,10 +19,9 @@ from care_sim.study.designs.realism import (
     IDEAL,
     LATE_CAMERA,
     LATE_FILM_CAMERA,
-    Headline,
     Pair,
 )
-from care_sim.study.designs.variants import FilmPlace, Variant
+from care_sim.study.designs.variants import FilmPlace, Place, Variant
 from care_sim.study.rows.reading import READ_WITH
 from care_sim.study.run_config import FULL, REFERENCE, Row
 
@@ -42,23 +34,32 @@ class Block:
     """A headline table, or a measure of the open loop at a budget: its policies, and the pairs
     whose order it tells.
 
-    `name` is the heading, in which `group` is the measure where several are told; `units` are what
-    was measured of a policy under a condition. With `by_cases` its units are pairs of case and
-    seed, of which cases are drawn.
+    `name` is the heading of its levels, `label` names its orders; `group` is the measure where
+    several are told. Of several places these are drawn, and not their seeds.
     """
 
+    frame: Frame
     name: str
     group: str
     label: str
     measure: Measure | Recall
+    places: Sequence[Place | FilmPlace]
     policies: Sequence[str]
     pairs: Sequence[Pair]
-    units: Callable[[Variant, str], Units]
-    by_cases: bool = False
+
+    def units(self, condition: Variant, policy: str) -> Units:
+        """What was measured of a policy, by place, and by seed or scene."""
+        # The full scan is found from every setting, whatever it feels of it.
+        keys = [(place.budget, condition.key(place, REFERENCE)[0]) for place in self.places]
+        return {
+            (number, unit): value
+            for number, (budget, setting) in enumerate(keys)
+            for unit, value in self.frame.units(self.measure, (setting, policy, budget)).items()
+        }
 
     def contrast(self, ours: Units, theirs: Units) -> Contrast | None:
         """`ours` minus `theirs`; None where one of them was not played."""
-        if self.by_cases and isinstance(self.measure, Measure):
+        if len(self.places) > 1 and isinstance(self.measure, Measure):
             return self.measure.contrast_of_cases(ours, theirs)
         return self.measure.contrast(ours, theirs)
 
@@ -89,7 +90,8 @@ class RealismStudy:
         self.title = "Open loop" if open_loop else "Closed loop"
         self.unit = "points" if open_loop else "m or points"
         self.levels_told = "%" if open_loop else "median first detection, m, or collisions avoided"
-        self.blocks = [*(_film_blocks(self.frame) if open_loop else _headline_blocks(self.frame))]
+        blocks = _film_blocks(self.frame) if open_loop else _headline_blocks(self.frame)
+        self.blocks = [block for each in blocks if (block := _as_played(each))]
         self.conditions = [
             each
             for each in (FILM_CONDITIONS if open_loop else CONDITIONS)
@@ -107,66 +109,40 @@ class RealismStudy:
         return found
 
 
+def _as_played(block: Block) -> Block | None:
+    """The block with the policies that were played, and CARE beside each that joined in; None of a
+    full scan alone, which is of every table of its scenario.
+    """
+    every = dict.fromkeys([*block.policies, *(policy for _, policy, _ in block.frame.groups)])
+    policies = [policy for policy in every if block.units(IDEAL, policy)]
+    joined = [policy for policy in policies if policy not in block.policies]
+    pairs = [*block.pairs, *((REFERENCE, policy) for policy in joined)]
+    return replace(block, policies=policies, pairs=pairs) if {*policies} - {FULL} else None
+
+
 def _headline_blocks(frame: Frame) -> Iterator[Block]:
-    """The headline tables that were played."""
-    for headline in HEADLINES:
-        measure = AVOIDED if headline.by_collisions else DETECTION
-        units = _units_of(frame, headline, measure)
-        known = dict.fromkeys([*headline.policies, *frame.policies])
-        policies = [policy for policy in known if units(IDEAL, policy)]
-        # A full scan is of every table of its scenario: alone it is of one that was not played.
-        if {*policies} - {FULL}:
-            joined = [policy for policy in policies if policy not in headline.policies]
-            yield Block(
-                headline.name,
-                "",
-                headline.name,
-                measure,
-                policies,
-                [*headline.pairs, *((REFERENCE, policy) for policy in joined)],
-                units,
-                by_cases=len(headline.places) > 1,
-            )
-
-
-def _units_of(
-    frame: Frame, headline: Headline, measure: Measure
-) -> Callable[[Variant, str], Units]:
-    def units(condition: Variant, policy: str) -> Units:
-        keys = [condition.key(place, policy) for place in headline.places]
-        return {
-            (number, seed): reading
-            for number, key in enumerate(keys)
-            for seed, reading in frame.units(measure, key).items()
-        }
-
-    return units
+    for each in HEADLINES:
+        measure = AVOIDED if each.by_collisions else DETECTION
+        yield Block(
+            frame, each.name, "", each.name, measure, each.places, each.policies, each.pairs
+        )
 
 
 def _film_blocks(frame: Frame) -> Iterator[Block]:
     """First-sighting and overall recall at every budget."""
     row = frame.rows[0]
     shared = tuple((name, row.get(name)) for name in _OF_THE_FILM)
-    policies = list(dict.fromkeys(policy for _, policy, _ in frame.groups))
-    joined = [policy for policy in policies if policy not in FILM_POLICIES]
-    pairs = [*FILM_PAIRS, *((REFERENCE, policy) for policy in joined)]
-
-    def units_of(measure: Measure | Recall, budget: float) -> Callable[[Variant, str], Units]:
-        place = FilmPlace(row["source"], budget, shared)
-        # The full scan is found as the ceiling of every setting, whatever it feels of it.
-        return lambda condition, policy: frame.units(
-            measure, (condition.key(place, REFERENCE)[0], policy, budget)
-        )
-
+    budgets = sorted({budget for _, policy, budget in frame.groups if policy != FULL})
     for measure in OPEN_LOOP.measures:
-        assert isinstance(measure, Recall)
-        for budget in sorted({budget for _, policy, budget in frame.groups if policy != FULL}):
+        for budget in budgets:
+            place, label = FilmPlace(row["source"], budget, shared), percent(budget)
             yield Block(
-                f"{measure.ratio.name}, {percent(budget)}",
-                measure.ratio.name,
-                percent(budget),
+                frame,
+                f"{measure.heading}, {label}",
+                measure.heading,
+                label,
                 measure,
-                policies,
-                pairs,
-                units_of(measure, budget),
+                [place],
+                FILM_POLICIES,
+                FILM_PAIRS,
             )

@@ -12,6 +12,8 @@ from care_sim.reports.table import Table, TableRow
 from care_sim.study.designs.realism import IDEAL
 from care_sim.study.run_config import Row
 
+__all__ = ["RealismStudy", "realism_tables"]
+
 
 def realism_tables(rows: Sequence[Row]) -> list[Table]:
     """Verdicts, orders, the second column, and the figures under every condition."""

@@ -4,7 +4,7 @@ order by order, in either loop.
 
 from collections.abc import Iterator, Sequence
 
-from care_sim.base.errors import percent
+from care_sim.base.errors import counted, percent
 from care_sim.reports.engine.frames import Frame
 from care_sim.reports.engine.levels import Cell, level, level_of
 from care_sim.reports.engine.measures import Measure, Recall, loop_of
@@ -72,11 +72,13 @@ def order_tables(rows: Sequence[Row]) -> list[Table]:
         return []
     loop = loop_of(rows)
     orders = list(study.frames)
+    episodes = max(len(own) for frame in study.frames.values() for own in frame.groups.values())
     title = f"{loop.shown} by order of cells"
     ordered = [key for key in study.keys if key[1] not in study.once]
+    played = f"Each cell has at most {counted(episodes, 'row')}."
     notes = [f"Feel no order, played once: {', '.join(study.once)}."] if study.once else []
     return [
-        *verdict_tables("The paper's statements by order of cells", verdicts(rows), ""),
+        *verdict_tables("The paper's statements by order of cells", verdicts(rows), played),
         condition_table(
             f"{title}, {loop.level_unit}",
             orders,
