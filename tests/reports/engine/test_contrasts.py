@@ -1,4 +1,4 @@
-"""Contrasts with known answers: paired by seed, by case, by scene, by event where scenes are few."""
+"""Contrasts with known answers: paired by seed, by case, by scene, by event."""
 
 import numpy as np
 import pytest
