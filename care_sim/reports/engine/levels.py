@@ -11,7 +11,7 @@ from care_sim.reports.engine.contrasts import Contrast
 from care_sim.reports.engine.frames import Frame
 from care_sim.reports.engine.measures import AVOIDED, BRAKED, DETECTION, Measure, Recall, Units
 from care_sim.reports.formatting import median
-from care_sim.study.rows.reading import Key, tags_of_row
+from care_sim.study.rows.reading import Key, detections, tags_of_row
 from care_sim.study.rows.settings import Setting
 from care_sim.study.run_config import FULL, Row
 
@@ -68,6 +68,7 @@ def level_of(frame: Frame, key: Key) -> Cell | None:
     rows = frame.of(key)
     if not rows:
         return None
+    readings = detections(rows)
     found = DETECTION.units(rows)
     full = {} if policy == FULL else frame.units(DETECTION, (setting, FULL, 1.0))
     # Full minus policy: a policy that detects later than the full scan has positive regret.
@@ -83,9 +84,9 @@ def level_of(frame: Frame, key: Key) -> Cell | None:
         budget=budget,
         tags=tags_of_row(rows[0]),
         episodes=len(rows),
-        met=len(found),
-        never=sum(reading.censored for reading in found.values()),
-        detection=quartiles([*found.values()]) or NO_ACTOR,
+        met=len(readings),
+        never=sum(reading.censored for reading in readings),
+        detection=quartiles(readings) or NO_ACTOR,
         braked=sum(row["braked"] for row in rows),
         closest_pass=_quartiles(rows, "min_distance_m"),
         clearance=_quartiles(rows, "clearance_m"),
