@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 
 from care_sim.evaluation.collision_outcomes import CollisionOutcome, collision_outcome
-from care_sim.reports.engine.contrasts import Contrast
+from care_sim.reports.engine.contrasts import Contrast, contrast
 from care_sim.reports.engine.controls import best_of, is_control
 from care_sim.reports.engine.measures import AVOIDANCE, Units
 from care_sim.study.rows.reading import policy_of, stops_for_nothing, tags_of_row
@@ -44,7 +44,7 @@ class CollisionRows:
 
     def difference(self, ours: str, theirs: str, budget: float) -> Contrast | None:
         """Points by which one policy avoids more than another, on the worlds that both have."""
-        return AVOIDANCE.contrast(*(self._avoided(policy, budget) for policy in (ours, theirs)))
+        return contrast(AVOIDANCE, *(self._avoided(policy, budget) for policy in (ours, theirs)))
 
     def best_control(self, budget: float) -> str | None:
         """The control that avoids most at a budget, on the worlds that all controls have there;

@@ -1,5 +1,8 @@
 """Names of the report engine under their former path, until every room imports them from there."""
 
+from collections.abc import Sequence
+
+from care_sim.reports.engine import contrasts
 from care_sim.reports.engine.contrasts import Contrast
 from care_sim.reports.engine.measures import (
     AVOIDED,
@@ -10,10 +13,9 @@ from care_sim.reports.engine.measures import (
     GATE_M,
     GATE_POINTS,
     Measure,
-    contrast,
-    contrast_of_cases,
-    preventable,
 )
+from care_sim.study.rows.reading import is_avoided
+from care_sim.study.run_config import Row
 
 __all__ = [
     "AVOIDED",
@@ -29,3 +31,24 @@ __all__ = [
     "contrast_of_cases",
     "preventable",
 ]
+
+
+def contrast(
+    measure: Measure, ours: Sequence[Row] | None, theirs: Sequence[Row] | None
+) -> Contrast | None:
+    """`ours` minus `theirs`, paired by seed; None without shared seeds that have the measure."""
+    return contrasts.contrast(measure, measure.units(ours or ()), measure.units(theirs or ()))
+
+
+def contrast_of_cases(
+    measure: Measure, ours: Sequence[Row] | None, theirs: Sequence[Row] | None
+) -> Contrast | None:
+    """The same of rows whose `seed` is a pair of case and seed, where cases are drawn."""
+    units = (measure.units(rows or ()) for rows in (ours, theirs))
+    return contrasts.contrast(measure, *units, by_cases=True)
+
+
+def preventable(full: Sequence[Row], rows: Sequence[Row]) -> list[Row]:
+    """The rows of the seeds on which the full scan avoids the collision."""
+    spared = {row["seed"] for row in full if is_avoided(row)}
+    return [row for row in rows if row["seed"] in spared]

@@ -1,13 +1,15 @@
 """How much more of a measure one cell has than another, and how sure that is."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Any
+
+import numpy as np
 
 from care_sim.evaluation.bootstrap import Interval
-from care_sim.evaluation.censoring import Bound, Difference
-
-if TYPE_CHECKING:
-    from care_sim.reports.engine.measures import Measure, Recall
+from care_sim.evaluation.censoring import Bound, Difference, Reading, difference
+from care_sim.evaluation.scene_contrasts import scene_contrast
+from care_sim.reports.engine.measures import Measure, Recall, Units
 
 OVER_EVENTS = "°"
 """Stands behind a difference whose interval comes from events."""
@@ -21,7 +23,7 @@ class Contrast:
     the events of the scenes.
     """
 
-    measure: "Measure | Recall"
+    measure: Measure | Recall
     difference: Difference
     over_events: bool = False
 
@@ -77,7 +79,38 @@ class Contrast:
 
 
 def of_interval(
-    measure: "Measure | Recall", interval: Interval, pairs: int, over_events: bool = False
+    measure: Measure | Recall, interval: Interval, pairs: int, over_events: bool = False
 ) -> Contrast:
     """A contrast of a measure without censored values."""
     return Contrast(measure, Difference(interval, Bound.EXACT, pairs, interval), over_events)
+
+
+def contrast(
+    measure: Measure | Recall, ours: Units, theirs: Units, by_cases: bool = False
+) -> Contrast | None:
+    """`ours` minus `theirs`, paired by unit; None without shared units that hold anything.
+
+    With `by_cases` units are pairs of case and seed, and cases are what is drawn: each counts with
+    its means over seeds. One case on many seeds is one world, and no proof.
+    """
+    if isinstance(measure, Recall):
+        found = scene_contrast(measure.ratio, ours, theirs)
+        if found is None:
+            return None
+        interval = found.by_scene if measure.equal_scenes else found.by_event
+        return of_interval(measure, interval, found.scenes)
+    # Sorted, shared units give the same resamples whatever the order of the rows.
+    pairs = {unit: (ours[unit], theirs[unit]) for unit in sorted({*ours} & {*theirs})}
+    if not pairs:
+        return None
+    cases: dict[Any, list[tuple[Reading, Reading]]] = {}
+    for unit, pair in pairs.items():
+        cases.setdefault(unit[0] if by_cases else unit, []).append(pair)
+    means = [[_mean(side) for side in zip(*own, strict=True)] for own in cases.values()]
+    return Contrast(measure, difference(*zip(*means, strict=True)))
+
+
+def _mean(readings: Sequence[Reading]) -> Reading:
+    """Of a mean with a censored value is known that the truth lies between 0 and this."""
+    value = float(np.mean([reading.value for reading in readings]))
+    return Reading(value, any(reading.censored for reading in readings))

@@ -6,7 +6,7 @@ from typing import Any
 from care_sim.base.errors import InvalidInput
 from care_sim.core.return_settings import RETURN_SETTINGS
 from care_sim.evaluation.scene_contrasts import Tallies, averaged
-from care_sim.reports.engine.contrasts import Contrast
+from care_sim.reports.engine.contrasts import Contrast, contrast
 from care_sim.reports.engine.measures import Measure, Recall, Units, tally_of
 from care_sim.reports.formatting import marked, tag_notes
 from care_sim.study.rows.reading import (
@@ -76,7 +76,7 @@ class Frame:
 
     def contrast(self, measure: Measure | Recall, ours: Key, theirs: Key) -> Contrast | None:
         """One cell minus another, paired by unit; None where they share none."""
-        return measure.contrast(self.units(measure, ours), self.units(measure, theirs))
+        return contrast(measure, self.units(measure, ours), self.units(measure, theirs))
 
     def marked(self, policy: str) -> str:
         """A policy's name, with a mark when no car can have it."""

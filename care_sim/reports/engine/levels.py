@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from care_sim.evaluation.censoring import Quartiles, Reading, quartiles
-from care_sim.reports.engine.contrasts import Contrast
+from care_sim.reports.engine.contrasts import Contrast, contrast
 from care_sim.reports.engine.frames import Frame
 from care_sim.reports.engine.measures import AVOIDED, BRAKED, DETECTION, Measure, Recall, Units
 from care_sim.reports.formatting import median
@@ -72,7 +72,7 @@ def level_of(frame: Frame, key: Key) -> Cell | None:
     found = DETECTION.units(rows)
     full = {} if policy == FULL else frame.units(DETECTION, (setting, FULL, 1.0))
     # Full minus policy: a policy that detects later than the full scan has positive regret.
-    regret = DETECTION.contrast(full, found)
+    regret = contrast(DETECTION, full, found)
     # An actor that neither detected is no success: a censored reading does not count.
     no_later = sum(
         not found[seed].censored and found[seed].value >= full[seed].value

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from care_sim.evaluation.censoring import FEWEST_PAIRS, Difference, Reading, difference
+from care_sim.evaluation.censoring import FEWEST_PAIRS, Reading
 from care_sim.evaluation.recall import Tally
 from care_sim.evaluation.scene_contrasts import (
     FIRST_SIGHTING,
@@ -14,10 +14,8 @@ from care_sim.evaluation.scene_contrasts import (
     TTFD,
     Ratio,
     ratio_level,
-    scene_contrast,
 )
 from care_sim.evaluation.strata import ENTRY, NEWCOMERS
-from care_sim.reports.engine.contrasts import Contrast, of_interval
 from care_sim.study.rows.reading import detection, is_avoided
 from care_sim.study.run_config import Row
 
@@ -68,24 +66,6 @@ class Measure:
         values = [reading.value for reading in units.values()]
         return float(np.mean(values)) if values else None
 
-    def contrast(self, ours: Units, theirs: Units) -> Contrast | None:
-        """`ours` minus `theirs`, paired by unit; None without shared units."""
-        # Sorted, shared units give the same resamples whatever the order of the rows.
-        pairs = [(ours[unit], theirs[unit]) for unit in sorted({*ours} & {*theirs})]
-        return Contrast(self, _difference(pairs)) if pairs else None
-
-    def contrast_of_cases(self, ours: Units, theirs: Units) -> Contrast | None:
-        """Return the same for units that are pairs of case and seed, where cases are drawn: each
-        case counts with its means over seeds. One case on many seeds is one world, and no proof.
-        """
-        cases: dict[Any, list[tuple[Reading, Reading]]] = {}
-        for case, seed in sorted({*ours} & {*theirs}):
-            cases.setdefault(case, []).append((ours[case, seed], theirs[case, seed]))
-        means = [
-            (_mean(a), _mean(b)) for a, b in (zip(*own, strict=True) for own in cases.values())
-        ]
-        return Contrast(self, _difference(means)) if means else None
-
 
 @dataclass(frozen=True)
 class Recall:
@@ -121,17 +101,6 @@ class Recall:
         """A level in the unit of the measure."""
         return "" if value is None else f"{value:.{self.decimals}f}"
 
-    def contrast(self, ours: Units, theirs: Units) -> Contrast | None:
-        """`ours` minus `theirs`, paired by scene; None without a shared scene with anything to
-        find.
-        """
-        found = scene_contrast(self.ratio, ours, theirs)
-        if found is None:
-            return None
-        return of_interval(
-            self, found.by_scene if self.equal_scenes else found.by_event, found.scenes
-        )
-
 
 def tally_of(row: Row, within: str = "") -> Tally:
     """The tally of a play, of all objects or `within` a stratum or a kind of newcomers."""
@@ -140,37 +109,6 @@ def tally_of(row: Row, within: str = "") -> Tally:
     # Columns of a stratum are named KIND/STRATUM/FIELD, those of all events by the field alone.
     prefix = f"{within}/" if within else ""
     return Tally(*(row[f"{prefix}{column}"] for column in _TALLY))
-
-
-def contrast(
-    measure: Measure, ours: Sequence[Row] | None, theirs: Sequence[Row] | None
-) -> Contrast | None:
-    """`ours` minus `theirs`, paired by seed; None without shared seeds that have the measure."""
-    return measure.contrast(measure.units(ours or ()), measure.units(theirs or ()))
-
-
-def contrast_of_cases(
-    measure: Measure, ours: Sequence[Row] | None, theirs: Sequence[Row] | None
-) -> Contrast | None:
-    """The same of rows whose `seed` is a pair of case and seed, where cases are drawn."""
-    return measure.contrast_of_cases(measure.units(ours or ()), measure.units(theirs or ()))
-
-
-def preventable(full: Sequence[Row], rows: Sequence[Row]) -> list[Row]:
-    """The rows of the seeds on which the full scan avoids the collision."""
-    spared = {row["seed"] for row in full if is_avoided(row)}
-    return [row for row in rows if row["seed"] in spared]
-
-
-def _difference(pairs: Sequence[tuple[Reading, Reading]]) -> Difference:
-    ours, theirs = zip(*pairs, strict=True)
-    return difference(ours, theirs)
-
-
-def _mean(readings: Sequence[Reading]) -> Reading:
-    """Of a mean with a censored value is known that the truth lies between 0 and this."""
-    value = float(np.mean([reading.value for reading in readings]))
-    return Reading(value, any(reading.censored for reading in readings))
 
 
 def _detected(row: Row) -> Reading | None:

@@ -6,7 +6,7 @@ import numpy as np
 
 from care_sim.evaluation.scene_contrasts import Ratio, among, contrast_gap
 from care_sim.evaluation.strata import thirds
-from care_sim.reports.engine.contrasts import Contrast, of_interval
+from care_sim.reports.engine.contrasts import Contrast, contrast, of_interval
 from care_sim.reports.engine.measures import HEADINGS, Recall
 from care_sim.reports.protocol.rows import SettingPlays
 from care_sim.study.run_config import REFERENCE
@@ -51,10 +51,10 @@ class SceneThird:
         # The thirds are those of CARE at this budget for both policies, so that each scene is
         # compared with itself.
         if self.which != DENSE_LESS_SPARSE:
-            return measure.contrast(among(ours, groups[self.which]), theirs)
+            return contrast(measure, among(ours, groups[self.which]), theirs)
         dense, sparse = groups["dense"], groups["sparse"]
         gap = contrast_gap(self.ratio, ours, theirs, dense, sparse)
-        parts = [measure.contrast(among(ours, some), theirs) for some in (dense, sparse)]
+        parts = [contrast(measure, among(ours, some), theirs) for some in (dense, sparse)]
         # Where one of the thirds has too few scenes for an interval of its own, that of the gap
         # says nothing.
         fewest = min(part.difference.pairs if part else 0 for part in parts)

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from care_sim.base.errors import percent
-from care_sim.reports.engine.contrasts import Contrast
+from care_sim.reports.engine.contrasts import Contrast, contrast
 from care_sim.reports.engine.frames import Frame
 from care_sim.reports.engine.levels import level
 from care_sim.reports.engine.measures import AVOIDED, DETECTION, OPEN_LOOP, Measure, Recall, Units
@@ -59,9 +59,7 @@ class Block:
 
     def contrast(self, ours: Units, theirs: Units) -> Contrast | None:
         """`ours` minus `theirs`; None where one of them was not played."""
-        if len(self.places) > 1 and isinstance(self.measure, Measure):
-            return self.measure.contrast_of_cases(ours, theirs)
-        return self.measure.contrast(ours, theirs)
+        return contrast(self.measure, ours, theirs, by_cases=len(self.places) > 1)
 
     def level(self, condition: Variant, policy: str) -> str:
         """The figure of a policy; empty where it was not played."""
@@ -74,9 +72,9 @@ class Block:
     def order(self, pair: Pair, conditions: Sequence[Variant]) -> Order:
         """How the first policy stands to the second under every condition."""
         found = {
-            each.label: Standing.of(contrast)
+            each.label: Standing.of(one)
             for each in conditions
-            if (contrast := self.contrast(*(self.units(each, policy) for policy in pair)))
+            if (one := self.contrast(*(self.units(each, policy) for policy in pair)))
         }
         return Order(self.label, pair, found)
 

@@ -5,6 +5,7 @@ order by order, in either loop.
 from collections.abc import Iterator, Sequence
 
 from care_sim.base.errors import counted, percent
+from care_sim.reports.engine.contrasts import contrast
 from care_sim.reports.engine.frames import Frame
 from care_sim.reports.engine.levels import Cell, level, level_of
 from care_sim.reports.engine.measures import Measure, Recall, loop_of
@@ -49,7 +50,7 @@ class OrderStudy:
         if BASE_ORDER not in self.frames:
             return ""
         ours, usual = (self.frames[each].units(measure, key) for each in (order, BASE_ORDER))
-        return interval(measure.contrast(ours, usual))
+        return interval(contrast(measure, ours, usual))
 
 
 class OrderCells(OrderStudy):

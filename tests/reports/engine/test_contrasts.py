@@ -6,13 +6,19 @@ import pytest
 from care_sim.evaluation.bootstrap import Interval, paired_difference
 from care_sim.evaluation.censoring import Bound
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, TTFD
+from care_sim.reports.engine import contrasts
 from care_sim.reports.engine.contrasts import of_interval
-from care_sim.reports.engine.measures import BRAKED, DETECTED, DETECTION, Recall, contrast
-from care_sim.reports.engine.measures import contrast_of_cases as by_cases
+from care_sim.reports.engine.measures import BRAKED, DETECTED, DETECTION, Recall
 from care_sim.reports.protocol.rows import plays_by_setting
 from care_sim.reports.protocol.thirds import DENSE_LESS_SPARSE, SceneThird
 from tests.helpers.made_plays import found, play, study
 from tests.helpers.made_rows import NEAREST_M, rows
+
+
+def contrast(measure, ours, theirs, **more):
+    """Of rows."""
+    return contrasts.contrast(measure, measure.units(ours), measure.units(theirs), **more)
+
 
 FIRST, ALL, DELAY = map(Recall, (FIRST_SIGHTING, OVERALL, TTFD))
 
@@ -28,7 +34,7 @@ def test_differences_are_paired_by_seed():
     )
     single = contrast(DETECTION, rows("care", [1.0, 9.0]), rows("full", [2.0]))
     assert (single.difference.pairs, single.mean, single.interval) == (1, -1.0, None)
-    assert contrast(DETECTION, rows("care", [1.0]), None) is None
+    assert contrast(DETECTION, rows("care", [1.0]), []) is None
 
 
 def test_rates_are_compared_in_points():
@@ -67,9 +73,9 @@ def test_cases_count_with_their_means_and_one_case_is_one_pair():
 
     ours = cases("care", {"a": [10.0] * 9, "b": [4.0, 6.0, 90.0]})
     theirs = cases("history", {"a": [9.0] * 9, "b": [2.0, 2.0], "c": [1.0]})
-    gap = by_cases(DETECTION, ours, theirs)
+    gap = contrast(DETECTION, ours, theirs, by_cases=True)
     assert (gap.difference.pairs, gap.mean) == (2, (1.0 + 3.0) / 2)
-    one = by_cases(DETECTION, ours[:9], theirs[:9])
+    one = contrast(DETECTION, ours[:9], theirs[:9], by_cases=True)
     assert (one.difference.pairs, one.excludes_zero) == (1, False)
 
 
