@@ -44,7 +44,8 @@ class CollisionRows:
 
     def difference(self, ours: str, theirs: str, budget: float) -> Contrast | None:
         """Points by which one policy avoids more than another, on the worlds that both have."""
-        return contrast(AVOIDANCE, *(self._avoided(policy, budget) for policy in (ours, theirs)))
+        first, second = (self._avoided(policy, budget) for policy in (ours, theirs))
+        return contrast(AVOIDANCE, first, second)
 
     def best_control(self, budget: float) -> str | None:
         """The control that avoids most at a budget, on the worlds that all controls have there;

@@ -44,8 +44,8 @@ def contrast_of_cases(
     measure: Measure, ours: Sequence[Row] | None, theirs: Sequence[Row] | None
 ) -> Contrast | None:
     """The same of rows whose `seed` is a pair of case and seed, where cases are drawn."""
-    units = (measure.units(rows or ()) for rows in (ours, theirs))
-    return contrasts.contrast(measure, *units, by_cases=True)
+    of_ours, of_theirs = (measure.units(rows or ()) for rows in (ours, theirs))
+    return contrasts.contrast(measure, of_ours, of_theirs, by_cases=True)
 
 
 def preventable(full: Sequence[Row], rows: Sequence[Row]) -> list[Row]:

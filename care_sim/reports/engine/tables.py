@@ -1,21 +1,16 @@
-"""The shapes of tables that both loops share: one policy minus others, policies minus the best
-control, and a measure under every condition.
-"""
+"""Tables that both loops share: one policy minus others, and policies minus the best control."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
 
 from care_sim.base.errors import percent
 from care_sim.reports.engine.controls import BEST_CONTROL, RULE, candidates
-from care_sim.reports.engine.measures import Loop, Measure, Recall
+from care_sim.reports.engine.measures import Measure, Recall
 from care_sim.reports.engine.parts import OverControl, Part
-from care_sim.reports.formatting import interval, marked, tag_notes
+from care_sim.reports.formatting import interval
 from care_sim.reports.table import Table, TableRow
-from care_sim.study.rows.reading import Key
 
 PAPER = "(paper)"
 """What the line under a policy begins with that holds the paper's numbers."""
-_NAMES = ("policy", "budget")
 OfPaper = Callable[[Measure | Recall, str], Sequence[str]]
 """What the paper says of a policy in a measure, budget by budget; empty where it says nothing."""
 
@@ -87,51 +82,3 @@ def control_tables(
             (" ".join([*notes, RULE, candidates(part.controls)]), *part.notes),
         )
     ]
-
-
-class Block(NamedTuple):
-    """The lines of a measure under a heading, a cell each."""
-
-    heading: str
-    measure: Measure | Recall
-    keys: Sequence[Key]
-
-
-def setting_blocks(keys: Sequence[Key], loop: Loop) -> list[Block]:
-    """The cells of every setting, measure by measure."""
-    return [
-        Block(f"{setting.label}: {measure.heading}", measure, [k for k in keys if k[0] == setting])
-        for setting in dict.fromkeys(key[0] for key in keys)
-        for measure in loop.measures
-    ]
-
-
-def condition_table(
-    title: str,
-    conditions: Sequence[str],
-    blocks: Sequence[Block],
-    tags: Mapping[str, tuple[str, ...]],
-    entry: Callable[[str, Measure | Recall, Key], str],
-    notes: Sequence[str] = (),
-    terminal: bool = True,
-) -> Table:
-    """What `entry` says of every cell under every condition."""
-
-    def lines() -> Iterator[TableRow]:
-        for heading, measure, keys in blocks:
-            yield (heading,)
-            for key in keys:
-                _, policy, budget = key
-                entries = (entry(condition, measure, key) for condition in conditions)
-                yield (marked(policy, tags.get(policy, ())), percent(budget), *entries)
-
-    told = " ".join(tag_notes(tags.values()))
-    return Table(
-        title,
-        (*_NAMES, *conditions),
-        tuple(lines()),
-        (*notes, *([told] if told else [])),
-        whole=_NAMES,
-        names=len(_NAMES),
-        terminal=terminal,
-    )

@@ -5,11 +5,9 @@ order by order, in either loop.
 from collections.abc import Iterator, Sequence
 
 from care_sim.base.errors import counted, percent
-from care_sim.reports.engine.contrasts import contrast
 from care_sim.reports.engine.frames import Frame
-from care_sim.reports.engine.levels import Cell, level, level_of
-from care_sim.reports.engine.measures import Measure, Recall, loop_of
-from care_sim.reports.engine.tables import condition_table, setting_blocks
+from care_sim.reports.engine.levels import Cell, level_of
+from care_sim.reports.engine.varied import Varied
 from care_sim.reports.formatting import interval
 from care_sim.reports.order_verdicts import Verdict, Verdicts, on_mirrored_order, verdict_tables
 from care_sim.reports.protocol.formatting import claim_in_short, verdict
@@ -22,44 +20,13 @@ from care_sim.study.rows.reading import Key
 from care_sim.study.run_config import FULL, Row
 
 
-class OrderStudy:
-    """The rows of the study by order. Cells of one key differ in nothing but the order."""
+class OrderCells:
+    """The rows of the study by order; what the figure reads of episodes."""
 
     def __init__(self, rows: Sequence[Row]):
         self.frames = {order: Frame(own) for order, own in rows_by_order(rows).items()}
-        self.once = without_order(rows)
-        self.tags = {
-            policy: frame.tags[policy]
-            for frame in self.frames.values()
-            for _, policy, _ in frame.groups
-        }
-
-    @property
-    def keys(self) -> list[Key]:
-        """Of all cells, settings together and by budget."""
-        found = dict.fromkeys(key for frame in self.frames.values() for key in frame.groups)
-        settings = list(dict.fromkeys(key[0] for key in found))
-        return sorted(found, key=lambda key: (settings.index(key[0]), key[2]))
-
-    def level(self, order: str, measure: Measure | Recall, key: Key) -> str:
-        """A level under an order."""
-        return level(measure, self.frames[order].units(measure, key))
-
-    def change(self, order: str, measure: Measure | Recall, key: Key) -> str:
-        """A cell under an order minus that under the usual one, paired by seed or scene."""
-        if BASE_ORDER not in self.frames:
-            return ""
-        ours, usual = (self.frames[each].units(measure, key) for each in (order, BASE_ORDER))
-        return interval(contrast(measure, ours, usual))
-
-
-class OrderCells(OrderStudy):
-    """What the figure reads of episodes."""
-
-    @property
-    def orders(self) -> tuple[str, ...]:
-        """The orders that were played."""
-        return tuple(self.frames)
+        self.orders = tuple(self.frames)
+        self.tags = {p: frame.tags[p] for frame in self.frames.values() for _, p, _ in frame.groups}
 
     def cell(self, order: str, key: Key) -> Cell | None:
         """What was measured; None where it was not played."""
@@ -68,34 +35,18 @@ class OrderCells(OrderStudy):
 
 def order_tables(rows: Sequence[Row]) -> list[Table]:
     """The paper's statements by order, then levels and their differences to the usual order."""
-    study = OrderStudy(rows)
+    study = OrderCells(rows)
     if set(study.tags) <= {FULL}:
         return []
-    loop = loop_of(rows)
-    orders = list(study.frames)
-    episodes = max(len(own) for frame in study.frames.values() for own in frame.groups.values())
-    title = f"{loop.shown} by order of cells"
-    ordered = [key for key in study.keys if key[1] not in study.once]
-    played = f"Each cell has at most {counted(episodes, 'row')}."
-    notes = [f"Feel no order, played once: {', '.join(study.once)}."] if study.once else []
+    rows_of_cell = max(len(own) for each in study.frames.values() for own in each.groups.values())
+    played = f"Each cell has at most {counted(rows_of_cell, 'row')}."
+    once = without_order(rows)
+    notes = [f"Feel no order, played once: {', '.join(once)}."] if once else []
+    varied = Varied("order of cells", study.frames, notes)
     return [
         *verdict_tables("The paper's statements by order of cells", verdicts(rows), played),
-        condition_table(
-            f"{title}, {loop.level_unit}",
-            orders,
-            setting_blocks(study.keys, loop),
-            study.tags,
-            study.level,
-            notes,
-        ),
-        condition_table(
-            f"{title}, minus {BASE_ORDER}, {loop.difference_unit}",
-            [order for order in orders if order != BASE_ORDER],
-            setting_blocks(ordered, loop),
-            study.tags,
-            study.change,
-            terminal=False,
-        ),
+        varied.levels(),
+        varied.minus_usual(BASE_ORDER, unfelt=once),
     ]
 
 
