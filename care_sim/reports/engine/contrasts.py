@@ -100,14 +100,15 @@ def contrast(
         interval = found.by_scene if measure.equal_scenes else found.by_event
         return of_interval(measure, interval, found.scenes)
     # Sorted, shared units give the same resamples whatever the order of the rows.
-    pairs = {unit: (ours[unit], theirs[unit]) for unit in sorted({*ours} & {*theirs})}
-    if not pairs:
-        return None
-    cases: dict[Any, list[tuple[Reading, Reading]]] = {}
-    for unit, pair in pairs.items():
-        cases.setdefault(unit[0] if by_cases else unit, []).append(pair)
-    means = [[_mean(side) for side in zip(*own, strict=True)] for own in cases.values()]
-    return Contrast(measure, difference(*zip(*means, strict=True)))
+    shared = sorted({*ours} & {*theirs})
+    pairs = [(ours[unit], theirs[unit]) for unit in shared]
+    if by_cases:
+        cases: dict[Any, list[tuple[Reading, Reading]]] = {}
+        for (case, _), pair in zip(shared, pairs, strict=True):
+            cases.setdefault(case, []).append(pair)
+        sides = (zip(*own, strict=True) for own in cases.values())
+        pairs = [(_mean(first), _mean(second)) for first, second in sides]
+    return Contrast(measure, difference(*zip(*pairs, strict=True))) if pairs else None
 
 
 def _mean(readings: Sequence[Reading]) -> Reading:

@@ -90,6 +90,6 @@ def _lines(plays: SettingPlays, ratio: Ratio, within: str, of_full: bool) -> Ite
         yield (plays.marked(policy), *levels)
     # The full scan has one budget and is the same beside all.
     if plays.full:
-        yield (FULL, *(level(FULL, 1.0) for _ in plays.budgets))
+        yield (FULL, *[level(FULL, 1.0)] * len(plays.budgets))
     for pair in reference_pairs(plays, ratio, within):
         yield (pair.label, *(interval(pair.measured(plays, budget)) for budget in plays.budgets))

@@ -63,6 +63,14 @@ def test_against_a_miss_the_difference_is_a_bound():
     assert (gap.mean, gap.excludes_zero) == (1.0, False)
 
 
+def test_a_difference_counts_whatever_the_censored_were():
+    """At 3 m for two missed actors the mean is 2.62 m; at 0 m it is 2.32 m, below the gate."""
+    ours = rows("care", [11.8] * 18 + [None] * 2)
+    gap = contrast(DETECTION, ours, rows("history", [9.0] * 18 + [2.0] * 2))
+    assert gap.mean == pytest.approx(2.62)
+    assert (gap.excludes_zero, gap.counts) == (True, False)
+
+
 def test_cases_count_with_their_means_and_one_case_is_one_pair():
     def cases(policy, by_case):
         return [
