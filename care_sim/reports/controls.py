@@ -1,40 +1,11 @@
-"""Which policies are the controls that a contender has to beat, and which of them is the best."""
+"""Names of the report engine under their former path, until every room imports them from there."""
 
-from collections.abc import Iterable, Mapping
-
-from care_sim.base.errors import percent
-from care_sim.reports.formatting import MARKS
-
-BEST_CONTROL = "best control"
-"""What the line begins with that names it at every budget."""
-IN_HINDSIGHT = (
-    f"The {BEST_CONTROL} is chosen anew at each budget, by the very results that are compared. "
-    "Such a choice in hindsight favours the control, which is the strict reading."
+from care_sim.reports.engine.controls import (
+    BEST_CONTROL,
+    IN_HINDSIGHT,
+    best_control,
+    is_control,
+    named_by_budget,
 )
 
-
-def candidates(controls: Iterable[str]) -> str:
-    """Among which controls the best one is chosen, in a sentence."""
-    return f"Candidates: {', '.join(controls)}."
-
-
-def named_by_budget(controls: Mapping[float, str]) -> str:
-    """The best control of each budget, in words: each control once, with its budgets."""
-    if len({*controls.values()}) == 1:
-        return f"{next(iter(controls.values()))} at every budget"
-    budgets: dict[str, list[str]] = {}
-    for budget, control in controls.items():
-        budgets.setdefault(control, []).append(percent(budget))
-    return " and ".join(f"{control} at {', '.join(own)}" for control, own in budgets.items())
-
-
-def is_control(tags: tuple[str, ...]) -> bool:
-    """Whether a policy with these tags is a control that a car can have."""
-    # What looks the episode up, or knows the truth, is a warning or a bound, and nothing to beat.
-    return "control" in tags and not {*tags} & {*MARKS}
-
-
-def best_control(levels: Mapping[str, float | None]) -> str | None:
-    """The control of the highest level, of equal ones the first; None where no level is known."""
-    known = {policy: level for policy, level in levels.items() if level is not None}
-    return max(known, key=lambda policy: known[policy], default=None)
+__all__ = ["BEST_CONTROL", "IN_HINDSIGHT", "best_control", "is_control", "named_by_budget"]

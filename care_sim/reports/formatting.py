@@ -1,16 +1,16 @@
 """How measured values are written in tables."""
 
 from collections.abc import Iterable
-from typing import Protocol
 
 import numpy as np
 
 from care_sim.core.arrays import Integers
 from care_sim.evaluation.bootstrap import Interval
 from care_sim.evaluation.censoring import Quartiles
-from care_sim.reports.contrasts import Contrast
+from care_sim.reports.engine.contrasts import Contrast
 from care_sim.reports.table import Bold
 
+ShownDifference = Contrast
 NOT_DETECTED = "not detected"
 MARKS = {"privileged": "†", "non-causal": "‡", "generator": "§"}
 """Marks of the policies that no car can have."""
@@ -19,45 +19,6 @@ _MEANINGS = {
     "non-causal": "‡ saw the full scan first: saves no sensing.",
     "generator": "§ looks the episode up in the public generator: a warning, no contender.",
 }
-
-
-class ShownDifference(Protocol):
-    """A mean difference, of the closed or the open loop, as tables show it."""
-
-    @property
-    def mean(self) -> float:
-        """In the unit of what is compared."""
-        ...
-
-    @property
-    def interval(self) -> Interval | None:
-        """None where too little was played for one."""
-        ...
-
-    @property
-    def decimals(self) -> int:
-        """Decimals of the mean and of the interval's ends."""
-        ...
-
-    @property
-    def bound(self) -> str:
-        """Stands before the mean, and says on which side of it the true difference may lie."""
-        ...
-
-    @property
-    def asterisk(self) -> str:
-        """Stands after the mean where the difference reaches its gate."""
-        ...
-
-    @property
-    def suffix(self) -> str:
-        """Stands at the end, and says what the interval rests on where that is not the usual."""
-        ...
-
-    @property
-    def excludes_zero(self) -> bool:
-        """Whether the interval excludes zero."""
-        ...
 
 
 def marked(policy: str, tags: tuple[str, ...]) -> str:
@@ -102,14 +63,14 @@ def spread_of_counts(counts: Integers) -> str:
     return f"{middle:.0f} [{low:.0f}, {high:.0f}] ({len(counts)})"
 
 
-def mean(difference: ShownDifference | None) -> str:
+def mean(difference: Contrast | None) -> str:
     """A mean difference without its interval, bold where it excludes zero."""
     if difference is None:
         return ""
     return emphasised(difference, f"{signed(difference)}{difference.suffix}")
 
 
-def interval(difference: ShownDifference | None) -> str:
+def interval(difference: Contrast | None) -> str:
     """A mean difference with its interval if it has one, bold where it excludes zero."""
     if difference is None:
         return ""
@@ -122,14 +83,14 @@ def unsigned(contrast: Contrast | None) -> str:
     return f"{contrast.bound}{contrast.mean:z.1f}" if contrast else ""
 
 
-def ends(difference: ShownDifference | None) -> str:
+def ends(difference: Contrast | None) -> str:
     """The interval of a difference alone; empty where there is none."""
     if difference is None or difference.interval is None:
         return ""
     return f"{bounds(difference.interval, difference.decimals)}{difference.suffix}"
 
 
-def signed(difference: ShownDifference) -> str:
+def signed(difference: Contrast) -> str:
     """A mean difference with its sign and the marks beside it."""
     # Beside an interval of one sign, a mean that reads as zero has one decimal more, too.
     hides = difference.excludes_zero and _reads_as_zero(difference.mean, difference.decimals)
@@ -137,7 +98,7 @@ def signed(difference: ShownDifference) -> str:
     return f"{difference.bound}{number}{difference.asterisk}"
 
 
-def emphasised(difference: ShownDifference, text: str) -> str:
+def emphasised(difference: Contrast, text: str) -> str:
     """The text, bold where the interval of the difference excludes zero."""
     if not difference.excludes_zero:
         return text

@@ -135,7 +135,9 @@ def test_a_file_changes_nothing_in_the_tables(tmp_path):
         read = read_rows(tmp_path / "episodes.parquet")
         tables = STUDIES[name].tables(read)
         assert tables == STUDIES[name].tables(rows)
-        assert name == "paper" or all(all(line[:3]) for table in tables for line in table.rows)
+        # The usual level of an ablation is compared with nothing.
+        if name not in ("paper", "ablate"):
+            assert all(all(line[:3]) for table in tables for line in table.rows)
 
 
 def test_a_study_leaves_its_name_and_its_columns_in_the_folder(tmp_path):

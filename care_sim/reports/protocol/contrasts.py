@@ -2,35 +2,18 @@
 new idea adds to either.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
-from typing import NamedTuple
+from collections.abc import Sequence
 
-from care_sim.base.errors import percent
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, TTFD
-from care_sim.reports.formatting import interval, marked, tag_notes
-from care_sim.reports.protocol.differences import MeasuredDifference, PolicyPair
-from care_sim.reports.protocol.formatting import PAPER, claims_of_paper
-from care_sim.reports.protocol.notes import (
-    UNITS_OF_DIFFERENCES,
-    left_out,
-    on_intervals,
-    papers,
-    played,
-)
-from care_sim.reports.protocol.paper import claims_about
+from care_sim.reports.engine.measures import Measure, Recall
+from care_sim.reports.engine.tables import minus_table
+from care_sim.reports.protocol.differences import PolicyPair
+from care_sim.reports.protocol.formatting import claims_of_paper
+from care_sim.reports.protocol.notes import UNITS_OF_DIFFERENCES, left_out, papers, played
+from care_sim.reports.protocol.paper import Claims, claims_about
 from care_sim.reports.protocol.rows import HISTORY, SettingPlays, plays_by_setting
 from care_sim.reports.table import Table
 from care_sim.study.run_config import REFERENCE, Row
-
-
-class _ContrastLine(NamedTuple):
-    """A pair, named by the one of its policies that is not the base, and its differences at every
-    budget.
-    """
-
-    policy: str
-    pair: PolicyPair
-    differences: list[MeasuredDifference | None]
 
 
 def protocol_contrast_tables(plays: SettingPlays) -> list[Table]:
@@ -56,66 +39,28 @@ def protocol_minus(rows: Sequence[Row], policy: str) -> list[Table]:
 def _table(
     plays: SettingPlays, base: str, equal_scenes: bool = False, base_first: bool = True
 ) -> Table:
-    contrasts = list(_contrasts(plays, base, equal_scenes, base_first))
-    said = claims_about(plays.setting)
-    intervals = on_intervals(
-        difference for contrast in contrasts for difference in contrast.differences
-    )
-    title, head = (
-        (f"{base} minus each policy", f"{base} minus")
-        if base_first
-        else (f"each policy minus {base}", f"minus {base}")
-    )
-    weights = ", equal scene weights" if equal_scenes else ""
-    return Table(
-        f"{plays.setting.label}: {title}{weights}",
-        (head, *map(percent, plays.budgets)),
-        tuple(_lines(plays, contrasts)),
-        (
-            f"{UNITS_OF_DIFFERENCES} {played(plays)}",
-            *intervals,
-            *left_out(plays),
-            *tag_notes(plays.tags.values()),
-        ),
-        papers(
-            said[contrast.pair].source
-            for contrast in contrasts
-            if contrast.pair in said and said[contrast.pair].any_at(plays.budgets)
-        ),
-        terminal=not equal_scenes,
-    )
-
-
-def _contrasts(
-    plays: SettingPlays, base: str, equal_scenes: bool, base_first: bool
-) -> Iterator[_ContrastLine]:
-    """The base less each of the others, or each of the others less the base."""
     kinds = () if equal_scenes else [kind for kind, count in plays.newcomers.items() if count]
-    first_sightings = [(FIRST_SIGHTING, kind) for kind in ("", *kinds)]
-    for ratio, within in (*first_sightings, (OVERALL, ""), (TTFD, "")):
-        for policy in plays.other_than(base):
-            # A positive difference speaks for the policy under test: for the base that stands
-            # first, for the others against history.
-            first, second = (base, policy) if base_first else (policy, base)
-            pair = PolicyPair(first, second, ratio, within, equal_scenes)
-            yield _ContrastLine(
-                policy, pair, [pair.measured(plays, budget) for budget in plays.budgets]
-            )
+    measures = [
+        *(Recall(FIRST_SIGHTING, kind, equal_scenes) for kind in ("", *kinds)),
+        *(Recall(ratio, equal_scenes=equal_scenes) for ratio in (OVERALL, TTFD)),
+    ]
+    said = claims_about(plays.setting)
 
+    def claims(measure: Measure | Recall, policy: str) -> Claims | None:
+        assert isinstance(measure, Recall)
+        pair = (base, policy) if base_first else (policy, base)
+        return said.get(PolicyPair(*pair, measure.ratio, measure.within, measure.equal_scenes))
 
-def _lines(plays: SettingPlays, contrasts: Iterable[_ContrastLine]) -> Iterator[tuple[str, ...]]:
-    """The differences at every budget, and under them the paper's, below the headings of the
-    measures.
-    """
-    heading = ""
-    for policy, pair, differences in contrasts:
-        if pair.heading != heading:
-            heading = pair.heading
-            yield (heading,)
-        # A policy without any difference in this measure has no line, and no line of the paper
-        # under it.
-        if any(differences):
-            yield (marked(policy, plays.tags[policy]), *map(interval, differences))
-            said = claims_about(plays.setting).get(pair)
-            if entries := claims_of_paper(said, plays.budgets):
-                yield (PAPER, *entries)
+    others = plays.other_than(base)
+    quoted = [found for each in measures for p in others if (found := claims(each, p))]
+    return minus_table(
+        plays,
+        base,
+        others,
+        measures,
+        base_first=base_first,
+        of_paper=lambda measure, policy: claims_of_paper(claims(measure, policy), plays.budgets),
+        weights=", equal scene weights" if equal_scenes else "",
+        notes=(" ".join([UNITS_OF_DIFFERENCES, played(plays), *left_out(plays)]),),
+        quotes=papers(each.source for each in quoted if each.any_at(plays.budgets)),
+    )

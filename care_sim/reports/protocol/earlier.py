@@ -4,7 +4,6 @@
 
 from care_sim.base.errors import percent
 from care_sim.evaluation.detection_order import DetectionOrder, detection_order
-from care_sim.reports.formatting import marked, tag_notes
 from care_sim.reports.protocol.rows import HISTORY, SettingPlays
 from care_sim.reports.table import Table
 from care_sim.study.rows.settings import WITHOUT_LABELS
@@ -21,7 +20,7 @@ def earlier_tables(plays: SettingPlays) -> list[Table]:
     if plays.setting.world != WITHOUT_LABELS or not plays.other_than(HISTORY):
         return []
     lines = [
-        (percent(budget), marked(policy, plays.tags[policy]), *_counts(plays, policy, budget))
+        (percent(budget), plays.marked(policy), *_counts(plays, policy, budget))
         for budget in plays.budgets
         for policy in plays.other_than(HISTORY)
     ]
@@ -34,9 +33,9 @@ def earlier_tables(plays: SettingPlays) -> list[Table]:
             (
                 "Mean over floor seeds. Two policies that do not detect an event within 6 "
                 "keyframes are tied. Events are new clusters of the reference, no labels.",
-                _VEHICLE,
-                *tag_notes(plays.tags.values()),
+                *plays.notes,
             ),
+            (_VEHICLE,),
         )
     ]
 

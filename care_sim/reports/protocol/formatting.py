@@ -3,13 +3,14 @@
 from collections.abc import Sequence
 
 from care_sim.evaluation.censoring import FEWEST_PAIRS
-from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, TTFD, Ratio, SceneShare
+from care_sim.evaluation.scene_contrasts import Ratio, SceneShare
+from care_sim.reports.engine.contrasts import Contrast
+from care_sim.reports.engine.measures import Recall
+from care_sim.reports.engine.tables import PAPER
 from care_sim.reports.formatting import bounds, emphasised, mean, signed
-from care_sim.reports.protocol.differences import MeasuredDifference, decimals_of
-from care_sim.reports.protocol.paper import Claim, Claims, PublishedLevel
+from care_sim.reports.protocol.paper import Claim, Claims
 
-PAPER = "(paper)"
-"""What the line under a policy begins with that holds the paper's numbers."""
+__all__ = ["PAPER"]
 MET = "met"
 NOT_MET = "not met"
 UNDECIDED = "undecided"
@@ -18,25 +19,7 @@ _SIGNS_ALONE = {1: "above", -1: "below", 0: "tied"}
 
 def written(ratio: Ratio, value: float | None) -> str:
     """A level in the unit of its measure."""
-    return "" if value is None else f"{value:.{decimals_of(ratio)}f}"
-
-
-def level_of_paper(said: PublishedLevel) -> tuple[str, ...]:
-    """The paper's levels of a policy, in the order of the columns: recall and share of the full
-    scan's, which it gives without an interval, of first sightings, not told apart by kind, and of
-    all; TTFD.
-    """
-    return (
-        written(FIRST_SIGHTING, said.first),
-        rounded(said.first_of_full),
-        "",
-        "",
-        "",
-        written(OVERALL, said.overall),
-        rounded(said.overall_of_full),
-        "",
-        written(TTFD, said.ttfd),
-    )
+    return Recall(ratio).written(value)
 
 
 def rounded(share: float | None, unit: str = "") -> str:
@@ -89,7 +72,7 @@ def claim_in_short(claim: Claim) -> str:
     return f"{claim.mean:+}" if claim.upper is None else f"{claim.mean:+} to {claim.upper}"
 
 
-def verdict(difference: MeasuredDifference, claimed: int) -> str:
+def verdict(difference: Contrast, claimed: int) -> str:
     """Whether a claim holds: 1 or -1 for a sign, 0 for a tie."""
     if difference.interval is None:
         return UNDECIDED
@@ -100,7 +83,7 @@ def verdict(difference: MeasuredDifference, claimed: int) -> str:
     return NOT_MET if difference.sign else UNDECIDED
 
 
-def judged(difference: MeasuredDifference | None, claim: Claim | None) -> str:
+def judged(difference: Contrast | None, claim: Claim | None) -> str:
     """A difference, whether it bears the claim out, and the claim itself; bold as `mean` is."""
     if difference is None:
         return ""

@@ -11,55 +11,19 @@ from care_sim.evaluation.scene_contrasts import (
     among,
     ratio_level,
 )
-from care_sim.evaluation.strata import NEWCOMERS
-from care_sim.reports.formatting import marked, tag_notes
+from care_sim.reports.engine.tables import PAPER, control_tables
 from care_sim.reports.protocol.contrasts import protocol_contrast_tables
-from care_sim.reports.protocol.controls import control_tables
-from care_sim.reports.protocol.differences import RATIOS
+from care_sim.reports.protocol.controls import over_controls
+from care_sim.reports.protocol.details import allocation_tables, thirds_tables
 from care_sim.reports.protocol.earlier import earlier_tables
-from care_sim.reports.protocol.entries import entry_tables
-from care_sim.reports.protocol.formatting import (
-    PAPER,
-    level_of_paper,
-    share,
-    share_ends,
-    written,
-)
+from care_sim.reports.protocol.formatting import rounded, share, share_ends, written
 from care_sim.reports.protocol.notes import left_out, of_full, papers
-from care_sim.reports.protocol.paper import LEVEL_SOURCES, PUBLISHED_LEVELS
+from care_sim.reports.protocol.paper import LEVEL_SOURCES, PUBLISHED_LEVELS, PublishedLevel
 from care_sim.reports.protocol.rows import SettingPlays, plays_by_setting
 from care_sim.reports.protocol.statements import statements_tables
-from care_sim.reports.protocol.strata import allocation_tables, strata_tables, thirds_tables
-from care_sim.reports.table import Table
+from care_sim.reports.protocol.strata import entry_tables, strata_tables
+from care_sim.reports.table import Table, TableRow
 from care_sim.study.run_config import FULL, Row
-
-_LEVEL_COLUMNS = (
-    "budget",
-    "policy",
-    "first sightings %",
-    "of full %",
-    "interval",
-    "emerging %",
-    "entering %",
-    "overall %",
-    "of full %",
-    "interval",
-    "TTFD",
-    "equal scenes: first sightings %",
-    "equal scenes: overall %",
-    "equal scenes: TTFD",
-    "seeds: first sightings ±",
-    "seeds: overall ±",
-    "scenes",
-)
-_OF_FULL = ("of full %", "interval")
-"""Columns of a setting in which the full scan was played."""
-_KINDS = tuple(f"{kind} %" for kind in NEWCOMERS)
-"""Columns of rows that tell how newcomers entered."""
-_DETAILS = tuple(name for name in _LEVEL_COLUMNS if ": " in name or name == "scenes")
-"""Columns of which the paper says nothing."""
-_LEVEL_FILES_ONLY = ("interval", *_DETAILS)
-_LEVEL_WHOLE = tuple(name for name in _LEVEL_COLUMNS if name != "policy")
 
 
 def protocol_tables(rows: Sequence[Row]) -> list[Table]:
@@ -68,7 +32,7 @@ def protocol_tables(rows: Sequence[Row]) -> list[Table]:
     made: list[Callable[[SettingPlays], list[Table]]] = [
         earlier_tables,
         protocol_contrast_tables,
-        control_tables,
+        lambda plays: control_tables(plays, over_controls(plays)),
         levels_tables,
         entry_tables,
         statements_tables,
@@ -82,58 +46,67 @@ def protocol_tables(rows: Sequence[Row]) -> list[Table]:
 def levels_tables(plays: SettingPlays) -> list[Table]:
     """Recall and TTFD of every policy and of the full scan, one line per policy and budget."""
     # The full scan comes last, under its own budget of all cells.
-    ceiling = ((FULL, 1.0),) if plays.full else ()
-    budgeted = ((policy, budget) for budget in plays.budgets for policy in plays.policies)
-    keys = [key for key in (*budgeted, *ceiling) if plays.rows(*key)]
-    lines = [line for key in keys for line in _level_lines(plays, *key)]
-    missing = (*(() if plays.full else _OF_FULL), *(() if plays.newcomers else _KINDS))
-    kept = [n for n, name in enumerate(_LEVEL_COLUMNS) if name not in missing]
+    keys = [(policy, budget) for budget in plays.budgets for policy in plays.policies]
+    lines: list[TableRow] = []
+    columns: TableRow = ()
+    for policy, budget in (*keys, (FULL, 1.0)):
+        if plays.rows(policy, budget):
+            said = PUBLISHED_LEVELS.get((policy, budget)) if plays.setting.as_in_paper else None
+            columns, line, paper = zip(*_columns(plays, policy, budget, said), strict=True)
+            lines += [line, ("", PAPER, *paper[2:])] if said else [line]
+    details = tuple(name for name in columns if ": " in name or name in ("scenes", "interval"))
     return [
         Table(
             f"{plays.setting.label}: levels",
-            tuple(_LEVEL_COLUMNS[n] for n in kept),
-            tuple(tuple(line[n] for n in kept) for line in lines),
-            (of_full(plays), *left_out(plays), *tag_notes(plays.tags.values())),
+            columns,
+            tuple(lines),
+            (" ".join([of_full(plays), *left_out(plays)]), *plays.notes),
             papers(LEVEL_SOURCES) if any(line[1] == PAPER for line in lines) else (),
-            _LEVEL_FILES_ONLY,
-            _LEVEL_WHOLE,
+            files_only=details,
+            whole=tuple(name for name in columns if name != "policy"),
         )
     ]
 
 
-def _level_lines(plays: SettingPlays, policy: str, budget: float) -> list[tuple[str, ...]]:
-    first, overall, ttfd = (plays.level(ratio, policy, budget) for ratio in RATIOS)
-    first_share, overall_share = (
-        plays.share_of_full(ratio, policy, budget) for ratio in (FIRST_SIGHTING, OVERALL)
+def _columns(
+    plays: SettingPlays, policy: str, budget: float, said: PublishedLevel | None
+) -> list[tuple[str, str, str]]:
+    """The columns of a line: the name, what was measured, and what the paper says."""
+    paper = said or PublishedLevel()
+    first, overall, ttfd = (
+        plays.level(ratio, policy, budget) for ratio in (FIRST_SIGHTING, OVERALL, TTFD)
     )
-    line = (
-        percent(budget),
-        marked(policy, plays.tags.get(policy, ())),
-        written(FIRST_SIGHTING, first.by_event),
-        share(first_share),
-        share_ends(first_share),
-        *(_of_kind(plays, kind, policy, budget) for kind in NEWCOMERS),
-        written(OVERALL, overall.by_event),
-        share(overall_share),
-        share_ends(overall_share),
-        written(TTFD, ttfd.by_event),
-        written(FIRST_SIGHTING, first.by_scene),
-        written(OVERALL, overall.by_scene),
-        written(TTFD, ttfd.by_scene),
-        _deviation(plays, FIRST_SIGHTING, policy, budget),
-        _deviation(plays, OVERALL, policy, budget),
-        str(len(plays.tallies(policy, budget))),
-    )
-    said = PUBLISHED_LEVELS.get((policy, budget)) if plays.setting.as_in_paper else None
-    if said is None:
-        return [line]
-    return [line, ("", PAPER, *level_of_paper(said), *("" for _ in _DETAILS))]
 
+    def of_full(ratio: Ratio, of_paper: float | None) -> list[tuple[str, str, str]]:
+        # The paper gives its shares without an interval.
+        found = plays.share_of_full(ratio, policy, budget)
+        columns = [
+            ("of full %", share(found), rounded(of_paper)),
+            ("interval", share_ends(found), ""),
+        ]
+        return columns if plays.full else []
 
-def _of_kind(plays: SettingPlays, kind: str, policy: str, budget: float) -> str:
-    if not plays.newcomers:
-        return ""
-    return written(FIRST_SIGHTING, plays.level(FIRST_SIGHTING, policy, budget, kind).by_event)
+    kinds = {kind: plays.level(FIRST_SIGHTING, policy, budget, kind) for kind in plays.newcomers}
+    return [
+        ("budget", percent(budget), ""),
+        ("policy", plays.marked(policy), ""),
+        (
+            "first sightings %",
+            written(FIRST_SIGHTING, first.by_event),
+            written(FIRST_SIGHTING, paper.first),
+        ),
+        *of_full(FIRST_SIGHTING, paper.first_of_full),
+        *((f"{kind} %", written(FIRST_SIGHTING, own.by_event), "") for kind, own in kinds.items()),
+        ("overall %", written(OVERALL, overall.by_event), written(OVERALL, paper.overall)),
+        *of_full(OVERALL, paper.overall_of_full),
+        ("TTFD", written(TTFD, ttfd.by_event), written(TTFD, paper.ttfd)),
+        ("equal scenes: first sightings %", written(FIRST_SIGHTING, first.by_scene), ""),
+        ("equal scenes: overall %", written(OVERALL, overall.by_scene), ""),
+        ("equal scenes: TTFD", written(TTFD, ttfd.by_scene), ""),
+        ("seeds: first sightings ±", _deviation(plays, FIRST_SIGHTING, policy, budget), ""),
+        ("seeds: overall ±", _deviation(plays, OVERALL, policy, budget), ""),
+        ("scenes", str(len(plays.tallies(policy, budget))), ""),
+    ]
 
 
 def _deviation(plays: SettingPlays, ratio: Ratio, policy: str, budget: float) -> str:

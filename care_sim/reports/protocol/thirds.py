@@ -1,10 +1,13 @@
 """What CARE gains over all-camera in scenes of little and of much traffic (paper, Sec. 5.2)."""
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from care_sim.evaluation.scene_contrasts import Ratio, Tallies, among, contrast_gap
-from care_sim.reports.protocol.differences import HEADINGS, MeasuredDifference, difference_between
+import numpy as np
+
+from care_sim.evaluation.scene_contrasts import Ratio, among, contrast_gap
+from care_sim.evaluation.strata import thirds
+from care_sim.reports.engine.contrasts import Contrast, contrast, of_interval
+from care_sim.reports.engine.measures import HEADINGS, Recall
 from care_sim.reports.protocol.rows import SettingPlays
 from care_sim.study.run_config import REFERENCE
 
@@ -38,30 +41,31 @@ class SceneThird:
         """The third."""
         return self.which if self.which == DENSE_LESS_SPARSE else f"{self.which} third"
 
-    def measured(self, plays: SettingPlays, budget: float) -> MeasuredDifference | None:
+    def measured(self, plays: SettingPlays, budget: float) -> Contrast | None:
         """None with fewer than three scenes per third."""
-        groups = plays.thirds(self.ranked_by, budget)
+        groups = thirds(means(plays, self.ranked_by, budget))
         if sum(map(len, groups.values())) < FEWEST_SCENES:
             return None
         ours, theirs = (plays.tallies(policy, budget) for policy in self.policies)
+        measure = Recall(self.ratio)
         # The thirds are those of CARE at this budget for both policies, so that each scene is
         # compared with itself.
         if self.which != DENSE_LESS_SPARSE:
-            return difference_between(self.ratio, among(ours, groups[self.which]), theirs)
-        return _dense_less_sparse(self.ratio, ours, theirs, groups)
+            return contrast(measure, among(ours, groups[self.which]), theirs)
+        dense, sparse = groups["dense"], groups["sparse"]
+        gap = contrast_gap(self.ratio, ours, theirs, dense, sparse)
+        parts = [contrast(measure, among(ours, some), theirs) for some in (dense, sparse)]
+        # Where one of the thirds has too few scenes for an interval of its own, that of the gap
+        # says nothing.
+        fewest = min(part.difference.pairs if part else 0 for part in parts)
+        return of_interval(measure, gap, fewest) if gap else None
 
 
-def _dense_less_sparse(
-    ratio: Ratio, ours: Tallies, theirs: Tallies, groups: Mapping[str, Sequence[str]]
-) -> MeasuredDifference | None:
-    interval = contrast_gap(ratio, ours, theirs, groups["dense"], groups["sparse"])
-    if interval is None:
-        return None
-    # The two thirds are measured only to ask whether each has scenes enough for an interval of its
-    # own. Where one has not, that of the gap says nothing.
-    thirds = [
-        difference_between(ratio, among(ours, groups[which]), theirs)
-        for which in ("dense", "sparse")
-    ]
-    enough = all(third and third.interval for third in thirds)
-    return MeasuredDifference(ratio, interval.mean, interval if enough else None)
+def means(plays: SettingPlays, column: str, budget: float) -> dict[str, float]:
+    """What CARE held in every scene (`tracks`, `explained`), averaged over floor seeds."""
+    values: dict[str, list[float]] = {scene: [] for scene in plays.tallies(REFERENCE, budget)}
+    for row in plays.rows(REFERENCE, budget):
+        # A scene that not all floor seeds have played is in no tally, and is left out here too.
+        if row["scene"] in values:
+            values[row["scene"]].append(row[column])
+    return {scene: float(np.mean(seeds)) for scene, seeds in values.items()}

@@ -2,15 +2,13 @@
 ones.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import NamedTuple
 
 from care_sim.evaluation.censoring import FEWEST_PAIRS
-from care_sim.reports.contrasts import Contrast
-from care_sim.reports.formatting import ShownDifference
-from care_sim.reports.protocol.differences import MeasuredDifference
+from care_sim.reports.engine.contrasts import Contrast
 from care_sim.study.designs.realism import IDEAL, Pair
 
 
@@ -19,36 +17,26 @@ class Standing(NamedTuple):
     the difference excludes zero, else 0, and None of fewer pairs than carry a claim.
     """
 
-    difference: ShownDifference
+    difference: Contrast
     sign: int | None
 
-
-def of_episodes(contrast: Contrast | None) -> Standing | None:
-    """From a difference of the closed loop."""
-    if contrast is None:
-        return None
-    sign = contrast.excludes_zero * (1 if contrast.mean > 0 else -1)
-    return Standing(contrast, sign if contrast.difference.pairs >= FEWEST_PAIRS else None)
-
-
-def of_plays(difference: MeasuredDifference | None) -> Standing | None:
-    """From a difference of the open loop."""
-    if difference is None:
-        return None
-    return Standing(difference, None if difference.interval is None else difference.sign)
+    @classmethod
+    def of(cls, contrast: Contrast) -> "Standing":
+        """From a contrast of the two."""
+        enough = contrast.difference.pairs >= FEWEST_PAIRS
+        return cls(contrast, contrast.sign if enough else None)
 
 
 class Verdict(StrEnum):
-    """What a condition makes of an order."""
+    """What a condition makes of an order: a lead that holds, is lost or flips; a tie that stays
+    tied, or from which a lead arises.
+    """
 
     HOLDS = "holds"
-    LOST = "lost"
     FLIPS = "flips"
-    TIED = "tied"
+    LOST = "lost"
     ARISES = "arises"
-
-
-CHANGED = (Verdict.FLIPS, Verdict.LOST, Verdict.ARISES)
+    TIED = "tied"
 
 
 @dataclass(frozen=True)
@@ -78,20 +66,3 @@ class Order:
         if not here:
             return Verdict.LOST
         return Verdict.HOLDS if here == before else Verdict.FLIPS
-
-
-class Change(NamedTuple):
-    """An order that is another under a condition."""
-
-    order: Order
-    condition: str
-    verdict: Verdict
-
-
-def changes(orders: Sequence[Order]) -> Iterator[Change]:
-    """Those that flip, those that are lost, then leads where there was a tie."""
-    for verdict in CHANGED:
-        for order in orders:
-            for condition in order.standings:
-                if order.verdict(condition) is verdict:
-                    yield Change(order, condition, verdict)

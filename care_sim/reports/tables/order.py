@@ -1,69 +1,52 @@
-"""What the order of cells inside a set does to the paper's closed-loop study: its statements and
-first detections, order by order.
+"""What the order of cells inside a set does: the paper's statements and the levels of all policies,
+order by order, in either loop.
 """
 
 from collections.abc import Iterator, Sequence
 
 from care_sim.base.errors import counted, percent
-from care_sim.reports.cells import Cell, summarise
-from care_sim.reports.contrasts import DETECTION, Contrast, contrast
-from care_sim.reports.formatting import interval, marked, median, tag_notes
-from care_sim.reports.order_tables import Shown, other_orders, played_once, tables_by_order
+from care_sim.reports.engine.frames import Frame
+from care_sim.reports.engine.levels import Cell, level_of
+from care_sim.reports.engine.varied import Varied
+from care_sim.reports.formatting import interval
 from care_sim.reports.order_verdicts import Verdict, Verdicts, on_mirrored_order, verdict_tables
+from care_sim.reports.protocol.formatting import claim_in_short, verdict
+from care_sim.reports.protocol.paper import claims_about
+from care_sim.reports.protocol.rows import SettingPlays, plays_by_setting
 from care_sim.reports.table import Table
 from care_sim.reports.tables.paper_statements import statements
 from care_sim.study.designs.order import BASE_ORDER, rows_by_order, without_order
-from care_sim.study.designs.paper import PAPER_EPISODES
-from care_sim.study.rows.reading import Key, grouped
-from care_sim.study.run_config import Row
-
-_DETECTION = Shown("First detection", "median, m", "m")
+from care_sim.study.rows.reading import Key
+from care_sim.study.run_config import FULL, Row
 
 
 class OrderCells:
-    """The cells of the study by order. Cells of one key differ in nothing but the order."""
+    """The rows of the study by order; what the figure reads of episodes."""
 
     def __init__(self, rows: Sequence[Row]):
-        played = rows_by_order(rows)
-        self.orders = tuple(played)
-        self.once = without_order(rows)
-        self.episodes = max(map(len, grouped(rows).values()))
-        self._groups = {order: grouped(own) for order, own in played.items()}
-        self._cells = {
-            order: {cell.key: cell for cell in summarise(own)} for order, own in played.items()
-        }
-        self.tags = {
-            cell.policy: cell.tags for cells in self._cells.values() for cell in cells.values()
-        }
-
-    @property
-    def keys(self) -> list[Key]:
-        """Of all cells, settings together and by budget."""
-        return list(dict.fromkeys(key for cells in self._cells.values() for key in cells))
+        self.frames = {order: Frame(own) for order, own in rows_by_order(rows).items()}
+        self.orders = tuple(self.frames)
+        self.tags = {p: frame.tags[p] for frame in self.frames.values() for _, p, _ in frame.groups}
 
     def cell(self, order: str, key: Key) -> Cell | None:
         """What was measured; None where it was not played."""
-        return self._cells[order].get(key)
-
-    def change(self, order: str, key: Key) -> Contrast | None:
-        """First detection under an order less that under the usual one, seed by seed."""
-        usual = self._groups.get(BASE_ORDER, {})
-        return contrast(DETECTION, self._groups[order].get(key), usual.get(key))
+        return level_of(self.frames[order], key)
 
 
 def order_tables(rows: Sequence[Row]) -> list[Table]:
-    """The paper's statements by order, then first detections and their differences to the usual
-    order.
-    """
+    """The paper's statements by order, then levels and their differences to the usual order."""
     study = OrderCells(rows)
-    title = "The paper's statements by order of cells"
-    played = f"Of each cell {counted(study.episodes, 'episode')}; the paper has {PAPER_EPISODES}."
-    notes = (*played_once(study.once), *tag_notes(study.tags.values()))
+    if set(study.tags) <= {FULL}:
+        return []
+    rows_of_cell = max(len(own) for each in study.frames.values() for own in each.groups.values())
+    played = f"Each cell has at most {counted(rows_of_cell, 'row')}."
+    once = without_order(rows)
+    notes = [f"Feel no order, played once: {', '.join(once)}."] if once else []
+    varied = Varied("order of cells", study.frames, notes)
     return [
-        *verdict_tables(title, verdicts(rows), played),
-        *tables_by_order(
-            _DETECTION, study.orders, _levels(study), _changes(study), notes, terminal=False
-        ),
+        *verdict_tables("The paper's statements by order of cells", verdicts(rows), played),
+        varied.levels(),
+        varied.minus_usual(BASE_ORDER, unfelt=once),
     ]
 
 
@@ -73,36 +56,26 @@ def order_closing(rows: Sequence[Row]) -> list[str]:
 
 
 def verdicts(rows: Sequence[Row]) -> Verdicts:
-    """Every statement of the paper under every order that was played."""
+    """Every statement of the paper on what was played, under every order."""
+    by_order = rows_by_order(rows)
+    if "source" in rows[0]:
+        return {order: dict(_judged(plays_by_setting(own)[0])) for order, own in by_order.items()}
     return {
-        order: {
-            statement.text: Verdict(statement.verdict, statement.measured)
-            for statement in statements(played)
-        }
-        for order, played in rows_by_order(rows).items()
+        order: {each.text: Verdict(each.verdict, each.measured) for each in statements(own)}
+        for order, own in by_order.items()
     }
 
 
-def _levels(study: OrderCells) -> Iterator[tuple[str, ...]]:
-    for key, names in _named(study, study.keys):
-        cells = [study.cell(order, key) for order in study.orders] if key else []
-        yield (*names, *(median(cell.detection) if cell else "" for cell in cells))
-
-
-def _changes(study: OrderCells) -> Iterator[tuple[str, ...]]:
-    others = other_orders(study.orders)
-    ordered = [key for key in study.keys if key[1] not in study.once]
-    for key, names in _named(study, ordered):
-        changes = [study.change(order, key) for order in others] if key else []
-        yield (*names, *map(interval, changes))
-
-
-def _named(study: OrderCells, keys: Sequence[Key]) -> Iterator[tuple[Key | None, tuple[str, ...]]]:
-    """The keys with policy and budget; before those of a setting, its label as a heading."""
-    heading = ""
-    for key in keys:
-        setting, policy, budget = key
-        if setting.label != heading:
-            heading = setting.label
-            yield None, (heading,)
-        yield key, (marked(policy, study.tags[policy]), percent(budget))
+def _judged(plays: SettingPlays) -> Iterator[tuple[str, Verdict]]:
+    for each, claims in claims_about(plays.setting).items():
+        if not set(each.policies) <= set(plays.policies):
+            continue
+        for budget in plays.budgets:
+            claim = claims.at(budget)
+            found = each.measured(plays, budget) if claim else None
+            if claim and found:
+                text = f"{each.label}, {each.heading.lower()}, {percent(budget)}"
+                yield (
+                    f"{text} (paper: {claim_in_short(claim)})",
+                    Verdict(verdict(found, claim.sign), interval(found)),
+                )

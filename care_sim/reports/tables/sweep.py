@@ -3,31 +3,24 @@ policies have over each, and what each has over the best control.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from care_sim.base.errors import percent
 from care_sim.evaluation.censoring import Quartiles
-from care_sim.reports.cells import Cell, summarise
-from care_sim.reports.contrasts import (
-    AVOIDED,
-    BRAKED,
-    DETECTED,
-    DETECTION,
-    Contrast,
-    Measure,
-    contrast,
-    preventable,
-)
-from care_sim.reports.formatting import ends, interval, marked, spread, tag_notes, unsigned
+from care_sim.reports.engine.frames import Frame
+from care_sim.reports.engine.levels import Cell, level_of
+from care_sim.reports.engine.measures import AVOIDED, BRAKED, DETECTED, DETECTION, Measure
+from care_sim.reports.engine.parts import Part
+from care_sim.reports.engine.tables import control_tables, minus_table
+from care_sim.reports.formatting import ends, marked, spread, unsigned
 from care_sim.reports.table import Table
-from care_sim.reports.tables.controls import control_tables
 from care_sim.study.designs.paper import (
     PAPER_EPISODES,
     PublishedResult,
     paper_cells,
     published_result,
 )
-from care_sim.study.rows.reading import Groups, Key, full_of, grouped
-from care_sim.study.rows.settings import Setting
+from care_sim.study.rows.reading import is_avoided
 from care_sim.study.run_config import FULL, REFERENCE, Row
 
 SWEEP_COLUMNS = (
@@ -51,128 +44,99 @@ _WHOLE = tuple(column for column in SWEEP_COLUMNS if column not in ("policy", "p
 
 def sweep_tables(rows: Sequence[Row]) -> list[Table]:
     """Levels and contrasts, one setting after the other."""
-    cells = summarise(rows)
-    groups = grouped(rows)
     tables = []
-    for setting in dict.fromkeys(cell.setting for cell in cells):
-        own = [cell for cell in cells if cell.setting == setting]
+    for part in _parts(rows):
+        cells = _cells(part)
+        # A map that serves as a control is held against the others in the table of controls.
+        learned = [
+            p for p, tags in part.tags.items() if "learned" in tags and "control" not in tags
+        ]
+        named = [policy for policy in (REFERENCE, *learned) if policy in part.tags]
         tables += [
-            levels_table(setting, own, groups),
-            *sweep_contrast_tables(setting, own, groups),
-            *control_tables(setting, own, groups),
+            _levels_table(part, cells),
+            *(table for policy in named for table in _minus(part, policy, cells)),
+            *_over_controls(part),
         ]
     return tables
 
 
 def sweep_minus(rows: Sequence[Row], policy: str) -> list[Table]:
     """One policy, named with its parameters, less every other, in every setting that has it."""
-    cells = summarise(rows)
-    groups = grouped(rows)
-    tables = []
-    for setting in dict.fromkeys(cell.setting for cell in cells if cell.policy == policy):
-        own = [cell for cell in cells if cell.setting == setting]
-        tags = _tags(setting, own, groups)
-        if len(tags) > 1:
-            tables.append(_contrast_table(setting, policy, own, groups, tags))
-    return tables
+    own = [part for part in _parts(rows) if policy in part.tags]
+    return [table for part in own for table in _minus(part, policy, _cells(part))]
 
 
-def levels_table(setting: Setting, cells: Sequence[Cell], groups: Groups) -> Table:
-    """Medians, counts and regret, one row per cell."""
-    published = [_published(cell) for cell in cells]
-    sentences = dict.fromkeys(f'Paper: "{result.sentence}"' for result in published if result)
-    lines = (_line(cell, result) for cell, result in zip(cells, published, strict=True))
-    missing = [] if full_of(groups, setting) else ["Regret: full not run."]
-    notes = [*tag_notes(cell.tags for cell in cells), *missing, *_nobody_notes(setting, cells)]
-    # A terminal has no room for columns of zeros.
-    counted = {"never": [cell.never for cell in cells], "collisions": [c.collisions for c in cells]}
-    hidden = (*_FILES_ONLY, *(column for column, counts in counted.items() if not any(counts)))
-    return Table(
-        setting.label,
-        SWEEP_COLUMNS,
-        tuple(lines),
-        tuple(notes),
-        tuple(sentences),
-        hidden,
-        _WHOLE,
+def _parts(rows: Sequence[Row]) -> list[Part]:
+    frame = Frame(rows)
+    return [Part(frame, setting) for setting in dict.fromkeys(key[0] for key in frame.groups)]
+
+
+def _cells(part: Part) -> list[Cell]:
+    """The cells of the setting by budget; its full scan comes last."""
+    keys = sorted(
+        (key for key in part.frame.groups if key[0] == part.setting), key=lambda key: key[2]
     )
+    return [cell for key in keys if (cell := level_of(part.frame, key))]
 
 
-def sweep_contrast_tables(setting: Setting, cells: Sequence[Cell], groups: Groups) -> list[Table]:
-    """CARE minus every other policy, then the same of every learned one; none for a policy that ran
-    alone.
-    """
-    tags = _tags(setting, cells, groups)
-    # A map that serves as a control is held against the others in the table of controls.
-    learned = [name for name in tags if "learned" in tags[name] and "control" not in tags[name]]
-    named = [policy for policy in (REFERENCE, *learned) if policy in tags and len(tags) > 1]
-    return [_contrast_table(setting, policy, cells, groups, tags) for policy in named]
+def _minus(part: Part, base: str, cells: Sequence[Cell]) -> list[Table]:
+    """The base minus every other policy and the full scan; none of a policy that ran alone."""
+    played = dict.fromkeys([*(cell.policy for cell in cells), *([FULL] if part.full else [])])
+    others = [policy for policy in played if policy != base]
+    return [minus_table(part, base, others, _measures(part, cells))] if others else []
 
 
-def _tags(setting: Setting, cells: Sequence[Cell], groups: Groups) -> dict[str, tuple[str, ...]]:
-    """The policies of a setting with their tags, and the full scan."""
-    # The full scan of the same worlds may stand in another setting, of which it feels the same.
-    full: dict[str, tuple[str, ...]] = {FULL: ()} if full_of(groups, setting) else {}
-    return {cell.policy: cell.tags for cell in cells} | full
-
-
-def _contrast_table(
-    setting: Setting,
-    reference: str,
-    cells: Sequence[Cell],
-    groups: Groups,
-    tags: dict[str, tuple[str, ...]],
-) -> Table:
-    """The reference minus the others: policies by budgets, one block per measure."""
-    # The budgets of the reference: at others there is nothing to compare with.
-    budgets = sorted({cell.budget for cell in cells if cell.policy == reference})
-    lines: list[tuple[str, ...]] = []
-    for measure in _measures(cells):
-        lines.append((f"{_name(measure, setting, groups)}, {measure.unit}",))
-        for policy in (policy for policy in tags if policy != reference):
-            pairs = [
-                ((setting, reference, budget), (setting, policy, budget)) for budget in budgets
-            ]
-            lines.append(
-                (
-                    marked(policy, tags[policy]),
-                    *(interval(_ahead(measure, *pair, groups)) for pair in pairs),
-                )
-            )
-    columns = (f"{reference} minus", *map(percent, budgets))
-    title = f"{setting.label}: {reference} minus each policy"
-    return Table(
-        title, columns, tuple(lines), tag_notes(cell.tags for cell in cells), whole=columns[:1]
-    )
-
-
-def _measures(cells: Sequence[Cell]) -> list[Measure]:
+def _measures(part: Part, cells: Sequence[Cell]) -> list[Measure]:
     """What is compared: detections and collisions where any policy has some."""
     further = (
         (DETECTED, any(cell.never for cell in cells)),
-        (AVOIDED, any(cell.collisions for cell in cells)),
+        (_preventable(part), any(cell.collisions for cell in cells)),
     )
     return [DETECTION, BRAKED, *(measure for measure, differs in further if differs)]
 
 
-def _name(measure: Measure, setting: Setting, groups: Groups) -> str:
-    """The name of a measure; that of collisions tells whether it counts the preventable alone."""
-    if measure is AVOIDED and full_of(groups, setting):
-        return f"Preventable {measure.name.lower()}"
-    return measure.name
+def _preventable(part: Part) -> Measure:
+    """Collisions avoided, on the seeds on which the full scan has none, if it was played."""
+    if not part.full:
+        return AVOIDED
+    spared = {row["seed"] for row in part.full if is_avoided(row)}
+    return replace(
+        AVOIDED,
+        name="Preventable collisions avoided",
+        read=lambda row: AVOIDED.read(row) if row["seed"] in spared else None,
+    )
 
 
-def _ahead(measure: Measure, ours: Key, theirs: Key, groups: Groups) -> Contrast | None:
-    """What a policy has over another at the same budget, or over the full scan; of collisions, on
-    the seeds on which the full scan has none, if it was played.
+def _over_controls(part: Part) -> list[Table]:
+    """First detection of every other policy and of the full scan less that of the best control;
+    none without a control or another policy.
     """
-    setting, policy, _ = theirs
-    full = full_of(groups, setting)
-    # The full scan has one budget, and is held against every budget of the others.
-    rows = groups.get(ours, ()), full or () if policy == FULL else groups.get(theirs, ())
-    if measure is AVOIDED and full:
-        rows = preventable(full, rows[0]), preventable(full, rows[1])
-    return contrast(measure, *rows)
+    rivals = [policy for policy in part.policies if policy not in part.controls]
+    others = [*rivals, *([FULL] if part.full else [])]
+    if not part.controls or not others:
+        return []
+    return control_tables(part, [part.over_control(DETECTION, others)])
+
+
+def _levels_table(part: Part, cells: Sequence[Cell]) -> Table:
+    """Medians, counts and regret, one row per cell."""
+    published = [_published(cell) for cell in cells]
+    sentences = dict.fromkeys(f'Paper: "{result.sentence}"' for result in published if result)
+    lines = (_line(cell, result) for cell, result in zip(cells, published, strict=True))
+    missing = [] if part.full else ["Regret: full not run."]
+    told = " ".join([*missing, *_nobody_notes(cells)])
+    # A terminal has no room for columns of zeros.
+    counted = {"never": [cell.never for cell in cells], "collisions": [c.collisions for c in cells]}
+    hidden = (*_FILES_ONLY, *(column for column, counts in counted.items() if not any(counts)))
+    return Table(
+        part.setting.label,
+        SWEEP_COLUMNS,
+        tuple(lines),
+        (*part.notes, *([told] if told else [])),
+        tuple(sentences),
+        hidden,
+        _WHOLE,
+    )
 
 
 def _published(cell: Cell) -> PublishedResult | None:
@@ -210,17 +174,15 @@ def _paper(result: PublishedResult) -> str:
     return f"{result.detection_m:g}{braked}"
 
 
-def _nobody_notes(setting: Setting, cells: Sequence[Cell]) -> list[str]:
+def _nobody_notes(cells: Sequence[Cell]) -> list[str]:
     """How many episodes first detections leave out, where there are any."""
     left_out = sorted({(cell.episodes - cell.met, cell.episodes) for cell in cells})
     named = [f"{count} of {all_of}" for count, all_of in left_out if count]
     if not named:
         return []
-    # Rows of other worlds lack the actor for reasons of their own.
-    why = ", since the drive meets nobody" if setting.world == "drive" else ""
     return [
-        f"{', '.join(named)} episodes have no first-sighting actor{why}: first detection, never "
-        "and regret leave them out."
+        f"{', '.join(named)} episodes have no first-sighting actor: first detection, never and "
+        "regret leave them out."
     ]
 
 

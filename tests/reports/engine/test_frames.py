@@ -1,4 +1,4 @@
-"""Plays by setting: what is compared with what, and what floor seeds become."""
+"""Plays by setting: what is compared with what, and what floor seeds become; marks of policies."""
 
 import numpy as np
 import pytest
@@ -7,6 +7,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.evaluation.recall import Tally
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL
 from care_sim.reports.protocol.rows import plays_by_setting
+from care_sim.reports.protocol.thirds import means
 from care_sim.study.rows.reading import setting_of
 from care_sim.study.rows.settings import Setting
 from tests.helpers.made_plays import FRAMES, found, play, study
@@ -49,7 +50,8 @@ def test_settings_stay_apart_and_policies_carry_their_parameters():
     ]
     plain, cluster = plays_by_setting(rows)
     assert plain.policies == ("care", "care margin=2")
-    assert plain.others == ("care margin=2",)
+    assert plain.other_than("care") == ("care margin=2",)
+    assert plain.other_than("history") == ()
     assert cluster.policies == ("care",)
 
 
@@ -60,10 +62,10 @@ def test_a_full_scan_serves_every_setting_that_it_does_not_feel():
         for more in ({"camera_latency": 1}, {"lidar_dropout": 0.5})
     )
     delayed, dropped = plays_by_setting([full, late, broken])
-    assert delayed.full == (full,)
-    assert dropped.full == ()
+    assert delayed.full == [full]
+    assert dropped.full == []
     (alone,) = plays_by_setting([full])
-    assert (alone.policies, alone.full) == ((), (full,))
+    assert (alone.policies, alone.full) == ((), [full])
 
 
 def test_only_full_scans_of_the_scenes_that_were_played_are_borrowed():
@@ -98,8 +100,8 @@ def test_a_scene_that_one_seed_lacks_is_left_out():
 
 def test_a_stratum_is_read_by_its_name():
     (plays,) = plays_by_setting([play("a", "care", [0, 6, 6, 0], [5, 0, 0, 5])])
-    assert list(plays.strata()) == ["range", "azimuth", "class", "entry"]
-    assert plays.strata()["range"] == ["below 20 m", "20 to 35 m", "from 35 m"]
+    assert list(plays.strata) == ["range", "azimuth", "class", "entry"]
+    assert plays.strata["range"] == ["below 20 m", "20 to 35 m", "from 35 m"]
     assert plays.tallies("care", 0.1, "range/below 20 m")["a"] == Tally(2, 2, 0, 2 * FRAMES, 10)
     assert plays.level(FIRST_SIGHTING, "care", 0.1, "range/20 to 35 m").by_event == 0.0
 
@@ -111,17 +113,22 @@ def test_a_scene_without_an_event_has_no_delays():
     assert plays.level(FIRST_SIGHTING, "care", 0.1).by_event is None
 
 
-def test_counts_and_differing_allocations_are_read_from_the_plays():
+def test_counts_are_averaged_over_floor_seeds():
     rows = [play("a", "care", [0], [1], floor_seed=n, tracks=float(n)) for n in range(3)]
-    rows += [
-        play("a", "history", [0], [1], floor_seed=n, differing_keyframes=n, differing_cells=10 * n)
-        for n in (1, 2)
-    ]
-    rows += [play("b", "history", [0], [1], differing_keyframes=None, differing_cells=None)]
     (plays,) = plays_by_setting(rows)
-    assert plays.means("tracks", 0.1) == {"a": 1.0}
-    difference = plays.allocation_difference("history", 0.1)
-    assert (difference.share, difference.cells_where_differing) == (3 / 80, 10.0)
+    assert means(plays, "tracks", 0.1) == {"a": 1.0}
+
+
+def test_policies_that_no_car_can_have_are_marked():
+    both = study({"care": (4, 5), "history-oracle": (4, 5), "random-points": (4, 5)})
+    (plays,) = plays_by_setting(both)
+    marks = ["care", "history-oracle †", "random-points ‡"]
+    assert [plays.marked(policy) for policy in plays.policies] == marks
+    assert plays.notes == (
+        "† knows the truth: no policy of a car. ‡ saw the full scan first: saves no sensing.",
+    )
+    (plain,) = plays_by_setting(study({"care": (4, 5)}))
+    assert plain.notes == ()
 
 
 def test_seeds_that_count_other_events_are_refused():

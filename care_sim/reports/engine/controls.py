@@ -1,0 +1,61 @@
+"""Which policies are the controls that a contender has to beat, and which of them is the best."""
+
+from collections.abc import Iterable, Mapping
+
+from care_sim.base.errors import percent
+from care_sim.reports.engine.measures import Measure, Recall, Units
+from care_sim.reports.formatting import MARKS
+
+BEST_CONTROL = "best control"
+"""What the line begins with that names it at every budget."""
+IN_HINDSIGHT = (
+    f"The {BEST_CONTROL} is chosen anew at each budget, by the very results that are compared. "
+    "Such a choice in hindsight favours the control, which is the strict reading."
+)
+
+RULE = (
+    f"The {BEST_CONTROL} is that with the highest mean of the measure at the budget, over the "
+    f"seeds or scenes that all controls have there. {IN_HINDSIGHT}"
+)
+
+
+def candidates(controls: Iterable[str]) -> str:
+    """Among which controls the best one is chosen, in a sentence."""
+    return f"Candidates: {', '.join(controls)}."
+
+
+def named_by_budget(controls: Mapping[float, str]) -> str:
+    """The best control of each budget, in words: each control once, with its budgets."""
+    if len({*controls.values()}) == 1:
+        return f"{next(iter(controls.values()))} at every budget"
+    budgets: dict[str, list[str]] = {}
+    for budget, control in controls.items():
+        budgets.setdefault(control, []).append(percent(budget))
+    return " and ".join(f"{control} at {', '.join(own)}" for control, own in budgets.items())
+
+
+def is_control(tags: tuple[str, ...]) -> bool:
+    """Whether a policy with these tags is a control that a car can have."""
+    # What looks the episode up, or knows the truth, is a warning or a bound, and nothing to beat.
+    return "control" in tags and not {*tags} & {*MARKS}
+
+
+def best_control(levels: Mapping[str, float | None]) -> str | None:
+    """The control of the highest level, of equal ones the first; None where no level is known."""
+    known = {policy: level for policy, level in levels.items() if level is not None}
+    return max(known, key=lambda policy: known[policy], default=None)
+
+
+def best_of(measure: Measure | Recall, found: Mapping[str, Units]) -> str | None:
+    """The control with the highest mean, given what was measured of each, over the units that all
+    of them have; None without one.
+    """
+    played = {policy: units for policy, units in found.items() if units}
+    # A control that lacks a hard seed or scene would win by that.
+    shared = set.intersection(*map(set, played.values())) if played else set()
+    return best_control(
+        {
+            policy: measure.mean({unit: units[unit] for unit in units if unit in shared})
+            for policy, units in played.items()
+        }
+    )

@@ -1,0 +1,111 @@
+"""The cells of one setting, and what its policies have over each other and over the controls."""
+
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+from care_sim.evaluation.scene_contrasts import Ratio
+from care_sim.reports.engine.contrasts import Contrast
+from care_sim.reports.engine.controls import best_of, is_control
+from care_sim.reports.engine.frames import Frame
+from care_sim.reports.engine.measures import Measure, Recall, Units
+from care_sim.reports.formatting import marked, tag_notes
+from care_sim.study.rows.reading import Key
+from care_sim.study.rows.settings import Setting
+from care_sim.study.run_config import FULL, Row
+
+
+class OverControl(NamedTuple):
+    """A measure of policies less that of the best control.
+
+    `controls` holds the best control of every budget, `differences` those of every policy there;
+    None where there is none.
+    """
+
+    measure: Measure | Recall
+    controls: list[str | None]
+    differences: dict[str, list[Contrast | None]]
+
+    @property
+    def ratio(self) -> Ratio:
+        """That of a measure of the open loop."""
+        assert isinstance(self.measure, Recall)
+        return self.measure.ratio
+
+
+class Part:
+    """The cells of one setting. Policies are named with their parameters; `tags` and `budgets` are
+    those of all but the full scan, which has one budget and is kept aside as the ceiling.
+    """
+
+    def __init__(self, frame: Frame, setting: Setting):
+        self.frame = frame
+        self.setting = setting
+        own = [key for key in frame.groups if key[0] == setting and key[1] != FULL]
+        self.tags = {policy: frame.tags[policy] for _, policy, _ in own}
+        self.budgets = sorted({budget for _, _, budget in own})
+
+    @property
+    def policies(self) -> tuple[str, ...]:
+        """All but the full scan, in the order of their first rows."""
+        return tuple(self.tags)
+
+    @property
+    def full(self) -> Sequence[Row]:
+        """The full scans of the same worlds."""
+        return self.rows(FULL, 1.0)
+
+    @property
+    def controls(self) -> list[str]:
+        """The controls that a car can have."""
+        return [policy for policy, tags in self.tags.items() if is_control(tags)]
+
+    def key(self, policy: str, budget: float) -> Key:
+        """A cell of the setting."""
+        return self.setting, policy, budget
+
+    def rows(self, policy: str, budget: float) -> Sequence[Row]:
+        """The rows of a cell; the full scan has one budget."""
+        return self.frame.of(self.key(policy, budget))
+
+    def units(self, measure: Measure | Recall, policy: str, budget: float) -> Units:
+        """What was measured in a cell, by seed or by scene."""
+        return self.frame.units(measure, self.key(policy, budget))
+
+    def contrast(
+        self, measure: Measure | Recall, ours: str, theirs: str, budget: float
+    ) -> Contrast | None:
+        """One policy minus another at a budget; None without a shared unit."""
+        pair = (self.key(policy, budget) for policy in (ours, theirs))
+        return self.frame.contrast(measure, *pair)
+
+    def best_control(self, measure: Measure | Recall, budget: float) -> str | None:
+        """The best control of a measure at a budget; None without one."""
+        return best_of(
+            measure, {policy: self.units(measure, policy, budget) for policy in self.controls}
+        )
+
+    def over_control(self, measure: Measure | Recall, policies: Iterable[str]) -> OverControl:
+        """The policies less the best control at every budget."""
+        best = [self.best_control(measure, budget) for budget in self.budgets]
+        against = list(zip(self.budgets, best, strict=True))
+        return OverControl(
+            measure,
+            best,
+            {
+                policy: [
+                    self.contrast(measure, policy, control, budget) if control else None
+                    for budget, control in against
+                ]
+                for policy in policies
+            },
+        )
+
+    def marked(self, policy: str) -> str:
+        """A policy's name, with a mark when no car can have it."""
+        return marked(policy, self.tags.get(policy, ()))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the marks of the policies mean, in one line."""
+        told = " ".join(tag_notes(self.tags.values()))
+        return (told,) if told else ()
