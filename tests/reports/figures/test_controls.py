@@ -3,11 +3,15 @@
 import pytest
 
 from care_sim.reports.figures.protocol import protocol_figures
-from care_sim.reports.protocol.controls import RULE, over_controls
+from care_sim.reports.protocol.controls import over_controls
 from care_sim.reports.protocol.rows import plays_by_setting
 from tests.helpers.made_plays import found, play
 from tests.reports.engine.test_controls import PLAYS
 
+NAMED = (
+    "Best control: in first-sighting recall place at 10% and rows at 20%; in overall recall rows at "
+    "every budget."
+)
 UNEQUAL = [
     play(f"{n}", policy, found(20, sighted + n * gain), [5] * 20)
     for n in range(6)
@@ -23,8 +27,8 @@ def test_bars_reach_from_end_to_end_of_the_intervals():
     assert low < mean - 1
     assert high > mean + 1
     first, _ = protocol_figures(UNEQUAL)["controls-streets"].axes
-    (bar,) = (line for line in first.lines if len({*line.get_xdata()}) == 1 < len(line.get_ydata()))
-    assert list(bar.get_ydata()) == pytest.approx([low, high])
+    (bar,) = first.collections
+    assert bar.get_segments()[0][:, 1] == pytest.approx([low, high])
 
 
 def test_the_figure_has_the_control_at_zero_and_a_curve_a_policy():
@@ -38,7 +42,9 @@ def test_the_figure_has_the_control_at_zero_and_a_curve_a_policy():
     }
     (care,) = (line for line in overall.lines if line.get_label() == "care")
     assert list(care.get_ydata()) == pytest.approx([-30.0, -10.0])
-    assert RULE in " ".join(figure.get_supxlabel().split())
+    assert NAMED in " ".join(figure.get_supxlabel().split())
+    others = [line for line in overall.lines if line.get_color() != care.get_color()]
+    assert care.zorder > max(line.zorder for line in others)
 
 
 def test_without_a_control_or_a_measure_there_is_no_figure():
