@@ -3,10 +3,8 @@
 from collections.abc import Collection, Iterable, Iterator
 
 from care_sim.base.errors import counted, percent
-from care_sim.evaluation.censoring import FEWEST_PAIRS
 from care_sim.evaluation.recall import Tally
 from care_sim.evaluation.sightings import ANNOTATED, VISIBLE
-from care_sim.reports.protocol.differences import MeasuredDifference
 from care_sim.reports.protocol.rows import SettingPlays
 from care_sim.study.run_config import FULL, Row
 
@@ -47,15 +45,9 @@ def counts(scenes: Iterable[Row]) -> Tally:
     return sum((Tally(events=row["events"], frames=row["frames"]) for row in scenes), Tally())
 
 
-def on_intervals(differences: Iterable[MeasuredDifference | None]) -> tuple[str, ...]:
-    """A note where one of the differences shown has no interval."""
-    missing = any(each is not None and each.interval is None for each in differences)
-    return (f"No interval: fewer than {FEWEST_PAIRS} scenes.",) if missing else ()
-
-
-def of_full(plays: SettingPlays) -> str:
+def of_full(plays: SettingPlays) -> tuple[str, ...]:
     """A note where there is no share of the full scan's recall."""
-    return "" if plays.full else "Of full: the full scan was not played."
+    return () if plays.full else ("Of full: the full scan was not played.",)
 
 
 def left_out(plays: SettingPlays) -> tuple[str, ...]:

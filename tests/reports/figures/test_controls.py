@@ -9,8 +9,8 @@ from tests.helpers.made_plays import found, play
 from tests.reports.engine.test_controls import PLAYS
 
 NAMED = (
-    "Best control: in first-sighting recall place at 10% and rows at 20%; in overall recall rows at "
-    "every budget."
+    "Best control: in first-sighting recall place at 10% and rows at 20%; in overall recall rows "
+    "at every budget."
 )
 UNEQUAL = [
     play(f"{n}", policy, found(20, sighted + n * gain), [5] * 20)
