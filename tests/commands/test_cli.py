@@ -172,8 +172,6 @@ def test_seeds_of_several_splits_are_no_study(command, capsys, tmp_path, monkeyp
         "run dartout --video",
         "run dartout --record",
         "compare dartout --record",
-        "bench --out",
-        "parity --out",
         "train learned-scorer --out",
         "train learned-sets --out",
         "train detector --out",
@@ -365,7 +363,7 @@ def test_a_condition_has_one_value_or_several(capsys, tmp_path):
     ("arguments", "message"),
     [
         ("run dense --seed abc", "--seed takes INT: invalid literal for int() with base 10: 'abc'"),
-        ("bench --seconds x", "--seconds takes FLOAT: could not convert string to float: 'x'"),
+        ("sweep --budgets x", "--budgets takes [FLOAT [FLOAT ...]]: Could not find valid parse for "),
         ("sweep --seeds 1 a", "--seeds takes [INT [INT ...]]: Could not find valid parse for "),
         ("run dense --seed", "--seed needs a value: INT"),
         ("list walls", "must be one of policies, agents, scenarios, sources, detectors, sensors, "),
@@ -460,8 +458,10 @@ def test_no_picture_when_the_car_never_brakes(capsys, tmp_path):
         (["run", "dense", "--export", "a" * 300], "path must be a path"),
         (["protocol", "--scenes", "9" * 5000], "scenes"),
         (["sweep", "--workers", str(10**30)], "workers"),
-        (["bench", "--seconds", "inf"], "seconds"),
-        (["parity", "--scenes", str(2**70)], "scenes"),
+        (["sweep", "--budgets", "inf"], "budget"),
+        (["run", "dense", "--seed", str(2**70)], "seed"),
+        (["bench", "--seconds", "3"], "`care-sim bench` is `make bench` now"),
+        (["parity"], "`care-sim parity` is `make parity` now"),
     ],
 )
 def test_absurd_input_is_one_line_and_exit_code_2(arguments, named, capsys, tmp_path, monkeypatch):
@@ -626,9 +626,9 @@ def test_the_trace_of_a_fault_in_code_of_ones_own_is_shown_where_it_is_wanted(
         ("PYTHONIOENCODING=ascii {} list policies > /dev/null", 0, ""),
         ("PYTHONIOENCODING=ascii {} view x --x", 2, "care-sim: unrecognized options: --x\n"),
         (
-            "PYTHONIOENCODING=ascii {} bench --seconds 0",
+            "PYTHONIOENCODING=ascii {} certify --workers 0",
             2,
-            "care-sim: seconds must lie in [0.001, 3600], got 0.0\n",
+            "care-sim: workers must be a whole number >= 1 and <= 1024, got 0\n",
         ),
     ],
 )
