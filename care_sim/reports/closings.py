@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from care_sim.base.errors import counted
 from care_sim.reports.findings import leads_of_episodes, leads_of_plays, ties
 from care_sim.reports.protocol.closing import protocol_closing
-from care_sim.reports.tables import order, validate
+from care_sim.reports.tables import ablations, order, validate
 from care_sim.reports.tables.paper_statements import in_short
 from care_sim.study.designs.faults import common_conditions
 from care_sim.study.rows.reading import setting_of, stops_for_nothing
@@ -55,6 +55,16 @@ def validation_closing(rows: Sequence[Row]) -> list[str]:
 def order_closing(rows: Sequence[Row]) -> list[str]:
     """Which statements depend on the order of cells."""
     return [collisions(rows), *order.order_closing(rows)]
+
+
+def open_order_closing(rows: Sequence[Row]) -> list[str]:
+    """Size of the study, and which statements depend on the order of cells."""
+    return [*protocol_closing(rows), *order.order_closing(rows)]
+
+
+def open_ablation_closing(rows: Sequence[Row]) -> list[str]:
+    """Size of the study, and what the full scan finds."""
+    return [*protocol_closing(rows), *ablations.ceiling(rows)]
 
 
 def fault_closing(rows: Sequence[Row]) -> list[str]:

@@ -9,8 +9,14 @@ from care_sim.evaluation.collision_outcomes import CollisionOutcome, collision_o
 from care_sim.reports.engine.contrasts import Contrast, contrast
 from care_sim.reports.engine.controls import best_of, is_control
 from care_sim.reports.engine.measures import AVOIDANCE, Units
-from care_sim.study.rows.reading import policy_of, stops_for_nothing, tags_of_row
+from care_sim.study.rows.reading import is_avoided, policy_of, stops_for_nothing, tags_of_row
 from care_sim.study.run_config import FULL, Row
+
+
+def preventable(full: Sequence[Row], rows: Sequence[Row]) -> list[Row]:
+    """The rows of the seeds on which the full scan avoids the collision."""
+    spared = {row["seed"] for row in full if is_avoided(row)}
+    return [row for row in rows if row["seed"] in spared]
 
 
 class CollisionRows:

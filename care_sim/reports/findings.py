@@ -9,15 +9,10 @@ import numpy as np
 from care_sim.base.errors import counted, percent
 from care_sim.evaluation.censoring import FEWEST_PAIRS
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, among, ratio_level
-from care_sim.reports.contrasts import (
-    AVOIDED,
-    DETECTION,
-    GATE_POINTS,
-    Measure,
-    contrast,
-    preventable,
-)
-from care_sim.reports.controls import BEST_CONTROL, best_control, is_control
+from care_sim.reports.collisions import preventable
+from care_sim.reports.engine.contrasts import contrast_of_rows
+from care_sim.reports.engine.controls import BEST_CONTROL, best_control, is_control
+from care_sim.reports.engine.measures import AVOIDED, DETECTION, GATE_POINTS, Measure
 from care_sim.reports.formatting import MARKS, ShownDifference, emphasised, ends, signed
 from care_sim.reports.protocol.differences import PolicyPair
 from care_sim.reports.protocol.notes import papers
@@ -189,7 +184,7 @@ def _leads_at(
 def _contrast(
     measure: Measure, compared: Mapping[str, Sequence[Row]], ours: str, theirs: str
 ) -> ShownDifference | None:
-    return contrast(measure, compared[ours], compared[theirs])
+    return contrast_of_rows(measure, compared[ours], compared[theirs])
 
 
 def _mean(measure: Measure, rows: Sequence[Row]) -> float | None:

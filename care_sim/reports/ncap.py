@@ -11,8 +11,9 @@ from care_sim.base.checks import check_known
 from care_sim.evaluation.censoring import Reading, difference
 from care_sim.evaluation.collision_outcomes import CollisionOutcome, collision_outcome
 from care_sim.evaluation.ncap_score import score
-from care_sim.reports.contrasts import Contrast, Measure
-from care_sim.reports.controls import best_control, is_control
+from care_sim.reports.engine.contrasts import Contrast
+from care_sim.reports.engine.controls import best_control, is_control
+from care_sim.reports.engine.measures import Measure
 from care_sim.reports.formatting import marked
 from care_sim.scenarios.ncap.forms import Ahead
 from care_sim.scenarios.ncap.table import TESTS

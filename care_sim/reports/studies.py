@@ -49,14 +49,10 @@ from care_sim.reports.findings import (
     leads_tables,
 )
 from care_sim.reports.mechanism.tables import mechanism_closing, mechanism_tables
-from care_sim.reports.protocol import ablations as open_ablations
-from care_sim.reports.protocol import firing as open_firing
-from care_sim.reports.protocol import order as open_order
 from care_sim.reports.protocol.closing import protocol_closing
 from care_sim.reports.protocol.contrasts import protocol_minus
 from care_sim.reports.protocol.tables import protocol_tables
-from care_sim.reports.realism import episodes as realism
-from care_sim.reports.realism import plays as open_realism
+from care_sim.reports.realism.tables import realism_tables
 from care_sim.reports.study import Study
 from care_sim.reports.summary import medians, recalls
 from care_sim.reports.table import Table
@@ -206,9 +202,9 @@ _ALL = (
     Study(
         "realism",
         "Headline orders under realistic conditions, closed loop",
-        realism.realism_tables,
+        realism_tables,
         realism_figures,
-        realism.realism_closing,
+        closings.episodes_closing,
         (REALISM_FIGURE,),
     ),
     Study(
@@ -222,9 +218,9 @@ _ALL = (
     Study(
         "order-open-loop",
         "Order of cells in the open loop",
-        open_order.order_tables,
+        order_tables,
         open_order_figures,
-        open_order.order_closing,
+        closings.open_order_closing,
         (OPEN_ORDER_FIGURE,),
         PLAYS,
         _ORDER_COLUMNS,
@@ -232,7 +228,7 @@ _ALL = (
     Study(
         "firing-open-loop",
         "Hardware in the open loop",
-        open_firing.firing_tables,
+        firing_tables,
         _no_figures,
         protocol_closing,
         (),
@@ -241,18 +237,18 @@ _ALL = (
     Study(
         "realism-open-loop",
         "Headline orders under realistic conditions, open loop",
-        open_realism.realism_tables,
+        realism_tables,
         open_realism_figures,
-        open_realism.realism_closing,
+        protocol_closing,
         (OPEN_REALISM_FIGURE,),
         PLAYS,
     ),
     Study(
         "ablate-open-loop",
         "Ablations of the open loop",
-        open_ablations.ablation_tables,
+        ablation_tables,
         open_ablation_figures,
-        open_ablations.ablation_closing,
+        closings.open_ablation_closing,
         (OPEN_ABLATION_FIGURE,),
         PLAYS,
     ),

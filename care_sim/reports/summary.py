@@ -9,7 +9,7 @@ from rich.console import Console
 from care_sim.base.errors import percent
 from care_sim.evaluation.censoring import quartiles
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING
-from care_sim.reports.controls import BEST_CONTROL, best_control, is_control
+from care_sim.reports.engine.controls import BEST_CONTROL, best_control, is_control
 from care_sim.reports.formatting import median
 from care_sim.reports.protocol.formatting import written
 from care_sim.reports.protocol.rows import HISTORY, plays_by_setting

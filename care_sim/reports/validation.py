@@ -9,8 +9,10 @@ from itertools import combinations
 import numpy as np
 
 from care_sim.evaluation.censoring import FEWEST_PAIRS
-from care_sim.reports.contrasts import AVOIDED, DETECTION, Contrast, contrast, preventable
-from care_sim.reports.controls import BEST_CONTROL, is_control
+from care_sim.reports.collisions import preventable
+from care_sim.reports.engine.contrasts import Contrast, contrast_of_rows
+from care_sim.reports.engine.controls import BEST_CONTROL, is_control
+from care_sim.reports.engine.measures import AVOIDED, DETECTION
 from care_sim.study.designs.validate import CAMERA_POLICIES, is_training
 from care_sim.study.rows.reading import detections, is_avoided, setting_of, tags_of_row
 from care_sim.study.rows.settings import Setting
@@ -87,8 +89,8 @@ class WorldPlays:
     def lead(self, ours: str, theirs: str, budget: float) -> Lead:
         """What one policy has over another at a budget."""
         a, b, full = (self.played(role, budget) for role in (ours, theirs, FULL))
-        avoided = contrast(AVOIDED, preventable(full, a), preventable(full, b))
-        return Lead(contrast(DETECTION, a, b), avoided)
+        avoided = contrast_of_rows(AVOIDED, preventable(full, a), preventable(full, b))
+        return Lead(contrast_of_rows(DETECTION, a, b), avoided)
 
     def answers(self, budget: float) -> tuple[bool, bool, bool]:
         """Whether the best camera policy leads the best control, whether the full scan does, and

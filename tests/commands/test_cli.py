@@ -363,7 +363,10 @@ def test_a_condition_has_one_value_or_several(capsys, tmp_path):
     ("arguments", "message"),
     [
         ("run dense --seed abc", "--seed takes INT: invalid literal for int() with base 10: 'abc'"),
-        ("sweep --budgets x", "--budgets takes [FLOAT [FLOAT ...]]: Could not find valid parse for "),
+        (
+            "sweep --budgets x",
+            "--budgets takes [FLOAT [FLOAT ...]]: Could not find valid ",
+        ),
         ("sweep --seeds 1 a", "--seeds takes [INT [INT ...]]: Could not find valid parse for "),
         ("run dense --seed", "--seed needs a value: INT"),
         ("list walls", "must be one of policies, agents, scenarios, sources, detectors, sensors, "),

@@ -2,7 +2,8 @@ import pytest
 
 from care_sim.evaluation.bootstrap import Interval
 from care_sim.evaluation.censoring import Bound, Difference
-from care_sim.reports.contrasts import BRAKED, DETECTION, Contrast
+from care_sim.reports.engine.contrasts import Contrast
+from care_sim.reports.engine.measures import BRAKED, DETECTION
 from care_sim.reports.formatting import interval, mean
 from care_sim.reports.table import Bold
 

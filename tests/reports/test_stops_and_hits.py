@@ -1,9 +1,12 @@
 """What tables make of a stop for nothing, and of a collision that another body causes."""
 
 from care_sim.evaluation.collision_outcomes import CollisionOutcome
-from care_sim.reports.cells import summarise
 from care_sim.reports.closings import collisions
-from care_sim.reports.contrasts import AVOIDED, contrast, preventable
+from care_sim.reports.collisions import preventable
+from care_sim.reports.engine.contrasts import contrast_of_rows
+from care_sim.reports.engine.frames import Frame
+from care_sim.reports.engine.levels import levels
+from care_sim.reports.engine.measures import AVOIDED
 from care_sim.reports.ncap import impact_of
 from care_sim.reports.tables.r157 import cut_in_rows
 from tests.helpers.made_rows import cut_ins, rows
@@ -13,13 +16,13 @@ STOPPED = {"braked_before_view": True}
 
 
 def test_a_stop_for_nothing_is_no_detection():
-    (cell,) = summarise([*rows("care", [15.0, 16.0]), *rows("care", [14.0], changes=STOPPED)])
+    (cell,) = levels(Frame([*rows("care", [15.0, 16.0]), *rows("care", [14.0], changes=STOPPED)]))
     assert (cell.met, cell.never, cell.braked) == (3, 1, 3)
 
 
 def test_a_stop_for_nothing_avoids_no_collision():
     honest, stopped = rows("care", [15.0]), rows("fan", [15.0], changes=STOPPED)
-    assert contrast(AVOIDED, honest, stopped).mean == 100.0
+    assert contrast_of_rows(AVOIDED, honest, stopped).mean == 100.0
     assert preventable(stopped, honest) == []
     outcomes = cut_in_rows(cut_ins("care", [None] * 4)).outcomes(
         cut_ins("care", [None] * 4, **STOPPED)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from care_sim.reports.controls import BEST_CONTROL
+from care_sim.reports.engine.controls import BEST_CONTROL
 from care_sim.reports.table import Bold
 from care_sim.reports.tables.validate import validation_closing, validation_tables
 from care_sim.reports.validation import BEST_CAMERA, HINDSIGHT, played_worlds

@@ -5,7 +5,8 @@ from itertools import product
 import pytest
 
 from care_sim.evaluation.censoring import Bound
-from care_sim.reports.contrasts import AVOIDED, DETECTION, contrast, contrast_of_cases
+from care_sim.reports.engine.contrasts import contrast_of_rows
+from care_sim.reports.engine.measures import AVOIDED, DETECTION
 from care_sim.reports.figures.faults import VEHICLE_FIGURE, vehicle_figures
 from care_sim.reports.vehicle.rows import outcome
 from care_sim.reports.vehicle.tables import vehicle_tables
@@ -121,12 +122,14 @@ def test_one_case_on_many_seeds_proves_no_more_than_on_one():
     copies = [{"seed": world, "collision": False} for world in product(range(11), SEEDS)]
     hit = [each | {"collision": each["seed"][0] == 4} for each in copies]
     once = [[each for each in side if each["seed"][1] == 0] for side in (copies, hit)]
-    found = contrast_of_cases(AVOIDED, copies, hit)
-    assert found == contrast_of_cases(AVOIDED, *once) == contrast(AVOIDED, *once)
+    found = contrast_of_rows(AVOIDED, copies, hit, by_cases=True)
+    assert (
+        found == contrast_of_rows(AVOIDED, *once, by_cases=True) == contrast_of_rows(AVOIDED, *once)
+    )
     assert found.mean == pytest.approx(100 / 11)
     assert not found.excludes_zero
-    assert contrast(AVOIDED, copies, hit).excludes_zero
-    assert contrast_of_cases(AVOIDED, copies, []) is None
+    assert contrast_of_rows(AVOIDED, copies, hit).excludes_zero
+    assert contrast_of_rows(AVOIDED, copies, [], by_cases=True) is None
 
 
 def test_a_case_with_a_censored_distance_is_censored():
@@ -134,7 +137,7 @@ def test_a_case_with_a_censored_distance_is_censored():
     theirs = [row((case, 0), None, 4.0) for case in range(5)]
     theirs += [row((case, 1), 8.0) for case in range(5)]
     # The seed 2 of a case that only one side has is no pair.
-    found = contrast_of_cases(DETECTION, [*ours, row((0, 2), 99.0)], theirs)
+    found = contrast_of_rows(DETECTION, [*ours, row((0, 2), 99.0)], theirs, by_cases=True)
     assert (found.mean, found.bound, found.difference.pairs) == (4.0, Bound.AT_LEAST, 5)
 
 

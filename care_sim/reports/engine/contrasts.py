@@ -10,6 +10,7 @@ from care_sim.evaluation.bootstrap import Interval
 from care_sim.evaluation.censoring import Bound, Difference, Reading, difference
 from care_sim.evaluation.scene_contrasts import scene_contrast
 from care_sim.reports.engine.measures import Measure, Recall, Units
+from care_sim.study.run_config import Row
 
 OVER_EVENTS = "°"
 """Stands behind a difference whose interval comes from events."""
@@ -109,6 +110,13 @@ def contrast(
         sides = (zip(*own, strict=True) for own in cases.values())
         pairs = [(_mean(first), _mean(second)) for first, second in sides]
     return Contrast(measure, difference(*zip(*pairs, strict=True))) if pairs else None
+
+
+def contrast_of_rows(
+    measure: Measure, ours: Sequence[Row], theirs: Sequence[Row], by_cases: bool = False
+) -> Contrast | None:
+    """The same of rows, by seed."""
+    return contrast(measure, measure.units(ours), measure.units(theirs), by_cases)
 
 
 def _mean(readings: Sequence[Reading]) -> Reading:

@@ -9,7 +9,8 @@ from matplotlib.figure import Figure
 
 from care_sim.base.errors import counted
 from care_sim.evaluation.censoring import Quartiles
-from care_sim.reports.cells import Cell, StudyCells, summarise
+from care_sim.reports.engine.frames import Frame
+from care_sim.reports.engine.levels import Cell, level_of, levels
 from care_sim.reports.figures.curves import FULL_SCAN, Panel, curves_figure
 from care_sim.sensors.setups import DEFAULT_SETUP
 from care_sim.study.designs.firing import AWARE, rows_by_firing
@@ -25,7 +26,7 @@ def sweep_figures(rows: Sequence[Row]) -> dict[str, Figure]:
     that was run without further conditions at several budgets, by name.
     """
     by_scenario: dict[str, list[Cell]] = {}
-    for cell in summarise(rows):
+    for cell in levels(Frame(rows)):
         if not cell.setting.conditions:
             by_scenario.setdefault(cell.setting.world, []).append(cell)
     return {
@@ -89,14 +90,14 @@ def firing_figures(rows: Sequence[Row]) -> dict[str, Figure]:
     budgets = sorted({row["budget"] for row in rows if row["policy"] == AWARE})
     if len(budgets) < 2:
         return {}
-    studies = {firing: StudyCells(own) for firing, own in rows_by_firing(rows).items()}
+    studies = {firing: Frame(own) for firing, own in rows_by_firing(rows).items()}
     settings = [*dict.fromkeys(setting_of(row) for each in studies.values() for row in each.rows)]
     panels = []
     for setting in settings:
-        full = next(iter(studies.values())).cell((setting.for_full(), FULL, 1.0))
+        full = level_of(next(iter(studies.values())), (setting.for_full(), FULL, 1.0))
         found = full.detection.median if full else None
         heights = {
-            firing: [height(study.cell((setting, AWARE, budget))) for budget in budgets]
+            firing: [height(level_of(study, (setting, AWARE, budget))) for budget in budgets]
             for firing, study in studies.items()
         }
         panels.append(

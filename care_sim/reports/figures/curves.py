@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Annotation
 
 from care_sim.base.errors import percent
-from care_sim.reports.controls import is_control
+from care_sim.reports.engine.controls import is_control
 from care_sim.reports.figures.files import texts_as_they_are
 from care_sim.reports.figures.styles import CALM, INK, colours
 from care_sim.reports.formatting import MARKS, marked, tag_notes

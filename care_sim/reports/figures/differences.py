@@ -11,13 +11,13 @@ from matplotlib.patches import Rectangle
 
 from care_sim.base.errors import counted, percent
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL
-from care_sim.reports.cells import StudyCells
-from care_sim.reports.contrasts import GATE_M
+from care_sim.reports.engine.frames import Frame
+from care_sim.reports.engine.measures import DETECTION, GATE_M, Recall
 from care_sim.reports.figures.maps import Map, maps_figure
 from care_sim.reports.figures.styles import INK
 from care_sim.reports.formatting import ShownDifference, mean
-from care_sim.reports.protocol.ablations import AblationPlays
 from care_sim.reports.protocol.paper_ablations import NEAR_FIELD
+from care_sim.reports.tables.ablations import AblationStudy
 from care_sim.reports.tables.crowding import COLLAPSE_M, Crowd
 from care_sim.study.designs.ablations import (
     ABLATION_PLACES,
@@ -75,10 +75,12 @@ _ABLATION_NOTE = "bold: the interval excludes 0; ≤, ≥: a bound, for some are
 
 def ablation_figures(rows: Sequence[Row]) -> dict[str, Figure]:
     """Paired differences of the first detection in metres, one column per scenario and budget."""
-    study = StudyCells(rows)
+    study = Frame(rows)
 
     def differences(ours: Variant, ablation: Ablation) -> list[ShownDifference | None]:
-        return [study.difference(*_keys(ablation, ours, place)) for place in ABLATION_PLACES]
+        return [
+            study.contrast(DETECTION, *_keys(ablation, ours, place)) for place in ABLATION_PLACES
+        ]
 
     seeds = counted(len({row["seed"] for row in rows}), "seed")
     title = f"first detection minus that of the usual level (m), {seeds}"
@@ -90,7 +92,7 @@ def ablation_figures(rows: Sequence[Row]) -> dict[str, Figure]:
 
 def open_ablation_figures(rows: Sequence[Row]) -> dict[str, Figure]:
     """Paired differences of recalls in points, one column per budget and measure."""
-    study = AblationPlays(rows)
+    study = AblationStudy(rows)
     columns = [
         (f"{name}, {percent(budget)}", FilmPlace(study.source, budget), ratio, within)
         for budget in study.budgets
@@ -102,7 +104,7 @@ def open_ablation_figures(rows: Sequence[Row]) -> dict[str, Figure]:
 
     def differences(ours: Variant, ablation: Ablation) -> list[ShownDifference | None]:
         return [
-            study.cells.difference(ratio, *_keys(ablation, ours, place), within)
+            study.frame.contrast(Recall(ratio, within), *_keys(ablation, ours, place))
             for _, place, ratio, within in columns
         ]
 

@@ -10,7 +10,8 @@ from itertools import product
 from matplotlib.figure import Figure
 
 from care_sim.base.errors import counted
-from care_sim.reports.cells import Cell, StudyCells
+from care_sim.reports.engine.frames import Frame
+from care_sim.reports.engine.levels import Cell, level_of
 from care_sim.reports.figures.curves import FULL_SCAN, Panel, curves_figure
 from care_sim.reports.tables.faults import policies_of
 from care_sim.reports.vehicle.rows import VehicleRows, mean_over_forecasts, total
@@ -61,19 +62,20 @@ FAULT_FIGURES = tuple(
 
 def fault_figures(rows: Sequence[Row]) -> dict[str, Figure]:
     """A figure for every place and measure, by name, with a panel for every fault."""
-    study = StudyCells(faults_alone(rows))
+    study = Frame(faults_alone(rows))
     made = [_figure(study, place, measure) for place, measure in product(FAULT_PLACES, MEASURES)]
     return dict(zip(FAULT_FIGURES, made, strict=True))
 
 
-def _figure(study: StudyCells, place: Place, measure: CurveMeasure) -> Figure:
+def _figure(study: Frame, place: Place, measure: CurveMeasure) -> Figure:
     panels = [
         Panel(
             fault.title,
             [level.label for level in fault.levels],
             {
                 FULL_SCAN if policy == FULL else policy: [
-                    measure.value(study.cell(level.key(place, policy))) for level in fault.levels
+                    measure.value(level_of(study, level.key(place, policy)))
+                    for level in fault.levels
                 ]
                 for policy in policies_of(study)
             },

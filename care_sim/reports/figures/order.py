@@ -8,8 +8,9 @@ from care_sim.base.errors import counted, percent
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING
 from care_sim.reports.figures.budget import height
 from care_sim.reports.figures.curves import FULL_SCAN, Panel, Tags, curves_figure
-from care_sim.reports.protocol.order import OrderPlays
+from care_sim.reports.protocol.rows import plays_by_setting
 from care_sim.reports.tables.order import OrderCells
+from care_sim.study.designs.order import rows_by_order
 from care_sim.study.designs.variants import USUAL_VARIANT, Place
 from care_sim.study.run_config import FULL, Row
 
@@ -43,17 +44,21 @@ def order_figures(rows: Sequence[Row]) -> dict[str, Figure]:
 
 def open_order_figures(rows: Sequence[Row]) -> dict[str, Figure]:
     """First-sighting recall in % by order, one panel per budget."""
-    study = OrderPlays(rows)
-    orders = tuple(study.by_order)
+    played = {order: plays_by_setting(own)[0] for order, own in rows_by_order(rows).items()}
+    orders, study = tuple(played), next(iter(played.values()))
     panels = []
     for budget in study.budgets:
         heights = {
-            policy: [study.level(FIRST_SIGHTING, order, policy, budget) for order in orders]
+            policy: [
+                played[order].level(FIRST_SIGHTING, policy, budget).by_event for order in orders
+            ]
             for policy in study.tags
         }
-        heights[FULL] = [study.level(FIRST_SIGHTING, orders[0], FULL, 1.0)]
+        heights[FULL] = [study.level(FIRST_SIGHTING, FULL, 1.0).by_event]
         panels.append(_panel(f"budget {percent(budget)}", orders, heights))
-    title = f"first-sighting recall (%): {study.label}, {counted(study.scenes, 'scene')}"
+    title = (
+        f"first-sighting recall (%): {study.setting.label}, {counted(len(study.scenes), 'scene')}"
+    )
     return _figures(OPEN_ORDER_FIGURE, title, panels, study.tags)
 
 

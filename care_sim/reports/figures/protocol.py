@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from matplotlib.figure import Figure
 
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, Ratio
-from care_sim.reports.controls import BEST_CONTROL
+from care_sim.reports.engine.controls import BEST_CONTROL
 from care_sim.reports.figures.curves import FULL_SCAN, Panel, curves_figure
 from care_sim.reports.protocol.controls import OverControl, named_controls, over_controls
 from care_sim.reports.protocol.paper import published_level

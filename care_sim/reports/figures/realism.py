@@ -9,10 +9,8 @@ from matplotlib.patches import Patch
 
 from care_sim.reports.figures.maps import Map, maps_figure
 from care_sim.reports.formatting import signed
-from care_sim.reports.realism.episodes import RealismEpisodes
 from care_sim.reports.realism.orders import Order, Verdict
-from care_sim.reports.realism.plays import RealismPlays
-from care_sim.reports.realism.tables import RealismStudy
+from care_sim.reports.realism.study import RealismStudy
 from care_sim.study.run_config import Row
 
 REALISM_FIGURE = "realism"
@@ -29,12 +27,12 @@ _COLOURS = {
 
 def realism_figures(rows: Sequence[Row]) -> dict[str, Figure]:
     """The map of the closed loop; none where no order was played."""
-    return _figures(REALISM_FIGURE, RealismEpisodes(rows))
+    return _figures(REALISM_FIGURE, RealismStudy(rows))
 
 
 def open_realism_figures(rows: Sequence[Row]) -> dict[str, Figure]:
     """The map of the open loop; none where no order was played."""
-    return _figures(OPEN_REALISM_FIGURE, RealismPlays(rows))
+    return _figures(OPEN_REALISM_FIGURE, RealismStudy(rows))
 
 
 def _figures(name: str, study: RealismStudy) -> dict[str, Figure]:

@@ -5,8 +5,10 @@ grows.
 from collections.abc import Iterable, Mapping, Sequence
 
 from care_sim.base.errors import percent
-from care_sim.reports.cells import StudyCells
-from care_sim.reports.contrasts import Contrast
+from care_sim.reports.engine.contrasts import Contrast
+from care_sim.reports.engine.frames import Frame
+from care_sim.reports.engine.levels import level_of
+from care_sim.reports.engine.measures import DETECTION
 from care_sim.reports.formatting import interval, mean, median
 from care_sim.reports.table import Table
 from care_sim.study.designs.crowding import CROWDING_POLICIES, VEHICLES_COLUMN
@@ -24,7 +26,7 @@ class Crowd:
     """The rows of a crowding study by standing vehicles and budget."""
 
     def __init__(self, rows: Sequence[Row]):
-        self.study = StudyCells(rows)
+        self.study = Frame(rows)
         self.counts = sorted({row[VEHICLES_COLUMN] for row in rows})
         self.budgets = sorted({row["budget"] for row in rows if row["policy"] != "full"})
         self.others = [
@@ -42,13 +44,13 @@ class Crowd:
         """First detection of another policy minus that of CARE, metres; negative where the other is
         later.
         """
-        return self.study.difference(
-            self.key(vehicles, other, budget), self.key(vehicles, "care", budget)
+        return self.study.contrast(
+            DETECTION, self.key(vehicles, other, budget), self.key(vehicles, "care", budget)
         )
 
     def median(self, vehicles: int, policy: str, budget: float) -> str:
         """A median first detection, as text."""
-        cell = self.study.cell(self.key(vehicles, policy, budget))
+        cell = level_of(self.study, self.key(vehicles, policy, budget))
         return median(cell.detection if cell else None)
 
     def collapsed(self, budget: float) -> list[int]:

@@ -5,8 +5,10 @@ policies changes.
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import pairwise
 
-from care_sim.reports.cells import Cell, StudyCells
-from care_sim.reports.contrasts import Contrast
+from care_sim.reports.engine.contrasts import Contrast
+from care_sim.reports.engine.frames import Frame
+from care_sim.reports.engine.levels import Cell, level_of
+from care_sim.reports.engine.measures import DETECTION
 from care_sim.reports.formatting import interval, median
 from care_sim.reports.table import Bold, Table, TableRow
 from care_sim.study.designs.faults import (
@@ -28,7 +30,7 @@ _MEASURES: Mapping[str, Callable[[Cell], str]] = {
 }
 
 
-def pairs_of(study: StudyCells) -> list[tuple[str, str]]:
+def pairs_of(study: Frame) -> list[tuple[str, str]]:
     """The pairs of policies whose order is followed."""
     return [
         *_PAIRS,
@@ -36,14 +38,14 @@ def pairs_of(study: StudyCells) -> list[tuple[str, str]]:
     ]
 
 
-def policies_of(study: StudyCells) -> list[str]:
+def policies_of(study: Frame) -> list[str]:
     """The policies of the study, then those that joined in."""
     return list(dict.fromkeys([*FAULT_POLICIES, *study.policies]))
 
 
 def fault_tables(rows: Sequence[Row]) -> list[Table]:
     """Where the order changes, then one table per fault with levels and paired differences."""
-    study = StudyCells(faults_alone(rows))
+    study = Frame(faults_alone(rows))
     marks = study.notes(study.policies)
     pairs = pairs_of(study)
     orders: list[TableRow] = []
@@ -68,7 +70,7 @@ def fault_tables(rows: Sequence[Row]) -> list[Table]:
     ]
 
 
-def order(pair: tuple[str, str], fault: Fault, place: Place, study: StudyCells) -> str:
+def order(pair: tuple[str, str], fault: Fault, place: Place, study: Frame) -> str:
     """How two policies stand as the fault grows, bold when that changes.
 
     '>' where the first detects earlier by a difference that counts, '<' where the second does, '='
@@ -90,20 +92,20 @@ def order(pair: tuple[str, str], fault: Fault, place: Place, study: StudyCells) 
 
 
 def _difference(
-    pair: tuple[str, str], level: Variant, place: Place, study: StudyCells
+    pair: tuple[str, str], level: Variant, place: Place, study: Frame
 ) -> Contrast | None:
     ours, theirs = (level.key(place, policy) for policy in pair)
-    return study.difference(ours, theirs)
+    return study.contrast(DETECTION, ours, theirs)
 
 
-def _blocks(fault: Fault, place: Place, study: StudyCells) -> Iterator[TableRow]:
+def _blocks(fault: Fault, place: Place, study: Frame) -> Iterator[TableRow]:
     """A block of policies for each measure, and one of paired differences."""
     policies = policies_of(study)
     # All measures of a place before the next place: they are read together.
     for name, entry in _MEASURES.items():
         yield (f"{place}: {name}",)
         for policy in policies:
-            cells = (study.cell(level.key(place, policy)) for level in fault.levels)
+            cells = (level_of(study, level.key(place, policy)) for level in fault.levels)
             yield (study.marked(policy), *(entry(cell) if cell else "" for cell in cells))
     yield (f"{place}: first detection of care minus, m",)
     for policy in policies:

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from care_sim.base.errors import percent
 from care_sim.evaluation.collision_outcomes import CollisionOutcome
-from care_sim.reports.controls import BEST_CONTROL
+from care_sim.reports.engine.controls import BEST_CONTROL
 from care_sim.reports.formatting import interval, tag_notes
 from care_sim.reports.ncap import READINGS, Line, NcapRows, overall
 from care_sim.reports.table import Table, TableRow

@@ -10,7 +10,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from care_sim.base.errors import counted
-from care_sim.reports.cells import Cell, summarise
+from care_sim.reports.engine.frames import Frame
+from care_sim.reports.engine.levels import Cell, levels
 from care_sim.reports.formatting import median
 from care_sim.reports.table import Bold, Table
 from care_sim.study.designs.paper import (
@@ -48,7 +49,7 @@ class Statement:
 
 def statements(rows: Sequence[Row]) -> list[Statement]:
     """All statements, when the rows cover every cell of the paper's study; else none."""
-    found = {cell.key: cell for cell in summarise(rows)}
+    found = {cell.key: cell for cell in levels(Frame(rows))}
     # A part of the study would agree with a part of the statements, and pass for all of them.
     if not paper_cells() <= set(found):
         return []

@@ -8,7 +8,7 @@ from care_sim.base.errors import percent
 from care_sim.core.driver_settings import FIXED
 from care_sim.evaluation.collision_outcomes import CollisionOutcome
 from care_sim.reports.collisions import CollisionRows
-from care_sim.reports.controls import BEST_CONTROL
+from care_sim.reports.engine.controls import BEST_CONTROL
 from care_sim.reports.formatting import interval, marked, tag_notes
 from care_sim.reports.table import Table, TableRow
 from care_sim.scenarios.r157.grid import KPH

@@ -5,7 +5,7 @@ from itertools import combinations
 
 from care_sim.base.errors import counted, percent
 from care_sim.evaluation.censoring import FEWEST_PAIRS, quartiles
-from care_sim.reports.controls import BEST_CONTROL
+from care_sim.reports.engine.controls import BEST_CONTROL
 from care_sim.reports.formatting import interval, marked, mean, median, tag_notes
 from care_sim.reports.table import Bold, Table, TableRow
 from care_sim.reports.validation import (

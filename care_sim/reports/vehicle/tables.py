@@ -4,7 +4,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from care_sim.reports.contrasts import AVOIDED, DETECTION, contrast, contrast_of_cases
+from care_sim.reports.engine.contrasts import contrast_of_rows
+from care_sim.reports.engine.measures import AVOIDED, DETECTION
 from care_sim.reports.formatting import interval, spread_of_counts
 from care_sim.reports.mechanism.paper import CELLS_AT_APPEARANCE, VEHICLE_CELLS
 from care_sim.reports.protocol.formatting import PAPER
@@ -100,11 +101,14 @@ def _compensation(study: VehicleRows) -> Table:
 
     def entries(group: Group, level: Variant, rows: Sequence[Row]) -> TableRow:
         # The seeds of a case are nearly copies of it, those of a drive are drives of their own.
-        differ = contrast_of_cases if len(group.places) > 1 else contrast
+        by_cases = len(group.places) > 1
         # Without lag there is nothing to compensate, and nothing is played twice.
         without = study.of(group, uncompensated(level), REFERENCE) if is_late(level) else []
         beside = (outcome(study.of(group, level, policy)) for policy in others)
-        gains = (interval(differ(measure, rows, without)) for measure in (DETECTION, AVOIDED))
+        gains = (
+            interval(contrast_of_rows(measure, rows, without, by_cases))
+            for measure in (DETECTION, AVOIDED)
+        )
         return (outcome(rows), outcome(without), *beside, *gains)
 
     return Table(
@@ -154,7 +158,9 @@ def _cost(study: VehicleRows, group: Group, levels: Sequence[Variant]) -> Table:
     for policy in study.further(FALLBACK_POLICIES):
         cells = [study.of(group, level, policy) for level in levels]
         if any(cells):
-            lost = (contrast(measure, cells[0], cells[1]) for measure in (DETECTION, AVOIDED))
+            lost = (
+                contrast_of_rows(measure, cells[0], cells[1]) for measure in (DETECTION, AVOIDED)
+            )
             lines.append((study.marked(policy), *map(outcome, cells), *map(interval, lost)))
     on, times, _ = (level.label for level in levels)
     labels = (level.label for level in levels)

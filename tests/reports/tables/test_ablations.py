@@ -3,7 +3,7 @@
 import pytest
 
 from care_sim.core.forgetting import ForgettingRules
-from care_sim.reports.protocol.ablations import ablation_closing
+from care_sim.reports.closings import open_ablation_closing as ablation_closing
 from care_sim.reports.protocol.paper_ablations import PUBLISHED_CHANGES, USUAL
 from care_sim.reports.table import Bold
 from care_sim.reports.tables.ablations import ablation_tables

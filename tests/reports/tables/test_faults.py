@@ -2,9 +2,10 @@ import pytest
 
 from care_sim.core.conditions import LOCALISATION, Sensing
 from care_sim.core.return_settings import RETURN_SETTINGS
+from care_sim.reports.engine.frames import Frame
 from care_sim.reports.figures.faults import FAULT_FIGURES, fault_figures
 from care_sim.reports.table import Bold
-from care_sim.reports.tables.faults import StudyCells, fault_tables, order
+from care_sim.reports.tables.faults import fault_tables, order
 from care_sim.study.designs.faults import FAULT_PLACES, FAULTS, fault_study
 from tests.helpers.drawn import heights, titles
 from tests.helpers.made_rows import row
@@ -33,7 +34,7 @@ def rows():
 
 
 def test_the_strength_at_which_the_order_changes_is_found(rows):
-    study = StudyCells(rows)
+    study = Frame(rows)
     missed = BY_TITLE["missed objects"]
     assert order(("care", "history"), missed, DARTOUT, study) == ">, < from 1"
     assert order(("care", "all-camera"), missed, DARTOUT, study) == "=, < from 0.6"
@@ -55,7 +56,7 @@ def test_a_table_per_fault_has_levels_and_paired_differences(rows):
 def test_strengths_that_were_not_played_are_passed_over(rows):
     def without(*rates):
         kept = [r for r in rows if r["policy"] != "care" or r["false_negative_rate"] not in rates]
-        return order(("care", "history"), BY_TITLE["missed objects"], DARTOUT, StudyCells(kept))
+        return order(("care", "history"), BY_TITLE["missed objects"], DARTOUT, Frame(kept))
 
     assert without(0.4) == ">, < from 1"
     assert without(0.0) == ">, < from 1"

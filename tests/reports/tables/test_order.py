@@ -2,7 +2,7 @@
 
 import pytest
 
-from care_sim.reports.protocol.order import order_closing as plays_closing
+from care_sim.reports.closings import open_order_closing as plays_closing
 from care_sim.reports.table import Bold
 from care_sim.reports.tables.order import order_closing, order_tables
 from care_sim.study.designs.order import ORDERS, order_study
