@@ -10,10 +10,10 @@ from care_sim.base.errors import counted, percent
 from care_sim.evaluation.censoring import FEWEST_PAIRS
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, among, ratio_level
 from care_sim.reports.collisions import preventable
-from care_sim.reports.engine.contrasts import contrast_of_rows
+from care_sim.reports.engine.contrasts import Contrast, contrast_of_rows
 from care_sim.reports.engine.controls import BEST_CONTROL, best_control, is_control
 from care_sim.reports.engine.measures import AVOIDED, DETECTION, GATE_POINTS, Measure
-from care_sim.reports.formatting import MARKS, ShownDifference, emphasised, ends, signed
+from care_sim.reports.formatting import MARKS, emphasised, ends, signed
 from care_sim.reports.protocol.differences import PolicyPair
 from care_sim.reports.protocol.notes import papers
 from care_sim.reports.protocol.paper import PAPER_BUDGETS
@@ -41,7 +41,7 @@ class Lead:
     gate: float
     first: str
     second: str | None
-    difference: ShownDifference | None
+    difference: Contrast | None
 
     @property
     def sign(self) -> int:
@@ -183,7 +183,7 @@ def _leads_at(
 
 def _contrast(
     measure: Measure, compared: Mapping[str, Sequence[Row]], ours: str, theirs: str
-) -> ShownDifference | None:
+) -> Contrast | None:
     return contrast_of_rows(measure, compared[ours], compared[theirs])
 
 
@@ -220,7 +220,7 @@ def _lead(
     gate: float,
     levels: Mapping[str, float | None],
     tags: Mapping[str, tuple[str, ...]],
-    minus: Callable[[str, str], ShownDifference | None],
+    minus: Callable[[str, str], Contrast | None],
 ) -> Lead | None:
     """The best that is no control against the best control; None where nobody is to compare."""
     known = {policy: level for policy, level in levels.items() if level is not None}

@@ -10,7 +10,6 @@ from care_sim.evaluation.censoring import Quartiles
 from care_sim.reports.engine.contrasts import Contrast
 from care_sim.reports.table import Bold
 
-ShownDifference = Contrast
 NOT_DETECTED = "not detected"
 MARKS = {"privileged": "†", "non-causal": "‡", "generator": "§"}
 """Marks of the policies that no car can have."""

@@ -11,11 +11,12 @@ from matplotlib.patches import Rectangle
 
 from care_sim.base.errors import counted, percent
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL
+from care_sim.reports.engine.contrasts import Contrast
 from care_sim.reports.engine.frames import Frame
 from care_sim.reports.engine.measures import DETECTION, GATE_M, Recall
 from care_sim.reports.figures.maps import Map, maps_figure
 from care_sim.reports.figures.styles import INK
-from care_sim.reports.formatting import ShownDifference, mean
+from care_sim.reports.formatting import mean
 from care_sim.reports.protocol.paper_ablations import NEAR_FIELD
 from care_sim.reports.tables.ablations import AblationStudy
 from care_sim.reports.tables.crowding import COLLAPSE_M, Crowd
@@ -77,7 +78,7 @@ def ablation_figures(rows: Sequence[Row]) -> dict[str, Figure]:
     """Paired differences of the first detection in metres, one column per scenario and budget."""
     study = Frame(rows)
 
-    def differences(ours: Variant, ablation: Ablation) -> list[ShownDifference | None]:
+    def differences(ours: Variant, ablation: Ablation) -> list[Contrast | None]:
         return [
             study.contrast(DETECTION, *_keys(ablation, ours, place)) for place in ABLATION_PLACES
         ]
@@ -102,7 +103,7 @@ def open_ablation_figures(rows: Sequence[Row]) -> dict[str, Figure]:
         )
     ]
 
-    def differences(ours: Variant, ablation: Ablation) -> list[ShownDifference | None]:
+    def differences(ours: Variant, ablation: Ablation) -> list[Contrast | None]:
         return [
             study.frame.contrast(Recall(ratio, within), *_keys(ablation, ours, place))
             for _, place, ratio, within in columns
@@ -123,7 +124,7 @@ def _ablation_map(
     ablations: Sequence[Ablation],
     place: Place | FilmPlace,
     columns: Sequence[str],
-    differences: Callable[[Variant, Ablation], Sequence[ShownDifference | None]],
+    differences: Callable[[Variant, Ablation], Sequence[Contrast | None]],
 ) -> dict[str, Figure]:
     """A line per level but the usual one, which `place` tells; none where nothing was played."""
     lines = {

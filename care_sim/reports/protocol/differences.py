@@ -3,14 +3,12 @@
 from dataclasses import dataclass
 
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, TTFD, Ratio
-from care_sim.reports.engine.contrasts import OVER_EVENTS, Contrast
-from care_sim.reports.engine.measures import HEADINGS, Recall
+from care_sim.reports.engine.contrasts import Contrast
+from care_sim.reports.engine.measures import Recall
 from care_sim.reports.protocol.rows import HISTORY, SettingPlays
 from care_sim.reports.protocol.thirds import SceneThird
 from care_sim.study.run_config import REFERENCE
 
-__all__ = ["HEADINGS", "OVER_EVENTS"]
-MeasuredDifference = Contrast
 RATIOS = (FIRST_SIGHTING, OVERALL, TTFD)
 
 
