@@ -5,6 +5,7 @@ LaTeX.
 import re
 from dataclasses import dataclass, replace
 
+from rich.cells import cell_len
 from rich.console import Console, ConsoleOptions, RenderResult
 from rich.segment import Segment
 from rich.table import Table as RichTable
@@ -29,6 +30,8 @@ _MARKS = {
 """Meanings of marks, by the pattern of an entry that has the mark."""
 _HEADING = "\N{BOX DRAWINGS LIGHT QUADRUPLE DASH HORIZONTAL}"
 """Stands in a terminal's grid for the row of a heading."""
+_LONGEST_NAME = 30
+"""Characters of a name from which on a terminal breaks it."""
 _BOLD = "Bold: the interval excludes 0"
 
 
@@ -43,7 +46,7 @@ class Table:
     """Entries of text under a title, with notes below.
 
     A row of one entry is a heading for the rows after it. A terminal leaves out the `quotes`, the
-    columns named in `files_only` and empty columns, and breaks no entry of the columns in `whole`.
+    columns named in `files_only` and empty columns.
     A page folds a table without `terminal`: details. The first `names` columns name the rows.
     Names in texts may be anybody's: control codes are shown as escapes.
     """
@@ -129,7 +132,10 @@ class TerminalTable:
         ]
         grid = RichTable(box=None, padding=(0, 1, 0, 0), header_style="")
         for n in shown:
-            grid.add_column(Text(table.columns[n]), overflow="fold")
+            # A name is broken last: whoever reads it wants to type it.
+            words = [*table.columns[n].split(), *table.entries(n)]
+            width = min(max(map(cell_len, words)), _LONGEST_NAME) if n < table.names else None
+            grid.add_column(Text(table.columns[n]), overflow="fold", width=width)
         for row in table.rows:
             cells = [_HEADING] if len(row) == 1 else [Text(row[n], _style(row[n])) for n in shown]
             grid.add_row(*cells)

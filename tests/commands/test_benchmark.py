@@ -82,7 +82,7 @@ def test_a_newcomer_gets_a_line(capsys, here, one_of_each, library, lot_of_a_tes
     code, out, _ = run(capsys, *shlex.split(leaderboard)[1:])
     assert code == 0
     assert {*re.findall(r"^\d +(\S+)", out, re.M)} == {"corridor:Corridor", "care", "place"}
-    assert "Only the tenth of the worlds" in out
+    assert "A trial with the tenth of the worlds" in out
     trial = here / "runs" / "leaderboard-quick"
     assert "corridor:Corridor" in (trial / "leaderboard.md").read_text()
     assert (trial / "leaderboard.png").is_file()

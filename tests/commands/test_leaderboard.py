@@ -68,12 +68,12 @@ def test_two_of_one_name_and_different_code_are_two_entries(capsys, here):
     # A lead is told over the name that the table shows.
     out = run(capsys, "leaderboard", ".", "--minus", "mine:Mine #aaaaaaa")[1]
     assert re.search(r"mine:Mine .*\+100\.0", " ".join(out.split()))
-    assert "As the files say, played by 2 versions of the code: care-sim" in " ".join(out.split())
+    assert "As the files say, played by 2 versions of the code; care-sim" in " ".join(out.split())
     for n, processor in enumerate(("one", "other")):
         made = {"policy_code": f"{n}", "machine": {"processor": processor}}
         made_result("mine:Mine", n, made_by=made).write(here / f"{n}.json")
     out = run(capsys, "leaderboard", ".")[1]
-    assert "As the files say, played on 2 kinds of processor: care-sim" in " ".join(out.split())
+    assert "As the files say, played on 2 kinds of processor; care-sim" in " ".join(out.split())
 
 
 def test_a_chart_is_written_in_both_formats_where_it_is_told(capsys, library, here):

@@ -188,7 +188,7 @@ MISSED = {
     "run dartout --detector pillars": "rl",
     "run dartout --record film.rrd": "viewer",
     "run dartout --video film.mp4": "video",
-    "enjoy ppo-dartout --view": "viewer",
+    "run ppo-dartout --view": "viewer",
     "view film.rrd": "viewer",
     "reproduce --cluster tcp://127.0.0.1:1": "cluster",
     "collect dense --dataset care-sim/dense/care-v0": "minari",

@@ -85,7 +85,7 @@ def test_it_needs_no_folder():
         assert env.observation_space.contains(observation)
     with gymnasium.make("CARE-Replay-v0", source="boreas", sensor="os1-64") as env:
         assert env.action_space.shape == (64, 1024)
-    with pytest.raises(InvalidInput, match=r"source must be .*kitti:FOLDER, boreas, or"):
+    with pytest.raises(InvalidInput, match=r"source must be .*sweeps:FOLDER, boreas, or"):
         source_of("boreas:somewhere")
     with pytest.raises(InvalidInput, match="split has no meaning for boreas"):
         source_of("boreas", split="val")

@@ -18,7 +18,7 @@ ENCODINGS = ("utf-8",) * 12 + ("ascii", "latin-1")
 
 TINY = ("--scenario-parameters", "duration_s=0.2")
 FOUND_CASES = (
-    (("crowding", "--seeds", "2147483647", "--workers", "1"), True, "utf-8"),
+    (("study", "crowding", "--seeds", "2147483647", "--workers", "1"), True, "utf-8"),
     (("sweep", "--seeds", "9999999999999999999999", *TINY), True, "utf-8"),
     (("view", "x\x00y"), False, "utf-8"),
     (("{0}", "[[1]]"), False, "latin-1"),

@@ -125,8 +125,9 @@ def test_it_trains_keeps_and_goes_on(capsys, tmp_path):
     assert play == f"care-sim run {out}"
     # It goes as it is told, and learns of the parameters of the training.
     assert beside == (
-        "care-sim sweep --scenarios dense --policies care ppo --budgets 0.03 "
-        f"--scenario-parameters duration_s=1.0 --policy-parameters ppo.path={out / 'weights.npz'}"
+        "care-sim sweep --scenario-parameters duration_s=1.0 "
+        f"--policy-parameters ppo.path={out / 'weights.npz'} "
+        "--scenarios dense --policies care ppo --budgets 0.03"
     )
     assert parsed_command(shlex.split(beside)[1:])[1].budgets == (0.03,)
     code, played, complaint = care(capsys, *shlex.split(play)[1:], "--seed", "5")
@@ -206,7 +207,7 @@ def test_an_interrupted_run_goes_on(capsys, monkeypatch, tmp_path, moment):
         patch.setattr(moment, interrupt)
         code, _, complaint = care(capsys, *command)
     assert code == 130
-    assert "the same command with --resume goes on" in complaint
+    assert "the same command with --resume resumes" in complaint
     assert care(capsys, *command, "--resume")[0] == 0
     assert len((tmp_path / "run" / "curve.csv").read_text().splitlines()) == 3
 

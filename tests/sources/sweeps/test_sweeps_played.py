@@ -17,7 +17,9 @@ def test_the_protocol_counts_who_detects_a_new_cluster_first(capsys, folder, tmp
     played = ("--policies", "history", "care", "rows", "full", "--budgets", "0.1")
     few = ("--floor-seeds", "1", "--workers", "1", "--detector", "cluster")
     options = (*played, *few, "--out", tmp_path / "out")
-    code, printed, _ = run(capsys, "protocol", "--source", f"sweeps:{folder}", *options)
+    code, printed, _ = run(
+        capsys, "protocol", "--source", f"sweeps:{folder}", "--verbose", *options
+    )
     assert code == 0
     told = " ".join(printed.split())
     assert "events detected earlier, later or at the same keyframe as history" in told
