@@ -46,8 +46,8 @@ class Table:
     """Entries of text under a title, with notes below.
 
     A row of one entry is a heading for the rows after it. A terminal leaves out the `quotes`, the
-    columns named in `files_only` and empty columns.
-    A page folds a table without `terminal`: details. The first `names` columns name the rows.
+    columns named in `files_only` and empty columns. It breaks entries of the columns in `whole`
+    last. A page folds a table without `terminal`: details. The first `names` columns name the rows.
     Names in texts may be anybody's: control codes are shown as escapes.
     """
 
@@ -134,7 +134,8 @@ class TerminalTable:
         for n in shown:
             # A name is broken last: whoever reads it wants to type it.
             words = [*table.columns[n].split(), *table.entries(n)]
-            width = min(max(map(cell_len, words)), _LONGEST_NAME) if n < table.names else None
+            named = n < table.names or table.columns[n] in table.whole
+            width = min(max(map(cell_len, words)), _LONGEST_NAME) if named else None
             grid.add_column(Text(table.columns[n]), overflow="fold", width=width)
         for row in table.rows:
             cells = [_HEADING] if len(row) == 1 else [Text(row[n], _style(row[n])) for n in shown]

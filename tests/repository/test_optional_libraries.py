@@ -191,7 +191,7 @@ MISSED = {
     "run ppo-dartout --view": "viewer",
     "view film.rrd": "viewer",
     "reproduce --cluster tcp://127.0.0.1:1": "cluster",
-    "collect dense --dataset care-sim/dense/care-v0": "minari",
+    "export minari dense --dataset care-sim/dense/care-v0": "minari",
     "run sweeps:drive.mcap": "rosbags",
     "train ppo": "rl",
     "train ppo --tune 2": "tune",

@@ -49,6 +49,8 @@ def validation_tables(rows: Sequence[Row]) -> list[Table]:
              "discriminates"),
             tuple(verdicts),
             (f"Too few: fewer than {FEWEST_PAIRS} test seeds.",),
+            files_only=_CHOSEN[2:],
+            whole=_CHOSEN,
         ),
         Table(
             "Who is hit?",
