@@ -111,3 +111,7 @@ def __getattr__(name: str) -> object:
         import_module("care_sim.policies")
         return import_module(f"care_sim.{name}")
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_PLACES})

@@ -39,6 +39,7 @@ _WAYS_ON = """care-sim COMMAND --help lists its options, --help-all the conditio
 care-sim --version prints the version, --tyro-print-completion SHELL a script
 by which bash, zsh or fish completes. Begin with: care-sim run dartout"""
 _COMPLETION = "--tyro-print-completion"
+_SHELLS = ("bash", "zsh", "fish")
 _NEW_OBJECTS = 100_000
 """After how many the garbage collector looks at them; Python's default is 700."""
 _NARROWEST = 20
@@ -84,7 +85,8 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
             _end_with(error, trace=_DEBUG in given or bool(os.environ.get("CARE_SIM_DEBUG")))
         if alone:
             interrupts.end_in_silence()
-        kept = next((_KEPT[name] for name in _named(arguments) if name in _KEPT), "")
+        names = _named([*RENAMED.get(arguments[0], "").split(), *arguments] if arguments else [])
+        kept = next((_KEPT[name] for name in names if name in _KEPT), "")
         _complain(f"interrupted{kept}", INTERRUPTED)
     finally:
         if alone:
@@ -193,6 +195,8 @@ def parsed_command(arguments: Sequence[str]) -> tuple[Command, Any]:
 
     arguments = _renamed(arguments)
     if arguments[0] == _COMPLETION:
+        if arguments[1:] not in [[shell] for shell in _SHELLS]:
+            raise InvalidInput(f"{_COMPLETION} takes one of {', '.join(_SHELLS)}")
         print_completion(arguments)
     name, rest = _chosen(arguments)
     command = COMMANDS[name]
@@ -238,6 +242,9 @@ def _renamed(arguments: Sequence[str]) -> Sequence[str]:
     now = "export nuscenes" if old_export else RENAMED.get(first)
     if now is None:
         return arguments
+    # One folder would be reported, and its tables written anew.
+    if first == "merge" and len(arguments) == 2 and not second.startswith("-"):
+        raise InvalidInput("merge needs two folders at least: care-sim report FOLDER FOLDER")
     report_problems([f"`care-sim {first}` is now `care-sim {now}`"])
     return [*now.split(), *arguments[1:]]
 

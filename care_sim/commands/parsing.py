@@ -159,8 +159,10 @@ def _joined(words: Sequence[str]) -> str:
 
 
 def _near(word: str, kind: type) -> str:
-    near = get_close_matches(word.partition("=")[0], [*option_names(kind)])
-    return f"; perhaps {' or '.join(near)}" if near else ""
+    # Without the dashes, which make every option like every other.
+    names = [name.removeprefix("--") for name in option_names(kind)]
+    near = get_close_matches(word.partition("=")[0].removeprefix("--"), names)
+    return f"; perhaps {' or '.join(f'--{name}' for name in near)}" if near else ""
 
 
 def option_names(kind: Any) -> Iterator[str]:

@@ -103,7 +103,8 @@ def _is_agent(what: str) -> bool:
     if what in scenario_names() or is_source(what):
         return False
     names = {name for agent in shipped_agents() for name in (agent.name, agent.policy)}
-    return what in names or "/" in what or Path(what).exists()
+    # A colon is that of a source whose kind is mistyped.
+    return what in names or ("/" in what and ":" not in what) or Path(what).exists()
 
 
 def _agents_run(options: Run) -> Run:

@@ -52,7 +52,7 @@ class Lead:
 
     @property
     def reaches_gate(self) -> bool:
-        """Whether one is ahead by the gate at least."""
+        """Whether one is ahead by the gate at least: an effect that is sure, and large enough."""
         if self.difference is None or not self.sign:
             return False
         # Of a bound only the asterisk says that the gate is reached, whatever was missed.
@@ -66,7 +66,8 @@ class Lead:
         if self.difference is None:
             return (*names, "", "", "")
         shown = emphasised(self.difference, signed(self.difference))
-        return (*names, shown, ends(self.difference), "yes" if self.reaches_gate else "no")
+        ahead = self.first if self.sign > 0 else self.second or ""
+        return (*names, shown, ends(self.difference), ahead if self.reaches_gate else "no")
 
 
 def leads_tables(leads: Sequence[Lead]) -> list[Table]:
@@ -141,7 +142,7 @@ def _table(title: str, first: str, second: str, leads: Sequence[Lead], *notes: s
         return []
     columns = ("setting", "budget", "measure", first, second, "difference", "interval")
     rows = tuple(lead.row for lead in leads)
-    return [Table(title, (*columns, "gate reached"), rows, notes, whole=columns[1:], names=3)]
+    return [Table(title, (*columns, "gate reached by"), rows, notes, whole=columns[1:], names=3)]
 
 
 def _is_real(policy: str, tags: Mapping[str, tuple[str, ...]]) -> bool:

@@ -8,7 +8,7 @@ from rich.console import Console
 
 from care_sim.base.errors import percent
 from care_sim.evaluation.censoring import quartiles
-from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING
+from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, among, ratio_level
 from care_sim.reports.engine.controls import BEST_CONTROL, best_control, is_control
 from care_sim.reports.formatting import median
 from care_sim.reports.protocol.formatting import written
@@ -95,13 +95,18 @@ def recalls(rows: Sequence[Row]) -> Table:
     for plays in plays_by_setting(rows):
         tags |= plays.tags
         full = written(FIRST_SIGHTING, plays.level(FIRST_SIGHTING, FULL, 1.0).by_event)
+        controls = [policy for policy in plays.policies if is_control(plays.tags[policy])]
         for budget in plays.budgets:
             line = _Line(plays.setting.label, budget, full)
             for policy in plays.policies:
                 level = plays.level(FIRST_SIGHTING, policy, budget).by_event
                 line.texts[policy] = written(FIRST_SIGHTING, level)
-                if is_control(plays.tags[policy]):
-                    line.controls[policy] = level
+            # A control that lacks a hard scene would win by that.
+            tallies = {policy: plays.tallies(policy, budget) for policy in controls}
+            played = {policy: own for policy, own in tallies.items() if own}
+            shared = set.intersection(*map(set, played.values())) if played else set()
+            for policy, own in played.items():
+                line.controls[policy] = ratio_level(FIRST_SIGHTING, among(own, shared)).by_event
             lines.append(line)
     return _table("First sightings detected in their first keyframe, %", lines, tags)
 

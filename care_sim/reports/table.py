@@ -31,7 +31,8 @@ _MARKS = {
 _HEADING = "\N{BOX DRAWINGS LIGHT QUADRUPLE DASH HORIZONTAL}"
 """Stands in a terminal's grid for the row of a heading."""
 _LONGEST_NAME = 30
-"""Characters of a name from which on a terminal breaks it."""
+_SENTENCE = 24
+"""Characters of a name, and of any other entry, from which on a terminal breaks it."""
 _BOLD = "Bold: the interval excludes 0"
 
 
@@ -124,32 +125,68 @@ class TerminalTable:
     table: Table
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        yield Text(self.table.title, "italic")
+        for number, part in enumerate(self._parts(options.max_width)):
+            if number:
+                yield Segment.line()
+            yield from self._part(part, console, options)
+        for note in self.table.lines:
+            yield Text(note, "dim")
+
+    def _parts(self, width: int) -> list[list[int]]:
+        """The columns that stand side by side: a table that is too wide goes on below itself, with
+        its names again. Folded, a number would be another number.
+        """
         table = self.table
         shown = [
             n
             for n, name in enumerate(table.columns)
             if name not in table.files_only and any(table.entries(n))
         ]
+        names = [n for n in shown if n < table.names]
+        parts: list[list[int]] = [[]]
+        for n in shown[len(names) :]:
+            if parts[-1] and sum(map(self._width, [*names, *parts[-1], n])) > width:
+                parts.append([])
+            parts[-1].append(n)
+        return [[*names, *part] for part in parts]
+
+    def _width(self, column: int) -> int:
+        """Characters of a column and the space behind it. Sentences are broken, and long names."""
+        table = self.table
+        entries = table.entries(column)
+        if not (column < table.names or table.columns[column] in table.whole):
+            entries = [
+                word
+                for entry in entries
+                for word in (entry.split() if cell_len(entry) > _SENTENCE else [entry])
+            ]
+        words = [*table.columns[column].split(), *entries]
+        return 1 + min(max(map(cell_len, words)), _LONGEST_NAME)
+
+    def _part(self, columns: list[int], console: Console, options: ConsoleOptions) -> RenderResult:
+        table = self.table
         grid = RichTable(box=None, padding=(0, 1, 0, 0), header_style="")
-        for n in shown:
-            # A name is broken last: whoever reads it wants to type it.
-            words = [*table.columns[n].split(), *table.entries(n)]
-            named = n < table.names or table.columns[n] in table.whole
-            width = min(max(map(cell_len, words)), _LONGEST_NAME) if named else None
+        widths = [self._width(n) for n in columns]
+        left = options.max_width - sum(widths)
+        for place, n in enumerate(columns):
+            # What is left goes to entries and headings that are broken, from left to right.
+            longest = max(map(cell_len, [table.columns[n], *table.entries(n)]))
+            more = min(max(longest + 1 - widths[place], 0), max(left, 0))
+            widths[place] += more
+            left -= more
+            width = widths[place] - 1 if left >= 0 else None
             grid.add_column(Text(table.columns[n]), overflow="fold", width=width)
         for row in table.rows:
-            cells = [_HEADING] if len(row) == 1 else [Text(row[n], _style(row[n])) for n in shown]
+            cells = [_HEADING] if len(row) == 1 else [Text(row[n], _style(row[n])) for n in columns]
             grid.add_row(*cells)
         headings = (row[0] for row in table.rows if len(row) == 1)
-        yield Text(table.title, "italic")
         for line in console.render_lines(grid, options, pad=False):
             # Rich has no cells that span columns: a heading takes the line of its row.
             if "".join(segment.text for segment in line).strip() == _HEADING:
                 yield Text(next(headings), "italic")
             else:
                 yield from [*line, Segment.line()]
-        for note in table.lines:
-            yield Text(note, "dim")
 
 
 def unmarked(text: str) -> str:

@@ -42,8 +42,8 @@ def lines(rows):
 @pytest.mark.parametrize(
     ("distances", "line", "sign"),
     [
-        ({"care": 16.0, "fan": 12.0, "rows": 11.0}, ("fan", "+4.0*", "[4.0,4.0]", "yes"), 1),
-        ({"care": 10.0, "fan": 16.0}, ("fan", "-6.0*", "[-6.0,-6.0]", "yes"), -1),
+        ({"care": 16.0, "fan": 12.0, "rows": 11.0}, ("fan", "+4.0*", "[4.0,4.0]", "care"), 1),
+        ({"care": 10.0, "fan": 16.0}, ("fan", "-6.0*", "[-6.0,-6.0]", "fan"), -1),
         ({"care": 16.0, "fan": 16.0}, ("fan", "+0.0", "[0.0,0.0]", "no"), 0),
         ({"care": 16.1, "fan": WAVERING}, ("fan", "+0.1", "[-0.4,0.6]", "no"), 0),
         # Below the gate of 2.5 m.
@@ -88,7 +88,7 @@ def test_a_seed_that_a_policy_lacks_counts_for_nobody():
 def test_collisions_count_where_a_full_scan_prevents_them():
     hit = {"fan": {"collision": True}}
     rows = episodes({"care": 16.0, "fan": 16.0, "full": 17.0}, **hit)
-    assert lines(rows)[1] == ("care", "fan", "+100*", "[100,100]", "yes")
+    assert lines(rows)[1] == ("care", "fan", "+100*", "[100,100]", "care")
     assert lines([each for each in rows if each["policy"] != "full"]) == lines(rows)
     doomed = episodes({"care": 16.0, "fan": 8.0, "full": 17.0}, **hit, full={"collision": True})
     assert len(lines(doomed)) == 1
@@ -96,7 +96,7 @@ def test_collisions_count_where_a_full_scan_prevents_them():
 
 def test_a_bound_reaches_the_gate_only_where_the_worst_case_does():
     missed = (None, *(16.0,) * 29)
-    for control, reaches in ((14.0, "no"), (4.0, "yes")):
+    for control, reaches in ((14.0, "no"), (4.0, "care")):
         (line,) = lines(episodes({"care": missed, "place": control}, seeds=range(30)))
         assert line[2].startswith("≤+")
         assert line[-1] == reaches
@@ -139,5 +139,11 @@ def test_the_open_loop_has_its_leads_and_the_papers_gate():
     )  # fmt: skip
     (gate,) = gate_tables(plays)
     assert gate.rows[0][3:6] == ("care", "history", "+40.0")
-    assert gate.rows[0][-1] == "yes"
+    assert gate.rows[0][-1] == "care"
     assert gate_tables([each | {"false_negative_rate": 0.2} for each in plays]) == []
+
+
+def test_the_papers_gate_names_history_where_that_is_ahead():
+    plays = made_plays.study({"care": (4, 6), "history": (12, 6)}, seeds=(0,), budgets=(0.1,))
+    (gate,) = gate_tables(plays)
+    assert gate.rows[0][-1] == "history"

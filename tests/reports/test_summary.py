@@ -50,3 +50,14 @@ def test_recalls_of_the_open_loop():
     table = recalls(plays)
     assert table.columns[2:] == ("history", "care", "best control", "full")
     assert table.rows[0][1:] == ("10%", "20.0", "60.0", "45.0 rows", "75.0")
+
+
+def test_a_control_that_lacks_hard_scenes_is_not_the_best():
+    """Place finds 10 of 20 events in the two scenes that it has, rows 12 there and none beyond."""
+    plays = made_plays.study({"place": (10, 5), "rows": (12, 5)}, seeds=(0,), budgets=(0.1,))
+    easy = ("scene 000", "scene 001")
+    kept = [each for each in plays if each["policy"] == "rows" or each["scene"] in easy]
+    for each in kept:
+        if each["policy"] == "rows" and each["scene"] not in easy:
+            each |= {"sighted": 0.0}
+    assert recalls(kept).rows[0][-2] == "20.0 rows"

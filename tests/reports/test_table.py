@@ -165,3 +165,14 @@ def test_how_to_read_the_tables_is_one_page_of_at_most_500_words_for_site_and_re
     assert asset.read_text() == page.read_text()
     assert len(re.findall(r"\w[\w'.-]*", page.read_text())) <= 500
     assert all(f"`{mark}`" in page.read_text() for mark in "*°≤≥~†‡§")
+
+
+def test_a_table_that_is_too_wide_goes_on_below_itself_and_breaks_no_number():
+    columns = ("test", *(f"policy-{n}" for n in range(9)))
+    row = ("in all", *(f"103/96/{n}37 1.03" for n in range(9)))
+    terminal = io.StringIO()
+    Console(width=80, file=terminal).print(Table("wide", columns, (row,)).rich())
+    lines = terminal.getvalue().splitlines()
+    assert all(len(line) <= 80 for line in lines)
+    assert all(sum(entry in line for line in lines) == 1 for entry in row[1:])
+    assert sum(line.startswith("in all") for line in lines) == 3

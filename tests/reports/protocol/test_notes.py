@@ -44,7 +44,7 @@ def test_what_rests_on_an_interval_over_events_is_marked_and_explained():
     judgement, interval = under(shown[STATEMENTS], "First sightings")[1:]
     assert (judgement, interval[-2:]) == ("+80.0 met° (+5.2)", "]°")
     (gate,) = gate_tables(three_with_events())
-    assert gate.rows[0][5:] == ("+80.0", interval, "yes")
+    assert gate.rows[0][5:] == ("+80.0", interval, "care")
     for table in (shown[CONTRASTS], shown[STATEMENTS], gate):
         assert "°: interval over events" in table.lines[-1]
 

@@ -392,7 +392,7 @@ def test_one_policy_without_care_has_levels_and_strata():
 def test_the_gain_is_held_against_the_papers_gate_at_the_papers_budgets():
     (gate,) = gate_tables(ROWS)
     assert [line[1:] for line in gate.rows] == [
-        (budget, "first sightings, points", "care", "history", "+10.0", "[10.0,10.0]", "yes")
+        (budget, "first sightings, points", "care", "history", "+10.0", "[10.0,10.0]", "care")
         for budget in ("10%", "20%", "35%")
     ]
     (small,) = gate_tables(study({"care": (5, 5), "history": (4, 5)}, events=25, budgets=(0.1,)))
