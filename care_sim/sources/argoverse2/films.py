@@ -90,15 +90,7 @@ def argoverse2_film(log: Path, grid: AngularGrid | None = None, empty_boxes: boo
     pose, an unknown category, an object annotated twice at once.
     """
     log = Path(os.path.abspath(log))
-    boxes_file = annotation_file(log)
-    pose_file = log / POSE_FILE
-    sweeps, boxes = read_boxes(boxes_file)
-    poses = read_poses(pose_file)
-    without_pose = np.setdiff1d(sweeps, poses["timestamp_ns"])
-    if len(without_pose):
-        raise InvalidInput(
-            f"{pose_file}: no pose for the timestamp {without_pose[0]} of {boxes_file.name}"
-        )
+    sweeps, boxes, poses = _tables(log)
     keyframes = _keyframes(sweeps, poses["timestamp_ns"])
     recorded = _sweep_files(log, keyframes)
     if recorded and len(recorded) < len(keyframes):
@@ -148,11 +140,25 @@ def sweep_files(log: Path) -> list[Path]:
     """Return the recorded sweeps that the film of a log is made of; none unless every keyframe has
     one. Raises InvalidInput for tables that cannot be read.
     """
-    keyframes = _keyframes(
-        read_boxes(annotation_file(log))[0], read_poses(log / POSE_FILE)["timestamp_ns"]
-    )
+    sweeps, _, poses = _tables(log)
+    keyframes = _keyframes(sweeps, poses["timestamp_ns"])
     found = _sweep_files(log, keyframes)
     return found if len(found) == len(keyframes) else []
+
+
+def _tables(log: Path) -> tuple[Integers, Columns, Columns]:
+    """Return the annotated timestamps, the boxes and the poses. Raises InvalidInput for a timestamp
+    without a pose.
+    """
+    boxes_file, pose_file = annotation_file(log), log / POSE_FILE
+    sweeps, boxes = read_boxes(boxes_file)
+    poses = read_poses(pose_file)
+    without_pose = np.setdiff1d(sweeps, poses["timestamp_ns"])
+    if len(without_pose):
+        raise InvalidInput(
+            f"{pose_file}: no pose for the timestamp {without_pose[0]} of {boxes_file.name}"
+        )
+    return sweeps, boxes, poses
 
 
 def _sweep_files(log: Path, keyframes: Integers) -> list[Path]:

@@ -3,7 +3,7 @@ import pyarrow as pa
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.sources.argoverse2.films import argoverse2_film
+from care_sim.sources.argoverse2.films import argoverse2_film, sweep_files
 from tests.helpers.av2_log import CAR_AHEAD, box, parked, replaced, rewrite, stamp
 
 
@@ -139,6 +139,10 @@ BREAKS = {
         lambda log: rewrite(log / "city_SE3_egovehicle.feather", lambda t: t.slice(0, 1)),
         f"city_SE3_egovehicle.feather: no pose for the timestamp {stamp(1)} of annotations.feather",
     ),
+    "no poses at all": (
+        lambda log: rewrite(log / "city_SE3_egovehicle.feather", lambda t: t.slice(0, 0)),
+        f"city_SE3_egovehicle.feather: no pose for the timestamp {stamp(0)} of annotations.feather",
+    ),
 }
 
 
@@ -147,10 +151,12 @@ def test_what_is_wrong_with_a_log_is_said_in_one_line(tmp_path, name):
     breaks, message = BREAKS[name]
     log = parked(tmp_path / "log", CAR_AHEAD, sweeps=2)
     breaks(log)
-    with pytest.raises(InvalidInput, match=message) as caught:
-        argoverse2_film(log)
-    assert "\n" not in str(caught.value)
-    assert str(log) in str(caught.value)
+    # A study asks for the files of a film before the film.
+    for read in (argoverse2_film, sweep_files):
+        with pytest.raises(InvalidInput, match=message) as caught:
+            read(log)
+        assert "\n" not in str(caught.value)
+        assert str(log) in str(caught.value)
 
 
 @pytest.mark.parametrize(
