@@ -230,5 +230,5 @@ def _page(tables: Sequence[str]) -> str:
         "What is played and why, and how to enter: the page *Report a result* of the "
         "documentation. Made by `care-sim leaderboard`."
     )
-    figure = f"![Scores with their intervals, and their parts]({LEADERBOARD_FIGURE}.png)"
+    figure = f"![Scores with their intervals, and their parts]({LEADERBOARD_FIGURE}.svg)"
     return "\n".join(["# Leaderboard\n", f"{reading}\n", *tables, f"{figure}\n"])

@@ -28,7 +28,7 @@ from care_sim.study.unfinished import UNFINISHED, how_far
 TABLES = "tables.md"
 """Name of the file in a folder of results that holds all tables."""
 CONFIG = "config.json"
-_READING = "[How to read the tables](../../docs/reading.md)\n"
+_READING = "[How to read the tables](../../../docs/reading.md)\n"
 PAGE = "report.html"
 """Name of a page where none is given."""
 

@@ -135,7 +135,7 @@ def _listed_parts(description: Any) -> Iterator[tuple[list[Row], int]]:
 
 
 def _plain_rows(given: Row) -> list[Row]:
-    """A row for every seed of a configuration."""
+    """A row for every policy and seed of a configuration."""
     row: Row = {}
     for name, value in given.items():
         if name.endswith(_PARAMETERS):
@@ -145,4 +145,9 @@ def _plain_rows(given: Row) -> list[Row]:
             row[name] = value
     (plural,) = _SEEDS.keys() & given.keys()
     row = with_tuples(row)
-    return [row | {_SEEDS[plural]: seed} for seed in given[plural]]
+    # Folders from before 0.3.0 list one policy at a time.
+    return [
+        row | {"policy": policy, _SEEDS[plural]: seed}
+        for policy in given.get("policies", [given.get("policy")])
+        for seed in given[plural]
+    ]

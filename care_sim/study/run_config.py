@@ -216,33 +216,28 @@ def in_batches(tasks: Sequence[RunConfig], most: int | None = None) -> list[list
 
 
 def collected(plain: Sequence[dict[str, Any]], axis: str, plural: str) -> dict[str, Any]:
-    """Configurations as plain data, each once, with the list of all values of an axis under its
-    plural. What all have alike is told once, under `common`: a study of thousands of
-    configurations else writes megabytes.
+    """Configurations as plain data, each once, with all values of an axis under its plural and all
+    policies under `policies`. What all have alike is told once, under `common`: a study of
+    thousands of configurations else writes megabytes.
     """
-    values: dict[str, list[Any]] = {}
-    kept: dict[str, dict[str, Any]] = {}
-    for one in plain:
-        rest = {name: value for name, value in one.items() if name != axis}
-        key = json.dumps(rest)
-        kept[key] = rest
-        values.setdefault(key, []).append(one[axis])
-    common = _common(list(kept.values()))
-    listed = [
-        {**{name: value for name, value in rest.items() if name not in common}, plural: values[key]}
-        for key, rest in kept.items()
-    ]
-    return {"common": common, "configurations": listed}
-
-
-def _common(plain: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """What all of them have alike."""
-    first = plain[0]
-    return {
+    listed = _grouped(_grouped(plain, axis, plural), "policy", "policies")
+    common = {
         name: value
-        for name, value in first.items()
-        if all(name in one and one[name] == value for one in plain)
+        for name, value in listed[0].items()
+        if name not in (plural, "policies")
+        and all(name in one and one[name] == value for one in listed)
     }
+    own = [{key: value for key, value in one.items() if key not in common} for one in listed]
+    return {"common": common, "configurations": own}
+
+
+def _grouped(plain: Sequence[dict[str, Any]], name: str, plural: str) -> list[dict[str, Any]]:
+    """Those that are alike but for one value as one, with the list of the values."""
+    grouped: dict[str, dict[str, Any]] = {}
+    for one in plain:
+        rest = {other: value for other, value in one.items() if other != name}
+        grouped.setdefault(json.dumps(rest), {**rest, plural: []})[plural].append(one[name])
+    return list(grouped.values())
 
 
 def _is_pair(given: object) -> bool:

@@ -1,6 +1,6 @@
 """How much of an entry's score is the camera's? The suite again, with a camera that sees nothing.
 
-    python docs/examples/blind_camera.py results/leaderboard/care-sector.json ... place.json
+    python docs/examples/blind_camera.py results/data/leaderboard/care-sector.json ... place.json
 
 The last file is the entry over which the leads are told. About two minutes an entry on two cores;
 what is finished stays in `runs/blind-camera`, and the same command goes on. Every play is a row of

@@ -1,6 +1,6 @@
 """First sightings over the drives of several sources: levels, and one policy less each other.
 
-    python docs/examples/pooled_drives.py care results/recorded-kitti results/recorded-boreas ...
+    python docs/examples/pooled_drives.py care results/data/recorded-kitti ...
 
 The first argument is the policy that the others are held against; then folders of `care-sim
 protocol`, played under one set of conditions. Whole drives are resampled, as in the tables of the

@@ -14,7 +14,7 @@ def here(tmp_path, monkeypatch):
 @pytest.fixture
 def library(here):
     """What the repository's own policies reached."""
-    folder = here / "results" / "leaderboard"
+    folder = here / "results" / "data" / "leaderboard"
     for policy, share in (("place", 0.5), ("care", 0.7)):
         made_result(policy, share).write(folder / f"{policy}.json")
     return folder

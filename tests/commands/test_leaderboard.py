@@ -38,7 +38,7 @@ def test_leads_are_told_over_any_entry(capsys, library):
 
 def test_where_the_control_is_missing_it_is_said_where_it_lies(capsys, library, here):
     told = "no place among these files: add a folder with its result for leads\n"
-    for words, lacks in ((["results/leaderboard/care.json"], True), ([library], False)):
+    for words, lacks in ((["results/data/leaderboard/care.json"], True), ([library], False)):
         code, out, err = run(capsys, "leaderboard", *words)
         assert (code, err) == (0, told if lacks else "")
         assert ("inus place" in out) != lacks

@@ -20,17 +20,13 @@ from care_sim.reports.table import Table
 from care_sim.study.benchmark.result_file import read_result
 from care_sim.study.rows.reading import policy_of
 from care_sim.study.run_config import FULL
-from care_sim.training.curves import grouped_runs, read_run
-from care_sim.training.curves_table import curves_table
 from tests.golden.cells import Cell, cells
 from tests.helpers.places import PUBLISHED
 
 FILE = Path(__file__).with_name("published.parquet")
 NOT_RECOMPUTED = {
-    "judge-care": "its tables need every box of the detectors; the folder holds their counts",
     "judge-logs": "its tables need every box of the detectors; the folder holds their counts",
     "judge-streets": "its tables need every box of the detectors; the folder holds their counts",
-    "learned-sets-seeds": "it holds weights, and no result",
 }
 """Published folders without numbers here, and why. What `bench` and `parity` measured is in files
 beside the folders; no command prints such a file again.
@@ -59,9 +55,6 @@ def tables_of(folder: Path) -> Iterator[Table]:
         leads = leads_table(results, "place")
         assert leads is not None
         yield leads
-    elif folder.name == "training":
-        runs = sorted(path for path in folder.iterdir() if path.is_dir())
-        yield curves_table(grouped_runs(map(read_run, runs)))
     else:
         yield from _tables_of_rows(folder)
 

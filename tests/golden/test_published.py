@@ -26,7 +26,7 @@ from tests.helpers.places import PUBLISHED
 
 SHOWN = 10
 """Differing cells that a failure lists."""
-QUICK = ("closed-loop-5", "constant-sets-streets", "vehicle")
+QUICK = ("closed-loop-5", "streets-cluster", "vehicle")
 """Folders that take a tenth of a second each: episodes, plays, and a study of its own."""
 
 

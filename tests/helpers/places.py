@@ -3,5 +3,5 @@
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-PUBLISHED = ROOT / "results"
-"""In a clone alone."""
+PUBLISHED = ROOT / "results" / "data"
+"""The folders of published rows; in a clone alone."""

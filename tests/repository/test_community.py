@@ -6,7 +6,7 @@ import pytest
 from pyarrow.parquet import read_metadata
 
 from care_sim.envs import IDS
-from tests.helpers.places import ROOT
+from tests.helpers.places import PUBLISHED, ROOT
 
 yaml = pytest.importorskip("yaml")
 COMMUNITY = ROOT / "docs" / "community"
@@ -22,8 +22,8 @@ def front_matter(name):
 def test_the_dataset_card_has_a_configuration_for_every_file_of_rows():
     card = front_matter("dataset-card.md")
     named = [config["data_files"] for config in card["configs"]]
-    files = sorted((ROOT / "results").rglob("*.parquet"))
-    assert named == [file.relative_to(ROOT / "results").as_posix() for file in files]
+    files = sorted(PUBLISHED.rglob("*.parquet"))
+    assert named == [file.relative_to(PUBLISHED).as_posix() for file in files]
     assert len({config["config_name"] for config in card["configs"]}) == len(named)
     assert sum("default" in config for config in card["configs"]) == 1
     rows = sum(read_metadata(file).num_rows for file in files)

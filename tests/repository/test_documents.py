@@ -163,14 +163,14 @@ def test_by_the_proxy_the_car_brakes_for_somebody_in_view():
     assert -1 < example.early_s("CARE-Dartout-v0", "returns", 0) < 0
 
 
-BLIND = re.compile(r"blind_camera\.py results/leaderboard/\{([^}]+)\}\.json")
+BLIND = re.compile(r"blind_camera\.py results/data/leaderboard/\{([^}]+)\}\.json")
 """The files of which a page says that they were played with a blind camera."""
 
 
 def test_a_blind_camera_takes_nothing_from_who_asks_none(tmp_path):
     example = loaded(EXAMPLES / "blind_camera.py")
     worlds = [next(world for world in published_worlds() if world.part == part) for part in PARTS]
-    told = [read_result(ROOT / f"results/leaderboard/{name}.json") for name in ("fan", "care")]
+    told = [read_result(ROOT / f"results/data/leaderboard/{name}.json") for name in ("fan", "care")]
     with player_in(tmp_path, 2) as player:
         fan, care = example.blinded(told, worlds, player)
 
@@ -197,14 +197,14 @@ def test_a_blind_camera_takes_nothing_from_who_asks_none(tmp_path):
     # The last is `fan`, over which the leads are told.
     assert cells[4].strip("*").startswith(f"{dark.mean - fan.score('blind').mean:.1f} [")
     with pytest.raises(SystemExit, match="has no plays of place"):
-        example.read_plays(table, [read_result(ROOT / "results/leaderboard/place.json")])
+        example.read_plays(table, [read_result(ROOT / "results/data/leaderboard/place.json")])
 
 
 def test_the_published_plays_with_a_blind_camera_make_the_table_of_their_page(capsys):
     page = (ROOT / "results" / "benchmark.md").read_text()
-    plays = ROOT / "results" / "leaderboard" / "blind-camera.csv"
+    plays = ROOT / "results" / "data" / "leaderboard" / "blind-camera.csv"
     files = BLIND.findall(page)[0].replace("\\\n", "").split(",")
-    paths = [str(ROOT / f"results/leaderboard/{name}.json") for name in files]
+    paths = [str(ROOT / f"results/data/leaderboard/{name}.json") for name in files]
     loaded(EXAMPLES / "blind_camera.py").main([str(plays), *paths])
     table = capsys.readouterr().out.replace("blind, minus the last", "blind, minus `place`")
     assert table.count("\n") == 2 + len(files)
@@ -217,7 +217,7 @@ def cut(result, played):
 
 
 def test_the_blind_camera_misses_everything():
-    entry = read_result(ROOT / "results/leaderboard/care.json").entry
+    entry = read_result(ROOT / "results/data/leaderboard/care.json").entry
     tasks = tasks_of(entry, published_worlds(), ["blind"])
     assert len(tasks) == 240
     assert {task.config.false_negative_rate for task in tasks} == {1.0}
@@ -230,14 +230,6 @@ def test_the_blind_camera_misses_everything():
 def test_without_result_files_the_blind_camera_says_so(files, line):
     with pytest.raises(SystemExit, match=line):
         loaded(EXAMPLES / "blind_camera.py").main(files)
-
-
-def test_what_training_seeds_tell_stands_in_its_page(capsys):
-    loaded(EXAMPLES / "training_seeds.py").main()
-    page = (ROOT / "results" / "worlds-that-vary.md").read_text()
-    tables = capsys.readouterr().out.strip().split("\n\n")
-    assert len(tables) == 5
-    assert all(table in page for table in tables)
 
 
 def test_the_policy_has_twenty_lines_at_most():

@@ -20,43 +20,40 @@ from care_sim.study.benchmark.worlds import TESTS, published_worlds
 from care_sim.study.results_formats import EPISODES
 from care_sim.study.rows.parquet import read_rows
 from care_sim.training.sets import ROUNDS
+from tests.helpers.examples import loaded
 from tests.helpers.pages import RESULTS, links
 from tests.helpers.places import ROOT
 
 FOLDER = ROOT / "results"
+DATA = FOLDER / "data"
 INDEX = FOLDER / "README.md"
 QUESTIONS = [page for page in RESULTS if page.name not in ("README.md", "findings.md")]
-PUBLISHED = sorted(
-    entry.name
-    for entry in FOLDER.iterdir()
-    if entry.is_dir() or entry.suffix in (".json", ".png", ".gif")
-)
 LINES = re.findall(r"^\| \[.*", INDEX.read_text(), re.M)
-"""Those of the index's tables, one for what one command left."""
+"""Those of the pictures."""
 
 
-def published(text):
-    """What of the folder a text links to."""
-    targets = re.findall(r"\]\(([^)#]+)", text)
-    return {target.split("/")[0] for target in targets} & set(PUBLISHED)
+def test_every_picture_has_a_line_in_the_index():
+    pictures = {file.name for ending in ("gif", "png") for file in FOLDER.glob(f"*.{ending}")}
+    assert {line.split("](")[0].removeprefix("| [") for line in LINES} == pictures
 
 
-@pytest.mark.parametrize("name", PUBLISHED)
-def test_what_is_published_stands_on_one_line_of_the_index(name):
-    assert len([line for line in LINES if name in published(line)]) == 1
-
-
-@pytest.mark.parametrize("name", [name for name in PUBLISHED if (FOLDER / name).is_dir()])
+@pytest.mark.parametrize("name", sorted(path.name for path in DATA.iterdir() if path.is_dir()))
 def test_a_folder_has_its_place_on_the_page_of_a_question(name):
-    assert any(name in published(page.read_text()) for page in QUESTIONS)
+    assert any(f"(data/{name}/" in page.read_text() for page in QUESTIONS)
 
 
-def test_the_commands_of_the_index_are_understood():
-    told = [re.findall(r"`((?:care-sim|make) [^`]*)`", line) for line in LINES]
+def test_the_index_of_the_rows_is_of_the_folders():
+    # An index that is not as the folders: python docs/results_index.py
+    index = loaded(ROOT / "docs" / "results_index.py").written()
+    assert index == (DATA / "README.md").read_text()
+
+
+def test_commands_beside_pictures_and_rows_are_understood():
+    rows = re.findall(r"^\| \[.*", (DATA / "README.md").read_text(), re.M)
+    told = [re.findall(r"`(care-sim [^`]*)`", line) for line in (*LINES, *rows)]
     assert all(told)
-    commands = [command for line in told for command in line if command.startswith("care-sim")]
-    for command in commands:
-        numbered = re.sub(r"\$\(seq (\d+) (\d+)\)", listed, re.sub(r"\bN\b", "0", command))
+    for command in (command for line in told for command in line):
+        numbered = re.sub(r"\$\(seq (\d+) (\d+)\)", listed, command)
         cli.parsed_command(shlex.split(numbered)[1:])
 
 
@@ -98,7 +95,7 @@ def test_how_many_tests_of_the_suite_are_of_a_kind_that_training_met():
     assert told.format(len({*kinds.values()}), len(known)) in page
 
     def avoided(name):
-        rows = read_result(FOLDER / f"leaderboard/{name}.json").of_part(TESTS, "measured")
+        rows = read_result(DATA / f"leaderboard/{name}.json").of_part(TESTS, "measured")
         return [sum(r.reached for r in rows if (r.world in known) == met) for met in (True, False)]
 
     told = "It avoids {} of the {}, and {} of the other {}."
@@ -132,7 +129,7 @@ def test_the_chart_of_the_headline_is_that_of_its_files_and_its_page_names_their
 
 def test_every_entry_of_the_leaderboard_stands_on_its_page_as_it_scores():
     page = (FOLDER / "benchmark.md").read_text()
-    entries = [read_result(file) for file in (FOLDER / "leaderboard").glob("*.json")]
+    entries = [read_result(file) for file in (DATA / "leaderboard").glob("*.json")]
     assert len(entries) > 10
     for score in (one.score() for one in entries if one.entry.policy != "full"):
         assert "{:.1f} [{:.1f}, {:.1f}]".format(*score) in page
@@ -140,17 +137,17 @@ def test_every_entry_of_the_leaderboard_stands_on_its_page_as_it_scores():
 
 def test_the_page_of_the_leaderboard_is_of_its_files(tmp_path, capsys):
     with pytest.raises(SystemExit) as end:
-        cli.main(["leaderboard", str(FOLDER / "leaderboard"), "--out", str(tmp_path)])
+        cli.main(["leaderboard", str(DATA / "leaderboard"), "--out", str(tmp_path)])
     assert end.value.code == 0
     capsys.readouterr()
     page = (tmp_path / "leaderboard.md").read_text()
-    assert page == (FOLDER / "leaderboard" / "leaderboard.md").read_text()
+    assert page == (DATA / "leaderboard" / "leaderboard.md").read_text()
 
 
 @pytest.mark.parametrize("page", ["docs/benchmark.md", "results/trust.md"])
 def test_on_another_processor_as_much_is_reached_by_other_cells(page):
     names = "care-units", "care-sightlines"
-    files = [read_result(FOLDER / f"leaderboard/{name}.json") for name in names]
+    files = [read_result(DATA / f"leaderboard/{name}.json") for name in names]
     assert len({*map(processor_of, files)}) == 2
     one, other = ({row[:3]: row for row in file.rows} for file in files)
     assert all(one[place].reached == other[place].reached for place in one)
@@ -167,7 +164,7 @@ def test_every_policy_is_on_the_leaderboard_or_its_page_says_why_not():
     section = (FOLDER / "benchmark.md").read_text().partition("\n## Who has no entry\n")[2]
     reasons = re.findall(r"^- ([^:]+):", section.partition("\n## ")[0], re.M)
     without = {name for reason in reasons for name in re.findall(r"`([\w-]+)`", reason)}
-    entries = [read_result(file) for file in (FOLDER / "leaderboard").glob("*.json")]
+    entries = [read_result(file) for file in (DATA / "leaderboard").glob("*.json")]
     entered = {one.entry.policy for one in entries}
     assert not without & entered
     assert without | entered == {*BUILT_IN}
@@ -175,7 +172,7 @@ def test_every_policy_is_on_the_leaderboard_or_its_page_says_why_not():
 
 @pytest.mark.parametrize("page", ["README.md", "docs/index.md"])
 def test_the_first_page_counts_the_collisions_of_other_drives(page):
-    rows = read_rows(FOLDER / "validate-drive" / EPISODES.file)
+    rows = read_rows(DATA / "validate-drive" / EPISODES.file)
     rows = [row for row in rows if row["budget"] == 0.03]
     seeds = {row["seed"] for row in rows if row["policy"] == "history"}
     hits = Counter(row["policy"] for row in rows if row["seed"] in seeds and row["collision"])

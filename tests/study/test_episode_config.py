@@ -171,28 +171,36 @@ def test_full_runs_once_for_all_budgets():
         ("care", 0.1),
         ("full", 1.0),
     ]
-    assert [plain["seeds"] for plain in listed_episodes(configs)["configurations"]] == [[0, 1]] * 3
+    told = listed_episodes(configs)["configurations"]
+    assert [(plain["policies"], plain["seeds"]) for plain in told] == [
+        (["care"], [0, 1]),
+        (["care"], [0, 1]),
+        (["full"], [0, 1]),
+    ]
 
 
 def test_what_all_configurations_have_alike_is_told_once():
     configs = [
-        *grid(["dense"], ["care"], (0.03, 0.1), (0, 1)),
+        *grid(["dense"], ["care", "history"], (0.03, 0.1), (0, 1)),
         *grid(["dense"], ["care"], (0.03,), (7,), camera_latency=1),
     ]
     told = listed_episodes(configs)
+    both = ["care", "history"]
     assert told["configurations"] == [
-        {"budget": 0.03, "camera_latency": 0, "seeds": [0, 1]},
-        {"budget": 0.1, "camera_latency": 0, "seeds": [0, 1]},
-        {"budget": 0.03, "camera_latency": 1, "seeds": [7]},
+        {"budget": 0.03, "camera_latency": 0, "seeds": [0, 1], "policies": both},
+        {"budget": 0.1, "camera_latency": 0, "seeds": [0, 1], "policies": both},
+        {"budget": 0.03, "camera_latency": 1, "seeds": [7], "policies": ["care"]},
     ]
     again = [
-        {**told["common"], **each, "seed": seed}
+        {**told["common"], **each, "seed": seed, "policy": policy}
         for each in told["configurations"]
+        for policy in each["policies"]
         for seed in each["seeds"]
     ]
-    assert [{k: v for k, v in one.items() if k != "seeds"} for one in again] == [
-        asdict(config) for config in configs
-    ]
+    plain = [{k: v for k, v in one.items() if k not in ("seeds", "policies")} for one in again]
+    assert sorted(map(str, map(sorted, map(dict.items, plain)))) == sorted(
+        str(sorted(asdict(config).items())) for config in configs
+    )
 
 
 def test_a_parameter_may_be_one_policys_own():

@@ -91,7 +91,14 @@ def run_study(
         if left:
             print_lines(left, file=sys.stderr)
         elif played:
-            _write([journal[config.key] for config in played], configs, folder, study, failures)
+            _write(
+                [journal[config.key] for config in played],
+                configs,
+                folder,
+                study,
+                failures,
+                command,
+            )
             forget(folder)
     return failures
 
@@ -107,9 +114,12 @@ def summary(failures: Sequence[Failure], unit: str) -> list[str]:
     ]
 
 
-def _description(configs: Sequence[RunConfig], study: Study, failures: Sequence[Failure]) -> str:
+def _description(
+    configs: Sequence[RunConfig], study: Study, failures: Sequence[Failure], command: str
+) -> str:
     settings = {
         "study": study.name,
+        "command": command,
         "versions": versions(),
         "machine": machine(),
         "failed": [*map(str, failures)],
@@ -187,6 +197,7 @@ def _write(
     folder: Path,
     study: Study,
     failures: Sequence[Failure],
+    command: str,
 ) -> None:
     """Write the results of a study: everything is made before the first file is replaced."""
     kind = study.results
@@ -196,7 +207,7 @@ def _write(
     kept = kind.kept_rows(rows)
     further = kind.further_files(rows)
     report = StudyReport.of(kept, study, left_out)
-    write_text(folder / CONFIG, _description(configs, study, failures))
+    write_text(folder / CONFIG, _description(configs, study, failures, command))
     for name, columns in further.items():
         write_columns(columns, folder / name)
     write_rows(kept, folder / kind.file, study.name, left_out, study.schema)

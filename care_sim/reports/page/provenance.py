@@ -109,7 +109,7 @@ def _unplayed(
     """What the configurations ask for and the rows do not hold. What failed is told as left out."""
     try:
         asked = sum(
-            len(each.get("seeds", each.get("floor_seeds")))
+            len(each.get("policies", [None])) * len(each.get("seeds", each.get("floor_seeds")))
             for each in description.get("configurations", ())
         )
         # Every configuration of the open loop is played in all scenes; the closed loop names none.

@@ -20,7 +20,7 @@ from care_sim.study.run_config import Row, RunConfig
 
 BENCHMARK_BUDGET = 0.01
 """Share of the cells: 164 of 16,384. With 2 and 3% a map without a camera is nearly as good in the
-closed loop (`results/validate-drive`, `results/validate-ncap`)."""
+closed loop (`results/data/validate-drive`, `results/data/validate-ncap`)."""
 MEASURED, IDEAL = CAMERAS = ("measured", "ideal")
 BLIND = "blind"
 """A camera that misses everything and makes no false box: no part of the suite, it tells how much

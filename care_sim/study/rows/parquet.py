@@ -58,7 +58,7 @@ def write_columns(
     # Arrow opens no file whose name is not UTF-8, so it gets files that are open.
     table = pa.table(typed).replace_schema_metadata(notes)
     with replacing(path) as unfinished, unfinished.open("wb") as file:
-        pq.write_table(table, file, write_page_checksum=True)
+        pq.write_table(table, file, compression="zstd", write_page_checksum=True)
 
 
 def check_columns(rows: Iterable[Row]) -> None:

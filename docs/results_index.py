@@ -1,0 +1,55 @@
+"""The index of the published rows, `results/data/README.md`, made from the folders.
+
+`python docs/results_index.py` writes it anew; a test says where it is not as the folders are.
+"""
+
+import json
+import re
+from pathlib import Path
+
+from pyarrow.parquet import read_metadata
+
+RESULTS = Path(__file__).parents[1] / "results"
+PAGE = RESULTS / "data" / "README.md"
+_HEAD = """# Published rows
+
+Every folder holds the rows of one study, its tables, and `config.json`: the command,
+configurations, seeds, versions, a hash of the code, the machine. `care-sim report FOLDER` makes all
+tables and figures again. [How to read the rows](../../docs/rows.md).
+
+Beside them lie `leaderboard`, the result files of the [benchmark](../benchmark.md)
+(`care-sim benchmark --policy NAME`; three with `--cell-order core-spread`), `judge-streets` and
+`judge-logs`, what `care-sim judge` says of [detectors](../detectors.md), and `bench.json` and
+`parity.json`, of `make bench` and `make parity`.
+
+| folder | command | rows | pages |
+|---|---|---|---|
+"""
+_ROWS = ("episodes.parquet", "plays.parquet", "vehicle.parquet")
+
+
+def written() -> str:
+    """The text of the index as the folders are now."""
+    pages = {
+        page: page.read_text(encoding="utf-8")
+        for page in sorted(RESULTS.glob("*.md"))
+        if page.name not in ("README.md", "findings.md")
+    }
+    lines = []
+    for path in sorted(PAGE.parent.glob("*/config.json")):
+        folder = path.parent
+        command = json.loads(path.read_text(encoding="utf-8"))["command"]
+        (rows,) = (
+            read_metadata(file).num_rows for file in map(folder.joinpath, _ROWS) if file.is_file()
+        )
+        cites = re.compile(rf"\(data/{folder.name}/")
+        cited = [
+            f"[{page.stem}](../{page.name})" for page, text in pages.items() if cites.search(text)
+        ]
+        name = f"[{folder.name}]({folder.name}/tables.md)"
+        lines.append(f"| {name} | `{command}` | {rows:,} | {', '.join(cited)} |\n")
+    return _HEAD + "".join(lines)
+
+
+if __name__ == "__main__":
+    PAGE.write_text(written(), encoding="utf-8")
