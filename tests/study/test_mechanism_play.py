@@ -7,7 +7,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.residual import wedges
 from care_sim.core.rig import Rig
 from care_sim.evaluation.sightings import Sightings
-from care_sim.policies.paper.care import Care
+from care_sim.policies.paper.reserves import Care
 from care_sim.sources.named import source_of
 from care_sim.sources.scenes import Scene
 from care_sim.study.mechanism_config import MechanismConfig, mechanism_plays
