@@ -10,8 +10,7 @@ from typing import NamedTuple, TypeGuard
 import numpy as np
 
 from care_sim.base.compiled import compiled
-from care_sim.batch.clearances import Clearances
-from care_sim.batch.impacts import Impacts
+from care_sim.batch.clearances import Clearances, Impacts
 from care_sim.batch.lane_columns import SPEED, LaneColumns
 from care_sim.batch.state import BatchState, Bodies, Egos, Passages, filled
 from care_sim.core.arrays import Floats, Integers, Mask

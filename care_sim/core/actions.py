@@ -22,7 +22,7 @@ NOT_FIRED, EXPLOITATION, RESERVE, FLOOR, CHOSEN, ALONG = range(len(SHARES))
 
 def scores_of(cells: Cells, shape: tuple[int, int], shots: Integers | int = 1) -> Action:
     """The action (E, A) that demands `cells` (n,); the earlier, the higher. Hardware that may fire
-    cells more than once (`care_sim.core.firing.energy`) fires each `shots` (n,) times at least, as
+    cells more than once (`care_sim.core.firing.base`) fires each `shots` (n,) times at least, as
     far as their sum does not exceed the budget; what is left of that goes on top.
 
     An action is float32. It keeps the order of 2^23 cells of one shot, and of 2^23 / (m (m + 1)) of

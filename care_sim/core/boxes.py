@@ -1,9 +1,15 @@
-"""What follows from boxes (n, 7): centre x, y, z, length, width, height, yaw."""
+"""Boxes (n, 7): centre x, y, z, length, width, height, yaw; and the azimuths and elevations that
+bound their hulls, which a dilated rectangle must hold.
+
+The sensor frame is level, so that boxes in it stand upright, whatever the tilt of the grid. Where
+the grid is tilted, the corners of the boxes are measured along its axes.
+"""
 
 import numpy as np
 
-from care_sim.core.arrays import Floats
+from care_sim.core.arrays import Floats, Mask
 from care_sim.core.frames import turned
+from care_sim.core.grid_kernels import silhouettes
 
 _AROUND = ((0.5, 0.5), (0.5, -0.5), (-0.5, -0.5), (-0.5, 0.5))
 _CORNERS = np.array([[x, y, z] for z in (-0.5, 0.5) for x, y in _AROUND])
@@ -33,3 +39,66 @@ def half_extents(boxes: Floats) -> tuple[Floats, Floats]:
     # The sides of a turned rectangle, each projected on the axis.
     cos, sin = np.abs(np.cos(yaw)), np.abs(np.sin(yaw))
     return (length * cos + width * sin) / 2, (length * sin + width * cos) / 2
+
+
+Bounds = tuple[Floats, Floats, Mask]
+"""(n, j) azimuths of every box, that of its centre first; (n, k) elevations; (n,) whether it stands
+around the axis about which azimuths are counted, and so covers every column."""
+
+
+def level_bounds(boxes: Floats) -> Bounds:
+    """The bounds of boxes (n, 7) on a level grid."""
+    # Angles are taken by NumPy here and not in the kernel: its arctangent differs from that of
+    # compiled code in the last bits, and published cells were made with it.
+    planar, upright, around = silhouettes(boxes)
+    azimuths = np.arctan2(planar[..., 1], planar[..., 0])
+    elevations = np.arctan2(upright[..., 0], upright[..., 1])
+    return azimuths, elevations, around
+
+
+def tilted_bounds(boxes: Floats, axes: Floats) -> Bounds:
+    """The bounds of boxes (n, 7) on a grid whose forward, left and up are the rows of `axes` (3, 3)
+    in the sensor frame.
+    """
+    # One product a box: that of all at once might round otherwise, by how many there are.
+    centres = (boxes[:, None, :3] @ axes.T)[:, 0]
+    return corner_bounds(centres, box_corners(boxes) @ axes.T)
+
+
+def corner_bounds(centres: Floats, corners: Floats) -> Bounds:
+    """The bounds of convex bodies with `corners` (n, 8, 3), joined as those of a box, and points
+    `centres` (n, 3) in their midst, all along the axes of the grid.
+    """
+    points = np.concatenate([centres[:, None], corners], axis=1)
+    azimuths = np.arctan2(points[..., 1], points[..., 0])
+
+    # Around the axis the corners leave no gap of half a turn between neighbours.
+    turns = np.sort(azimuths[:, 1:], axis=1)
+    gaps = np.diff(turns, axis=1, append=turns[:, :1] + 2 * np.pi)
+    around = gaps.max(axis=1) < np.pi
+
+    # A face has its highest and lowest elevation on its edges, for only at the poles is the
+    # elevation of a direction extreme. A box around the axis reaches the pole above or below.
+    extremes = np.concatenate([corners, _extreme_points(corners)], axis=1)
+    elevations = np.arctan2(extremes[..., 2], np.hypot(extremes[..., 0], extremes[..., 1]))
+    levels = corners[..., 2]
+    above = np.where(around & (levels.max(axis=1) > 0), np.pi / 2, elevations[:, 0])
+    below = np.where(around & (levels.min(axis=1) < 0), -np.pi / 2, elevations[:, 0])
+    return azimuths, np.column_stack([elevations, above, below]), around
+
+
+def _extreme_points(corners: Floats) -> Floats:
+    """(n, 12, 3) the point of every edge of boxes with `corners` (n, 8, 3) at which its elevation
+    is extreme, or the end that is nearest to it.
+    """
+    starts, ends = corners[:, BOX_EDGES[:, 0]], corners[:, BOX_EDGES[:, 1]]
+    ways = ends - starts
+    # At the share t of the way, z / hypot(x, y) is extreme where its derivative is 0. The terms
+    # with t^2 cancel out, so that there is one such t.
+    z, rise = starts[..., 2], ways[..., 2]
+    along = (starts * ways)[..., :2].sum(axis=-1)
+    beyond = rise * along - z * (ways[..., :2] ** 2).sum(axis=-1)
+    behind = z * along - rise * (starts[..., :2] ** 2).sum(axis=-1)
+    shares = np.divide(behind, beyond, out=np.zeros_like(z), where=beyond != 0)
+    points: Floats = starts + np.clip(shares, 0.0, 1.0)[..., None] * ways
+    return points

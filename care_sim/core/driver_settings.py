@@ -16,7 +16,7 @@ class DriverSettings:
 
     driver: str = one_of(FIXED, DRIVERS)
     """Who brakes: `fixed`, the controller of `care_sim.driving.braking`, or `careful-human`, the
-    driver model of UN Regulation 157 (`care_sim.driving.careful_human`).
+    driver model of UN Regulation 157 (`care_sim.driving.drivers`).
     """
     brake_mps2: float = bounded(5.0, 0.1, 20)
     """Deceleration b, m/s^2; 5 is the least that UN Regulation 152 asks of emergency braking."""

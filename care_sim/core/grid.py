@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats, Integers
-from care_sim.core.box_bounds import corner_bounds, level_bounds, tilted_bounds
+from care_sim.core.boxes import corner_bounds, level_bounds, tilted_bounds
 from care_sim.core.cell_sets import CellSets
 from care_sim.core.defaults import AZIMUTH_MARGIN, ELEVATION_MARGIN
 from care_sim.core.frames import Frame

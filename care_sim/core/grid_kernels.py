@@ -182,3 +182,15 @@ def _lay(cells: Integers, place: int, edges: Integers, grid: GridSpacing) -> int
             cells[place] = row * columns + column
             place += 1
     return place
+
+
+@compiled(brief=True)
+def copy_rows(rows: Floats, into: Floats) -> None:
+    """Copy `rows` (n, k) to the first n rows of `into` (m, k).
+
+    An assignment of slices does the same, but Numba compiles the text of its error along, which
+    takes seconds.
+    """
+    for n in range(rows.shape[0]):
+        for k in range(rows.shape[1]):
+            into[n, k] = rows[n, k]

@@ -40,11 +40,11 @@ class ReturnSettings:
     lidar_stated_reflectance: float = bounded(0.1, 0.001, 1)
     """Reflectance of the target at `lidar_stated_range_m`, 0 to 1; most data sheets take 0.1."""
     visibility_m: float = bounded(0.0, 0, 1_000_000)
-    """Meteorological visibility in fog, metres, 0.01 at least (`care_sim.sensors.weather`); 0 is
+    """Meteorological visibility in fog, metres, 0.01 at least (`care_sim.sensors.signal`); 0 is
     clear air. The cameras see on as before.
     """
     rain_mm_h: float = bounded(0.0, 0, 1000)
-    """Rain, millimetres per hour (`care_sim.sensors.weather`). The cameras see on as before."""
+    """Rain, millimetres per hour (`care_sim.sensors.signal`). The cameras see on as before."""
     lidar_divergence_mrad: float = bounded(0.0, 0, 100)
     """Angle between opposite edges of a beam, milliradians (`care_sim.sensors.bundle`). A beam may
     then meet several bodies. At 0 it is one ray.

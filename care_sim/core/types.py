@@ -243,7 +243,7 @@ class Demand:
     """The reserve layers in order of priority, each a sequence of sets of cells."""
     shots: Integers | None = None
     """(N,) how often at least every cell of the grid is to be fired if it is taken, of hardware
-    that may fire one more than once (`care_sim.core.firing.energy`); None for once. The allocator
+    that may fire one more than once (`care_sim.core.firing.base`); None for once. The allocator
     counts cells; the hardware deals the shots, no more than the budget, and what is left on top.
     """
 

@@ -3,12 +3,91 @@
 from collections.abc import Callable
 from typing import Protocol
 
+import numpy as np
+
 from care_sim.base.errors import InvalidInput
+from care_sim.base.times import LAST_BITS_S
+from care_sim.core.arrays import Mask
+from care_sim.core.boxes import half_extents
 from care_sim.core.driver_settings import BRAKING_RULES, CAREFUL_HUMAN, FIXED, DriverSettings
 from care_sim.core.types import Command, Ego, Tracks
 from care_sim.driving.braking import BrakingController
-from care_sim.driving.careful_human import CarefulHuman
+from care_sim.driving.corridor import in_strip
 from care_sim.driving.human_model import HUMAN_MODEL
+
+_STEADY_MPS = 0.1
+"""Slower sideways motion is none: a box that is 1 cm off between two keyframes moves as fast."""
+
+
+class CarefulHuman:
+    """Brakes on tracks. `front_m` and `half_width_m` are the ego's extents seen from its sensor,
+    metres; it cruises at `cruise_mps`.
+    """
+
+    def __init__(
+        self,
+        cruise_mps: float,
+        front_m: float,
+        half_width_m: float,
+        keyframe_s: float,
+        settings: DriverSettings,
+    ):
+        self.guarded_m = 2 * half_width_m
+        self._cruise_mps = cruise_mps
+        self._front_m = front_m
+        self._half_width_m = half_width_m
+        self._keyframe_s = keyframe_s
+        self._comfort_mps2 = settings.comfort_mps2
+        self._evaluated_s: dict[int, float] = {}
+        self._danger_s: float | None = None
+
+    def command(self, tracks: Tracks, ego: Ego) -> Command:
+        """Decide from the tracks of this keyframe, as they lie before a car that drives straight
+        ahead, and the ego's motion.
+        """
+        half_x, _ = half_extents(tracks.boxes)
+        risks = self._perceived(tracks, self._risky(tracks))
+        closing = ego.speed - tracks.velocities[:, 0]
+        if self._danger_s is None:
+            gaps = tracks.boxes[:, 0] - half_x - self._front_m
+            if np.any(risks & (closing > 0) & (gaps <= closing * HUMAN_MODEL.danger_s)):
+                self._danger_s = 0.0
+        else:
+            self._danger_s += self._keyframe_s
+            if not np.any(risks & (closing > 0)):
+                self._danger_s = None
+        return self._act(ego.speed, held=bool(np.any(risks)))
+
+    def _act(self, speed: float, held: bool) -> Command:
+        if self._danger_s is None:
+            comfort = 0.0 if held else self._comfort_mps2
+            wanted = (self._cruise_mps - speed) / self._keyframe_s
+            return Command(float(min(max(wanted, -comfort), comfort)), False)
+        # The mean over the keyframe, for which the car holds it.
+        ends = np.array([self._danger_s, self._danger_s + self._keyframe_s])
+        before, after = HUMAN_MODEL.speed_lost(ends)
+        return Command(float((before - after) / self._keyframe_s), True)
+
+    def _risky(self, tracks: Tracks) -> Mask:
+        """(n,) which tracks are in the way or cut in."""
+        half_x, _ = half_extents(tracks.boxes)
+        ahead = tracks.boxes[:, 0] + half_x > self._front_m
+        towards_mps = -np.sign(tracks.boxes[:, 1]) * tracks.velocities[:, 1]
+        off_its_lane = np.abs(tracks.boxes[:, 1]) < HUMAN_MODEL.lane_m - HUMAN_MODEL.wander_m
+        cuts_in = ahead & off_its_lane & (towards_mps > _STEADY_MPS)
+        return in_strip(tracks, self._front_m, self._half_width_m) | cuts_in
+
+    def _perceived(self, tracks: Tracks, risky: Mask) -> Mask:
+        """(n,) which tracks have been risky for as long as their evaluation takes."""
+        # The first keyframe begins the evaluation; a track that is risky no more begins anew.
+        known = self._evaluated_s
+        self._evaluated_s = {
+            track: known.get(track, -self._keyframe_s) + self._keyframe_s
+            for track in tracks.ids[risky].tolist()
+        }
+        least_s = HUMAN_MODEL.evaluation_s - LAST_BITS_S
+        evaluated = [self._evaluated_s.get(track, -1.0) for track in tracks.ids.tolist()]
+        return np.array(evaluated, dtype=float) >= least_s
 
 
 class Driver(Protocol):

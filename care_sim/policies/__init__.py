@@ -15,14 +15,8 @@ from care_sim.base.links import refuse_link
 from care_sim.base.plugins import Plugins
 from care_sim.base.vectors import attribute_of_each, shared_attribute
 from care_sim.policies.base import Policy
-from care_sim.policies.controls.fan import Fan
-from care_sim.policies.controls.history_place import HistoryPlace
-from care_sim.policies.controls.history_rows import HistoryRows
-from care_sim.policies.controls.place import Place
-from care_sim.policies.controls.place_hulls import PlaceHulls
-from care_sim.policies.controls.rows import Rows
-from care_sim.policies.controls.stride import Stride
-from care_sim.policies.controls.sweep import Sweep
+from care_sim.policies.controls.patterns import Fan, Place, Rows, Stride, Sweep
+from care_sim.policies.controls.patterns_and_tracks import HistoryPlace, HistoryRows, PlaceHulls
 from care_sim.policies.isolation import IsolatedMaker, are_isolated
 from care_sim.policies.learned.learned_scorer import LearnedScorer
 from care_sim.policies.learned.learned_sets import LearnedSets
@@ -39,19 +33,9 @@ from care_sim.policies.own.care_sector import CareSector
 from care_sim.policies.own.care_sightlines import CareSightlines
 from care_sim.policies.own.care_spread import CareSpread
 from care_sim.policies.own.care_units import CareUnits
-from care_sim.policies.paper.all_camera import AllCamera
-from care_sim.policies.paper.beam_reduce import BeamReduce
-from care_sim.policies.paper.care import Care
-from care_sim.policies.paper.care_priority import CarePriority
-from care_sim.policies.paper.care_sbf import CareSbf
-from care_sim.policies.paper.farthest_points import FarthestPoints
-from care_sim.policies.paper.full import Full
-from care_sim.policies.paper.history import History
-from care_sim.policies.paper.history_oracle import HistoryOracle
-from care_sim.policies.paper.history_uniform import HistoryUniform
-from care_sim.policies.paper.random import Random
-from care_sim.policies.paper.random_points import RandomPoints
-from care_sim.policies.paper.uncertainty import Uncertainty
+from care_sim.policies.paper.blind import BeamReduce, FarthestPoints, Full, Random, RandomPoints
+from care_sim.policies.paper.reserves import AllCamera, Care, CarePriority, CareSbf
+from care_sim.policies.paper.tracks import History, HistoryOracle, HistoryUniform, Uncertainty
 from care_sim.policies.vector import VectorPolicy
 from care_sim.policies.vector_rigs import policy_of_rigs
 
@@ -113,7 +97,7 @@ BUILT_IN |= {
     for name, place in {
         "seed-finder": "seed_finder:SeedFinder",
         "learned-place": "learned_place:LearnedPlace",
-        "history-learned-place": "history_learned_place:HistoryLearnedPlace",
+        "history-learned-place": "learned_place:HistoryLearnedPlace",
     }.items()
 }
 

@@ -15,7 +15,7 @@ import numpy as np
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.conditions import IDEAL_CAMERA, YOLOX_CAMERA, CameraFaults
 from care_sim.core.types import CLASSES
-from care_sim.sensors.detector_recall import RecallTable
+from care_sim.sensors.camera_errors import RecallTable
 
 
 @dataclass(frozen=True)

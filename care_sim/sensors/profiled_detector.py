@@ -8,13 +8,9 @@ from care_sim.core.arrays import Floats, Integers
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import ImageDetections
 from care_sim.sensors.annotated import IdentifiedDetections
-from care_sim.sensors.box_jitter import jittered
 from care_sim.sensors.box_pool import BoxPool
+from care_sim.sensors.camera_errors import Ghosts, PersistentDraws, confused, jittered, seen_as
 from care_sim.sensors.camera_profiles import CameraProfile
-from care_sim.sensors.class_confusion import confused
-from care_sim.sensors.detector_recall import seen_as
-from care_sim.sensors.ghosts import Ghosts
-from care_sim.sensors.persistent_draws import PersistentDraws
 
 _JITTERED = 4
 """A box's middle across and down, its width and its height."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.conditions import Sensing
-from care_sim.core.firing.shots import shots_by_cell
+from care_sim.core.firing.base import shots_by_cell
 from care_sim.core.grid import Cells
 from care_sim.core.grid_stack import Grid
 from care_sim.sensors.annotated import Cloud

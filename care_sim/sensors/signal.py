@@ -14,11 +14,12 @@ which it must count so many, it needs an nth of the power: the left side counts 
 clear air the reach grows with the square root of n. `docs/firing.md` has the sources.
 """
 
+import math
+
 import numpy as np
 
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.return_settings import ReturnSettings
-from care_sim.sensors.weather import fog_extinction, rain_extinction
 
 
 class Signal:
@@ -59,3 +60,24 @@ class Signal:
         np.divide(self._least * ranges**2, intensities, out=needed, where=met)
         fewest: Floats = np.maximum(np.ceil(needed), 1.0)
         return fewest
+
+
+KOSCHMIEDER = 3.912
+"""ln 50: at the meteorological visibility 2% of the contrast is left (Koschmieder 1924). Fog of a
+visibility below 500 m dims all light alike, near infrared too (Kim, McArthur and Korevaar 2001);
+beyond that near infrared is dimmed less, which is left out."""
+RAIN_DB_PER_KM, RAIN_POWER = 1.076, 0.67
+"""1.076 R^0.67 dB/km at R mm/h (Carbonneau and Wisely 1998; ITU-R P.1814)."""
+DB_PER_FACTOR_E = 10 / math.log(10)
+"""Decibels of a factor e of power, 4.343."""
+
+
+def fog_extinction(visibility_m: float) -> float:
+    """Extinction of fog per metre: 3.912 / V; 0 in clear air, which is written as 0 m."""
+    return KOSCHMIEDER / visibility_m if visibility_m else 0.0
+
+
+def rain_extinction(rain_mm_h: float) -> float:
+    """Extinction of rain per metre, 0 without rain."""
+    decibels_per_km: float = RAIN_DB_PER_KM * rain_mm_h**RAIN_POWER
+    return decibels_per_km / DB_PER_FACTOR_E / 1000

@@ -16,7 +16,7 @@ from care_sim.core.conditions import COLUMNS_WHERE_CHANGED, DEFAULTS, ClosedLoop
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.envs import ENVIRONMENT_IDS, make_scenario_env
 from care_sim.envs.closed_loop import KEYFRAME_S, ClosedLoopEnv
-from care_sim.envs.vector.coverage import why_separate
+from care_sim.envs.vector.arguments import why_separate
 from care_sim.perception.detectors import PROXY
 from care_sim.policies.base import PrivilegedPolicy
 from care_sim.scenarios import SCENARIOS, make_scenario
@@ -145,7 +145,7 @@ class EpisodeConfig(ClosedLoopConditions, RunConfig):
     @property
     def alone(self) -> bool:
         """Whether it is played by itself: for a privileged policy, which asks its own world for the
-        truth, and in worlds that are not played as arrays (`care_sim.envs.vector.coverage`).
+        truth, and in worlds that are not played as arrays (`care_sim.envs.vector.arguments`).
         """
         return bool(vars(self)["_alone"])
 

@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 from care_sim.base.errors import InvalidInput
 from care_sim.envs.sensing import Observed
 from care_sim.envs.spaces import checked_scores
-from care_sim.envs.vector.compiled_worlds import CompiledWorlds
-from care_sim.envs.vector.coverage import why_separate
-from care_sim.envs.vector.worlds import Stepped
+from care_sim.envs.vector.arguments import why_separate
+from care_sim.envs.vector.worlds import CompiledWorlds, Stepped
 from care_sim.policies.vector import vector_policy
 from care_sim.study.episode_config import EpisodeConfig, closed_loop
 from care_sim.study.episode_play import EpisodeHash, Played, result_or_reason, run_episode

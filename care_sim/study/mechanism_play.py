@@ -2,17 +2,128 @@
 
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
 
 import care_sim
+from care_sim.base.errors import InvalidInput
+from care_sim.core.arrays import Integers
+from care_sim.core.grid import Cells
+from care_sim.core.residual import camera_layers
 from care_sim.evaluation.allocation_differences import allocation_difference
-from care_sim.evaluation.ray_shares import RAY_SHARES
+from care_sim.evaluation.miss_reasons import miss_reason
+from care_sim.evaluation.ray_shares import RAY_SHARES, ServedDemand, rays_by_share
+from care_sim.evaluation.reserve_use import ReserveUse, reserve_use
 from care_sim.evaluation.sightings import Sightings
-from care_sim.study.accounted_play import Account, account_play
+from care_sim.loops.film import Film
+from care_sim.study.appearances import NewObject, new_objects
 from care_sim.study.episode_play import peak_rss_mb, result_or_reason
 from care_sim.study.mechanism_config import MechanismConfig
+from care_sim.study.play_config import PlayConfig
 from care_sim.study.run_config import FULL, Row
 from care_sim.study.scene_play import film_hash
-from care_sim.study.shared_belief import SharedBelief, share_belief
+
+FOUND = ""
+"""Stands for a reason where nothing was missed."""
+
+
+@dataclass(frozen=True)
+class Account:
+    """Event by event, e of them in the order of `Sightings.events`: the censored times to first
+    detection `delays` in keyframes, the `reasons` why they were missed at their first keyframe,
+    `FOUND` where they were not, the marks 1 or 0 of those that had a track already (`tracked`), and
+    `rays` (e, 5) by share of those that hit them at that keyframe.
+    """
+
+    keyframes: int
+    delays: list[int]
+    reasons: list[str]
+    tracked: list[int]
+    rays: Integers
+
+
+def account_play(config: PlayConfig, film: Film, sightings: Sightings) -> Account:
+    """Play a policy through the film of its scene, and account for its rays.
+
+    Raises InvalidInput for a policy that answers without a demand.
+    """
+    reasons: list[str] = []
+    tracked: list[int] = []
+    rays = [np.empty((0, len(RAY_SHARES)), np.int64)]
+    with config.make_env(film) as env:
+        policy = config.make_policy(env)
+        observation, _ = env.reset(seed=config.scene.seed)
+        policy.reset()
+        rig = env.rig
+        while not env.loop.over:
+            entries = new_objects(env.loop, rig.read(observation), sightings)
+            observation, *_ = env.step(policy(observation))
+            if not entries:
+                continue
+            if policy.demanded is None:
+                raise InvalidInput(
+                    f"policy {config.policy} states no demand, without which its rays cannot be "
+                    "accounted for"
+                )
+            fired = env.keyframes[-1].fired
+            served = ServedDemand.of(policy.demanded, fired, rig)
+            for new in entries:
+                seen = new.appearance
+                reasons.append(miss_reason(seen, served, config.min_returns))
+                tracked.append(int(seen.tracked))
+                rays.append(rays_by_share(seen.returns, served)[None])
+        delays = env.score.delays.tolist()
+        keyframes = len(env.keyframes)
+    # A reason was worked out for every event; only those of misses stand.
+    told = [reason if delay else FOUND for reason, delay in zip(reasons, delays, strict=True)]
+    return Account(keyframes, delays, told, tracked, np.concatenate(rays))
+
+
+@dataclass
+class SharedBelief:
+    """What happened while one policy drove through a film.
+
+    `fired` are the cells of every keyframe by the name of the policy, `received` how many of them
+    lie in the hull of each new object; `entries` are those objects, and `reserve` what the camera's
+    wedges made of the reserve.
+    """
+
+    fired: dict[str, list[Cells]]
+    received: dict[str, list[int]]
+    entries: list[NewObject] = field(default_factory=list)
+    reserve: ReserveUse = field(default_factory=ReserveUse)
+
+
+def share_belief(
+    driver: PlayConfig, others: Sequence[PlayConfig], film: Film, sightings: Sightings
+) -> SharedBelief:
+    """Let the `driver` play its film, and ask the `others` at every keyframe what they would fire
+    there. They have its budget and its conditions.
+    """
+    with driver.make_env(film) as env:
+        policies = {config.policy: config.make_policy(env) for config in (*others, driver)}
+        observation, _ = env.reset(seed=driver.scene.seed)
+        for policy in policies.values():
+            policy.reset()
+        shared = SharedBelief({name: [] for name in policies}, {name: [] for name in policies})
+        rig = env.rig
+        while not env.loop.over:
+            # What the policies make of the observation, in its precision.
+            belief = rig.read(observation)
+            entries = new_objects(env.loop, belief, sightings)
+            layers = camera_layers(belief, rig)
+            hulls = rig.hulls(belief.tracks.boxes)
+            shared.reserve += reserve_use(hulls, *layers, rig.budget, rig.reserve_fraction)
+            actions = {name: policy(observation) for name, policy in policies.items()}
+            for name, action in actions.items():
+                fired = env.would_fire(action)
+                shared.fired[name].append(fired)
+                shared.received[name] += [int(np.isin(new.hull, fired).sum()) for new in entries]
+            shared.entries += entries
+            observation, *_ = env.step(actions[driver.policy])
+    return shared
+
 
 ACCOUNT_COLUMNS = ("ttfds", "misses", "tracked", *(f"rays_{share}" for share in RAY_SHARES))
 """What every row says of the events of its own play, in order."""

@@ -1,15 +1,22 @@
 """An environment whose episodes differ in what they are played in."""
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from typing import Any
 
 import gymnasium
+import numpy as np
+from numpy.typing import NDArray
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.grid_stack import Grid
 from care_sim.core.rig import Rig
-from care_sim.envs.sensing import SensingEnv, sensing
-from care_sim.training.draws import Draw, drawn
+from care_sim.envs.scenes import StreetEnv
+from care_sim.envs.sensing import Observed, SensingEnv, sensing
+from care_sim.envs.wrappers.grid_observation import GridArrays
+from care_sim.policies.learned.grid_features import EGO_INPUTS
+from care_sim.sources.street_films import street_film
+from care_sim.training.draws import STREETS, Draw, drawn
 
 AnyEnv = gymnasium.Env[Any, Any]
 
@@ -82,3 +89,75 @@ class DrawnEnv(gymnasium.Env[Any, Any]):
         # wrappers of learners all spaces are the same.
         self.observation_space = self._env.observation_space
         self.action_space = self._env.action_space
+
+
+# Those of the training and those of the validation.
+_film = lru_cache(maxsize=2 * STREETS)(street_film)
+
+
+class DrawnStreet(StreetEnv):
+    """The street of the seed `street` in every episode; the seed of `reset` draws faults, noise and
+    floor.
+    """
+
+    def __init__(self, street: int, **parameters: Any):
+        super().__init__(**parameters)
+        self._street = street
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observed, dict[str, Any]]:
+        """Begin an episode in the street."""
+        self._reseed(seed, options)
+        film = _film(self._street, self._secret, self._setup, self.conditions.filmed)
+        return self._start(film, self._draw_entropy(seed))
+
+
+_YAW_RATE = EGO_INPUTS.index("yaw_rate")
+_LAST_BITS = 1e-9
+
+
+class Mirrored(gymnasium.Wrapper[GridArrays, NDArray[np.float32], Any, Any]):
+    """Shows the pictures of `GridObservation` reflected at the plane through the middle of the car,
+    and reflects the scores of sectors back. `shape` (channels, rows, columns) is that of the
+    pictures.
+
+    So it fits every environment, and a learner meets either side as often. Raises InvalidInput for
+    a LiDAR that is not the same on both sides.
+    """
+
+    def __init__(self, env: gymnasium.Env[Any, Any], shape: tuple[int, int, int]):
+        super().__init__(env)
+        self._shape = shape
+        if not _is_symmetric(sensing(env).rig):
+            raise InvalidInput(
+                "sides can be drawn only of a LiDAR that stands in the middle of the car and is "
+                "alike on both"
+            )
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[GridArrays, dict[str, Any]]:
+        """Begin an episode."""
+        observation, info = self.env.reset(seed=seed, options=options)
+        return self._reflected(observation), info
+
+    def step(
+        self, action: NDArray[np.float32]
+    ) -> tuple[GridArrays, Any, bool, bool, dict[str, Any]]:
+        """Go on to the next keyframe."""
+        observation, reward, terminated, truncated, info = self.env.step(action[:, ::-1])
+        return self._reflected(observation), reward, terminated, truncated, info
+
+    def _reflected(self, observation: GridArrays) -> GridArrays:
+        grid = observation["grid"].reshape(self._shape)[..., ::-1].ravel()
+        ego = observation["ego"].copy()
+        ego[_YAW_RATE] *= -1
+        return {"grid": grid, "ego": ego}
+
+
+def _is_symmetric(rig: Rig) -> bool:
+    """Whether the grid's columns on the left are those on the right, reflected."""
+    directions = rig.grid.directions.reshape(*rig.grid.shape, 3)
+    reflected = directions[:, ::-1] * (1, -1, 1)
+    return not rig.sensor_y_m and bool(np.abs(directions - reflected).max() < _LAST_BITS)

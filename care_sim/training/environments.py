@@ -18,10 +18,8 @@ from care_sim.envs.wrappers.vector_sector_actions import VectorSectorReserve, Ve
 from care_sim.envs.wrappers.vectors import AnyVector
 from care_sim.training.chances import MissedChances
 from care_sim.training.config import AgentConfig
-from care_sim.training.drawn_env import DrawnEnv
-from care_sim.training.drawn_street import DrawnStreet
+from care_sim.training.drawn_env import DrawnEnv, DrawnStreet, Mirrored
 from care_sim.training.draws import Draw, drawn
-from care_sim.training.mirroring import Mirrored
 from care_sim.training.seeds import TrainingSeeds, VectorTrainingSeeds, validation_seeds
 
 if TYPE_CHECKING:

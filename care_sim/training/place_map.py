@@ -16,7 +16,7 @@ from care_sim.core.grid import AngularGrid, Cells
 from care_sim.envs.open_loop import FilmEnv
 from care_sim.loops.film import Film
 from care_sim.policies.learned.weights import Card, save_weights
-from care_sim.policies.paper.full import Full
+from care_sim.policies.paper.blind import Full
 from care_sim.sensors.setups import DEFAULT_SETUP, sensor_setup
 from care_sim.sources.street_films import street_film
 from care_sim.streets.street import CALIBRATION_SEEDS

@@ -34,7 +34,7 @@ from care_sim.evaluation.sightings import RANGE_M
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.open_loop import OpenLoop
 from care_sim.policies.learned.cell_inputs import CellInputs, Float32s
-from care_sim.policies.paper.history import History
+from care_sim.policies.paper.tracks import History
 from care_sim.sources.street_films import street_film
 from care_sim.training.drawn_worlds import (
     AnyEnv,

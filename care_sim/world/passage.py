@@ -1,5 +1,6 @@
 """What happens to the ego while its world moves on from one keyframe to the next."""
 
+import math
 from collections.abc import Callable, Mapping
 
 import numpy as np
@@ -9,8 +10,8 @@ from care_sim.world.approach import ClosestApproach, Impact
 from care_sim.world.bodies import BodyKind
 from care_sim.world.body_tables import Footprints
 from care_sim.world.bullet import BulletWorld
-from care_sim.world.clearance_judge import CONTACT_REACH_M, judge_here
-from care_sim.world.least_clearance import LeastClearance
+from care_sim.world.clearance_judge import CONTACT_REACH_M, ClearanceJudge, judge_here
+from care_sim.world.gaps import PADDING_M, least_gap
 
 
 class Passage:
@@ -71,3 +72,32 @@ class Passage:
                 boxes = self._footprints.boxes
                 return Impact.on(body, kind.name, boxes, self._ego, speed_mps, velocity)
         return None
+
+
+class LeastClearance:
+    """Between the hulls of an `ego` and an `other` body of these kinds, at the moments that were
+    noted.
+    """
+
+    def __init__(self, judge: ClearanceJudge, ego: BodyKind, other: BodyKind):
+        self._judge = judge
+        self._kinds = ego, other
+        self._moments: list[tuple[float, Floats]] = []
+
+    def note(self, boxes: Floats, poses: Floats) -> None:
+        """Note where the two are now: the boxes (2, 7) that hold them, and their poses (2, 7) as in
+        `care_sim.world.body_tables.Primitives.poses`.
+        """
+        self._moments.append((least_gap(*boxes) - PADDING_M, poses))
+
+    def metres(self) -> float:
+        """The least clearance of all moments; negative when the hulls overlapped."""
+        # First the moment at which they could be nearest. Whoever was farther apart than what is
+        # found by then need not be asked about.
+        least = math.inf
+        for at_least, poses in sorted(self._moments, key=lambda moment: moment[0]):
+            if at_least > least:
+                break
+            stand_ins = self._judge.stand_ins(*self._kinds)
+            least = min(least, self._judge.clearance(stand_ins, poses))
+        return least

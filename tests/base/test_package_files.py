@@ -25,7 +25,7 @@ from functools import cache, partial
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from types import SimpleNamespace
-from care_sim.policies.paper.history import History
+from care_sim.policies.paper.tracks import History
 """
 MINE = HEAD + "class Mine(History):\n    pass\n"
 MAKE = "def make(rig):\n    return Mine(rig)\n"

@@ -6,8 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from care_sim.batch.camera_faults import BatchDelay, BatchMisses, Detected
-from care_sim.batch.drawn_ahead import DrawnAhead
+from care_sim.batch.camera_faults import BatchDelay, BatchMisses, Detected, DrawnAhead
 from care_sim.batch.loading import load
 from care_sim.batch.sight import Sight
 from care_sim.batch.state import BatchState

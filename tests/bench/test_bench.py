@@ -19,7 +19,7 @@ from care_sim.core.rig import Rig
 from care_sim.envs import CLOSED_LOOP
 from care_sim.envs.spaces import observation_space
 from care_sim.policies.learned.weights import load_weights, shipped_weights
-from care_sim.policies.paper.care import Care
+from care_sim.policies.paper.reserves import Care
 from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.sensors.engines import ENGINES
 from care_sim.world.bodies import CATALOGUE

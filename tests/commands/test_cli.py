@@ -501,7 +501,7 @@ def test_a_fault_of_the_software_is_one_line_and_its_trace_is_to_be_had(fault, c
 _FAULTY = """
 import numpy
 from dataclasses import dataclass
-from care_sim.policies.paper.history import History
+from care_sim.policies.paper.tracks import History
 from care_sim.base.errors import InvalidInput
 from care_sim.scenarios.dartout import Dartout
 from care_sim.sources.scenes import Generated

@@ -150,7 +150,7 @@ def test_a_study_that_cannot_be_shown_replaces_nothing(folder, monkeypatch):
 
 MOODY = """
 from pathlib import Path
-from care_sim.policies.paper.history import History
+from care_sim.policies.paper.tracks import History
 
 class Moody(History):
     def demand(self, belief):

@@ -105,7 +105,7 @@ def test_bad_options_are_refused_before_anything_is_played(
 
 SPY = """
 import gc, gymnasium
-from care_sim.policies.paper.care import Care
+from care_sim.policies.paper.reserves import Care
 
 class Spy(Care):
     def demand(self, belief):

@@ -5,7 +5,7 @@ import os, signal, threading, time
 from pathlib import Path
 import numpy as np
 from care_sim.core.types import Demand
-from care_sim.policies.paper.history import History
+from care_sim.policies.paper.tracks import History
 
 class Dies(History):
     def demand(self, belief):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from care_sim.sources.nuscenes.films import nuscenes_film
-from care_sim.sources.nuscenes.splits import scenes
+from care_sim.sources.nuscenes.recordings import split_scenes
 from care_sim.sources.nuscenes.tables import Database
 from tests.helpers.nuscenes_database import annotated, as_recorded, pose, write
 
@@ -24,5 +24,5 @@ def database(folder, samples=None):
 
 def first(root, **options):
     tables = Database(root)
-    (scene,) = scenes(tables)
+    (scene,) = split_scenes(tables)
     return nuscenes_film(tables, scene, **options)

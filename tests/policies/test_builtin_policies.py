@@ -17,7 +17,7 @@ from care_sim.core.forgetting import ForgettingRules
 from care_sim.core.rig import Rig
 from care_sim.core.types import Ego
 from care_sim.envs import CLOSED_LOOP
-from care_sim.policies.paper.care_sbf import CareSbf
+from care_sim.policies.paper.reserves import CareSbf
 
 CAMERA_POLICIES = ["care", "all-camera", "care-priority", "care-sbf"]
 

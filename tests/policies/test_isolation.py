@@ -18,10 +18,10 @@ from care_sim.study.provenance import policy_digest
 from tests.helpers.descendants import until
 
 POLICIES = [
-    "care_sim.policies.paper.care:Care",
-    "care_sim.policies.paper.random:Random",
+    "care_sim.policies.paper.reserves:Care",
+    "care_sim.policies.paper.blind:Random",
     "care_sim.policies.own.care_spread:CareSpread",
-    "care_sim.policies.controls.history_learned_place:HistoryLearnedPlace",
+    "care_sim.policies.controls.learned_place:HistoryLearnedPlace",
 ]
 """With a memory, with a generator, told a setting, told a scenario."""
 SPY = """

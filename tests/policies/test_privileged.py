@@ -16,7 +16,7 @@ from care_sim.core.belief import Belief
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.policies import BUILT_IN, tags_of
 from care_sim.policies.base import PrivilegedPolicy
-from care_sim.policies.paper.farthest_points import FarthestPoints
+from care_sim.policies.paper.blind import FarthestPoints
 from care_sim.world.bullet import BulletWorld
 from care_sim.world.world import World
 

@@ -10,8 +10,8 @@ from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.core.residual import camera_layers
 from care_sim.core.types import Ego
-from care_sim.policies.paper.beam_reduce import horizon_rows
-from care_sim.policies.paper.history_uniform import uniform_pattern
+from care_sim.policies.paper.blind import horizon_rows
+from care_sim.policies.paper.tracks import uniform_pattern
 
 GRID = AngularGrid()
 

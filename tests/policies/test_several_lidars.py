@@ -9,14 +9,12 @@ from care_sim.core.grid import AngularGrid
 from care_sim.core.grid_stack import GridStack
 from care_sim.core.rig import Rig
 from care_sim.core.types import Ego, ImageDetections, Tracks
-from care_sim.policies.controls.fan import Fan
-from care_sim.policies.controls.rows import cells_by_row, entry_cells, entry_elevation_deg
+from care_sim.policies.controls.patterns import Fan, cells_by_row, entry_cells, entry_elevation_deg
 from care_sim.policies.learned.cell_inputs import CellInputs
 from care_sim.policies.learned.grid_features import CHANNELS, GridFeatures
 from care_sim.policies.learned.tiling import Tiling
-from care_sim.policies.own.sector import AHEAD_RAD, columns_ahead
-from care_sim.policies.own.sight_lines import SightLines
-from care_sim.policies.paper.beam_reduce import horizon_rows
+from care_sim.policies.own.sight_lines import AHEAD_RAD, SightLines, columns_ahead
+from care_sim.policies.paper.blind import horizon_rows
 from tests.helpers.lidars import DEGREE, ROOF, STACK
 
 RIG = Rig(STACK, budget=100, sensor_height_m=1.8)

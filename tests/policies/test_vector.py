@@ -21,8 +21,8 @@ from care_sim.core.world_sets import WorldSets
 from care_sim.envs.sensing import sensing
 from care_sim.policies import BUILT_IN
 from care_sim.policies.base import FixedPolicy, PrivilegedPolicy, RowPolicy
-from care_sim.policies.paper.care import Care
-from care_sim.policies.paper.random import Random
+from care_sim.policies.paper.blind import Random
+from care_sim.policies.paper.reserves import Care
 from care_sim.policies.vector import vector_policy
 
 WORLDS = 3

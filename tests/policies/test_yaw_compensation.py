@@ -7,7 +7,7 @@ import care_sim
 from care_sim.base.errors import InvalidInput
 from care_sim.core.belief import Belief
 from care_sim.core.types import Ego
-from care_sim.policies.paper.care import Care
+from care_sim.policies.paper.reserves import Care
 
 TURN = np.deg2rad(20.0)
 

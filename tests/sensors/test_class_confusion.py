@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from care_sim.core.types import CLASSES
+from care_sim.sensors.camera_errors import confused
 from care_sim.sensors.camera_profiles import YOLOX
-from care_sim.sensors.class_confusion import confused
 
 MATRIX = YOLOX.confusion_matrix()
 BICYCLE, PEDESTRIAN = CLASSES.index("bicycle"), CLASSES.index("pedestrian")

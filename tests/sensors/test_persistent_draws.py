@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from care_sim.sensors.persistent_draws import PersistentDraws
+from care_sim.sensors.camera_errors import PersistentDraws
 
 KEYFRAME_S = 0.1
 

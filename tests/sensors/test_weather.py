@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from care_sim.sensors.weather import fog_extinction, rain_extinction
+from care_sim.sensors.signal import fog_extinction, rain_extinction
 
 
 def test_at_the_visibility_two_per_cent_of_the_light_are_left():

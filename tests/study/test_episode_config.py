@@ -121,7 +121,7 @@ def package(tmp_path, monkeypatch):
     info.mkdir()
     (tmp_path / "ours_policy" / "__init__.py").touch()
     (tmp_path / "ours_policy" / "near.py").write_text(
-        "from care_sim.policies.paper.history import History as Near\n"
+        "from care_sim.policies.paper.tracks import History as Near\n"
     )
     (tmp_path / "ours_policy" / "table.csv").write_text("1\n")
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: ours\nVersion: 1.0\n")

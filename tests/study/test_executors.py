@@ -30,7 +30,7 @@ CONFIGS = [
 
 THIRD_PARTY = """
 import os
-from care_sim.policies.paper.history import History
+from care_sim.policies.paper.tracks import History
 
 class Dies(History):
     def demand(self, belief):

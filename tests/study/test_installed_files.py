@@ -22,7 +22,7 @@ from care_sim.study.runner import run_all
 HEAD = """
 from pathlib import Path
 import numpy as np
-from care_sim.policies.paper.beam_reduce import BeamReduce
+from care_sim.policies.paper.blind import BeamReduce
 HERE = Path(__file__).parent
 """
 BODY = """
@@ -267,7 +267,7 @@ def test_of_a_policy_by_its_place_code_counts_and_what_lies_beside_it_does_not(
     """A log that the shell writes there must not end the study that it tells of."""
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr("sys.dont_write_bytecode", True)
-    source = "import placed_help\nfrom care_sim.policies.paper.history import History as Mine\n"
+    source = "import placed_help\nfrom care_sim.policies.paper.tracks import History as Mine\n"
     (tmp_path / "placed.py").write_text(source)
     (tmp_path / "placed_help.py").write_text("margin = 1")
     (tmp_path / "log.txt").write_text("one line")

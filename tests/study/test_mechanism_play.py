@@ -7,14 +7,18 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.residual import wedges
 from care_sim.core.rig import Rig
 from care_sim.evaluation.sightings import Sightings
-from care_sim.policies.paper.care import Care
+from care_sim.policies.paper.reserves import Care
 from care_sim.sources.named import source_of
 from care_sim.sources.scenes import Scene
-from care_sim.study.accounted_play import account_play
 from care_sim.study.mechanism_config import MechanismConfig, mechanism_plays
-from care_sim.study.mechanism_play import BELIEF_MARKS, BELIEF_SUMS, play_mechanism
+from care_sim.study.mechanism_play import (
+    BELIEF_MARKS,
+    BELIEF_SUMS,
+    account_play,
+    play_mechanism,
+    share_belief,
+)
 from care_sim.study.play_config import PlayConfig
-from care_sim.study.shared_belief import share_belief
 from tests.helpers.handmade_film import (
     BEHIND,
     BESIDE,

@@ -21,7 +21,7 @@ from care_sim.study.rows.parquet import read_rows, write_rows
 from care_sim.study.rows.reading import policy_of
 
 ANYTHING = """
-from care_sim.policies.paper.history import History
+from care_sim.policies.paper.tracks import History
 
 def anything(rig, **given):
     return History(rig)

@@ -1,4 +1,7 @@
-"""What hardware is: cells that fire together, and a choice of them for what is demanded."""
+"""What hardware is: cells that fire together, and a choice of them for what is demanded.
+
+Hardware may fire a cell more than once: it then stands as often among what fired.
+"""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -104,3 +107,15 @@ def demanded(scores: NDArray[Any]) -> Cells:
     falling = (~flat[cells].view(np.uint32)).astype(np.uint64)
     keys = np.sort(falling << np.uint64(32) | cells.astype(np.uint64))
     return (keys & np.uint64(0xFFFFFFFF)).astype(np.int64)
+
+
+def shots_by_cell(fired: Cells, size: int) -> tuple[Cells, Integers | None]:
+    """The cells (n,) of what `fired`, ascending, each once, and (size,) how often each cell of a
+    grid of that size fires; None where none fires more than once, as with all but one hardware.
+    """
+    again = fired[1:] == fired[:-1]
+    # Asked at every keyframe of every hardware: a count of all cells would take much longer.
+    if not again.any():
+        return fired, None
+    shots = np.bincount(fired, minlength=size)
+    return np.flatnonzero(shots), shots

@@ -4,15 +4,10 @@ import re
 from collections.abc import Callable
 
 from care_sim.base.errors import InvalidInput, shown
-from care_sim.core.firing.azimuth_window import AzimuthWindow
 from care_sim.core.firing.base import Hardware
-from care_sim.core.firing.energy import Energy
-from care_sim.core.firing.free_cells import FreeCells
-from care_sim.core.firing.ring_segments import RingSegments
-from care_sim.core.firing.tiles import Tiles
-from care_sim.core.firing.vertical_window import VerticalWindow
-from care_sim.core.firing.whole_columns import WholeColumns
-from care_sim.core.firing.whole_rows import WholeRows
+from care_sim.core.firing.free_cells import Energy, FreeCells
+from care_sim.core.firing.units import RingSegments, Tiles, WholeColumns, WholeRows
+from care_sim.core.firing.windows import AzimuthWindow, VerticalWindow
 from care_sim.core.grid_stack import Grid
 
 HARDWARE: dict[str, type[Hardware]] = {

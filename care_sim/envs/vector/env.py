@@ -21,15 +21,10 @@ from care_sim.core.types import Action
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.envs.sensing import Observed
 from care_sim.envs.spaces import checked_scores
-from care_sim.envs.vector.arguments import Maker, autoreset_of, makers_of, models_of
-from care_sim.envs.vector.compiled_worlds import CompiledWorlds
-from care_sim.envs.vector.coverage import why_separate
-from care_sim.envs.vector.infos import joined, kept
-from care_sim.envs.vector.resets import seeds_of, worlds_to_reset
-from care_sim.envs.vector.same_step import last_rows, same_step
-from care_sim.envs.vector.separate_worlds import SeparateWorlds
+from care_sim.envs.vector.arguments import Maker, autoreset_of, makers_of, models_of, why_separate
+from care_sim.envs.vector.steps import joined, kept, last_rows, same_step, seeds_of, worlds_to_reset
 from care_sim.envs.vector.threads import Threads
-from care_sim.envs.vector.worlds import Stepped, Worlds
+from care_sim.envs.vector.worlds import CompiledWorlds, SeparateWorlds, Stepped, Worlds
 from care_sim.scenarios.base import Scenario
 
 MOST_WORLDS = 2**16

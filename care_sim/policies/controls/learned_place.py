@@ -10,15 +10,46 @@ from typing import ClassVar
 
 import numpy as np
 
-from care_sim.base.checks import check_whole
+from care_sim.base.checks import check_known, check_whole
 from care_sim.base.seed_ranges import training_seeds
+from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
+from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.loops.seeds import EpisodeSeeds
 from care_sim.policies.base import FixedPolicy
-from care_sim.policies.controls.place import likeliest_first
-from care_sim.policies.controls.rehearsal import known_scenario, rehearsal
+from care_sim.policies.controls.patterns import likeliest_first
+from care_sim.policies.controls.patterns_and_tracks import HistoryPattern
+from care_sim.scenarios import SCENARIOS, make_scenario
 from care_sim.scenarios.base import Scenario
+
+FALLBACK_SCENARIO = "dense"
+"""What is rehearsed where no scenario is told, as in the open loop."""
+
+
+def known_scenario(told: Scenario | str | None) -> Scenario:
+    """The scenario of the environment, or one by name with its default arguments.
+
+    Raises InvalidInput for an unknown name.
+    """
+    if isinstance(told, Scenario):
+        return told
+    name = FALLBACK_SCENARIO if told is None else told
+    check_known("scenario", name, SCENARIOS)
+    return make_scenario(name)
+
+
+def rehearsal(scenario: Scenario, seed: int, rig: Rig) -> ClosedLoop:
+    """The episode of a seed before its first keyframe, as an environment without faults builds it.
+
+    The caller closes its world.
+    """
+    seeds = EpisodeSeeds.of(seed)
+    world = scenario.make_world(np.random.default_rng(seeds.scenario))
+    # A rig that was made alone may have no camera; the scenario's environment has these.
+    equipped = rig if rig.cameras else replace(rig, cameras=scenario.cameras)
+    return ClosedLoop(world, equipped, ClosedLoopConditions(), seeds.sensors)
 
 
 class LearnedPlace(FixedPolicy):
@@ -81,3 +112,17 @@ def _first_hull(rig: Rig, scenario: Scenario, seed: int) -> Cells:
             hit = record.impact_speed_mps is not None
             over = hit or world.is_over() or world.time >= scenario.duration_s
     return np.zeros(0, np.int64)
+
+
+class HistoryLearnedPlace(HistoryPattern):
+    """The hulls of the history policy; the reserve goes to the map of `learned-place`, of which it
+    has the parameters.
+    """
+
+    name = "history-learned-place"
+    tags = ("causal", "learned", "control")
+    source = "own: history, and a map of the scenario's training seeds that never changes"
+    told: ClassVar[Mapping[str, str]] = {"scenario": "scenario"}
+
+    def __init__(self, rig: Rig, scenario: Scenario | str | None = None, seeds: int = 10):
+        super().__init__(LearnedPlace(rig, scenario, seeds))

@@ -16,7 +16,7 @@ from care_sim.core.frames import Frame
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
-from care_sim.policies.controls.rehearsal import known_scenario, rehearsal
+from care_sim.policies.controls.learned_place import known_scenario, rehearsal
 from care_sim.scenarios.base import Scenario
 from care_sim.world.world import World
 

@@ -25,7 +25,7 @@ from care_sim.policies.learned.cell_kernels import (
     mark_scan,
     mark_sets,
 )
-from care_sim.policies.paper.uncertainty import GROUND_CLEARANCE_M
+from care_sim.policies.paper.tracks import GROUND_CLEARANCE_M
 
 CELL_MARKS = (
     "in the wedge of a camera detection that no forecast explains",

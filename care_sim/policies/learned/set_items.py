@@ -19,8 +19,8 @@ from care_sim.policies.learned.set_kernels import (
     look_at_strips,
     look_back,
 )
-from care_sim.policies.own.rounds import CORE_FIRST
-from care_sim.policies.paper.uncertainty import GROUND_CLEARANCE_M
+from care_sim.policies.own.care_spread import CORE_FIRST
+from care_sim.policies.paper.tracks import GROUND_CLEARANCE_M
 
 LOOKED_AT = 24
 """So many cells of an item tell what the last scan found there."""

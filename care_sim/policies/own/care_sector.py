@@ -9,10 +9,10 @@ from care_sim.core.residual import camera_layers
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
-from care_sim.policies.controls.rows import cells_by_row, entry_cells
+from care_sim.policies.controls.patterns import cells_by_row, entry_cells
 from care_sim.policies.own.care_sightlines import WEDGE_ROUNDS
-from care_sim.policies.own.rounds import CORE_FIRST, Round
-from care_sim.policies.own.sector import columns_ahead
+from care_sim.policies.own.care_spread import CORE_FIRST, Round
+from care_sim.policies.own.sight_lines import columns_ahead
 
 
 class CareSector(Policy):

@@ -11,8 +11,8 @@ from care_sim.core.residual import camera_layers
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
-from care_sim.policies.controls.rows import cells_by_row, entry_cells
-from care_sim.policies.own.rounds import CORE_FIRST, Round
+from care_sim.policies.controls.patterns import cells_by_row, entry_cells
+from care_sim.policies.own.care_spread import CORE_FIRST, Round
 from care_sim.policies.own.sight_lines import SightLines
 
 WEDGE_ROUNDS = 4

@@ -11,8 +11,24 @@ from care_sim.core.arrays import Floats, Mask
 from care_sim.core.belief import Belief
 from care_sim.core.grid import Cells
 from care_sim.core.grid_kernels import GridSpacing
+from care_sim.core.grid_stack import Grid
 from care_sim.core.rig import Rig
-from care_sim.policies.own.sector import columns_ahead
+
+AHEAD_RAD = math.atan(13 / 50)
+"""Half of the sector: at the range of scoring, 50 m, a street of 26 m from house to house, with two
+lanes, parked cars and pavements."""
+
+
+def columns_ahead(grid: Grid) -> Cells:
+    """(n,) the columns whose middle lies within `AHEAD_RAD` of straight ahead, the nearest to it
+    first; none on a grid whose columns are wider than that. Of several LiDARs those of the second
+    are numbered on from those of the first.
+    """
+    off_ahead = np.abs(np.concatenate([head.grid.azimuths for head in grid.heads]))
+    nearest_first = np.argsort(off_ahead, kind="stable")
+    columns: Cells = nearest_first[off_ahead[nearest_first] <= AHEAD_RAD]
+    return columns
+
 
 OPEN_M = 25.0
 """A line of sight is open if nothing was met nearer than this, half the range of scoring."""

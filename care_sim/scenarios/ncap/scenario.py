@@ -22,7 +22,6 @@ from care_sim.scenarios.ncap.forms import (
     Variation,
 )
 from care_sim.scenarios.ncap.meeting import Ego, Meeting
-from care_sim.scenarios.ncap.obstructions import Sizes, standing_cars
 from care_sim.scenarios.ncap.table import (
     LARGE_HEIGHT_M,
     LARGE_LENGTH_M,
@@ -32,7 +31,7 @@ from care_sim.scenarios.ncap.table import (
     SMALL_WIDTH_M,
     TESTS,
 )
-from care_sim.scenarios.ncap.turning import across_exit, oncoming
+from care_sim.scenarios.ncap.turning import Sizes, across_exit, oncoming, standing_cars
 from care_sim.streets.dimensions import LANE_WIDTH_M, Range, draw
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.route import Route

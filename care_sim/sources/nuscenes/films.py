@@ -41,10 +41,14 @@ from care_sim.sources.nuscenes.boxes import (
 )
 from care_sim.sources.nuscenes.cameras import RecordedCamera, projected_detections
 from care_sim.sources.nuscenes.detections import DetectionFile
-from care_sim.sources.nuscenes.earlier_sweeps import earlier, with_earlier_sweeps
 from care_sim.sources.nuscenes.mounts import camera_of, frame_of, lidar_mount
 from care_sim.sources.nuscenes.pictures import OWN, pictures_of
-from care_sim.sources.nuscenes.sweeps import read_points, recorded_cloud
+from care_sim.sources.nuscenes.sweeps import (
+    earlier,
+    read_points,
+    recorded_cloud,
+    with_earlier_sweeps,
+)
 from care_sim.sources.nuscenes.table_files import JsonRow
 from care_sim.sources.nuscenes.tables import CAMERA_CHANNELS, LIDAR, Database
 

@@ -12,9 +12,9 @@ from care_sim.base.checks import check_whole
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats
 from care_sim.sources.nuscenes.by_sample import FORM, boxes_by_sample, recordings_by_sample
-from care_sim.sources.nuscenes.cache import cached_table
 from care_sim.sources.nuscenes.table_files import (
     JsonRow,
+    cached_table,
     check_tokens,
     finite_numbers,
     table_rows,

@@ -11,10 +11,8 @@ from care_sim.policies import make_policy
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.episode_play import GymEnv, result_or_reason, trace
 from care_sim.study.run_config import Row
-from care_sim.study.vehicle.evidence import Evidence
-from care_sim.study.vehicle.fallback import Fallback
-from care_sim.study.vehicle.forecasts import Forecasts
-from care_sim.study.vehicle.guard import Guard
+from care_sim.study.vehicle.evidence import Evidence, Forecasts
+from care_sim.study.vehicle.guard import Fallback, Guard
 
 ASKED = ("care", "all-camera", "history")
 """The policies of which the paper says that they are one without a camera (Sec. 5.5)."""

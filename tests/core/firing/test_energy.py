@@ -11,8 +11,8 @@ from hypothesis.extra.numpy import arrays
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.actions import scores_of
+from care_sim.core.firing.base import shots_by_cell
 from care_sim.core.firing.listing import hardware_of, settled
-from care_sim.core.firing.shots import shots_by_cell
 from care_sim.core.grid import AngularGrid
 
 GRID = AngularGrid(columns=6, rows=3)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from care_sim.envs.scenarios import DartoutEnv
-from care_sim.envs.vector.coverage import why_separate
+from care_sim.envs.vector.arguments import why_separate
 from care_sim.envs.vector.env import ClosedLoopVectorEnv
 
 

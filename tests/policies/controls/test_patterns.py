@@ -11,13 +11,17 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
 from care_sim.policies import controls, make_policy, tags_of
-from care_sim.policies.controls.fan import Fan
-from care_sim.policies.controls.place import Place
-from care_sim.policies.controls.rows import Rows, cells_by_row, entry_elevation_deg
-from care_sim.policies.controls.stride import Stride
-from care_sim.policies.controls.sweep import Sweep
+from care_sim.policies.controls.patterns import (
+    Fan,
+    Place,
+    Rows,
+    Stride,
+    Sweep,
+    cells_by_row,
+    entry_elevation_deg,
+)
 from care_sim.policies.learned.weights import Card, save_weights
-from care_sim.policies.paper.history_uniform import uniform_pattern
+from care_sim.policies.paper.tracks import uniform_pattern
 
 CONTROLS = [
     "rows",

@@ -6,8 +6,8 @@ import pytest
 import care_sim
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
-from care_sim.policies.controls.place import likeliest_cells
-from care_sim.policies.controls.place_hulls import PlaceHulls
+from care_sim.policies.controls.patterns import likeliest_cells
+from care_sim.policies.controls.patterns_and_tracks import PlaceHulls
 from care_sim.policies.learned.weights import Card, save_weights
 
 GRID = AngularGrid()

@@ -7,10 +7,10 @@ import care_sim
 from care_sim.core.grid import AngularGrid
 from care_sim.core.residual import camera_layers
 from care_sim.core.rig import Rig
-from care_sim.policies.controls.rows import cells_by_row
+from care_sim.policies.controls.patterns import cells_by_row
 from care_sim.policies.own.care_sector import CareSector
-from care_sim.policies.own.rounds import CORE_FIRST
-from care_sim.policies.own.sector import columns_ahead
+from care_sim.policies.own.care_spread import CORE_FIRST
+from care_sim.policies.own.sight_lines import columns_ahead
 
 
 def test_the_sector_is_as_wide_as_a_street_at_50_m():

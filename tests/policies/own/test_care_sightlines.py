@@ -9,8 +9,8 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.belief import MAX_DETECTIONS
 from care_sim.core.residual import camera_layers
 from care_sim.core.types import ImageDetections
-from care_sim.policies.controls.rows import cells_by_row
-from care_sim.policies.own.rounds import CORE_FIRST
+from care_sim.policies.controls.patterns import cells_by_row
+from care_sim.policies.own.care_spread import CORE_FIRST
 
 
 def blind(observation):

@@ -13,7 +13,7 @@ from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.core.types import Ego, ImageDetections, Tracks
-from care_sim.policies.controls.rows import entry_cells
+from care_sim.policies.controls.patterns import entry_cells
 from care_sim.policies.own.sight_lines import EDGE_COLUMNS, SightLines
 
 GRID = AngularGrid()

@@ -15,8 +15,7 @@ from care_sim.core.residual import wedges
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
-from care_sim.policies.own.care_units import CareUnits
-from care_sim.policies.own.target_shots import TargetShots
+from care_sim.policies.own.care_units import CareUnits, TargetShots
 from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.world.bodies import CATALOGUE
 

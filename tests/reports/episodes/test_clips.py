@@ -16,7 +16,7 @@ from care_sim.base.errors import InvalidInput, MissingExtra
 from care_sim.cli import main
 from care_sim.commands.compare import play_side_by_side
 from care_sim.loops.records import Keyframe
-from care_sim.policies.paper.care import Care
+from care_sim.policies.paper.reserves import Care
 from care_sim.reports.episodes.clips import Clip, outcome_words
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.episode_play import run_episode, trace

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
 from care_sim.sources.nuscenes.films import nuscenes_film
-from care_sim.sources.nuscenes.splits import scenes
+from care_sim.sources.nuscenes.recordings import split_scenes
 from care_sim.sources.nuscenes.tables import Database
 from tests.helpers.nuscenes_database import change
 from tests.helpers.nuscenes_drive import write_drive
@@ -134,7 +134,7 @@ def test_a_film_of_mapped_tables_is_that_of_tables_just_read(tmp_path):
 
 def fingerprints(root):
     tables = Database(root)
-    return [pickle.dumps(nuscenes_film(tables, scene)) for scene in scenes(tables)]
+    return [pickle.dumps(nuscenes_film(tables, scene)) for scene in split_scenes(tables)]
 
 
 def test_odd_numbers_are_refused_where_they_are_needed_alone(tmp_path):

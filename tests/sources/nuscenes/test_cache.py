@@ -9,8 +9,8 @@ import pyarrow as pa
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.sources.nuscenes import cache
-from care_sim.sources.nuscenes.cache import cached_table
+from care_sim.sources.nuscenes import table_files
+from care_sim.sources.nuscenes.table_files import cached_table
 
 PLACE = "kept.arrow"
 
@@ -99,7 +99,7 @@ def test_on_a_full_disk_a_table_is_made_once_and_stays_in_memory(maker, monkeypa
     def full(place, table):
         raise OSError(errno.ENOSPC, "no space left on device")
 
-    monkeypatch.setattr(cache, "_write", full)
+    monkeypatch.setattr(table_files, "_write", full)
     assert maker.cached() == kept("one")
     assert maker.made == 1
 

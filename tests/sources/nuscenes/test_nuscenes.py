@@ -10,7 +10,7 @@ from care_sim.core.grid import AngularGrid
 from care_sim.core.types import CLASSES
 from care_sim.sensors.annotated import NO_OBJECT, Annotations
 from care_sim.sources.nuscenes.categories import DETECTION_NAMES, NUSCENES_CATEGORIES
-from care_sim.sources.nuscenes.splits import OFFICIAL, scenes
+from care_sim.sources.nuscenes.recordings import OFFICIAL, split_scenes
 from care_sim.sources.nuscenes.sweeps import owners, read_points
 from care_sim.sources.nuscenes.tables import Database
 from tests.helpers.nuscenes_database import SENSORS, annotated, as_recorded, change, pose, write
@@ -208,18 +208,18 @@ def test_splits_choose_scenes(tmp_path):
     sample = [([CAR], pose(), as_recorded(WORLD))]
     root = write(tmp_path, {"scene-0061": sample, "scene-0103": sample, "scene-0916": sample})
     tables = Database(root)
-    assert [row["name"] for row in scenes(tables)] == ["scene-0103", "scene-0916"]
-    assert len(scenes(tables, "all")) == 3
+    assert [row["name"] for row in split_scenes(tables)] == ["scene-0103", "scene-0916"]
+    assert len(split_scenes(tables, "all")) == 3
     (root / "v1.0-trainval" / "splits.json").write_text(
         json.dumps({"mine": ["scene-0061"], "gone": ["scene-9"]})
     )
-    assert [row["name"] for row in scenes(tables, "mine")] == ["scene-0061"]
+    assert [row["name"] for row in split_scenes(tables, "mine")] == ["scene-0061"]
     with pytest.raises(InvalidInput, match=r"splits.json: the split 'gone' names 'scene-9'"):
-        scenes(tables, "gone")
+        split_scenes(tables, "gone")
     with pytest.raises(
         InvalidInput, match="unknown split 'x'; known: all, gone, mine, mini_train, "
     ):
-        scenes(tables, "x")
+        split_scenes(tables, "x")
 
 
 def test_an_empty_split_names_those_that_hold_scenes(tmp_path):
@@ -228,13 +228,13 @@ def test_an_empty_split_names_those_that_hold_scenes(tmp_path):
         InvalidInput,
         match=r"scene.json: holds no scene of the split 'val'; .*: all, train, mini_train$",
     ):
-        scenes(Database(root))
+        split_scenes(Database(root))
     own = {"mine": ["scene-0061"], "gone": ["scene-9"], "none": []}
     (root / "v1.0-trainval" / "splits.json").write_text(json.dumps(own))
     with pytest.raises(
         InvalidInput, match=r"the split 'val'; splits it holds: all, train, mini_train, mine$"
     ):
-        scenes(Database(root))
+        split_scenes(Database(root))
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.sources.nuscenes.splits import scenes
+from care_sim.sources.nuscenes.recordings import split_scenes
 from care_sim.sources.nuscenes.tables import Database
 from tests.helpers.nuscenes_database import as_recorded, change, pose
 from tests.helpers.nuscenes_scene import CAR, SCENE, WORLD, database, first
@@ -375,7 +375,7 @@ def test_the_version_must_be_clear(tmp_path):
     (tmp_path / "nuscenes" / "v1.0-mini").mkdir()
     with pytest.raises(InvalidInput, match=r"found: v1\.0-mini, v1\.0-trainval"):
         Database(tmp_path / "nuscenes")
-    assert len(scenes(Database(tmp_path / "nuscenes", "v1.0-trainval"))) == 1
+    assert len(split_scenes(Database(tmp_path / "nuscenes", "v1.0-trainval"))) == 1
 
 
 @pytest.mark.parametrize(
@@ -392,4 +392,4 @@ def test_a_wrong_file_of_splits_is_named(tmp_path, content, message):
     root = database(tmp_path)
     (root / "v1.0-trainval" / "splits.json").write_text(json.dumps(content))
     with pytest.raises(InvalidInput, match=f"splits.json: {message}"):
-        scenes(Database(root), "mine")
+        split_scenes(Database(root), "mine")

@@ -10,8 +10,8 @@ from care_sim.core.types import CLASSES, Detections, Ego, ImageDetections
 from care_sim.loops.film import Shot
 from care_sim.sensors.annotated import Annotations, Cloud, IdentifiedDetections
 from care_sim.sources.nuscenes.films import nuscenes_film
+from care_sim.sources.nuscenes.recordings import split_scenes
 from care_sim.sources.nuscenes.results_form import MOST_BOXES, attribute, confidences, result_boxes
-from care_sim.sources.nuscenes.splits import scenes
 from care_sim.sources.nuscenes.tables import Database
 from tests.helpers.nuscenes_drive import KEYFRAMES, OBJECTS, SPLIT, write_drive
 
@@ -68,7 +68,7 @@ def test_the_annotations_of_a_database_come_back_as_its_tables_hold_them(tmp_pat
     """Read into the frame of a tilted, turned, driving sensor, and written out again."""
     tables = Database(write_drive(tmp_path / "nuscenes"))
     compared = 0
-    for scene in scenes(tables):
+    for scene in split_scenes(tables):
         for moment in nuscenes_film(tables, scene).shots:
             truth = moment.annotations
             counts = np.arange(100, 100 - len(truth), -1)

@@ -6,7 +6,7 @@ from scipy.spatial import cKDTree
 
 from care_sim.evaluation.sightings import Sightings
 from care_sim.sources.kinds import recordings
-from care_sim.sources.sweeps.folders import log_of_folder
+from care_sim.sources.sweeps.recordings import log_of_folder
 from tests.helpers.examples import EXAMPLES, loaded
 from tests.helpers.places import ROOT
 

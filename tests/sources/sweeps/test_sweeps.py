@@ -96,7 +96,7 @@ def test_every_form_of_file_holds_the_same_points(tmp_path, folder, form):
 
 
 def film_of_points(folder):
-    from care_sim.sources.sweeps.folders import log_of_folder
+    from care_sim.sources.sweeps.recordings import log_of_folder
 
     return log_of_folder(folder).points_of(7)
 

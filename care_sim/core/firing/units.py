@@ -1,4 +1,6 @@
-"""Blocks of the grid: rectangles of cells, each of which fires as a whole."""
+"""Hardware that fires in units of neighbouring cells: tiles, segments of a ring, whole rows and
+whole columns are all blocks.
+"""
 
 import math
 from functools import cached_property
@@ -82,3 +84,71 @@ def _take(order: NDArray[np.integer], unit_of: Integers, taken: Mask, count: int
         count += not taken[unit]
         taken[unit] = True
     return count
+
+
+class Tiles(Blocks):
+    """A flash sensor without moving parts, whose emitters are switched in sub-arrays."""
+
+    name = "tiles"
+    numbers = ("ROWS", "COLUMNS")
+    usual = (4, 8)
+    unit = "tile"
+    product = "solid-state flash sensor with addressable sub-arrays of emitters"
+    source = (
+        "TriLumina, Progress in High-Power High-Speed VCSEL Arrays, 2016, doi 10.1117/12.2215009: "
+        "sub-array regions are addressed separately"
+    )
+
+
+class RingSegments(Blocks):
+    """A spinning sensor that is told for every channel in which sections of azimuth it fires. The
+    sensor of the source knows five sections per channel, which is not held to here.
+    """
+
+    name = "segments"
+    numbers = ("COLUMNS",)
+    usual = (16,)
+    unit = "segment"
+    product = "spinning sensor with sections of azimuth for every channel"
+    source = (
+        "Hesai, PandarQT user manual Q01-en-2101A1, Sec. 4.3, Azimuth FOV (Sec. 4.3.3, "
+        "multi-section FOV, not opened)"
+    )
+
+    def __init__(self, grid: Grid, columns: int):
+        super().__init__(grid, 1, columns)
+
+
+class WholeRows(Blocks):
+    """A sensor with two mirrors: the fast one draws a whole line, the slow one chooses which."""
+
+    name = "rows"
+    unit = "row"
+    product = "scanner with micro-mirrors that draws whole scan lines"
+    source = (
+        "Blickfeld, Qb2 documentation, Scan Pattern: a scan line per half swing of the horizontal "
+        "mirror; their number and foveation"
+    )
+
+    def __init__(self, grid: Grid):
+        super().__init__(grid, 1, grid.columns)
+
+
+class WholeColumns(Blocks):
+    """A line laser whose upright plane a galvanometer mirror turns. How fast the mirror turns is
+    not held to here; `azimuth-window` is hardware that turns slowly. Of several LiDARs each has its
+    own. Raises InvalidInput where their columns have different numbers of cells.
+    """
+
+    name = "columns"
+    unit = "column"
+    product = "line laser on a galvanometer mirror (light curtain)"
+    source = "Wang et al., Programmable Triangulation Light Curtains, ECCV 2018"
+
+    def __init__(self, grid: Grid):
+        rows = sorted({head.grid.rows for head in grid.heads})
+        if len(rows) > 1:
+            raise InvalidInput(
+                f"firing columns needs LiDARs of as many rows each, got {rows[0]} and {rows[-1]}"
+            )
+        super().__init__(grid, rows[0], 1)

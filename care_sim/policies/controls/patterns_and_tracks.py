@@ -1,4 +1,4 @@
-"""A control: the map of `place`, and a few cells for every track, without a camera."""
+"""Controls that see no camera: a fixed pattern beside the cells of tracks."""
 
 from collections.abc import Mapping
 from os import PathLike
@@ -9,8 +9,48 @@ from care_sim.core.conditions import MIN_RETURNS
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
-from care_sim.policies.controls.place import likeliest_cells
-from care_sim.policies.own.rounds import CORE_FIRST, Round
+from care_sim.policies.controls.patterns import Place, Rows, likeliest_cells
+from care_sim.policies.own.care_spread import CORE_FIRST, Round
+
+
+class HistoryPattern(Policy):
+    """The hulls of the history policy; the reserve goes to what a `pattern` asks for."""
+
+    keeps_order = True
+
+    def __init__(self, pattern: Policy):
+        super().__init__(pattern.rig)
+        self._pattern = pattern
+
+    def demand(self, belief: Belief) -> Demand:
+        """Hulls, then the pattern."""
+        hulls = self.rig.listed(self.rig.hulls(belief.tracks.boxes))
+        return Demand(hulls, self._pattern.demand(belief).layers)
+
+
+class HistoryPlace(HistoryPattern):
+    """The hulls of the history policy; the reserve goes to the map of `place`."""
+
+    name = "history-place"
+    tags = ("causal", "learned", "control")
+    source = "own: history, and a map that never changes"
+
+    def __init__(self, rig: Rig, path: str | PathLike[str] | None = None):
+        super().__init__(Place(rig, path))
+
+
+class HistoryRows(HistoryPattern):
+    """The hulls of the history policy; the reserve goes to the rows at which things enter the
+    range. What CARE must beat to show that its camera matters.
+    """
+
+    name = "history-rows"
+    tags = ("causal", "control")
+    source = "own: history, and a pattern that never changes"
+
+    def __init__(self, rig: Rig):
+        super().__init__(Rows(rig))
+
 
 MAP_SHARE = 0.35
 """Share of the budget that the map has before any track is served. First tried on the streets 0 to

@@ -1,0 +1,246 @@
+"""What a measured camera detector gets wrong (`care_sim.sensors.camera_profiles`): whom it finds,
+how its boxes jitter, which classes it confuses, which ghosts it reports, how long an error lasts.
+
+It finds an object by its height in the picture and its visible share. The height is that of the
+object's whole 3D box as the picture shows it, hidden or not: the box of its eight corners, cut at
+the picture's edges. The visible share is the area of the box round the visible pixels over the area
+that this box has when nothing hides the object, which is a share of its whole box (`UNHIDDEN`).
+CityPersons defines visibility alike, by boxes (Zhang et al. 2017). Where a source tells the share
+itself, as nuScenes does in levels, that one counts.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from care_sim.base.times import LAST_BITS_S
+from care_sim.core.arrays import Floats, Integers
+from care_sim.core.pinhole import PinholeCamera
+from care_sim.core.types import CLASSES, ImageDetections
+from care_sim.sensors.annotated import IdentifiedDetections
+from care_sim.sensors.box_pool import NO_ROWS, BoxPool, box_areas
+from care_sim.sensors.false_boxes import without_duplicates
+
+
+class PersistentDraws:
+    """Numbers (n, k) from 0 to 1, k of each of n objects, evenly distributed at every keyframe.
+
+    From one keyframe to the next each stays with the chance exp(-keyframe / time) and else is drawn
+    anew. So the autocorrelation of whatever is made of one number alone is exp(-t / time), as long
+    as what it is made with stays. Two draws are taken for each at every keyframe, seen or not, so
+    that every policy meets the same.
+    """
+
+    def __init__(
+        self,
+        objects: int,
+        times_s: ArrayLike,
+        keyframe_s: float,
+        rng: np.random.Generator,
+    ):
+        """`times_s` (k,) are the correlation times in seconds."""
+        self._stays = np.exp(-keyframe_s / np.asarray(times_s, float))
+        self._rng = rng
+        self._numbers = rng.random((objects, len(self._stays)))
+        self._started = False
+
+    def next(self) -> Floats:
+        """(n, k) the numbers of the next keyframe, read-only by agreement."""
+        if self._started:
+            stays, fresh = self._rng.random((2, *self._numbers.shape))
+            self._numbers = np.where(stays < self._stays, self._numbers, fresh)
+        self._started = True
+        return self._numbers
+
+
+UNHIDDEN = {"car": 0.98, "truck": 0.99, "bus": 1.0, "bicycle": 0.80, "pedestrian": 0.84}
+"""The share of its whole box that the box round an object's pixels has when nothing hides it: the
+medians of the catalogue's bodies, seen from all sides at 10 to 30 m. The corners of a turned box
+stay empty, of slender bodies most.
+"""
+_UNHIDDEN = np.array([UNHIDDEN[name] for name in CLASSES])
+
+
+@dataclass(frozen=True)
+class RecallTable:
+    """Measured recall at some heights and visible shares, linear between them.
+
+    `heights` (h,) in pixels and `shares` (s,) ascend; `recalls` (s, h). Recall falls to 0 from the
+    first height to height 0 and from the first share to share 0; beyond the last ones it stays.
+    """
+
+    heights: tuple[float, ...]
+    shares: tuple[float, ...]
+    recalls: tuple[tuple[float, ...], ...]
+
+    def at(self, heights: Floats, shares: Floats) -> Floats:
+        """(n,) the recall at `heights` (n,) in pixels and visible `shares` (n,)."""
+        known = (0.0, *self.heights)
+        by_height = [np.interp(heights, known, (0.0, *row)) for row in self.recalls]
+        levels = np.stack([np.zeros(len(heights)), *by_height])
+        # Where each share lies between two of the table: the lower one, and how far beyond it.
+        places = np.interp(shares, (0.0, *self.shares), np.arange(len(levels)))
+        lower = np.minimum(places.astype(np.int64), len(levels) - 2)
+        objects = np.arange(len(heights))
+        low, high = levels[lower, objects], levels[lower + 1, objects]
+        recalls: Floats = low + (places - lower) * (high - low)
+        return recalls
+
+
+def seen_as(
+    seen: IdentifiedDetections, boxes: Floats, cameras: Sequence[PinholeCamera], focal_px: float
+) -> tuple[Floats, Floats]:
+    """(n,) heights in pixels of a picture of the focal length `focal_px`, and (n,) visible shares,
+    of the detections `seen` of objects with the sensor-frame `boxes` (n, 7).
+    """
+    heights = np.empty(len(seen))
+    shares = np.empty(len(seen))
+    for number, camera in enumerate(cameras):
+        (own,) = np.nonzero(seen.detections.cameras == number)
+        whole = whole_boxes(camera, boxes[own])
+        heights[own] = (whole[:, 3] - whole[:, 1]) * focal_px / camera.focal
+        shares[own] = _shares(seen.detections, own, whole)
+    return heights, shares if seen.visible is None else seen.visible
+
+
+def whole_boxes(camera: PinholeCamera, boxes: Floats) -> Floats:
+    """(n, 4) what whole 3D boxes (n, 7) span in the picture, cut at its edges."""
+    limits = np.tile([camera.width, camera.height], 2)
+    # What is wholly behind the camera spans nothing.
+    return np.clip(np.nan_to_num(camera.project_boxes(boxes), nan=0.0), 0.0, limits)
+
+
+def _shares(detections: ImageDetections, rows: Integers, whole: Floats) -> Floats:
+    unhidden = box_areas(whole) * _UNHIDDEN[detections.classes[rows]]
+    # Many an object shows more than the median of its kind. No box is smaller than a pixel.
+    shares: Floats = np.minimum(box_areas(detections.boxes[rows]) / np.maximum(unhidden, 1.0), 1.0)
+    return shares
+
+
+LEAST_PX = 1.0
+"""Width and height that a box keeps within its picture."""
+
+
+def jittered(
+    boxes: Floats,
+    draws: Floats,
+    spreads: Floats,
+    of_cameras: Integers,
+    cameras: Sequence[PinholeCamera],
+) -> Floats:
+    """(n, 4) image `boxes` (n, 4) after Gaussian errors, cut at the edges of their pictures.
+
+    `spreads` (n, 4) are relative to the box: of its middle across and down, and of the logarithms
+    of its width and height. `draws` (n, 4) from 0 to 1 decide; 0.5 leaves a box as it is.
+    `of_cameras` (n,) are places in `cameras`.
+    """
+    from scipy.special import ndtri
+
+    across, down, wider, higher = (ndtri(draws) * spreads).T
+    sizes = boxes[:, 2:] - boxes[:, :2]
+    middles = (boxes[:, :2] + boxes[:, 2:]) / 2 + sizes * np.column_stack([across, down])
+    half = sizes * np.exp(np.column_stack([wider, higher])) / 2
+    # Of a box at the edge something stays in the picture: it was seen there.
+    pictures = np.array([(camera.width, camera.height) for camera in cameras], float)
+    limits = pictures.reshape(-1, 2)[of_cameras]
+    low = np.clip(middles - half, 0.0, limits - LEAST_PX)
+    high = np.clip(middles + half, low + LEAST_PX, limits)
+    return np.concatenate([low, high], axis=1)
+
+
+def confused(classes: Integers, draws: Floats, matrix: Floats) -> Integers:
+    """(n,) the classes that are reported of objects of `classes` (n,).
+
+    `matrix` (c, c) holds the chances that the class of a row is reported as that of a column;
+    `draws` (n,) from 0 to 1 decide.
+    """
+    # The reported class is the first whose chance, with those before it, is beyond the draw. The
+    # last sum is 1 but for its last bits.
+    sums = np.cumsum(matrix, axis=1)[classes]
+    reported: Integers = np.minimum((draws[:, None] >= sums).sum(axis=1), matrix.shape[1] - 1)
+    return reported
+
+
+@dataclass(frozen=True)
+class _Ghost:
+    """It follows the pool's `object` in the pictures of its `camera`, which were taken `later_s`
+    seconds after those in which it is shown; `draws` (3,) vary its boxes.
+    """
+
+    object: int
+    camera: int
+    later_s: float
+    draws: Floats
+
+
+class Ghosts:
+    """False boxes that are born, follow an object of the pool, and end.
+
+    `rate` of them are there per picture on the mean, each for `time_s` seconds on the mean; lives
+    are exponentially distributed, and end when the pool's object leaves its pictures. A ghost is
+    born as one of the boxes that are usable then, varied a little, and shows what became of that
+    object later. So it moves as something of its kind that the car passes. While it lies on another
+    box of its class it is not shown, as a detector suppresses duplicates. What is drawn does not
+    depend on what is there: every policy meets the same ghosts.
+    """
+
+    def __init__(
+        self,
+        pool: BoxPool,
+        rate: float,
+        time_s: float,
+        keyframe_s: float,
+        cameras: int,
+        rng: np.random.Generator,
+    ):
+        self._pool = pool
+        self._mean = rate * cameras
+        self._stays = float(np.exp(-keyframe_s / time_s))
+        self._rng = rng
+        self._alive: list[_Ghost] = []
+        self._started = False
+
+    def draw(self, shown: Floats, time_s: float) -> Floats:
+        """(k, 9) the ghosts in the pictures of this keyframe, beside the boxes `shown` (n, 9)."""
+        stay = self._rng.random(len(self._alive)) < self._stays
+        self._alive = [one for one, stays in zip(self._alive, stay, strict=True) if stays]
+        # As many are born as end on the mean. The first picture has those of the long run.
+        born = self._rng.poisson(self._mean * (1 - self._stays if self._started else 1.0))
+        self._started = True
+        self._alive += self._born(self._rng.random((born, 4)), time_s)
+
+        # One whose object is out of the pool's picture has ended too.
+        rows = [self._row(one, time_s) for one in self._alive]
+        self._alive = [one for one, row in zip(self._alive, rows, strict=True) if row is not None]
+        if not self._alive:
+            return NO_ROWS
+        places = np.array([row for row in rows if row is not None], np.int64)
+        varied = self._pool.varied(places, np.array([one.draws for one in self._alive]))
+        return without_duplicates(varied[:, None], shown)
+
+    def _born(self, draws: Floats, time_s: float) -> list[_Ghost]:
+        """A ghost for every row of `draws` (k, 4): one picks its box, three vary it."""
+        pool = self._pool
+        usable = pool.usable(time_s)
+        if not len(usable):
+            return []
+        picks: Integers = usable[(draws[:, 0] * len(usable)).astype(np.int64)]
+        return [
+            _Ghost(
+                int(pool.objects[row]),
+                int(pool.cameras[row]),
+                float(pool.times_s[row]) - time_s,
+                own,
+            )
+            for row, own in zip(picks.tolist(), draws[:, 1:], strict=True)
+        ]
+
+    def _row(self, ghost: _Ghost, time_s: float) -> int | None:
+        """The box of the pool that a ghost shows now, None if there is none any more."""
+        pool = self._pool
+        is_now = np.abs(pool.times_s - time_s - ghost.later_s) <= LAST_BITS_S
+        is_own = (pool.objects == ghost.object) & (pool.cameras == ghost.camera)
+        rows = np.flatnonzero(is_now & is_own)
+        return int(rows[0]) if len(rows) else None
