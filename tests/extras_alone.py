@@ -47,9 +47,6 @@ USES = {
         f"care-sim run dense --detector pillars {SHORT}",
         "care-sim train ppo --env CARE-CutIn-v0 --steps 1024 --episodes 1 --out ppo",
     ],
-    "tune": [
-        "care-sim train ppo --env CARE-CutIn-v0 --steps 1024 --episodes 1 --tune 1 --out tune"
-    ],
     "torchrl": ["python vector.py"],
     "viewer": [f"care-sim run dense {SHORT} --record a.rrd"],
     "video": [f"care-sim run dense {SHORT} --video a.mp4"],

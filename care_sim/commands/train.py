@@ -1,6 +1,5 @@
 """`care-sim train ppo`, `sac` and `recurrent-ppo`."""
 
-import shlex
 from collections.abc import Iterator
 from dataclasses import fields
 
@@ -13,25 +12,16 @@ from care_sim.training.config import AgentConfig
 from care_sim.training.folder import CHECKPOINT, CURVE, RULES, WEIGHTS, read_curve, read_rules
 from care_sim.training.hyperparameters import read_hyperparameters
 from care_sim.training.run import train_agent
-from care_sim.training.tuning import tune
 
 CHANCE = "random"
 """The rule that whoever has learned something is better than."""
 
 
 def train(options: Learner) -> int:
-    """Train an agent, or try hyperparameters."""
+    """Train an agent."""
     table = read_hyperparameters(options.kind, options.env, options.hyperparameters, options.drawn)
     config = options.kind(**{one.name: getattr(options, one.name) for one in fields(options.kind)})
     print_lines(*table.told(config))
-    if options.tune:
-        best = tune(config, options.tune, train_agent)
-        print(best.read_text(encoding="utf-8"), end="")
-        line = ["care-sim", "train", config.algorithm, "--env", *config.env]
-        line += ["--drawn"] if config.drawn else []
-        line += ["--without", *config.without] if config.without else []
-        print_lines(f"train with them: {shlex.join([*line, '--hyperparameters', str(best)])}")
-        return 0
     train_agent(config)
     print_lines(*end_of_training(config))
     return 0

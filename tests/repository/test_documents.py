@@ -28,6 +28,9 @@ from care_sim.study.benchmark.result_file import read_result
 from care_sim.study.benchmark.tasks import tasks_of
 from care_sim.study.benchmark.worlds import PARTS, published_worlds
 from care_sim.study.results_formats import RESULTS_FORMATS
+from care_sim.training.config import PpoConfig
+from care_sim.training.folder import read_curve
+from care_sim.training.hyperparameters import read_hyperparameters
 from tests.helpers.examples import EXAMPLES, loaded
 from tests.helpers.forked import LEARNING, LIBRARIES, Forked
 from tests.helpers.pages import PAGES, README, SITE, fenced, links, name_of
@@ -131,6 +134,24 @@ def test_the_learner_of_the_examples_learns():
         model.learn(steps, reset_num_timesteps=False)
         means.append(np.mean([episode["r"] for episode in model.ep_info_buffer]))
     assert means[1] > means[0] + LEARNED
+
+
+@pytest.mark.slow
+def test_hyperparameters_are_chosen_in_one_file_that_can_be_run_again(tmp_path):
+    for library in ("optuna", "stable_baselines3"):
+        pytest.importorskip(library)
+    example = loaded(EXAMPLES / "tune_ppo.py")
+    for _ in range(2):
+        example.main(tmp_path, 1, steps=64, episodes=1)
+    assert {path.name for path in tmp_path.iterdir()} >= {"000", "001"}
+    best = read_hyperparameters(PpoConfig, [example.ENV], tmp_path / "best.toml")
+    assert best.values.keys() == {*example.TRIED}
+    returns = [
+        max(row[2] for row in read_curve(tmp_path / n / "curve.csv")) for n in ("000", "001")
+    ]
+    tried = [json.loads((tmp_path / n / "config.json").read_text()) for n in ("000", "001")]
+    assert tried[0]["learning_rate"] == PpoConfig.learning_rate
+    assert best.values["learning_rate"] == tried[int(np.argmax(returns))]["learning_rate"]
 
 
 def test_a_detector_runs_on_a_sweep_in_one_file(tmp_path, monkeypatch, capsys):

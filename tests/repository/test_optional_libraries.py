@@ -194,7 +194,6 @@ MISSED = {
     "export minari dense --dataset care-sim/dense/care-v0": "minari",
     "run sweeps:drive.mcap": "rosbags",
     "train ppo": "rl",
-    "train ppo --tune 2": "tune",
     "train recurrent-ppo": "rl",
     "train detector --out weights.npz": "rl",
     "train learned-sets --out weights.npz": "rl",

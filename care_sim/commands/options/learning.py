@@ -6,7 +6,6 @@ from typing import Annotated, ClassVar
 
 import tyro
 
-from care_sim.base.bounds import bounded
 from care_sim.training.config import AgentConfig, PpoConfig, RecurrentPpoConfig, SacConfig
 
 
@@ -28,9 +27,6 @@ class Learner(AgentConfig):
     hyperparameters: Path | None = None
     """TOML file of hyperparameters by environment, instead of the one that comes with the package.
     Options win over both."""
-    tune: int = bounded(0, 0, 10_000)
-    """Try so many sets of hyperparameters instead, each in a training run of --steps (extra
-    'tune'), and write the best as a file for --hyperparameters."""
 
 
 @dataclass(frozen=True, kw_only=True)
