@@ -3,7 +3,8 @@ is handed the truth as well, through a door of its own.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -42,6 +43,8 @@ class Policy(ABC):
     Two flags leave the demand as it is whatever `cell_order` the rig has: `keeps_order` of a policy
     that asks `Rig.listed` for its hulls and wedges itself, and `is_pattern` of one that asks for
     neither and fires the same under every order.
+    `files` are files outside of its package that decide what it does, such as weights: when one
+    changes, episodes are played again. Relative names count from the module.
     `demanded` is what `demand` last answered a call with, in the order in which it was served, for
     those who watch.
     """
@@ -52,6 +55,7 @@ class Policy(ABC):
     told: ClassVar[Mapping[str, str]] = {}
     keeps_order: ClassVar[bool] = False
     is_pattern: ClassVar[bool] = False
+    files: ClassVar[Sequence[str | Path]] = ()
     demanded: Demand | None = None
 
     def __init__(self, rig: Rig):

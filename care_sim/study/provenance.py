@@ -11,8 +11,7 @@ from uuid import uuid4
 import care_sim
 from care_sim.base.cores import CORES
 from care_sim.base.digests import combined_digest, content_digest, file_digest
-from care_sim.base.named_files import files_named_by, files_named_in, paths_in
-from care_sim.base.package_files import shipped_files
+from care_sim.base.entry_files import CODE, entry_files, paths_in
 from care_sim.perception.detectors import DETECTORS
 from care_sim.policies import POLICIES
 from care_sim.policies.isolation import are_isolated, policy_process
@@ -36,9 +35,6 @@ _EXTRAS = ("mujoco-core", "open3d", "open3d-cpu", "panda-gym", "torch")
 
 SHIPPED = Path(care_sim.__file__).parent / "policies" / "learned" / "shipped"
 """Where the weights lie that come with the package."""
-_CODE = (".py", ".so", ".pyd")
-"""Endings of files that a process loads once."""
-
 SESSION = uuid4().hex
 """Names this run of the program; no other run has it."""
 
@@ -53,9 +49,9 @@ def code_digest() -> str:
 
 
 def policy_digest(policy: str) -> str | None:
-    """Hash of the files that decide what an installed policy does: those of its distribution and
-    package, and those that its defaults, constants and code name (`care_sim.base.named_files`).
-    Empty for a built-in policy, None where there are no files to read.
+    """Hash of the version and the files that decide what an installed policy does
+    (`care_sim.base.entry_files`). Empty for a built-in policy, None where there are no files to
+    read.
     """
     if policy in POLICIES.built_in:
         return ""
@@ -94,25 +90,19 @@ def source_digests(source: Source) -> list[str | None]:
 
 
 def _entry_digest(entry: EntryPoint) -> str | None:
-    files = shipped_files(entry)
+    files = entry_files(entry)
     if files is None:
         return None
-    shipped = [
+    digests = [entry.dist.version if entry.dist else ""]
+    for name, path in sorted(files.items()):
         # An edit of code that is loaded changes nothing in this process. Weights and tables are
         # read again for every episode, and so is their hash.
-        f"{name} {_loaded(file) if file.suffix in _CODE else content_digest(file)}"
-        for name, file in files.items()
-    ]
-    further = files_named_by(entry) | files_named_in(files.values())
-    named = []
-    for name, path in further.items():
-        digest = file_digest(path)
-        # A folder with too many files to read: nothing can be promised about it, and looking at the
-        # others would take as long for each.
+        digest = _loaded(path) if path.suffix in CODE else file_digest(path)
+        # A folder with too many files to read: nothing can be promised about it.
         if digest is None:
             return None
-        named.append(f"{name} {digest}")
-    return combined_digest([*sorted(shipped), *named])
+        digests.append(f"{name} {digest}")
+    return combined_digest(digests)
 
 
 @cache

@@ -16,8 +16,8 @@ import gymnasium
 
 import care_sim
 from care_sim.base.digests import file_digest
+from care_sim.base.entry_files import paths_in
 from care_sim.base.errors import InvalidInput, shown
-from care_sim.base.named_files import paths_in
 from care_sim.core.conditions import DEFAULTS, UNUSED_BY_FULL_SCAN
 from care_sim.policies import check_policy, make_policy
 from care_sim.policies.base import Policy
