@@ -1,6 +1,7 @@
 import numpy as np
 
-from care_sim.reports.collisions import CollisionRows
+from care_sim.reports.engine.contrasts import contrast_of_rows
+from care_sim.reports.engine.measures import AVOIDANCE
 from care_sim.reports.figures.standards import r157_figures
 from care_sim.reports.tables.r157 import cut_in_rows, r157_tables
 from tests.helpers.drawn import ticks
@@ -31,17 +32,17 @@ def test_avoided_by_the_speed_of_the_ego():
 
 def test_only_worlds_that_both_have_met_are_compared():
     study = cut_in_rows([*CUT_INS[:4], *CUT_INS[5:7]])
-    contrast = study.difference("history", "care", 0.01)
+    history, care, fan = (study.of(policy, 0.01) for policy in ("history", "care", "fan"))
+    contrast = contrast_of_rows(AVOIDANCE, history, care)
     assert (contrast.difference.pairs, contrast.mean) == (2, -100.0)
-    assert study.difference("history", "fan", 0.01) is None
-    assert study.best_control(0.01) is None
+    assert contrast_of_rows(AVOIDANCE, history, fan) is None
 
 
 def test_the_best_control_is_chosen_on_what_all_controls_have():
     """Stride has only the case that it avoids; there, both are alike, and the first is taken."""
     rows = [*cut_ins("fan", [None, 40.0, 50.0, 50.0], tags="control")]
     rows += cut_ins("stride", [None] * 4, tags="control")[:1]
-    assert CollisionRows(rows, lambda row: 1.0).best_control(0.01) == "fan"
+    assert r157_tables(rows)[0].rows[0] == ("budget 1%, best control fan",)
 
 
 def test_a_panel_for_every_policy_and_budget_coloured_by_what_was_avoided():

@@ -7,10 +7,9 @@ from care_sim.evaluation.scene_contrasts import OVERALL
 from care_sim.reports.engine.contrasts import of_interval
 from care_sim.reports.engine.measures import Recall
 from care_sim.reports.page.build import Findings
-from care_sim.reports.realism.orders import Order, Standing, Verdict
-from care_sim.reports.realism.tables import realism_tables
 from care_sim.reports.studies import STUDIES
 from care_sim.reports.table import Bold
+from care_sim.reports.tables.realism import Order, Standing, Verdict, realism_tables
 from care_sim.study.designs.realism import (
     CONDITIONS,
     FILM_CONDITIONS,

@@ -5,9 +5,8 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.reports.figures.standards import ncap_figures
-from care_sim.reports.ncap import NcapRows, impact_of, overall
 from care_sim.reports.table import Bold
-from care_sim.reports.tables.ncap import ncap_tables
+from care_sim.reports.tables.ncap import NcapRows, impact_of, ncap_tables, overall
 from care_sim.study.designs.ncap import NcapCase
 from care_sim.study.episode_config import grid
 from care_sim.study.rows.reading import with_added_columns

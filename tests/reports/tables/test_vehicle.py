@@ -8,8 +8,7 @@ from care_sim.evaluation.censoring import Bound
 from care_sim.reports.engine.contrasts import contrast_of_rows
 from care_sim.reports.engine.measures import AVOIDED, DETECTION
 from care_sim.reports.figures.faults import VEHICLE_FIGURE, vehicle_figures
-from care_sim.reports.vehicle.rows import outcome
-from care_sim.reports.vehicle.tables import vehicle_tables
+from care_sim.reports.tables.vehicle import outcome, vehicle_tables
 from care_sim.study.designs.vehicle import (
     BLACKOUTS,
     DENSE,
