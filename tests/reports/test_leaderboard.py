@@ -70,18 +70,12 @@ def test_a_trial_says_that_it_is_one():
         assert table.notes[0].startswith("A trial with the tenth of the worlds that --quick plays")
 
 
-def test_equal_scores_stand_in_one_order_in_table_and_figure():
-    equal = [replace(GOOD, entry=Entry(name)) for name in ("b", "a", "c")]
-    names = [row[1] for row in leaderboard_table(equal).rows]
-    (axes,) = leaderboard_figure(equal).axes
-    assert names == ["b", "a", "c"]
-    assert [text.get_text() for text in axes.get_yticklabels()] == names[::-1]
-
-
-def test_results_of_one_name_are_told_apart_by_their_code():
-    two = [replace(GOOD, made_by={"policy_code": code}) for code in ("12345678", "abcdefgh")]
+def test_equal_scores_of_one_name_stand_in_one_order_and_are_told_apart_by_their_code():
+    two = [replace(GOOD, made_by={"policy_code": code}) for code in ("abcdefgh", "12345678")]
     names = [row[1] for row in leaderboard_table(two).rows]
-    assert names == ["good #1234567", "good #abcdefg"]
+    assert names == ["good #abcdefg", "good #1234567"]
+    (axes,) = leaderboard_figure(two).axes
+    assert [text.get_text() for text in axes.get_yticklabels()] == names[::-1]
 
 
 def test_the_chart_shows_every_score_with_its_interval_and_who_uses_no_camera():

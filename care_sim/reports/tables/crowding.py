@@ -12,7 +12,8 @@ from care_sim.reports.engine.measures import DETECTION
 from care_sim.reports.formatting import interval, mean
 from care_sim.reports.table import Table
 from care_sim.study.designs.crowding import CROWDING_POLICIES, VEHICLES_COLUMN
-from care_sim.study.rows.reading import Key, key_of
+from care_sim.study.designs.variants import USUAL_VARIANT, Place
+from care_sim.study.rows.reading import Key
 from care_sim.study.run_config import FULL, Row
 
 COLLAPSE_M = 3.0
@@ -31,9 +32,8 @@ class Crowd:
 
     def key(self, vehicles: int, policy: str, budget: float) -> Key:
         """Where the rows are found."""
-        return key_of(
-            {"scenario": "dense", "policy": policy, "budget": budget, VEHICLES_COLUMN: vehicles}
-        )
+        place = Place("dense", budget, (("vehicles", vehicles),))
+        return USUAL_VARIANT.key(place, policy)
 
     def gap(self, vehicles: int, budget: float, other: str = "all-camera") -> Contrast | None:
         """First detection of another policy minus that of CARE, metres; negative where the other is

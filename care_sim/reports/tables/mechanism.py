@@ -19,13 +19,7 @@ from care_sim.reports.formatting import marked, spread_of_counts
 from care_sim.reports.protocol.formatting import PAPER
 from care_sim.reports.protocol.notes import papers
 from care_sim.reports.table import Table, TableRow
-from care_sim.study.mechanism_play import (
-    ACCOUNT_COLUMNS,
-    BELIEF_MARKS,
-    BELIEF_SUMS,
-    DIFFERING,
-    RECEIVED,
-)
+from care_sim.study import mechanism_play as played
 from care_sim.study.rows.reading import policy_of, setting_of, tags_of_row
 from care_sim.study.run_config import FULL, REFERENCE, Row
 
@@ -123,7 +117,7 @@ def mechanism_closing(rows: Sequence[Row]) -> list[str]:
 
 def _belief(plays: _Plays) -> Table:
     """What the driver's belief makes of the camera's boxes."""
-    keyframes, *sums = plays.sums(plays.driver, ("keyframes", *BELIEF_SUMS))
+    keyframes, *sums = plays.sums(plays.driver, ("keyframes", *played.BELIEF_SUMS))
     filled, filled_rho, explained, untaken = sums
     pairs = [*plays.pairs(plays.driver, FULL)]
 
@@ -169,11 +163,11 @@ def _allocations(plays: _Plays) -> Table:
     lines: list[TableRow] = []
     for policy in plays.tags:
         pairs = [*plays.pairs(policy, plays.driver)]
-        cells = np.array([each for row, _ in pairs for each in row[RECEIVED]], np.int64)
+        cells = np.array([each for row, _ in pairs for each in row[played.RECEIVED]], np.int64)
         covered = np.array([mark for _, own in pairs for mark in own["covered"]], bool)
         moved = ("", "", "")
         if policy != plays.driver:
-            found = AllocationDifference(*plays.sums(policy, ("keyframes", *DIFFERING)))
+            found = AllocationDifference(*plays.sums(policy, ("keyframes", *played.DIFFERING)))
             share = _share(found.differing, found.keyframes)
             said = plays.paper(_CHANGED.get(policy, ""))
             moved = (share, said, f"{found.cells_where_differing:.0f}")
@@ -276,10 +270,13 @@ def _check(rows: Sequence[Row]) -> None:
     events = {row["scene"]: len(row["ttfds"]) for row in rows}
     for row in rows:
         place = f"scene {row['scene']}, {row['policy']}"
-        needed = [*ACCOUNT_COLUMNS]
+        needed = [*played.ACCOUNT_COLUMNS]
         if row["policy"] != FULL:
             driving = row["policy"] == row["driver"]
-            needed += [RECEIVED, *((*BELIEF_SUMS, *BELIEF_MARKS) if driving else DIFFERING)]
+            needed += [
+                played.RECEIVED,
+                *((*played.BELIEF_SUMS, *played.BELIEF_MARKS) if driving else played.DIFFERING),
+            ]
         for name in needed:
             own = row[name]
             if own is None or (isinstance(own, tuple) and len(own) != events[row["scene"]]):

@@ -172,12 +172,11 @@ def ncap_headline(rows: Sequence[Row]) -> Table:
 
 def _endings(results: NcapRows, tests: Mapping[str, Sequence[Line]]) -> Table:
     def entry(policy: str, budget: float, held: Sequence[Line]) -> str:
-        contender = results.contender(policy, budget)
-        endings = results.endings(contender, held)
+        endings = results.endings((policy, budget), held)
         if not endings:
             return "-"
         counts = "/".join(str(endings[each]) for each in CollisionOutcome)
-        return f"{counts} {overall(results.scores(contender, held)):.2f}"
+        return f"{counts} {overall(results.scores((policy, budget), held)):.2f}"
 
     lines = {
         f"budget {percent(budget)}": [
@@ -205,9 +204,7 @@ def _differences(results: NcapRows) -> list[Table]:
             (
                 results.marked(policy),
                 *(
-                    interval(
-                        results.difference(results.contender(policy, budget), (other, budget), held)
-                    )
+                    interval(results.difference((policy, budget), (other, budget), held))
                     if other and other != policy
                     else ""
                     for budget, other in against.items()

@@ -29,18 +29,17 @@ _OF_THE_FILM = ("sensor", "sensor_hash", *READ_WITH)
 
 
 class Standing(NamedTuple):
-    """How the first of two policies stands to the second; `sign` is 1 or -1 where the interval of
-    the difference excludes zero, else 0, and None of fewer pairs than carry a claim.
-    """
+    """How the first of two policies stands to the second."""
 
     difference: Contrast
-    sign: int | None
 
-    @classmethod
-    def of(cls, contrast: Contrast) -> "Standing":
-        """From a contrast of the two."""
-        enough = contrast.difference.pairs >= FEWEST_PAIRS
-        return cls(contrast, contrast.sign if enough else None)
+    @property
+    def sign(self) -> int | None:
+        """1 or -1 where the interval excludes zero, else 0; None of fewer pairs than carry a
+        claim.
+        """
+        enough = self.difference.difference.pairs >= FEWEST_PAIRS
+        return self.difference.sign if enough else None
 
 
 class Verdict(StrEnum):
@@ -129,7 +128,7 @@ class _Block:
     def order(self, pair: Pair, conditions: Sequence[Variant]) -> Order:
         """How the first policy stands to the second under every condition."""
         found = ((each.label, self._contrast(*((p, each) for p in pair))) for each in conditions)
-        return Order(self.label, pair, {name: Standing.of(one) for name, one in found if one})
+        return Order(self.label, pair, {name: Standing(one) for name, one in found if one})
 
     def _contrast(self, ours: tuple[str, Variant], theirs: tuple[str, Variant]) -> Contrast | None:
         by_cases = len(self.places) > 1

@@ -56,7 +56,7 @@ def lines(tables, part):
 )
 def test_an_order_holds_is_lost_flips_or_arises(before, here, pairs, verdict):
     standings = {
-        name: Standing.of(of_interval(Recall(OVERALL), Interval(sum(ends) / 2, *ends), pairs))
+        name: Standing(of_interval(Recall(OVERALL), Interval(sum(ends) / 2, *ends), pairs))
         for name, ends in (("ideal", before), ("here", here))
     }
     order = Order("", ("a", "b"), standings)
