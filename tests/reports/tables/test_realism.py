@@ -88,12 +88,6 @@ def test_a_change_of_the_order_is_told_with_the_figures_behind_it():
     assert sum(len(line) == 1 for line in titled(tables, "every condition").rows) == 1
 
 
-def test_fewer_than_five_seeds_carry_no_verdict():
-    few = realism_tables([each for each in ROWS if each["seed"] < 4])
-    assert lines(few, "by condition")["dense, 3%: care : history"][LATE] == "-1.0 [-1.0,-1.0]"
-    assert not any("that change" in table.title for table in few)
-
-
 def test_a_map_is_made_of_the_same_rows():
     (figure,) = STUDIES["realism"].figures(ROWS).values()
     assert figure.axes[0].texts[0].get_text() == "+6.0*"
