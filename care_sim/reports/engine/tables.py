@@ -16,12 +16,8 @@ OfPaper = Callable[[Measure | Recall, str], Sequence[str]]
 
 
 def under_headings(lines: Mapping[str, Iterable[TableRow]]) -> tuple[TableRow, ...]:
-    """The rows of a table, each part below its heading; below none where it is empty."""
-    return tuple(
-        line
-        for heading, own in lines.items()
-        for line in (*([(heading,)] if heading else []), *own)
-    )
+    """The rows of a table, each part below its heading."""
+    return tuple(line for heading, own in lines.items() for line in ((heading,), *own))
 
 
 def minus_table(

@@ -6,8 +6,9 @@ from itertools import product
 
 import pytest
 
+from care_sim.evaluation.censoring import Bound
 from care_sim.reports.engine.contrasts import contrast_of_rows
-from care_sim.reports.engine.measures import AVOIDED
+from care_sim.reports.engine.measures import AVOIDED, DETECTION
 from care_sim.reports.figures.faults import VEHICLE_FIGURE, vehicle_figures
 from care_sim.reports.tables.vehicle import vehicle_tables
 from care_sim.study.designs.vehicle import DENSE, TURNS, vehicle_study
@@ -69,6 +70,17 @@ def test_one_case_on_many_seeds_proves_no_more_than_on_one():
     hit = [each | {"collision": each["seed"][0] == 4} for each in copies]
     once = [[each for each in side if each["seed"][1] == 0] for side in (copies, hit)]
     assert contrast_of_rows(AVOIDED, copies, hit, by_cases=True) == contrast_of_rows(AVOIDED, *once)
+
+
+def test_a_case_with_a_censored_distance_is_censored():
+    met = {"detection_distance_m": 10.0, "undetected_to_m": None}
+    missed = {"detection_distance_m": None, "undetected_to_m": 4.0}
+    ours = [met | {"seed": world} for world in product(range(5), (0, 1))]
+    theirs = [(missed if each["seed"][1] else met) | {"seed": each["seed"]} for each in ours]
+    # A seed that only one side has is no pair.
+    further = met | {"seed": (0, 2), "detection_distance_m": 99.0}
+    found = contrast_of_rows(DETECTION, [*ours, further], theirs, by_cases=True)
+    assert (found.mean, found.bound, found.difference.pairs) == (3.0, Bound.AT_LEAST, 5)
 
 
 def test_the_cost_is_the_camera_on_less_the_camera_away(rows):
