@@ -9,7 +9,6 @@ import numpy as np
 from care_sim.base.errors import counted, percent
 from care_sim.evaluation.censoring import FEWEST_PAIRS
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, among, ratio_level
-from care_sim.reports.collisions import preventable
 from care_sim.reports.engine.contrasts import Contrast, contrast_of_rows
 from care_sim.reports.engine.controls import BEST_CONTROL, best_control, is_control
 from care_sim.reports.engine.measures import AVOIDED, DETECTION, GATE_POINTS, Measure
@@ -20,7 +19,14 @@ from care_sim.reports.protocol.paper import PAPER_BUDGETS
 from care_sim.reports.protocol.quotes import GATE
 from care_sim.reports.protocol.rows import HISTORY, SettingPlays, plays_by_setting
 from care_sim.reports.table import Table, TableRow
-from care_sim.study.rows.reading import full_of, grouped, is_avoided, policy_of, tags_of_row
+from care_sim.study.rows.reading import (
+    full_of,
+    grouped,
+    is_avoided,
+    policy_of,
+    preventable,
+    tags_of_row,
+)
 from care_sim.study.run_config import FULL, REFERENCE, Row
 
 _SIGHTINGS = "first sightings, points"

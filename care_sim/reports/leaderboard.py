@@ -11,6 +11,7 @@ from care_sim.study.benchmark.made_by import code_of, processor_of
 from care_sim.study.benchmark.result import BenchmarkResult
 from care_sim.study.benchmark.tasks import CAMERAS, IDEAL, Entry
 from care_sim.study.benchmark.worlds import BENCHMARK_VERSION
+from care_sim.study.run_config import FULL
 
 CONTROL = Entry("place")
 """A map of the places where things first appeared on 20 other streets; it has no camera and no
@@ -26,14 +27,30 @@ def leaderboard_table(results: Sequence[BenchmarkResult], minus: str = CONTROL.n
     that is among them. All must be of the same worlds.
     """
     named, control = _named(results, minus)
-    # What no car can have stands where its score puts it, and takes no place.
-    contenders = [each for _, each in named if not is_beyond(each)]
-    numbers = {id(each): f"{number}" for number, each in enumerate(contenders, 1)}
-    rows = tuple(_line(each, name, numbers.get(id(each), ""), control) for name, each in named)
+    rows: list[TableRow] = []
+    place = 0
+    for name, each in named:
+        # What no car can have stands where its score puts it, and takes no place.
+        is_beyond = bool({*each.tags} & {*MARKS}) or each.entry.policy == FULL
+        place += not is_beyond
+        score = f"{each.score().mean:.1f} {bounds(each.score(), 1)}"
+        shares = (each.part_score(part) for part in each.parts)
+        lead = [] if control is None else ["" if each is control else _shown(each.lead(control))]
+        rows.append(
+            (
+                "" if is_beyond else f"{place}",
+                name,
+                score,
+                *(f"{share:.1f}" for share in (*shares, each.score(IDEAL).mean)),
+                *lead,
+            )
+        )
     leads = () if control is None else (f"minus {minus}",)
     # The leads are the widest: at 80 characters all but they stand side by side.
     columns = ("", "policy", "score", *results[0].parts, "ideal camera", *leads)
-    return Table(title(results), columns, rows, _notes(results), whole=("", "score"), names=2)
+    return Table(
+        _title(results), columns, tuple(rows), _notes(results), whole=("", "score"), names=2
+    )
 
 
 def leads_table(results: Sequence[BenchmarkResult], minus: str) -> Table | None:
@@ -53,8 +70,8 @@ def leads_table(results: Sequence[BenchmarkResult], minus: str) -> Table | None:
         if each is not control
     )
     columns = ("policy", *control.parts, "score, ideal camera")
-    title_of_leads = f"{title(results)}: minus {minus}, part by part"
-    return Table(title_of_leads, columns, rows, (_TRIAL if control.quick else _IN_HINDSIGHT,))
+    title = f"{_title(results)}: minus {minus}, part by part"
+    return Table(title, columns, rows, (_TRIAL if control.quick else _IN_HINDSIGHT,))
 
 
 def _named(
@@ -76,19 +93,16 @@ def names_in(results: Sequence[BenchmarkResult]) -> list[str]:
     where several have the name.
     """
     times = Counter(each.entry.name for each in results)
-    return [
-        marked(
-            each.entry.name
-            + (
-                f" #{each.made_by.get('policy_code', '')}"[:9] if times[each.entry.name] > 1 else ""
-            ),
-            each.tags,
-        )
+    names = (
+        f"{each.entry.name} #{each.made_by.get('policy_code', '')[:7]}"
+        if times[each.entry.name] > 1
+        else each.entry.name
         for each in results
-    ]
+    )
+    return [marked(name, each.tags) for name, each in zip(names, results, strict=True)]
 
 
-def title(results: Sequence[BenchmarkResult]) -> str:
+def _title(results: Sequence[BenchmarkResult]) -> str:
     """Version, and which worlds."""
     sealed = results[0].sealed
     worlds = len(results[0].rows) // len(CAMERAS)
@@ -104,24 +118,6 @@ def _notes(results: Sequence[BenchmarkResult]) -> tuple[str, ...]:
     made += [f"on {len(processors)} kinds of processor"] if len(processors) > 1 else []
     told = _AS_TOLD.format(f", played {' '.join(made)}" if made else "")
     return _TRIAL if results[0].quick else told, *tag_notes(each.tags for each in results)
-
-
-def is_beyond(result: BenchmarkResult) -> bool:
-    """Whether no car can have the policy."""
-    return bool({*result.tags} & {*MARKS}) or result.entry.policy == "full"
-
-
-def _line(
-    result: BenchmarkResult, name: str, number: str, control: BenchmarkResult | None
-) -> TableRow:
-    return (
-        number,
-        name,
-        f"{result.score().mean:.1f} {bounds(result.score(), 1)}",
-        *(f"{result.part_score(part):.1f}" for part in result.parts),
-        f"{result.score(IDEAL).mean:.1f}",
-        *(() if control is None else ("" if result is control else _shown(result.lead(control)),)),
-    )
 
 
 def _shown(lead: Interval) -> str:

@@ -48,11 +48,9 @@ from care_sim.reports.findings import (
     leads_of_plays,
     leads_tables,
 )
-from care_sim.reports.mechanism.tables import mechanism_closing, mechanism_tables
 from care_sim.reports.protocol.closing import protocol_closing
 from care_sim.reports.protocol.contrasts import protocol_minus
 from care_sim.reports.protocol.tables import protocol_tables
-from care_sim.reports.realism.tables import realism_tables
 from care_sim.reports.study import Study
 from care_sim.reports.summary import medians, recalls
 from care_sim.reports.table import Table
@@ -60,13 +58,15 @@ from care_sim.reports.tables.ablations import ablation_tables
 from care_sim.reports.tables.crowding import crowding_tables
 from care_sim.reports.tables.faults import fault_tables
 from care_sim.reports.tables.firing import firing_tables
+from care_sim.reports.tables.mechanism import mechanism_closing, mechanism_tables
 from care_sim.reports.tables.ncap import ncap_headline, ncap_tables
 from care_sim.reports.tables.order import order_tables
 from care_sim.reports.tables.paper_statements import statement_tables
 from care_sim.reports.tables.r157 import r157_tables
+from care_sim.reports.tables.realism import realism_tables
 from care_sim.reports.tables.sweep import sweep_minus, sweep_tables
 from care_sim.reports.tables.validate import validation_tables
-from care_sim.reports.vehicle.tables import vehicle_tables
+from care_sim.reports.tables.vehicle import vehicle_tables
 from care_sim.study.designs.crowding import VEHICLES_COLUMN
 from care_sim.study.designs.ncap import (
     REPORTED_COLUMN,

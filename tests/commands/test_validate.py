@@ -3,7 +3,7 @@
 import pytest
 
 from care_sim.cli import main
-from care_sim.reports.validation import played_worlds
+from care_sim.reports.tables.validate import played_worlds
 from care_sim.study.rows.parquet import read_rows
 
 SHORT = (

@@ -1,16 +1,15 @@
 """What tables make of a stop for nothing, and of a collision that another body causes."""
 
-from care_sim.evaluation.collision_outcomes import CollisionOutcome
 from care_sim.reports.closings import collisions
-from care_sim.reports.collisions import preventable
 from care_sim.reports.engine.contrasts import contrast_of_rows
 from care_sim.reports.engine.frames import Frame
 from care_sim.reports.engine.levels import levels
 from care_sim.reports.engine.measures import AVOIDED
-from care_sim.reports.ncap import impact_of
-from care_sim.reports.tables.r157 import cut_in_rows
+from care_sim.reports.tables.ncap import impact_of
+from care_sim.reports.tables.r157 import r157_tables
+from care_sim.study.rows.reading import preventable
 from tests.helpers.made_rows import cut_ins, rows
-from tests.reports.test_ncap import played
+from tests.reports.tables.test_ncap import played
 
 STOPPED = {"braked_before_view": True}
 
@@ -24,10 +23,9 @@ def test_a_stop_for_nothing_avoids_no_collision():
     honest, stopped = rows("care", [15.0]), rows("fan", [15.0], changes=STOPPED)
     assert contrast_of_rows(AVOIDED, honest, stopped).mean == 100.0
     assert preventable(stopped, honest) == []
-    outcomes = cut_in_rows(cut_ins("care", [None] * 4)).outcomes(
-        cut_ins("care", [None] * 4, **STOPPED)
-    )
-    assert outcomes == {CollisionOutcome.HIT: 4}
+    outcomes, speeds = r157_tables(cut_ins("care", [None] * 4, **STOPPED))
+    assert outcomes.rows[1][1:5] == ("4", "0.0%", "0", "4")
+    assert speeds.rows[1][1:] == ("0/2", "0/2")
     (row,) = played("care", "CPNCO-50", [None])
     assert impact_of(row) == (None, 20.0 / 3.6)
     assert impact_of(row | STOPPED) == (20.0 / 3.6, 20.0 / 3.6)

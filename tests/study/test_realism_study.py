@@ -5,7 +5,7 @@ import pytest
 from care_sim.base.errors import InvalidInput
 from care_sim.core.defaults import CELLS
 from care_sim.core.firing.listing import HARDWARE, settled
-from care_sim.reports.realism.tables import realism_tables
+from care_sim.reports.tables.realism import realism_tables
 from care_sim.sources.named import source_of
 from care_sim.sources.scenes import Scene, Streets
 from care_sim.study.designs.realism import (

@@ -1,6 +1,6 @@
 """Tables that both loops share: one policy minus others, and policies minus the best control."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from care_sim.base.errors import percent
 from care_sim.reports.engine.controls import BEST_CONTROL, RULE, candidates
@@ -13,6 +13,11 @@ PAPER = "(paper)"
 """What the line under a policy begins with that holds the paper's numbers."""
 OfPaper = Callable[[Measure | Recall, str], Sequence[str]]
 """What the paper says of a policy in a measure, budget by budget; empty where it says nothing."""
+
+
+def under_headings(lines: Mapping[str, Iterable[TableRow]]) -> tuple[TableRow, ...]:
+    """The rows of a table, each part below its heading."""
+    return tuple(line for heading, own in lines.items() for line in ((heading,), *own))
 
 
 def minus_table(

@@ -14,7 +14,7 @@ from care_sim.reports.engine.frames import Frame
 from care_sim.reports.engine.levels import Cell, level_of
 from care_sim.reports.figures.curves import FULL_SCAN, Panel, curves_figure
 from care_sim.reports.tables.faults import policies_of
-from care_sim.reports.vehicle.rows import VehicleRows, mean_over_forecasts, total
+from care_sim.reports.tables.vehicle import VehicleRows, mean_over_forecasts, total
 from care_sim.study.designs.faults import FAULT_PLACES, FAULTS, faults_alone
 from care_sim.study.designs.variants import Place
 from care_sim.study.designs.vehicle import (

@@ -9,8 +9,7 @@ from matplotlib.patches import Patch
 
 from care_sim.reports.figures.maps import Map, maps_figure
 from care_sim.reports.formatting import signed
-from care_sim.reports.realism.orders import Order, Verdict
-from care_sim.reports.realism.study import RealismStudy
+from care_sim.reports.tables.realism import Order, RealismStudy, Verdict
 from care_sim.study.run_config import Row
 
 REALISM_FIGURE = "realism"

@@ -12,7 +12,7 @@ from care_sim.core.arrays import Floats
 from care_sim.evaluation.ncap_score import BEST_SCORE
 from care_sim.reports.figures.maps import Map, maps_figure
 from care_sim.reports.formatting import marked
-from care_sim.reports.ncap import Contender, NcapRows
+from care_sim.reports.tables.ncap import Contender, NcapRows
 from care_sim.reports.tables.r157 import cut_in_rows
 from care_sim.study.designs.r157 import case_of
 from care_sim.study.rows.reading import is_avoided

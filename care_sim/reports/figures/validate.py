@@ -11,7 +11,7 @@ from care_sim.base.errors import percent
 from care_sim.evaluation.censoring import quartiles
 from care_sim.reports.engine.controls import BEST_CONTROL, named_by_budget
 from care_sim.reports.figures.curves import FULL_SCAN, Panel, curves_figure
-from care_sim.reports.validation import WorldPlays, played_worlds
+from care_sim.reports.tables.validate import WorldPlays, played_worlds
 from care_sim.study.designs.validate import CAMERA_POLICIES, MEMORISER
 from care_sim.study.rows.reading import detections
 from care_sim.study.run_config import FULL, Row

@@ -2,13 +2,14 @@
 policies changes.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 
 from care_sim.reports.engine.contrasts import Contrast
 from care_sim.reports.engine.frames import Frame
 from care_sim.reports.engine.levels import Cell, level_of
 from care_sim.reports.engine.measures import DETECTION
+from care_sim.reports.engine.tables import under_headings
 from care_sim.reports.formatting import interval, median
 from care_sim.reports.table import Bold, Table, TableRow
 from care_sim.study.designs.faults import (
@@ -48,20 +49,21 @@ def fault_tables(rows: Sequence[Row]) -> list[Table]:
     study = Frame(faults_alone(rows))
     marks = study.notes(study.policies)
     pairs = pairs_of(study)
-    orders: list[TableRow] = []
-    for place in FAULT_PLACES:
-        orders.append((str(place),))
-        orders += [
+    orders = {
+        str(place): [
             (fault.label, *(order(pair, fault, place, study) for pair in pairs)) for fault in FAULTS
         ]
+        for place in FAULT_PLACES
+    }
     columns = ("fault", *(" : ".join(map(study.marked, pair)) for pair in pairs))
+    title = "Where the order of policies changes"
     return [
-        Table("Where the order of policies changes", columns, tuple(orders), (_ORDER, *marks)),
+        Table(title, columns, under_headings(orders), (_ORDER, *marks)),
         *(
             Table(
                 fault.title,
                 (fault.unit, *(level.label for level in fault.levels)),
-                tuple(line for place in FAULT_PLACES for line in _blocks(fault, place, study)),
+                under_headings(_blocks(fault, study)),
                 (*fault.notes, *marks),
                 terminal=False,
             )
@@ -98,17 +100,19 @@ def _difference(
     return study.contrast(DETECTION, ours, theirs)
 
 
-def _blocks(fault: Fault, place: Place, study: Frame) -> Iterator[TableRow]:
-    """A block of policies for each measure, and one of paired differences."""
+def _blocks(fault: Fault, study: Frame) -> dict[str, list[TableRow]]:
+    """Of every place a block of policies for each measure, and one of paired differences."""
     policies = policies_of(study)
+    blocks: dict[str, list[TableRow]] = {}
     # All measures of a place before the next place: they are read together.
-    for name, entry in _MEASURES.items():
-        yield (f"{place}: {name}",)
-        for policy in policies:
-            cells = (level_of(study, level.key(place, policy)) for level in fault.levels)
-            yield (study.marked(policy), *(entry(cell) if cell else "" for cell in cells))
-    yield (f"{place}: first detection of care minus, m",)
-    for policy in policies:
-        if policy != "care":
+    for place in FAULT_PLACES:
+        for name, entry in _MEASURES.items():
+            blocks[f"{place}: {name}"] = own = []
+            for policy in policies:
+                cells = (level_of(study, level.key(place, policy)) for level in fault.levels)
+                own.append((study.marked(policy), *(entry(c) if c else "" for c in cells)))
+        blocks[f"{place}: first detection of care minus, m"] = own = []
+        for policy in (each for each in policies if each != "care"):
             found = (_difference(("care", policy), level, place, study) for level in fault.levels)
-            yield (study.marked(policy), *map(interval, found))
+            own.append((study.marked(policy), *map(interval, found)))
+    return blocks

@@ -197,6 +197,12 @@ def is_avoided(row: Row) -> bool:
     return not (row["collision"] or stops_for_nothing(row))
 
 
+def preventable(full: Sequence[Row], rows: Sequence[Row]) -> list[Row]:
+    """The rows of the seeds on which the full scan avoids the collision."""
+    spared = {row["seed"] for row in full if is_avoided(row)}
+    return [row for row in rows if row["seed"] in spared]
+
+
 _FullScans = dict[tuple[Setting, int], Row]
 
 

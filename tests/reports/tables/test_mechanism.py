@@ -1,24 +1,13 @@
 """Tables of the mechanism on rows with known answers."""
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import Conditions
-from care_sim.evaluation.miss_reasons import (
-    ELSEWHERE,
-    EXPLAINED,
-    MISS_REASONS,
-    NOT_DEMANDED,
-    STARVED,
-)
+from care_sim.evaluation.miss_reasons import ELSEWHERE, EXPLAINED, NOT_DEMANDED, STARVED
 from care_sim.evaluation.ray_shares import RAY_SHARES
-from care_sim.reports.mechanism.rows import MechanismRows
-from care_sim.reports.mechanism.tables import mechanism_closing, mechanism_tables
+from care_sim.reports.tables.mechanism import mechanism_closing, mechanism_tables
 from care_sim.study.mechanism_play import BELIEF_MARKS, BELIEF_SUMS, DIFFERING, RECEIVED
-from care_sim.study.results_formats import MECHANISM
-from care_sim.study.rows.parquet import read_rows, write_rows
 
 FOUND = ""
 
@@ -76,12 +65,11 @@ ROWS = [
 
 
 def tables(rows=ROWS):
-    return {table.title.rpartition(": ")[2]: table for table in mechanism_tables(rows)}
+    return {table.title.rpartition(": ")[2]: table.rows for table in mechanism_tables(rows)}
 
 
 def test_the_shared_belief_beside_the_paper():
-    lines = {line[0]: line[1:] for line in tables()["on the belief of care"].rows}
-    assert [*lines.values()] == [
+    assert [line[1:] for line in tables()["on the belief of care"]] == [
         ("75.0% of 80", "79% at 10%"),
         ("87.5% of 80", ""),
         ("1,000", "about 1,000"),
@@ -92,30 +80,28 @@ def test_the_shared_belief_beside_the_paper():
         ("0.0% of 1", "85%"),
         ("1", "4 at 10%"),
     ]
-
-
-def test_an_entry_that_the_full_scan_misses_too_is_none_that_a_reserve_would_win():
+    # An entry that the full scan misses too is none that a reserve would win.
     rows = [each | {"ttfds": (0, 0, 6)} if each is ROWS[2] else each for each in ROWS]
-    belief = tables(rows)["on the belief of care"].rows
+    belief = tables(rows)["on the belief of care"]
     assert [line[1] for line in belief[-2:]] == ["100.0% of 1", "0"]
 
 
 def test_allocations_on_it():
-    assert tables()["allocations on the belief of care"].rows == (
+    assert tables()["allocations on the belief of care"] == (
         ("care", "", "", "", "40 [0, 50] (5)", "7 [7, 7] (1)"),
         ("history", "62.5% of 80", "", "30", "0 [0, 1] (5)", "9 [9, 9] (1)"),
         ("(paper), no camera", "", "", "", "1 to 5", "117 to 123"),
     )
 
 
-def test_who_was_first_and_whose_rays_it_was():
+def test_which_policy_was_first_and_whose_rays_it_was():
     """CARE caught the first event of both scenes: exploitation had 3 of 4 rays of one, and none of
     the other. History caught the second of the second scene, by the floor alone.
     """
-    assert tables()["events found earlier, later or at the same keyframe"].rows == (
+    assert tables()["events found earlier, later or at the same keyframe"] == (
         ("care", "history", "2", "1", "3", "17 / 8 / 79"),
     )
-    assert tables()["whose rays caught what the other missed"].rows == (
+    assert tables()["whose rays caught what the other missed"] == (
         ("care", "history", "2", "38%", "62%", "0%", "0%", "0%", "1"),
         ("history", "care", "1", "0%", "0%", "0%", "0%", "100%", "0"),
     )
@@ -123,83 +109,43 @@ def test_who_was_first_and_whose_rays_it_was():
 
 def test_only_misses_that_the_full_scan_finds_are_given_a_reason():
     """The full scan finds five events. Of CARE's three misses it misses one too."""
-    lines = tables()["why first sightings were missed that the full scan finds"].rows
-    assert lines == (
+    assert mechanism_closing(ROWS) == ["Scenes: 2, with 6 first sightings; plays: 6."]
+    assert tables()["why first sightings were missed that the full scan finds"] == (
         ("care", "5", "2", "0", "1", "0", "0", "1", "0"),
         ("history", "5", "3", "0", "0", "2", "0", "1", "0"),
     )
 
 
-EVENTS = st.lists(
-    st.tuples(st.sampled_from([0, 1, 6]), st.sampled_from(MISS_REASONS), st.sampled_from([0, 6])),
-    min_size=3, max_size=3,
-)  # fmt: skip
-
-
-@given(EVENTS)
-def test_the_reasons_add_up_to_the_misses(events):
-    delays, reasons, full = zip(*events, strict=True)
-    told = tuple(why if late else FOUND for late, why in zip(delays, reasons, strict=True))
-    rows = [
-        ROWS[0],
-        row(
-            "a", "mine", delays, told, (NONE,) * 5,
-            differing_keyframes=0, differing_cells=0, received=NONE,
-        ),
-        ROWS[2] | {"ttfds": full},
-    ]  # fmt: skip
-    study = MechanismRows(rows)
-    missed = sum(late > 0 and found == 0 for late, found in zip(delays, full, strict=True))
-    assert sum(study.misses("mine").values()) == missed <= study.found_by_full("mine")
-
-
-def test_the_rows_survive_their_file(tmp_path):
-    write_rows(ROWS, tmp_path / MECHANISM.file, "mechanism", schema=MECHANISM.schema)
-    read = read_rows(tmp_path / MECHANISM.file, MECHANISM.schema)
-    assert mechanism_tables(read) == mechanism_tables(ROWS)
-    assert mechanism_closing(read) == ["Scenes: 2, with 6 first sightings; plays: 6."]
-
-
 def test_the_paper_stands_beside_its_own_belief_and_conditions_alone():
     late = [each | {"camera_latency": 1} for each in ROWS if each["policy"] != "full"]
-    led = [each | {"driver": "history"} for each in ROWS if each["policy"] == "full"]
-    for rows in (late, [*led, *_driven_by_history()]):
-        shown = str([(table.rows, table.quotes) for table in mechanism_tables(rows)])
-        assert "79%" not in shown
-        assert "17 / 8" not in shown
-        assert "Paper" not in shown
-
-
-def _driven_by_history():
-    """The same rows with their parts on the shared belief exchanged."""
-    care, history = ROWS[:2]
-    own = {name: care[name] for name in (*BELIEF_SUMS, *BELIEF_MARKS)}
-    moved = {name: history[name] for name in DIFFERING}
-    return [
-        care | dict.fromkeys(own) | moved | {"driver": "history"},
-        history | own | dict.fromkeys(moved) | {"driver": "history"},
-    ]
-
-
-def test_full_scans_alone_show_nothing():
+    # A study of full scans alone has no belief.
     assert mechanism_tables([ROWS[2]]) == []
-    assert mechanism_closing([ROWS[2]]) == ["Scenes: 1, with 3 first sightings; plays: 1."]
+    care, history, full = ROWS[:3]
+    # The parts on the shared belief exchanged.
+    own = {name: care[name] for name in (*BELIEF_SUMS, *BELIEF_MARKS)}
+    rows = (
+        care | {name: history[name] for name in DIFFERING},
+        history | own,
+        full,
+    )
+    led = [each | {"driver": "history"} for each in rows]
+    for rows in (late, led):
+        shown = str([(table.rows, table.quotes) for table in mechanism_tables(rows)])
+        assert not any(said in shown for said in ("79%", "17 / 8", "Paper"))
 
 
 @pytest.mark.parametrize(
-    ("changed", "complaint"),
+    ("place", "changed", "complaint"),
     [
-        ({"received": None}, "scene a, history: received must be given"),
-        ({"tracked": (0,)}, "history: tracked must tell of the 3 events of the scene, got 1"),
-        ({"driver": "history"}, "all rows must have one driver, got history beside care"),
-        ({"misses": ("bad luck", "", "")}, "unknown reason for a miss 'bad luck'"),
+        (0, {"filled": None}, "scene a, care: filled is missing"),
+        (1, {"received": None}, "scene a, history: received is missing"),
+        (1, {"tracked": (0,)}, "history: tracked is missing, or not of the 3 events of the scene"),
+        (1, {"driver": "history"}, "all rows must have one driver, got care, history"),
+        (1, {"misses": ("bad luck", "", "")}, "unknown reason for a miss 'bad luck'"),
     ],
 )
-def test_rows_that_no_study_writes_are_refused(changed, complaint):
+def test_rows_that_no_study_writes_are_refused(place, changed, complaint):
+    rows = ROWS[:2]
+    rows[place] = rows[place] | changed
     with pytest.raises(InvalidInput, match=complaint):
-        mechanism_tables([ROWS[0], ROWS[1] | changed])
-
-
-def test_a_driver_without_its_belief_is_refused():
-    with pytest.raises(InvalidInput, match="scene a, care: filled must be given"):
-        mechanism_tables([ROWS[0] | {"filled": None}])
+        mechanism_tables(rows)

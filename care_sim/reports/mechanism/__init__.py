@@ -1,1 +1,0 @@
-"""Tables of the mechanism: the shared belief, and the account of the rays."""

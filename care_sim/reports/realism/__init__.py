@@ -1,1 +1,0 @@
-"""What realistic conditions do to the orders of the headline tables."""

@@ -1,1 +1,0 @@
-"""What is shown of the vehicle study, beside the paper's figures (Sec. 5.5)."""
