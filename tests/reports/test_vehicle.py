@@ -7,7 +7,7 @@ import pytest
 from care_sim.evaluation.censoring import Bound
 from care_sim.reports.engine.contrasts import contrast_of_rows
 from care_sim.reports.engine.measures import AVOIDED, DETECTION
-from care_sim.reports.figures.faults import VEHICLE_FIGURE, vehicle_figures
+from care_sim.reports.figures.closed_loop import vehicle_figures
 from care_sim.reports.vehicle.rows import outcome
 from care_sim.reports.vehicle.tables import vehicle_tables
 from care_sim.study.designs.vehicle import (
@@ -193,7 +193,7 @@ def test_without_a_forecast_or_a_picture_there_is_no_number():
 
 
 def test_the_figure_shows_every_late_level(rows):
-    held, errors = vehicle_figures(rows)[VEHICLE_FIGURE].axes
+    held, errors = vehicle_figures(rows)["vehicle"].axes
     late = [level.label for level in EVIDENCE_LEVELS if "late" in level.label]
     assert [text.get_text() for text in held.get_xticklabels()] == late
     compensated, without, *_ = held.get_lines()

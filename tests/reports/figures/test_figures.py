@@ -7,15 +7,18 @@ import sys
 import numpy as np
 import pytest
 
-from care_sim.reports.figures.budget import firing_figures, sweep_figures
-from care_sim.reports.figures.differences import (
+from care_sim.reports.figures.closed_loop import (
+    firing_figures,
+    order_figures,
+    sweep_figures,
+    validation_figures,
+)
+from care_sim.reports.figures.files import remove_others, save, svg_text
+from care_sim.reports.figures.study_maps import (
     ablation_figures,
     crowding_figures,
     open_ablation_figures,
 )
-from care_sim.reports.figures.files import remove_others, save, svg_text
-from care_sim.reports.figures.order import open_order_figures, order_figures
-from care_sim.reports.figures.validate import validation_figures
 from care_sim.study.designs.ablations import ablation_study
 from care_sim.study.designs.firing import firing_study
 from care_sim.study.designs.order import ORDERS, order_study
@@ -141,19 +144,6 @@ def test_orders_have_a_panel_a_place_that_was_played():
     few = order_figures([each for each in made if each["scenario"] == "dense"])["order"]
     assert titles(few) == ["dense, 3%", "dense, 5%"]
     assert order_figures([each for each in made if each["scenario"] == "cutin"]) == {}
-
-
-def test_orders_of_the_open_loop_have_a_panel_a_budget():
-    plays = made_plays.study({"full": (15, 9)})
-    assert open_order_figures(plays) == {}
-    for number, order in enumerate(ORDERS):
-        found = {"history": (4, 6), "care": (6 + number, 5)}
-        plays += made_plays.study(found, budgets=(0.03, 0.1), seeds=(0,), cell_order=order)
-    figure = open_order_figures(plays)["order-open-loop"]
-    assert titles(figure) == ["budget 3%", "budget 10%"]
-    shown = heights(figure.axes[1])
-    assert shown["care"] == [30.0, 35.0, 40.0, 45.0, 50.0, 55.0]
-    assert {*shown["full scan"]} == {75.0}
 
 
 def test_a_validation_has_every_world_with_the_factor_that_is_changed():
