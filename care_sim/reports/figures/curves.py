@@ -26,10 +26,7 @@ BUDGET = "budget (share of cells fired)"
 _CEILINGS = (FULL_SCAN, BEST_CONTROL)
 """What others are held against is dashed."""
 _FIRST = (REFERENCE, "history", "all-camera", *_CEILINGS)
-_RULE = (
-    "named: the paper's policies, the best control, and the best others by their mean over the "
-    "panel; grey: all others"
-)
+_RULE = "named: the paper's policies, the best control, the best others by mean; grey: all others"
 _HOLLOW = "hollow, at 0: not detected"
 _PAPER = "diamonds, dotted line: what the paper reports"
 _SIZES = {1: (6.5, 3.6), 2: (4.6, 3.3)}

@@ -23,8 +23,6 @@ _PANEL_INCHES = 0.5, 0.5
 _LETTER_INCHES, _SLANT = 0.065, 0.9
 _INCH_LETTERS = 12
 _LUMINANCE, _PALE = (0.299, 0.587, 0.114), 0.5
-_TURNED = 4
-"""Letters from which on the names of columns are turned."""
 
 
 class Map(NamedTuple):
@@ -62,7 +60,7 @@ def maps_figure(
         axes.set_xticks(range(len(columns)), columns)
         axes.set_yticks(range(len(lines)), lines)
         axes.tick_params(length=0, labelsize=7)
-        if max(map(len, columns)) > _TURNED:
+        if _LETTER_INCHES * max(map(len, columns)) > width:
             for tick in axes.get_xticklabels():
                 tick.set(rotation=60, ha="right", rotation_mode="anchor")
         axes.spines[:].set(visible=True, linewidth=0.4)

@@ -8,9 +8,7 @@ from hypothesis import strategies as st
 
 from care_sim.reports.page.listing import _world, episode_groups
 from care_sim.reports.page.provenance import provenance_of, settings
-from care_sim.reports.page.tables import blocks, sort_key
-from care_sim.reports.protocol.formatting import PAPER
-from care_sim.reports.table import Bold, Table
+from care_sim.reports.page.sorting import sort_key
 from care_sim.study.results_formats import EPISODES, PLAYS
 from tests.helpers.made_rows import STUDY, rows
 
@@ -46,37 +44,15 @@ def test_signed_numbers_sort_as_their_values(values):
     assert sorted(texts, key=sort_key) == [f"{value:+.1f} [0.0,1.0]" for value in sorted(values)]
 
 
-def test_rows_lie_in_blocks_and_the_papers_numbers_move_with_the_row_above():
-    lines = (
-        ("care", "1"),
-        ("First",),
-        ("history", Bold("+2")),
-        (PAPER, "3"),
-        ("Second",),
-        (PAPER, "4"),
-    )
-    top, first, second = blocks(Table("t", ("a", "b"), lines))
-    assert (top.heading, [line.attached for line in top.lines]) == ("", [False])
-    assert (first.heading, [line.attached for line in first.lines]) == ("First", [False, True])
-    assert (second.heading, [line.attached for line in second.lines]) == ("Second", [False])
-    entry = first.lines[0].entries[1]
-    assert (entry.text, entry.bold, entry.key) == ("+2", True, 2.0)
-
-
-def test_a_table_of_one_column_has_no_headings():
-    (block,) = blocks(Table("t", ("a",), (("1",), ("2",))))
-    assert len(block.lines) == 2
-
-
 def test_the_listing_has_a_line_a_configuration_and_an_entry_a_seed():
     played = [*STUDY, *rows("care", [9.0], budget=0.05, changes={"collision": True})]
     (group,) = episode_groups(played, [])
     assert (group.label, group.worlds, group.watchable) == (
         "dense",
-        ("seed 0", "seed 1", "seed 2", "seed 3", "seed 4"),
+        ["seed 0", "seed 1", "seed 2", "seed 3", "seed 4"],
         0,
     )
-    by_name = {(line.policy, line.budget): line.outcomes for line in group.configurations}
+    by_name = group.configurations
     assert [outcome.text for outcome in by_name["history", "3%"]] == [
         "4.0",
         "never",
@@ -85,7 +61,7 @@ def test_the_listing_has_a_line_a_configuration_and_an_entry_a_seed():
         "never",
     ]
     assert by_name["care", "5%"][0].collision
-    assert by_name["care", "5%"][1:] == (None,) * 4
+    assert by_name["care", "5%"][1:] == [None] * 4
     assert by_name["history", "3%"][1].about == "never detected, braked"
 
 

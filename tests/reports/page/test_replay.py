@@ -4,14 +4,14 @@ import base64
 import json
 import signal
 import zlib
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
-from care_sim.reports.page.episodes import Episode, episodes_to_watch, follow, played_again
+from care_sim.reports.page.episodes import Episode, episodes_to_watch, played_again
 from care_sim.reports.page.played_rows import config_of
 from care_sim.reports.page.replay import replayed
 from care_sim.reports.page.story import SECTORS, fullness, packed, sightlines
@@ -288,15 +288,6 @@ def test_an_interrupt_does_not_wait_for_episodes_that_have_not_begun():
         played_again(rows, 1, interrupted)
     assert all(future.done() for future in handed)
     assert sum(future.cancelled() for future in handed) >= 15
-
-
-def test_how_far_the_episodes_are_is_shown_with_the_time_that_is_left():
-    futures, shown = [Future() for _ in range(4)], []
-    for future in futures:
-        future.set_result("done")
-    clock = iter((100.0, 110.0, 120.0, 130.0, 140.0))
-    follow(futures, lambda *told: shown.append(told), lambda: next(clock))
-    assert shown == [(1, "30 s left"), (2, "20 s left"), (3, "10 s left"), (4, "0 s left")]
 
 
 def test_what_cannot_be_played_says_why():

@@ -96,8 +96,8 @@ def test_policies_of_a_scene_share_its_bodies(rows, logs):
     assert len(data["bodies"]) == 1
     assert {each["world"] for each in data["episodes"]} == {0}
     (group,) = episode_groups(rows, again)
-    assert (group.worlds, group.watchable) == (("drive",), len(rows))
-    first = group.configurations[0].outcomes[0]
+    assert (group.worlds, group.watchable) == (["drive"], len(rows))
+    first = next(iter(group.configurations.values()))[0]
     assert first.text == f"{int(rows[0]['sighted'])}/{int(rows[0]['events'])}"
 
 
