@@ -119,7 +119,7 @@ def _scenery(
         return Scenery(picture, None)
     below = Image.new("RGB", BELOW_SIZE, palette.BACKGROUND)
     draw = ImageDraw.Draw(below)
-    draw.text((20, 8), "From above, driving to the right:", palette.INK, drawing.font(14))
+    drawing.write(draw, (20, 8), "From above, driving to the right:", 14)
     _write_legend(draw, (20, 34), legend)
     return Scenery(picture, below)
 
@@ -147,8 +147,8 @@ class Map:
             ends = self.pixels(np.array([[-metres, metres], [metres, -metres]]))
             (left, top), (right, bottom) = ends.tolist()
             self.draw.ellipse((left, top, right, bottom), outline=_RING_COLOUR)
-            at, words = (right - 4, (top + bottom) / 2), f"{metres:.0f} m"
-            self.draw.text(at, words, palette.FAINT_INK, drawing.font(11), anchor="rm")
+            at = right - 4, (top + bottom) / 2
+            drawing.write(self.draw, at, f"{metres:.0f} m", 11, palette.FAINT_INK, "rm")
 
 
 def _draw_returns(street: Map, loop: OpenLoop, watched: Watched | None) -> None:
@@ -175,14 +175,7 @@ def _draw_wedges(street: Map, rig: Rig, situation: TrueSituation) -> None:
     """The rays through the left and right of every image box, as far as objects are scored."""
     rays = wedge_rays(situation.belief.detections, rig)
     for nine, known, false in zip(rays, situation.known, situation.false, strict=True):
-        colour = (
-            palette.FALSE_COLOUR
-            if false
-            else palette.EXPLAINED_COLOUR
-            if known
-            else palette.UNEXPLAINED_COLOUR
-        )
-        dimmed = tuple(round(_DIMMED * part) for part in colour)
+        dimmed = tuple(round(_DIMMED * part) for part in palette.box_colour(known, false))
         for x, y, _ in nine[_SIDES]:
             line = street.pixels(np.array([[0.0, 0.0], [x, y]]) * RANGE_M / np.hypot(x, y))
             street.draw.line(line.ravel().tolist(), dimmed)
@@ -216,4 +209,4 @@ def _name_sightings(street: Map, situation: TrueSituation, keyframe: SceneKeyfra
 
 def _write_legend(draw: ImageDraw.ImageDraw, at: tuple[int, int], legend: Sequence[State]) -> None:
     for row, (words, colour) in enumerate(legend):
-        draw.text((at[0], at[1] + _LINE * row), words, colour, drawing.font(13))
+        drawing.write(draw, (at[0], at[1] + _LINE * row), words, 13, colour)
