@@ -151,7 +151,7 @@ def write_page(
         if source is not None and study.results is not PLAYS:
             raise InvalidInput(f"--source is for plays of the open loop, and {folder} holds none")
         findings = Findings.of(study, rows)
-        about = provenance_of(folder, rows, study.results, left_out)
+        about = provenance_of(folder, rows, left_out)
         watched = episodes_to_watch(rows, most) if study.results in WATCHED else []
         if watched:
             rest = f" (--episodes {len(rows)}: all)" if len(watched) < len(rows) else ""

@@ -10,7 +10,7 @@ from typing import Any
 from care_sim.base.json_text import json_content
 from care_sim.core.conditions import DEFAULTS
 from care_sim.study.provenance import code_digest
-from care_sim.study.results_formats import ResultsFormat, is_parameter
+from care_sim.study.results_formats import is_parameter
 from care_sim.study.run_config import Row
 
 CONFIG = "config.json"
@@ -44,17 +44,14 @@ class Provenance:
         return code_digest()
 
 
-def provenance_of(
-    folder: Path, rows: Sequence[Row], kind: ResultsFormat, left_out: Sequence[str]
-) -> Provenance:
+def provenance_of(folder: Path, rows: Sequence[Row], left_out: Sequence[str]) -> Provenance:
     """What the folder of a study tells about its rows."""
     description, trouble = description_in(folder)
-    left = [f"Left out: {what}." for what in left_out]
     machine, versions = (
         found if isinstance(found := description.get(name), dict) else {}
         for name in ("machine", "versions")
     )
-    missing = (*trouble, *_unplayed(description, rows, kind), *left)
+    missing = (*trouble, *(f"Left out: {what}." for what in left_out))
     return Provenance(machine, versions, settings(rows), missing)
 
 
@@ -89,23 +86,3 @@ def description_in(folder: Path) -> tuple[dict[str, Any], list[str]]:
     if not isinstance(description, dict):
         return {}, [f"{CONFIG} is not the description of a study: {_NOT_KNOWN}"]
     return description, []
-
-
-def _unplayed(
-    description: Mapping[str, Any], rows: Sequence[Row], kind: ResultsFormat
-) -> list[str]:
-    """What the configurations ask for and the rows do not hold. What failed is told as left out."""
-    try:
-        asked = sum(
-            len(each.get("seeds", each.get("floor_seeds")))
-            for each in description.get("configurations", ())
-        )
-        # Every configuration of the open loop is played in all scenes; the closed loop names none.
-        asked *= len(description.get("scenes", [None]))
-        failed = len(description.get("failed", ()))
-    except (AttributeError, TypeError):
-        return [f"The configurations in {CONFIG} cannot be read."]
-    # A file may hold more rows than were asked for, when studies shared a folder; that is no lack.
-    lacking = asked - failed - len(rows)
-    missing = f"{lacking} of {asked} {kind.unit} are missing from {kind.file}."
-    return [missing] if lacking > 0 else []
