@@ -2,7 +2,7 @@
 what is avoided in the Euro NCAP tests and in the cut-ins of UN Regulation 157.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from matplotlib.colors import ListedColormap
@@ -97,7 +97,7 @@ _Column = tuple[Place | FilmPlace, Measure | Recall]
 
 
 def _ablations(
-    name: str, title: str, study: AblationStudy, columns: dict[str, _Column]
+    name: str, title: str, study: AblationStudy, columns: Mapping[str, _Column]
 ) -> dict[str, Figure]:
     """A line per level but the usual one; no figure where nothing was played."""
     lines: dict[str, list[Contrast | None]] = {}

@@ -96,7 +96,7 @@ def _scenery(loop: ClosedLoop, frame: Keyframe | None, whole: bool) -> Scenery:
         bar = Frame.mounted(way_ahead(loop.world, loop.rig.sensor_x_m, metres), (0.0, 1.6, 0.0))
         (ground,) = loop.sensor.boxes_to_local(np.array([[bar.x, bar.y, *[0.0] * 5]]))
         if at := drawing.point_above(camera, ground):
-            labels.over(at, f"{metres:.0f} m", palette.INK, 12)
+            labels.beside(at, f"{metres:.0f} m", palette.INK, 12)
     return Scenery(street, below)
 
 

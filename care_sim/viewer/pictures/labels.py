@@ -29,19 +29,19 @@ class Labels:
         """Text centred over a point, on a dark plate, kept inside the picture; a text that the
         picture cannot hold is left out.
         """
-        left, top, right, bottom = self._draw.textbbox((0, 0), text, font(size))
-        width, height = right - left + 2 * _MARGIN, bottom - top + 2 * _MARGIN
+        width, height = self._plate(text, size)
         canvas = self._draw.im.size
         x = min(max(at[0] - width / 2, 0), canvas[0] - width)
         y = min(max(at[1] - height - 2, 0), canvas[1] - height)
-        area = self._moved_up((x, y, x + width, y + height))
-        if area is None or min(area) < 0 or area[2] > canvas[0] or area[3] > canvas[1]:
-            return
-        self._draw.rectangle(area, BACKGROUND)
-        # A text does not begin at its own origin: its box tells where the ink lies.
-        at = area[0] + _MARGIN - left, area[1] + _MARGIN - top
-        self._draw.text(at, text, colour, font(size))
-        self._taken.append(area)
+        if area := self._moved_up((x, y, x + width, y + height)):
+            self._write(area, text, colour, size)
+
+    def beside(self, at: tuple[float, float], text: str, colour: Colour, size: int) -> None:
+        """Text that ends at a point, where there is room: a number stays at its value."""
+        width, height = self._plate(text, size)
+        area = at[0] - width, at[1] - height / 2, at[0], at[1] + height / 2
+        if not any(_overlap(area, other) for other in self._taken):
+            self._write(area, text, colour, size)
 
     def arrow(self, tip: tuple[float, float], text: str, colour: Colour) -> None:
         """An arrow that points down at the label of `tip`, with a text of its own over it."""
@@ -61,6 +61,21 @@ class Labels:
                 return None
             area = left, bottom - height, right, bottom
         return area
+
+    def _plate(self, text: str, size: int) -> tuple[float, float]:
+        left, top, right, bottom = self._draw.textbbox((0, 0), text, font(size))
+        return right - left + 2 * _MARGIN, bottom - top + 2 * _MARGIN
+
+    def _write(self, area: _Area, text: str, colour: Colour, size: int) -> None:
+        canvas = self._draw.im.size
+        if min(area) < 0 or area[2] > canvas[0] or area[3] > canvas[1]:
+            return
+        self._draw.rectangle(area, BACKGROUND)
+        # A text does not begin at its own origin: its box tells where the ink lies.
+        left, top, _, _ = self._draw.textbbox((0, 0), text, font(size))
+        at = area[0] + _MARGIN - left, area[1] + _MARGIN - top
+        self._draw.text(at, text, colour, font(size))
+        self._taken.append(area)
 
 
 def _overlap(one: _Area, other: _Area) -> bool:

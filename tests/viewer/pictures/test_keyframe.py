@@ -180,11 +180,3 @@ def test_several_lidars_are_drawn_one_below_the_other_within_the_room_of_one():
     assert end <= CELLS_TOP + CELLS_SIZE[1] + 26
     # One that goes all round names its ends, and the others what lies in their view.
     assert [name for _, name in directions(STACK.grids[1])] == ["left", "ahead"]
-
-
-@pytest.mark.parametrize("heading", [-np.pi, np.pi])
-def test_a_grid_that_looks_behind_names_every_direction(heading):
-    named = directions(AngularGrid(heading=heading))
-    assert sorted(named) == [
-        (0.0, "ahead"), (0.25, "right"), (0.5, "behind"), (0.75, "left"), (1.0, "ahead"),
-    ]  # fmt: skip

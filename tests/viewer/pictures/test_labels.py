@@ -63,3 +63,14 @@ def test_a_label_leaves_the_arrow_in_sight():
     labels.arrow((150, 150), "person", INK)
     labels.over((150, 120), "truck", INK)
     assert all(pen.canvas.getpixel((150, y)) == INK for y in range(100, 128))
+
+
+def test_text_beside_a_point_ends_there_and_without_room_it_is_left_out():
+    pen = Pen()
+    labels = Labels(pen)
+    labels.beside((60, 90), "20 m", INK, 12)
+    ((_, top, right, bottom),) = pen.plates
+    assert (right, (top + bottom) / 2) == (60, 90)
+    for at in ((60, 92), (5, 30), (60, 1), (60, SIZE[1] - 1), (SIZE[0] + 5, 90)):
+        labels.beside(at, "20 m", INK, 12)
+    assert len(pen.plates) == 1
