@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from care_sim.reports.figures.closed_loop import (
+    FAULT_FIGURES,
+    fault_figures,
     firing_figures,
     order_figures,
     sweep_figures,
@@ -20,6 +22,7 @@ from care_sim.reports.figures.study_maps import (
     open_ablation_figures,
 )
 from care_sim.study.designs.ablations import ablation_study
+from care_sim.study.designs.faults import FAULTS, fault_study
 from care_sim.study.designs.firing import firing_study
 from care_sim.study.designs.order import ORDERS, order_study
 from care_sim.study.designs.variants import Variant
@@ -95,6 +98,17 @@ def test_the_crowding_map_has_a_number_in_every_cell_and_frames_the_collapse():
     assert [text.get_text() for text in texts] == ["≤-12.0*", "-7.0*", "-0.5", "+0.0"]
     assert [text.get_weight() for text in texts] == ["bold", "bold", "bold", "normal"]
     assert [patch.get_y() + 0.5 for patch in axes.patches] == [1, 0]
+
+
+def test_faults_have_a_figure_a_place_and_measure_with_a_panel_a_fault():
+    configs = [c for c in fault_study([0, 1]) if c.scenario == "dartout"]
+    made = [row(each, 9.0 - each.seed) | {"braked": each.seed == 0} for each in configs]
+    figures = fault_figures(made)
+    assert {*figures} == {name for name in FAULT_FIGURES if "dartout" in name}
+    for name, height in (("detection", 8.5), ("braked", 50.0)):
+        figure = figures[f"faults-dartout-{name}"]
+        assert titles(figure) == [fault.title for fault in FAULTS]
+        assert {*heights(figure.axes[0])["care"]} == {height}
 
 
 def fired(config):

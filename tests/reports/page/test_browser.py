@@ -7,7 +7,7 @@ import pytest
 from PIL import ImageColor
 
 from care_sim.reports.figures.styles import colours
-from care_sim.reports.page.build import write_page
+from care_sim.reports.page.build import _embedded, write_page
 from care_sim.sources.named import source_of
 from care_sim.study.episode_config import PLAIN_FIELDS, grid
 from care_sim.study.episode_play import run_episode
@@ -280,6 +280,7 @@ def test_text_from_outside_is_text(opened, tmp_path):
     ]
     page = opened(written(tmp_path, [{"tags": "causal"} | each for each in made], "sweep"))
     assert page.locator("#evil").count() == 0
+    assert "</script>" not in _embedded({"policy": evil})
     assert evil in page.inner_text("#tables")
     assert evil in page.inner_html("#figures svg").replace("&lt;", "<").replace("&gt;", ">")
 
