@@ -1,11 +1,8 @@
 """Files of figures, and the figures of the closed loop's studies on rows made by hand."""
 
-import os
-import subprocess
-import sys
-
 import numpy as np
 import pytest
+from matplotlib import rc_context
 
 from care_sim.reports.figures.closed_loop import (
     FAULT_FIGURES,
@@ -21,13 +18,12 @@ from care_sim.reports.figures.study_maps import (
     crowding_figures,
     open_ablation_figures,
 )
+from care_sim.reports.report import StudyReport
 from care_sim.study.designs.ablations import ablation_study
 from care_sim.study.designs.faults import FAULTS, fault_study
 from care_sim.study.designs.firing import firing_study
 from care_sim.study.designs.order import ORDERS, order_study
 from care_sim.study.designs.variants import Variant
-from care_sim.study.results_formats import EPISODES
-from care_sim.study.rows.parquet import write_rows
 from tests.helpers import made_plays, made_worlds
 from tests.helpers.drawn import heights, ticks, titles
 from tests.helpers.made_rows import CROWD, STUDY, row, rows
@@ -56,18 +52,13 @@ def test_texts_are_texts_of_anybody_on_a_transparent_ground():
     assert "date" not in drawing
 
 
-def test_settings_of_the_user_change_no_figure(tmp_path):
-    for name in ("plain", "styled"):
-        write_rows(SWEEP, tmp_path / name / EPISODES.file)
-    (tmp_path / "matplotlibrc").write_text("text.usetex: True\nlines.linewidth: 9\n")
-    program = [sys.executable, "-c", "from care_sim.cli import main; main()"]
-    settings = {"MATPLOTLIBRC": str(tmp_path), "MPLBACKEND": "none"}
-    subprocess.run([*program, "report", tmp_path / "plain"], check=True, timeout=120)
-    styled = [*program, "report", tmp_path / "styled"]
-    subprocess.run(styled, check=True, timeout=120, env=os.environ | settings)
-    for suffix in (".png", ".svg"):
-        plain = (tmp_path / "plain" / "dense-budget").with_suffix(suffix)
-        assert (tmp_path / "styled" / plain.name).read_bytes() == plain.read_bytes()
+def test_settings_of_the_user_change_no_figure():
+    def drawn():
+        return svg_text(StudyReport.of(SWEEP).figures["dense-budget"], "dense-budget")
+
+    with rc_context({"axes.linewidth": 9, "font.family": "serif"}):
+        styled = drawn()
+    assert styled == drawn()
 
 
 def test_only_figures_of_known_names_are_removed(tmp_path):

@@ -138,18 +138,6 @@ def test_the_grid_shows_the_left_on_the_left_and_colours_returns():
     assert tuple(picture[5, 1]) == palette.NOT_FIRED_COLOUR
 
 
-def test_a_picture_of_more_cells_than_pixels_averages_them():
-    grid = AngularGrid(columns=4, rows=2)
-    ranges = np.zeros(grid.shape)
-    ranges[:, :2] = grid.range_m
-    picture = np.asarray(drawing.cells_picture(drawing.scan_colours(grid, ranges), (2, 4)))
-    assert [tuple(pixel) for pixel in picture[0]] == [
-        palette.NOT_FIRED_COLOUR,
-        palette.NO_RETURN_COLOUR,
-    ]
-    assert (picture == picture[0]).all()
-
-
 @pytest.mark.parametrize("sensor", ["m1-forward", CORNERS])
 def test_another_sensor_is_drawn_within_the_picture(sensor):
     """A camera wider than its place, a grid of other proportions than the paper's, and several."""
