@@ -46,6 +46,17 @@ def test_no_plate_lies_over_another_or_over_the_edge(wanted):
         assert bottom <= SIZE[1]
 
 
+def test_the_second_of_two_moves_up_and_a_third_without_room_is_left_out():
+    pen = Pen()
+    labels = Labels(pen)
+    for _ in range(6):
+        labels.over((150, 190), "truck", INK)
+    first, second, *others = pen.plates
+    assert second[3] < first[1]
+    assert (first[0], first[2]) == (second[0], second[2])
+    assert len(others) == 1
+
+
 def test_a_label_leaves_the_arrow_in_sight():
     pen = Pen()
     labels = Labels(pen)
