@@ -7,41 +7,30 @@ from matplotlib.figure import Figure
 
 from care_sim.base.errors import unknown
 from care_sim.reports import closings
-from care_sim.reports.figures.budget import (
+from care_sim.reports.figures.closed_loop import (
     BUDGET_FIGURES,
-    FIRING_FIGURE,
-    firing_figures,
-    sweep_figures,
-)
-from care_sim.reports.figures.differences import (
-    ABLATION_FIGURE,
-    CROWDING_FIGURE,
-    OPEN_ABLATION_FIGURE,
-    ablation_figures,
-    crowding_figures,
-    open_ablation_figures,
-)
-from care_sim.reports.figures.faults import (
     FAULT_FIGURES,
-    VEHICLE_FIGURE,
     fault_figures,
+    firing_figures,
+    order_figures,
+    sweep_figures,
+    validation_figures,
     vehicle_figures,
 )
-from care_sim.reports.figures.order import (
-    OPEN_ORDER_FIGURE,
-    ORDER_FIGURE,
+from care_sim.reports.figures.open_loop import (
+    PROTOCOL_FIGURES,
     open_order_figures,
-    order_figures,
+    protocol_figures,
 )
-from care_sim.reports.figures.protocol import PROTOCOL_FIGURES, protocol_figures
-from care_sim.reports.figures.realism import (
-    OPEN_REALISM_FIGURE,
-    REALISM_FIGURE,
+from care_sim.reports.figures.study_maps import (
+    ablation_figures,
+    crowding_figures,
+    ncap_figures,
+    open_ablation_figures,
     open_realism_figures,
+    r157_figures,
     realism_figures,
 )
-from care_sim.reports.figures.standards import NCAP_FIGURE, R157_FIGURE, ncap_figures, r157_figures
-from care_sim.reports.figures.validate import VALIDATION_FIGURE, validation_figures
 from care_sim.reports.findings import (
     gate_tables,
     leads_of_episodes,
@@ -135,7 +124,7 @@ _ALL = (
         crowding_tables,
         crowding_figures,
         closings.episodes_closing,
-        (CROWDING_FIGURE,),
+        ("crowding",),
         columns={VEHICLES_COLUMN: COUNT},
     ),
     Study(
@@ -144,7 +133,7 @@ _ALL = (
         r157_tables,
         r157_figures,
         closings.episodes_closing,
-        (R157_FIGURE,),
+        ("r157-avoided",),
         columns=_CASE_COLUMNS,
     ),
     Study(
@@ -153,7 +142,7 @@ _ALL = (
         ablation_tables,
         ablation_figures,
         closings.episodes_closing,
-        (ABLATION_FIGURE,),
+        ("ablations",),
     ),
     Study(
         "faults",
@@ -169,7 +158,7 @@ _ALL = (
         vehicle_tables,
         vehicle_figures,
         closings.episodes_closing,
-        (VEHICLE_FIGURE,),
+        ("vehicle",),
         VEHICLE,
     ),
     Study(
@@ -178,7 +167,7 @@ _ALL = (
         ncap_tables,
         ncap_figures,
         closings.ncap_closing,
-        (NCAP_FIGURE,),
+        ("ncap",),
         columns=_NCAP_COLUMNS,
         headline=ncap_headline,
     ),
@@ -188,7 +177,7 @@ _ALL = (
         order_tables,
         order_figures,
         closings.order_closing,
-        (ORDER_FIGURE,),
+        ("order",),
         columns=_ORDER_COLUMNS,
     ),
     Study(
@@ -197,7 +186,7 @@ _ALL = (
         firing_tables,
         firing_figures,
         closings.episodes_closing,
-        (FIRING_FIGURE,),
+        ("firing",),
     ),
     Study(
         "realism",
@@ -205,7 +194,7 @@ _ALL = (
         realism_tables,
         realism_figures,
         closings.episodes_closing,
-        (REALISM_FIGURE,),
+        ("realism",),
     ),
     Study(
         "validate",
@@ -213,7 +202,7 @@ _ALL = (
         validation_tables,
         validation_figures,
         closings.validation_closing,
-        (VALIDATION_FIGURE,),
+        ("validation",),
     ),
     Study(
         "order-open-loop",
@@ -221,7 +210,7 @@ _ALL = (
         order_tables,
         open_order_figures,
         closings.open_order_closing,
-        (OPEN_ORDER_FIGURE,),
+        ("order-open-loop",),
         PLAYS,
         _ORDER_COLUMNS,
     ),
@@ -240,7 +229,7 @@ _ALL = (
         realism_tables,
         open_realism_figures,
         protocol_closing,
-        (OPEN_REALISM_FIGURE,),
+        ("realism-open-loop",),
         PLAYS,
     ),
     Study(
@@ -249,7 +238,7 @@ _ALL = (
         ablation_tables,
         open_ablation_figures,
         closings.open_ablation_closing,
-        (OPEN_ABLATION_FIGURE,),
+        ("ablations-open-loop",),
         PLAYS,
     ),
     Study(

@@ -51,6 +51,13 @@ def found_colour(keyframe: SceneKeyframe, row: int) -> Colour:
     return NOT_FOUND_COLOUR if keyframe.scored[row] else UNSCORED_COLOUR
 
 
+def box_colour(known: bool, false: bool) -> Colour:
+    """That of a camera box: a false one is told, whether a track explains it or not."""
+    if false:
+        return FALSE_COLOUR
+    return EXPLAINED_COLOUR if known else UNEXPLAINED_COLOUR
+
+
 class State(NamedTuple):
     """How it stands with somebody: words and their colour."""
 

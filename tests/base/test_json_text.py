@@ -19,7 +19,7 @@ from care_sim.base.json_text import (
     parsed_json,
 )
 from care_sim.policies.learned.weights import load_weights
-from care_sim.reports.page.provenance import CONFIG, _description
+from care_sim.reports.page.provenance import CONFIG, description_in
 from care_sim.sources.nuscenes.table_files import LARGEST_TABLE, read_json
 from care_sim.study.journal import LARGEST_JOURNAL, Journal
 from care_sim.training.folder import read_config, read_curve
@@ -53,7 +53,7 @@ def test_every_reader_says_so_in_one_line(tmp_path, levels):
     with pytest.raises(InvalidInput, match=r"weights\.npz: no \.npz of weights .*deep"):
         load_weights(weights)
     (tmp_path / CONFIG).write_text(DEEP[levels])
-    description, (trouble,) = _description(tmp_path / CONFIG)
+    description, (trouble,) = description_in(tmp_path)
     assert description == {}
     assert "deep" in trouble
 
@@ -87,7 +87,7 @@ def test_every_reader_refuses_what_is_too_large_before_it_is_read(
     for reader in (read_config, read_curve):
         with pytest.raises(InvalidInput, match=rf"config\.json is damaged: {reason}"):
             reader(path)
-    description, (trouble,) = _description(path)
+    description, (trouble,) = description_in(path.parent)
     assert description == {}
     assert "cannot be read (it " in trouble
 

@@ -17,8 +17,6 @@ from care_sim.reports.episodes.clips import view_of
 from care_sim.study.episode_play import GymEnv
 from care_sim.viewer.pictures.keyframe import draw_keyframe
 
-ENDINGS = (".png",)
-"""Of the file of a picture."""
 _ROUNDING_S = 1e-6
 """Times are sums of keyframes."""
 
@@ -28,22 +26,22 @@ class Photo:
 
     It shows the first keyframe that is `at` seconds or later, as its own clock tells; without `at`
     the first at which the car brakes, of the open loop the first at which somebody appears. Raises
-    InvalidInput for a time without a path and a negative one, and for a file whose ending is none
-    of ENDINGS; InvalidInput and OSError at once where no picture can be written:
-    `care_sim.base.files.check_output`.
+    InvalidInput for a time without a path, a negative one and another ending than .png, and what
+    `care_sim.base.files.check_output` raises.
     """
 
     def __init__(self, path: Path | None, at: float | None = None):
         self._path = path
         self._at = at
         self._taken = False
-        self._loop: ClosedLoop | OpenLoop | None = None
+        self._nobody = "the car never braked"
         if at is not None:
             check_number("at", at, least=0.0)
             if path is None:
                 raise InvalidInput("--at has no meaning without --picture")
+            self._nobody = f"no keyframe at {at:g} s or later"
         if path is not None:
-            check_known("ending of a picture", path.suffix, ENDINGS)
+            check_known("ending of a picture", path.suffix, (".png",))
             check_output(path, PNG)
 
     def watching(self, env: GymEnv, policy: Policy) -> GymEnv:
@@ -52,7 +50,8 @@ class Photo:
 
     def show(self, loop: ClosedLoop | OpenLoop, watched: Watched) -> None:
         """Take the picture after a keyframe, if none is taken and the keyframe is the one."""
-        self._loop = loop
+        if self._at is None and isinstance(loop, OpenLoop):
+            self._nobody = "nobody appeared"
         view = view_of(loop, [watched.record], watched)
         wanted = view.is_moment if self._at is None else view.time_s > self._at - _ROUNDING_S
         if self._path is not None and wanted and not self._taken:
@@ -62,16 +61,8 @@ class Photo:
 
     def report(self) -> None:
         """Tell on stderr that there was nothing to take a picture of."""
-        # Without a path there is nothing to do and nothing to tell.
-        if self._path is None or self._taken:
-            return
-        if self._at is not None:
-            why = f"no keyframe at {self._at:g} s or later"
-        elif isinstance(self._loop, OpenLoop):
-            why = "nobody appeared"
-        else:
-            why = "the car never braked"
-        print(f"{why}: no picture", file=sys.stderr)
+        if self._path is not None and not self._taken:
+            print(f"{self._nobody}: no picture", file=sys.stderr)
 
 
 class _Watched(Watching):

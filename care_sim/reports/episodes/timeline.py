@@ -56,20 +56,19 @@ _Frame = TypeVar("_Frame")
 
 @dataclass(frozen=True)
 class Timeline:
-    """What is told of an episode."""
+    """What is told of an episode: one of the `lines` per keyframe, None where some are left out,
+    `events`, and the outcome as people read it, by its labels. The last columns, `words` of them,
+    hold words.
+    """
 
     title: str
     columns: tuple[str, ...]
     words: int
-    """How many of the columns, the last ones, hold words."""
     lines: list[tuple[str, ...] | None]
-    """One per keyframe that is told, None where some are left out."""
     legend: str
     events: list[str]
     row: Row
-    """Of the results."""
     outcome: dict[str, str]
-    """The outcome as people read it, by its labels."""
 
     def print(self, console: Console) -> None:
         """Print the keyframes, what happened, then the outcome."""
@@ -120,7 +119,7 @@ def scene_timeline(config: PlayConfig, played: PlayedScene) -> Timeline:
         config.label,
         _SCENE_COLUMNS,
         0,
-        [_scene_cells(frame) if frame else None for frame in frames],
+        [_cells(frame) if frame else None for frame in frames],
         _SCENE_LEGEND,
         [
             f"{keyframes[event['keyframe']].time_s:5.1f} s  {event['class']} "
@@ -133,8 +132,8 @@ def scene_timeline(config: PlayConfig, played: PlayedScene) -> Timeline:
 
 
 def with_gaps(keyframes: Sequence[_Frame], events: Iterable[int]) -> list[_Frame | None]:
-    """First and last keyframe and those with the numbers of `events`; None for every run left out,
-    however long it is.
+    """First and last keyframe and those with the numbers of `events`; None for every run left
+    out.
     """
     # The intersection drops the ends of an episode without keyframes.
     kept = sorted({0, len(keyframes) - 1, *events} & set(range(len(keyframes))))
@@ -167,20 +166,15 @@ def encounter_text(encounter: Row, keyframes: Sequence[Keyframe]) -> str:
     return f"{who}: {'; '.join(told)}"
 
 
-def _cells(frame: Keyframe) -> tuple[str, ...]:
+def _cells(frame: Keyframe | SceneKeyframe) -> tuple[str, ...]:
+    fired = 0 if frame.fired is None else len(frame.fired)
+    if isinstance(frame, SceneKeyframe):
+        counts = (frame.objects, frame.objects_found, frame.entries, frame.entries_found, fired)
+        return (f"{frame.time_s:.1f}", *map(str, counts))
     numbers = (frame.time_s, frame.speed_mps, frame.distance_m, frame.clearance_m)
     flags = (frame.in_view, frame.detected, frame.braking)
-    return (
-        *(f"{number:z.1f}" for number in numbers),
-        str(len(frame.fired)),
-        *("yes" if flag else "" for flag in flags),
-    )
-
-
-def _scene_cells(frame: SceneKeyframe) -> tuple[str, ...]:
-    fired = 0 if frame.fired is None else len(frame.fired)
-    counts = (frame.objects, frame.objects_found, frame.entries, frame.entries_found, fired)
-    return (f"{frame.time_s:.1f}", *map(str, counts))
+    words = ("yes" if flag else "" for flag in flags)
+    return (*(f"{number:z.1f}" for number in numbers), str(fired), *words)
 
 
 def _found(ttfd: int) -> str:

@@ -1,6 +1,6 @@
 """Figures of maps: coloured cells in lines and columns, with a text in each where it has room."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain, product
 from textwrap import fill
 from typing import Any, NamedTuple
@@ -11,7 +11,9 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 from care_sim.core.arrays import Floats
+from care_sim.reports.engine.contrasts import Contrast
 from care_sim.reports.figures.styles import INK
+from care_sim.reports.formatting import mean
 from care_sim.reports.table import Bold
 
 _TEXT_INCHES, _CELL_INCHES = (0.56, 0.24), (0.17, 0.16)
@@ -21,8 +23,6 @@ _PANEL_INCHES = 0.5, 0.5
 _LETTER_INCHES, _SLANT = 0.065, 0.9
 _INCH_LETTERS = 12
 _LUMINANCE, _PALE = (0.299, 0.587, 0.114), 0.5
-_TURNED = 4
-"""Letters from which on the names of columns are turned."""
 
 
 class Map(NamedTuple):
@@ -60,7 +60,7 @@ def maps_figure(
         axes.set_xticks(range(len(columns)), columns)
         axes.set_yticks(range(len(lines)), lines)
         axes.tick_params(length=0, labelsize=7)
-        if max(map(len, columns)) > _TURNED:
+        if _LETTER_INCHES * max(map(len, columns)) > width:
             for tick in axes.get_xticklabels():
                 tick.set(rotation=60, ha="right", rotation_mode="anchor")
         axes.spines[:].set(visible=True, linewidth=0.4)
@@ -72,6 +72,36 @@ def maps_figure(
     if unit:
         figure.colorbar(image, ax=panels, label=unit, fraction=0.02, pad=0.01)
     return figure
+
+
+def differences_figure(
+    title: str,
+    lines: Mapping[str, Sequence[Contrast | None]],
+    columns: Sequence[str],
+    note: str,
+    widest: float = 0.0,
+) -> Figure:
+    """A map of mean differences, whose sign is their colour; the scale is at least `widest`."""
+    values = np.array([[each.mean if each else np.nan for each in own] for own in lines.values()])
+    # Symmetric about zero.
+    widest = max(widest, float(np.nanmax(np.abs(values), initial=0.0)))
+    drawn = Map("", values, [[*map(mean, own)] for own in lines.values()])
+    scale: dict[str, Any] = {"cmap": "PuOr", "vmin": -widest, "vmax": widest}
+    return maps_figure(title, [[drawn]], [*lines], columns, note, **scale)
+
+
+def map_of_means(
+    title: str,
+    lines: Sequence[Any],
+    columns: Sequence[Any],
+    values: Iterable[tuple[Any, Any, float]],
+) -> Map:
+    """The mean of all values of the same line and column."""
+    cells: dict[tuple[Any, Any], list[float]] = {}
+    for line, column, value in values:
+        cells.setdefault((line, column), []).append(value)
+    means = [[np.mean(cells.get((line, each), np.nan)) for each in columns] for line in lines]
+    return Map(title, np.array(means))
 
 
 def _write(axes: Axes, drawn: Map, image: Any) -> None:

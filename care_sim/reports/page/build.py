@@ -6,11 +6,10 @@ import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markdown_it import MarkdownIt
 from markupsafe import Markup
 
@@ -19,11 +18,12 @@ from care_sim.base.errors import InvalidInput, counted, printable_lines
 from care_sim.base.files import HTML, replacing
 from care_sim.evaluation.recall import CENSORED_AT
 from care_sim.evaluation.sightings import RANGE_M
+from care_sim.reports.engine.tables import PAPER
 from care_sim.reports.figures.files import default_style, svg_text
 from care_sim.reports.page.episodes import Episode, episodes_to_watch, played_again
 from care_sim.reports.page.listing import episode_groups, replay_data
 from care_sim.reports.page.provenance import Provenance, provenance_of
-from care_sim.reports.page.tables import blocks, least_ems
+from care_sim.reports.page.sorting import is_bold, sort_key
 from care_sim.reports.report import read_results
 from care_sim.reports.study import Study
 from care_sim.reports.table import Table
@@ -35,14 +35,14 @@ from care_sim.study.run_config import Row
 WATCHED = (EPISODES, VEHICLE, PLAYS)
 """What can be played again to be watched. A row of the mechanism is no play by itself."""
 _STYLE_ELEMENT = re.compile(r"<style.*?</style>", re.DOTALL)
+_ASSETS = Path(__file__).with_name("assets")
 
 
 @dataclass(frozen=True)
 class Findings:
-    """What a study makes of its rows."""
+    """What a study makes of its rows: the SVG of every figure by name, tables, sentences."""
 
     drawings: Mapping[str, str]
-    """The SVG of every figure by name."""
     tables: Sequence[Table]
     closing: Sequence[str]
 
@@ -58,7 +58,7 @@ class Findings:
 
 @dataclass(frozen=True)
 class Page:
-    """What a page shows of a study."""
+    """What a page shows of a study. `episodes` are those that were played again."""
 
     name: str
     study: Study
@@ -67,48 +67,44 @@ class Page:
     provenance: Provenance
     episodes: Sequence[Episode]
 
-    @property
-    def open_loop(self) -> bool:
-        """Whether its episodes are plays of scenes, in which nothing reacts."""
-        return self.study.results is PLAYS
-
     def html(self) -> str:
         """The page as one file."""
-        return str(
-            _template().render(
-                page=self,
-                title=self.study.title,
-                version=care_sim.__version__,
-                drawings={name: _inline(svg) for name, svg in self.findings.drawings.items()},
-                tables=[(table, blocks(table), least_ems(table)) for table in self.findings.tables],
-                reading=Markup(MarkdownIt().enable("table").render(_asset("reading.md"))),
-                closing=self.findings.closing,
-                groups=episode_groups(self.rows, self.episodes) if self.listed else [],
-                replays=_embedded(replay_data(self.episodes)),
-                asset=_asset,
-                counted=counted,
-                range_m=f"{RANGE_M:g}",
-                censored_at=CENSORED_AT,
-            )
+        # StrictUndefined: a name that is misspelt in the template raises and is not left empty.
+        environment = Environment(
+            loader=FileSystemLoader(_ASSETS),
+            autoescape=True,
+            undefined=StrictUndefined,
+            finalize=_printable,
+            trim_blocks=True,
+            lstrip_blocks=True,
         )
-
-    @property
-    def watched(self) -> bool:
-        """Whether its rows can be played again."""
-        return self.study.results in WATCHED
-
-    @property
-    def listed(self) -> bool:
-        """Whether the page lists episodes: of the open loop those in scenes that can be watched."""
-        return bool(self.watchable) if self.open_loop else self.watched
+        watched = self.study.results in WATCHED
+        return environment.get_template("page.html").render(
+            page=self,
+            title=self.study.title,
+            version=care_sim.__version__,
+            drawings={name: _inline(svg) for name, svg in self.findings.drawings.items()},
+            tables=self.findings.tables,
+            is_bold=is_bold,
+            sort_key=sort_key,
+            paper=PAPER,
+            reading=Markup(MarkdownIt().enable("table").render(_asset("reading.md"))),
+            closing=self.findings.closing,
+            watched=watched,
+            open_loop=self.study.results is PLAYS,
+            groups=episode_groups(self.rows, self.episodes) if watched else [],
+            replays=_embedded(replay_data(self.episodes)),
+            asset=_asset,
+            counted=counted,
+            range_m=f"{RANGE_M:g}",
+            censored_at=CENSORED_AT,
+        )
 
     @property
     def warnings(self) -> list[str]:
         """Sentences about what is missing, or is not as it was."""
         # Each reason once, with the number of episodes that it kept from playing.
-        reasons = Counter(
-            episode.ending for episode in self.episodes if isinstance(episode.ending, str)
-        )
+        reasons = Counter(each.ending for each in self.episodes if isinstance(each.ending, str))
         unplayable = [
             f"Episodes that cannot be played again: {count} ({reason})."
             for reason, count in reasons.items()
@@ -143,7 +139,7 @@ def write_page(
     make_executor: ExecutorFactory = processes,
     source: Source | None = None,
 ) -> Page:
-    """Write the page of a folder of results, with at most so many episodes to watch, to `path`.
+    """Write the page of a folder of results, with at most `most` episodes to watch, to `path`.
     `source` is where the scenes of recordings are found.
 
     Raises InvalidInput where there are no results and for a source of the closed loop, and
@@ -155,42 +151,21 @@ def write_page(
         if source is not None and study.results is not PLAYS:
             raise InvalidInput(f"--source is for plays of the open loop, and {folder} holds none")
         findings = Findings.of(study, rows)
-        about = provenance_of(folder, rows, study.results, left_out)
+        about = provenance_of(folder, rows, left_out)
         watched = episodes_to_watch(rows, most) if study.results in WATCHED else []
         if watched:
-            left = len(rows) - len(watched)
-            rest = f" (--episodes {len(rows)}: all)" if left else ""
-            print(
-                f"playing {counted(len(watched), 'episode')} again to be watched{rest}",
-                file=sys.stderr,
-            )
+            rest = f" (--episodes {len(rows)}: all)" if len(watched) < len(rows) else ""
+            again = counted(len(watched), "episode")
+            print(f"playing {again} again to be watched{rest}", file=sys.stderr)
         episodes = played_again(watched, workers, make_executor, source)
         page = Page(folder.resolve().name, study, rows, findings, about, episodes)
         unfinished.write_text(page.html(), encoding="utf-8")
     return page
 
 
-def _template() -> Any:
-    # StrictUndefined: a name that is misspelt in the template raises and is not left empty.
-    loader = PackageLoader("care_sim.reports.page", "assets")
-    environment = Environment(
-        loader=loader,
-        autoescape=True,
-        undefined=StrictUndefined,
-        finalize=_printable,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    return environment.get_template("page.html")
-
-
 def _asset(name: str) -> Markup:
     """A file of the page as it stands."""
-    return Markup(
-        resources.files("care_sim.reports.page")
-        .joinpath("assets", name)
-        .read_text(encoding="utf-8")
-    )
+    return Markup((_ASSETS / name).read_text(encoding="utf-8"))
 
 
 def _inline(svg: str) -> Markup:
@@ -199,13 +174,10 @@ def _inline(svg: str) -> Markup:
 
 
 def _embedded(data: Any) -> Markup:
-    """Plain data for a script element, whose end no text in it can be."""
-    return Markup(
-        # "</script>" in a text would end the element.
-        json.dumps(_printable(data), separators=(",", ":"), ensure_ascii=False).replace(
-            "<", "\\u003c"
-        )
-    )
+    """Plain data for a script element."""
+    text = json.dumps(_printable(data), separators=(",", ":"), ensure_ascii=False)
+    # "</script>" in a text would end the element.
+    return Markup(text.replace("<", "\\u003c"))
 
 
 def _printable(data: Any) -> Any:

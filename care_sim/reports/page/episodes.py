@@ -3,17 +3,16 @@ were made.
 """
 
 import math
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import BrokenExecutor, Future, as_completed
 from dataclasses import dataclass
 
-from care_sim.reports.page.played_rows import config_of, play_config_of
+from care_sim.reports.page.played_rows import config_of, in_open_loop, play_config_of
 from care_sim.reports.page.replay import Replay, replayed
 from care_sim.sources.scenes import Source
 from care_sim.study.episode_play import result_or_reason
 from care_sim.study.executors import ExecutorFactory, processes
-from care_sim.study.progress import Show, rounded_duration, shown_progress
+from care_sim.study.progress import shown_progress
 from care_sim.study.run_config import FULL, Row
 from care_sim.study.runner import DIED
 
@@ -58,11 +57,6 @@ class Episode:
         ]
 
 
-def in_open_loop(row: Row) -> bool:
-    """Whether a row is of a play in a scene of a source."""
-    return "scene" in row
-
-
 def episodes_to_watch(rows: Sequence[Row], most: int) -> list[Row]:
     """At most so many rows: all of the first seed, of the open loop of the first scene, then those
     of the next, so that policies can be seen side by side. Of a scene the full scan comes first,
@@ -97,24 +91,13 @@ def played_again(
         # Each by itself: what was played before the death of a worker stays.
         futures = [executor.submit(result_or_reason, _replay_of, row, source) for row in rows]
         with shown_progress(len(rows), "episodes") as show:
-            follow(futures, show)
+            for done, _ in enumerate(as_completed(futures), 1):
+                show(done, "")
         return [Episode(row, _ending(future)) for row, future in zip(rows, futures, strict=True)]
     finally:
         # After an interrupt the episodes that wait are not begun. Those that are being played end
         # first.
         executor.shutdown(cancel_futures=True)
-
-
-def follow(
-    futures: Sequence[Future[Replay | str]],
-    show: Show,
-    clock: Callable[[], float] = time.monotonic,
-) -> None:
-    """Wait for all, and show how many have ended and how long the others should take."""
-    started = clock()
-    for done, _ in enumerate(as_completed(futures), 1):
-        left_s = (clock() - started) / done * (len(futures) - done)
-        show(done, f"{rounded_duration(left_s)} left")
 
 
 def _replay_of(row: Row, source: Source | None) -> Replay:

@@ -3,20 +3,19 @@ entry per seed, of the open loop per scene.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from care_sim.base.errors import counted, percent
 from care_sim.reports.formatting import marked
-from care_sim.reports.page.episodes import Episode, in_open_loop
+from care_sim.reports.page.episodes import Episode
+from care_sim.reports.page.played_rows import in_open_loop
 from care_sim.reports.page.story import packed
 from care_sim.study.rows.reading import policy_of, setting_of, stops_for_nothing, tags_of_row
 from care_sim.study.rows.settings import Setting
 from care_sim.study.run_config import Row
 
 
-@dataclass(frozen=True)
-class EpisodeEntry:
+class EpisodeEntry(NamedTuple):
     """What an entry says of an episode; `number` is that of its replay in the page, None without
     one.
     """
@@ -28,24 +27,14 @@ class EpisodeEntry:
     number: int | None
 
 
-@dataclass(frozen=True)
-class Configuration:
-    """A policy at a budget, and its outcomes by world; None for one that was not played."""
-
-    policy: str
-    budget: str
-    outcomes: tuple[EpisodeEntry | None, ...]
-
-
-@dataclass(frozen=True)
-class Group:
-    """The configurations of a setting, and the `worlds` that they were played in, seeds or scenes;
-    `watchable` counts the episodes that can be watched.
+class Group(NamedTuple):
+    """The configurations of a setting: by policy and budget an entry for each of the `worlds`,
+    seeds or scenes, None where it was not played. `watchable` counts the episodes to watch.
     """
 
     label: str
-    worlds: tuple[str, ...]
-    configurations: tuple[Configuration, ...]
+    worlds: list[str]
+    configurations: dict[tuple[str, str], list[EpisodeEntry | None]]
     watchable: int
 
 
@@ -53,11 +42,8 @@ def episode_groups(rows: Sequence[Row], episodes: Sequence[Episode]) -> list[Gro
     """All rows by setting, of the open loop those in scenes that can be watched; `episodes` are
     those of them that were played again, in the order of `replay_data`.
     """
-    held = {
-        # By its configuration, which is unique in the rows of a study.
-        _place(episode.row): (number, episode)
-        for number, episode in enumerate(_watchable(episodes))
-    }
+    # A configuration is unique in the rows of a study.
+    held = {_place(each.row): (number, each) for number, each in enumerate(_watchable(episodes))}
     # A study of the open loop has up to 150 scenes, of which few are played again.
     shown = {_column(episode.row) for _, episode in held.values()}
     by_setting: dict[Setting, list[Row]] = {}
@@ -69,30 +55,26 @@ def episode_groups(rows: Sequence[Row], episodes: Sequence[Episode]) -> list[Gro
 
 def replay_data(episodes: Sequence[Episode]) -> dict[str, Any]:
     """What `play.js` plays: every replay, and the standing bodies that several share."""
-    standing: list[Any] = []
-    numbers: dict[str, int] = {}
+    # Policies meet the same world, whose standing bodies are then written once.
+    standing: dict[str, Any] = {}
     worlds: dict[Any, int] = {}
     played = []
     for episode in _watchable(episodes):
         assert episode.replay is not None
-        # Policies meet the same world, whose standing bodies are then written once.
-        bodies = episode.replay.bodies
-        number = numbers.setdefault(repr(bodies), len(numbers))
-        if number == len(standing):
-            standing.append(bodies)
-        row = episode.row
+        row, key = episode.row, repr(episode.replay.bodies)
+        standing.setdefault(key, episode.replay.bodies)
         played.append(
             {
-                "policy": f"{marked(policy_of(row), tags_of_row(row))} {percent(row['budget'])}",
+                "policy": f"{_policy(row)} {percent(row['budget'])}",
                 "setting": setting_of(row).label,
                 "where": _where(row),
                 "world": worlds.setdefault(_world(row), len(worlds)),
-                "bodies": number,
+                "bodies": [*standing].index(key),
                 "differences": episode.differences,
                 "story": packed(episode.replay.story),
             }
         )
-    return {"bodies": standing, "episodes": played}
+    return {"bodies": [*standing.values()], "episodes": played}
 
 
 def _watchable(episodes: Sequence[Episode]) -> list[Episode]:
@@ -100,21 +82,18 @@ def _watchable(episodes: Sequence[Episode]) -> list[Episode]:
 
 
 def _group(setting: Setting, rows: Sequence[Row], held: dict[Any, tuple[int, Episode]]) -> Group:
-    columns = sorted({_column(row) for row in rows})
-    lines: dict[tuple[str, str], dict[Any, EpisodeEntry]] = {}
-    for row in rows:
-        key = marked(policy_of(row), tags_of_row(row)), percent(row["budget"])
-        entry = _entry(row, *held.get(_place(row), (None, None)))
-        lines.setdefault(key, {})[_column(row)] = entry
-    # A world that this configuration was not played in leaves its place empty.
-    configurations = [
-        Configuration(*key, tuple(map(own.get, columns))) for key, own in lines.items()
-    ]
     worlds = {_column(row): _where(row) for row in rows}
+    columns = sorted(worlds)
+    found = {
+        (_policy(row), percent(row["budget"]), _column(row)): _entry(
+            row, *held.get(_place(row), (None, None))
+        )
+        for row in rows
+    }
+    # A world that this configuration was not played in leaves its place empty.
+    lines = {key[:2]: [found.get((*key[:2], each)) for each in columns] for key in found}
     watchable = sum(_place(row) in held for row in rows)
-    return Group(
-        setting.label, tuple(worlds[each] for each in columns), tuple(configurations), watchable
-    )
+    return Group(setting.label, [worlds[each] for each in columns], lines, watchable)
 
 
 def _entry(row: Row, number: int | None, episode: Episode | None) -> EpisodeEntry:
@@ -132,6 +111,10 @@ def _entry(row: Row, number: int | None, episode: Episode | None) -> EpisodeEntr
     ]
     text = "never" if distance is None else f"{distance:.1f}"
     return EpisodeEntry(text, ", ".join(said), row["collision"], differs, number)
+
+
+def _policy(row: Row) -> str:
+    return marked(policy_of(row), tags_of_row(row))
 
 
 def _column(row: Row) -> Any:

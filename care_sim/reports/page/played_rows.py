@@ -13,6 +13,11 @@ from care_sim.study.play_config import PlayConfig
 from care_sim.study.run_config import Row
 
 
+def in_open_loop(row: Row) -> bool:
+    """Whether a row is of a play in a scene of a source."""
+    return "scene" in row
+
+
 def config_of(row: Row) -> EpisodeConfig:
     """The configuration that a row was played with. Raises InvalidInput for one that this version
     does not accept, and for a sensor set-up that is neither told nor comes with it.

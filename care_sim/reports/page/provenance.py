@@ -10,12 +10,13 @@ from typing import Any
 from care_sim.base.json_text import json_content
 from care_sim.core.conditions import DEFAULTS
 from care_sim.study.provenance import code_digest
-from care_sim.study.results_formats import ResultsFormat, is_parameter
+from care_sim.study.results_formats import is_parameter
 from care_sim.study.run_config import Row
 
 CONFIG = "config.json"
 _MANY = 12
 """So many values of a parameter are listed; of more, the first and the last."""
+_NOT_KNOWN = "machine, versions and what was to be played are not known."
 
 
 @dataclass(frozen=True)
@@ -43,18 +44,15 @@ class Provenance:
         return code_digest()
 
 
-def provenance_of(
-    folder: Path, rows: Sequence[Row], kind: ResultsFormat, left_out: Sequence[str]
-) -> Provenance:
+def provenance_of(folder: Path, rows: Sequence[Row], left_out: Sequence[str]) -> Provenance:
     """What the folder of a study tells about its rows."""
-    description, trouble = _description(folder / CONFIG)
-    missing = [
-        *trouble,
-        *_unplayed(description, rows, kind),
-        *(f"Left out: {what}." for what in left_out),
-    ]
-    machine, versions = (_mapping(description, name) for name in ("machine", "versions"))
-    return Provenance(machine, versions, settings(rows), tuple(missing))
+    description, trouble = description_in(folder)
+    machine, versions = (
+        found if isinstance(found := description.get(name), dict) else {}
+        for name in ("machine", "versions")
+    )
+    missing = (*trouble, *(f"Left out: {what}." for what in left_out))
+    return Provenance(machine, versions, settings(rows), missing)
 
 
 def settings(rows: Sequence[Row]) -> dict[str, str]:
@@ -68,62 +66,23 @@ def settings(rows: Sequence[Row]) -> dict[str, str]:
 
 
 def _listed(values: Sequence[Any]) -> str:
-    texts = [_text(value) for value in values]
-    return (
-        ", ".join(texts)
-        if len(texts) <= _MANY
-        else f"{texts[0]} to {texts[-1]}, {len(texts)} values"
-    )
-
-
-def _text(value: Any) -> str:
-    return (
+    texts = [
         "not given" if value is None else f"{value:g}" if isinstance(value, float) else str(value)
-    )
+        for value in values
+    ]
+    if len(texts) <= _MANY:
+        return ", ".join(texts)
+    return f"{texts[0]} to {texts[-1]}, {len(texts)} values"
 
 
-def _description(path: Path) -> tuple[dict[str, Any], list[str]]:
+def description_in(folder: Path) -> tuple[dict[str, Any], list[str]]:
     """The file that a study writes first of all, and what is wrong with it."""
     try:
-        description = json_content(path)
+        description = json_content(folder / CONFIG)
     except FileNotFoundError:
-        return {}, [
-            f"{CONFIG} is missing: machine, versions and the list of what was to be played are not "
-            "known."
-        ]
+        return {}, [f"{CONFIG} is missing: {_NOT_KNOWN}"]
     except (OSError, ValueError) as error:
-        return {}, [
-            f"{CONFIG} cannot be read ({str(error).splitlines()[0]}): machine and versions are not "
-            "known."
-        ]
+        return {}, [f"{CONFIG} cannot be read ({str(error).splitlines()[0]}): {_NOT_KNOWN}"]
     if not isinstance(description, dict):
-        return {}, [
-            f"{CONFIG} is not the description of a study: machine and versions are not known."
-        ]
+        return {}, [f"{CONFIG} is not the description of a study: {_NOT_KNOWN}"]
     return description, []
-
-
-def _unplayed(
-    description: Mapping[str, Any], rows: Sequence[Row], kind: ResultsFormat
-) -> list[str]:
-    """What the configurations ask for and the rows do not hold. What failed is told as left out."""
-    try:
-        asked = sum(
-            len(each.get("policies", [None])) * len(each.get("seeds", each.get("floor_seeds")))
-            for each in description.get("configurations", ())
-        )
-        # Every configuration of the open loop is played in all scenes; the closed loop names none.
-        asked *= len(description.get("scenes", [None]))
-        failed = len(description.get("failed", ()))
-    except (AttributeError, TypeError):
-        return [f"The configurations in {CONFIG} cannot be read."]
-    # A file may hold more rows than were asked for, when studies shared a folder; that is no lack.
-    lacking = asked - failed - len(rows)
-    return (
-        [f"{lacking} of {asked} {kind.unit} are missing from {kind.file}."] if lacking > 0 else []
-    )
-
-
-def _mapping(description: Mapping[str, Any], name: str) -> Mapping[str, Any]:
-    found = description.get(name)
-    return found if isinstance(found, dict) else {}

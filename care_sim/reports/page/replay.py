@@ -4,14 +4,13 @@ knew.
 Everything is in the world frame and in the numbers of `care_sim.reports.page.story`.
 """
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from care_sim.core.frames import Frame, Pose
 from care_sim.core.return_settings import FilmedReturns
 from care_sim.core.types import CLASSES
 from care_sim.evaluation.recall import CENSORED_AT
@@ -21,8 +20,7 @@ from care_sim.loops.open_loop import OpenLoop
 from care_sim.loops.records import Keyframe, Outcome
 from care_sim.loops.scene_records import SceneKeyframe
 from care_sim.loops.watcher import sought
-from care_sim.reports.page.story import CENTI, Known, fullness, whole, whole_poses
-from care_sim.reports.page.walls import WALL_M, walls
+from care_sim.reports.page.story import CENTI, fullness, known_before, whole, whole_pose
 from care_sim.sensors.annotated import NO_OBJECT
 from care_sim.sources.scenes import Scene, Source
 from care_sim.study.episode_config import EpisodeConfig
@@ -35,10 +33,14 @@ from care_sim.world.bodies import CATALOGUE
 
 _WAY_STEP_M = 2.0
 """Between two points of the way: on a turn of 7 m the line between them is 7 cm off."""
-AWAY, BEYOND, MISSED, FOUND = ".012"
+_AWAY, _BEYOND, _MISSED, _FOUND = ".012"
 """How it stands with an object of a film at a keyframe: not annotated, beyond the range that is
 scored, not found, found.
 """
+_WALL_M = 0.5
+"""Side of the squares in which walls are drawn: a scene has about a thousand."""
+_WALL_FROM_M = 0.5
+"""Over the road: what returns below is the ground or a kerb."""
 
 
 @dataclass(frozen=True)
@@ -55,45 +57,37 @@ class Replay:
     ending: tuple[str, ...]
 
 
-class Moment(NamedTuple):
-    """What there is before a keyframe. Bodies are numbers: of the closed loop their places among
-    the actors, of a film those of its objects.
-    """
-
-    time_s: float
-    place: Pose
-    """Of the car."""
-    speed_mps: float
-    sensor: Frame
-    poses: dict[int, Pose]
-    """Of the bodies that are there."""
-    seen: set[int]
-    """Those that the cameras show, of a film those that the policy was shown."""
-
-
-@dataclass
 class Recorder:
     """Watches an episode of either loop. The last moment of the closed loop is after its last
     keyframe.
+
+    Bodies are numbers: of the closed loop their places among the actors, of a film those of its
+    objects.
     """
 
-    moments: list[Moment] = field(default_factory=list)
-    known: Known = field(default_factory=Known)
-    beliefs: list[dict[str, Any]] = field(default_factory=list)
-    rays: list[str] = field(default_factory=list)
-    loop: Any = None
+    def __init__(self) -> None:
+        self.loop: Any = None
+        self._columns: dict[str, list[Any]] = {"rays": []}
+        self._tracked: dict[int, list[Any]] = {}
+        self._poses: list[dict[int, list[int]]] = []
+        self._seen: list[set[int]] = []
 
     def before(self, loop: ClosedLoop | OpenLoop) -> None:
         """Take down what there is and what is known before the coming keyframe."""
         self.loop = loop
-        moment = _of_world(loop) if isinstance(loop, ClosedLoop) else _of_film(loop)
-        self.moments.append(moment)
-        self.beliefs.append(self.known.at(loop.belief, moment.sensor, loop.rig))
+        read: Any = _of_world if isinstance(loop, ClosedLoop) else _of_film
+        moment, poses, seen = read(loop)
+        self._poses.append({body: whole_pose(pose) for body, pose in poses.items()})
+        self._seen.append(seen)
+        sensor = loop.sensor if isinstance(loop, ClosedLoop) else loop.shot.sensor
+        moment |= known_before(loop.belief, sensor, loop.rig, self._tracked)
+        for name, value in moment.items():
+            self._columns.setdefault(name, []).append(value)
 
     def after(self, loop: ClosedLoop | OpenLoop, frame: Keyframe | SceneKeyframe) -> None:
         """Take down what the keyframe fired, and what there is before the next."""
         assert frame.fired is not None
-        self.rays.append(fullness(frame.fired, loop.rig.grid))
+        self._columns["rays"].append(fullness(frame.fired, loop.rig.grid))
         if isinstance(loop, ClosedLoop) or not loop.over:
             self.before(loop)
 
@@ -105,45 +99,39 @@ class Recorder:
             "sensor": whole(rig.sensor_position[:2], CENTI),
             "reach": whole(rig.grid.range_m, CENTI),
         }
-        return {
-            "ego": ego,
-            "time": [whole(moment.time_s, CENTI) for moment in self.moments],
-            "place": whole_poses(np.array([moment.place for moment in self.moments])).tolist(),
-            "speed": [whole(moment.speed_mps, CENTI) for moment in self.moments],
-            "seen": [signs(dict.fromkeys(m.seen, "1"), bodies, "0") for m in self.moments],
-            "rays": self.rays,
-            "tracked": self.known.tracked,
-            **{name: [belief[name] for belief in self.beliefs] for name in self.beliefs[0]},
-        }
+        seen = ["".join("01"[body in each] for body in bodies) for each in self._seen]
+        return {"ego": ego, "seen": seen, "tracked": self._tracked, **self._columns}
 
     def poses(self, body: int) -> list[list[int] | None]:
         """That of a body at every moment, None where it is not there."""
-        told = [moment.poses.get(body) for moment in self.moments]
-        return [
-            None if pose is None else whole_poses(np.array([pose]))[0].tolist() for pose in told
-        ]
+        return [poses.get(body) for poses in self._poses]
 
 
-def signs(given: dict[int, str], bodies: Sequence[int], other: str) -> str:
-    """A sign for every body: the `given` one, or the `other`."""
-    return "".join(given.get(body, other) for body in bodies)
-
-
-def _of_world(loop: ClosedLoop) -> Moment:
-    world, actors = loop.world, enumerate(loop.world.actors)
-    poses = {n: actor.pose_at(world.time) for n, actor in enumerate(world.actors)}
+def _of_world(loop: ClosedLoop) -> tuple[dict[str, Any], dict[int, Any], set[int]]:
+    """The moment, the poses of the bodies that are there, and which of them the cameras show."""
+    world, actors = loop.world, [*enumerate(loop.world.actors)]
+    poses = {n: actor.pose_at(world.time) for n, actor in actors}
     seen = {n for n, actor in actors if loop.shows(actor.body)}
-    return Moment(world.time, world.ego.pose, world.ego_motion.speed, loop.sensor, poses, seen)
+    return _moment(world.time, world.ego.pose, world.ego_motion.speed), poses, seen
 
 
-def _of_film(loop: OpenLoop) -> Moment:
+def _of_film(loop: OpenLoop) -> tuple[dict[str, Any], dict[int, Any], set[int]]:
+    """The same of a film, and which of its objects the policy was shown."""
     shot, (x, y) = loop.shot, loop.film.place
     # The sensor turns with the car and stands `place` before its middle.
-    (car,) = shot.sensor.boxes_to_world(np.array([[-x, -y, *[0.0] * 5]]))[:, [0, 1, 6]].tolist()
-    boxes = shot.sensor.boxes_to_world(shot.annotations.boxes)[:, [0, 1, 6]].tolist()
-    poses = dict(zip(shot.annotations.objects.tolist(), map(tuple, boxes), strict=True))
+    (car,) = shot.sensor.boxes_to_world(np.array([[-x, -y, *[0.0] * 5]]))[:, [0, 1, 6]]
+    boxes = shot.sensor.boxes_to_world(shot.annotations.boxes)[:, [0, 1, 6]]
+    poses = dict(zip(shot.annotations.objects.tolist(), boxes, strict=True))
     seen = {*loop.true_detected_objects().tolist()} - {NO_OBJECT}
-    return Moment(shot.time_s, tuple(car), shot.ego.speed, shot.sensor, poses, seen)
+    return _moment(shot.time_s, car, shot.ego.speed), poses, seen
+
+
+def _moment(time_s: float, car: Sequence[float], speed_mps: float) -> dict[str, Any]:
+    return {
+        "time": whole(time_s, CENTI),
+        "place": whole_pose(car),
+        "speed": whole(speed_mps, CENTI),
+    }
 
 
 def replayed(config: EpisodeConfig | PlayConfig) -> Replay:
@@ -167,33 +155,27 @@ def replayed(config: EpisodeConfig | PlayConfig) -> Replay:
     # In whole centimetres and milliradians: what moves less stands still in the picture.
     moving = [body for body in bodies if any(pose != body["poses"][0] for pose in body["poses"])]
     standing = [body | {"pose": body.pop("poses")[0]} for body in bodies if body not in moving]
-    story = {
-        "moving": moving,
-        **recorder.story(range(len(bodies)), world.ego_kind.size),
-        **_told(recorder.loop, keyframes),
-    }
+    story = recorder.story(range(len(bodies)), world.ego_kind.size)
+    story |= {"moving": moving, **_told(recorder.loop, keyframes)}
     return Replay(row, standing, story, tuple(Outcome.__dataclass_fields__))
 
 
 def _told(loop: ClosedLoop, keyframes: Sequence[Keyframe]) -> dict[str, Any]:
     """What the keyframes tell, one column for each thing, and whom the episode is about."""
     world, about = loop.world, sought(loop.world)
+
+    def flags(read: Callable[[Any], bool]) -> str:
+        return "".join(str(int(read(frame))) for frame in keyframes)
+
     # How it stands with each of them: "0" out of the cameras' view, "1" in it, "2" detected.
     sights = [f.sights if world.meetings else (f,) * len(about) for f in keyframes]
     states = [["2" if one.detected else str(int(one.in_view)) for one in each] for each in sights]
-    flags = {"in_view": "in_view", "found": "detected", "brake": "braking"}
     far = [frame.distance_m for frame in keyframes]
     impact = next((frame.impact for frame in keyframes if frame.impact), None)
-    hit = impact and {
-        "kind": impact.kind,
-        "at_front": impact.at_front,
-        "speed": whole(impact.speed_mps, CENTI),
-    }
     return {
-        **{
-            key: "".join(str(int(getattr(frame, name))) for frame in keyframes)
-            for key, name in flags.items()
-        },
+        "in_view": flags(lambda frame: frame.in_view),
+        "found": flags(lambda frame: frame.detected),
+        "brake": flags(lambda frame: frame.braking),
         "distance": [whole(metres, CENTI) if np.isfinite(metres) else None for metres in far],
         "contact": next((f.index for f in keyframes if f.impact_speed_mps is not None), None),
         # Whom the strips and distances are of.
@@ -202,7 +184,12 @@ def _told(loop: ClosedLoop, keyframes: Sequence[Keyframe]) -> dict[str, Any]:
             (world.actors.index(actor), "".join(each[number] for each in states))
             for number, actor in enumerate(about)
         ],
-        "hit": hit,
+        "hit": impact
+        and {
+            "kind": impact.kind,
+            "at_front": impact.at_front,
+            "speed": whole(impact.speed_mps, CENTI),
+        },
         "way": _way(loop),
     }
 
@@ -235,20 +222,12 @@ def _replayed_scene(config: PlayConfig, recorder: Recorder) -> Replay:
             # An object keeps the size that it has at first: annotated ones breathe.
             about.setdefault(number, {"kind": CLASSES[label], "size": whole(box[3:5], CENTI)})
     numbers = [NO_OBJECT, *sorted(about)]
-    bodies = [
-        {"n": 0, "kind": "wall", "squares": whole(walls(film), CENTI), "side": whole(WALL_M, CENTI)}
+    bodies: list[dict[str, Any]] = [
+        {"n": 0, "kind": "wall", "squares": _walls(film), "side": whole(_WALL_M, CENTI)}
     ]
-    bodies += [
-        {
-            "n": n,
-            "object": number,
-            **about[number],
-            "reported": True,
-            "sought": False,
-            "poses": recorder.poses(number),
-        }
-        for n, number in enumerate(numbers[1:], 1)
-    ]
+    for n, number in enumerate(numbers[1:], 1):
+        body = {"n": n, "object": number, "reported": True, "sought": False}
+        bodies.append(body | about[number] | {"poses": recorder.poses(number)})
     story = recorder.story(numbers, CATALOGUE["ego"].size)
     story |= {
         "moving": [],
@@ -272,8 +251,22 @@ def _found(
         told = zip(objects, frame.found, frame.scored, frame.appearing, strict=True)
         given = {}
         for number, found, scored, appears in told:
-            given[number] = (FOUND if found else MISSED) if scored else BEYOND
+            given[number] = (_FOUND if found else _MISSED) if scored else _BEYOND
             if appears:
                 entries.append([numbers.index(number), frame.index])
-        states.append(signs(given, numbers, AWAY))
+        states.append("".join(given.get(number, _AWAY) for number in numbers))
     return {"states": states, "entries": entries}
+
+
+def _walls(film: Film) -> Any:
+    """(n, 2) the corners of all squares in which anything that nobody annotated returns at some
+    keyframe: what hides those behind it.
+    """
+    squares = []
+    for shot in film.shots:
+        points = shot.cloud.points[shot.cloud.objects == NO_OBJECT]
+        # Over the road as the sensor stands on it: of a recording it may slope.
+        points = points[points[:, 2] > _WALL_FROM_M - film.sensor_height_m]
+        places = shot.sensor.origin + shot.sensor.vectors_to_world(points)
+        squares.append(np.floor(places[:, :2] / _WALL_M))
+    return whole(np.unique(np.concatenate(squares), axis=0) * _WALL_M, CENTI)

@@ -6,13 +6,11 @@ what the policy knew.
 import base64
 import json
 import zlib
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from care_sim.core.arrays import Floats, Mask
+from care_sim.core.arrays import Mask
 from care_sim.core.belief import Belief
 from care_sim.core.frames import Frame
 from care_sim.core.grid import Cells
@@ -27,6 +25,7 @@ _DIGITS = "0123456789abcdefghijklmnopqrstuvwxyz"
 """The digits that say how full a sector is, from none of its cells to all of them."""
 CENTI = 100
 MILLI = 1000
+_POSE = (CENTI, CENTI, MILLI)
 
 
 def packed(story: dict[str, Any]) -> str:
@@ -36,36 +35,31 @@ def packed(story: dict[str, Any]) -> str:
     ).decode()
 
 
-@dataclass
-class Known:
-    """What a policy knew, moment by moment. `tracked` is the class and size of every track, once,
-    as they were last: the moments repeat only what moves.
+def known_before(
+    belief: Belief, sensor: Frame, rig: Rig, tracked: dict[int, list[Any]]
+) -> dict[str, Any]:
+    """What a policy knew: `tracks`, of each its id, place, velocity, and whether it was missed and
+    is drawn from its forecast, in the world, and `camera`, the lines of sight of the camera's
+    boxes. Class and size of every track, as they were last, go into `tracked`, once for all
+    moments.
     """
-
-    tracked: dict[int, list[Any]] = field(default_factory=dict)
-
-    def at(self, belief: Belief, sensor: Frame, rig: Rig) -> dict[str, Any]:
-        """`tracks`, of each its id, place, velocity, and whether it was missed and is drawn from
-        its forecast, in the world, and `camera`, the lines of sight of the camera's boxes.
-        """
-        tracks = belief.tracks
-        places = sensor.boxes_to_world(tracks.boxes)
-        # Tracks move on the ground: their velocities have no vertical part.
-        moves = sensor.vectors_to_world(np.column_stack([tracks.velocities, np.zeros(len(tracks))]))
-        for track, label, box in zip(
-            tracks.ids.tolist(), tracks.classes.tolist(), places, strict=True
-        ):
-            self.tracked[track] = [CLASSES[label], *whole(box[3:5], CENTI)]
-        columns = [
-            tracks.ids[:, None],
-            whole_poses(places[:, [0, 1, 6]]),
-            whole_array(moves[:, :2], CENTI),
-        ]
-        known = explained(belief.detections, tracks, rig)
-        return {
-            "tracks": np.column_stack([*columns, tracks.misses > 0]).tolist(),
-            "camera": sightlines(belief.detections, known, rig),
-        }
+    tracks = belief.tracks
+    places = sensor.boxes_to_world(tracks.boxes)
+    # Tracks move on the ground: their velocities have no vertical part.
+    moves = sensor.vectors_to_world(np.column_stack([tracks.velocities, np.zeros(len(tracks))]))
+    for track, label, box in zip(tracks.ids.tolist(), tracks.classes, places, strict=True):
+        tracked[track] = [CLASSES[label], *whole(box[3:5], CENTI)]
+    columns = (
+        tracks.ids,
+        np.rint(places[:, [0, 1, 6]] * _POSE),
+        np.rint(moves[:, :2] * CENTI),
+        tracks.misses > 0,
+    )
+    known = explained(belief.detections, tracks, rig)
+    return {
+        "tracks": np.column_stack(columns).astype(np.int64).tolist(),
+        "camera": sightlines(belief.detections, known, rig),
+    }
 
 
 def fullness(fired: Cells, grid: Grid) -> str:
@@ -102,16 +96,11 @@ def sightlines(detections: ImageDetections, known: Mask, rig: Rig) -> list[list[
     return lines
 
 
-def whole_poses(poses: Floats) -> NDArray[np.int64]:
-    """Places in centimetres and headings in milliradians, (n, 3)."""
-    return whole_array(poses * (CENTI, CENTI, MILLI), 1)
-
-
-def whole_array(values: Floats, scale: int) -> NDArray[np.int64]:
-    """Numbers of the scale as whole ones."""
-    return np.rint(values * scale).astype(np.int64)
+def whole_pose(pose: Any) -> list[int]:
+    """A place in centimetres and its heading in milliradians."""
+    return whole(np.asarray(pose) * _POSE, 1)  # type: ignore[no-any-return]
 
 
 def whole(values: Any, scale: int) -> Any:
-    """The same as plain data, of a number one."""
-    return whole_array(np.asarray(values, float), scale).tolist()
+    """Numbers of the scale as whole ones, plain data; of a number one."""
+    return np.rint(np.asarray(values, float) * scale).astype(np.int64).tolist()

@@ -1,4 +1,4 @@
-"""Parts of pictures: boxes in space, the angular grid in colours, and what they are drawn with."""
+"""Parts of pictures: words, boxes in space, and the angular grid in colours."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,13 +10,22 @@ from care_sim.core.grid_stack import Grid
 from care_sim.core.pinhole import NEAR_M, PinholeCamera
 from care_sim.viewer import palette
 
-_RANGE_COLOURS = "plasma_r"
-"""Of Matplotlib."""
-
 
 def font(size: int) -> ImageFont.ImageFont | ImageFont.FreeTypeFont:
     """The font of every text, `size` pixels high."""
     return ImageFont.load_default(size)
+
+
+def write(
+    draw: ImageDraw.ImageDraw,
+    at: tuple[float, float],
+    text: str,
+    size: int,
+    colour: palette.Colour = palette.INK,
+    anchor: str = "la",
+) -> None:
+    """Text with its `anchor` at a pixel."""
+    draw.text(at, text, colour, font(size), anchor=anchor)
 
 
 def plate(
@@ -30,14 +39,14 @@ def plate(
     """Text in the background's colour on a plate of `colour`, its `anchor` at a pixel."""
     left, top, right, bottom = draw.textbbox(at, text, font(size), anchor=anchor)
     draw.rounded_rectangle((left - 10, top - 8, right + 10, bottom + 8), 7, colour)
-    draw.text(at, text, palette.BACKGROUND, font(size), anchor=anchor)
+    write(draw, at, text, size, palette.BACKGROUND, anchor)
 
 
 def key(draw: ImageDraw.ImageDraw, at: tuple[int, int], colour: palette.Colour, words: str) -> int:
     """What a colour means: a patch of it and words. Gives the column where the next may begin."""
     x, y = at
     draw.rectangle((x, y, x + 14, y + 12), colour)
-    draw.text((x + 20, y - 2), words, palette.FAINT_INK, font(13))
+    write(draw, (x + 20, y - 2), words, 13, palette.FAINT_INK)
     return round(x + 44 + draw.textlength(words, font(13)))
 
 
@@ -62,10 +71,15 @@ def point_above(camera: PinholeCamera, box: Floats) -> tuple[float, float] | Non
     return (float(pixel[0]), float(pixel[1])) if inside else None
 
 
-def cells_picture(colours: NDArray[np.uint8]) -> Image.Image:
-    """Cells with colours (E, n, 3) as the car sees them: its left is left. A pixel a cell."""
+def cells_picture(colours: NDArray[np.uint8], size: tuple[int, int]) -> Image.Image:
+    """Cells with colours (E, n, 3) as the car sees them: its left is left. They stay sharp where
+    they grow to `size`, and are averaged where several share a pixel.
+    """
     # Columns run counter-clockwise, so that the right comes first.
-    return Image.fromarray(np.ascontiguousarray(colours[:, ::-1]))
+    picture = Image.fromarray(np.ascontiguousarray(colours[:, ::-1]))
+    least = min(picture.width, size[0]), min(picture.height, size[1])
+    averaged = picture.resize(least, Image.Resampling.BOX)
+    return averaged.resize(size, Image.Resampling.NEAREST)
 
 
 def scan_colours(grid: Grid, ranges: NDArray[np.floating]) -> NDArray[np.uint8]:
@@ -78,21 +92,11 @@ def scan_colours(grid: Grid, ranges: NDArray[np.floating]) -> NDArray[np.uint8]:
     return colours
 
 
-def fitted(picture: Image.Image, size: tuple[int, int]) -> Image.Image:
-    """A picture of cells in another size: cells stay sharp where they grow, and are averaged where
-    several share a pixel.
-    """
-    width = min(picture.width, size[0])
-    height = min(picture.height, size[1])
-    averaged = picture.resize((width, height), Image.Resampling.BOX)
-    return averaged.resize(size, Image.Resampling.NEAREST)
-
-
 def range_colours(shares: NDArray[np.floating]) -> NDArray[np.uint8]:
     """(..., 3) colours of ranges that are given as shares of the reach: near is bright."""
     from matplotlib import colormaps
 
     # The ends of the scale are left out: they are too close to the background and to white.
     scale = 0.05 + 0.75 * np.asarray(shares)
-    colours: NDArray[np.uint8] = colormaps[_RANGE_COLOURS](scale, bytes=True)[..., :3]
+    colours: NDArray[np.uint8] = colormaps["plasma_r"](scale, bytes=True)[..., :3]
     return colours

@@ -15,7 +15,14 @@ from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.grid_stack import Grid
 from care_sim.core.rig import Rig
 from care_sim.viewer import palette
-from care_sim.viewer.pictures import drawing
+from care_sim.viewer.pictures.drawing import (
+    cells_picture,
+    key,
+    plate,
+    range_colours,
+    scan_colours,
+    write,
+)
 
 PICTURE_WIDTH = 960
 PANEL_WIDTH = 512
@@ -91,20 +98,17 @@ def draw_keyframe(view: View) -> Image.Image:
     row = below.width == PICTURE_WIDTH
     top = STREET_TOP + street.height
     left = (PICTURE_WIDTH - CELLS_SIZE[0]) // 2 if row else BELOW_SIZE[0]
-    height = top + BELOW_SIZE[1] + (below.height if row else 0)
-    canvas = Image.new("RGB", (PICTURE_WIDTH, height), palette.BACKGROUND)
-    draw = ImageDraw.Draw(canvas)
-    draw.text((12, 8), f"{view.time_s:.1f} s", palette.INK, drawing.font(20))
-    draw.text((90, 8), view.progress, palette.INK, drawing.font(20))
-    if view.braking:
-        drawing.plate(draw, (250, 20), "BRAKING", palette.BRAKING_COLOUR, 20)
+    grid_top = top + (below.height if row else 0)
+    canvas, draw = _canvas(PICTURE_WIDTH, grid_top + BELOW_SIZE[1], view, 250)
+    write(draw, (12, 8), f"{view.time_s:.1f} s", 20)
+    write(draw, (90, 8), view.progress, 20)
     if view.contact:
-        drawing.plate(draw, (PICTURE_WIDTH - 18, 20), view.contact, palette.HIT.colour, 20, "rm")
+        plate(draw, (PICTURE_WIDTH - 18, 20), view.contact, palette.HIT.colour, 20, "rm")
     else:
-        draw.text((PICTURE_WIDTH - 12, 8), view.aside, palette.INK, drawing.font(20), anchor="ra")
+        write(draw, (PICTURE_WIDTH - 12, 8), view.aside, 20, anchor="ra")
     canvas.paste(street, (0, STREET_TOP))
     canvas.paste(below, (0, top))
-    _draw_grid(canvas, (left, top + (below.height if row else 0)), view)
+    _draw_grid(canvas, (left, grid_top), view)
     return canvas
 
 
@@ -116,34 +120,45 @@ def draw_panel(name: str, view: View) -> Image.Image:
     """
     street, _ = view.scenery(False)
     below = STREET_TOP + street.height
-    size = PANEL_WIDTH, below + _GRID_HEIGHT + _LINE_HEIGHT
-    canvas = Image.new("RGB", size, palette.BACKGROUND)
-    draw = ImageDraw.Draw(canvas)
-    draw.text((8, 6), name, palette.INK, drawing.font(22))
-    draw.text((250, 8), f"{view.time_s:.1f} s", palette.FAINT_INK, drawing.font(18))
-    draw.text((305, 8), view.progress, palette.FAINT_INK, drawing.font(18))
-    if view.braking:
-        drawing.plate(draw, (453, 18), "BRAKING", palette.BRAKING_COLOUR, 20)
+    height = below + _GRID_HEIGHT + _LINE_HEIGHT
+    canvas, draw = _canvas(PANEL_WIDTH, height, view, 453)
+    write(draw, (8, 6), name, 22)
+    write(draw, (250, 8), f"{view.time_s:.1f} s", 18, palette.FAINT_INK)
+    write(draw, (305, 8), view.progress, 18, palette.FAINT_INK)
     canvas.paste(street, (0, STREET_TOP))
     _draw_grid(canvas, (0, below), view)
     text, colour = (view.contact, palette.HIT.colour) if view.contact else view.verdict
-    draw.text((8, size[1] - 26), text, colour, drawing.font(16))
+    write(draw, (8, height - 26), text, 16, colour)
     return canvas
+
+
+def _canvas(
+    width: int, height: int, view: View, brake_x: int
+) -> tuple[Image.Image, ImageDraw.ImageDraw]:
+    """An empty picture that says whether the car brakes."""
+    canvas = Image.new("RGB", (width, height), palette.BACKGROUND)
+    draw = ImageDraw.Draw(canvas)
+    if view.braking:
+        plate(draw, (brake_x, 20), "BRAKING", palette.BRAKING_COLOUR, 20)
+    return canvas, draw
 
 
 def _draw_grid(canvas: Image.Image, at: tuple[int, int], view: View) -> None:
     """The angular grid with a scan, its left and top words `at` a pixel of a picture, its
     directions and a legend of its colours.
     """
-    draw = ImageDraw.Draw(canvas)
-    draw.text((at[0] + 2, at[1] + 8), _grid_words(view), palette.INK, drawing.font(14))
-    grid = view.rig.grid
-    if view.shares is not None:
-        top = draw_cells(canvas, at, grid, palette.SHARE_COLOURS[view.shares])
-        _write_shares(draw, (at[0], top), view)
-    else:
-        top = draw_cells(canvas, at, grid, drawing.scan_colours(grid, view.ranges))
+    grid, draw = view.rig.grid, ImageDraw.Draw(canvas)
+    write(draw, (at[0] + 2, at[1] + 8), _grid_words(view), 14)
+    if view.shares is None:
+        top = draw_cells(canvas, at, grid, scan_colours(grid, view.ranges))
         _write_ranges(canvas, (at[0], top), grid.range_m)
+        return
+    x, top = at[0], draw_cells(canvas, at, grid, palette.SHARE_COLOURS[view.shares])
+    # The shares that there are, and how many shots each paid for.
+    paid = np.bincount(view.shares.ravel()[view.fired], minlength=len(SHARES))
+    for share in np.flatnonzero(paid).tolist():
+        colour = tuple(palette.SHARE_COLOURS[share].tolist())
+        x = key(draw, (x, top), colour, f"{SHARES[share]} {paid[share]}")
 
 
 def _grid_words(view: View) -> str:
@@ -174,13 +189,12 @@ def draw_cells(
     strip = max(1, (height - (count - 1) * _NAMES_HEIGHT) // count)
     for number, head in enumerate(grid.heads):
         first, last = head.rows
-        picture = drawing.cells_picture(colours[first : last + 1])
         upper = top + CELLS_TOP + number * (strip + _NAMES_HEIGHT)
-        canvas.paste(drawing.fitted(picture, (width, strip)), (left, upper))
+        canvas.paste(cells_picture(colours[first : last + 1], (width, strip)), (left, upper))
         for share, name in directions(head.grid):
             anchor = {0.0: "la", 1.0: "ra"}.get(share, "ma")
             place = (left + share * width, upper + strip + 4)
-            draw.text(place, name, palette.FAINT_INK, drawing.font(13), anchor=anchor)
+            write(draw, place, name, 13, palette.FAINT_INK, anchor)
     return upper + strip + 26
 
 
@@ -198,24 +212,10 @@ def directions(grid: AngularGrid) -> list[tuple[float, str]]:
 
 def _write_ranges(canvas: Image.Image, at: tuple[int, int], reach: float) -> None:
     draw, (left, top) = ImageDraw.Draw(canvas), at
-    for x, colour, name in (
-        (0, palette.NOT_FIRED_COLOUR, "not fired"),
-        (95, palette.NO_RETURN_COLOUR, "no return"),
-    ):
-        drawing.key(draw, (left + x, top), colour, name)
+    key(draw, at, palette.NOT_FIRED_COLOUR, "not fired")
+    key(draw, (left + 95, top), palette.NO_RETURN_COLOUR, "no return")
     # The scale of ranges, from 0 to the reach.
-    scale = np.tile(drawing.range_colours(np.linspace(0.0, 1.0, 160)), (13, 1, 1))
+    scale = np.tile(range_colours(np.linspace(0.0, 1.0, 160)), (13, 1, 1))
     canvas.paste(Image.fromarray(scale), (left + 245, top))
-    draw.text((left + 240, top - 2), "0 m", palette.FAINT_INK, drawing.font(13), anchor="ra")
-    draw.text((left + 411, top - 2), f"{reach:.0f} m", palette.FAINT_INK, drawing.font(13))
-
-
-def _write_shares(draw: ImageDraw.ImageDraw, at: tuple[int, int], view: View) -> None:
-    """The shares that there are, and how many shots each paid for."""
-    assert view.shares is not None
-    assert view.fired is not None
-    paid = np.bincount(view.shares.ravel()[view.fired], minlength=len(SHARES))
-    x = at[0]
-    for share in np.flatnonzero(paid).tolist():
-        words = f"{SHARES[share]} {paid[share]}"
-        x = drawing.key(draw, (x, at[1]), tuple(palette.SHARE_COLOURS[share].tolist()), words)
+    write(draw, (left + 240, top - 2), "0 m", 13, palette.FAINT_INK, "ra")
+    write(draw, (left + 411, top - 2), f"{reach:.0f} m", 13, palette.FAINT_INK)

@@ -33,15 +33,14 @@ class Labels:
         canvas = self._draw.im.size
         x = min(max(at[0] - width / 2, 0), canvas[0] - width)
         y = min(max(at[1] - height - 2, 0), canvas[1] - height)
-        area = self._moved_up((x, y, x + width, y + height))
-        if area is not None and self._inside(area):
+        if area := self._moved_up((x, y, x + width, y + height)):
             self._write(area, text, colour, size)
 
     def beside(self, at: tuple[float, float], text: str, colour: Colour, size: int) -> None:
-        """Text that ends at a point, where there is room inside the picture."""
+        """Text that ends at a point, where there is room: a number stays at its value."""
         width, height = self._plate(text, size)
         area = at[0] - width, at[1] - height / 2, at[0], at[1] + height / 2
-        if self._inside(area) and not any(_overlap(area, other) for other in self._taken):
+        if not any(_overlap(area, other) for other in self._taken):
             self._write(area, text, colour, size)
 
     def arrow(self, tip: tuple[float, float], text: str, colour: Colour) -> None:
@@ -51,14 +50,6 @@ class Labels:
         self._draw.line((x, y - _SHAFT, x, y - 8), colour, 4)
         self._draw.polygon([(x - 9, y - 14), (x + 9, y - 14), (x, y)], colour)
         self._taken.append((x - 9, y - _SHAFT, x + 9, y))
-
-    def _inside(self, area: _Area) -> bool:
-        canvas = self._draw.im.size
-        return min(area) >= 0 and area[2] <= canvas[0] and area[3] <= canvas[1]
-
-    def _plate(self, text: str, size: int) -> tuple[float, float]:
-        left, top, right, bottom = self._draw.textbbox((0, 0), text, font(size))
-        return right - left + 2 * _MARGIN, bottom - top + 2 * _MARGIN
 
     def _moved_up(self, area: _Area) -> _Area | None:
         left, top, right, bottom = area
@@ -71,10 +62,17 @@ class Labels:
             area = left, bottom - height, right, bottom
         return area
 
+    def _plate(self, text: str, size: int) -> tuple[float, float]:
+        left, top, right, bottom = self._draw.textbbox((0, 0), text, font(size))
+        return right - left + 2 * _MARGIN, bottom - top + 2 * _MARGIN
+
     def _write(self, area: _Area, text: str, colour: Colour, size: int) -> None:
+        canvas = self._draw.im.size
+        if min(area) < 0 or area[2] > canvas[0] or area[3] > canvas[1]:
+            return
+        self._draw.rectangle(area, BACKGROUND)
         # A text does not begin at its own origin: its box tells where the ink lies.
         left, top, _, _ = self._draw.textbbox((0, 0), text, font(size))
-        self._draw.rectangle(area, BACKGROUND)
         at = area[0] + _MARGIN - left, area[1] + _MARGIN - top
         self._draw.text(at, text, colour, font(size))
         self._taken.append(area)

@@ -18,7 +18,7 @@ from care_sim.loops.scene_records import SceneKeyframe
 from care_sim.loops.watcher import TrueSituation, Watched, returned
 from care_sim.viewer import palette
 from care_sim.viewer.palette import State
-from care_sim.viewer.pictures import drawing
+from care_sim.viewer.pictures.drawing import write
 from care_sim.viewer.pictures.keyframe import BELOW_SIZE, PANEL_WIDTH, PICTURE_WIDTH, Scenery, View
 from care_sim.viewer.pictures.labels import Labels
 from care_sim.world.bodies import CATALOGUE
@@ -101,119 +101,108 @@ def scene_view(
 def _scenery(
     loop: OpenLoop, keyframe: SceneKeyframe, watched: Watched | None, whole: bool
 ) -> Scenery:
-    legend = _OBJECTS + (_KNOWN if watched else _SCAN)
-    picture = Image.new(
-        "RGB", (PICTURE_WIDTH if whole else PANEL_WIDTH, MAP_HEIGHT), palette.BACKGROUND
-    )
-    street = Map(picture)
+    size = PICTURE_WIDTH if whole else PANEL_WIDTH, MAP_HEIGHT
+    street = _Map(Image.new("RGB", size, palette.BACKGROUND))
     street.draw_rings()
     if watched:
-        _draw_wedges(street, loop.rig, watched.situation)
-    _draw_returns(street, loop, watched)
-    _draw_objects(street, loop.film.shots[keyframe.index].annotations.boxes, keyframe)
+        street.draw_wedges(loop.rig, watched.situation)
+    street.draw_returns(loop, watched)
+    street.draw_objects(loop.film.shots[keyframe.index].annotations.boxes, keyframe)
     if watched:
-        _draw_tracks(street, watched.situation)
-        _name_sightings(street, watched.situation, keyframe)
+        street.draw_tracks(watched.situation)
+        street.name_sightings(watched.situation, keyframe)
+    legend = _OBJECTS + (_KNOWN if watched else _SCAN)
     if not whole:
         _write_legend(street.draw, (8, MAP_HEIGHT - _LINE * len(legend)), legend)
-        return Scenery(picture, None)
+        return Scenery(street.picture, None)
     below = Image.new("RGB", BELOW_SIZE, palette.BACKGROUND)
     draw = ImageDraw.Draw(below)
-    draw.text((20, 8), "From above, driving to the right:", palette.INK, drawing.font(14))
+    write(draw, (20, 8), "From above, driving to the right:", 14)
     _write_legend(draw, (20, 34), legend)
-    return Scenery(picture, below)
+    return Scenery(street.picture, below)
 
 
-class Map:
+def _write_legend(draw: ImageDraw.ImageDraw, at: tuple[int, int], legend: Sequence[State]) -> None:
+    for row, (words, colour) in enumerate(legend):
+        write(draw, (at[0], at[1] + _LINE * row), words, 13, colour)
+
+
+class _Map:
     """A picture of the ground from above, the car in its middle."""
 
     def __init__(self, picture: Image.Image):
+        self.picture = picture
         self.draw = ImageDraw.Draw(picture)
         self._middle = np.array(picture.size) / 2
 
-    def pixels(self, places: Floats) -> Floats:
+    def _pixels(self, places: Floats) -> Floats:
         """(n, 2) pixels of places (n, 2) in the sensor frame: ahead is right, left is up."""
         on_map: Floats = self._middle + places * [_PIXELS_PER_M, -_PIXELS_PER_M]
         return on_map
 
-    def draw_box(self, box: Floats, colour: palette.Colour, width: int) -> None:
+    def _draw_box(self, box: Floats, colour: palette.Colour, width: int) -> None:
         """The outline of a box (7,)."""
-        corners = self.pixels(box_corners(box[None])[0, :4, :2])
+        corners = self._pixels(box_corners(box[None])[0, :4, :2])
         self.draw.polygon(corners.ravel().tolist(), outline=colour, width=width)
 
     def draw_rings(self) -> None:
         """The rings of range around the car."""
         for metres in _RINGS:
-            ends = self.pixels(np.array([[-metres, metres], [metres, -metres]]))
+            ends = self._pixels(np.array([[-metres, metres], [metres, -metres]]))
             (left, top), (right, bottom) = ends.tolist()
             self.draw.ellipse((left, top, right, bottom), outline=_RING_COLOUR)
-            at, words = (right - 4, (top + bottom) / 2), f"{metres:.0f} m"
-            self.draw.text(at, words, palette.FAINT_INK, drawing.font(11), anchor="rm")
+            at = right - 4, (top + bottom) / 2
+            write(self.draw, at, f"{metres:.0f} m", 11, palette.FAINT_INK, "rm")
 
+    def draw_returns(self, loop: OpenLoop, watched: Watched | None) -> None:
+        """The returns, in the colours of their shares where these are known."""
+        cells, points = returned(loop.last_ranges, loop.rig.grid)
+        colours = np.full((len(cells), 3), RETURN_COLOUR)
+        if watched:
+            colours = palette.SHARE_COLOURS[watched.shares.ravel()[cells]]
+        for (x, y), colour in zip(self._pixels(points[:, :2]), colours.tolist(), strict=True):
+            self.draw.rectangle((x, y, x + 1, y + 1), tuple(colour))
 
-def _draw_returns(street: Map, loop: OpenLoop, watched: Watched | None) -> None:
-    cells, points = returned(loop.last_ranges, loop.rig.grid)
-    shares = watched.shares.ravel()[cells].tolist() if watched else [None] * len(cells)
-    for (x, y), share in zip(street.pixels(points[:, :2]), shares, strict=True):
-        colour = RETURN_COLOUR if share is None else tuple(palette.SHARE_COLOURS[share].tolist())
-        street.draw.rectangle((x, y, x + 1, y + 1), colour)
+    def draw_objects(self, boxes: Floats, keyframe: SceneKeyframe) -> None:
+        """The car, and the annotated boxes (n, 7) in the colours of how it stands with them; those
+        that appear have a second line.
+        """
+        self._draw_box(_CAR, palette.INK, 2)
+        for row, box in enumerate(boxes):
+            colour = palette.found_colour(keyframe, row)
+            self._draw_box(box, colour, 2)
+            if keyframe.appearing[row]:
+                self._draw_box(box + _AROUND, colour, 1)
 
+    def draw_wedges(self, rig: Rig, situation: TrueSituation) -> None:
+        """The rays through the left and right of every image box, as far as objects are scored."""
+        rays = wedge_rays(situation.belief.detections, rig)
+        for nine, known, false in zip(rays, situation.known, situation.false, strict=True):
+            dimmed = tuple(round(_DIMMED * part) for part in palette.box_colour(known, false))
+            for x, y, _ in nine[_SIDES]:
+                line = self._pixels(np.array([[0.0, 0.0], [x, y]]) * RANGE_M / np.hypot(x, y))
+                self.draw.line(line.ravel().tolist(), dimmed)
 
-def _draw_objects(street: Map, boxes: Floats, keyframe: SceneKeyframe) -> None:
-    """The car, and the annotated boxes (n, 7) in the colours of how it stands with them; those that
-    appear have a second line.
-    """
-    street.draw_box(_CAR, palette.INK, 2)
-    for row, box in enumerate(boxes):
-        colour = palette.found_colour(keyframe, row)
-        street.draw_box(box, colour, 2)
-        if keyframe.appearing[row]:
-            street.draw_box(box + _AROUND, colour, 1)
+    def draw_tracks(self, situation: TrueSituation) -> None:
+        """A dot at the centre of every forecast, hollow where the last scan missed the track, and a
+        line to where it would be in a second, over ground.
+        """
+        tracks = situation.belief.tracks
+        centres = tracks.boxes[:, :2]
+        ends = self._pixels(centres + _AHEAD_S * tracks.velocities)
+        for (x, y), end, misses in zip(self._pixels(centres), ends, tracks.misses, strict=True):
+            self.draw.line((x, y, *end.tolist()), TRACK_COLOUR)
+            dot = (x - _DOT, y - _DOT, x + _DOT, y + _DOT)
+            self.draw.ellipse(dot, None if misses else TRACK_COLOUR, TRACK_COLOUR)
 
-
-def _draw_wedges(street: Map, rig: Rig, situation: TrueSituation) -> None:
-    """The rays through the left and right of every image box, as far as objects are scored."""
-    rays = wedge_rays(situation.belief.detections, rig)
-    for nine, known, false in zip(rays, situation.known, situation.false, strict=True):
-        colour = (
-            palette.FALSE_COLOUR
-            if false
-            else palette.EXPLAINED_COLOUR
-            if known
-            else palette.UNEXPLAINED_COLOUR
-        )
-        dimmed = tuple(round(_DIMMED * part) for part in colour)
-        for x, y, _ in nine[_SIDES]:
-            line = street.pixels(np.array([[0.0, 0.0], [x, y]]) * RANGE_M / np.hypot(x, y))
-            street.draw.line(line.ravel().tolist(), dimmed)
-
-
-def _draw_tracks(street: Map, situation: TrueSituation) -> None:
-    """A dot at the centre of every forecast, hollow where the last scan missed the track, and a
-    line to where it would be in a second, over ground.
-    """
-    tracks = situation.belief.tracks
-    centres = tracks.boxes[:, :2]
-    ends = street.pixels(centres + _AHEAD_S * tracks.velocities)
-    for (x, y), end, misses in zip(street.pixels(centres), ends, tracks.misses, strict=True):
-        street.draw.line((x, y, *end.tolist()), TRACK_COLOUR)
-        dot = (x - _DOT, y - _DOT, x + _DOT, y + _DOT)
-        street.draw.ellipse(dot, None if misses else TRACK_COLOUR, TRACK_COLOUR)
-
-
-def _name_sightings(street: Map, situation: TrueSituation, keyframe: SceneKeyframe) -> None:
-    """Who appears, the nearest first, whose name keeps its place: a person is a few pixels large.
-    A film has no names: they hide who else is there.
-    """
-    labels = Labels(street.draw)
-    boxes = situation.sensor.boxes_to_local(situation.bodies)
-    for row in np.argsort(planar_ranges(boxes), kind="stable").tolist():
-        if keyframe.appearing[row]:
-            x, y = street.pixels(boxes[row, :2]).tolist()
-            words = f"{situation.names[row]} appears"
-            labels.over((x, y - _CLEAR), words, palette.found_colour(keyframe, row))
-
-
-def _write_legend(draw: ImageDraw.ImageDraw, at: tuple[int, int], legend: Sequence[State]) -> None:
-    for row, (words, colour) in enumerate(legend):
-        draw.text((at[0], at[1] + _LINE * row), words, colour, drawing.font(13))
+    def name_sightings(self, situation: TrueSituation, keyframe: SceneKeyframe) -> None:
+        """Who appears, the nearest first, whose name keeps its place: a person is a few pixels
+        large. A film has no names: they hide who else is there.
+        """
+        labels = Labels(self.draw)
+        boxes = situation.sensor.boxes_to_local(situation.bodies)
+        for row in np.argsort(planar_ranges(boxes), kind="stable").tolist():
+            if keyframe.appearing[row]:
+                x, y = self._pixels(boxes[row, :2]).tolist()
+                words = f"{situation.names[row]} appears"
+                labels.over((x, y - _CLEAR), words, palette.found_colour(keyframe, row))

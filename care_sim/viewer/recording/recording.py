@@ -98,7 +98,7 @@ class RecordedEpisode:
         guarded_m = loop.guarded_m if isinstance(loop, ClosedLoop) else 0.0
         self._space = SpaceLog(lane, loop.rig, guarded_m)
         self._pictures = PictureLog(lane, loop)
-        self._curves = MeasureLog(lane, loop.rig.budget, colour)
+        self._curves = MeasureLog(lane, loop.rig.budget, colour, isinstance(loop, OpenLoop))
 
     def look(self, loop: ClosedLoop | OpenLoop) -> None:
         """Take the camera's picture of the keyframe that is about to be played."""

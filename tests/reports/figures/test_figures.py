@@ -1,27 +1,29 @@
 """Files of figures, and the figures of the closed loop's studies on rows made by hand."""
 
-import os
-import subprocess
-import sys
-
 import numpy as np
 import pytest
+from matplotlib import rc_context
 
-from care_sim.reports.figures.budget import firing_figures, sweep_figures
-from care_sim.reports.figures.differences import (
+from care_sim.reports.figures.closed_loop import (
+    FAULT_FIGURES,
+    fault_figures,
+    firing_figures,
+    order_figures,
+    sweep_figures,
+    validation_figures,
+)
+from care_sim.reports.figures.files import remove_others, save, svg_text
+from care_sim.reports.figures.study_maps import (
     ablation_figures,
     crowding_figures,
     open_ablation_figures,
 )
-from care_sim.reports.figures.files import remove_others, save, svg_text
-from care_sim.reports.figures.order import open_order_figures, order_figures
-from care_sim.reports.figures.validate import validation_figures
+from care_sim.reports.report import StudyReport
 from care_sim.study.designs.ablations import ablation_study
+from care_sim.study.designs.faults import FAULTS, fault_study
 from care_sim.study.designs.firing import firing_study
 from care_sim.study.designs.order import ORDERS, order_study
 from care_sim.study.designs.variants import Variant
-from care_sim.study.results_formats import EPISODES
-from care_sim.study.rows.parquet import write_rows
 from tests.helpers import made_plays, made_worlds
 from tests.helpers.drawn import heights, ticks, titles
 from tests.helpers.made_rows import CROWD, STUDY, row, rows
@@ -33,17 +35,12 @@ SWEEP = [
 ]
 
 
-@pytest.mark.parametrize(
-    ("draw", "study", "name"),
-    [(sweep_figures, SWEEP, "dense-budget"), (crowding_figures, CROWD, "crowding")],
-)
-def test_figures_are_written_the_same_every_time(draw, study, name, tmp_path):
-    figures = draw(study)
-    assert list(figures) == [name]
-    save(figures[name], tmp_path / name)
-    assert (tmp_path / f"{name}.png").read_bytes().startswith(b"\x89PNG")
-    drawing = (tmp_path / f"{name}.svg").read_text()
-    assert drawing == svg_text(draw(study)[name], name)
+def test_figures_are_written_the_same_every_time(tmp_path):
+    ((name, figure),) = sweep_figures(SWEEP).items()
+    save(figure, tmp_path / name)
+    assert (tmp_path / "dense-budget.png").read_bytes().startswith(b"\x89PNG")
+    drawing = (tmp_path / "dense-budget.svg").read_text()
+    assert drawing == svg_text(sweep_figures(SWEEP)[name], name)
 
 
 def test_texts_are_texts_of_anybody_on_a_transparent_ground():
@@ -55,18 +52,13 @@ def test_texts_are_texts_of_anybody_on_a_transparent_ground():
     assert "date" not in drawing
 
 
-def test_settings_of_the_user_change_no_figure(tmp_path):
-    for name in ("plain", "styled"):
-        write_rows(SWEEP, tmp_path / name / EPISODES.file)
-    (tmp_path / "matplotlibrc").write_text("text.usetex: True\nlines.linewidth: 9\n")
-    program = [sys.executable, "-c", "from care_sim.cli import main; main()"]
-    settings = {"MATPLOTLIBRC": str(tmp_path), "MPLBACKEND": "none"}
-    subprocess.run([*program, "report", tmp_path / "plain"], check=True, timeout=120)
-    styled = [*program, "report", tmp_path / "styled"]
-    subprocess.run(styled, check=True, timeout=120, env=os.environ | settings)
-    for suffix in (".png", ".svg"):
-        plain = (tmp_path / "plain" / "dense-budget").with_suffix(suffix)
-        assert (tmp_path / "styled" / plain.name).read_bytes() == plain.read_bytes()
+def test_settings_of_the_user_change_no_figure():
+    def drawn():
+        return svg_text(StudyReport.of(SWEEP).figures["dense-budget"], "dense-budget")
+
+    with rc_context({"axes.linewidth": 9, "font.family": "serif"}):
+        styled = drawn()
+    assert styled == drawn()
 
 
 def test_only_figures_of_known_names_are_removed(tmp_path):
@@ -97,6 +89,17 @@ def test_the_crowding_map_has_a_number_in_every_cell_and_frames_the_collapse():
     assert [text.get_text() for text in texts] == ["≤-12.0*", "-7.0*", "-0.5", "+0.0"]
     assert [text.get_weight() for text in texts] == ["bold", "bold", "bold", "normal"]
     assert [patch.get_y() + 0.5 for patch in axes.patches] == [1, 0]
+
+
+def test_faults_have_a_figure_a_place_and_measure_with_a_panel_a_fault():
+    configs = [c for c in fault_study([0, 1]) if c.scenario == "dartout"]
+    made = [row(each, 9.0 - each.seed) | {"braked": each.seed == 0} for each in configs]
+    figures = fault_figures(made)
+    assert {*figures} == {name for name in FAULT_FIGURES if "dartout" in name}
+    for name, height in (("detection", 8.5), ("braked", 50.0)):
+        figure = figures[f"faults-dartout-{name}"]
+        assert titles(figure) == [fault.title for fault in FAULTS]
+        assert {*heights(figure.axes[0])["care"]} == {height}
 
 
 def fired(config):
@@ -143,19 +146,6 @@ def test_orders_have_a_panel_a_place_that_was_played():
     assert order_figures([each for each in made if each["scenario"] == "cutin"]) == {}
 
 
-def test_orders_of_the_open_loop_have_a_panel_a_budget():
-    plays = made_plays.study({"full": (15, 9)})
-    assert open_order_figures(plays) == {}
-    for number, order in enumerate(ORDERS):
-        found = {"history": (4, 6), "care": (6 + number, 5)}
-        plays += made_plays.study(found, budgets=(0.03, 0.1), seeds=(0,), cell_order=order)
-    figure = open_order_figures(plays)["order-open-loop"]
-    assert titles(figure) == ["budget 3%", "budget 10%"]
-    shown = heights(figure.axes[1])
-    assert shown["care"] == [30.0, 35.0, 40.0, 45.0, 50.0, 55.0]
-    assert {*shown["full scan"]} == {75.0}
-
-
 def test_a_validation_has_every_world_with_the_factor_that_is_changed():
     figure = validation_figures(made_worlds.STUDY)["validation"]
     found, hit = figure.axes
@@ -166,16 +156,6 @@ def test_a_validation_has_every_world_with_the_factor_that_is_changed():
     assert heights(found)["best control"] == [16.0, 10.0]
     assert heights(hit)["history"] == [0.0, 100.0]
     assert "best control of dartout: " in figure.get_supxlabel()
-
-
-def test_the_best_control_of_a_validation_is_that_of_each_world():
-    fan_is_best = made_worlds.TRAINING | {"rows": (9.0, 3), "fan": (14.0, 0)}
-    both = [
-        *made_worlds.world(made_worlds.TELLING, made_worlds.TRAINING),
-        *made_worlds.world(made_worlds.TELLING, fan_is_best, parameters=made_worlds.MIRRORED),
-    ]
-    (found, _) = validation_figures(both)["validation"].axes
-    assert heights(found)["best control"] == [10.0, 15.0]
 
 
 def ablated(config):

@@ -7,16 +7,11 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.reports.page.build import write_page
-from care_sim.reports.report import StudyReport
 from care_sim.reports.studies import STUDIES
 from care_sim.study.rows.parquet import write_rows
 from tests.helpers.made_rows import STUDY, rows
 
 SWEEP = [*STUDY, *rows("care", [9.0], budget=0.1)]
-
-
-def test_every_study_has_a_title():
-    assert len({study.title for study in STUDIES.values()}) == len(STUDIES)
 
 
 def test_what_cannot_be_drawn_fails_before_an_episode_is_played(tmp_path, monkeypatch):
@@ -35,15 +30,6 @@ def test_what_cannot_be_drawn_fails_before_an_episode_is_played(tmp_path, monkey
         )
 
 
-def test_one_is_singular(tmp_path):
-    once = rows("care", [9.0], budget=0.05) + rows("care", [9.0], budget=0.1)
-    write_rows(once, tmp_path / "episodes.parquet")
-    write_page(tmp_path, tmp_path / "report.html", 0, 1)
-    page = (tmp_path / "report.html").read_text()
-    assert "<small>2 configurations, 1 seed</small>" in page
-    assert ">dense: 1 seed a point</text>" in page
-
-
 def test_figures_of_a_page_share_no_id_and_bring_no_style(tmp_path):
     both = [row | {"scenario": name} for row in SWEEP for name in ("dense", "dartout")]
     write_rows(both, tmp_path / "episodes.parquet")
@@ -54,16 +40,6 @@ def test_figures_of_a_page_share_no_id_and_bring_no_style(tmp_path):
     assert not ids[0] & ids[1]
     assert "<style" not in first
     assert {*re.findall(r"url\(#(.*?)\)", first)} <= ids[0]
-
-
-def test_the_page_holds_how_to_read_its_tables(tmp_path):
-    write_rows(STUDY, tmp_path / "episodes.parquet")
-    write_page(tmp_path, tmp_path / "report.html", 0, 1)
-    page = (tmp_path / "report.html").read_text()
-    assert '<a href="#reading">How to read the tables</a>' in page
-    assert "<td>metres from the LiDAR" in page
-    first, *_ = StudyReport.of(STUDY).texts["tables.md"].splitlines()
-    assert first == "[How to read the tables](../../docs/reading.md)"
 
 
 def test_directions_and_control_codes_in_names_are_shown_as_escapes(tmp_path):
@@ -80,23 +56,3 @@ def test_directions_and_control_codes_in_names_are_shown_as_escapes(tmp_path):
     assert "<td>mine\\u202e\\x1b</td>" in page
     assert ">mine\\u202e\\x1b</text>" in page
     assert "<b>runs\\u2066</b>" in page
-
-
-def test_a_page_leaves_out_empty_columns(tmp_path):
-    def page_of(rows):
-        write_rows(rows, tmp_path / "episodes.parquet")
-        write_page(tmp_path, tmp_path / "report.html", 0, 1)
-        return (tmp_path / "report.html").read_text()
-
-    def headings(page):
-        return re.findall(r'<th scope="col"><button type="button">(.*?)</button>', page)
-
-    whole, without = page_of(STUDY), page_of([row for row in STUDY if row["policy"] != "full"])
-    assert {"regret m", "as full"} <= {*headings(whole)}
-    assert {"regret m", "as full"}.isdisjoint(headings(without))
-
-
-def test_a_page_says_where_one_number_of_a_policy_comes_from(tmp_path):
-    write_rows(STUDY, tmp_path / "episodes.parquet")
-    write_page(tmp_path, tmp_path / "report.html", 0, 1)
-    assert "<code>care-sim benchmark --policy NAME</code>" in (tmp_path / "report.html").read_text()

@@ -1,27 +1,20 @@
 """What a page knows of an episode is what happened in it."""
 
-import base64
 import json
 import signal
-import zlib
-from concurrent.futures import Future, ThreadPoolExecutor
 
 import numpy as np
 import pytest
 
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
-from care_sim.reports.page.episodes import Episode, episodes_to_watch, follow, played_again
+from care_sim.reports.page.episodes import Episode, episodes_to_watch, played_again
 from care_sim.reports.page.played_rows import config_of
 from care_sim.reports.page.replay import replayed
-from care_sim.reports.page.story import SECTORS, fullness, packed, sightlines
-from care_sim.reports.report import read_results
-from care_sim.scenarios import SCENARIOS
+from care_sim.reports.page.story import SECTORS, fullness, sightlines
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.episode_play import run_episode, trace
 from care_sim.study.executors import processes
-from care_sim.study.results_formats import VEHICLE
-from tests.helpers.lidars import STACK
 
 CONFIG = EpisodeConfig("dartout", "care", 0.1, seed=3)
 
@@ -49,7 +42,7 @@ def test_the_replay_is_the_episode(replay, played):
     assert replay.story["contact"] is None
 
 
-@pytest.mark.parametrize("scenario", SCENARIOS)
+@pytest.mark.parametrize("scenario", ["dense", "drive", "r157"])
 def test_an_episode_of_every_world_is_played_again_as_it_was(scenario):
     config = EpisodeConfig(
         scenario, "care", 0.03, 2, camera_latency=1, scenario_parameters=(("duration_s", 1.0),)
@@ -60,13 +53,6 @@ def test_an_episode_of_every_world_is_played_again_as_it_was(scenario):
     assert Episode(row, watched).identical
     assert len(watched.story["rays"]) == 10
     json.dumps([watched.story, watched.bodies], allow_nan=False)
-
-
-def test_a_row_of_the_vehicle_study_is_played_again_as_it_was(published):
-    rows, study, _ = read_results(published / "vehicle")
-    assert study.results is VEHICLE
-    (again,) = played_again(rows[:1], 1, lambda _workers: ThreadPoolExecutor(1))
-    assert again.identical
 
 
 def test_there_is_a_moment_before_every_keyframe_and_one_after_the_last(replay, played):
@@ -119,12 +105,6 @@ def test_a_drive_tells_whom_it_lets_the_car_meet_its_way_and_whom_it_hit():
     assert story["about"] == "bicycle"
 
 
-def test_straight_ahead_there_is_no_way_and_without_contact_no_hit(replay):
-    assert (replay.story["way"], replay.story["hit"]) == (None, None)
-    ((_, states),) = replay.story["sought"]
-    assert [state == "2" for state in states] == [found == "1" for found in replay.story["found"]]
-
-
 def test_a_track_lies_where_the_person_is_and_moves_as_the_person_does(replay):
     (person,) = (body for body in replay.story["moving"] if body["sought"])
     k = replay.story["found"].index("1") + 3
@@ -166,18 +146,6 @@ def test_fullness_counts_the_cells_of_a_sector_in_all_rows():
     assert fullness(np.array(third[: len(third) // 7]), grid)[2] == "5"
 
 
-def test_fullness_is_that_of_the_cells_of_all_lidars():
-    """The left corner of 120 degrees is a third of what lies there: four rows of narrow columns."""
-    left = STACK.heads[1]
-    ahead_left = SECTORS * 200 // 360
-    # Sectors are narrower than the columns of the roof: some hold no cell.
-    assert {*fullness(np.arange(STACK.size), STACK)} == {"0", "z"}
-    alone = fullness(np.arange(left.first, left.cells.stop), STACK)
-    assert {*alone} > {"0"}
-    assert alone[ahead_left] not in "0z"
-    assert alone[0] == "0"
-
-
 def test_a_box_in_the_middle_of_the_picture_is_straight_ahead(seen):
     from care_sim.sensors.camera import FRONT_CAMERA
 
@@ -186,11 +154,6 @@ def test_a_box_in_the_middle_of_the_picture_is_straight_ahead(seen):
     )
     lines = sightlines(detections, np.array([True, False]), Rig(cameras=(FRONT_CAMERA,)))
     assert lines == [[-100, -885, 1], [685, -100, 0]]
-
-
-def test_a_story_is_unpacked_as_it_was_packed(replay):
-    unpacked = json.loads(zlib.decompress(base64.b64decode(packed(replay.story))))
-    assert unpacked == json.loads(json.dumps(replay.story))
 
 
 @pytest.mark.parametrize(
@@ -216,12 +179,6 @@ def test_a_row_gives_its_configuration_back(config):
         config_of({**dict.fromkeys(["policy.rate", "scenario.gap_m"]), **other, **config.row()})
         == config
     )
-
-
-def test_a_condition_that_the_row_does_not_tell_is_the_default():
-    row = CONFIG.row()
-    del row["cell_order"]
-    assert config_of(row) == config_of(row | {"cell_order": None, "driver": None}) == CONFIG
 
 
 def test_seeds_are_watched_one_after_the_other():
@@ -253,12 +210,6 @@ def test_an_episode_that_ends_otherwise_is_told_from_one_that_does_not(replay):
     assert not Episode({}, "gone").identical
 
 
-def test_a_row_with_another_outcome_is_not_identical_whatever_its_hash(replay):
-    edited = Episode(replay.row | {"braked": False}, replay)
-    assert edited.differences == ["braked False → True"]
-    assert not edited.identical
-
-
 @pytest.fixture
 def interruptible():
     """Also where the tests run in the background, with interrupts ignored."""
@@ -288,15 +239,6 @@ def test_an_interrupt_does_not_wait_for_episodes_that_have_not_begun():
         played_again(rows, 1, interrupted)
     assert all(future.done() for future in handed)
     assert sum(future.cancelled() for future in handed) >= 15
-
-
-def test_how_far_the_episodes_are_is_shown_with_the_time_that_is_left():
-    futures, shown = [Future() for _ in range(4)], []
-    for future in futures:
-        future.set_result("done")
-    clock = iter((100.0, 110.0, 120.0, 130.0, 140.0))
-    follow(futures, lambda *told: shown.append(told), lambda: next(clock))
-    assert shown == [(1, "30 s left"), (2, "20 s left"), (3, "10 s left"), (4, "0 s left")]
 
 
 def test_what_cannot_be_played_says_why():

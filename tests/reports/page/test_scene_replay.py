@@ -82,22 +82,14 @@ def test_an_object_is_drawn_where_it_is_and_only_while_it_is_annotated(replay):
     assert there[-1]
 
 
-def test_the_car_drives_the_way_that_was_recorded(replay):
-    places = np.array(replay.story["place"])
-    assert np.diff(places[:, 0]) == pytest.approx(np.full(len(places) - 1, 250), abs=2)
-    assert replay.story["way"] == places[:, :2].tolist()
-    columns = ("time", "place", "speed", "rays", "states", "tracks", "camera", "seen")
-    assert {len(replay.story[name]) for name in columns} == {len(places)}
-
-
 def test_policies_of_a_scene_share_its_bodies(rows, logs):
     again = played_again(rows, 1, lambda _workers: ThreadPoolExecutor(1), logs)
     data = replay_data(again)
     assert len(data["bodies"]) == 1
     assert {each["world"] for each in data["episodes"]} == {0}
     (group,) = episode_groups(rows, again)
-    assert (group.worlds, group.watchable) == (("drive",), len(rows))
-    first = group.configurations[0].outcomes[0]
+    assert (group.worlds, group.watchable) == (["drive"], len(rows))
+    first = next(iter(group.configurations.values()))[0]
     assert first.text == f"{int(rows[0]['sighted'])}/{int(rows[0]['events'])}"
 
 
@@ -143,7 +135,3 @@ def test_what_returns_and_nobody_annotated_is_a_wall(short_streets):
     way = np.array([[shot.sensor.x, shot.sensor.y] for shot in film.shots])
     apart = np.hypot(*(walls[:, None] / 100 + 0.25 - way).transpose(2, 0, 1)).min(axis=1)
     assert 2.0 < apart.min() < apart.max() <= film.grid.range_m + 0.5
-
-
-def test_the_ground_is_no_wall(replay):
-    assert len(replay.bodies[0]["squares"]) < 5

@@ -3,7 +3,7 @@ import pytest
 from care_sim.core.conditions import LOCALISATION, Sensing
 from care_sim.core.return_settings import RETURN_SETTINGS
 from care_sim.reports.engine.frames import Frame
-from care_sim.reports.figures.faults import FAULT_FIGURES, fault_figures
+from care_sim.reports.figures.closed_loop import FAULT_FIGURES, fault_figures
 from care_sim.reports.table import Bold
 from care_sim.reports.tables.faults import fault_tables, order
 from care_sim.study.designs.faults import FAULT_PLACES, FAULTS, fault_study

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.reports.figures.standards import ncap_figures
+from care_sim.reports.figures.study_maps import ncap_figures
 from care_sim.reports.table import Bold
 from care_sim.reports.tables.ncap import impact_of, ncap_headline, ncap_tables
 from care_sim.study.designs.ncap import NcapCase

@@ -1,6 +1,6 @@
 import numpy as np
 
-from care_sim.reports.figures.standards import r157_figures
+from care_sim.reports.figures.study_maps import r157_figures
 from care_sim.reports.tables.r157 import r157_tables
 from tests.helpers.drawn import ticks
 from tests.helpers.made_rows import CUT_INS, cut_ins

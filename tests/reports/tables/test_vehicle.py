@@ -9,7 +9,7 @@ import pytest
 from care_sim.evaluation.censoring import Bound
 from care_sim.reports.engine.contrasts import contrast_of_rows
 from care_sim.reports.engine.measures import AVOIDED, DETECTION
-from care_sim.reports.figures.faults import VEHICLE_FIGURE, vehicle_figures
+from care_sim.reports.figures.closed_loop import vehicle_figures
 from care_sim.reports.tables.vehicle import vehicle_tables
 from care_sim.study.designs.vehicle import DENSE, TURNS, vehicle_study
 from tests.helpers.made_rows import vehicle_row
@@ -107,6 +107,6 @@ def test_without_a_forecast_or_a_picture_there_is_no_number():
 
 
 def test_the_figure_shows_every_late_level(rows):
-    held, errors = vehicle_figures(rows)[VEHICLE_FIGURE].axes
+    held, errors = vehicle_figures(rows)["vehicle"].axes
     assert [{*line.get_ydata()} for line in held.get_lines()[:2]] == [{90.0}, {50.0}]
     assert errors.get_lines()[0].get_ydata().max() == 2.0

@@ -58,7 +58,3 @@ def test_a_false_box_has_a_colour_of_its_own_and_a_cross(pictures):
         left, top, right, bottom = np.clip(box.round().astype(int), 0, None)
         assert shown[top : bottom + 1, left : right + 1].sum() >= bottom - top
     assert not any(np.any(np.all(each == FALSE_COLOUR, axis=-1)) for each in pictures)
-
-
-def test_the_sky_is_darker_than_the_words_on_it(pictures):
-    assert not any(np.any(np.all(picture > 200, axis=-1)) for picture in pictures)

@@ -43,22 +43,6 @@ def arrows(loop, frame):
     return {state for state in (DETECTED, HIT, IN_VIEW, OUT_OF_VIEW) if state.colour in drawn}
 
 
-def test_a_drive_is_about_everybody_it_lets_the_ego_meet(drive):
-    loop, _ = drive
-    bodies = [one.body for one in loop.world.meetings]
-    assert len(bodies) == 3
-    assert [actor.body for actor in sought(loop.world)] == bodies
-
-
-def test_another_scenario_is_about_its_first_sighting_actor():
-    with gymnasium.make("CARE-Dartout-v0", disable_env_checker=True) as env:
-        env.reset(seed=0)
-        world = env.unwrapped.loop.world
-        assert sought(world) == [world.first_sighting]
-        world.first_sighting = None
-        assert sought(world) == []
-
-
 def test_an_arrow_tells_the_state_of_each_within_range(drive):
     loop, frame = drive
     unseen, found = Sight(40.0, False, False), Sight(40.0, False, True)
@@ -80,11 +64,6 @@ def test_whom_the_car_hit_is_named_whoever_it_is(drive):
     assert arrows(loop, hit) == {OUT_OF_VIEW, HIT}
     into_the_car = replace(hit, impact=Impact(near.body, 5.04, False, "car", 5.04))
     assert contact_text(loop, into_the_car) == f"HIT BY {near.name}"
-    headers = [
-        np.asarray(draw_keyframe(episode_view(loop, [replace(each, braking=False)])))[:40]
-        for each in (frame, hit)
-    ]
-    red = [np.all(header == HIT.colour, axis=-1).sum() for header in headers]
-    assert red[0] == 0
+    header = np.asarray(draw_keyframe(episode_view(loop, [replace(hit, braking=False)])))[:40]
     # A plate as large as its words.
-    assert red[1] > 4000
+    assert np.all(header == HIT.colour, axis=-1).sum() > 4000
