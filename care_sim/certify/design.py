@@ -77,11 +77,6 @@ AS_LISTED: dict[str, dict[str, Any]] = {
 keyframe, as many as they have seeds.
 """
 
-ALONE, VECTOR = "alone", "vector"
-"""How an episode is played: by itself, or in one of Gymnasium's vectors with others. Neither may
-change it: no trail holds the mode. Other processes and other hash seeds are played by the tests.
-"""
-
 _BUDGETS = (0.01, 0.03, 0.05, 0.1, 0.2, 0.35)
 CERTIFIED_FAULTS: dict[str, dict[str, Any]] = {
     "false_negative_rate": {"false_negative_rate": 0.4},
@@ -168,7 +163,6 @@ class Drawn:
     policy: str
     seed: int
     keyframes: int
-    mode: str
 
     @property
     def text(self) -> str:
@@ -203,5 +197,4 @@ def drawn(number: int) -> Drawn:
         # One that `seed-finder` knows, where it plays.
         seed = rng.randrange(_KNOWN_SEEDS if policy == "seed-finder" else 1000)
     keyframes = rng.choice(_CLOSED_KEYFRAMES if closed else _OPEN_KEYFRAMES)
-    mode = rng.choice((ALONE, VECTOR))
-    return Drawn(number, environment, tuple(arguments.items()), policy, seed, keyframes, mode)
+    return Drawn(number, environment, tuple(arguments.items()), policy, seed, keyframes)

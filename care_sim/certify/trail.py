@@ -57,7 +57,7 @@ class Trail(gymnasium.Wrapper[Any, Any, Any, Any]):
         self._content = hashlib.sha256()
         self._stages = bytearray()
         self._keyframes = 0
-        self._gained = _Gained()
+        self._reward, self._objects, self._found = 0.0, 0, 0
         self._observation: Any = None
         self.over = False
         """Whether the trail is whole."""
@@ -89,11 +89,14 @@ class Trail(gymnasium.Wrapper[Any, Any, Any, Any]):
     def _play(self, action: Any) -> None:
         self._observation, reward, terminated, truncated, info = super().step(action)
         self._keyframes += 1
-        self._gained.add(reward, info)
+        self._reward += float(reward)
+        self._objects += info.get("objects", 0)
+        self._found += info.get("found", 0)
         self._act(self._observation, np.asarray(info["fired"], np.int64))
         self.over = terminated or truncated or self._keyframes == self._episode.keyframes
         if self.over:
-            self._note(*self._gained.outcome(self.env.unwrapped, info), terminated, truncated)
+            gained = self._reward, self._objects, self._found
+            self._note(*gained, _outcome(self.env.unwrapped, info), terminated, truncated)
         else:
             self._look(self._observation)
 
@@ -101,7 +104,8 @@ class Trail(gymnasium.Wrapper[Any, Any, Any, Any]):
         """Note the first three of `TRAIL_STAGES`, before the policy chooses."""
         loop = self.env.unwrapped.loop  # type: ignore[attr-defined]
         self._note(
-            *(_moving(loop) if isinstance(loop, ClosedLoop) else _filmed(loop)), observation["ego"]
+            *(_moving(loop) if isinstance(loop, ClosedLoop) else _filmed(loop)),
+            observation["ego"],
         )
         self._note(observation["detections"])
         self._note(observation["tracks"])
@@ -116,34 +120,6 @@ class Trail(gymnasium.Wrapper[Any, Any, Any, Any]):
         # The hash runs on: once two episodes differ, so does every later stage.
         self._content.update(portable_bytes(*parts))
         self._stages += self._content.digest()[-STAGE_BYTES:]
-
-
-class _Gained:
-    """Reward and findings of an episode so far, whether or not it is played to its end."""
-
-    def __init__(self) -> None:
-        self._reward = 0.0
-        self._objects = 0
-        self._found = 0
-
-    def add(self, reward: Any, info: Mapping[str, Any]) -> None:
-        """Count a keyframe."""
-        self._reward += float(reward)
-        self._objects += info.get("objects", 0)
-        self._found += info.get("found", 0)
-
-    def outcome(self, env: Any, info: Mapping[str, Any]) -> tuple[Any, ...]:
-        """All that was gained; the outcome of the closed loop is that of the keyframes so far, that
-        of the open loop is empty before its end.
-        """
-        if isinstance(env, ClosedLoopEnv):
-            ended = outcome(env.keyframes)
-            sums = {name: getattr(ended, name) for name in _CLOSED_LOOP_OUTCOME}
-        else:
-            sums = asdict(env.score.tally()) if "outcome" in info else {}
-        # None has no bytes of its own: NaN stands for it.
-        values = tuple((name, math.nan if value is None else value) for name, value in sums.items())
-        return self._reward, self._objects, self._found, values
 
 
 def first_difference(trail: bytes, other: bytes) -> tuple[str, int | None]:
@@ -165,6 +141,19 @@ def first_difference(trail: bytes, other: bytes) -> tuple[str, int | None]:
 def _stages(trail: bytes) -> list[bytes]:
     stages = trail[DIGEST_BYTES:]
     return [stages[n : n + STAGE_BYTES] for n in range(0, len(stages), STAGE_BYTES)]
+
+
+def _outcome(env: Any, info: Mapping[str, Any]) -> tuple[tuple[str, Any], ...]:
+    """The outcome of the closed loop by the keyframes so far; that of the open loop, which is empty
+    before its end.
+    """
+    if isinstance(env, ClosedLoopEnv):
+        ended = outcome(env.keyframes)
+        sums = {name: getattr(ended, name) for name in _CLOSED_LOOP_OUTCOME}
+    else:
+        sums = asdict(env.score.tally()) if "outcome" in info else {}
+    # None has no bytes of its own: NaN stands for it.
+    return tuple((name, math.nan if value is None else value) for name, value in sums.items())
 
 
 def _moving(loop: ClosedLoop) -> tuple[Any, ...]:

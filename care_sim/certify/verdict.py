@@ -40,7 +40,7 @@ class Verdict:
         if self.as_published:
             yield f"{counted}: {self.hash}, as published"
             if self.asked == 1:
-                yield _made_of(min(self.found))
+                yield f"  {drawn(min(self.found)).text}"
             return
         stages = Counter(name for name, _ in self.differing.values())
         told = ", ".join(
@@ -56,7 +56,7 @@ class Verdict:
         trail = self.found[first]
         reason = trail if isinstance(trail, str) else f"which differs first in {name}{moment}"
         yield f"the first is episode {first}, {reason}"
-        yield _made_of(first)
+        yield f"  {drawn(first).text}"
         if self.asked > 1:
             yield f"  care-sim certify --episode {first}"
 
@@ -72,7 +72,3 @@ def verdict_of(found: Trails, published: Sequence[bytes], asked: int = 0) -> Ver
         elif trail != published[number]:
             differing[number] = first_difference(published[number], trail)
     return Verdict(found, asked or len(found), differing)
-
-
-def _made_of(number: int) -> str:
-    return f"  {drawn(number).text}, played in mode {drawn(number).mode}"

@@ -10,8 +10,7 @@ from care_sim.base.errors import BrokenPolicy, InvalidInput, print_lines, report
 from care_sim.base.exit_codes import DONE, FAILED
 from care_sim.base.files import JSON, check_output
 from care_sim.commands.options.results import Benchmark
-from care_sim.commands.shared.run_study import summary
-from care_sim.commands.shared.selection import check_values, policy_parameters, some_playable
+from care_sim.commands.shared.selection import check_values, playable, policy_parameters
 from care_sim.policies import tags_of
 from care_sim.policies.isolation import isolated_policies
 from care_sim.reports.leaderboard import leaderboard_table
@@ -27,6 +26,7 @@ from care_sim.study.benchmark.worlds import (
 )
 from care_sim.study.executors import processes
 from care_sim.study.run_config import parameters_for
+from care_sim.study.runner import by_reason
 
 
 @isolated_policies()
@@ -53,7 +53,7 @@ def benchmark(options: Benchmark) -> int:
     if results:
         TableConsole().print(leaderboard_table(results).rich())
         print_lines(*(f"Result: {_file(options, result.entry)}" for result in results))
-    failed = [f"failed: {line}" for line in summary(player.failures, "plays")]
+    failed = [f"failed: {line}" for line in by_reason(player.failures, "plays")]
     report_problems([*failed, *left_out])
     return FAILED if failed or left_out else DONE
 
@@ -71,7 +71,7 @@ def _entries(options: Benchmark) -> tuple[list[Entry], list[str]]:
 
     # One world of every part is enough to see whether a policy can be made.
     tried = [*{world.part: world for world in published_worlds()}.values()]
-    policies, left_out = some_playable(options.policy, lambda name: _tasks(entry(name), tried))
+    policies, left_out = playable(options.policy, lambda name: _tasks(entry(name), tried))
     entries = [entry(name) for name in policies]
     if options.name and len(entries) > 1:
         raise InvalidInput("--name names one entry, and several policies are given")

@@ -12,20 +12,14 @@ from care_sim.base.console import TableConsole
 from care_sim.base.errors import report_problems
 from care_sim.base.exit_codes import DONE, FAILED
 from care_sim.commands.options.watching import Compare
-from care_sim.commands.shared.one_scene import (
-    finish_files,
-    is_source,
-    scene_of,
-    scene_plays,
-    scene_source,
-)
-from care_sim.commands.shared.selection import arguments_of, some_playable
+from care_sim.commands.shared.one_scene import finish_files, maker_of
+from care_sim.commands.shared.selection import playable
 from care_sim.envs.wrappers.record_rerun import RecordRerun, recording
 from care_sim.loops.film import Film
 from care_sim.reports.episodes.clips import Clip
-from care_sim.reports.episodes.timeline import SCENE_LABELS, outcome_text, text
+from care_sim.reports.episodes.timeline import SCENE_LABELS, outcome_text
 from care_sim.reports.table import Table
-from care_sim.study.episode_config import EpisodeConfig, grid
+from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.episode_play import GymEnv, result_or_reason, trace
 from care_sim.study.play_config import PlayConfig
 from care_sim.study.rows.reading import stops_for_nothing
@@ -53,20 +47,8 @@ _OF_STOPS_FOR_NOTHING = {"braked_before_view": "braked for nothing"}
 
 def compare(options: Compare) -> int:
     """Play one seed under several policies, and print their outcomes."""
-    common = arguments_of(options, options.policies)
-    if is_source(options.scenario):
-        source = scene_source(options, options.scenario, options.sensor)
-        scene = scene_of(options, source, options.seed)
-
-        def made(names: Sequence[str]) -> Sequence[AnyConfig]:
-            return scene_plays(source, scene, names, options.budget, common)
-    else:
-        options.check_unused()
-
-        def made(names: Sequence[str]) -> Sequence[AnyConfig]:
-            return grid([options.scenario], names, [options.budget], [options.seed], **common)
-
-    policies, left_out = some_playable(options.policies, lambda name: made([name]))
+    made = maker_of(options, options.scenario, options.policies, options.budget)
+    policies, left_out = playable(options.policies, lambda name: made([name]))
     failures = play_side_by_side(made(policies), options.record, options.video, options.video_start)
     return FAILED if left_out or failures else DONE
 
@@ -136,19 +118,14 @@ def _outcome_table(played: Sequence[tuple[AnyConfig, Row]]) -> Table:
     """One line per episode."""
     config = played[0][0]
     if isinstance(config, PlayConfig):
-        title, told, written = config.scene.name, SCENE_LABELS, outcome_text
+        title, told = config.scene.name, SCENE_LABELS
     else:
         title, told = f"{config.scenario} seed {config.seed}", {**_COLUMNS}
         told |= _OF_COLLISIONS if any(row["collision"] for _, row in played) else {}
         told |= _OF_STOPS_FOR_NOTHING if any(stops_for_nothing(row) for _, row in played) else {}
-        written = _text_of
     lines = [
-        (config.policy, f"{config.budget:.4g}", *(written(row, name) for name in told))
+        (config.policy, f"{config.budget:.4g}", *(outcome_text(row, name) for name in told))
         for config, row in played
     ]
     columns = ("policy", "budget", *told.values())
     return Table(title, columns, tuple(lines), whole=columns)
-
-
-def _text_of(row: Row, name: str) -> str:
-    return text(row[name])

@@ -57,15 +57,11 @@ def _configs(options: ExportNuScenes) -> list[PlayConfig]:
             "source must be nuscenes:FOLDER, whose samples the official form names, got "
             f"{options.source!r}"
         )
-
-    # One floor and one latency: results are of one way to play, whereas a study has several.
     source = source_named(options, options.source)
     common = common_of(options, [options.policy])
+    # One floor: results are of one way to play, whereas a study has several.
     floors = [common.pop("floor_seed")]
-    latencies = [common.pop("camera_latency")]
-    return play_grid(
-        source, source.scenes(), [options.policy], [options.budget], floors, latencies, **common
-    )
+    return play_grid(source, source.scenes(), [options.policy], [options.budget], floors, **common)
 
 
 def _meta(options: ExportNuScenes, config: PlayConfig) -> dict[str, Any]:

@@ -14,16 +14,16 @@ from care_sim.base.exit_codes import DONE, FAILED
 from care_sim.base.files import JSON, check_no_link, check_output, write_text
 from care_sim.commands.options.results import Judge
 from care_sim.commands.shared.selection import check_values, common_of, source_named
-from care_sim.evaluation.detector_quality import Counts, SceneBoxes, counts, curve, reliability
+from care_sim.evaluation.detector_quality import SceneBoxes, counts, curve, reliability
 from care_sim.perception.detectors import PROXY, check_detector
 from care_sim.policies.isolation import isolated_policies
 from care_sim.reports.detectors import Judged, detector_tables
 from care_sim.reports.figures.detectors import DETECTORS_FIGURE, detectors_figure
 from care_sim.reports.figures.files import check_figure, save
-from care_sim.sources.scenes import Scene, chosen_scenes
+from care_sim.sources.scenes import Scene, Source, chosen_scenes
 from care_sim.study.episode_play import result_or_reason
 from care_sim.study.executors import processes
-from care_sim.study.judging import JudgedScene, Samples, judge_scene
+from care_sim.study.judging import JudgedScene, judge_scene
 from care_sim.study.parameters import Parameters, parameters
 from care_sim.study.play_config import PlayConfig, play_grid
 from care_sim.study.progress import shown_progress
@@ -39,19 +39,17 @@ _TRUTH = "truth"
 @isolated_policies()
 def judge(options: Judge) -> int:
     """Judge the detectors, print tables and write them."""
-    _check(options)
-    scenes = _scenes(options)
-    plays = _plays(options, scenes)
-    if (options.out / _FIGURES).exists() and not options.force:
-        raise InvalidInput(
-            f"{options.out} holds what was judged before: give another --out, or --force to "
-            "replace it"
-        )
-    check_no_link(options.out / _OFFICIAL)
-    check_output(options.out / _FIGURES, JSON)
-    check_output(options.out / _TABLES)
-    check_figure(options.out / DETECTORS_FIGURE)
-    judged: dict[str, dict[str, JudgedScene]] = {name: {} for name in _names(options)}
+    check_values(options, "detectors", "least_scores")
+    for name in (options.against, *options.detectors):
+        check_detector(name)
+    if options.detector != PROXY:
+        raise InvalidInput("judge takes --detectors, one or several, instead of --detector")
+    names = [*dict.fromkeys(options.detectors)]
+    source = source_named(options, options.source)
+    scenes = chosen_scenes(source.scenes(), options.scenes)
+    plays = _plays(options, names, source, scenes)
+    _check_folder(options)
+    judged: dict[str, dict[str, JudgedScene]] = {name: {} for name in names}
     problems = []
     # Whatever ends it, what is judged by then is told.
     try:
@@ -64,39 +62,41 @@ def judge(options: Judge) -> int:
                 if isinstance(each, str):
                     problems.append(f"failed: {scene.name}: {each}")
                 else:
-                    for name, one in zip(_names(options), each, strict=True):
+                    for name, one in zip(names, each, strict=True):
                         judged[name][scene.name] = one
                 show(number, "")
     except BrokenExecutor:
         problems.append(f"{DIED} that judges")
     finally:
-        if judged[_names(options)[0]]:
+        if judged[names[0]]:
             _tell(options, judged, plays[0][0])
     report_problems(problems)
     return FAILED if problems else DONE
 
 
-def _names(options: Judge) -> list[str]:
-    """The detectors, each once."""
-    return [*dict.fromkeys(options.detectors)]
-
-
-def _scenes(options: Judge) -> Sequence[Scene]:
-    return chosen_scenes(source_named(options, options.source).scenes(), options.scenes)
-
-
-def _plays(options: Judge, scenes: Sequence[Scene]) -> list[list[PlayConfig]]:
-    """Those of every scene, one a detector."""
-    source = source_named(options, options.source)
-    common = common_of(options, [options.policy])
-    floors, latencies = [common.pop("floor_seed")], [common.pop("camera_latency")]
-    made = []
-    for name in _names(options):
-        check_detector(name)
-        own = common | {"detector": name, "detector_parameters": _parameters(options, name)}
-        made.append(
-            play_grid(source, scenes, [options.policy], [options.budget], floors, latencies, **own)
+def _check_folder(options: Judge) -> None:
+    """Raise InvalidInput where a file could not be written, or would be lost."""
+    if (options.out / _FIGURES).exists() and not options.force:
+        raise InvalidInput(
+            f"{options.out} holds what was judged before: give another --out, or --force to "
+            "replace it"
         )
+    check_no_link(options.out / _OFFICIAL)
+    check_output(options.out / _FIGURES, JSON)
+    check_output(options.out / _TABLES)
+    check_figure(options.out / DETECTORS_FIGURE)
+
+
+def _plays(
+    options: Judge, names: Sequence[str], source: Source, scenes: Sequence[Scene]
+) -> list[list[PlayConfig]]:
+    """Those of every scene, one a detector."""
+    common = common_of(options, [options.policy])
+    floors = [common.pop("floor_seed")]
+    made = []
+    for name in names:
+        own = common | {"detector": name, "detector_parameters": _parameters(options, name)}
+        made.append(play_grid(source, scenes, [options.policy], [options.budget], floors, **own))
     return [list(plays) for plays in zip(*made, strict=True)]
 
 
@@ -117,29 +117,28 @@ def _parameters(options: Judge, detector: str) -> Parameters:
 def _tell(
     options: Judge, judged: Mapping[str, Mapping[str, JudgedScene]], play: PlayConfig
 ) -> None:
+    """Write tables, figure and numbers, and with --official all boxes; print the tables."""
     scenes = {name: [*own.values()] for name, own in judged.items()}
+    first = next(iter(judged.values()))
     boxes = {name: [one.boxes for one in own] for name, own in scenes.items()}
     tables = detector_tables(scenes, options.least_scores, options.against)
-    told = _report(options, [*judged[_names(options)[0]]], scenes, play)
+    told = _report(options, [*first], scenes, play)
     write_text(options.out / _FIGURES, json.dumps(told, indent=1) + "\n")
     write_text(options.out / _TABLES, "\n".join(table.markdown() for table in tables))
     save(detectors_figure(boxes), options.out / DETECTORS_FIGURE)
     # Samples of another run beside these would be scored as if they were of these scenes.
-    for old in (options.out / _OFFICIAL).glob("*.json"):
+    official = options.out / _OFFICIAL
+    for old in official.glob("*.json"):
         old.unlink()
     if options.official:
-        for name, own in scenes.items():
-            _write_samples(options, name, [one.reported for one in own])
-        _write_samples(options, _TRUTH, [one.true for one in scenes[_names(options)[0]]])
+        written = {name: [one.reported for one in own] for name, own in scenes.items()}
+        for name, samples in (written | {_TRUTH: [one.true for one in first.values()]}).items():
+            all_boxes = {token: own for each in samples for token, own in each.items()}
+            write_text(official / f"{name}.json", json.dumps(all_boxes))
     for table in tables:
         TableConsole().print(table.rich())
     figure = f"Figure: {options.out / DETECTORS_FIGURE}.png"
     print_lines(f"Tables: {options.out / _TABLES}", figure)
-
-
-def _write_samples(options: Judge, name: str, scenes: Sequence[Samples]) -> None:
-    samples = {token: boxes for scene in scenes for token, boxes in scene.items()}
-    write_text(options.out / _OFFICIAL / f"{name}.json", json.dumps(samples))
 
 
 def _report(
@@ -147,10 +146,9 @@ def _report(
 ) -> dict[str, Any]:
     """Everything that the tables and the figure show, and what was played, as plain values."""
     row = play.row()
-    conditions = {name: row[name] for name in row if not name.startswith(("scene", "detector"))}
     return {
         "scenes": [*names],
-        "conditions": conditions,
+        "conditions": {n: row[n] for n in row if not n.startswith(("scene", "detector"))},
         "detector_parameters": [list(pair) for pair in parameters(options.detector_parameters)],
         "least_scores": list(options.least_scores),
         "versions": versions(),
@@ -164,24 +162,16 @@ def _report(
 
 
 def _numbers(options: Judge, scenes: Sequence[SceneBoxes]) -> dict[str, Any]:
-    found = {f"{score:g}": _plain(counts(scenes, score)) for score in (0.0, *options.least_scores)}
+    columns = ("boxes", "right", "frames", "found", "events", "sighted")
+    met = {score: counts(scenes, score) for score in (0.0, *options.least_scores)}
     return {
-        "from score": found,
+        "from score": {
+            f"{score:g}": {name: float(getattr(found, name).sum()) for name in columns}
+            for score, found in met.items()
+        },
         "score, recall, precision": curve(scenes).round(5).tolist(),
         "boxes, mean score, share right": [
             [None if np.isnan(number) else round(number, 5) for number in row]
             for row in reliability(scenes).tolist()
         ],
     }
-
-
-def _check(options: Judge) -> None:
-    check_values(options, "detectors", "least_scores")
-    check_detector(options.against)
-    if options.detector != PROXY:
-        raise InvalidInput("judge takes --detectors, one or several, instead of --detector")
-
-
-def _plain(found: Counts) -> dict[str, float]:
-    columns = ("boxes", "right", "frames", "found", "events", "sighted")
-    return {name: float(getattr(found, name).sum()) for name in columns}

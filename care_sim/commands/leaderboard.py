@@ -31,12 +31,17 @@ from care_sim.reports.figures.leaderboard import (
 from care_sim.reports.leaderboard import CONTROL, leaderboard_table, leads_table, names_in
 from care_sim.study.benchmark.made_by import elsewhere, own_code_of
 from care_sim.study.benchmark.player import Player, player_in
-from care_sim.study.benchmark.replay import Replay, replayed
+from care_sim.study.benchmark.replay import replayed
 from care_sim.study.benchmark.result import BenchmarkResult
 from care_sim.study.benchmark.result_file import is_result, read_result
 from care_sim.study.benchmark.screening import screened_worlds
 from care_sim.study.benchmark.worlds import Salt, World
 
+_HEAD = (
+    "# Leaderboard\n\nWhat is played and why, and how to enter: the page *Report a result* of the "
+    "documentation. Made by `care-sim leaderboard`.\n"
+)
+_FIGURE = f"![Scores with their intervals, and their parts]({LEADERBOARD_FIGURE}.svg)\n"
 _TABLES, _TRIALS = Path("runs/leaderboard"), Path("runs/leaderboard-quick")
 
 
@@ -66,21 +71,20 @@ def _show(options: Leaderboard, results: Sequence[BenchmarkResult]) -> None:
     # The control may be missing: then nobody's lead is told.
     if options.minus != CONTROL.name and options.minus not in known:
         raise unknown("entry", options.minus, known)
-    tables = [leaderboard_table(own, options.minus) for own in sets.values()]
     folder = options.out or (_TRIALS if options.quick else _TABLES)
     page = folder / f"{LEADERBOARD_FIGURE}.md"
     check_output(page)
     check_figure(folder / LEADERBOARD_FIGURE)
-    if options.chart:
-        check_figure(options.chart)
     told = told_if_replaced(page)
     first = next(iter(sets.values()))
-    save(leaderboard_figure(first), folder / LEADERBOARD_FIGURE)
     if options.chart:
+        check_figure(options.chart)
         save(score_chart(first), options.chart.with_suffix(""))
+    save(leaderboard_figure(first), folder / LEADERBOARD_FIGURE)
+    tables = [leaderboard_table(own, options.minus) for own in sets.values()]
     by_part = [leads_table(own, options.minus) for own in sets.values()]
     shown = [*tables, *(table for table in by_part if table)]
-    write_text(page, _page([table.markdown() for table in shown]))
+    write_text(page, "\n".join([_HEAD, *(table.markdown() for table in shown), _FIGURE]))
     for table in tables:
         TableConsole().print(table.rich())
     # Sealed results have a control of their own, which nobody has published.
@@ -91,9 +95,7 @@ def _show(options: Leaderboard, results: Sequence[BenchmarkResult]) -> None:
             f"no {options.minus} among these files: add a folder with its result for leads",
             file=sys.stderr,
         )
-    print_lines(f"Page: {told}")
-    if options.chart:
-        print_lines(f"Chart: {options.chart}")
+    print_lines(f"Page: {told}", *([f"Chart: {options.chart}"] if options.chart else []))
 
 
 @isolated_policies()
@@ -113,14 +115,23 @@ def _verified(options: Leaderboard, results: dict[Path, BenchmarkResult]) -> lis
         except (InvalidInput, MissingExtra) as error:
             problems.append(f"{path} cannot be verified: {error}")
             continue
+        drawn = f"{counted(replay.played, 'episode')} of {len(result.rows)}, drawn by lot,"
+        made = elsewhere(result)
         if replay.holds:
-            print_lines(f"{path}: {_drawn(replay, result)} came out again as the file says")
+            print_lines(f"{path}: {drawn} came out again as the file says")
         if replay.detours:
             print_lines(
-                f"{path}: of {_drawn(replay, result)} {replay.detours} reached as much with "
-                f"another hash; played {elsewhere(result)}"
+                f"{path}: of {drawn} {replay.detours} reached as much with another hash; "
+                f"played {made}"
             )
-        problems += [f"{path}: {problem}" for problem in _told(replay, result)]
+        differing = [
+            f"of {drawn} {len(replay.differing)} did not go as it says, the first world "
+            f"{row.world} of the {row.part} with the {row.camera} camera"
+            f"{f'; played {made}' if made else ''}"
+            for row in replay.differing[:1]
+        ]
+        told = [*replay.false, *differing, *map(str, replay.failures[:1])]
+        problems += [f"{path}: {problem}" for problem in told]
     return problems
 
 
@@ -132,21 +143,6 @@ def _player(options: Leaderboard) -> Iterator[Player]:
         player_in(Path(folder), options.workers) as player,
     ):
         yield player
-
-
-def _told(replay: Replay, result: BenchmarkResult) -> list[str]:
-    """A line for each kind of thing in which a result does not hold."""
-    other = f"; played {made}" if (made := elsewhere(result)) else ""
-    differing = [
-        f"of {_drawn(replay, result)} {len(replay.differing)} did not go as it says, the first "
-        f"world {row.world} of the {row.part} with the {row.camera} camera{other}"
-        for row in replay.differing[:1]
-    ]
-    return [*replay.false, *differing, *map(str, replay.failures[:1])]
-
-
-def _drawn(replay: Replay, result: BenchmarkResult) -> str:
-    return f"{counted(replay.played, 'episode')} of {len(result.rows)}, drawn by lot,"
 
 
 def _read(places: Sequence[Path]) -> tuple[dict[Path, BenchmarkResult], list[str]]:
@@ -223,12 +219,3 @@ def _of_whole(
             continue
         kept[key] = path, result.cut_to_tenth() if quick else result
     return [result for _, result in kept.values()], problems
-
-
-def _page(tables: Sequence[str]) -> str:
-    reading = (
-        "What is played and why, and how to enter: the page *Report a result* of the "
-        "documentation. Made by `care-sim leaderboard`."
-    )
-    figure = f"![Scores with their intervals, and their parts]({LEADERBOARD_FIGURE}.svg)"
-    return "\n".join(["# Leaderboard\n", f"{reading}\n", *tables, f"{figure}\n"])

@@ -82,15 +82,19 @@ def _description(kind: type, brief: bool) -> str:
 def _explained(
     asked: StructTypeInfo, brief: bool, defaults: Mapping[str, Any]
 ) -> StructConstructorSpec | None:
-    """The fields of options as tyro takes them, the lines of their docstrings joined, since a
-    terminal breaks them elsewhere; with `brief` without the conditions. `defaults` replace those
-    of the class.
+    """The fields of options as tyro takes them, a command's own first; with `brief` without help
+    for the conditions. `defaults` replace those of the class.
     """
     if not (is_dataclass(asked.type) and asked.type.__module__.startswith("care_sim.")):
         return None
     types = get_type_hints(asked.type, include_extras=True)
     is_hidden = brief and issubclass(asked.type, Conditions)
     told = {} if is_hidden else _docstrings(asked.type)
+    owners = [vars(owner).get("__annotations__", {}) for owner in asked.type.__mro__]
+    own_first = sorted(
+        (field for field in fields(asked.type) if field.init),
+        key=lambda field: next(n for n, names in enumerate(owners) if field.name in names),
+    )
     return StructConstructorSpec(
         asked.type,
         tuple(
@@ -100,14 +104,15 @@ def _explained(
                 defaults.get(field.name, _default_of(field, asked.default)),
                 told.get(field.name, ""),
             )
-            for field in fields(asked.type)
-            if field.init
+            for field in own_first
         ),
     )
 
 
 def _docstrings(kind: type) -> dict[str, str]:
-    """The docstring of every field in one line, those of subclasses first."""
+    """The docstring of every field in one line, since a terminal breaks it elsewhere; those of
+    subclasses win.
+    """
     return {
         each.arg_name: " ".join((each.description or "").split())
         for owner in reversed(kind.__mro__[:-1])
@@ -122,40 +127,32 @@ def _default_of(field: Field[Any], options: Any) -> Any:
     return MISSING_NONPROP if field.default is MISSING else field.default
 
 
-def _refuse(kind: type, event: _errors.ParseErrorEvent) -> NoReturn:
+def _refuse(kind: type, event: Any) -> NoReturn:
     """Raise InvalidInput for what tyro cannot read, in one line."""
-    raise InvalidInput(_complaint(kind, event)) from None
-
-
-def _complaint(kind: type, event: Any) -> str:
     match event:
         case _errors.MissingArgs():
             missing = ", ".join(_name_of(each.arg) for each in event.missing_arguments)
-            unknown = event.unrecognized_tokens
-            return f"missing: {missing}{f'; unknown: {_joined(unknown)}' if unknown else ''}"
+            unknown = " ".join(event.unrecognized_tokens)
+            told = f"missing: {missing}{f'; unknown: {unknown}' if unknown else ''}"
         case _errors.UnrecognizedArgs():
             hints = "".join(_near(word, kind) for word in event.tokens if word.startswith("--"))
-            return f"unrecognized options: {_joined(event.tokens)}{hints}"
+            told = f"unrecognized options: {' '.join(event.tokens)}{hints}"
         case _errors.InvalidChoice():
             choices = ", ".join(event.choices)
-            return f"{_name_of(event.argument)} must be one of {choices}, got {event.value!r}"
+            told = f"{_name_of(event.argument)} must be one of {choices}, got {event.value!r}"
         case _errors.BadValue():
-            return f"{_name_of(event.argument)} needs a value: {event.argument.lowered.metavar}"
+            told = f"{_name_of(event.argument)} needs a value: {event.argument.lowered.metavar}"
         case _errors.InstantiationFailure() if event.argument is not None:
             reason = event.message.partition("\n")[0]
-            return f"{_name_of(event.argument)} takes {event.argument.lowered.metavar}: {reason}"
-        case _errors.InstantiationFailure():
-            return str(event.message)
-    return f"{type(event).__name__} in {event.prog}"
+            told = f"{_name_of(event.argument)} takes {event.argument.lowered.metavar}: {reason}"
+        case _:
+            told = str(getattr(event, "message", type(event).__name__))
+    raise InvalidInput(told) from None
 
 
 def _name_of(argument: Any) -> str:
     """An option as it is written, or what help calls an argument without a name."""
     return str(argument.lowered.metavar if argument.is_positional() else argument.display_name())
-
-
-def _joined(words: Sequence[str]) -> str:
-    return " ".join(words)
 
 
 def _near(word: str, kind: type) -> str:
@@ -179,21 +176,15 @@ def print_completion(arguments: Sequence[str]) -> NoReturn:
     families: dict[str, list[Any]] = {}
     for name, command in COMMANDS.items():
         first, _, second = name.partition(" ")
-        kind: Any = command.options_class()
-        families.setdefault(first, []).append(Annotated[kind, _subcommand(second or first)])
-    kinds = [
-        own[0] if len(own) == 1 else Annotated[_union(own), _subcommand(first)]
-        for first, own in families.items()
-    ]
-    tyro.cli(
-        _union(kinds), prog="care-sim", args=arguments, registry=_registry(brief=False, defaults={})
-    )
+        families.setdefault(first, []).append(_named(second or first, [command.options_class()]))
+    kinds = [own[0] if len(own) == 1 else _named(first, own) for first, own in families.items()]
+    any_command: Any = Union[tuple(kinds)]  # noqa: UP007 (annotated kinds have no operator)
+    registry = _registry(brief=False, defaults={})
+    tyro.cli(any_command, prog="care-sim", args=arguments, registry=registry)
     raise AssertionError("tyro exits once it has printed the script")
 
 
-def _union(kinds: Sequence[Any]) -> Any:
-    return Union[tuple(kinds)]  # noqa: UP007 (annotated kinds have no operator)
-
-
-def _subcommand(name: str) -> Any:
-    return tyro.conf.subcommand(name, prefix_name=False)
+def _named(name: str, kinds: Sequence[Any]) -> Any:
+    """One of several kinds of options, as a command of that name."""
+    # Annotated kinds have no operator.
+    return Annotated[Union[tuple(kinds)], tyro.conf.subcommand(name, prefix_name=False)]  # noqa: UP007

@@ -4,21 +4,13 @@ import sys
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from care_sim.base.console import TableConsole
 from care_sim.base.errors import InvalidInput, report_problems
 from care_sim.base.extras import import_rerun
 from care_sim.commands.options.watching import Run, View
 from care_sim.commands.shared.agent_play import AgentPlay
-from care_sim.commands.shared.one_scene import (
-    finish_files,
-    is_source,
-    scene_of,
-    scene_plays,
-    scene_source,
-)
-from care_sim.commands.shared.selection import arguments_of
+from care_sim.commands.shared.one_scene import finish_files, is_source, maker_of
 from care_sim.commands.view import view
 from care_sim.envs.wrappers.export_scans import ExportScans
 from care_sim.envs.wrappers.record_rerun import RecordRerun
@@ -27,8 +19,8 @@ from care_sim.reports.episodes.clips import Clip
 from care_sim.reports.episodes.photos import Photo
 from care_sim.reports.episodes.timeline import episode_timeline, scene_timeline
 from care_sim.scenarios import scenario_names
-from care_sim.study.episode_config import grid
 from care_sim.study.episode_play import GymEnv, trace
+from care_sim.study.play_config import PlayConfig
 from care_sim.study.scene_trace import trace_scene
 from care_sim.training.agents import find_agent, shipped_agents
 
@@ -49,35 +41,21 @@ def run(options: Run) -> int:
     elif options.scenario is not None:
         raise InvalidInput("--scenario is for an agent: name the scenario itself")
     policy = options.policy or _POLICY
-    budget = _BUDGET if options.budget is None else options.budget
-    given = arguments_of(options, [policy])
-    if is_source(options.what):
-        return _play_scene(options, policy, budget, given)
-    options.check_unused()
+    asked = _BUDGET if options.budget is None else options.budget
     # Made as a grid of one, the configuration gets what `full` needs, as in a study.
-    (config,) = grid([options.what], [policy], [budget], [options.seed], **given)
-    _tell_budget(config.budget, budget)
+    (config,) = maker_of(options, options.what, [policy], asked)([policy])
+    if config.budget != asked:
+        print("full fires every cell, whatever the budget", file=sys.stderr)
     photo = Photo(options.picture, options.at)
     film = Clip(options.video, options.video_start)
-    played = trace(config, film.episode(policy), wrap=partial(_watched, options, photo))
-    film.show_outcome(played[0])
-    episode_timeline(config, *played).print(TableConsole())
-    photo.report()
-    finish_files(options.record, film, options.video)
-    return 0
-
-
-def _play_scene(options: Run, policy: str, budget: float, given: dict[str, Any]) -> int:
-    """The same of a scene of the open loop."""
-    source = scene_source(options, options.what, options.sensor)
-    scene = scene_of(options, source, options.seed)
-    (config,) = scene_plays(source, scene, [policy], budget, given)
-    _tell_budget(config.budget, budget)
-    photo = Photo(options.picture, options.at)
-    film = Clip(options.video, options.video_start)
-    wrap = partial(_watched, options, photo)
-    played = trace_scene(config, config.film(), film.episode(policy), wrap=wrap)
-    scene_timeline(config, played).print(TableConsole())
+    watch, wrap = film.episode(policy), partial(_watched, options, photo)
+    if isinstance(config, PlayConfig):
+        timeline = scene_timeline(config, trace_scene(config, config.film(), watch, wrap=wrap))
+    else:
+        played = trace(config, watch, wrap=wrap)
+        film.show_outcome(played[0])
+        timeline = episode_timeline(config, *played)
+    timeline.print(TableConsole())
     photo.report()
     finish_files(options.record, film, options.video)
     return 0
@@ -90,11 +68,6 @@ def _watched(options: Run, photo: Photo, env: GymEnv, policy: Policy) -> GymEnv:
     if options.export is not None:
         env = ExportScans(env, options.export, policy)
     return photo.watching(env, policy)
-
-
-def _tell_budget(played: float, asked: float) -> None:
-    if played != asked:
-        print("full fires every cell, whatever the budget", file=sys.stderr)
 
 
 def _is_agent(what: str) -> bool:

@@ -1,10 +1,12 @@
-"""`care-sim train ppo`, `sac` and `recurrent-ppo`."""
+"""`care-sim train ppo`, `sac` and `recurrent-ppo`, and `curves` of what they learned."""
 
 from collections.abc import Iterator
 from dataclasses import fields
 
-from care_sim.base.errors import print_lines
-from care_sim.commands.options.learning import Learner
+from care_sim.base.console import TableConsole
+from care_sim.base.errors import InvalidInput, print_lines
+from care_sim.base.files import told_if_replaced
+from care_sim.commands.options.learning import Curves, Learner
 from care_sim.commands.shared.agent_play import AgentPlay
 from care_sim.training.agents import Agent
 from care_sim.training.closing import how_to_play
@@ -47,3 +49,24 @@ def end_of_training(config: AgentConfig) -> Iterator[str]:
     yield f"kept: the weights of that step, {out / WEIGHTS}"
     yield how_to_play("run", out)
     yield f"beside care: {AgentPlay(Agent.of_run(config, out / WEIGHTS)).study_line()}"
+
+
+def curves(options: Curves) -> int:
+    """Draw learning curves, and print their table."""
+    # Imported here because training draws nothing.
+    from care_sim.reports.figures.files import check_figure, save
+    from care_sim.training.curves import grouped_runs, read_run
+    from care_sim.training.curves_figure import curves_figure
+    from care_sim.training.curves_table import curves_table
+
+    if not options.folders:
+        raise InvalidInput(
+            "curves needs the folder of a training run, the --out of `care-sim train`"
+        )
+    groups = grouped_runs(map(read_run, options.folders))
+    check_figure(options.out)
+    told = told_if_replaced(options.out.with_suffix(".png"))
+    save(curves_figure(groups), options.out)
+    TableConsole().print(curves_table(groups).rich())
+    print_lines(f"Figure: {told}")
+    return 0

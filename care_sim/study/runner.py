@@ -42,6 +42,17 @@ class Failure:
         return f"{self.config.label}: {self.reason}"
 
 
+def by_reason(failures: Sequence[Failure], unit: str) -> list[str]:
+    """What failed, in a line for every reason."""
+    reasons: dict[str, list[Failure]] = {}
+    for failure in failures:
+        reasons.setdefault(failure.reason, []).append(failure)
+    return [
+        str(own[0]) if len(own) == 1 else f"{len(own)} {unit}, the first {own[0]}"
+        for own in reasons.values()
+    ]
+
+
 class RunListener:
     """Follows a run; this base class keeps quiet."""
 

@@ -60,7 +60,7 @@ def test_workers_and_threads_keep_to_the_affinity():
         "import gymnasium, care_sim\n"
         "from care_sim.commands.options.studies import Sweep\n"
         "import care_sim.envs.vector.env as vector\n"
-        "from care_sim.commands.certify import Certify\n"
+        "from care_sim.commands.options.results import Certify\n"
         "from care_sim.study.provenance import machine\n"
         "print(Sweep().workers, Certify().workers, vector.CORES, machine()['cores'])\n"
     )

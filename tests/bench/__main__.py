@@ -1,4 +1,4 @@
-"""Measure speed and memory, beside known engines and environments: `make bench`.
+"""Measure speed, beside known engines and environments: `make bench`.
 
 All but what takes several threads or processes runs on one core. MuJoCo, panda-gym, Open3D and PPO
 are measured where the extra `dev` is installed, EnvPool where somebody has installed it.
@@ -46,16 +46,6 @@ def main(arguments=None):
     return 0
 
 
-SEVERAL_CORES = {
-    "memory": environments.worker_memory,
-    "batch_memory": vectors.batch_memory,
-    "study": environments.study,
-    "vectorised": environments.vectorised,
-}
-ONE_CORE = {"choices": choices, "growth": growth}
-"""The figures of the report that are measured in one call, by name."""
-
-
 def bench_report(settings, tell=lambda _what: None):
     """All figures of a run: `config`, `machine`, `versions`, `main` (the environment in question),
     the figures of every measure by its name, `ratios`, and `skipped`: what is left out, in one line
@@ -79,9 +69,8 @@ def bench_report(settings, tell=lambda _what: None):
         measured, missing = measure(settings)
         report["batches"] |= measured
         skipped += missing
-    for name, measure in SEVERAL_CORES.items():
-        tell(name)
-        report[name] = measure(settings)
+    tell("vectorised")
+    report["vectorised"] = environments.vectorised(settings)
     # All else runs on one, so that libraries with threads of their own gain nothing by them.
     with one_core():
         tell("speed")
@@ -92,9 +81,9 @@ def bench_report(settings, tell=lambda _what: None):
         report["speed"] = {name: by_name([told[name] for told in rounds]) for name in made}
         tell("scans")
         report["scans"], missing = scans(settings)
-        for name, measure in ONE_CORE.items():
-            tell(name)
-            report[name] = measure(settings)
+        for measure in (choices, growth):
+            tell(measure.__name__)
+            report[measure.__name__] = measure(settings)
     return {**report, "ratios": ratios(report), "skipped": skipped + missing}
 
 
@@ -187,11 +176,6 @@ def lines(report):
         yield spread(what, "ms", figures["scan_ms"])
         if name != REFERENCE:
             yield f"  {figures['same_body']:.1%} of its rays meet the same body as in {REFERENCE}"
-    for name in ("memory", "batch_memory"):
-        yield f"{name}: " + ", ".join(f"{key} {value:.0f}" for key, value in report[name].items())
-    yield "the paper's {episodes:.0f} episodes, two workers: {seconds:.1f} s".format(
-        **report["study"]
-    )
     yield from (f"{name}: {value:.3g}" for name, value in report["ratios"].items())
 
 

@@ -1,5 +1,5 @@
-"""Steps and constructions per second of the environments, and of known ones beside them; memory of
-a worker, steps of two processes, time of a study.
+"""Steps and constructions per second of the environments, and of known ones beside them; steps of
+two processes.
 """
 
 import time
@@ -16,11 +16,6 @@ from care_sim.base.processes import following, starting
 from care_sim.core.conditions import DEFAULTS
 from care_sim.envs import ENVIRONMENT_IDS
 from care_sim.sensors.engines import ENGINES
-from care_sim.study.designs.paper import paper_study
-from care_sim.study.episode_play import peak_rss_mb
-from care_sim.study.episodes_together import MOST_TOGETHER, play_episodes
-from care_sim.study.executors import processes
-from care_sim.study.run_config import in_batches
 from tests.bench.settings import EPISODE, MAIN
 
 STANDARD_OUTPUT = 1
@@ -106,36 +101,6 @@ def _replaced(maker, made):
     return made.enter_context(maker())
 
 
-def worker_memory(settings):
-    """Peak memory in MB of a worker that begins `resets` episodes; see `grown_memory`."""
-    with processes(1) as pool:
-        return pool.submit(_worker_resets, settings.resets).result()
-
-
-def _worker_resets(resets):
-    with driven() as env:
-
-        def begin(number):
-            env.reset(seed=EPISODE.seed + number)
-            env.step(0)
-
-        return {"resets": float(resets)} | grown_memory(begin, resets)
-
-
-def grown_memory(begin, times):
-    """Peak memory in MB of this process: `begun_mb` when `begin` was called once, `early_mb` after
-    a tenth of the times, `peak_mb` after all.
-    """
-    memory = {}
-    for number in range(times):
-        begin(number)
-        if number == 0:
-            memory["begun_mb"] = peak_rss_mb()
-        if number == times // 10:
-            memory["early_mb"] = peak_rss_mb()
-    return {**memory, "peak_mb": peak_rss_mb()}
-
-
 def vectorised(settings):
     """Steps per second, in every round, of one and of two processes that each hold an environment
     and its policy. Not to be called on one core.
@@ -151,18 +116,3 @@ def vectorised(settings):
             finally:
                 envs.close()
     return figures
-
-
-def study(settings):
-    """The paper's closed-loop study: its `episodes`, and the `seconds` two workers take from their
-    start to the last row. Raises RuntimeError when an episode fails.
-    """
-    configs = paper_study(range(settings.seeds))
-    started = time.perf_counter()
-    with processes(2) as pool:
-        batches = pool.map(play_episodes, in_batches(configs, MOST_TOGETHER))
-        answers = [answer for batch in batches for answer in batch]
-    seconds = time.perf_counter() - started
-    for failed in (answer for answer in answers if isinstance(answer, str)):
-        raise RuntimeError(failed)
-    return {"episodes": float(len(answers)), "seconds": seconds}

@@ -35,9 +35,8 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
 def scans(settings):
     """The figures of every engine, and what is left out in one line each.
 
-    Medians of every round in ms: `poses_ms` to move all bodies, `cast_ms` to answer the rays,
-    `scan_ms` for both. `rays_per_s` of the scan. `same_body` and `same_range` are the shares of the
-    rays that are answered as Bullet answers them.
+    `scan_ms`, the medians of every round, to move all bodies and answer the rays. `same_body` and
+    `same_range` are the shares of the rays that are answered as Bullet answers them.
     """
     grid = AngularGrid()
     bodies = moving_bodies(BODIES, EPISODE.seed)
@@ -46,17 +45,13 @@ def scans(settings):
         made, skipped = casters(bodies.kinds, grid, opened)
         answers = agreement(made, bodies, cells)
         rounds = [laps(made, bodies, cells, settings.samples) for _ in range(settings.repeats)]
-    engines = {}
-    for name in made:
-        seconds = np.median([times[name] for times in rounds], axis=1)
-        poses, cast, both = (1e3 * seconds.T).tolist()
-        engines[name] = {
-            "poses_ms": poses,
-            "cast_ms": cast,
-            "scan_ms": both,
-            "rays_per_s": (len(cells) / seconds[:, 2]).tolist(),
+    engines = {
+        name: {
+            "scan_ms": [1e3 * float(np.median(times[name])) for times in rounds],
             **answers[name],
         }
+        for name in made
+    }
     return {"rays": len(cells), "bodies": BODIES, "engines": engines}, skipped
 
 
@@ -84,18 +79,16 @@ def agreement(made, bodies, cells):
 
 
 def laps(made, bodies, cells, samples):
-    """(samples, 3) seconds of poses, cast and both, of every engine."""
+    """(samples,) seconds to place the bodies and cast, of every engine."""
     # The engines take turns, scan by scan: what else the machine does falls on all alike.
-    times = {name: np.empty((samples, 3)) for name in made}
+    times = {name: np.empty(samples) for name in made}
     for number in range(samples):
         poses = bodies.at(number)
         for name, caster in made.items():
             started = time.perf_counter()
             caster.place(poses)
-            placed = time.perf_counter()
             caster.cast(SENSOR, cells)
-            ended = time.perf_counter()
-            times[name][number] = placed - started, ended - placed, ended - started
+            times[name][number] = time.perf_counter() - started
     return times
 
 
@@ -139,7 +132,7 @@ def _point(settings, axis, value):
     with ExitStack() as opened:
         made, _ = casters(bodies.kinds, grid, opened)
         times = laps(made, bodies, cells, 1 - (-settings.samples // 10))
-    return {name: 1e3 * float(np.median(seconds[1:, 2])) for name, seconds in times.items()}
+    return {name: 1e3 * float(np.median(seconds[1:])) for name, seconds in times.items()}
 
 
 def growth_figure(report):

@@ -15,15 +15,12 @@ MAIN = ENVIRONMENT_IDS[EPISODE.scenario]
 @dataclass(frozen=True)
 class Settings:
     """`seconds` of every single measurement of steps; `repeats`, rounds in each of which everything
-    is measured once; `samples`, scans per engine and choices per round; `resets` of the episodes
-    after which memory is read; `seeds` of the paper's study that two workers play.
+    is measured once; `samples`, scans per engine and choices per round.
     """
 
     seconds: float = 3.0
     repeats: int = 3
     samples: int = 200
-    resets: int = 2000
-    seeds: int = 5
 
 
 def middle(values):

@@ -1,8 +1,7 @@
-"""Steps per second and memory of many worlds at once, on threads, in processes, inside a learner;
-and of EnvPool's driving beside them, where it is installed.
+"""Steps per second of many worlds at once, on threads, in processes, inside a learner; and of
+EnvPool's driving beside them, where it is installed.
 """
 
-import threading
 import time
 from contextlib import closing
 from functools import partial
@@ -18,7 +17,6 @@ from care_sim.study.executors import processes
 from care_sim.training.algorithms import algorithm, make_learner
 from care_sim.training.config import PpoConfig
 from care_sim.training.environments import side_by_side
-from tests.bench.environments import grown_memory
 from tests.bench.settings import EPISODE, MAIN, by_name
 
 WORLDS = 64
@@ -128,31 +126,6 @@ def _envpool():
     choices = vector.single_action_space.n
     drawn = cycle(rng.integers(choices, size=(1000, WORLDS), dtype=np.int32))
     return vector, lambda _observations: next(drawn)
-
-
-def batch_memory(settings):
-    """Peak memory in MB of a process that plays one batch on two threads, with its policy; see
-    `grown_memory`. `threads_left` is how many threads are there still when the environment is
-    closed.
-    """
-    with processes(1) as pool:
-        return pool.submit(_batch_resets, settings.resets).result()
-
-
-def _batch_resets(resets):
-    threads = threading.active_count()
-    rounds = -(-resets // WORLDS)
-    vector, policy = _ours(threads=2)
-
-    def begin(number):
-        observations, _ = vector.reset(seed=EPISODE.seed + number * WORLDS)
-        policy.reset()
-        vector.step(policy(observations))
-
-    with closing(vector):
-        memory = grown_memory(begin, rounds)
-    left = float(threading.active_count() - threads)
-    return {"resets": float(rounds * WORLDS), **memory, "threads_left": left}
 
 
 def learning(settings):

@@ -7,7 +7,6 @@ from itertools import combinations, product
 
 from care_sim.certify import CERTIFIED_EPISODES
 from care_sim.certify.design import (
-    ALONE,
     CERTIFIED_DRIVERS,
     CERTIFIED_FAULTS,
     CERTIFIED_POLICIES,
@@ -17,7 +16,6 @@ from care_sim.certify.design import (
     DRAWN_TEST,
     REPLAY,
     STREET,
-    VECTOR,
     drawn,
 )
 from care_sim.core.conditions import DEFAULTS, LOCALISATION, CameraFaults, LidarFaults
@@ -29,7 +27,6 @@ from care_sim.envs.sensing import arguments_of
 from care_sim.policies import BUILT_IN
 from care_sim.scenarios import make_scenario
 
-MODES = (ALONE, VECTOR)
 LIST = [drawn(number) for number in range(CERTIFIED_EPISODES)]
 OF_EVERY_WORLD = {
     name
@@ -65,15 +62,10 @@ LEFT_OUT = {
 
 def test_the_episodes_that_are_played_hold_every_pair_that_can_meet():
     environments = {*CLOSED, STREET, REPLAY}
-    met = [(e.environment, e.policy, e.mode, {name for name, _ in e.arguments}) for e in LIST]
-    assert {(e, p) for e, p, _, _ in met} == set(product(environments, CERTIFIED_POLICIES))
-    assert {(e, m) for e, _, m, _ in met} == set(product(environments, MODES))
-    parameters = {name for world in CERTIFIED_WORLDS.values() for one in world for name in one}
-    assert {(p, n) for _, p, _, given in met for n in given} >= set(
+    met = [(e.environment, e.policy, {name for name, _ in e.arguments}) for e in LIST]
+    assert {(e, p) for e, p, _ in met} == set(product(environments, CERTIFIED_POLICIES))
+    assert {(p, n) for _, p, given in met for n in given} >= set(
         product(CERTIFIED_POLICIES, {*OF_EVERY_WORLD, *DRAWN_TEST})
-    )
-    assert {(m, n) for _, _, m, given in met for n in given} >= set(
-        product(MODES, {*OF_EVERY_WORLD, *parameters})
     )
     faults = {name for one in CERTIFIED_FAULTS.values() for name in one}
     together = {pair for *_, given in met for pair in combinations(sorted(given), 2)}
@@ -106,15 +98,8 @@ def test_worlds_take_the_parameters_of_the_list():
             assert (scenario != usual) == bool(parameters)
 
 
-def test_every_environment_is_in_the_list():
+def test_every_environment_and_built_in_policy_is_in_the_list_which_does_not_move():
+    """A policy that is missing is added at the end, and the list is published anew."""
     assert {*CLOSED, STREET, REPLAY} == {*IDS}
-
-
-def test_every_built_in_policy_is_in_the_list():
-    """One that is missing is added at the end, and the list is published anew."""
     assert {*BUILT_IN} == {*CERTIFIED_POLICIES}
-
-
-def test_an_episode_of_the_list_does_not_move():
-    assert drawn(0).text == LIST[0].text
-    assert len({(e.text, e.mode) for e in LIST}) == len(LIST)
+    assert len({e.text for e in LIST}) == len(LIST)

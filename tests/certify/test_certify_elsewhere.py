@@ -26,7 +26,7 @@ differ by more than last bits."""
 
 def played(folder):
     source = write_drive(Path(folder))
-    return dict(zip(NUMBERS, play_alone([drawn(n) for n in NUMBERS], source), strict=True))
+    return {n: play_alone(drawn(n), source) for n in NUMBERS}
 
 
 @pytest.mark.slow

@@ -39,12 +39,6 @@ def test_an_option_of_a_source_counts_as_given_if_it_is_a_number(given, told):
     assert command.source_options() == told
 
 
-def test_paths_are_told_as_a_shell_takes_them():
-    command = parsed_command(["study", "crowding", "--out", "a b"])[1]
-    assert command.out == Path("a b")
-    assert command_line(command) == "care-sim study crowding --out 'a b'"
-
-
 def test_a_home_folder_is_expanded_wherever_a_path_begins(monkeypatch, tmp_path):
     monkeypatch.setenv("HOME", str(tmp_path))
     command = parsed_command(

@@ -72,12 +72,6 @@ def test_a_folder_in_which_another_process_writes_is_left_alone(here, sweep):
     assert "because another study writes to runs/sweep now\nResults go to runs/sweep-2" in err
 
 
-def test_a_folder_that_is_given_is_that_one_or_none(here, sweep):
-    sweep("--scenarios dartout --seeds 1 --out mine")
-    _, err = sweep("--scenarios dense --seeds 1 --out mine", code=2)
-    assert "give another --out, or --force to replace it" in err
-
-
 def test_a_world_and_a_source_have_folders_of_their_own(monkeypatch, capsys, tmp_path):
     from care_sim.commands.shared import play_study
 

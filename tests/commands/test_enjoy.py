@@ -7,25 +7,17 @@ from types import SimpleNamespace
 
 import pytest
 
-from care_sim.base.errors import InvalidInput
-from care_sim.cli import main, parsed_command
+from care_sim.cli import parsed_command
 from care_sim.commands import run as run_command
 from care_sim.commands.options.shared import EpisodeOptions
 from care_sim.commands.shared.agent_play import AgentPlay
-from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.policies.learned.weights import load_weights, save_weights, shipped_weights
 from care_sim.training.agents import Agent, find_agent, shipped_agents
 from care_sim.training.config import SacConfig
 from care_sim.training.folder import Folder
+from tests.helpers.commands import run
 
 SHORT = ("--scenario-parameters", "duration_s=0.3")
-
-
-def run(capsys, *arguments):
-    """Exit code, output and complaint of a command."""
-    with pytest.raises(SystemExit) as end:
-        main([str(argument) for argument in arguments])
-    return end.value.code, *capsys.readouterr()
 
 
 def hash_of(out):
@@ -123,13 +115,6 @@ def test_every_agent_of_the_package_is_found_and_has_a_world():
         assert name in parsed_command(line[1:])[1].policies
 
 
-@pytest.mark.parametrize("agent", shipped_agents(), ids=lambda agent: agent.name)
-def test_every_agent_of_the_package_can_be_enjoyed(capsys, agent):
-    code, out, complaint = run(capsys, "run", agent.name)
-    assert (code, complaint) == (0, "")
-    assert hash_of(out)
-
-
 @pytest.mark.parametrize(
     ("env", "given", "line"),
     [
@@ -158,14 +143,6 @@ def test_the_line_beside_care_is_that_of_its_loop_and_conditions(env, given, lin
     told = AgentPlay(Agent("ppo", "w.npz", env, 0.1, given)).study_line()
     # In whatever order the options come.
     assert parsed_command(shlex.split(told)[1:]) == parsed_command(shlex.split(line)[1:])
-
-
-def test_a_recorded_scene_is_played_as_it_was_learned():
-    given = (("source", "argoverse2:logs"), ("scene", "one"), ("min_returns", 2))
-    play = AgentPlay(Agent("ppo", None, "CARE-Replay-v0", 0.1, given))
-    assert (play.world, play.scene) == ("argoverse2:logs", {"scene": "one"})
-    told = EpisodeOptions(**play.options(EpisodeOptions()))
-    assert told == EpisodeOptions(conditions=ClosedLoopConditions(min_returns=2))
 
 
 @pytest.mark.parametrize(
@@ -213,11 +190,3 @@ def test_a_card_that_somebody_wrote_breaks_nothing(tmp_path, config):
     save_weights(tmp_path / "odd.npz", file.arrays, card)
     agent = find_agent(str(tmp_path / "odd.npz"))
     assert (agent.budget, agent.env_parameters) == (0.1, ())
-
-
-def test_a_card_that_gives_a_parameter_twice_is_refused(tmp_path):
-    file = load_weights(shipped_weights("ppo-dense"))
-    config = {"env_parameters": ["a=1", "a=2"]}
-    save_weights(tmp_path / "odd.npz", file.arrays, replace(file.card, result={"config": config}))
-    with pytest.raises(InvalidInput, match=r"odd.npz: of its card, a parameter is given once"):
-        find_agent(str(tmp_path / "odd.npz"))

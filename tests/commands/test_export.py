@@ -3,9 +3,9 @@ import json
 import numpy as np
 import pytest
 
-from care_sim.cli import main
 from care_sim.core.frames import turned
 from care_sim.core.types import CLASSES
+from tests.helpers.commands import run
 from tests.helpers.nuscenes_database import change
 from tests.helpers.nuscenes_drive import KEYFRAMES, OBJECTS, SPLIT, write_drive
 
@@ -21,19 +21,8 @@ def export(capsys, drive, out, *options):
     """Exit code, output and error lines of the command."""
     # The split that the drive holds whole, unless another is asked for.
     options = options if "--split" in options else ("--split", "mini_val", *options)
-    with pytest.raises(SystemExit) as end:
-        main(
-            [
-                "export",
-                "nuscenes",
-                "--source",
-                f"nuscenes:{drive}",
-                "--out",
-                str(out),
-                *map(str, options),
-            ]
-        )
-    return end.value.code, *capsys.readouterr()
+    line = ["export", "nuscenes", "--source", f"nuscenes:{drive}", "--out", out]
+    return run(capsys, *line, *options)
 
 
 def test_a_full_scan_finds_every_object_in_every_sample_where_it_is_and_as_fast_as_it_is(
@@ -73,17 +62,10 @@ def in_order(classes, places, velocities):
 
 
 def test_the_origin_is_told(capsys, tmp_path, drive):
-    options = [
-        "--policy",
-        "care-sbf",
-        "--policy-parameters",
-        "k_safe=1.5",
-        "--budget",
-        "0.2",
-        "--floor-seed",
-        "2",
-    ]
-    options += ["--camera-latency", "1"]
+    (tmp_path / "found.json").write_text("[]")
+    options = "--policy care-sbf --policy-parameters k_safe=1.5 --budget 0.2 --floor-seed 2"
+    options = [*options.split(), "--camera-latency", 1]
+    options += ["--camera-detections", tmp_path / "found.json"]
     export(capsys, drive, tmp_path / "out.json", *options)
     meta = json.loads((tmp_path / "out.json").read_text())["meta"]
     own = meta.pop("care_sim")
@@ -95,6 +77,7 @@ def test_the_origin_is_told(capsys, tmp_path, drive):
     assert (own["floor_seed"], own["camera_latency"]) == (2, 1)
     assert (own["split"], own["detector"], own["source"]) == ("mini_val", "returns", "nuscenes")
     assert str(tmp_path) not in json.dumps(own)
+    assert len(own["camera_detections"]) == 16, "a hash of the file"
 
 
 def test_the_same_command_writes_the_same_file_and_another_floor_another(capsys, tmp_path, drive):
@@ -116,50 +99,6 @@ def test_samples_in_which_nothing_is_found_are_there_and_a_file_without_a_box_is
     assert json.loads((tmp_path / "out.json").read_text())["results"] == {
         token: [] for token in TOKENS
     }
-
-
-def test_a_split_of_splits_json_and_camera_detections_from_a_file(capsys, tmp_path, drive):
-    (drive / "v1.0-trainval" / "splits.json").write_text('{"mine": ["scene-0916"]}')
-    (tmp_path / "found.json").write_text("[]")
-    options = [
-        "--split",
-        "mine",
-        "--camera-detections",
-        tmp_path / "found.json",
-        "--version",
-        "v1.0-trainval",
-    ]
-    code, _, _ = export(capsys, drive, tmp_path / "out.json", *options)
-    content = json.loads((tmp_path / "out.json").read_text())
-    assert code == 0
-    assert [*content["results"]] == TOKENS[KEYFRAMES:]
-    assert len(content["meta"]["care_sim"]["camera_detections"]) == 16, "a hash of the file"
-
-
-@pytest.mark.parametrize(
-    ("options", "names"),
-    [
-        (["--source", "argoverse2:x"], ["nuscenes:FOLDER", "'argoverse2:x'"]),
-        (["--source", "nuscenes:nowhere"], ["nowhere is no folder"]),
-        (["--split", "train"], ["'train'", "val"]),
-        (["--version", "v9"], ["v9"]),
-        (["--policy", "best"], ["'best'", "care"]),
-        (["--policy-parameters", "k=3"], ["care", "k"]),
-        (["--budget", "0"], ["budget", "(0, 1]"]),
-        (["--detector", "magic"], ["'magic'", "cluster"]),
-        (["--detector-parameters", "depth"], ["NAME=VALUE", "'depth'"]),
-        (["--camera-detections", "gone.json"], ["gone.json: no such file"]),
-        (["--floor-seed", "-1"], ["floor_seed", ">= 0"]),
-    ],
-)
-def test_bad_input_is_one_line_and_nothing_is_written(capsys, tmp_path, drive, options, names):
-    code, _, err = export(capsys, drive, tmp_path / "out.json", *options)
-    assert code == 2
-    assert err.startswith("care-sim: ")
-    assert err.count("\n") == 1
-    for name in names:
-        assert name in err
-    assert not (tmp_path / "out.json").exists()
 
 
 def test_a_damaged_scene_ends_it_since_the_devkit_asks_for_every_sample(capsys, tmp_path, drive):

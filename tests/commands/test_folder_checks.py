@@ -1,13 +1,11 @@
 """No study replaces the results of another unless it is told to."""
 
-import json
 from dataclasses import replace
 
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.cli import main
-from care_sim.commands.shared.folder_checks import check_results
+from care_sim.commands.shared.folder_checks import check_folder
 from care_sim.commands.shared.run_study import run_study
 from care_sim.evaluation.sightings import PRESENCES
 from care_sim.reports.report import write_report
@@ -26,6 +24,7 @@ from care_sim.study.results_formats import (
 )
 from care_sim.study.rows.parquet import read_notes, read_rows, write_rows
 from care_sim.study.unfinished import UNFINISHED
+from tests.helpers.commands import run
 from tests.helpers.made_rows import STUDY, rows
 
 SHORT = (("duration_s", 0.1),)
@@ -67,30 +66,28 @@ def test_another_study_is_refused_in_a_line_that_names_both_and_touches_nothing(
 def test_rows_that_nobody_asks_for_now_are_named(folder):
     asked = grid(["dense"], ["history", "care"], [0.03], range(5))
     with pytest.raises(InvalidInput) as refused:
-        check_results(folder, asked, PAPER)
+        check_folder(folder, asked, PAPER)
     assert (
         "holds 20 episodes of the study paper; 10 of them, "
         "the first dense all-camera 0.03, would be gone" in str(refused.value)
     )
     whole = grid(["dense"], ["history", "all-camera", "care", "full"], [0.03], range(5))
-    check_results(folder, whole, PAPER)
-    check_results(folder, [*whole, *short()], PAPER)
+    check_folder(folder, whole, PAPER)
+    check_folder(folder, [*whole, *short()], PAPER)
     with pytest.raises(
         InvalidInput,
         match=r"; 4 of them, the first dense history 0\.03 seed 4, .* asked for, 16 episodes",
     ):
-        check_results(folder, [config for config in whole if config.seed < 4], PAPER)
-    late = grid(
-        ["dense"],
-        ["history", "all-camera", "care", "full"],
-        [0.03],
-        range(5),
-        camera_latencies=(1,),
-    )
-    with pytest.raises(
-        InvalidInput, match=r"; 15 of them, .* 0\.03 \(camera_latency 0, now 1\), would be"
-    ):
-        check_results(folder, late, PAPER)
+        check_folder(folder, [config for config in whole if config.seed < 4], PAPER)
+    named = ["history", "all-camera", "care", "full"]
+    late = grid(["dense"], named, [0.03], range(5), camera_latencies=(1,))
+    # The nearest task of the name is told of, wherever it is among them.
+    later = [config.changed(lidar_dropout=0.1) for config in late]
+    for asked in (late, [*later, *late], [*late, *later]):
+        with pytest.raises(
+            InvalidInput, match=r"; 15 of them, .* 0\.03 \(camera_latency 0, now 1\), would be"
+        ):
+            check_folder(folder, asked, PAPER)
 
 
 def test_the_same_command_goes_on_with_more_seeds_policies_and_after_changes_of_the_code(
@@ -102,34 +99,20 @@ def test_the_same_command_goes_on_with_more_seeds_policies_and_after_changes_of_
         == []
     )
     monkeypatch.setattr("care_sim.study.run_config.code_digest", lambda: "edited")
-    check_results(tmp_path, short(("history", "care"), (0, 1), lidar_dead_rows=(3, 4)), SWEEP)
+    check_folder(tmp_path, short(("history", "care"), (0, 1), lidar_dead_rows=(3, 4)), SWEEP)
     with pytest.raises(InvalidInput, match=r"; 1 of them, the first dartout care 0\.1 seed 1"):
-        check_results(
+        check_folder(
             tmp_path, short(("history", "care"), (0, 1), lidar_dead_rows=(3, 4))[:3], SWEEP
         )
 
 
 def test_force_replaces_at_the_end_and_keeps_the_journal(folder, tmp_path, capsys):
-    sweep = [
-        "sweep",
-        "--scenarios",
-        "dartout",
-        "--policies",
-        "random",
-        "--seeds",
-        "1",
-        "--workers",
-        "1",
-    ]
-    command = [*sweep, "--scenario-parameters", "duration_s=0.1", "--out", str(folder)]
-    with pytest.raises(SystemExit) as end:
-        main(command)
-    said = capsys.readouterr().err
-    assert (end.value.code, said.count("\n")) == (2, 1)
+    line = "sweep --scenarios dartout --policies random --seeds 1 --workers 1"
+    command = [*line.split(), "--scenario-parameters", "duration_s=0.1", "--out", folder]
+    code, _, said = run(capsys, *command)
+    assert (code, said.count("\n")) == (2, 1)
     assert "holds the study paper, 20 episodes" in said
-    with pytest.raises(SystemExit) as end:
-        main([*command, "--force"])
-    assert end.value.code == 0
+    assert run(capsys, *command, "--force")[0] == 0
     assert read_notes(folder / EPISODES.file)[0] == "sweep"
     assert len(read_rows(folder / EPISODES.file)) == 1
     assert not [path for path in folder.iterdir() if path.suffix in (".png", ".svg")]
@@ -187,17 +170,6 @@ def test_where_tasks_fail_fewer_rows_replace_no_more(install, tmp_path, capsys):
     assert [row["policy"] for row in read_rows(out / EPISODES.file)] == ["history"]
 
 
-def test_an_interrupted_study_is_known_by_its_journal(tmp_path):
-    with Journal(tmp_path / JOURNAL, "faults") as journal:
-        journal.append({"digest": "a"})
-    with pytest.raises(
-        InvalidInput, match="holds the unfinished study faults, 1 row, beside which the study sweep"
-    ):
-        run_study(short(), tmp_path, workers=1)
-    assert run_study(short(), tmp_path, workers=1, force=True) == []
-    assert run_study(short(), tmp_path, workers=1) == []
-
-
 def test_an_interrupted_study_of_other_options_keeps_its_folder(tmp_path):
     begun = short(("history", "care"), range(3))
     with Journal(tmp_path / JOURNAL, "sweep") as journal:
@@ -229,9 +201,12 @@ def test_an_interrupted_study_of_other_options_keeps_its_folder(tmp_path):
     assert run_study(short(("history", "care"), range(4)), tmp_path, workers=1) == []
 
 
-def test_force_plays_beside_an_interrupted_study(tmp_path):
-    with Journal(tmp_path / JOURNAL, "sweep") as journal:
+def test_an_interrupted_study_is_known_by_its_journal_beside_which_force_plays(tmp_path):
+    with Journal(tmp_path / JOURNAL, "faults") as journal:
         journal.append(short()[0].row() | {"digest": "a"})
+    told = "holds the unfinished study faults, 1 row, beside which the study sweep"
+    with pytest.raises(InvalidInput, match=told):
+        run_study(short(), tmp_path, workers=1)
     assert run_study(short(seeds=(1,)), tmp_path, workers=1, force=True) == []
     assert run_study(short(seeds=(1,)), tmp_path, workers=1) == []
 
@@ -248,21 +223,6 @@ def test_the_folder_is_locked_until_its_results_are_written(tmp_path, monkeypatc
     monkeypatch.setattr("care_sim.commands.shared.run_study.write_rows", write)
     run_study(short(), tmp_path, workers=1)
     assert locked == [EPISODES.file]
-
-
-def test_a_damaged_line_is_played_again_and_said(tmp_path, capsys):
-    run_study(short(seeds=(0, 1)), tmp_path, workers=1)
-    path = tmp_path / JOURNAL
-    first, second = path.read_text().splitlines()
-    seed = json.loads(second)["rays_fired"]
-    path.write_text(f"{first}\n{second.replace(str(seed), str(seed + 1))}\n")
-    (tmp_path / "episodes.parquet").unlink()
-    capsys.readouterr()
-    assert run_study(short(seeds=(0, 1)), tmp_path, workers=1) == []
-    said = capsys.readouterr().err
-    assert f"1 line of {path} passed over, damaged or of a version that wrote no checksums" in said
-    assert "1 of 2 episodes found" in said
-    assert [row["rays_fired"] for row in read_rows(tmp_path / EPISODES.file)] == [seed, seed]
 
 
 def test_made_rows_are_of_the_same_identity_as_played_ones(tmp_path):
@@ -282,7 +242,7 @@ def test_made_rows_are_of_the_same_identity_as_played_ones(tmp_path):
         scenario_parameters=(("gap_m", [0.5, 0.6]),),
         policy_parameters=(("k_safe", 1.0),),
     )
-    check_results(tmp_path, asked, SWEEP)
+    check_folder(tmp_path, asked, SWEEP)
 
 
 def test_plays_by_one_presence_are_known_by_it_and_are_not_those_of_the_other(tmp_path):
@@ -293,12 +253,12 @@ def test_plays_by_one_presence_are_known_by_it_and_are_not_those_of_the_other(tm
     }
     for own, other in (PRESENCES, PRESENCES[::-1]):
         write_rows([config.row() for config in by[own]], tmp_path / PLAYS.file, "protocol")
-        check_results(tmp_path, by[own], STUDIES["protocol"])
-        check_results(tmp_path, [*by[other], *by[own]], STUDIES["protocol"])
+        check_folder(tmp_path, by[own], STUDIES["protocol"])
+        check_folder(tmp_path, [*by[other], *by[own]], STUDIES["protocol"])
         with pytest.raises(
             InvalidInput, match="; 2 of them, the first street-0000-straight care"
         ) as refused:
-            check_results(tmp_path, by[other], STUDIES["protocol"])
+            check_folder(tmp_path, by[other], STUDIES["protocol"])
         assert f"care 0.1 (presence {own}, now {other}), would be gone" in str(refused.value)
 
 

@@ -9,7 +9,7 @@ import pytest
 
 import care_sim
 from care_sim.base.errors import InvalidInput
-from care_sim.cli import main, parsed_command
+from care_sim.cli import parsed_command
 from care_sim.commands.options import results, shared, watching
 from care_sim.commands.parsing import option_names
 from care_sim.commands.table import COMMANDS, FAMILIES, RENAMED
@@ -19,18 +19,10 @@ from care_sim.reports.leaderboard import CONTROL
 from care_sim.sensors.setups import DEFAULT_SETUP
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.run_config import MOST_TASKS
+from tests.helpers.commands import run
 
 HEAVY = {"highway_env", "matplotlib", "numba", "pandas", "pyarrow", "pybullet", "scipy", "torch"}
-OWN_ROOM = {"certify", "parity", "bench"}
-"""Commands whose options are in the room that they measure, which they import."""
 KINDS = ("policies", "agents", "scenarios", "sources", "detectors", "sensors", "engines")
-
-
-def run(capsys, *arguments):
-    """Exit code, output and error lines of a command."""
-    with pytest.raises(SystemExit) as end:
-        main([str(argument) for argument in arguments])
-    return end.value.code, *capsys.readouterr()
 
 
 def test_alone_it_shows_every_command_in_a_line(capsys):
@@ -65,8 +57,6 @@ def test_help_explains_every_option_and_help_all_every_condition(name, capsys, m
     options = {*option_names(COMMANDS[name].options_class())} - positional
     options -= {"--scenario"} if name != "run" else set()
     conditions = {f"--{each.replace('_', '-')}" for each in DEFAULTS} & options
-    if name in OWN_ROOM:
-        return
     explained = explained_in(whole)
     assert explained >= options
     has_group = "Conditions, which --help-all explains:" in short
@@ -86,7 +76,7 @@ def explained_in(text):
 
 
 def test_help_of_no_command_loads_the_simulator():
-    lines = [[], *([*name.split(), "--help"] for name in COMMANDS if name not in OWN_ROOM)]
+    lines = [[], *([*name.split(), "--help"] for name in COMMANDS)]
     code = f"""
 import sys
 from care_sim.cli import main

@@ -75,34 +75,6 @@ def test_parameters_of_a_detector_named_by_its_place_are_its_own(drive, tmp_path
     assert f"unknown parameter of detector {place} 'least'" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    ("arguments", "complaint"),
-    [
-        (["--detectors", "nobody"], "unknown detector 'nobody'"),
-        (["--detectors"], "--detectors needs at least one value"),
-        (["--least-scores", "2"], "least_scores must be from 0 to 1, got 2"),
-        (
-            ["--detectors", "cluster", "--detector-parameters", "min_points=3"],
-            "detector parameters are given as DETECTOR.NAME=VALUE of one of cluster, got "
-            "min_points",
-        ),
-        (["--detectors", "cluster", "--scenes", "nowhere"], "nowhere"),
-        (["--policy", "nobody", "--detectors", "cluster"], "unknown policy 'nobody'"),
-        (["--detectors", "cluster", "--against", "nobody"], "unknown detector 'nobody'"),
-        (["--detector", "cluster"], "judge takes --detectors, one or several"),
-    ],
-)
-def test_bad_options_are_refused_before_anything_is_played(
-    arguments, complaint, tmp_path, monkeypatch, capsys
-):
-    monkeypatch.chdir(tmp_path)
-    assert run(*arguments) == 2
-    error = capsys.readouterr().err
-    assert complaint in error
-    assert error.count("\n") == 1
-    assert not (tmp_path / "runs").exists()
-
-
 SPY = """
 import gc, gymnasium
 from care_sim.policies.paper.reserves import Care

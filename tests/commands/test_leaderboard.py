@@ -81,9 +81,3 @@ def test_a_chart_is_written_in_both_formats_where_it_is_told(capsys, library, he
     assert (code, out.splitlines()[-1]) == (0, "Chart: mine.svg")
     assert (here / "mine.svg").read_text().startswith("<?xml")
     assert (here / "mine.png").read_bytes().startswith(b"\x89PNG")
-    for options, line in (
-        (["--chart", "mine.pdf"], "unknown ending of a chart '.pdf'; known: .png, .svg"),
-        (["--chart", "a.png", "--verify"], "chart is for a table, which verify does not make"),
-    ):
-        code, _, err = run(capsys, "leaderboard", library, *options)
-        assert (code, line in err) == (2, True)

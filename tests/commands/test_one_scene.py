@@ -1,31 +1,26 @@
 """A scene of the open loop is played and watched as an episode of the closed one is."""
 
 import re
+from functools import partial
 
 import pytest
 from PIL import Image
 
 from care_sim.base.errors import InvalidInput
-from care_sim.cli import main
-from care_sim.commands.options.watching import SceneOptions
+from care_sim.commands.options.watching import WatchOptions
 from care_sim.commands.shared.one_scene import scene_of
 from care_sim.sources.named import source_of
 from care_sim.sources.scenes import film_of
 from care_sim.study.play_config import play_grid
 from care_sim.study.scene_play import ScenePlayer
 from tests.helpers.av2_log import at, box, write
+from tests.helpers.commands import run
 from tests.helpers.short_streets import few_and_short
 
 
 @pytest.fixture
 def played(capsys):
-    def play(*arguments):
-        with pytest.raises(SystemExit) as end:
-            main([*map(str, arguments)])
-        out, err = capsys.readouterr()
-        return end.value.code, out, err
-
-    return play
+    return partial(run, capsys)
 
 
 def test_a_log_is_told_by_its_first_sightings_and_is_the_play_of_the_protocol(played, drive):
@@ -69,16 +64,6 @@ def test_a_scene_and_another_seed_are_told_to_be_one_too_many(played):
     assert len(hashes) == 1
 
 
-def test_the_seed_draws_the_floor_of_a_log_that_is_named_too(played, drive):
-    log = source_of(f"argoverse2:{drive}").scenes()[0].name
-    line = ("run", f"argoverse2:{drive}", "--policy", "random", "--budget", "0.02")
-    hashes = [
-        re.findall(r"^episode_hash +(\S+)$", played(*line, *options)[1], re.MULTILINE)
-        for options in ((), ("--seed", 5), ("--seed", 5, "--scene", log))
-    ]
-    assert hashes[0] != hashes[1] == hashes[2]
-
-
 def test_a_source_of_a_single_street_has_no_other_seed(tmp_path, monkeypatch):
     (tmp_path / "onestreet.py").write_text(
         "from dataclasses import dataclass\n"
@@ -90,46 +75,10 @@ def test_a_source_of_a_single_street_has_no_other_seed(tmp_path, monkeypatch):
     )
     monkeypatch.syspath_prepend(tmp_path)
     source = source_of("onestreet:One")
-    assert scene_of(SceneOptions(), source, 7).seed == 7
+    assert scene_of(WatchOptions(seed=7), source).seed == 7
     with pytest.raises(InvalidInput, match=r"seed must be of a scene of onestreet:One.* got 3"):
-        scene_of(SceneOptions(), source, 3)
-    assert scene_of(SceneOptions(scene="one-0007"), source, 3).seed == 7
-
-
-@pytest.mark.parametrize(
-    ("line", "told"),
-    [
-        ("run street --seed 400", "seed must be of a scene of streets, 0 to 149, got 400"),
-        ("run street --scene nowhere", "unknown scene 'nowhere'; known: street-0000"),
-        ("run street --scene 3", "0149-bend, 150 in all; --seed 3 plays that of the seed"),
-        ("run street --driver careful-human", "--driver has no meaning in the open loop"),
-        ("run street --scenario-parameters x=1", "--scenario-parameters has no meaning in the"),
-        ("run street --at 3", "--at has no meaning without --picture"),
-        ("run dartout --at 3", "--at has no meaning without --picture"),
-        ("run street --picture x.txt", "unknown ending of a picture '.txt'; known: .png"),
-        ("run dartout --picture x.gif", "unknown ending of a picture '.gif'; known: .png"),
-        ("run dartout --picture x", "unknown ending of a picture ''; known: .png"),
-        ("run street --picture x.png --at -1", "at must be a finite number >= 0, got -1"),
-        ("run street --engine bullet", "engine cannot be changed in the open loop"),
-        (
-            "run argoverse2",
-            "source must be argoverse2:FOLDER, nuscenes:FOLDER, kitti:FOLDER, sweeps:FOLDER, "
-            "boreas, or",
-        ),
-        ("run argoverse2:nowhere", "source argoverse2:nowhere: nowhere is no folder"),
-        ("run dartout --scene x", "--scene has no meaning in the closed loop"),
-        ("compare dartout --split val", "--split has no meaning in the closed loop"),
-        ("compare street --policies nobody", "unknown policy 'nobody'"),
-    ],
-)
-def test_what_a_loop_does_not_have_is_refused_in_one_line(
-    line, told, played, tmp_path, monkeypatch
-):
-    monkeypatch.chdir(tmp_path)
-    code, _, err = played(*line.split())
-    assert code == 2
-    assert told in err
-    assert err.count("\n") == 1
+        scene_of(WatchOptions(seed=3), source)
+    assert scene_of(WatchOptions(scene="one-0007", seed=7), source).seed == 7
 
 
 def test_policies_are_compared_on_one_film_and_filmed_side_by_side(played, drive, tmp_path):
@@ -182,13 +131,6 @@ def test_of_a_moment_that_never_comes_there_is_no_picture_and_the_play_is_told(p
         assert (code, err.splitlines()[-1]) == (0, f"{told}: no picture")
         assert re.search("^found % +100.0$", out, re.M)
     assert not picture.exists()
-
-
-def test_a_picture_of_an_episode_may_be_of_a_time_too(played, tmp_path):
-    line = ("run", "dartout", "--scenario-parameters", "duration_s=0.6", "--picture")
-    assert played(*line, tmp_path / "x.png", "--at", 0.3)[::2] == (0, "")
-    assert played(*line, tmp_path / "y.png", "--at", 9)[2].startswith("no keyframe at 9 s")
-    assert [path.name for path in tmp_path.iterdir()] == ["x.png"]
 
 
 def test_pictures_and_scans_leave_the_play_as_it_is(played, drive, tmp_path, open3d):

@@ -13,16 +13,10 @@ import pytest
 from care_sim.cli import main
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.episode_play import run_episode
+from tests.helpers.commands import run
 from tests.helpers.descendants import Marked
 
 SHORT = ["--scenario-parameters", "duration_s=0.5"]
-
-
-def run(capsys, *arguments):
-    with pytest.raises(SystemExit) as end:
-        main([str(argument) for argument in arguments])
-    out, err = capsys.readouterr()
-    return end.value.code, out, err
 
 
 @pytest.fixture(scope="module")
@@ -31,26 +25,6 @@ def recording(tmp_path_factory):
     with pytest.raises(SystemExit):
         main(["run", "dartout", "--record", str(path), *SHORT])
     return path
-
-
-@pytest.mark.parametrize(
-    ("content", "named"), [(None, "No such file"), (b"", "no recording"), (b"PK..", "no recording")]
-)
-def test_what_is_no_recording_is_one_line(content, named, capsys, tmp_path):
-    file = tmp_path / "out.rrd"
-    if content is not None:
-        file.write_bytes(content)
-    code, _, err = run(capsys, "view", file)
-    assert (code, err.count("\n")) == (2, 1)
-    assert named in err
-    assert "out.rrd" in err
-
-
-def test_a_place_that_cannot_be_written_is_one_line(capsys, tmp_path):
-    (tmp_path / "file").touch()
-    code, _, err = run(capsys, "run", "dartout", "--record", tmp_path / "file" / "out.rrd", *SHORT)
-    assert (code, err.count("\n")) == (2, 1)
-    assert "file" in err
 
 
 @pytest.mark.parametrize(
@@ -85,14 +59,7 @@ def test_without_a_display_the_browser_is_recommended(recording, capfd, monkeypa
 
 @pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGKILL])
 def test_the_web_viewer_is_served_and_ends_with_its_children(recording, end):
-    command = [
-        sys.executable,
-        "-c",
-        "from care_sim.cli import main; main()",
-        "view",
-        str(recording),
-        "--web",
-    ]
+    command = [sys.executable, "-m", "care_sim", "view", str(recording), "--web"]
     with Marked(command, stderr=None) as started:
         server = started.process
         url = re.search(r"http://(127\.0\.0\.1):(\d+)/\S*", server.stdout.readline())
@@ -153,27 +120,3 @@ def test_run_says_which_files_it_has_written_as_compare_does(capsys, tmp_path, d
         assert (code, err) == (0, "")
         assert out.endswith(f"Recorded in {record}: care-sim view {record}\nFilmed in {video}\n")
     assert not re.findall("^(Recorded|Filmed)", run(capsys, "run", *played)[1], re.MULTILINE)
-
-
-def test_compare_without_a_recording_writes_nothing(capsys, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    code, out, _ = run(capsys, "compare", "cutin", *SHORT)
-    assert code == 0
-    assert "history" in out
-    assert not list(tmp_path.iterdir())
-
-
-def test_run_exports_every_scan(capsys, tmp_path, open3d):
-    code, _, _ = run(
-        capsys,
-        "run",
-        "dartout",
-        "--export",
-        tmp_path / "scans",
-        "--record",
-        tmp_path / "out.rrd",
-        *SHORT,
-    )
-    assert code == 0
-    assert len(list((tmp_path / "scans").glob("*.pcd"))) == 5
-    assert (tmp_path / "out.rrd").stat().st_size > 10_000

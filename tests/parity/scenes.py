@@ -26,21 +26,14 @@ SCENE_GRIDS = (
     AngularGrid(columns=180, rows=24),
     AngularGrid(columns=2048, rows=128, range_m=30.0),
 )
-_AIMED = 24
-"""Rays of a scene towards points in and just around parts."""
+_AIMED, _STRAY = 24, 8
+"""Rays of a scene towards points in and just around parts, and rays anywhere."""
 _AROUND = 1.05
 """Those points lie in the box around a part, made larger by this factor."""
-_STRAY = 8
-"""Rays of a scene anywhere."""
 _UNCLEAR_M = 0.001
 """What a ray meets that starts so close to a surface, or within a sphere, Bullet leaves open."""
 AWAY = Frame(1000.0, 1000.0, 0.0, 0.0)
 """Where bodies stand that a scene does not use: beyond the reach of every grid."""
-_SMALLEST_M = 0.05
-_LARGEST_M = 12.0
-_STRETCH = (0.5, 1.5)
-"""Sizes of vehicles and people as shares of the catalogue's."""
-_GREY = (0.5, 0.5, 0.5)
 
 
 class RandomScene(NamedTuple):
@@ -77,9 +70,27 @@ def random_scenes(seed, number, done):
 
 
 def draw_bodies(seed, cast):
-    """The bodies that `SCENES_PER_CAST` scenes share."""
+    """The bodies that `SCENES_PER_CAST` scenes share: of the catalogue, of another size, or single
+    primitives.
+    """
     rng = np.random.default_rng((seed, 0, cast))
     return tuple(_draw_kind(rng) for _ in range(_BODIES))
+
+
+def _draw_kind(rng):
+    made = rng.integers(3)
+    if made == 0:
+        return CATALOGUE[rng.choice(sorted(CATALOGUE))]
+    if made == 1:
+        label = CLASSES[rng.integers(len(CLASSES))]
+        x, y, z = (np.array(CATALOGUE[label].size) * rng.uniform(0.5, 1.5, 3)).tolist()
+        return sized(label, label, (x, y, z))
+    # From 5 cm to 12 m, every order of size as often.
+    x, y, z = np.exp(rng.uniform(np.log(0.05), np.log(12.0), 3)).tolist()
+    centre = tuple(rng.uniform(-1.0, 1.0, 3).tolist())
+    shapes = ("box", (x, y, z)), ("cylinder", (x, x, z)), ("sphere", (x, x, x))
+    shape, size = shapes[rng.integers(3)]
+    return BodyKind(shape, None, size, (Part(shape, size, centre, (0.5, 0.5, 0.5)),))
 
 
 def draw_scene(seed, number, kinds, grid):
@@ -92,32 +103,6 @@ def draw_scene(seed, number, kinds, grid):
     return scene
 
 
-def _draw_kind(rng):
-    """A body of the catalogue, one of another size, or a single primitive."""
-    return [_catalogued, _resized, _primitive][rng.integers(3)](rng)
-
-
-def _catalogued(rng):
-    return CATALOGUE[rng.choice(sorted(CATALOGUE))]
-
-
-def _resized(rng):
-    label = CLASSES[rng.integers(len(CLASSES))]
-    x, y, z = (np.array(CATALOGUE[label].size) * rng.uniform(*_STRETCH, 3)).tolist()
-    return sized(label, label, (x, y, z))
-
-
-def _primitive(rng):
-    x, y, z = np.exp(rng.uniform(np.log(_SMALLEST_M), np.log(_LARGEST_M), 3)).tolist()
-    centre = tuple(rng.uniform(-1.0, 1.0, 3).tolist())
-    part = [
-        Part("box", (x, y, z), centre, _GREY),
-        Part("cylinder", (x, x, z), centre, _GREY),
-        Part("sphere", (x, x, x), centre, _GREY),
-    ][rng.integers(3)]
-    return BodyKind(part.shape, None, part.size, (part,))
-
-
 def _draw_scene(rng, kinds, grid):
     # In half of the scenes the sensor leans, by up to 11 degrees; in half the bodies are tilted, by
     # up to 86.
@@ -125,14 +110,29 @@ def _draw_scene(rng, kinds, grid):
     sensor = Frame(*_place(rng), float(rng.uniform(0.3, 6.0)), *_turn(rng, lean))
     tilt = 1.5 if rng.random() < 0.5 else 0.0
     used = int(rng.integers(1, _BODIES + 1))
-    frames = [_stand(rng, tilt) for _ in range(used)]
+    frames = [
+        Frame(*_place(rng), float(rng.uniform(0.0, 4.0)) if tilt else 0.0, *_turn(rng, tilt))
+        for _ in range(used)
+    ]
 
-    # The first body goes where engines are most likely to differ.
-    situation = _SITUATIONS[rng.integers(len(_SITUATIONS))]
-    here, there = situation(rng, kinds[0].parts[0], grid)
-    frames[0] = _put(frames[0], here, sensor.origin + sensor.vectors_to_world(there))
+    # The first body goes where engines are most likely to differ: its point `here` comes to the
+    # sensor's point `there`.
+    here, there = _SITUATIONS[rng.integers(len(_SITUATIONS))](rng, kinds[0].parts[0], grid)
+    first = frames[0]
+    world = sensor.origin + sensor.vectors_to_world(there)
+    x, y, z = (world - first.vectors_to_world(here)).tolist()
+    frames[0] = Frame(x, y, z, first.yaw, first.roll, first.pitch)
 
-    cells = _aim(rng, kinds[:used], frames, sensor, grid)
+    # Ascending cells: those of points in and around the bodies, and some anywhere.
+    points = []
+    for body in rng.integers(used, size=_AIMED):
+        part = kinds[body].parts[rng.integers(len(kinds[body].parts))]
+        points.append(
+            frames[body].origin + frames[body].vectors_to_world(_within(rng, part, _AROUND))
+        )
+    cells = grid.cells_of(sensor.vectors_to_local(np.array(points) - sensor.origin))
+    stray = rng.integers(grid.size, size=_STRAY)
+    cells = np.unique(np.concatenate([cells[cells >= 0], stray]))
     return RandomScene((*frames, *[AWAY] * (_BODIES - used)), sensor, cells)
 
 
@@ -167,14 +167,18 @@ def _turn(rng, most):
     return yaw, roll, pitch
 
 
-def _stand(rng, tilt):
-    return Frame(*_place(rng), float(rng.uniform(0.0, 4.0)) if tilt else 0.0, *_turn(rng, tilt))
+def _within(rng, part, share):
+    """A point of the box around a part, which is enlarged by the factor `share`."""
+    return np.array(part.centre) + share * np.array(part.size) / 2 * rng.uniform(-1.0, 1.0, 3)
 
 
-def _put(frame, here, world):
-    """The frame, turned as it is, that has its point `here` at the point `world`."""
-    x, y, z = (world - frame.vectors_to_world(here)).tolist()
-    return Frame(x, y, z, frame.yaw, frame.roll, frame.pitch)
+def _surface(rng, part, gap):
+    """A point `gap` metres outside a face of the box around a part."""
+    point = _within(rng, part, 1.0)
+    axis = rng.integers(3)
+    side = rng.choice((-1.0, 1.0))
+    point[axis] = part.centre[axis] + side * (part.size[axis] / 2 + gap)
+    return point
 
 
 def _anywhere(rng, part, grid):
@@ -208,30 +212,3 @@ def _inside(rng, part, grid):
 
 _SITUATIONS = (_anywhere, _overhead, _behind, _at_the_reach, _touching, _inside)
 """Each gives a point of a body's frame, and where it shall be in the sensor's."""
-
-
-def _within(rng, part, share):
-    """A point of the box around a part, which is enlarged by the factor `share`."""
-    return np.array(part.centre) + share * np.array(part.size) / 2 * rng.uniform(-1.0, 1.0, 3)
-
-
-def _surface(rng, part, gap):
-    """A point `gap` metres outside a face of the box around a part."""
-    point = _within(rng, part, 1.0)
-    axis = rng.integers(3)
-    side = rng.choice((-1.0, 1.0))
-    point[axis] = part.centre[axis] + side * (part.size[axis] / 2 + gap)
-    return point
-
-
-def _aim(rng, kinds, frames, sensor, grid):
-    """Ascending cells: those of points in and around the bodies, and some anywhere."""
-    points = []
-    for body in rng.integers(len(kinds), size=_AIMED):
-        part = kinds[body].parts[rng.integers(len(kinds[body].parts))]
-        points.append(
-            frames[body].origin + frames[body].vectors_to_world(_within(rng, part, _AROUND))
-        )
-    cells = grid.cells_of(sensor.vectors_to_local(np.array(points) - sensor.origin))
-    stray = rng.integers(grid.size, size=_STRAY)
-    return np.unique(np.concatenate([cells[cells >= 0], stray]))

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
-from care_sim.commands.shared.folder_checks import check_results
+from care_sim.commands.shared.folder_checks import check_folder
 from care_sim.commands.shared.run_study import run_study
 from care_sim.reports.studies import SWEEP
 from care_sim.study.episode_config import EpisodeConfig, grid
@@ -149,7 +149,7 @@ def test_an_odd_policy_is_played_and_known_again(anything, tmp_path):
         "\x1b" not in (tmp_path / "tables.md").read_text() + (tmp_path / "tables.tex").read_text()
     )
     assert policy_of(row) in policy_of(configs[0].row())
-    check_results(tmp_path, configs, SWEEP)
+    check_folder(tmp_path, configs, SWEEP)
 
 
 def test_values_that_share_no_column_are_refused_before_anything_is_played(anything, tmp_path):

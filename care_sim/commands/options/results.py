@@ -7,10 +7,18 @@ from typing import Annotated
 import tyro
 
 from care_sim.base.bounds import bounded, check_fields
-from care_sim.base.checks import LARGEST_INTEGER
-from care_sim.base.cores import MOST_WORKERS, WORKERS
+from care_sim.base.checks import LARGEST_INTEGER, check_whole
 from care_sim.base.errors import InvalidInput
-from care_sim.commands.options.shared import EpisodeOptions, PlayOptions, SourceOptions
+from care_sim.certify import ALL_EPISODES
+from care_sim.commands.options.shared import (
+    EpisodeOptions,
+    Flag,
+    PlayOptions,
+    PolicyOptions,
+    SceneOptions,
+    SourceOptions,
+    WorkerOptions,
+)
 from care_sim.core.defaults import AS_DEMANDED
 
 CONTROL = "place"
@@ -19,8 +27,15 @@ _MOST_EPISODES = 100_000
 """As many as a study may have."""
 
 
+def _refuse(*cases: tuple[object, str]) -> None:
+    """Raise InvalidInput with the text of the first case that is true."""
+    for wrong, told in cases:
+        if wrong:
+            raise InvalidInput(told)
+
+
 @dataclass(frozen=True, kw_only=True)
-class Benchmark:
+class Benchmark(WorkerOptions):
     """Play the official suite: one score, and a result file.
 
     The suite is drives, Euro NCAP tests and streets at 1% of the cells: 480 plays an entry, 48 with
@@ -37,22 +52,17 @@ class Benchmark:
     rows-down, rows-up, columns, random, spread, core-spread."""
     name: str = ""
     """What you call the entry, for its line in tables, if one policy is played alone."""
-    quick: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    quick: Flag = False
     """The first tenth of the worlds alone: a trial, and no line of the leaderboard."""
     sealed: Path | None = None
     """For organisers of a competition: a file with a secret salt, which draws other worlds. The
     journal in the folder holds their seeds; the result files do not."""
     out: Path = Path("runs/benchmark")
     """Folder of the result files; what is finished stays there, and the same command resumes."""
-    workers: int = bounded(WORKERS, 1, MOST_WORKERS)
-    """Processes that play at the same time."""
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Leaderboard:
+class Leaderboard(WorkerOptions):
     """Put result files in one table, or verify them.
 
     To verify one is to play a random tenth of its episodes again.
@@ -62,11 +72,11 @@ class Leaderboard:
         tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER...")
     ] = ()
     """Folders with result files, or such files. Of two with one name and code the first counts."""
-    quick: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    quick: Flag = False
     """Compare on the tenth of the worlds that `benchmark --quick` plays: a trial."""
     minus: str = CONTROL
     """The entry over which the leads of all others are shown, by its name in the table."""
-    verify: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    verify: Flag = False
     """Play a random tenth of the episodes of every result again, instead of a table. Their policies
     must be installed here."""
     sealed: Path | None = None
@@ -77,21 +87,24 @@ class Leaderboard:
     chart: Path | None = None
     """PNG or SVG file for a bar chart of the scores alone; the other format is written beside
     it."""
-    workers: int = bounded(WORKERS, 1, MOST_WORKERS)
-    """With --verify: processes that play at the same time."""
 
     def __post_init__(self) -> None:
-        check_fields(self)
-        if self.sealed and not self.verify:
-            raise InvalidInput("sealed is the salt of results that are verified: give verify too")
-        if self.verify and self.chart:
-            raise InvalidInput("chart is for a table, which verify does not make")
-        if self.verify and self.minus != CONTROL:
-            raise InvalidInput("minus is for a table, which verify does not make")
+        super().__post_init__()
+        _refuse(
+            (
+                self.sealed and not self.verify,
+                "sealed is for results that are verified: give verify too",
+            ),
+            (self.verify and self.chart, "chart is for a table, which verify does not make"),
+            (
+                self.verify and self.minus != CONTROL,
+                "minus is for a table, which verify does not make",
+            ),
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
-class Report(SourceOptions):
+class Report(SourceOptions, WorkerOptions):
     """Print a folder's tables and figures again, or make one page.
 
     Several folders of one study are put into a new one, with tables and figures of them all: what
@@ -113,48 +126,44 @@ class Report(SourceOptions):
     episodes: int = bounded(40, 0, LARGEST_INTEGER)
     """At most this many episodes are played again for the page, seed by seed; 0 for none. They take
     as long as they did in the study."""
-    workers: int = bounded(WORKERS, 1, MOST_WORKERS)
-    """Processes that play them."""
     source: str | None = None
     """Where the recordings are that a study of the open loop played, for its page:
     argoverse2:FOLDER, nuscenes:FOLDER, kitti:FOLDER, sweeps:FOLDER, boreas, or a source of your
     own. Streets need none."""
 
     def __post_init__(self) -> None:
-        check_fields(self)
-        if not self.folders:
-            raise InvalidInput("report needs the folder of a study, its --out")
-        self._check_merging()
-        if self.source is None and (given := self.source_options()):
-            raise InvalidInput(f"--{given[0].replace('_', '-')} has no meaning without --source")
-        if self.source is not None and self.page is None:
-            raise InvalidInput("--source has no meaning without --page: nothing is played again")
-        if self.source is not None and not self.episodes:
-            raise InvalidInput("--source has no meaning with --episodes 0: nothing is played again")
-        if self.minus is not None and self.page is not None:
-            raise InvalidInput("--minus has no meaning with --page: a page draws its own pairs")
-
-    def _check_merging(self) -> None:
-        if len(self.folders) == 1:
-            if self.out is not None:
-                raise InvalidInput("--out is for several folders; the report of one stays in it")
-        elif self.page is not None or self.minus is not None:
-            raise InvalidInput(
-                "--page and --minus take one folder: merge several first, then report --out"
-            )
+        super().__post_init__()
+        given = [name.replace("_", "-") for name in self.source_options()]
+        _refuse(
+            (not self.folders, "report needs the folder of a study, its --out"),
+            (
+                len(self.folders) == 1 and self.out,
+                "--out is for several folders; the report of one stays in it",
+            ),
+            (
+                len(self.folders) > 1 and (self.page or self.minus is not None),
+                "--page and --minus take one folder: merge several first, then report --out",
+            ),
+            (not self.source and given, f"--{''.join(given[:1])} has no meaning without --source"),
+            (
+                self.source and not (self.page and self.episodes),
+                "--source has no meaning without --page and --episodes: nothing is played again",
+            ),
+            (
+                self.minus is not None and self.page,
+                "--minus has no meaning with --page: a page draws its own pairs",
+            ),
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
-class Judge(PlayOptions):
+class Judge(SceneOptions, WorkerOptions, PolicyOptions):
     """Judge detectors: what they find, and how much of it is right.
 
     They are judged on full scans, or on those of a policy: what they find, how much of it is right,
     how sure they may be, how long they take.
     """
 
-    scenes: tuple[str, ...] = ()
-    """One number: that many scenes, from the first. Otherwise names of scenes. Without this option,
-    all scenes."""
     detectors: tuple[str, ...] = ("returns", "cluster", "pillars")
     """Names of `care-sim list detectors`, instead of --detector. Give a parameter of one as
     DETECTOR.NAME=VALUE, such as pillars.least_score=0.02."""
@@ -164,27 +173,23 @@ class Judge(PlayOptions):
     against: str = "cluster"
     """The detector at whose precision the others are compared with it."""
     policy: str = "full"
-    """`care-sim list policies` lists them. `full` fires every cell."""
     budget: float = 1.0
-    """Share of the cells that may fire at a keyframe, above 0 and at most 1."""
-    workers: int = bounded(WORKERS, 1, MOST_WORKERS)
-    """Processes that play at the same time."""
     out: Path = Path("runs/judge")
     """Folder of tables, figure and numbers."""
-    official: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    official: Flag = False
     """Write all boxes, too, in the form that the official nuScenes devkit scores."""
-    force: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    force: Flag = False
     """Replace what such a command wrote there."""
 
     def __post_init__(self) -> None:
-        check_fields(self)
+        super().__post_init__()
         for score in self.least_scores:
             if not 0 <= score <= 1:
                 raise InvalidInput(f"least_scores must be from 0 to 1, got {score:g}")
 
 
 @dataclass(frozen=True, kw_only=True)
-class ExportNuScenes(PlayOptions):
+class ExportNuScenes(PlayOptions, PolicyOptions):
     """Write a policy's detections for the official nuScenes devkit.
 
     The policy plays over nuScenes scenes; its detections are in the results form of the devkit.
@@ -192,16 +197,12 @@ class ExportNuScenes(PlayOptions):
 
     source: str = tyro.MISSING
     """nuscenes:FOLDER, the folder of a nuScenes v1.0 database."""
-    policy: str = "care"
-    """`care-sim list policies` lists them. `full` always runs with budget 1.0."""
-    budget: float = 0.1
-    """Share of the cells that may fire at a keyframe, above 0 and at most 1."""
     out: Path
     """The results file, JSON."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class ExportMinari(EpisodeOptions):
+class ExportMinari(EpisodeOptions, PolicyOptions):
     """Write a policy's episodes as a Minari dataset.
 
     The dataset is for offline learning. It holds observations, actions, rewards, seeds and the
@@ -214,12 +215,30 @@ class ExportMinari(EpisodeOptions):
     dataset: str = tyro.MISSING
     """The id for `minari.load_dataset`, for example care-sim/dense/care-v0. Minari stores datasets
     in the folder MINARI_DATASETS_PATH, or else in ~/.minari/datasets."""
-    policy: str = "care"
-    """`care-sim list policies` lists them. `full` always runs with budget 1.0."""
-    budget: float = 0.1
-    """Share of the cells that may fire at a keyframe, above 0 and at most 1."""
     episodes: int = bounded(20, 1, _MOST_EPISODES)
     """Episodes to play, on the training seeds from 10000 on."""
 
     def __post_init__(self) -> None:
         check_fields(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Certify(WorkerOptions):
+    """Play published episodes and say whether they go as published.
+
+    Play a published list of episodes and say whether they go as published, or where one does
+    not.
+
+    The list holds every environment, built-in policy and fault.
+    """
+
+    all: Flag = False
+    """All 10,000 episodes, not only the first 3,050."""
+    episode: int | None = None
+    """This episode alone, by its number in the list."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.episode is not None:
+            check_whole("episode", self.episode, 0, ALL_EPISODES - 1)
+            _refuse((self.all, "episode plays one alone: give not all with it"))

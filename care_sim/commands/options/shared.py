@@ -1,4 +1,4 @@
-"""Options that several commands share: sensors and conditions, parameters, sources, seeds."""
+"""Options that several commands share. A subclass that changes a default keeps the help."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -14,21 +14,70 @@ from care_sim.base.seed_ranges import CALIBRATION, split_of
 from care_sim.core.conditions import ClosedLoopConditions, Conditions
 from care_sim.study.parameters import parameters
 
+Flag = Annotated[bool, tyro.conf.FlagCreatePairsOff]
+"""A switch that has no opposite."""
 _CLOSED_LOOP, _BOTH_LOOPS = ClosedLoopConditions(), Conditions()
 """The defaults."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class SensingOptions:
-    """Sensors, detector and conditions of the closed loop, the same for all episodes."""
+class WorkerOptions:
+    """How many processes a command takes."""
 
-    sensor: str = "hdl-32e"
-    """LiDAR and cameras: a name of `care-sim list sensors`, or a .toml file of a set-up."""
+    workers: int = bounded(WORKERS, 1, MOST_WORKERS)
+    """Processes that play at the same time."""
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PolicyOptions:
+    """One policy and its budget."""
+
+    policy: str = "care"
+    """`care-sim list policies` lists them. `full` always runs with budget 1.0."""
+    budget: float = 0.1
+    """Share of the cells that may fire at a keyframe, above 0 and at most 1."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class GridOptions:
+    """Policies and budgets, of which every pair is played."""
+
+    policies: tuple[str, ...] = ()
+    """Names of `care-sim list policies`; `all` stands for all but the controls. `full` always runs
+    with budget 1.0."""
+    budgets: tuple[float, ...] = ()
+    """Shares of the cells that may fire at a keyframe, above 0 and at most 1."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DetectorOptions:
+    """Which detector looks at the points."""
+
     detector: str = "returns"
     """returns (the paper's proxy), graded (the surer the more returns), cluster (a real one),
     pillars (a learned one), torchscript, the name of an installed one, or MODULE:CLASS."""
     detector_parameters: tuple[str, ...] = ()
     """Parameters of the detector as NAME=VALUE, for example file=model.pt for torchscript."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ParameterOptions:
+    """Parameters of policies."""
+
+    policy_parameters: tuple[str, ...] = ()
+    """Parameters of the policies as NAME=VALUE, for example k_safe=0 for care-sbf; for one of
+    several policies as POLICY.NAME=VALUE, for example ppo.path=weights.npz."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SensingOptions(DetectorOptions):
+    """Sensors, detector and conditions of the closed loop, the same for all episodes."""
+
+    sensor: str = "hdl-32e"
+    """LiDAR and cameras: a name of `care-sim list sensors`, or a .toml file of a set-up."""
     conditions: Annotated[ClosedLoopConditions, tyro.conf.OmitArgPrefixes] = _CLOSED_LOOP
     """How well the car senses, how it drives, and how it spends its budget."""
 
@@ -43,26 +92,31 @@ class SensingOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
-class EpisodeOptions(SensingOptions):
+class EpisodeOptions(SensingOptions, ParameterOptions):
     """Everything that episodes share: sensing, and parameters of scenarios and policies."""
 
     scenario_parameters: tuple[str, ...] = ()
     """Physics of the scenario as NAME=VALUE, a range as NAME=LOW,HIGH, for example vehicles=7
     gap_m=0.8,1.2; see `care-sim list scenarios`."""
-    policy_parameters: tuple[str, ...] = ()
-    """Parameters of the policies as NAME=VALUE, for example k_safe=0 for care-sbf; for one of
-    several policies as POLICY.NAME=VALUE, for example ppo.path=weights.npz."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class SourceOptions:
-    """Which scenes a source has, and what their camera saw."""
+class RecordingOptions:
+    """Which part of a source is meant."""
 
     split: str | None = None
     """For streets: evaluation (150 scenes) or calibration (20). For nuScenes: train, val,
     mini_train, mini_val, all, or one of splits.json."""
     version: str | None = None
     """For nuScenes: the version, if the folder holds several."""
+    topics: tuple[str, ...] = ()
+    """For bags: the topics of points and poses, if there are several."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SourceOptions(RecordingOptions):
+    """Which scenes a source has, and what their camera saw."""
+
     sensor: str | None = None
     """For streets, KITTI, Boreas and sweeps: LiDAR and cameras, a name of `care-sim list sensors`
     or a .toml file of a set-up."""
@@ -79,8 +133,6 @@ class SourceOptions:
     """For nuScenes and Argoverse 2: annotate boxes without a recorded point, too."""
     reference: Annotated[str | None, tyro.conf.arg(metavar="STR")] = None
     """For sweeps: the detector that annotates them, cluster unless given."""
-    topics: tuple[str, ...] = ()
-    """For bags: the topics of points and poses, if there are several."""
 
     def source_options(self) -> list[str]:
         """The names of options that are given."""
@@ -94,34 +146,32 @@ class SourceOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
-class PlayOptions(SourceOptions):
+class PlayOptions(SourceOptions, DetectorOptions, ParameterOptions):
     """Options that all plays of the open loop share."""
 
     source: str = "streets"
     """streets, argoverse2:FOLDER, nuscenes:FOLDER, kitti:FOLDER, sweeps:FOLDER, boreas, or a source
     of your own: the name of an installed one or MODULE:CLASS, with :FOLDER for recordings."""
-    detector: str = "returns"
-    """returns (the paper's proxy), graded (the surer the more returns), cluster (a real one),
-    pillars (a learned one), torchscript, the name of an installed one, or MODULE:CLASS."""
-    detector_parameters: tuple[str, ...] = ()
-    """Parameters of the detector as NAME=VALUE, for example file=model.pt for torchscript."""
-    policy_parameters: tuple[str, ...] = ()
-    """Parameters of the policies as NAME=VALUE, for example k_safe=0 for care-sbf; for one of
-    several policies as POLICY.NAME=VALUE, for example ppo.path=weights.npz."""
     conditions: Annotated[Conditions, tyro.conf.OmitArgPrefixes] = _BOTH_LOOPS
     """How well the car senses, and how it spends its budget."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class StudyOptions:
+class SceneOptions(PlayOptions):
+    """Plays of the open loop over several scenes."""
+
+    scenes: tuple[str, ...] = ()
+    """One number: that many scenes, from the first. Otherwise names of scenes. Without this option,
+    all scenes."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class StudyOptions(WorkerOptions):
     """Options of every command that plays a study."""
 
-    workers: int = bounded(WORKERS, 1, MOST_WORKERS)
-    """Processes that play at the same time on this machine; a cluster plays as many tasks as it has
-    threads."""
     cluster: str | None = None
-    """Address of a dask scheduler whose workers play instead, for example tcp://HOST:8786 (extra
-    'cluster')."""
+    """Address of a dask scheduler whose workers play instead, as many tasks at a time as they have
+    threads, for example tcp://HOST:8786 (extra 'cluster')."""
     out: Path | None = None
     """Folder of the results; an interrupted study resumes there. Without this option it is in runs/
     and has the name of the command: the first, such as runs/sweep and runs/sweep-2, that holds no
@@ -132,9 +182,6 @@ class StudyOptions:
     never replace the plays of a protocol, nor plays episodes: their files have other names."""
     verbose: bool = False
     """Print all tables."""
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
 
 def seeds_of(numbers: Sequence[int]) -> Sequence[int]:

@@ -7,33 +7,36 @@ from typing import Annotated, Literal
 import tyro
 
 from care_sim.base.errors import InvalidInput
-from care_sim.commands.options.shared import EpisodeOptions
+from care_sim.commands.options.shared import EpisodeOptions, RecordingOptions
 
 
 @dataclass(frozen=True, kw_only=True)
-class SceneOptions:
-    """Which scene of a source is played."""
+class WatchOptions(RecordingOptions, EpisodeOptions):
+    """What is played before one's eyes, in either loop, and where it is kept."""
 
     scene: str | None = None
     """For a source of scenes: the name of the scene. Without it streets play that of the seed,
     recordings the first."""
-    split: str | None = None
-    """For streets: evaluation (150 scenes) or calibration (20). For nuScenes: val, all, or one of
-    splits.json."""
-    version: str | None = None
-    """For nuScenes: the version, if the folder holds several."""
-    topics: tuple[str, ...] = ()
-    """For bags: the topics of points and poses, if there are several."""
+    seed: int = 0
+    """Seed of scenario, camera faults, noise and floor."""
+    record: Path | None = None
+    """File (.rrd) for a recording that `care-sim view FILE` plays (extra 'viewer'), several
+    policies side by side."""
+    video: Path | None = None
+    """File for a clip, several policies side by side: MP4 (extra 'video'), or animated GIF, WebP or
+    PNG, by its ending."""
+    video_start: float | None = None
+    """Start the clip this many seconds after the episode starts."""
 
-    def check_unused(self) -> None:
-        """Raise InvalidInput if one is given, and no source is named."""
-        for field in fields(SceneOptions):
-            if getattr(self, field.name) not in (None, ()):
-                raise InvalidInput(f"--{field.name} has no meaning in the closed loop")
+    def check_closed(self) -> None:
+        """Raise InvalidInput if an option of scenes is given, and no source is named."""
+        for name in ("scene", *(field.name for field in fields(RecordingOptions))):
+            if getattr(self, name) not in (None, ()):
+                raise InvalidInput(f"--{name} has no meaning in the closed loop")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Run(SceneOptions, EpisodeOptions):
+class Run(WatchOptions):
     """Play one episode and print its timeline and outcome.
 
     A trained agent plays where it learned, in the first of several environments and without drawn
@@ -55,20 +58,11 @@ class Run(SceneOptions, EpisodeOptions):
     budget: float | None = None
     """Share of the cells that may fire at a keyframe, above 0 and at most 1; 0.1 unless given, for
     an agent the first of its training."""
-    seed: int = 0
-    """Seed of scenario, camera faults, noise and floor."""
     picture: Path | None = None
     """PNG file for a picture of the first keyframe at which the car brakes; in the open loop, of
     the first at which somebody appears."""
     at: float | None = None
     """For --picture: the time that it shows, seconds from the start, instead of that moment."""
-    video: Path | None = None
-    """File for a clip of the episode: MP4 (extra 'video'), or animated GIF, WebP or PNG, by its
-    ending."""
-    video_start: float | None = None
-    """Start the clip this many seconds after the episode starts."""
-    record: Path | None = None
-    """File (.rrd) for a recording that `care-sim view FILE` plays (extra 'viewer')."""
     view: bool = False
     """Open the viewer on the recording once the episode is played (extra 'viewer'); without
     --record it is runs/run.rrd."""
@@ -78,7 +72,7 @@ class Run(SceneOptions, EpisodeOptions):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Compare(SceneOptions, EpisodeOptions):
+class Compare(WatchOptions):
     """Play one seed under several policies, side by side."""
 
     scenario: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCENARIO|SOURCE")]
@@ -90,16 +84,6 @@ class Compare(SceneOptions, EpisodeOptions):
     with budget 1.0."""
     budget: float = 0.1
     """Share of the cells that may fire at a keyframe, above 0 and at most 1."""
-    seed: int = 0
-    """Seed of scenario, camera faults, noise and floor, the same for every policy."""
-    record: Path | None = None
-    """File (.rrd) for a recording of all episodes, side by side; `care-sim view FILE` plays it
-    (extra 'viewer')."""
-    video: Path | None = None
-    """File for a film of all episodes, side by side: MP4 (extra 'video'), or animated GIF, WebP or
-    PNG, by its ending."""
-    video_start: float | None = None
-    """Start the film this many seconds after the episodes start."""
 
 
 @dataclass(frozen=True, kw_only=True)

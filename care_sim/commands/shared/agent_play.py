@@ -2,7 +2,6 @@
 and the lines of commands that play it.
 """
 
-from collections.abc import Iterator
 from dataclasses import asdict, dataclass, fields, replace
 from functools import cached_property
 from typing import Any
@@ -17,8 +16,6 @@ from care_sim.training.agents import Agent
 
 _STREET, _REPLAY = OPEN_LOOP
 _CONDITIONS = {one.name for one in fields(ClosedLoopConditions)}
-_OPTIONS = {*_CONDITIONS, "sensor", "detector"}
-"""Parameters of environments that are options of commands, in the same form."""
 _USUAL = asdict(ClosedLoopConditions())
 _OF_REPLAY = ("source", "scene", "split", "version")
 """Parameters that say which scene is played."""
@@ -31,6 +28,8 @@ _NO_OPTION = (
     "secret",
 )
 """Parameters that no command which plays one episode takes."""
+_NO_PHYSICS = {*_CONDITIONS, "sensor", "detector", *_NO_OPTION}
+"""Parameters of environments that are none of the scenario."""
 
 
 @dataclass(frozen=True)
@@ -68,9 +67,10 @@ class AgentPlay:
         the agent learned with where `given` has the default; with `only_agent` with the weights
         alone.
         """
+        told = {one.name: getattr(given, one.name) for one in fields(EpisodeOptions)}
         # `path=` is before what is given, over which the same name would be one too many.
         path = [] if self.agent.path is None else [f"path={self.agent.path}"]
-        told = _shared(given) | {"policy_parameters": (*path, *given.policy_parameters)}
+        told["policy_parameters"] = (*path, *given.policy_parameters)
         if only_agent:
             return told
         conditions = {
@@ -82,9 +82,11 @@ class AgentPlay:
         for name in ("sensor", "detector"):
             if name in self._given and told[name] == getattr(EpisodeOptions, name):
                 told[name] = self._given[name]
-        own = {text.partition("=")[0] for text in given.scenario_parameters}
+        own = {text.partition("=")[0] for text in given.scenario_parameters} | _NO_PHYSICS
         physics = [
-            f"{name}={_written(value)}" for name, value in self._physics() if name not in own
+            f"{name}={_written(value)}"
+            for name, value in self._given.items()
+            if name not in own and not self.is_open
         ]
         return told | {"scenario_parameters": (*physics, *given.scenario_parameters)}
 
@@ -92,23 +94,17 @@ class AgentPlay:
         """The parameters that no command has."""
         return [name for name in _NO_OPTION if name in self._given]
 
-    def _physics(self) -> Iterator[tuple[str, Any]]:
-        for name, value in self._given.items():
-            known = name in _OPTIONS or name in _NO_OPTION
-            if not (known or self.is_open):
-                yield name, value
-
     def study_line(self) -> str:
         """The command that plays the agent beside `care` where it learned."""
         given = self.options(EpisodeOptions())
-        policies = ("care", self.agent.policy)
         path = tuple(f"{self.agent.policy}.{one}" for one in given["policy_parameters"])
-        given = given | {"policy_parameters": path}
+        shared: dict[str, Any] = {
+            "policies": ("care", self.agent.policy),
+            "policy_parameters": path,
+            "budgets": (self.agent.budget,),
+        }
         if not self.is_open:
-            budgets = (self.agent.budget,)
-            return command_line(
-                Sweep(scenarios=(self.world,), policies=policies, budgets=budgets, **given)
-            )
+            return command_line(Sweep(scenarios=(self.world,), **given | shared))
         conditions = {
             one.name: getattr(given["conditions"], one.name) for one in fields(Conditions)
         }
@@ -118,17 +114,10 @@ class AgentPlay:
                 split=self.scene.get("split"),
                 version=self.scene.get("version"),
                 detector=given["detector"],
-                policies=policies,
-                policy_parameters=path,
-                budgets=(self.agent.budget,),
                 conditions=Conditions(**conditions),
+                **shared,
             )
         )
-
-
-def _shared(given: EpisodeOptions) -> dict[str, Any]:
-    """The options of episodes, of a command that has more."""
-    return {one.name: getattr(given, one.name) for one in fields(EpisodeOptions)}
 
 
 def _written(value: Any) -> str:

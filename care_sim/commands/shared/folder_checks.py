@@ -1,7 +1,7 @@
 """Which folder a study may take: what is there already, and whether the new rows hold all of it."""
 
 import sys
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from care_sim.base.errors import InvalidInput, counted, print_lines
@@ -13,7 +13,6 @@ from care_sim.study.row_identity import USUAL, asked_with, identity, row_label
 from care_sim.study.rows.parquet import read_notes, read_rows
 from care_sim.study.run_config import Row, RunConfig
 
-_RUNS = Path("runs")
 WAYS_OUT = "give another --out, or --force to replace it"
 _MOST_TOLD = 3
 """Differing parameters that a refusal names, at the most."""
@@ -23,11 +22,11 @@ def free_folder(name: str, configs: Sequence[RunConfig], study: Study) -> Path:
     """The first of runs/NAME, runs/NAME-2 and so on that the study may take: where nothing lies, or
     only rows that are all asked for now, which it goes on with. A line says why another is not it.
     """
-    folder, number = _RUNS / name, 1
+    folder, number = Path("runs", name), 1
     first = reason = _why_not(folder, configs, study)
     while reason:
         number += 1
-        folder = _RUNS / f"{name}-{number}"
+        folder = Path("runs", f"{name}-{number}")
         reason = _why_not(folder, configs, study)
     if first:
         print_lines(f"another folder is taken, because {first}", file=sys.stderr)
@@ -41,16 +40,23 @@ def _why_not(folder: Path, configs: Sequence[RunConfig], study: Study) -> str:
     if is_written(folder / JOURNAL):
         return f"another study writes to {folder} now"
     try:
-        check_kind(folder, study)
-        check_results(folder, configs, study)
-        check_journal(folder, configs, read_journal(folder / JOURNAL), study)
+        check_folder(folder, configs, study, read_journal(folder / JOURNAL))
     except InvalidInput as error:
         return str(error).removesuffix(f": {WAYS_OUT}")
     return ""
 
 
-def check_kind(folder: Path, study: Study) -> None:
-    """Raise InvalidInput where the folder holds results of the other kind, episodes or plays."""
+def check_folder(
+    folder: Path,
+    configs: Sequence[RunConfig],
+    study: Study,
+    journal: Journal | Finished | None = None,
+    force: bool = False,
+) -> None:
+    """Raise InvalidInput where the study may not take the folder: where that holds results of the
+    other kind, episodes or plays, and unless `force` where results or the rows of a journal would
+    be lost. Raises as `read_rows` does where results are damaged.
+    """
     # Each kind has files of its own, so that --force would leave both in one folder.
     kind = study.results
     for other in RESULTS_FORMATS:
@@ -59,32 +65,50 @@ def check_kind(folder: Path, study: Study) -> None:
                 f"{folder} holds {other.unit} of another study; the {kind.unit} of the study "
                 f"{study.name} need another --out, with --force too"
             )
-
-
-def check_results(folder: Path, configs: Sequence[RunConfig], study: Study) -> None:
-    """Raise InvalidInput where the folder holds results that would be lost: those of another study,
-    or rows of this one with parameters that are not asked for now. Raises as `read_rows` does where
-    results are damaged.
-    """
-    path = folder / study.results.file
-    if not path.is_file():
+    if force:
         return
+    if (folder / kind.file).is_file():
+        _check_results(folder, configs, study)
+    elif journal and journal.rows:
+        _check_journal(folder, configs, journal, study)
+
+
+def _check_results(folder: Path, configs: Sequence[RunConfig], study: Study) -> None:
+    path, task = folder / study.results.file, study.results.task
     # A file that names no study was written by a version that had sweeps alone.
     there = read_notes(path)[0] or SWEEP.name
-    rows, gone = _rows_and_gone(path, configs, study)
-    task = study.results.task
-    here = counted(len(rows), task)
-    wanted = counted(len(configs), task)
+    rows = read_rows(path, study.results.schema.lenient)
+    here, wanted = counted(len(rows), task), counted(len(configs), task)
     if there != study.name:
         raise InvalidInput(
             f"{folder} holds the study {there}, {here}, which the study {study.name}, {wanted}, "
             f"would replace: {WAYS_OUT}"
         )
-    if gone:
+    if gone := _gone(rows, configs):
         raise InvalidInput(
             f"{folder} holds {here} of the study {there}; {len(gone)} of them, the first "
-            f"{row_label(gone[0])}{_differing(gone[0], configs)}, would be gone from the study "
-            f"{study.name} that is asked for, {wanted}: {WAYS_OUT}"
+            f"{_first(gone, configs)}, would be gone from the study {study.name} that is asked "
+            f"for, {wanted}: {WAYS_OUT}"
+        )
+
+
+def _check_journal(
+    folder: Path, configs: Sequence[RunConfig], journal: Journal | Finished, study: Study
+) -> None:
+    """The same of an interrupted study, whose own command would be refused as soon as these results
+    lie there. A row counts by its parameters, whatever code played it, so that a command goes on
+    after a change of the code.
+    """
+    rows = counted(len(journal.rows), "row")
+    held = f"{folder} holds the unfinished study {' and '.join(sorted(journal.studies))}, {rows}"
+    if study.name not in journal.studies:
+        raise InvalidInput(
+            f"{held}, beside which the study {study.name} would be played: {WAYS_OUT}"
+        )
+    if gone := _gone(journal.rows, configs):
+        raise InvalidInput(
+            f"{held}; {len(gone)} of them, the first {_first(gone, configs)}, are not asked for "
+            "now: give the command that began it, another --out, or --force to play beside them"
         )
 
 
@@ -92,9 +116,9 @@ def lost(folder: Path, played: Sequence[RunConfig], study: Study) -> str:
     """One line that tells which rows of the folder would be lost because tasks failed; empty for
     none.
     """
-    path = folder / study.results.file
-    rows, gone = _rows_and_gone(path, played, study) if path.is_file() else ([], [])
-    task = study.results.task
+    path, task = folder / study.results.file, study.results.task
+    rows = read_rows(path, study.results.schema.lenient) if path.is_file() else []
+    gone = _gone(rows, played)
     if not gone:
         return ""
     return (
@@ -105,65 +129,25 @@ def lost(folder: Path, played: Sequence[RunConfig], study: Study) -> str:
     )
 
 
-def check_journal(
-    folder: Path, configs: Sequence[RunConfig], journal: Journal | Finished, study: Study
-) -> None:
-    """Raise InvalidInput where the folder holds an interrupted study that has another name, or rows
-    that are not asked for now.
-
-    Otherwise that study's own command would be refused as soon as these results lie there. A row
-    counts by its parameters, whatever code played it, so that a command goes on after a change of
-    the code.
-    """
-    if not journal.rows or (folder / study.results.file).is_file():
-        return
-    rows = counted(len(journal.rows), "row")
-    if study.name not in journal.studies:
-        raise InvalidInput(
-            f"{folder} holds the unfinished study {_joined(journal.studies)}, {rows}, beside "
-            f"which the study {study.name} would be played: {WAYS_OUT}"
-        )
-    if gone := _gone(journal.rows, configs):
-        raise InvalidInput(
-            f"{folder} holds the unfinished study {_joined(journal.studies)}, {rows}; {len(gone)} "
-            f"of them, the first {row_label(gone[0])}{_differing(gone[0], configs)}, are not asked "
-            "for now: give the command that began it, another --out, or --force to play beside them"
-        )
-
-
-def _rows_and_gone(
-    path: Path, configs: Sequence[RunConfig], study: Study
-) -> tuple[list[Row], list[Row]]:
-    """The rows of a file, and those that are none of `configs`."""
-    rows = read_rows(path, study.results.schema.lenient)
-    return rows, _gone(rows, configs)
-
-
 def _gone(rows: Sequence[Row], configs: Sequence[RunConfig]) -> list[Row]:
+    """The rows that are none of `configs`."""
     own = {identity(config.row()) for config in configs}
     return [row for row in rows if identity(row) not in own]
 
 
-def _differing(row: Row, configs: Sequence[RunConfig]) -> str:
-    """In brackets, the parameters in which a row differs from the nearest task with the same label;
-    empty where no task has that label.
+def _first(gone: Sequence[Row], configs: Sequence[RunConfig]) -> str:
+    """The first of the rows and, in brackets, the parameters in which it differs from the nearest
+    task with the same label, where one has that label.
     """
-    label = row_label(row)
-    there = asked_with(row)
+    label, there = row_label(gone[0]), asked_with(gone[0])
     found = []
-    for asked in (config.row() for config in configs):
-        if row_label(asked) == label:
-            now = asked_with(asked)
-            names = [name for name in sorted({*there, *now}) if there.get(name) != now.get(name)]
-            found.append([f"{name} {_told(name, there)}, now {_told(name, now)}" for name in names])
+    for now in (asked_with(row) for row in (c.row() for c in configs) if row_label(row) == label):
+        names = [name for name in sorted({*there, *now}) if there.get(name) != now.get(name)]
+        found.append([f"{name} {_told(name, there)}, now {_told(name, now)}" for name in names])
     nearest = min(found, key=len, default=[])
-    return f" ({'; '.join(nearest[:_MOST_TOLD])})" if nearest else ""
+    return f"{label} ({'; '.join(nearest[:_MOST_TOLD])})" if nearest else label
 
 
 def _told(name: str, asked: Row) -> str:
     value = asked.get(name, USUAL.get(name))
     return "not given" if value is None else str(value)
-
-
-def _joined(names: Collection[str]) -> str:
-    return " and ".join(sorted(names))

@@ -1,9 +1,9 @@
-"""What `run` and `compare` play of the open loop: one scene of a source, named in the place of a
-scenario.
+"""What `run` and `compare` play: one episode per policy, or one scene of a source that is named in
+the place of a scenario.
 """
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,8 @@ from typing import Any
 from care_sim.base.checks import check_known
 from care_sim.base.errors import InvalidInput, print_lines
 from care_sim.base.plugins import is_place
-from care_sim.commands.options.watching import SceneOptions
+from care_sim.commands.options.watching import WatchOptions
+from care_sim.commands.shared.selection import arguments_of
 from care_sim.core.conditions import DEFAULTS, OF_BOTH_LOOPS, ClosedLoopConditions
 from care_sim.reports.episodes.clips import Clip
 from care_sim.sensors.setups import DEFAULT_SETUP
@@ -19,57 +20,11 @@ from care_sim.sources.installed import SOURCES, means_source
 from care_sim.sources.named import source_name, source_of
 from care_sim.sources.recordings import Recordings
 from care_sim.sources.scenes import Scene, Source, Streets
+from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.play_config import PlayConfig, play_grid
 
 _STREET = "street"
 """One of the generated streets, as `CARE-Street-v0` has them; `streets` says the same."""
-
-
-def scene_source(options: SceneOptions, text: str, sensor: str) -> Source:
-    """The source that is named in the place of a scenario."""
-    named = Streets.kind if text == _STREET else text
-    given = None if sensor == DEFAULT_SETUP else sensor
-    topics = options.topics or None
-    return source_of(
-        named, split=options.split, version=options.version, sensor=given, topics=topics
-    )
-
-
-def scene_of(options: SceneOptions, source: Source, seed: int) -> Scene:
-    """The scene that is named, or else that of the seed. Raises InvalidInput where there is
-    none.
-    """
-    scenes = {each.name: each for each in source.scenes()}
-    _check_scene(options, scenes)
-    chosen = next(iter(scenes.values())) if options.scene is None else scenes[options.scene]
-    # Of a recording the seed draws the faults and the floor alone; a street is its seed.
-    kind: Any = SOURCES.maker(source.kind)
-    if issubclass(kind, Recordings):
-        return chosen._replace(seed=seed)
-    if options.scene is not None:
-        # Of the seed that nobody gave there is nothing to say.
-        if seed not in (0, chosen.seed):
-            told = f"{chosen.name} is that of --scene, --seed {seed} changes nothing"
-            print(told, file=sys.stderr)
-        return chosen
-    seeds = {each.seed: each for each in scenes.values()}
-    if seed in seeds:
-        return seeds[seed]
-    told = f"{min(seeds)} to {max(seeds)}, got {seed}"
-    raise InvalidInput(f"seed must be of a scene of {source.kind}, {told}")
-
-
-def _check_scene(options: SceneOptions, scenes: Mapping[str, Scene]) -> None:
-    if options.scene is None:
-        return
-    try:
-        check_known("scene", options.scene, scenes)
-    except InvalidInput as error:
-        # A number is meant for a seed, where scenes have each their own.
-        seeds = {str(each.seed) for each in scenes.values()}
-        is_seed = len(seeds) == len(scenes) and options.scene in seeds
-        hint = f"; --seed {options.scene} plays that of the seed" if is_seed else ""
-        raise InvalidInput(f"{error}{hint}") from None
 
 
 def is_source(text: str) -> bool:
@@ -81,22 +36,59 @@ def is_source(text: str) -> bool:
     return is_place(name) and means_source(name)
 
 
-def scene_plays(
-    source: Source, scene: Scene, policies: Sequence[str], budget: float, given: dict[str, Any]
-) -> list[PlayConfig]:
-    """The plays of the policies, with the options that are `given` to a closed loop. Raises
-    InvalidInput for those that the open loop does not have.
+def maker_of(
+    options: WatchOptions, named: str, policies: Sequence[str], budget: float
+) -> Callable[[Sequence[str]], Sequence[EpisodeConfig | PlayConfig]]:
+    """What makes one task for each of some of the `policies`: an episode of the scenario that is
+    `named`, or a play of one scene of that source. Raises InvalidInput for options that the loop
+    does not have.
     """
-    given = dict(given)
-    given.pop("sensor")
+    given = arguments_of(options, policies)
+    if not is_source(named):
+        options.check_closed()
+        return lambda names: grid([named], names, [budget], [options.seed], **given)
+    sensor = given.pop("sensor")
+    source = source_of(
+        Streets.kind if named == _STREET else named,
+        split=options.split,
+        version=options.version,
+        sensor=None if sensor == DEFAULT_SETUP else sensor,
+        topics=options.topics or None,
+    )
     if given.pop("scenario_parameters"):
         raise InvalidInput("--scenario-parameters has no meaning in the open loop")
     for field in fields(ClosedLoopConditions):
         if field.name not in OF_BOTH_LOOPS and given.pop(field.name) != DEFAULTS[field.name]:
             option = field.name.replace("_", "-")
             raise InvalidInput(f"--{option} has no meaning in the open loop")
-    floors, latencies = (given.pop("floor_seed"),), (given.pop("camera_latency"),)
-    return play_grid(source, [scene], policies, [budget], floors, latencies, **given)
+    floors, scene = [given.pop("floor_seed")], scene_of(options, source)
+    return lambda names: play_grid(source, [scene], names, [budget], floors, **given)
+
+
+def scene_of(options: WatchOptions, source: Source) -> Scene:
+    """The scene that is named, or else that of the seed. Raises InvalidInput where there is
+    none.
+    """
+    scenes = {each.name: each for each in source.scenes()}
+    seed = options.seed
+    if options.scene is not None:
+        check_known("scene", options.scene, scenes)
+    chosen = next(iter(scenes.values())) if options.scene is None else scenes[options.scene]
+    # Of a recording the seed draws the faults and the floor alone; a street is its seed.
+    kind: Any = SOURCES.maker(source.kind)
+    if issubclass(kind, Recordings):
+        return chosen._replace(seed=seed)
+    if options.scene is not None:
+        # 0 may be the seed that nobody gave.
+        if seed not in (0, chosen.seed):
+            told = f"{chosen.name} is that of --scene, --seed {seed} changes nothing"
+            print(told, file=sys.stderr)
+        return chosen
+    seeds = {each.seed: each for each in scenes.values()}
+    if seed in seeds:
+        return seeds[seed]
+    told = f"{min(seeds)} to {max(seeds)}, got {seed}"
+    raise InvalidInput(f"seed must be of a scene of {source.kind}, {told}")
 
 
 def finish_files(record: Path | None, film: Clip, video: Path | None) -> None:

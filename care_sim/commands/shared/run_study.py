@@ -8,7 +8,7 @@ from pathlib import Path
 from care_sim.base.checks import check_whole
 from care_sim.base.errors import InvalidInput, counted, print_lines
 from care_sim.base.files import write_text
-from care_sim.commands.shared.folder_checks import check_journal, check_kind, check_results, lost
+from care_sim.commands.shared.folder_checks import check_folder, lost
 from care_sim.reports.report import CONFIG, TABLES, StudyReport
 from care_sim.reports.studies import SWEEP, study_of
 from care_sim.reports.study import Study
@@ -23,7 +23,7 @@ from care_sim.study.rows.parquet import (
     write_rows,
 )
 from care_sim.study.run_config import Row, RunConfig
-from care_sim.study.runner import Failure
+from care_sim.study.runner import Failure, by_reason
 from care_sim.study.unfinished import UNFINISHED, Unfinished, forget
 from care_sim.study.world_hash import check_worlds
 
@@ -44,18 +44,14 @@ def run_study(
     failed.
 
     Names the folder, and leaves in it how large the study is and the `command` that plays it, until
-    it has ended (`care_sim.study.unfinished`). Writes `journal.jsonl` as tasks finish. When all
-    have ended and some did not fail, writes `config.json` with the configurations and what failed,
-    the Parquet files of the study's kind with the rows of `configs` in their order, `tables.md`,
-    `tables.tex` and the figures of `study`.
-    No other study can take the folder until all of that is written. A folder that holds all of it
+    it has ended (`care_sim.study.unfinished`). Writes `journal.jsonl` as tasks finish, and when all
+    have ended and some did not fail, the results: `config.json`, Parquet files, tables and figures
+    of `study`. No other study can take the folder until then. A folder that holds all of it
     stays as it is, unless `force`; `report` draws lost figures. Where the folder holds rows
     that were not obtained again because tasks failed, its files stay, unless `force`.
 
-    Raises InvalidInput for no task or no worker, when the folder cannot be written, and where a
-    scenario builds different worlds of one seed. Unless
-    `force`, also when the folder holds another study, finished or not, or rows of this one that are
-    none of `configs`.
+    Raises InvalidInput for no task or no worker, when the folder cannot be written, where a
+    scenario builds different worlds of one seed, and where `check_folder` does.
     """
     if not configs:
         raise InvalidInput("a study needs at least one value on every axis")
@@ -72,10 +68,10 @@ def run_study(
     check_columns(config.row() for config in configs)
     # The folder is checked before it is locked, which would leave a file in it, and again after, in
     # case that another process has written meanwhile.
-    _check(folder, configs, study, force)
+    check_folder(folder, configs, study, force=force)
     with _journal(folder, study) as journal:
         journal.drop_unsound(configs, study.schema)
-        _check(folder, configs, study, force, journal)
+        check_folder(folder, configs, study, journal, force)
         print_lines(goes, file=sys.stderr)
         others = _say_what_is_found(configs, journal, folder, kind.unit)
         Unfinished(study.name, kind.unit, len(configs), others, command).write(folder)
@@ -83,65 +79,16 @@ def run_study(
         # The journal keeps what finishes, even if this process ends before results are written.
         failures = run_with_progress(configs, journal, workers, make_executor, kind)
         played = [config for config in configs if config.key in journal]
-
-        check_worlds(journal[config.key] for config in played)
+        rows = [journal[config.key] for config in played]
+        check_worlds(rows)
 
         # Results of an earlier run are worth more than new ones with holes in their place.
-        left = lost(folder, played, study) if failures and not force else ""
-        if left:
+        if failures and not force and (left := lost(folder, played, study)):
             print_lines(left, file=sys.stderr)
         elif played:
-            _write(
-                [journal[config.key] for config in played],
-                configs,
-                folder,
-                study,
-                failures,
-                command,
-            )
+            _write(rows, configs, folder, study, failures, command)
             forget(folder)
     return failures
-
-
-def summary(failures: Sequence[Failure], unit: str) -> list[str]:
-    """What failed, in a line for every reason."""
-    by_reason: dict[str, list[Failure]] = {}
-    for failure in failures:
-        by_reason.setdefault(failure.reason, []).append(failure)
-    return [
-        str(own[0]) if len(own) == 1 else f"{len(own)} {unit}, the first {own[0]}"
-        for own in by_reason.values()
-    ]
-
-
-def _description(
-    configs: Sequence[RunConfig], study: Study, failures: Sequence[Failure], command: str
-) -> str:
-    settings = {
-        "study": study.name,
-        "command": command,
-        "versions": versions(),
-        "machine": machine(),
-        "failed": [*map(str, failures)],
-    }
-    return json.dumps(settings | study.results.listed(configs), indent=1) + "\n"
-
-
-def _check(
-    folder: Path,
-    configs: Sequence[RunConfig],
-    study: Study,
-    force: bool,
-    journal: Journal | None = None,
-) -> None:
-    """Raise InvalidInput where the study may not take the folder; with its journal once that is
-    locked.
-    """
-    check_kind(folder, study)
-    if not force:
-        check_results(folder, configs, study)
-        if journal is not None:
-            check_journal(folder, configs, journal, study)
 
 
 def _journal(folder: Path, study: Study) -> Journal:
@@ -201,13 +148,24 @@ def _write(
 ) -> None:
     """Write the results of a study: everything is made before the first file is replaced."""
     kind = study.results
-    left_out = summary(failures, kind.unit)
+    left_out = by_reason(failures, kind.unit)
     if len(rows) >= _MANY:
         print(f"making tables and figures of {counted(len(rows), kind.task)}", file=sys.stderr)
     kept = kind.kept_rows(rows)
     further = kind.further_files(rows)
     report = StudyReport.of(kept, study, left_out)
-    write_text(folder / CONFIG, _description(configs, study, failures, command))
+    settings = {
+        "study": study.name,
+        "command": command,
+        "versions": versions(),
+        "machine": machine(),
+        "failed": [*map(str, failures)],
+    }
+    # A line per configuration: one value a line makes megabytes of a study with thousands.
+    listed = kind.listed(configs)
+    lines = ",\n".join(f"  {json.dumps(own)}" for own in listed.pop("configurations"))
+    head = json.dumps(settings | listed, indent=1).removesuffix("\n}")
+    write_text(folder / CONFIG, f'{head},\n "configurations": [\n{lines}\n ]\n}}\n')
     for name, columns in further.items():
         write_columns(columns, folder / name)
     write_rows(kept, folder / kind.file, study.name, left_out, study.schema)

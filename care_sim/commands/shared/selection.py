@@ -1,6 +1,6 @@
 """What a command plays of what is named: scenarios, policies, sources, values of a condition."""
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -49,17 +49,7 @@ def buildable(names: Sequence[str], given: Parameters) -> tuple[list[str], list[
     """
     wanted = expanded(names, scenario_names())
     report_problems([line for one, line in PLUGINS.refusals() if scenario_of(one.name) in wanted])
-    sound, left_out = [], []
-    for name in wanted:
-        try:
-            check_built(name, given)
-            sound.append(name)
-        except (BrokenScenario, MissingExtra) as error:
-            left_out.append(f"left out: {error}")
-    report_problems(left_out)
-    if not sound:
-        raise InvalidInput("none of the scenarios can be played")
-    return sound, left_out
+    return _sound("scenarios", wanted, lambda name: check_built(name, given), BrokenScenario, 1)
 
 
 def check_built(scenario: str, given: Parameters) -> None:
@@ -71,45 +61,35 @@ def check_built(scenario: str, given: Parameters) -> None:
         made.make_world(np.random.default_rng(0)).close()
 
 
-def makeable(
-    policies: Iterable[str], make: Callable[[str], object]
-) -> tuple[list[str], dict[str, str]]:
-    """The policies of which `make` can make tasks, and for each of the others the reason why it
-    cannot.
-
-    Raises what `make` raises where the policy is not to blame.
-    """
-    sound = []
-    broken = {}
-    for policy in policies:
-        try:
-            make(policy)
-            sound.append(policy)
-        except (BrokenPolicy, MissingExtra) as error:
-            broken[policy] = str(error)
-    return sound, broken
-
-
-def playable(names: Sequence[str], make: Callable[[str], object]) -> tuple[list[str], list[str]]:
-    """The policies whose tasks `make` can make, and a line for each that cannot be made, which is
-    printed too.
-
-    Raises InvalidInput where something else is wrong.
-    """
-    policies, broken = makeable(_policies(names), make)
-    left_out = [f"left out: {reason}" for reason in broken.values()]
-    report_problems(left_out)
-    return policies, left_out
-
-
-def some_playable(
-    names: Sequence[str], make: Callable[[str], object]
+def playable(
+    names: Sequence[str], make: Callable[[str], object], least: int = 1
 ) -> tuple[list[str], list[str]]:
-    """As `playable`. Raises InvalidInput if no policy is left, too."""
-    policies, left_out = playable(names, make)
-    if not policies:
-        raise InvalidInput("none of the policies can be played")
-    return policies, left_out
+    """The policies, each once, whose tasks `make` can make, and a line for each that cannot be
+    made, which is printed too.
+
+    Raises InvalidInput where something else is wrong, and if fewer than `least` policies are left.
+    """
+    return _sound("policies", _policies(names), make, BrokenPolicy, least)
+
+
+def _sound(
+    kind: str,
+    names: Sequence[str],
+    make: Callable[[str], object],
+    broken: type[Exception],
+    least: int,
+) -> tuple[list[str], list[str]]:
+    sound, left_out = [], []
+    for name in names:
+        try:
+            make(name)
+            sound.append(name)
+        except (broken, MissingExtra) as error:
+            left_out.append(f"left out: {error}")
+    report_problems(left_out)
+    if len(sound) < least:
+        raise InvalidInput(f"none of the {kind} can be played")
+    return sound, left_out
 
 
 def policy_parameters(texts: Sequence[str], policies: Sequence[str]) -> Parameters:

@@ -5,16 +5,18 @@ from functools import partial
 
 from care_sim.base.checks import check_known
 from care_sim.base.errors import InvalidInput
-from care_sim.commands.options.further_studies import (
+from care_sim.commands.options.shared import seeds_of
+from care_sim.commands.options.studies import (
     R157,
     Crowding,
     Faults,
+    FixedStudy,
     Ncap,
+    Reproduce,
+    Sweep,
     Validate,
     Vehicle,
 )
-from care_sim.commands.options.shared import seeds_of
-from care_sim.commands.options.studies import FixedStudy, Reproduce, Sweep
 from care_sim.commands.shared.play_study import play_study
 from care_sim.commands.shared.selection import (
     arguments_of,
@@ -25,7 +27,6 @@ from care_sim.commands.shared.selection import (
     in_turn,
     named_after,
     playable,
-    some_playable,
 )
 from care_sim.envs import ENVIRONMENT_IDS
 from care_sim.scenarios.ncap.table import TESTS
@@ -49,15 +50,17 @@ def further_policies(options: FixedStudy) -> tuple[list[str], list[str]]:
     """Those that can be played, and a line for each that cannot."""
     # It is tried on one task in every scenario.
     named = CONTROLS if options.also is None else options.also
-    return playable(named, lambda name: grid(ENVIRONMENT_IDS, [name], [0.1], [0]))
+    return playable(named, lambda name: grid(ENVIRONMENT_IDS, [name], [0.1], [0]), 0)
 
 
-def fixed_study(options: FixedStudy, study: str, configurations: _Configurations, name: str) -> int:
+def fixed_study(
+    options: FixedStudy, study: str, configurations: _Configurations, folder: str = ""
+) -> int:
     """Play the configurations of the seeds, with the further policies."""
     seeds = seeds_of(options.seeds)
     also, left_out = further_policies(options)
     configs = of_seeds(configurations(seeds[:1], also), seeds)
-    return play_study(options, study, configs, name, left_out)
+    return play_study(options, study, configs, folder or study, left_out)
 
 
 def reproduce(options: Reproduce) -> int:
@@ -67,13 +70,17 @@ def reproduce(options: Reproduce) -> int:
 
 def crowding(options: Crowding) -> int:
     """Fill the dense street with vehicles."""
-    return fixed_study(options, "crowding", crowding_study, "crowding")
+    return fixed_study(options, "crowding", crowding_study)
 
 
 def faults(options: Faults) -> int:
     """Let every fault grow."""
-    study = partial(fault_study, **options.sensing())
-    return fixed_study(options, "faults", study, "faults")
+    return fixed_study(options, "faults", partial(fault_study, **options.sensing()))
+
+
+def vehicle(options: Vehicle) -> int:
+    """Play the paper's vehicle study."""
+    return fixed_study(options, "vehicle", vehicle_study)
 
 
 def sweep(options: Sweep) -> int:
@@ -83,7 +90,7 @@ def sweep(options: Sweep) -> int:
     # Skip third-party scenarios and policies that fail; the others play.
     scenarios, unbuilt = buildable(options.scenarios, common["scenario_parameters"])
     # A policy is tried on one seed and budget.
-    policies, left_out = some_playable(
+    policies, left_out = playable(
         options.policies, lambda name: grid(scenarios, [name], options.budgets[:1], [0], **common)
     )
     rates = in_turn(options.false_negative_rates, "false_negative_rate", common)
@@ -102,7 +109,7 @@ def ncap(options: Ncap) -> int:
     if not ncap_cases(tests, options.step_kph):
         raise InvalidInput(f"no speed of these tests is a multiple of {options.step_kph:g} km/h")
     common = options.sensing()
-    policies, left_out = some_playable(
+    policies, left_out = playable(
         options.policies, lambda name: grid(["ncap"], [name], options.budgets[:1], [0], **common)
     )
     seeds = seeds_of(options.seeds)
@@ -114,7 +121,7 @@ def r157(options: R157) -> int:
     """Play the preventable cut-ins of UN Regulation 157."""
     check_values(options, "policies", "budgets", "seeds")
     driver = options.driver
-    policies, left_out = some_playable(
+    policies, left_out = playable(
         options.policies,
         lambda name: grid(["r157"], [name], options.budgets[:1], [0], driver=driver),
     )
@@ -138,11 +145,3 @@ def validate(options: Validate) -> int:
         **options.sensing(),
     )
     return play_study(options, "validate", configs, named_after("validate", options.world))
-
-
-def vehicle(options: Vehicle) -> int:
-    """Play the paper's vehicle study."""
-    seeds = seeds_of(options.seeds)
-    also, left_out = further_policies(options)
-    configs = of_seeds(vehicle_study(seeds[:1], also), seeds)
-    return play_study(options, "vehicle", configs, "vehicle", left_out)

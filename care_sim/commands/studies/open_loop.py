@@ -1,9 +1,10 @@
 """Studies of the open loop."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
 
-from care_sim.commands.options.further_studies import Mechanism
-from care_sim.commands.options.studies import Protocol
+from care_sim.commands.options.studies import Mechanism, Protocol, ProtocolVariants
 from care_sim.commands.shared.play_study import play_study
 from care_sim.commands.shared.selection import (
     check_values,
@@ -11,45 +12,56 @@ from care_sim.commands.shared.selection import (
     in_turn,
     named_after,
     playable,
-    some_playable,
     source_named,
 )
-from care_sim.sources.scenes import Scene, chosen_scenes
-from care_sim.study.mechanism_config import MechanismConfig, mechanism_plays
-from care_sim.study.play_config import play_grid
+from care_sim.sources.scenes import chosen_scenes
+from care_sim.study.mechanism_config import mechanism_plays
+from care_sim.study.play_config import PlayConfig, play_grid
+
+
+def play_scenes(
+    options: Protocol | Mechanism | ProtocolVariants,
+    study: str,
+    command: str,
+    source_text: str,
+    plays: Callable[..., Sequence[PlayConfig]],
+) -> int:
+    """Play scenes of the source that is named; `plays` takes the source, scenes and policies.
+
+    Raises InvalidInput if none of the policies can be played.
+    """
+    check_values(options, "policies")
+    source = source_named(options, source_text)
+    scenes = chosen_scenes(source.scenes(), options.scenes)
+    policies, left_out = playable(options.policies, lambda name: plays(source, scenes[:1], [name]))
+    configs = plays(source, scenes, policies)
+    return play_study(options, study, configs, named_after(command, source_text), left_out)
 
 
 def protocol(options: Protocol) -> int:
     """Play the paper's first-sighting protocol (Secs. 3 and 5)."""
-    check_values(options, "policies", "budgets")
-    source = source_named(options, options.source)
-    common = common_of(options, options.policies) | {"presence": options.presence}
-    scenes = chosen_scenes(source.scenes(), options.scenes)
+    check_values(options, "budgets")
+    common = _common(options, options.policies)
     latencies = in_turn(options.camera_latencies, "camera_latency", common)
     # The floors of a scene have consecutive seeds, from --floor-seed on.
     first = common.pop("floor_seed")
-    policies, left_out = some_playable(
-        options.policies,
-        lambda name: play_grid(source, scenes[:1], [name], options.budgets[:1], **common),
+    plays = partial(
+        play_grid,
+        budgets=options.budgets,
+        floor_seeds=range(first, first + options.floor_seeds),
+        camera_latencies=latencies,
+        **common,
     )
-    floors = range(first, first + options.floor_seeds)
-    configs = play_grid(source, scenes, policies, options.budgets, floors, latencies, **common)
-    name = named_after("protocol", options.source)
-    return play_study(options, "protocol", configs, name, left_out)
+    return play_scenes(options, "protocol", "protocol", options.source, plays)
 
 
 def mechanism(options: Mechanism) -> int:
     """Say why policies differ: on one shared belief, and ray by ray."""
-    source = source_named(options, options.source)
     driver = options.driver
-    common = common_of(options, (*options.policies, driver)) | {"presence": options.presence}
-    scenes = chosen_scenes(source.scenes(), options.scenes)
+    common = _common(options, (*options.policies, driver))
+    plays = partial(mechanism_plays, budget=options.budget, driver=driver, **common)
+    return play_scenes(options, "mechanism", "mechanism", options.source, plays)
 
-    def plays(scenes: Sequence[Scene], policies: Sequence[str]) -> list[MechanismConfig]:
-        return mechanism_plays(
-            source, scenes, policies, budget=options.budget, driver=driver, **common
-        )
 
-    policies, left_out = playable(options.policies, lambda name: plays(scenes[:1], [name]))
-    name = named_after("mechanism", options.source)
-    return play_study(options, "mechanism", plays(scenes, policies), name, left_out)
+def _common(options: Protocol | Mechanism, policies: Sequence[str]) -> dict[str, Any]:
+    return common_of(options, policies) | {"presence": options.presence}

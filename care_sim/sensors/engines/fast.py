@@ -14,8 +14,7 @@ from care_sim.world.bullet import FAR_M, BulletWorld, PixelWindow
 
 
 class Fast:
-    """Rays and pictures of the bodies of a world where they are at the moment; nothing is rebuilt
-    when bodies move.
+    """Compiled kernels over the same bodies; `make parity` compares them with `bullet` ray by ray.
 
     The first call on a machine compiles for some seconds; later processes read the compiled code
     from a cache.

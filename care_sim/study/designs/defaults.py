@@ -16,3 +16,16 @@ FIRING_POLICIES = ("care", "care-sightlines", "care-units", "rows", "place", "fu
 FILM_POLICIES = ("history", "all-camera", "care", "care-sightlines", "rows", "place", "full")
 FILM_BUDGETS = (0.01, 0.03, 0.1)
 """Of the study of realism, for first sightings."""
+
+PROTOCOL_POLICIES = (
+    *("history", "history-uniform", "all-camera", "uncertainty", "beam-reduce", "random"),
+    *("care", "care-sbf", "learned-scorer", "care-sightlines", "rows", "place", "full"),
+)
+"""Those of the paper's Sec. 5.1, `random`, which is the floor alone, and the best patterns without
+a camera.
+"""
+ORDERED_POLICIES = (
+    *("history", "all-camera", "care", "care-sbf", "care-sightlines", "care-sector"),
+    *("learned-scorer", "history-place", "full"),
+)
+"""The policies whose cells are taken in every order."""

@@ -13,7 +13,6 @@ import pytest
 from care_sim.base.errors import InvalidInput
 from care_sim.cli import main
 from care_sim.commands.shared.run_study import run_study
-from care_sim.core.conditions import Conditions
 from care_sim.evaluation.recall import Tally
 from care_sim.reports.protocol.rows import plays_by_setting
 from care_sim.reports.report import read_results
@@ -21,11 +20,8 @@ from care_sim.reports.studies import STUDIES
 from care_sim.sources.named import source_of
 from care_sim.sources.scenes import Scene, Streets, chosen_scenes
 from care_sim.study import scene_play as plays
-from care_sim.study.journal import JOURNAL, Journal
-from care_sim.study.play_config import PLAY_FIELDS, PlayConfig, listed_plays, play_grid
-from care_sim.study.results_formats import PLAYS
+from care_sim.study.play_config import PLAY_FIELDS, listed_plays, play_grid
 from care_sim.study.run_config import in_batches
-from care_sim.study.runner import run_all
 from tests.helpers.av2_log import at, box, write
 
 MEASURED = {"wall_s", "peak_rss_mb"}
@@ -79,26 +75,6 @@ def test_a_play_is_one_row_with_the_sums_of_the_scene_and_of_its_strata(source):
     assert (row["differing_keyframes"], row["differing_cells"]) == (None, None)
 
 
-def test_one_policy_alone_is_read_again(source, tmp_path):
-    """What differs from the reference is known of no row then: a column of nothing, which is still
-    one of counts.
-    """
-    assert not run_study(small(source, ["care"]), tmp_path / "out", 1, study=PROTOCOL)
-    counts = pq.read_table(tmp_path / "out" / PLAYS.file).select(
-        ["differing_keyframes", "differing_cells"]
-    )
-    assert [str(column.type) for column in counts.columns] == ["int64", "int64"]
-    (row,) = read_results(tmp_path / "out")[0]
-    assert (row["differing_keyframes"], row["differing_cells"]) == (None, None)
-
-
-@pytest.mark.parametrize("lost", ["events.parquet", "tables.tex"])
-def test_a_finished_study_writes_a_lost_file_again(source, tmp_path, lost):
-    for _ in range(2):
-        assert not run_study(small(source, ["care"]), tmp_path / "out", 1, study=PROTOCOL)
-        (tmp_path / "out" / lost).unlink()
-
-
 def test_the_rows_of_a_play_do_not_depend_on_what_was_played_beside_it(source):
     together = small(source, ["history", "care", "full"], floors=(0, 1))
     rows = attempted(together)
@@ -106,12 +82,6 @@ def test_the_rows_of_a_play_do_not_depend_on_what_was_played_beside_it(source):
         assert steady(attempted([config])[0]) == steady(row)
     backwards = attempted(together[::-1])
     assert [steady(row) for row in backwards[::-1]] == [steady(row) for row in rows]
-
-
-def test_a_film_has_one_hash_and_floors_give_other_episodes(source):
-    rows = attempted(small(source, ["random", "care"], floors=(0, 1), scenes=("a", "b")))
-    assert len({row["film_hash"] for row in rows}) == 2
-    assert len({row["episode_hash"] for row in rows}) == len(rows)
 
 
 def test_allocations_are_compared_with_those_of_care_under_the_same_conditions(source):
@@ -221,57 +191,12 @@ def test_the_events_are_kept_one_by_one(source, tmp_path):
     assert "sightings" not in rows[0]
 
 
-def test_a_policy_that_joins_later_is_all_that_is_played(source, tmp_path):
-    before = small(source, scenes=("a", "b"))
-    run_study(before, tmp_path, workers=1, study=PROTOCOL)
-    lines = (tmp_path / JOURNAL).read_text().splitlines()
-    run_study(
-        [*before, *small(source, ["random"], scenes=("a", "b"))],
-        tmp_path,
-        workers=1,
-        study=PROTOCOL,
-    )
-    after = (tmp_path / JOURNAL).read_text().splitlines()
-    assert after[:4] == lines
-    assert [json.loads(line)["policy"] for line in after[4:]] == ["random", "random"]
-
-
-def test_workers_get_whole_scenes_and_equal_what_is_played_at_home(source, tmp_path):
-    configs = small(source, scenes=("a", "b"))
-    with Journal(tmp_path / JOURNAL) as journal:
-        assert run_all(configs, journal, 2, play_batch=PLAYS.play_batch) == []
-        kept = [journal[config.digest()] for config in configs]
-    at_home = [
-        row
-        for name in "ab"
-        for row in attempted([config for config in configs if config.scene.name == name])
-    ]
-    assert [steady(row) for row in kept] == [steady(row) for row in at_home]
-
-
 def test_the_command_plays_prints_and_resumes(folder, tmp_path, capsys):
-    arguments = [
-        "protocol",
-        "--source",
-        f"argoverse2:{folder}",
-        "--policies",
-        "history",
-        "care",
-        "full",
-    ]
-    options = [
-        "--budgets",
-        "0.05",
-        "--floor-seeds",
-        "2",
-        "--out",
-        str(tmp_path / "out"),
-        "--workers",
-        "1",
-    ]
+    line = "--policies history care full --budgets 0.05 --floor-seeds 2 --workers 1"
+    options = [*line.split(), "--out", str(tmp_path / "out")]
     for found in (False, True):
         with pytest.raises(SystemExit) as end:
-            main([*arguments, *options])
+            main(["protocol", "--source", f"argoverse2:{folder}", *options])
         said = capsys.readouterr()
         assert end.value.code == 1
         assert ("10 of 15 plays found" in said.err) == found
@@ -280,43 +205,6 @@ def test_the_command_plays_prints_and_resumes(folder, tmp_path, capsys):
         main(["report", str(tmp_path / "out")])
     assert end.value.code == 0
     assert "Left out: 5 plays" in capsys.readouterr().out
-
-
-@pytest.mark.parametrize(
-    ("arguments", "complaint"),
-    [
-        (
-            ["--source", "waymo:."],
-            "unknown source 'waymo:.'; known: streets, argoverse2:FOLDER, nuscenes:FOLDER",
-        ),
-        (["--source", "argoverse2:nowhere"], "source argoverse2:nowhere: nowhere is no folder"),
-        (["--split", "val"], "unknown split of the streets 'val'; known: calibration, evaluation"),
-        (["--version", "v1.0-mini"], "version has no meaning for streets"),
-        (["--scenes", "151"], "scenes must be a number from 1 to 150 or names, got 151"),
-        (["--scenes", "street-9"], "unknown scene 'street-9'"),
-        (["--policies", "nobody"], "unknown policy 'nobody'"),
-        (["--budgets", "1.5"], "budget"),
-        (["--floor-seeds", "0"], "floor_seeds must be a whole number >= 1 and <= 1000, got 0"),
-        (["--detector", "yolo"], "unknown detector 'yolo'"),
-        (["--engine", "bullet"], "engine cannot be changed in the open loop"),
-        (
-            ["--camera-latency", "1", "--camera-latencies", "0", "1"],
-            "give camera_latency one value or several",
-        ),
-    ],
-)
-def test_what_the_command_does_not_take_is_one_line(arguments, complaint, capsys, tmp_path):
-    with pytest.raises(SystemExit) as end:
-        main(["protocol", "--out", str(tmp_path), *arguments])
-    assert end.value.code == 2
-    error = capsys.readouterr().err
-    assert complaint in error
-    assert error.count("\n") == 1
-
-
-def test_a_source_without_recordings_is_one_line(tmp_path):
-    with pytest.raises(InvalidInput, match="no Argoverse 2 log"):
-        source_of(f"argoverse2:{tmp_path}").scenes()
 
 
 def test_scenes_are_chosen_by_number_or_by_name():
@@ -333,26 +221,12 @@ def test_scenes_are_chosen_by_number_or_by_name():
     )
 
 
-@pytest.mark.parametrize("text", ["-1", "0", "151", "2.5", "1e2", "+3"])
-def test_a_number_of_scenes_that_there_is_not_is_one_short_line(text):
-    with pytest.raises(InvalidInput) as refused:
-        chosen_scenes(Streets().scenes(), (text,))
-    assert str(refused.value) == f"scenes must be a number from 1 to 150 or names, got {text}"
-
-
 def test_a_scene_without_an_event_has_a_row_too(tmp_path):
     far = box("REGULAR_VEHICLE", (70.0, 0.0, 0.42))
     write(tmp_path / "empty", [[far]] * 15, [at()] * 15)
     (row,) = attempted(small(source_of(f"argoverse2:{tmp_path}"), ["care"], scenes=("empty",)))
     assert Tally(*(row[name] for name in plays.SUMS)) == Tally()
     assert row["ttfds"] == ()
-
-
-def test_conditions_of_a_play_are_those_of_the_environment(source):
-    (config,) = small(source, ["care"], min_returns=5, reserve_fraction=0.5)
-    with config.make_env(config.source.film(config.scene)) as env:
-        assert env.conditions == Conditions(min_returns=5, reserve_fraction=0.5)
-    assert isinstance(config, PlayConfig)
 
 
 def test_a_play_is_named_by_the_file_that_its_detector_is_given(source, tmp_path):
@@ -380,23 +254,6 @@ def test_what_changed_in_a_recording_is_played_again(source, folder, drive, tmp_
     assert config.digest() != before
 
 
-def test_a_bad_policy_costs_only_its_own_plays(third_party, source, tmp_path):
-    """Whole scenes go to a worker; the one that dies takes the others down, which are then played
-    without it.
-    """
-    configs = small(source, ["history", "dies", "care", "raises"], floors=(0, 1), scenes=("a", "b"))
-    with Journal(tmp_path / JOURNAL) as journal:
-        failures = run_all(configs, journal, 2, play_batch=PLAYS.play_batch)
-        kept = [config.policy for config in configs if config.digest() in journal]
-    assert sorted(kept) == ["care"] * 4 + ["history"] * 4
-    reasons = sorted((failure.config.policy, failure.reason) for failure in failures)
-    assert (
-        reasons[4:] == [("raises", "RuntimeError: no idea, at all (misbehaving.py, line 22)")] * 4
-    )
-    assert reasons[0] == ("dies", "the worker process died")
-    assert reasons[3] == ("dies", "the worker process died 3 times before")
-
-
 def test_a_scene_that_cannot_be_read_is_read_once(source, monkeypatch):
     read = []
     film = type(source.recordings).film
@@ -407,11 +264,3 @@ def test_a_scene_that_cannot_be_read_is_read_once(source, monkeypatch):
     (reason,) = set(attempted(configs))
     assert "annotations.feather" in reason
     assert read == ["torn"]
-
-
-def test_a_folder_of_another_kind_of_study_is_refused(source, tmp_path):
-    (tmp_path / "episodes.parquet").touch()
-    with pytest.raises(
-        InvalidInput, match="holds episodes of another study; the plays of the study protocol need"
-    ):
-        run_study(small(source), tmp_path, workers=1, study=PROTOCOL, force=True)
