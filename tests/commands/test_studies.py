@@ -1,12 +1,12 @@
 """`care-sim study NAME`: from arguments to a folder that `report` writes again from its rows."""
 
 import pytest
-from care_sim.reports.validation import played_worlds
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.return_settings import RETURN_SETTINGS
 from care_sim.reports.report import read_results
 from care_sim.reports.studies import STUDIES
+from care_sim.reports.tables.validate import played_worlds
 from care_sim.study.designs.ablations import OPEN_ABLATIONS
 from care_sim.study.designs.faults import fault_study
 from care_sim.study.designs.firing import FIRINGS
