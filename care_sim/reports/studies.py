@@ -1,12 +1,12 @@
 """The studies by name: what is shown of their rows."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TypeVar
 
 from matplotlib.figure import Figure
 
 from care_sim.base.errors import unknown
-from care_sim.reports import closings
 from care_sim.reports.figures.budget import (
     BUDGET_FIGURES,
     FIRING_FIGURE,
@@ -43,29 +43,29 @@ from care_sim.reports.figures.realism import (
 from care_sim.reports.figures.standards import NCAP_FIGURE, R157_FIGURE, ncap_figures, r157_figures
 from care_sim.reports.figures.validate import VALIDATION_FIGURE, validation_figures
 from care_sim.reports.findings import (
+    collisions,
     gate_tables,
-    leads_of_episodes,
-    leads_of_plays,
+    headline,
     leads_tables,
+    shared_conditions,
+    ties,
 )
 from care_sim.reports.mechanism.tables import mechanism_closing, mechanism_tables
-from care_sim.reports.protocol.closing import protocol_closing
 from care_sim.reports.protocol.contrasts import protocol_minus
+from care_sim.reports.protocol.notes import protocol_closing
 from care_sim.reports.protocol.tables import protocol_tables
 from care_sim.reports.realism.tables import realism_tables
 from care_sim.reports.study import Study
-from care_sim.reports.summary import medians, recalls
-from care_sim.reports.table import Table
-from care_sim.reports.tables.ablations import ablation_tables
+from care_sim.reports.tables.ablations import ablation_tables, ceiling
 from care_sim.reports.tables.crowding import crowding_tables
 from care_sim.reports.tables.faults import fault_tables
 from care_sim.reports.tables.firing import firing_tables
 from care_sim.reports.tables.ncap import ncap_headline, ncap_tables
-from care_sim.reports.tables.order import order_tables
-from care_sim.reports.tables.paper_statements import statement_tables
+from care_sim.reports.tables.order import order_closing, order_tables
+from care_sim.reports.tables.paper_statements import in_short, statement_tables
 from care_sim.reports.tables.r157 import r157_tables
 from care_sim.reports.tables.sweep import sweep_minus, sweep_tables
-from care_sim.reports.tables.validate import validation_tables
+from care_sim.reports.tables.validate import validation_closing, validation_tables
 from care_sim.reports.vehicle.tables import vehicle_tables
 from care_sim.study.designs.crowding import VEHICLES_COLUMN
 from care_sim.study.designs.ncap import (
@@ -80,22 +80,16 @@ from care_sim.study.rows.parquet import read_notes
 from care_sim.study.rows.schema import COUNT, FLAG, SUM, TEXT, as_optional
 from care_sim.study.run_config import Row
 
+_T = TypeVar("_T")
+
 
 def _no_figures(_rows: Sequence[Row]) -> dict[str, Figure]:
     return {}
 
 
-def _sweep_tables(rows: Sequence[Row]) -> list[Table]:
-    return [*leads_tables(leads_of_episodes(rows)), *sweep_tables(rows)]
-
-
-def _paper_tables(rows: Sequence[Row]) -> list[Table]:
-    leads = leads_of_episodes(rows, conditions=False)
-    return [*leads_tables(leads), *statement_tables(rows), *sweep_tables(rows)]
-
-
-def _protocol_tables(rows: Sequence[Row]) -> list[Table]:
-    return [*leads_tables(leads_of_plays(rows)), *gate_tables(rows), *protocol_tables(rows)]
+def _joined(*makers: Callable[[Sequence[Row]], list[_T]]) -> Callable[[Sequence[Row]], list[_T]]:
+    """What several functions make of the rows, one after the other."""
+    return lambda rows: [each for make in makers for each in make(rows)]
 
 
 _ORDER_COLUMNS = {"cell_order": TEXT}
@@ -112,29 +106,29 @@ _ALL = (
     Study(
         "sweep",
         "Sweep of the closed loop",
-        _sweep_tables,
+        _joined(leads_tables, statement_tables, sweep_tables),
         sweep_figures,
-        closings.sweep_closing,
+        _joined(ties, in_short, collisions),
         BUDGET_FIGURES,
         minus=sweep_minus,
-        headline=medians,
+        headline=headline,
     ),
     Study(
         "paper",
         "The paper's closed-loop study",
-        _paper_tables,
+        _joined(leads_tables, statement_tables, sweep_tables),
         sweep_figures,
-        closings.paper_closing,
+        _joined(ties, in_short, collisions),
         BUDGET_FIGURES,
         minus=sweep_minus,
-        headline=medians,
+        headline=headline,
     ),
     Study(
         "crowding",
         "Crowding in the closed loop",
         crowding_tables,
         crowding_figures,
-        closings.episodes_closing,
+        collisions,
         (CROWDING_FIGURE,),
         columns={VEHICLES_COLUMN: COUNT},
     ),
@@ -143,7 +137,7 @@ _ALL = (
         "Cut-ins of UN Regulation 157",
         r157_tables,
         r157_figures,
-        closings.episodes_closing,
+        collisions,
         (R157_FIGURE,),
         columns=_CASE_COLUMNS,
     ),
@@ -152,7 +146,7 @@ _ALL = (
         "Ablations of the closed loop",
         ablation_tables,
         ablation_figures,
-        closings.episodes_closing,
+        collisions,
         (ABLATION_FIGURE,),
     ),
     Study(
@@ -160,7 +154,7 @@ _ALL = (
         "Faults in the closed loop",
         fault_tables,
         fault_figures,
-        closings.fault_closing,
+        _joined(collisions, shared_conditions),
         FAULT_FIGURES,
     ),
     Study(
@@ -168,7 +162,7 @@ _ALL = (
         "The vehicle study",
         vehicle_tables,
         vehicle_figures,
-        closings.episodes_closing,
+        collisions,
         (VEHICLE_FIGURE,),
         VEHICLE,
     ),
@@ -177,7 +171,7 @@ _ALL = (
         "Euro NCAP tests",
         ncap_tables,
         ncap_figures,
-        closings.ncap_closing,
+        _joined(collisions, shared_conditions),
         (NCAP_FIGURE,),
         columns=_NCAP_COLUMNS,
         headline=ncap_headline,
@@ -187,7 +181,7 @@ _ALL = (
         "Order of cells in the closed loop",
         order_tables,
         order_figures,
-        closings.order_closing,
+        _joined(collisions, order_closing),
         (ORDER_FIGURE,),
         columns=_ORDER_COLUMNS,
     ),
@@ -196,7 +190,7 @@ _ALL = (
         "Hardware in the closed loop",
         firing_tables,
         firing_figures,
-        closings.episodes_closing,
+        collisions,
         (FIRING_FIGURE,),
     ),
     Study(
@@ -204,7 +198,7 @@ _ALL = (
         "Headline orders under realistic conditions, closed loop",
         realism_tables,
         realism_figures,
-        closings.episodes_closing,
+        collisions,
         (REALISM_FIGURE,),
     ),
     Study(
@@ -212,7 +206,7 @@ _ALL = (
         "Validation of a world",
         validation_tables,
         validation_figures,
-        closings.validation_closing,
+        _joined(collisions, validation_closing),
         (VALIDATION_FIGURE,),
     ),
     Study(
@@ -220,7 +214,7 @@ _ALL = (
         "Order of cells in the open loop",
         order_tables,
         open_order_figures,
-        closings.open_order_closing,
+        _joined(protocol_closing, order_closing),
         (OPEN_ORDER_FIGURE,),
         PLAYS,
         _ORDER_COLUMNS,
@@ -248,20 +242,20 @@ _ALL = (
         "Ablations of the open loop",
         ablation_tables,
         open_ablation_figures,
-        closings.open_ablation_closing,
+        _joined(protocol_closing, ceiling),
         (OPEN_ABLATION_FIGURE,),
         PLAYS,
     ),
     Study(
         "protocol",
         "First sightings in the open loop",
-        _protocol_tables,
+        _joined(leads_tables, gate_tables, protocol_tables),
         protocol_figures,
-        closings.first_sighting_closing,
+        _joined(ties, protocol_closing),
         PROTOCOL_FIGURES,
         PLAYS,
         minus=protocol_minus,
-        headline=recalls,
+        headline=headline,
     ),
     Study(
         "mechanism",

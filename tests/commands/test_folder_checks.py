@@ -10,7 +10,7 @@ from care_sim.cli import main
 from care_sim.commands.shared.folder_checks import check_results
 from care_sim.commands.shared.run_study import run_study
 from care_sim.evaluation.sightings import PRESENCES
-from care_sim.reports.report import write_report
+from care_sim.reports.report import StudyReport
 from care_sim.reports.studies import STUDIES
 from care_sim.sources.named import source_of
 from care_sim.study.episode_config import PLAIN_FIELDS, grid
@@ -42,7 +42,7 @@ def short(policies=("history",), seeds=(0,), **conditions):
 def folder(tmp_path):
     """Results of twenty episodes of the paper's study, with figures."""
     write_rows(STUDY, tmp_path / EPISODES.file, "paper")
-    write_report(STUDY, tmp_path, PAPER)
+    StudyReport.of(STUDY, PAPER).write(tmp_path)
     (tmp_path / "dense-budget.png").write_text("a figure")
     return tmp_path
 

@@ -8,7 +8,7 @@ from rich.console import Console
 
 from care_sim.base.errors import InvalidInput
 from care_sim.commands.shared.run_study import run_study
-from care_sim.reports.report import StudyReport, print_report, write_report
+from care_sim.reports.report import StudyReport, print_report
 from care_sim.reports.studies import STUDIES, study_of
 from care_sim.study.designs import (
     ablations,
@@ -98,7 +98,7 @@ def test_every_study_shows_its_rows_in_three_forms(name, rows, tmp_path, capsys)
         FigureCanvasAgg(figure).draw()
     first = dict([*figures.items()][:1])
     study = replace(study, figures=lambda rows: first)
-    write_report(rows, tmp_path, study)
+    StudyReport.of(rows, study).write(tmp_path)
     assert all((tmp_path / f"{figure}.png").is_file() for figure in first)
     print_report(rows, Console(width=80), study, verbose=True)
     printed, markdown, latex = (

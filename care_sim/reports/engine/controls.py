@@ -50,12 +50,18 @@ def best_of(measure: Measure | Recall, found: Mapping[str, Units]) -> str | None
     """The control with the highest mean, given what was measured of each, over the units that all
     of them have; None without one.
     """
-    played = {policy: units for policy, units in found.items() if units}
     # A control that lacks a hard seed or scene would win by that.
+    shared = shared_units(found)
+    return best_control({policy: measure.mean(units) for policy, units in shared.items()})
+
+
+def shared_units(found: Mapping[str, Units]) -> dict[str, Units]:
+    """What was measured of each policy, over the units that all of them have; without those of
+    which nothing was measured.
+    """
+    played = {policy: units for policy, units in found.items() if units}
     shared = set.intersection(*map(set, played.values())) if played else set()
-    return best_control(
-        {
-            policy: measure.mean({unit: units[unit] for unit in units if unit in shared})
-            for policy, units in played.items()
-        }
-    )
+    return {
+        policy: {unit: units[unit] for unit in units if unit in shared}
+        for policy, units in played.items()
+    }

@@ -9,11 +9,16 @@ from care_sim.reports.engine.frames import Frame
 from care_sim.reports.engine.levels import Cell, level_of
 from care_sim.reports.engine.varied import Varied
 from care_sim.reports.formatting import interval
-from care_sim.reports.order_verdicts import Verdict, Verdicts, on_mirrored_order, verdict_tables
 from care_sim.reports.protocol.formatting import claim_in_short, verdict
 from care_sim.reports.protocol.paper import claims_about
 from care_sim.reports.protocol.rows import SettingPlays, plays_by_setting
 from care_sim.reports.table import Table
+from care_sim.reports.tables.order_verdicts import (
+    Verdict,
+    Verdicts,
+    on_mirrored_order,
+    verdict_tables,
+)
 from care_sim.reports.tables.paper_statements import statements
 from care_sim.study.designs.order import BASE_ORDER, rows_by_order, without_order
 from care_sim.study.rows.reading import Key

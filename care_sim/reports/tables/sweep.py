@@ -3,14 +3,12 @@ policies have over each, and what each has over the best control.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 from care_sim.base.errors import percent
 from care_sim.evaluation.censoring import Quartiles
-from care_sim.reports.engine.frames import Frame
 from care_sim.reports.engine.levels import Cell, level_of
-from care_sim.reports.engine.measures import AVOIDED, BRAKED, DETECTED, DETECTION, Measure
-from care_sim.reports.engine.parts import Part
+from care_sim.reports.engine.measures import BRAKED, DETECTED, DETECTION, Measure
+from care_sim.reports.engine.parts import Part, parts
 from care_sim.reports.engine.tables import control_tables, minus_table
 from care_sim.reports.formatting import ends, marked, spread, unsigned
 from care_sim.reports.table import Table
@@ -20,7 +18,6 @@ from care_sim.study.designs.paper import (
     paper_cells,
     published_result,
 )
-from care_sim.study.rows.reading import is_avoided
 from care_sim.study.run_config import FULL, REFERENCE, Row
 
 SWEEP_COLUMNS = (
@@ -45,7 +42,7 @@ _WHOLE = tuple(column for column in SWEEP_COLUMNS if column not in ("policy", "p
 def sweep_tables(rows: Sequence[Row]) -> list[Table]:
     """Levels and contrasts, one setting after the other."""
     tables = []
-    for part in _parts(rows):
+    for part in parts(rows):
         cells = _cells(part)
         # A map that serves as a control is held against the others in the table of controls.
         learned = [
@@ -62,13 +59,8 @@ def sweep_tables(rows: Sequence[Row]) -> list[Table]:
 
 def sweep_minus(rows: Sequence[Row], policy: str) -> list[Table]:
     """One policy, named with its parameters, less every other, in every setting that has it."""
-    own = [part for part in _parts(rows) if policy in part.tags]
+    own = [part for part in parts(rows) if policy in part.tags]
     return [table for part in own for table in _minus(part, policy, _cells(part))]
-
-
-def _parts(rows: Sequence[Row]) -> list[Part]:
-    frame = Frame(rows)
-    return [Part(frame, setting) for setting in dict.fromkeys(key[0] for key in frame.groups)]
 
 
 def _cells(part: Part) -> list[Cell]:
@@ -90,21 +82,9 @@ def _measures(part: Part, cells: Sequence[Cell]) -> list[Measure]:
     """What is compared: detections and collisions where any policy has some."""
     further = (
         (DETECTED, any(cell.never for cell in cells)),
-        (_preventable(part), any(cell.collisions for cell in cells)),
+        (part.avoided, any(cell.collisions for cell in cells)),
     )
     return [DETECTION, BRAKED, *(measure for measure, differs in further if differs)]
-
-
-def _preventable(part: Part) -> Measure:
-    """Collisions avoided, on the seeds on which the full scan has none, if it was played."""
-    if not part.full:
-        return AVOIDED
-    spared = {row["seed"] for row in part.full if is_avoided(row)}
-    return replace(
-        AVOIDED,
-        name="Preventable collisions avoided",
-        read=lambda row: AVOIDED.read(row) if row["seed"] in spared else None,
-    )
 
 
 def _over_controls(part: Part) -> list[Table]:

@@ -17,7 +17,7 @@ from care_sim.reports.protocol.paper import (
     claims_about,
 )
 from care_sim.reports.protocol.tables import protocol_tables
-from care_sim.reports.report import print_report, write_report
+from care_sim.reports.report import StudyReport, print_report
 from care_sim.reports.studies import STUDIES
 from care_sim.reports.table import Bold
 from care_sim.study.rows.parquet import read_rows, with_tuples, write_rows
@@ -411,7 +411,7 @@ def test_a_file_changes_nothing_in_the_tables(tmp_path):
 
 def test_the_study_is_shown_in_three_forms(tmp_path, capsys):
     protocol = STUDIES["protocol"]
-    write_report(ROWS, tmp_path, protocol)
+    StudyReport.of(ROWS, protocol).write(tmp_path)
     print_report(ROWS, Console(width=100), protocol, verbose=True)
     printed, markdown, latex = (
         capsys.readouterr().out,

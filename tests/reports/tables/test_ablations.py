@@ -3,8 +3,8 @@
 import pytest
 
 from care_sim.core.forgetting import ForgettingRules
-from care_sim.reports.closings import open_ablation_closing as ablation_closing
 from care_sim.reports.protocol.paper_ablations import PUBLISHED_CHANGES, USUAL
+from care_sim.reports.studies import STUDIES
 from care_sim.reports.table import Bold
 from care_sim.reports.tables.ablations import ablation_tables
 from care_sim.sources.scenes import Scene, Streets
@@ -211,13 +211,15 @@ def test_rows_of_before_tell_no_released_cells(plays):
 
 
 def test_the_closing_tells_what_the_full_scan_finds(plays):
-    closing = ablation_closing(plays)
+    closing = STUDIES["ablate-open-loop"].closing(plays)
     assert closing[-1] == (
         "The full scan finds: first sightings 80.0%, below 20 m 90.0%, overall 90.0%."
     )
     assert closing[0].startswith("Scenes: 6, with 90 first sightings")
     without = [row for row in plays if row["policy"] != "full"]
-    assert not any("full scan" in sentence for sentence in ablation_closing(without))
+    assert not any(
+        "full scan" in sentence for sentence in STUDIES["ablate-open-loop"].closing(without)
+    )
 
 
 def test_all_that_the_paper_says_is_of_levels_and_bases_that_are_shown():

@@ -2,7 +2,7 @@
 
 import pytest
 
-from care_sim.reports.closings import open_order_closing as plays_closing
+from care_sim.reports.studies import STUDIES
 from care_sim.reports.table import Bold
 from care_sim.reports.tables.order import order_closing, order_tables
 from care_sim.study.designs.order import ORDERS, order_study
@@ -150,7 +150,9 @@ def test_statements_on_plays_are_judged_under_every_order():
     assert isinstance(line[2], Bold)
     assert all("3%" not in row[0] for row in of_plays()[VERDICTS].rows)
     assert (CLAIM, "+10.0 [10.0,10.0]", "+0.0 [0.0,0.0]") in of_plays()[MEASURED].rows
-    assert "0 of 4 statements have the same verdict" in plays_closing(PLAYS)[-1]
+    assert (
+        "0 of 4 statements have the same verdict" in STUDIES["order-open-loop"].closing(PLAYS)[-1]
+    )
     scarce = [row for row in PLAYS if row["budget"] in (0.03, 1.0)]
     assert VERDICTS not in of_plays(scarce)
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from care_sim.reports.closings import paper_closing
+from care_sim.reports.studies import STUDIES
 from care_sim.reports.table import Bold
 from care_sim.reports.tables.paper_statements import statement_tables, statements
 from care_sim.study.designs.paper import paper_study
@@ -32,11 +32,11 @@ def changed(where, **values):
 
 
 def test_the_closing_counts_what_holds_and_names_what_does_not():
-    assert "The paper: 12 of 12 statements hold." in paper_closing(STUDY)
+    assert "The paper: 12 of 12 statements hold." in STUDIES["paper"].closing(STUDY)
     late = changed(DARTOUT | {"policy": "history"}, braked=True)
     told = "The paper: 11 of 12 statements hold. Not: dart-out 10%: history brakes in 3 of 5"
-    assert any(line.startswith(told) for line in paper_closing(late))
-    assert not any("paper" in line for line in paper_closing(STUDY[:10]))
+    assert any(line.startswith(told) for line in STUDIES["paper"].closing(late))
+    assert not any("paper" in line for line in STUDIES["paper"].closing(STUDY[:10]))
     assert statement_tables(STUDY[:10]) == []
 
 
