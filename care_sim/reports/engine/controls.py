@@ -1,6 +1,6 @@
 """Which policies are the controls that a contender has to beat, and which of them is the best."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
 from care_sim.base.errors import percent
 from care_sim.reports.engine.measures import Measure, Recall, Units
@@ -8,20 +8,6 @@ from care_sim.reports.formatting import MARKS
 
 BEST_CONTROL = "best control"
 """What the line begins with that names it at every budget."""
-IN_HINDSIGHT = (
-    f"The {BEST_CONTROL} is chosen anew at each budget, by the very results that are compared. "
-    "Such a choice in hindsight favours the control, which is the strict reading."
-)
-
-RULE = (
-    f"The {BEST_CONTROL} is that with the highest mean of the measure at the budget, over the "
-    f"seeds or scenes that all controls have there. {IN_HINDSIGHT}"
-)
-
-
-def candidates(controls: Iterable[str]) -> str:
-    """Among which controls the best one is chosen, in a sentence."""
-    return f"Candidates: {', '.join(controls)}."
 
 
 def named_by_budget(controls: Mapping[float, str]) -> str:

@@ -8,8 +8,12 @@ from typing import NamedTuple
 
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, TTFD, Ratio
 from care_sim.reports.protocol import quotes
-from care_sim.reports.protocol.differences import Comparison, PolicyPair
-from care_sim.reports.protocol.thirds import DENSE_LESS_SPARSE, SceneThird
+from care_sim.reports.protocol.comparisons import (
+    DENSE_LESS_SPARSE,
+    Comparison,
+    PolicyPair,
+    SceneThird,
+)
 from care_sim.study.rows.settings import Setting
 
 PAPER_BUDGETS = (0.10, 0.20, 0.35)

@@ -14,8 +14,7 @@ from care_sim.evaluation.scene_contrasts import (
 from care_sim.reports.engine.tables import PAPER, control_tables
 from care_sim.reports.protocol.contrasts import protocol_contrast_tables
 from care_sim.reports.protocol.controls import over_controls
-from care_sim.reports.protocol.details import allocation_tables, thirds_tables
-from care_sim.reports.protocol.earlier import earlier_tables
+from care_sim.reports.protocol.details import allocation_tables, earlier_tables, thirds_tables
 from care_sim.reports.protocol.formatting import rounded, share, share_ends, written
 from care_sim.reports.protocol.notes import left_out, of_full, papers
 from care_sim.reports.protocol.paper import LEVEL_SOURCES, PUBLISHED_LEVELS, PublishedLevel

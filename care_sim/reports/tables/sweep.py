@@ -9,7 +9,7 @@ from care_sim.evaluation.censoring import Quartiles
 from care_sim.reports.engine.levels import Cell, level_of
 from care_sim.reports.engine.measures import BRAKED, DETECTED, DETECTION, Measure
 from care_sim.reports.engine.parts import Part, parts
-from care_sim.reports.engine.tables import control_tables, minus_table
+from care_sim.reports.engine.tables import control_tables, minus_tables
 from care_sim.reports.formatting import ends, marked, spread, unsigned
 from care_sim.reports.table import Table
 from care_sim.study.designs.paper import (
@@ -75,7 +75,7 @@ def _minus(part: Part, base: str, cells: Sequence[Cell]) -> list[Table]:
     """The base minus every other policy and the full scan; none of a policy that ran alone."""
     played = dict.fromkeys([*(cell.policy for cell in cells), *([FULL] if part.full else [])])
     others = [policy for policy in played if policy != base]
-    return [minus_table(part, base, others, _measures(part, cells))] if others else []
+    return minus_tables(part, base, others, _measures(part, cells))
 
 
 def _measures(part: Part, cells: Sequence[Cell]) -> list[Measure]:

@@ -9,8 +9,8 @@ from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, TTFD
 from care_sim.reports.engine import contrasts
 from care_sim.reports.engine.contrasts import of_interval
 from care_sim.reports.engine.measures import BRAKED, DETECTED, DETECTION, Recall
+from care_sim.reports.protocol.comparisons import DENSE_LESS_SPARSE, SceneThird
 from care_sim.reports.protocol.rows import plays_by_setting
-from care_sim.reports.protocol.thirds import DENSE_LESS_SPARSE, SceneThird
 from tests.helpers.made_plays import found, play, study
 from tests.helpers.made_rows import NEAREST_M, rows
 
