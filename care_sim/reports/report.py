@@ -57,12 +57,13 @@ def read_results(folder: Path) -> tuple[list[Row], Study, list[str]]:
     return rows, study, [*dict.fromkeys([*read_notes(path)[1], *twice, *doubts])]
 
 
-def described(folder: Path) -> Any:
+def described(folder: Path) -> dict[str, Any]:
     """What `config.json` says of the folder; nothing where it cannot be read."""
     try:
-        return json_content(folder / CONFIG)
+        content = json_content(folder / CONFIG)
     except (OSError, ValueError):
         return {}
+    return content if isinstance(content, dict) else {}
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import pytest
 from rich.console import Console
 
 from care_sim.reports.table import Bold
-from care_sim.reports.tables.sweep import SWEEP_COLUMNS, sweep_tables
+from care_sim.reports.tables.sweep import sweep_tables
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.rows.reading import setting_of
 from tests.helpers.made_rows import STUDY, row, rows
@@ -19,9 +19,8 @@ ORACLE = rows(
 
 
 def levels(study=STUDY):
-    return {
-        line[1]: dict(zip(SWEEP_COLUMNS, line, strict=True)) for line in sweep_tables(study)[0].rows
-    }
+    table = sweep_tables(study)[0]
+    return {line[1]: dict(zip(table.columns, line, strict=True)) for line in table.rows}
 
 
 def blocks(study=STUDY):
