@@ -29,29 +29,11 @@ from tests.helpers import made_worlds
 from tests.helpers.made_rows import CROWD, CUT_INS, STUDY, row, vehicle_row
 
 
-@pytest.mark.parametrize("name", STUDIES)
-def test_a_file_knows_its_study(name, tmp_path):
-    write_rows(STUDY, tmp_path / "episodes.parquet", name)
-    assert study_of(tmp_path / "episodes.parquet") is STUDIES[name]
-
-
 def test_a_file_that_names_no_study_holds_a_sweep(tmp_path):
     path = tmp_path / "episodes.parquet"
     write_rows(STUDY, path)
     pq.write_table(pq.read_table(path).replace_schema_metadata(None), path)
     assert study_of(path).name == "sweep"
-
-
-def test_an_unknown_study_is_one_clear_line(tmp_path):
-    write_rows(STUDY, tmp_path / "episodes.parquet", "gardening")
-    with pytest.raises(
-        InvalidInput,
-        match=r"unknown study in .* 'gardening'; "
-        "known: ablate, ablate-open-loop, crowding, faults, firing, firing-open-loop, mechanism, "
-        "ncap, order, order-open-loop, paper, protocol, r157, realism, realism-open-loop, sweep, "
-        "validate, vehicle",
-    ):
-        study_of(tmp_path / "episodes.parquet")
 
 
 EPISODES = {
@@ -147,9 +129,3 @@ def test_a_study_leaves_its_name_and_its_columns_in_the_folder(tmp_path):
     assert json.loads((tmp_path / "config.json").read_text())["study"] == "crowding"
     assert study_of(tmp_path / "episodes.parquet").name == "crowding"
     assert {"tags", "regret_m", "censored"} <= set(read_rows(tmp_path / "episodes.parquet")[0])
-
-
-def test_without_a_sentence_there_is_no_heading_for_it():
-    silent = replace(STUDIES["sweep"], closing=lambda rows: [])
-    assert "## Statements" in StudyReport.of(STUDY, STUDIES["sweep"]).texts["tables.md"]
-    assert "## Statements" not in StudyReport.of(STUDY, silent).texts["tables.md"]

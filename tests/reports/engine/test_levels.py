@@ -20,11 +20,6 @@ def key(policy, **fields):
     return key_of(EpisodeConfig("dense", policy, 0.03, **fields).row())
 
 
-def test_medians_rank_the_never_detected_last():
-    history = cell("history").detection
-    assert (history.low, history.median, history.high) == (None, 4.0, 6.0)
-
-
 def test_regret_is_what_the_full_scan_has_over_a_policy():
     assert cell("care").regret.mean == pytest.approx(0.1)
     assert cell("care").as_full == 4
@@ -79,11 +74,6 @@ def test_cells_and_differences_are_found_by_key_and_what_was_not_played_is_none(
     assert frame.of(key("care", camera_latency=1)) == ()
     assert level_of(frame, key("history")) is None
     assert frame.contrast(DETECTION, key("care"), key("history")) is None
-
-
-def test_a_number_is_the_same_key_as_an_int_and_as_a_float():
-    whole, real = (key("care-sbf", policy_parameters=(("k_safe", value),)) for value in (1, 1.0))
-    assert whole == real != key("care-sbf")
 
 
 def test_levels_in_words():

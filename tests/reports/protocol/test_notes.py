@@ -49,14 +49,6 @@ def test_what_rests_on_an_interval_over_events_is_marked_and_explained():
         assert "°: interval over events" in table.lines[-1]
 
 
-def test_intervals_over_scenes_have_no_mark_and_no_note():
-    shown = tables(study(BOTH, scenes=5))
-    entries = [entry for table in shown.values() for row in table.rows for entry in row]
-    assert "°" not in "".join(entries)
-    few = tables(study({"care": (3, 5), "history": (1, 6)}, scenes=1, events=4))
-    assert "°" not in "".join(entry for row in few[CONTRASTS].rows for entry in row)
-
-
 def test_the_closing_counts_events_by_both_presences_where_the_rows_do():
     def closing(**more):
         (told,) = protocol_closing(study(BOTH, scenes=6, events=20, **more))
