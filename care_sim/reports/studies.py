@@ -103,25 +103,21 @@ _NCAP_COLUMNS = {
 
 
 _ALL = (
-    Study(
-        "sweep",
-        "Sweep of the closed loop",
-        _joined(leads_tables, statement_tables, sweep_tables),
-        sweep_figures,
-        _joined(ties, in_short, collisions),
-        BUDGET_FIGURES,
-        minus=sweep_minus,
-        headline=headline,
-    ),
-    Study(
-        "paper",
-        "The paper's closed-loop study",
-        _joined(leads_tables, statement_tables, sweep_tables),
-        sweep_figures,
-        _joined(ties, in_short, collisions),
-        BUDGET_FIGURES,
-        minus=sweep_minus,
-        headline=headline,
+    *(
+        Study(
+            name,
+            title,
+            _joined(leads_tables, statement_tables, sweep_tables),
+            sweep_figures,
+            _joined(ties, in_short, collisions),
+            BUDGET_FIGURES,
+            minus=sweep_minus,
+            headline=headline,
+        )
+        for name, title in (
+            ("sweep", "Sweep of the closed loop"),
+            ("paper", "The paper's closed-loop study"),
+        )
     ),
     Study(
         "crowding",

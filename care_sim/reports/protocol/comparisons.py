@@ -34,9 +34,14 @@ class PolicyPair:
     equal_scenes: bool = False
 
     @property
+    def measure(self) -> Recall:
+        """What is compared."""
+        return Recall(self.ratio, self.within, self.equal_scenes)
+
+    @property
     def heading(self) -> str:
         """The measure, the stratum, the weights."""
-        return Recall(self.ratio, self.within, self.equal_scenes).heading
+        return self.measure.heading
 
     @property
     def label(self) -> str:
@@ -50,8 +55,7 @@ class PolicyPair:
 
     def measured(self, plays: SettingPlays, budget: float) -> Contrast | None:
         """Paired by scene, on the scenes that both policies have."""
-        measure = Recall(self.ratio, self.within, self.equal_scenes)
-        return plays.contrast(measure, *self.policies, budget)
+        return plays.contrast(self.measure, *self.policies, budget)
 
 
 @dataclass(frozen=True)
