@@ -1,7 +1,6 @@
 import json
 from dataclasses import replace
 
-import pyarrow.parquet as pq
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from rich.console import Console
@@ -27,14 +26,6 @@ from care_sim.study.rows.parquet import read_rows, write_rows
 from care_sim.study.rows.reading import with_added_columns
 from tests.helpers import made_worlds
 from tests.helpers.made_rows import CROWD, CUT_INS, STUDY, row, vehicle_row
-
-
-def test_a_file_that_names_no_study_holds_a_sweep(tmp_path):
-    path = tmp_path / "episodes.parquet"
-    write_rows(STUDY, path)
-    pq.write_table(pq.read_table(path).replace_schema_metadata(None), path)
-    assert study_of(path).name == "sweep"
-
 
 EPISODES = {
     "sweep": STUDY,

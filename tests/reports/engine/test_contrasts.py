@@ -7,7 +7,7 @@ from care_sim.evaluation.bootstrap import paired_difference
 from care_sim.evaluation.censoring import Bound
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, TTFD
 from care_sim.reports.engine import contrasts
-from care_sim.reports.engine.measures import BRAKED, DETECTED, DETECTION, Recall
+from care_sim.reports.engine.measures import DETECTION, Recall
 from care_sim.reports.protocol.comparisons import DENSE_LESS_SPARSE, SceneThird
 from care_sim.reports.protocol.rows import plays_by_setting
 from tests.helpers.made_plays import found, play, study
@@ -34,14 +34,6 @@ def test_differences_are_paired_by_seed():
     single = contrast(DETECTION, rows("care", [1.0, 9.0]), rows("full", [2.0]))
     assert (single.difference.pairs, single.mean, single.interval) == (1, -1.0, None)
     assert contrast(DETECTION, rows("care", [1.0]), []) is None
-
-
-def test_rates_are_compared_in_points():
-    ours, theirs = rows("care", [9.0] * 4), rows("history", [9.0, 9.0, 9.0, None])
-    theirs[0]["braked"] = False
-    assert contrast(BRAKED, ours, theirs).mean == 25.0
-    assert contrast(DETECTED, ours, theirs).mean == 25.0
-    assert contrast(DETECTED, ours, theirs).bound == Bound.EXACT
 
 
 @pytest.mark.parametrize(

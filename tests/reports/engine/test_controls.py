@@ -26,12 +26,10 @@ def plays(rows=PLAYS):
     ("tags", "control"),
     [
         (("causal", "control"), True),
-        (("control",), True),
         (("causal",), False),
         (("generator", "control"), False),
         (("privileged", "control"), False),
         (("non-causal", "control"), False),
-        (("",), False),
     ],
 )
 def test_a_control_is_one_that_a_car_can_have(tags, control):
@@ -41,7 +39,6 @@ def test_a_control_is_one_that_a_car_can_have(tags, control):
 @pytest.mark.parametrize(
     ("controls", "words"),
     [
-        ({0.03: "fan"}, "fan at every budget"),
         ({0.01: "fan", 0.03: "fan"}, "fan at every budget"),
         ({0.01: "fan", 0.03: "rows", 0.05: "fan"}, "fan at 1%, 5% and rows at 3%"),
     ],

@@ -220,42 +220,12 @@ def test_strata_have_the_level_of_every_policy_and_contrasts():
     assert block(tables()["overall recall by stratum"], "azimuth: side, 420 object frames")
 
 
-def test_thirds_are_shown_with_what_they_are_ranked_by():
-    """CARE finds two frames more an event than all-camera in the third with the most tracks."""
-    rows = [
-        play(f"{n:02d}", policy, found(10, 3), [5 + 2 * (policy == "care" and n >= 10)] * 10,
-             tracks=float(n), explained=float(n % 3))
-        for n in range(15) for policy in ("care", "all-camera")
-    ]  # fmt: skip
-    table = tables(rows)["care minus all-camera in thirds of the scenes"]
-    assert [line[1] for line in block(table, "Tracked objects a keyframe")] == [
-        "12.0",
-        "7.0",
-        "2.0",
-    ]
-    lines = block(table, "Overall recall, by tracks")
-    assert [line[1] for line in lines if line[0] != "(paper)"] == [
-        "+20.0 [20.0,20.0]",
-        "+0.0 [0.0,0.0]",
-        "+0.0 [0.0,0.0]",
-        "+20.0 [20.0,20.0]",
-    ]
-    assert block(table, "First sightings, by explained")[0] == ("dense third", "+0.0 [0.0,0.0]")
-
-
 def test_differing_allocations_stand_above_the_papers():
     table = tables()["keyframes on which the allocation differs from that of care"]
     assert table.rows[1:3] == (
         ("all-camera", *["10%, 50 cells"] * 3),
         ("(paper)", "17%", "", "68%"),
     )
-
-
-def test_one_policy_without_care_has_levels_and_strata():
-    shown = tables(study({"history": (4, 6), "full": (8, 8)}))
-    by_stratum = ["first-sighting recall by stratum", "overall recall by stratum"]
-    assert list(shown) == ["levels", ENTRIES, *by_stratum]
-    assert list(tables(study({"full": (8, 8)}))) == ["levels"]
 
 
 def test_the_gain_is_held_against_the_papers_gate_at_the_papers_budgets():

@@ -87,9 +87,3 @@ def test_both_sides_are_shown():
     assert table.rows[6] == (late, "10.3 against 15.1", "10.3 against 15.1", "agrees")
     (differs,) = statement_tables(changed(DARTOUT | {"policy": "history"}, braked=True))
     assert isinstance(differs.rows[3][3], Bold)
-
-
-def test_an_undetected_median_ranks_last_and_is_said():
-    missed = changed(DARTOUT | {"policy": "history"}, **MISSED)
-    assert differing(missed) == []
-    assert statements(missed)[2].measured == "not detected against 15.1"

@@ -55,13 +55,6 @@ def test_care_is_compared_with_every_policy_at_every_budget():
     assert found["Detected, points", "history"][0].startswith("+40 [0,80]")
 
 
-def test_the_full_scan_alone_has_nothing_to_regret():
-    (table,) = sweep_tables([row for row in STUDY if row["policy"] == "full"])
-    assert table.notes == ()
-    (table,) = sweep_tables([row for row in STUDY if row["policy"] == "history"])
-    assert table.notes == ("Regret: full not run.",)
-
-
 def test_a_drive_that_meets_nobody_is_told():
     nobody = {"detection_distance_m": None, "undetected_to_m": None}
     met, row = rows("full", [9.0, 9.0], scenario="drive")
@@ -102,11 +95,6 @@ def test_preventable_are_the_collisions_that_the_full_scan_avoids_on_the_same_se
     found = blocks([*COLLISIONS, *collided("full", {3, 4})])
     assert found["Preventable collisions avoided, points", "history"][0].startswith("+67 [")
     assert found["Preventable collisions avoided, points", "full"] == ("+0 [0,0]",)
-
-
-def test_without_care_or_another_policy_there_is_no_contrast():
-    assert len(sweep_tables([row for row in STUDY if row["policy"] != "care"])) == 1
-    assert len(sweep_tables(rows("care", [15.0]))) == 1
 
 
 def test_a_pass_that_was_never_in_view_is_said():
