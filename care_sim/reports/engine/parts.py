@@ -10,7 +10,6 @@ from care_sim.reports.engine.contrasts import Contrast
 from care_sim.reports.engine.controls import best_of, is_control
 from care_sim.reports.engine.frames import Frame
 from care_sim.reports.engine.measures import AVOIDED, Measure, Recall, Units
-from care_sim.reports.formatting import marked, tag_notes
 from care_sim.study.rows.reading import Key, is_avoided
 from care_sim.study.rows.settings import Setting
 from care_sim.study.run_config import FULL, Row
@@ -116,13 +115,7 @@ class Part:
 
     def marked(self, policy: str) -> str:
         """A policy's name, with a mark when no car can have it."""
-        return marked(policy, self.tags.get(policy, ()))
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What the marks of the policies mean, in one line."""
-        told = " ".join(tag_notes(self.tags.values()))
-        return (told,) if told else ()
+        return self.frame.marked(policy)
 
 
 def parts(rows: Sequence[Row]) -> list[Part]:

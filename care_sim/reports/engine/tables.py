@@ -29,10 +29,8 @@ def budget_table(
     """A table of a setting with a column per budget; none without lines."""
     columns = (head, *map(percent, part.budgets if budgets is None else budgets))
     heading = f"{part.setting.label}: {title}"
-    rows, said = tuple(lines), (*notes, *part.notes)
-    if not rows:
-        return []
-    return [Table(heading, columns, rows, said, tuple(quotes), terminal=terminal)]
+    table = Table(heading, columns, tuple(lines), tuple(notes), tuple(quotes), terminal=terminal)
+    return [table] if table.rows else []
 
 
 def minus_tables(

@@ -125,7 +125,6 @@ def earlier_tables(plays: SettingPlays) -> list[Table]:
     notes = (
         "Mean over floor seeds. Two policies that do not detect an event within 6 keyframes are "
         "tied. Events are new clusters of the reference, no labels.",
-        *plays.notes,
     )
     vehicle = "CARE earlier than history on 17 of 104 entries, later on 8."
     return [

@@ -61,7 +61,7 @@ def levels_tables(plays: SettingPlays) -> list[Table]:
             f"{plays.setting.label}: levels",
             columns,
             tuple(lines),
-            (*of_full(plays), *left_out(plays), *plays.notes),
+            (*of_full(plays), *left_out(plays)),
             papers(LEVEL_SOURCES) if any(line[1] == PAPER for line in lines) else (),
             files_only=details,
             whole=tuple(name for name in columns if name != "policy"),

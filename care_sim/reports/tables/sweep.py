@@ -97,7 +97,7 @@ def _levels_table(part: Part, cells: Sequence[Cell]) -> Table:
         part.setting.label,
         columns,
         tuple(tuple(line.values()) for line in lines),
-        (*part.notes, f"{missing} {_nobody_note(cells)}".strip()),
+        (f"{missing} {_nobody_note(cells)}".strip(),),
         tuple(quotes),
         files_only=(*_FILES_ONLY, *zeros),
         whole=tuple(column for column in columns if column not in ("policy", "paper")),

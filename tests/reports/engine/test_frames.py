@@ -70,11 +70,6 @@ def test_policies_that_no_car_can_have_are_marked():
     (plays,) = plays_by_setting(both)
     marks = ["care", "history-oracle †", "random-points ‡"]
     assert [plays.marked(policy) for policy in plays.policies] == marks
-    assert plays.notes == (
-        "† knows the truth: no policy of a car. ‡ saw the full scan first: saves no sensing.",
-    )
-    (plain,) = plays_by_setting(study({"care": (4, 5)}))
-    assert plain.notes == ()
 
 
 def test_plays_of_two_films_of_a_scene_are_refused_and_two_camera_detectors_are_two_settings():

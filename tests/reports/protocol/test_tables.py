@@ -69,7 +69,7 @@ def test_contrasts_stand_above_the_papers():
     assert block(table, "Censored TTFD")[0] == ("history", *["-0.60 [-0.60,-0.60]"] * 3)
     counted = "6 scenes, 120 events (42 emerging, 78 entering), 1,200 object frames; 3 floor seeds"
     assert any(counted in note for note in table.notes)
-    assert any(note.startswith("†") for note in table.notes)
+    assert "†: knows the truth" in table.lines[-1]
     assert any(quote.startswith('Paper: "Table 1') for quote in table.quotes)
 
 
