@@ -24,31 +24,28 @@ def verdict_tables(title: str, verdicts: Verdicts, played: str) -> list[Table]:
     """The verdict on every statement under every order, and what was measured; none without
     statements. `played` says how much it rests on.
     """
-    statements = list(dict.fromkeys(text for found in verdicts.values() for text in found))
-    if not statements:
-        return []
     usual = verdicts.get(BASE_ORDER, {})
-    words: list[tuple[str, ...]] = []
-    measured: list[tuple[str, ...]] = []
-    for text in statements:
-        found = [own.get(text, Verdict("", "")) for own in verdicts.values()]
-        known = usual.get(text)
-        words.append(
-            (
-                text,
-                *(
-                    Bold(each.word) if known and each.word not in ("", known.word) else each.word
-                    for each in found
-                ),
-            )
-        )
-        measured.append((text, *(each.measured for each in found)))
+    found = {
+        text: [own.get(text, Verdict("", "")) for own in verdicts.values()]
+        for text in dict.fromkeys(text for own in verdicts.values() for text in own)
+    }
+    if not found:
+        return []
+    words = tuple(
+        (text, *(_against(each.word, usual.get(text)) for each in own))
+        for text, own in found.items()
+    )
+    measured = tuple((text, *(each.measured for each in own)) for text, own in found.items())
     columns = ("statement", *verdicts)
     rule = f"Bold: another verdict than under {BASE_ORDER}."
     return [
-        Table(title, columns, tuple(words), (rule, played), whole=tuple(verdicts)),
-        Table(f"{title}, what was measured", columns, tuple(measured), (played,), terminal=False),
+        Table(title, columns, words, (rule, played), whole=tuple(verdicts)),
+        Table(f"{title}, what was measured", columns, measured, (played,), terminal=False),
     ]
+
+
+def _against(word: str, usual: Verdict | None) -> str:
+    return Bold(word) if usual and word not in ("", usual.word) else word
 
 
 def on_mirrored_order(verdicts: Verdicts) -> list[str]:
