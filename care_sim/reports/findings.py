@@ -72,7 +72,8 @@ def leads(rows: Sequence[Row]) -> list[Lead]:
     """The best policy over the best control at every budget of the main settings: in first
     sightings, or in first detections and, where there are any, in collisions.
 
-    Compared are policies that a car can have, on the seeds or scenes that all have played.
+    The best are chosen among policies that a car can have, by the seeds or scenes that all of
+    them have. Their difference is over those that the two share.
     """
     found = (
         _lead(part, budget, measure)

@@ -11,7 +11,6 @@ from care_sim.reports.report import StudyReport, print_report
 from care_sim.reports.studies import STUDIES, study_of
 from care_sim.study.designs import (
     ablations,
-    crowding,
     faults,
     firing,
     ncap,
@@ -93,9 +92,7 @@ def test_a_file_changes_nothing_in_the_tables(tmp_path):
     played = {
         "ablate": ablations.ablation_study(range(2)),
         "faults": faults.fault_study(range(2)),
-        "order": order.order_study(range(2)),
         "firing": firing.firing_study(range(2)),
-        "crowding": crowding.crowding_study(range(2)),
         "ncap": ncap.ncap_study(range(2), ["care", "fan", "full"], ["CPNA-25", "CCRs"]),
         "paper": paper.paper_study(range(2)),
         "validate": validate.validation_study("cutin", [(("mirrored", "drawn"),)], [0.1], [0], 1),
