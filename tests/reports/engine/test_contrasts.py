@@ -99,6 +99,17 @@ def test_two_events_more_in_every_scene_of_twenty_are_ten_points():
     assert over_history(FIRST, plays(study({"care": (6, 5)}))) is None
 
 
+def test_equal_scene_weights_count_scenes():
+    rows = [
+        play(f"{n}", policy, found(events, sighted), [0] * events)
+        for n, (events, ours) in enumerate([(2, 1), (10, 0), (2, 1), (10, 0), (2, 1)])
+        for policy, sighted in (("care", ours), ("history", 0))
+    ]
+    assert over_history(FIRST, plays(rows)).mean == pytest.approx(100 * 3 / 26)
+    equal = Recall(FIRST_SIGHTING, equal_scenes=True)
+    assert over_history(equal, plays(rows)).mean == pytest.approx(30.0)
+
+
 def test_of_few_scenes_the_interval_comes_from_events_averaged_over_floor_seeds():
     """Of 30 events CARE finds 12 and 6 with its two floors, three more a keyframe late, and history
     none.
