@@ -6,9 +6,8 @@ has changed than the policy, and nothing of the two folders may be compared.
 """
 
 import json
-from collections.abc import Collection, Hashable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -46,7 +45,7 @@ class Merged:
     rows: Sequence[Row]
     events: Mapping[str, Any] | None
     left_out: Sequence[str]
-    descriptions: Mapping[str, Any]
+    descriptions: Mapping[str, dict[str, Any]]
     twice: int
     apart: Sequence[Path]
 
@@ -67,15 +66,15 @@ class Merged:
         if self.events is not None:
             write_columns(self.events, folder / _EVENTS)
         write_rows(self.rows, folder / kind.file, self.study.name, self.left_out, self.study.schema)
-        write_text(folder / CONFIG, json.dumps(self._description(), indent=1) + "\n")
-        report.write(folder)
-
-    def _description(self) -> dict[str, Any]:
-        of_all = {
-            name: {key: ", ".join(held) for key, held in _values(self.descriptions, name).items()}
-            for name in ("versions", "machine")
+        told = {
+            "study": self.study.name,
+            "versions": _joined(self.descriptions.values(), "versions"),
+            "machine": _joined(self.descriptions.values(), "machine"),
+            "failed": [],
+            "merged": self.descriptions,
         }
-        return {"study": self.study.name, **of_all, "failed": [], "merged": self.descriptions}
+        write_text(folder / CONFIG, json.dumps(told, indent=1) + "\n")
+        report.write(folder)
 
 
 def merged(folders: Sequence[Path]) -> Merged:
@@ -85,13 +84,13 @@ def merged(folders: Sequence[Path]) -> Merged:
     came out differently in two of them, or one scene has two films; and for columns that cannot be
     one, since their types differ.
     """
-    studies = [read_results(folder)[1] for folder in folders]
-    first, study = folders[0], studies[0]
-    for folder, other in zip(folders, studies, strict=True):
+    study = read_results(folders[0])[1]
+    for folder in folders[1:]:
+        other = read_results(folder)[1]
         if other.name != study.name:
             raise InvalidInput(
-                f"{first} holds the study {study.name} and {folder} the study {other.name}: only "
-                "folders of one study can be merged"
+                f"{folders[0]} holds the study {study.name} and {folder} the study {other.name}: "
+                "only folders of one study can be merged"
             )
     rows: list[Row] = []
     events: list[pa.Table] = []
@@ -110,7 +109,11 @@ def merged(folders: Sequence[Path]) -> Merged:
     check_worlds(rows)
     rows = _in_one_table(rows, firsts)
     told = _descriptions(folders)
-    codes = dict(zip(folders, map(_codes, told.values()), strict=True))
+    # A folder that was merged before tells the code of all its parts.
+    codes = {
+        folder: {*_joined([own], "versions").get("code", "").split(", ")} - {""}
+        for folder, own in zip(folders, told.values(), strict=True)
+    }
     return Merged(
         study,
         with_regret(rows) if study.results in (EPISODES, VEHICLE) else rows,
@@ -119,7 +122,7 @@ def merged(folders: Sequence[Path]) -> Merged:
         [*dict.fromkeys([*noted, *seen.doubts([*rows[0]], study.schema, {"merged": told})])],
         told,
         seen.twice,
-        _apart(folders, codes, seen.shared),
+        _apart(codes, seen.shared),
     )
 
 
@@ -136,29 +139,21 @@ def _in_one_table(rows: Sequence[Row], firsts: Sequence[Row]) -> list[Row]:
         try:
             pa.array([row[name] for row in made])
         except pa.ArrowException as error:
-            raise InvalidInput(
-                f"the column {name} has values of different types in the folders: they cannot be "
-                "one table"
-            ) from error
+            raise _types_differ(f"the column {name} has values") from error
     return made
 
 
 def _apart(
-    folders: Sequence[Path],
-    codes: Mapping[Path, Collection[str]],
-    shared: Collection[frozenset[Path]],
+    codes: Mapping[Path, Collection[str]], shared: Collection[frozenset[Path]]
 ) -> list[Path]:
     """The folders that nothing links to the first, by way of others or not."""
-    of_one_code = {
-        frozenset(pair)
-        for pair in combinations(folders, 2)
-        if {*codes[pair[0]]} & {*codes[pair[1]]}
-    }
-    links = of_one_code.union(shared)
-    reached = {folders[0]}
-    while more := {each for link in links if link & reached for each in link} - reached:
-        reached |= more
-    return [folder for folder in folders if folder not in reached]
+    reached = {next(iter(codes))}
+    known: set[str] = set()
+    for _ in codes:
+        known |= {code for folder in reached for code in codes[folder]}
+        reached |= {folder for folder, own in codes.items() if known & {*own}}
+        reached |= {folder for pair in shared if pair & reached for folder in pair}
+    return [folder for folder in codes if folder not in reached]
 
 
 def _events(folder: Path, rows: Sequence[Row], kept: Sequence[bool]) -> list[pa.Table]:
@@ -180,16 +175,17 @@ def _events_of_all(tables: Sequence[pa.Table]) -> dict[str, Any]:
     try:
         table = pa.concat_tables(tables, promote_options="permissive")
     except pa.ArrowException as error:
-        raise InvalidInput(
-            f"the columns of {_EVENTS} have different types in the folders: they cannot be one "
-            "table"
-        ) from error
+        raise _types_differ(f"{_EVENTS} has columns") from error
     return {name: table[name].combine_chunks() for name in table.column_names}
 
 
-def _descriptions(folders: Sequence[Path]) -> dict[str, Any]:
+def _types_differ(what: str) -> InvalidInput:
+    return InvalidInput(f"{what} of different types in the folders: they cannot be one table")
+
+
+def _descriptions(folders: Sequence[Path]) -> dict[str, dict[str, Any]]:
     """What every folder says of itself, by its name; nothing of a folder that says nothing."""
-    told: dict[str, Any] = {}
+    told: dict[str, dict[str, Any]] = {}
     for folder in folders:
         name = folder.resolve().name
         # Two folders of one name in different places are told apart by their turn.
@@ -199,23 +195,11 @@ def _descriptions(folders: Sequence[Path]) -> dict[str, Any]:
     return told
 
 
-def _codes(description: Any) -> list[str]:
-    """The hashes of the code that played a folder, or those that were merged in it."""
-    if not isinstance(description, dict):
-        return []
-    parts = description.get("merged")
-    if isinstance(parts, dict):
-        return [code for part in parts.values() for code in _codes(part)]
-    versions = description.get("versions")
-    code = versions.get("code") if isinstance(versions, dict) else None
-    return [code] if isinstance(code, str) else []
-
-
-def _values(descriptions: Mapping[str, Any], name: str) -> dict[str, list[str]]:
-    """By name the values that the folders tell, each once."""
+def _joined(descriptions: Iterable[dict[str, Any]], name: str) -> dict[str, str]:
+    """The values that the folders tell under a name, by key, each once."""
     found: dict[str, dict[str, None]] = {}
-    for each in descriptions.values():
-        told = each.get(name) if isinstance(each, dict) else None
+    for each in descriptions:
+        told = each.get(name)
         for key, value in (told if isinstance(told, dict) else {}).items():
             found.setdefault(key, {})[str(value)] = None
-    return {key: [*values] for key, values in found.items()}
+    return {key: ", ".join(values) for key, values in found.items()}

@@ -2,7 +2,7 @@
 
 import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +16,7 @@ from care_sim.reports.figures.files import default_style, remove_others, save
 from care_sim.reports.latex import PREAMBLE, latex, paragraph
 from care_sim.reports.studies import STUDIES, SWEEP, study_of
 from care_sim.reports.study import Study
-from care_sim.reports.summary import shortened
-from care_sim.reports.table import unmarked
+from care_sim.reports.table import Table, unmarked
 from care_sim.study.results_formats import results_format_in
 from care_sim.study.row_checks import RowChecks
 from care_sim.study.rows.parquet import read_notes, read_rows, read_table
@@ -28,9 +27,11 @@ from care_sim.study.unfinished import UNFINISHED, how_far
 TABLES = "tables.md"
 """Name of the file in a folder of results that holds all tables."""
 CONFIG = "config.json"
-_READING = "[How to read the tables](../../../docs/reading.md)\n"
+_READING = "How to read the tables: `docs/reading.md`.\n"
 PAGE = "report.html"
 """Name of a page where none is given."""
+MOST_LINES = 15
+"""Lines of a table at the end of a study."""
 
 
 def read_results(folder: Path) -> tuple[list[Row], Study, list[str]]:
@@ -56,12 +57,13 @@ def read_results(folder: Path) -> tuple[list[Row], Study, list[str]]:
     return rows, study, [*dict.fromkeys([*read_notes(path)[1], *twice, *doubts])]
 
 
-def described(folder: Path) -> Any:
+def described(folder: Path) -> dict[str, Any]:
     """What `config.json` says of the folder; nothing where it cannot be read."""
     try:
-        return json_content(folder / CONFIG)
+        content = json_content(folder / CONFIG)
     except (OSError, ValueError):
         return {}
+    return content if isinstance(content, dict) else {}
 
 
 @dataclass(frozen=True)
@@ -102,13 +104,6 @@ class StudyReport:
         )
 
 
-def write_report(
-    rows: Sequence[Row], folder: Path, study: Study = SWEEP, left_out: Sequence[str] = ()
-) -> None:
-    """Make a report and write it into a folder."""
-    StudyReport.of(rows, study, left_out).write(folder)
-
-
 def print_report(
     rows: Sequence[Row],
     console: Console,
@@ -130,6 +125,20 @@ def print_report(
         console.print()
     for sentence in _closing(rows, study, left_out):
         console.print(sentence, markup=False)
+
+
+def shortened(table: Table, console: Console) -> Table:
+    """The first rows of a table, as many as a console shows in `MOST_LINES`."""
+    shown = table
+    kept = len(table.rows)
+    while kept > 1 and len(console.render_lines(shown.rich(), pad=False)) > MOST_LINES:
+        kept -= 1
+        # A heading alone says nothing.
+        while len(table.rows[kept - 1]) == 1 and kept > 1:
+            kept -= 1
+        note = f"{kept} of {len(table.rows)} rows; --verbose prints all."
+        shown = replace(table, rows=table.rows[:kept], notes=(note,))
+    return shown
 
 
 def print_minus(rows: Sequence[Row], console: Console, study: Study, policy: str) -> None:

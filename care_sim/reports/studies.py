@@ -1,12 +1,12 @@
 """The studies by name: what is shown of their rows."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TypeVar
 
 from matplotlib.figure import Figure
 
 from care_sim.base.errors import unknown
-from care_sim.reports import closings
 from care_sim.reports.figures.closed_loop import (
     BUDGET_FIGURES,
     FAULT_FIGURES,
@@ -32,29 +32,29 @@ from care_sim.reports.figures.study_maps import (
     realism_figures,
 )
 from care_sim.reports.findings import (
+    collisions,
     gate_tables,
-    leads_of_episodes,
-    leads_of_plays,
+    headline,
     leads_tables,
+    shared_conditions,
+    ties,
 )
-from care_sim.reports.protocol.closing import protocol_closing
 from care_sim.reports.protocol.contrasts import protocol_minus
+from care_sim.reports.protocol.notes import protocol_closing
 from care_sim.reports.protocol.tables import protocol_tables
 from care_sim.reports.study import Study
-from care_sim.reports.summary import medians, recalls
-from care_sim.reports.table import Table
-from care_sim.reports.tables.ablations import ablation_tables
+from care_sim.reports.tables.ablations import ablation_tables, ceiling
 from care_sim.reports.tables.crowding import crowding_tables
 from care_sim.reports.tables.faults import fault_tables
 from care_sim.reports.tables.firing import firing_tables
 from care_sim.reports.tables.mechanism import mechanism_closing, mechanism_tables
 from care_sim.reports.tables.ncap import ncap_headline, ncap_tables
-from care_sim.reports.tables.order import order_tables
-from care_sim.reports.tables.paper_statements import statement_tables
+from care_sim.reports.tables.order import order_closing, order_tables
+from care_sim.reports.tables.paper_statements import in_short, statement_tables
 from care_sim.reports.tables.r157 import r157_tables
 from care_sim.reports.tables.realism import realism_tables
 from care_sim.reports.tables.sweep import sweep_minus, sweep_tables
-from care_sim.reports.tables.validate import validation_tables
+from care_sim.reports.tables.validate import validation_closing, validation_tables
 from care_sim.reports.tables.vehicle import vehicle_tables
 from care_sim.study.designs.crowding import VEHICLES_COLUMN
 from care_sim.study.designs.ncap import (
@@ -69,22 +69,16 @@ from care_sim.study.rows.parquet import read_notes
 from care_sim.study.rows.schema import COUNT, FLAG, SUM, TEXT, as_optional
 from care_sim.study.run_config import Row
 
+_T = TypeVar("_T")
+
 
 def _no_figures(_rows: Sequence[Row]) -> dict[str, Figure]:
     return {}
 
 
-def _sweep_tables(rows: Sequence[Row]) -> list[Table]:
-    return [*leads_tables(leads_of_episodes(rows)), *sweep_tables(rows)]
-
-
-def _paper_tables(rows: Sequence[Row]) -> list[Table]:
-    leads = leads_of_episodes(rows, conditions=False)
-    return [*leads_tables(leads), *statement_tables(rows), *sweep_tables(rows)]
-
-
-def _protocol_tables(rows: Sequence[Row]) -> list[Table]:
-    return [*leads_tables(leads_of_plays(rows)), *gate_tables(rows), *protocol_tables(rows)]
+def _joined(*makers: Callable[[Sequence[Row]], list[_T]]) -> Callable[[Sequence[Row]], list[_T]]:
+    """What several functions make of the rows, one after the other."""
+    return lambda rows: [each for make in makers for each in make(rows)]
 
 
 _ORDER_COLUMNS = {"cell_order": TEXT}
@@ -98,32 +92,28 @@ _NCAP_COLUMNS = {
 
 
 _ALL = (
-    Study(
-        "sweep",
-        "Sweep of the closed loop",
-        _sweep_tables,
-        sweep_figures,
-        closings.sweep_closing,
-        BUDGET_FIGURES,
-        minus=sweep_minus,
-        headline=medians,
-    ),
-    Study(
-        "paper",
-        "The paper's closed-loop study",
-        _paper_tables,
-        sweep_figures,
-        closings.paper_closing,
-        BUDGET_FIGURES,
-        minus=sweep_minus,
-        headline=medians,
+    *(
+        Study(
+            name,
+            title,
+            _joined(leads_tables, statement_tables, sweep_tables),
+            sweep_figures,
+            _joined(ties, in_short, collisions),
+            BUDGET_FIGURES,
+            minus=sweep_minus,
+            headline=headline,
+        )
+        for name, title in (
+            ("sweep", "Sweep of the closed loop"),
+            ("paper", "The paper's closed-loop study"),
+        )
     ),
     Study(
         "crowding",
         "Crowding in the closed loop",
         crowding_tables,
         crowding_figures,
-        closings.episodes_closing,
+        collisions,
         ("crowding",),
         columns={VEHICLES_COLUMN: COUNT},
     ),
@@ -132,7 +122,7 @@ _ALL = (
         "Cut-ins of UN Regulation 157",
         r157_tables,
         r157_figures,
-        closings.episodes_closing,
+        collisions,
         ("r157-avoided",),
         columns=_CASE_COLUMNS,
     ),
@@ -141,7 +131,7 @@ _ALL = (
         "Ablations of the closed loop",
         ablation_tables,
         ablation_figures,
-        closings.episodes_closing,
+        collisions,
         ("ablations",),
     ),
     Study(
@@ -149,7 +139,7 @@ _ALL = (
         "Faults in the closed loop",
         fault_tables,
         fault_figures,
-        closings.fault_closing,
+        _joined(collisions, shared_conditions),
         FAULT_FIGURES,
     ),
     Study(
@@ -157,7 +147,7 @@ _ALL = (
         "The vehicle study",
         vehicle_tables,
         vehicle_figures,
-        closings.episodes_closing,
+        collisions,
         ("vehicle",),
         VEHICLE,
     ),
@@ -166,7 +156,7 @@ _ALL = (
         "Euro NCAP tests",
         ncap_tables,
         ncap_figures,
-        closings.ncap_closing,
+        _joined(collisions, shared_conditions),
         ("ncap",),
         columns=_NCAP_COLUMNS,
         headline=ncap_headline,
@@ -176,7 +166,7 @@ _ALL = (
         "Order of cells in the closed loop",
         order_tables,
         order_figures,
-        closings.order_closing,
+        _joined(collisions, order_closing),
         ("order",),
         columns=_ORDER_COLUMNS,
     ),
@@ -185,7 +175,7 @@ _ALL = (
         "Hardware in the closed loop",
         firing_tables,
         firing_figures,
-        closings.episodes_closing,
+        collisions,
         ("firing",),
     ),
     Study(
@@ -193,7 +183,7 @@ _ALL = (
         "Headline orders under realistic conditions, closed loop",
         realism_tables,
         realism_figures,
-        closings.episodes_closing,
+        collisions,
         ("realism",),
     ),
     Study(
@@ -201,7 +191,7 @@ _ALL = (
         "Validation of a world",
         validation_tables,
         validation_figures,
-        closings.validation_closing,
+        _joined(collisions, validation_closing),
         ("validation",),
     ),
     Study(
@@ -209,7 +199,7 @@ _ALL = (
         "Order of cells in the open loop",
         order_tables,
         open_order_figures,
-        closings.open_order_closing,
+        _joined(protocol_closing, order_closing),
         ("order-open-loop",),
         PLAYS,
         _ORDER_COLUMNS,
@@ -237,20 +227,20 @@ _ALL = (
         "Ablations of the open loop",
         ablation_tables,
         open_ablation_figures,
-        closings.open_ablation_closing,
+        _joined(protocol_closing, ceiling),
         ("ablations-open-loop",),
         PLAYS,
     ),
     Study(
         "protocol",
         "First sightings in the open loop",
-        _protocol_tables,
+        _joined(leads_tables, gate_tables, protocol_tables),
         protocol_figures,
-        closings.first_sighting_closing,
+        _joined(ties, protocol_closing),
         PROTOCOL_FIGURES,
         PLAYS,
         minus=protocol_minus,
-        headline=recalls,
+        headline=headline,
     ),
     Study(
         "mechanism",

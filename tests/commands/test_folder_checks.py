@@ -8,7 +8,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.commands.shared.folder_checks import check_folder
 from care_sim.commands.shared.run_study import run_study
 from care_sim.evaluation.sightings import PRESENCES
-from care_sim.reports.report import write_report
+from care_sim.reports.report import StudyReport
 from care_sim.reports.studies import STUDIES
 from care_sim.sources.named import source_of
 from care_sim.study.episode_config import PLAIN_FIELDS, grid
@@ -41,7 +41,7 @@ def short(policies=("history",), seeds=(0,), **conditions):
 def folder(tmp_path):
     """Results of twenty episodes of the paper's study, with figures."""
     write_rows(STUDY, tmp_path / EPISODES.file, "paper")
-    write_report(STUDY, tmp_path, PAPER)
+    StudyReport.of(STUDY, PAPER).write(tmp_path)
     (tmp_path / "dense-budget.png").write_text("a figure")
     return tmp_path
 
@@ -136,6 +136,7 @@ from pathlib import Path
 from care_sim.policies.paper.tracks import History
 
 class Moody(History):
+    files = ("mood.txt",)
     def demand(self, belief):
         if (Path(__file__).parent / "mood.txt").read_text() == "bad":
             raise RuntimeError("no")

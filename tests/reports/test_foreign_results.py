@@ -60,63 +60,17 @@ def complaint(folder):
 @pytest.mark.parametrize(
     ("name", "column", "value", "fault"),
     [
-        ("sweep", "budget", "a tenth", "column budget must hold numbers, got string"),
         ("sweep", "budget", 0.0, "column budget must hold numbers from 1e-09 to 1"),
         ("sweep", "seed", 0.5, "column seed must hold whole numbers, got double"),
-        ("protocol", "frames", 5e-324, "column frames must hold whole numbers"),
-        ("sweep", "policy", 3, "column policy must hold text, got int64"),
         ("sweep", "policy", None, "column policy must hold text, got null"),
         ("sweep", "braked", 1, "column braked must hold true or false, got int64"),
-        (
-            "sweep",
-            "detection_distance_m",
-            float("nan"),
-            "column detection_distance_m must hold numbers from 0 to",
-        ),
-        (
-            "sweep",
-            "detection_distance_m",
-            float("inf"),
-            "column detection_distance_m must hold numbers from 0 to",
-        ),
-        ("sweep", "min_distance_m", [3.0], "column min_distance_m must hold numbers, got list"),
-        (
-            "sweep",
-            "lidar_dead_rows",
-            ["a"],
-            "column lidar_dead_rows must hold lists of whole numbers",
-        ),
-        ("sweep", "camera_latency", "late", "column camera_latency must hold whole numbers"),
-        (
-            "crowding",
-            "scenario.vehicles",
-            "many",
-            "column scenario.vehicles must hold whole numbers",
-        ),
-        ("protocol", "ttfds", [0.5], "column ttfds must hold lists of whole numbers"),
+        ("sweep", "detection_distance_m", float("nan"), "must hold numbers from 0 to"),
+        ("sweep", "lidar_dead_rows", ["a"], "must hold lists of whole numbers"),
+        ("crowding", "scenario.vehicles", "many", "must hold whole numbers"),
         ("protocol", "ttfds", [1, None], "column ttfds must hold whole lists"),
         ("protocol", "ttfds", [], "has 0 TTFD of 5 events"),
-        ("protocol", "events", None, "column events must hold numbers, got null"),
-        (
-            "protocol",
-            "range/below 20 m/found",
-            "x",
-            "column range/below 20 m/found must hold numbers",
-        ),
-        (
-            "protocol",
-            "differing_cells",
-            -1,
-            "column differing_cells must hold whole numbers from 0",
-        ),
-        ("protocol", "tags", 1, "column tags must hold text"),
-        ("protocol", "sighted", 1000, "column sighted must be at most events in every row"),
-        (
-            "protocol",
-            "entry/ring/found",
-            1000,
-            "column entry/ring/found must be at most entry/ring/frames in every row",
-        ),
+        ("protocol", "differing_cells", -1, "must hold whole numbers from 0"),
+        ("protocol", "entry/ring/found", 1000, "must be at most entry/ring/frames in every row"),
     ],
 )
 def test_a_column_of_another_type_or_range_is_named(tmp_path, name, column, value, fault):
@@ -143,49 +97,10 @@ def test_no_flipped_bit_changes_rows_in_silence(tmp_path):
         assert left_out or (found, of) == (rows, study)
 
 
-def test_files_without_checksums_are_read(tmp_path):
-    put(table("sweep", tmp_path), "sweep", tmp_path)
-    assert len(read_results(tmp_path)[0]) == len(STUDY)
-
-
-def test_a_parameter_of_a_structure_is_named(tmp_path):
-    content = table("sweep", tmp_path)
-    put(
-        content.append_column("policy.x", pa.array([{"a": 1}] * content.num_rows)),
-        "sweep",
-        tmp_path,
-    )
-    assert (
-        "column policy.x must hold text, numbers, flags or lists of them, got struct"
-        in complaint(tmp_path)
-    )
-
-
-@pytest.mark.parametrize("kind", [pa.null(), pa.float64(), pa.string()])
-def test_a_column_of_nothing_is_of_any_type(tmp_path, kind):
-    """Earlier versions wrote numbers there."""
-    content = table("protocol", tmp_path)
-    nothing = pa.nulls(content.num_rows, kind)
-    place = content.column_names.index("differing_cells")
-    put(content.set_column(place, "differing_cells", nothing), "protocol", tmp_path)
-    assert {row["differing_cells"] for row in read_results(tmp_path)[0]} == {None}
-
-
-@pytest.mark.parametrize(
-    "column", ["class/bus/delay", "film_hash", "tracks", "ttfds", "keyframes", "events"]
-)
+@pytest.mark.parametrize("column", ["class/bus/delay", "film_hash", "events"])
 def test_a_missing_column_of_a_play_is_named(tmp_path, column):
     put(table("protocol", tmp_path).drop_columns(column), "protocol", tmp_path)
     assert f"it lacks {column}" in complaint(tmp_path)
-
-
-def test_one_empty_cell_and_two_columns_of_a_name_are_named(tmp_path):
-    content = table("sweep", tmp_path)
-    policies = [None, *content["policy"].to_pylist()[1:]]
-    put(content.set_column(1, "policy", pa.array(policies)), "sweep", tmp_path)
-    assert "column policy must hold text in every row, got nothing in 1" in complaint(tmp_path)
-    put(content.append_column("policy", content["policy"]), "sweep", tmp_path)
-    assert "is not a readable Parquet file: Multiple matches" in complaint(tmp_path)
 
 
 def test_files_of_other_people_are_one_line_and_further_columns_do_no_harm(tmp_path):
@@ -203,23 +118,11 @@ def test_files_of_other_people_are_one_line_and_further_columns_do_no_harm(tmp_p
     assert len(read_results(tmp_path)[0]) == content.num_rows
 
 
-def test_names_and_texts_of_broken_characters_are_damage(tmp_path):
-    table("protocol", tmp_path)
-    path = tmp_path / STUDIES["protocol"].results.file
-    content = path.read_bytes()
-    for text in (b"differing_cells", b"film of scene 000"):
-        assert text in content
-        path.write_bytes(content.replace(text, text[:-1] + b"\xed"))
-        assert "is not a readable Parquet file: " in complaint(tmp_path)
-
-
 @pytest.mark.parametrize(
     ("notes", "fault"),
     [
         ({STUDY_NOTE: b"\xff"}, "has notes that cannot be read"),
-        ({LEFT_OUT_NOTE: b"["}, "has notes that cannot be read"),
         ({LEFT_OUT_NOTE: DEEP}, "nested too deep"),
-        ({LEFT_OUT_NOTE: b"3"}, "what is left out must be a list of texts"),
         ({LEFT_OUT_NOTE: b"[1]"}, "what is left out must be a list of texts"),
         ({STUDY_NOTE: b"gardening"}, "unknown study"),
         (
@@ -235,21 +138,8 @@ def test_notes_of_another_kind_are_one_line(tmp_path, notes, fault):
 
 
 VALUES = [
-    None,
-    float("nan"),
-    -1.0,
-    0.0,
-    1e300,
-    "text",
-    "$x^$ <b>|`",
-    True,
-    -1,
-    2**62,
-    [],
-    [1],
-    [None],
-    {"a": 1},
-    b"x",
+    *(None, float("nan"), -1.0, 0.0, 1e300, "text", "$x^$ <b>|`", True, -1, 2**62),
+    *([], [1], [None], {"a": 1}, b"x"),
 ]
 
 
@@ -279,7 +169,7 @@ def mutated(content, random):
         return content
 
 
-@pytest.mark.parametrize("name", ROWS)
+@pytest.mark.parametrize("name", ["crowding", "protocol"])
 def test_damaged_results_are_shown_or_refused(tmp_path, name):
     """Seeded damage; figures are drawn of few."""
     rolls = random.Random(name)

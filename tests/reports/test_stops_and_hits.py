@@ -1,10 +1,10 @@
 """What tables make of a stop for nothing, and of a collision that another body causes."""
 
-from care_sim.reports.closings import collisions
 from care_sim.reports.engine.contrasts import contrast_of_rows
 from care_sim.reports.engine.frames import Frame
 from care_sim.reports.engine.levels import levels
 from care_sim.reports.engine.measures import AVOIDED
+from care_sim.reports.findings import collisions
 from care_sim.reports.tables.ncap import impact_of
 from care_sim.reports.tables.r157 import r157_tables
 from care_sim.study.rows.reading import preventable
@@ -34,7 +34,7 @@ def test_a_stop_for_nothing_avoids_no_collision():
 def test_stops_for_nothing_and_who_ran_into_the_car_are_counted():
     hit_by = {"collision": True, "hit_at_front": False}
     study = [*rows("care", [9.0, 9.0], changes=STOPPED), *rows("full", [9.0], changes=hit_by)]
-    assert collisions(study) == (
+    assert collisions(study) == [
         "Collisions: 1 in 3 episodes; in 1 another body ran into the car; 2 stops for nothing, "
         "which avoid none."
-    )
+    ]

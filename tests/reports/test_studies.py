@@ -1,18 +1,16 @@
 import json
 from dataclasses import replace
 
-import pyarrow.parquet as pq
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from rich.console import Console
 
 from care_sim.base.errors import InvalidInput
 from care_sim.commands.shared.run_study import run_study
-from care_sim.reports.report import StudyReport, print_report, write_report
+from care_sim.reports.report import StudyReport, print_report
 from care_sim.reports.studies import STUDIES, study_of
 from care_sim.study.designs import (
     ablations,
-    crowding,
     faults,
     firing,
     ncap,
@@ -27,32 +25,6 @@ from care_sim.study.rows.parquet import read_rows, write_rows
 from care_sim.study.rows.reading import with_added_columns
 from tests.helpers import made_worlds
 from tests.helpers.made_rows import CROWD, CUT_INS, STUDY, row, vehicle_row
-
-
-@pytest.mark.parametrize("name", STUDIES)
-def test_a_file_knows_its_study(name, tmp_path):
-    write_rows(STUDY, tmp_path / "episodes.parquet", name)
-    assert study_of(tmp_path / "episodes.parquet") is STUDIES[name]
-
-
-def test_a_file_that_names_no_study_holds_a_sweep(tmp_path):
-    path = tmp_path / "episodes.parquet"
-    write_rows(STUDY, path)
-    pq.write_table(pq.read_table(path).replace_schema_metadata(None), path)
-    assert study_of(path).name == "sweep"
-
-
-def test_an_unknown_study_is_one_clear_line(tmp_path):
-    write_rows(STUDY, tmp_path / "episodes.parquet", "gardening")
-    with pytest.raises(
-        InvalidInput,
-        match=r"unknown study in .* 'gardening'; "
-        "known: ablate, ablate-open-loop, crowding, faults, firing, firing-open-loop, mechanism, "
-        "ncap, order, order-open-loop, paper, protocol, r157, realism, realism-open-loop, sweep, "
-        "validate, vehicle",
-    ):
-        study_of(tmp_path / "episodes.parquet")
-
 
 EPISODES = {
     "sweep": STUDY,
@@ -98,7 +70,7 @@ def test_every_study_shows_its_rows_in_three_forms(name, rows, tmp_path, capsys)
         FigureCanvasAgg(figure).draw()
     first = dict([*figures.items()][:1])
     study = replace(study, figures=lambda rows: first)
-    write_report(rows, tmp_path, study)
+    StudyReport.of(rows, study).write(tmp_path)
     assert all((tmp_path / f"{figure}.png").is_file() for figure in first)
     print_report(rows, Console(width=80), study, verbose=True)
     printed, markdown, latex = (
@@ -106,7 +78,7 @@ def test_every_study_shows_its_rows_in_three_forms(name, rows, tmp_path, capsys)
         *((tmp_path / f).read_text() for f in ("tables.md", "tables.tex")),
     )
     assert all("Collisions: 0 in" in text for text in (printed, markdown, latex))
-    assert markdown.startswith("[How to read the tables](../../docs/reading.md)\n")
+    assert markdown.startswith("How to read the tables: `docs/reading.md`.\n")
     tables = study.tables(rows)
     assert latex.count(r"\begin{table}") == len(tables)
     assert all(f"## {table.title}\n" in markdown for table in tables)
@@ -120,9 +92,7 @@ def test_a_file_changes_nothing_in_the_tables(tmp_path):
     played = {
         "ablate": ablations.ablation_study(range(2)),
         "faults": faults.fault_study(range(2)),
-        "order": order.order_study(range(2)),
         "firing": firing.firing_study(range(2)),
-        "crowding": crowding.crowding_study(range(2)),
         "ncap": ncap.ncap_study(range(2), ["care", "fan", "full"], ["CPNA-25", "CCRs"]),
         "paper": paper.paper_study(range(2)),
         "validate": validate.validation_study("cutin", [(("mirrored", "drawn"),)], [0.1], [0], 1),
@@ -147,9 +117,3 @@ def test_a_study_leaves_its_name_and_its_columns_in_the_folder(tmp_path):
     assert json.loads((tmp_path / "config.json").read_text())["study"] == "crowding"
     assert study_of(tmp_path / "episodes.parquet").name == "crowding"
     assert {"tags", "regret_m", "censored"} <= set(read_rows(tmp_path / "episodes.parquet")[0])
-
-
-def test_without_a_sentence_there_is_no_heading_for_it():
-    silent = replace(STUDIES["sweep"], closing=lambda rows: [])
-    assert "## Statements" in StudyReport.of(STUDY, STUDIES["sweep"]).texts["tables.md"]
-    assert "## Statements" not in StudyReport.of(STUDY, silent).texts["tables.md"]

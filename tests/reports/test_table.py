@@ -11,7 +11,7 @@ from rich.console import Console
 
 import care_sim.reports.page
 from care_sim.reports.latex import escaped, latex
-from care_sim.reports.summary import MOST_LINES, shortened
+from care_sim.reports.report import MOST_LINES, shortened
 from care_sim.reports.table import Bold, Table
 from care_sim.reports.tables.crowding import crowding_tables
 from care_sim.reports.tables.sweep import sweep_tables
@@ -77,15 +77,6 @@ def test_a_table_has_bold_type_headings_and_notes_in_all_three_forms():
     )
 
 
-def test_a_narrow_terminal_breaks_entries_and_loses_none():
-    columns = ("policy", *(f"column {n}" for n in range(6)))
-    rows = (("A long heading of the rows below it",), ("care", *(f"{n}1/22/33" for n in range(6))))
-    shown = terminal(Table("t", columns, rows), 50)
-    assert max(map(len, shown.splitlines())) <= 50
-    assert "A long heading of the rows below it" in shown
-    assert sum(character.isdigit() for character in shown) == 6 + 6 * 6
-
-
 def test_the_end_of_a_study_shows_the_first_rows():
     rows = (*((f"{n}", "x") for n in range(20)), ("Heading",), *(("y", "z") for _ in range(9)))
     table = Table("t", ("a", "b"), rows)
@@ -96,16 +87,6 @@ def test_the_end_of_a_study_shows_the_first_rows():
     assert short.notes == (f"{len(short.rows)} of 30 rows; --verbose prints all.",)
     few = Table("t", ("a", "b"), rows[:3])
     assert shortened(few, console) is few
-
-
-def test_columns_in_which_nothing_stands_can_be_left_out():
-    table = TABLE.without_empty_columns()
-    assert table.columns == ("policy", "3%")
-    assert table.rows == (("First, m",), ("x_y", "+5.0* [4.0,6.0]"), ("z†", "≤-1.0 [-2.0,0.0]"))
-    assert isinstance(table.rows[1][1], Bold)
-    # Without a second column every row would read as a heading.
-    nothing = Table("t", ("", "policy", "3%"), (("", "x", ""),), names=2).without_empty_columns()
-    assert nothing.columns == ("", "policy")
 
 
 @pytest.mark.parametrize(

@@ -71,12 +71,16 @@ class Contrast:
 
     @property
     def counts(self) -> bool:
-        """Whether the interval excludes zero and the mean difference reaches the gate, whatever the
+        """Whether the difference reaches the gate of the measure."""
+        return self.reaches(self.measure.gate)
+
+    def reaches(self, gate: float) -> bool:
+        """Whether the interval excludes zero and the mean difference reaches a gate, whatever the
         censored values were.
         """
         # The cautious mean puts every censored distance where it speaks most against the
         # difference.
-        return self.excludes_zero and abs(self.difference.cautious.mean) >= self.measure.gate
+        return self.excludes_zero and abs(self.difference.cautious.mean) >= gate
 
 
 def of_interval(

@@ -1,6 +1,6 @@
 """Which policies are the controls that a contender has to beat, and which of them is the best."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
 from care_sim.base.errors import percent
 from care_sim.reports.engine.measures import Measure, Recall, Units
@@ -8,20 +8,6 @@ from care_sim.reports.formatting import MARKS
 
 BEST_CONTROL = "best control"
 """What the line begins with that names it at every budget."""
-IN_HINDSIGHT = (
-    f"The {BEST_CONTROL} is chosen anew at each budget, by the very results that are compared. "
-    "Such a choice in hindsight favours the control, which is the strict reading."
-)
-
-RULE = (
-    f"The {BEST_CONTROL} is that with the highest mean of the measure at the budget, over the "
-    f"seeds or scenes that all controls have there. {IN_HINDSIGHT}"
-)
-
-
-def candidates(controls: Iterable[str]) -> str:
-    """Among which controls the best one is chosen, in a sentence."""
-    return f"Candidates: {', '.join(controls)}."
 
 
 def named_by_budget(controls: Mapping[float, str]) -> str:
@@ -50,12 +36,18 @@ def best_of(measure: Measure | Recall, found: Mapping[str, Units]) -> str | None
     """The control with the highest mean, given what was measured of each, over the units that all
     of them have; None without one.
     """
-    played = {policy: units for policy, units in found.items() if units}
     # A control that lacks a hard seed or scene would win by that.
+    shared = shared_units(found)
+    return best_control({policy: measure.mean(units) for policy, units in shared.items()})
+
+
+def shared_units(found: Mapping[str, Units]) -> dict[str, Units]:
+    """What was measured of each policy, over the units that all of them have; without those of
+    which nothing was measured.
+    """
+    played = {policy: units for policy, units in found.items() if units}
     shared = set.intersection(*map(set, played.values())) if played else set()
-    return best_control(
-        {
-            policy: measure.mean({unit: units[unit] for unit in units if unit in shared})
-            for policy, units in played.items()
-        }
-    )
+    return {
+        policy: {unit: units[unit] for unit in units if unit in shared}
+        for policy, units in played.items()
+    }

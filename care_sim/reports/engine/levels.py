@@ -52,13 +52,14 @@ class Cell:
         return self.setting, self.policy, self.budget
 
 
-def levels(frame: Frame) -> list[Cell]:
-    """The cells of a study of episodes, in the order of their first rows, settings kept
-    together.
+def levels(frame: Frame, only: Setting | None = None) -> list[Cell]:
+    """The cells of a study of episodes, or of one setting of it, in the order of their first rows,
+    settings kept together.
     """
-    settings = list(dict.fromkeys(setting for setting, _, _ in frame.groups))
+    settings = [only] if only else list(dict.fromkeys(setting for setting, _, _ in frame.groups))
+    own = [key for key in frame.groups if key[0] in settings]
     # The sort is stable, so that the policies of a budget keep the order of their rows.
-    keys = sorted(frame.groups, key=lambda key: (settings.index(key[0]), key[2]))
+    keys = sorted(own, key=lambda key: (settings.index(key[0]), key[2]))
     return [cell for key in keys if (cell := level_of(frame, key))]
 
 

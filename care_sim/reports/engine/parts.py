@@ -1,15 +1,16 @@
 """The cells of one setting, and what its policies have over each other and over the controls."""
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from functools import cached_property
 from typing import NamedTuple
 
 from care_sim.evaluation.scene_contrasts import Ratio
 from care_sim.reports.engine.contrasts import Contrast
 from care_sim.reports.engine.controls import best_of, is_control
 from care_sim.reports.engine.frames import Frame
-from care_sim.reports.engine.measures import Measure, Recall, Units
-from care_sim.reports.formatting import marked, tag_notes
-from care_sim.study.rows.reading import Key
+from care_sim.reports.engine.measures import AVOIDED, Measure, Recall, Units
+from care_sim.study.rows.reading import Key, is_avoided
 from care_sim.study.rows.settings import Setting
 from care_sim.study.run_config import FULL, Row
 
@@ -49,7 +50,7 @@ class Part:
         """All but the full scan, in the order of their first rows."""
         return tuple(self.tags)
 
-    @property
+    @cached_property
     def full(self) -> Sequence[Row]:
         """The full scans of the same worlds."""
         return self.rows(FULL, 1.0)
@@ -58,6 +59,18 @@ class Part:
     def controls(self) -> list[str]:
         """The controls that a car can have."""
         return [policy for policy, tags in self.tags.items() if is_control(tags)]
+
+    @property
+    def avoided(self) -> Measure:
+        """Collisions avoided, on the seeds on which the full scan has none, if it was played."""
+        if not self.full:
+            return AVOIDED
+        spared = {row["seed"] for row in self.full if is_avoided(row)}
+        return replace(
+            AVOIDED,
+            name="Preventable collisions avoided",
+            read=lambda row: AVOIDED.read(row) if row["seed"] in spared else None,
+        )
 
     def key(self, policy: str, budget: float) -> Key:
         """A cell of the setting."""
@@ -102,10 +115,10 @@ class Part:
 
     def marked(self, policy: str) -> str:
         """A policy's name, with a mark when no car can have it."""
-        return marked(policy, self.tags.get(policy, ()))
+        return self.frame.marked(policy)
 
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What the marks of the policies mean, in one line."""
-        told = " ".join(tag_notes(self.tags.values()))
-        return (told,) if told else ()
+
+def parts(rows: Sequence[Row]) -> list[Part]:
+    """The settings of a study of episodes, in the order of their first rows."""
+    frame = Frame(rows)
+    return [Part(frame, setting) for setting in dict.fromkeys(key[0] for key in frame.groups)]

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from care_sim.base.errors import percent
-from care_sim.reports.engine.controls import BEST_CONTROL, RULE, candidates
+from care_sim.reports.engine.controls import BEST_CONTROL
 from care_sim.reports.engine.measures import Measure, Recall
 from care_sim.reports.engine.parts import OverControl, Part
 from care_sim.reports.formatting import interval
@@ -20,7 +20,25 @@ def under_headings(lines: Mapping[str, Iterable[TableRow]]) -> tuple[TableRow, .
     return tuple(line for heading, own in lines.items() for line in ((heading,), *own))
 
 
-def minus_table(
+def budget_table(
+    part: Part,
+    title: str,
+    head: str,
+    lines: Iterable[TableRow],
+    notes: Sequence[str] = (),
+    quotes: Sequence[str] = (),
+    *,
+    budgets: Sequence[float] | None = None,
+    terminal: bool = True,
+) -> list[Table]:
+    """A table of a setting with a column per budget; none without lines."""
+    columns = (head, *map(percent, part.budgets if budgets is None else budgets))
+    heading = f"{part.setting.label}: {title}"
+    table = Table(heading, columns, tuple(lines), tuple(notes), tuple(quotes), terminal=terminal)
+    return [table] if table.rows else []
+
+
+def minus_tables(
     part: Part,
     base: str,
     others: Sequence[str],
@@ -31,59 +49,52 @@ def minus_table(
     weights: str = "",
     notes: Sequence[str] = (),
     quotes: Sequence[str] = (),
-) -> Table:
-    """A base minus every other policy, or every other minus the base, measure by measure."""
+) -> list[Table]:
+    """A base minus every other policy, or every other minus the base, measure by measure; none
+    where there is nothing to compare.
+    """
     # At other budgets than those of the base there is nothing to compare with.
     budgets = [budget for budget in part.budgets if part.rows(base, budget)]
     lines: list[TableRow] = []
     for measure in measures:
-        lines.append((measure.heading,))
+        block: list[TableRow] = []
         for policy in others:
             # A positive difference speaks for the policy that stands first.
             pair = (base, policy) if base_first else (policy, base)
             found = [part.contrast(measure, *pair, budget) for budget in budgets]
             if any(found):
-                lines.append((part.marked(policy), *map(interval, found)))
+                block.append((part.marked(policy), *map(interval, found)))
                 if said := of_paper(measure, policy):
-                    lines.append((PAPER, *said))
-    title, head = (
-        (f"{base} minus each policy", f"{base} minus")
-        if base_first
-        else (f"each policy minus {base}", f"minus {base}")
-    )
-    columns = (head, *map(percent, budgets))
-    return Table(
-        f"{part.setting.label}: {title}{weights}",
-        columns,
-        tuple(lines),
-        (*notes, *part.notes),
-        tuple(quotes),
-        whole=columns[:1],
+                    block.append((PAPER, *said))
+        lines += [(measure.heading,), *block] if block else []
+    title = f"{base} minus each policy" if base_first else f"each policy minus {base}"
+    head = f"{base} minus" if base_first else f"minus {base}"
+    return budget_table(
+        part,
+        f"{title}{weights}",
+        head,
+        lines,
+        notes,
+        quotes,
+        budgets=budgets,
         terminal=not weights,
     )
 
 
-def control_tables(
-    part: Part, measures: Sequence[OverControl], notes: Sequence[str] = ()
-) -> list[Table]:
+def control_tables(part: Part, measures: Sequence[OverControl]) -> list[Table]:
     """Policies minus the best control, measure by measure; none without any difference."""
     lines: list[TableRow] = []
     for each in measures:
-        lines += [
-            (each.measure.heading,),
-            (BEST_CONTROL, *(control or "" for control in each.controls)),
-        ]
+        controls = (control or "" for control in each.controls)
+        lines += [(each.measure.heading,), (BEST_CONTROL, *controls)]
         lines += [
             (part.marked(policy), *map(interval, differences))
             for policy, differences in each.differences.items()
         ]
-    if not lines:
-        return []
-    return [
-        Table(
-            f"{part.setting.label}: each policy minus the {BEST_CONTROL}",
-            (f"minus the {BEST_CONTROL}", *map(percent, part.budgets)),
-            tuple(lines),
-            (" ".join([*notes, RULE, candidates(part.controls)]), *part.notes),
-        )
-    ]
+    rule = (
+        f"The {BEST_CONTROL} has the highest mean of the measure at the budget, over the seeds or "
+        "scenes that all controls have. This choice in hindsight favours the control. "
+        f"Candidates: {', '.join(part.controls)}."
+    )
+    title = f"each policy minus the {BEST_CONTROL}"
+    return budget_table(part, title, f"minus the {BEST_CONTROL}", lines, (rule,))

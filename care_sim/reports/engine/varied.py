@@ -9,7 +9,7 @@ from care_sim.reports.engine.contrasts import contrast
 from care_sim.reports.engine.frames import Frame
 from care_sim.reports.engine.levels import level
 from care_sim.reports.engine.measures import Measure, Recall, loop_of
-from care_sim.reports.formatting import interval, marked, tag_notes
+from care_sim.reports.formatting import interval, marked
 from care_sim.reports.table import Table, TableRow
 from care_sim.study.rows.reading import Key
 from care_sim.study.run_config import FULL
@@ -33,8 +33,7 @@ class Varied:
         self.tags = {
             policy: frame.tags[policy] for frame in frames.values() for _, policy, _ in frame.groups
         }
-        told = " ".join(tag_notes(self.tags.values()))
-        self.notes = (*notes, *([told] if told else []))
+        self.notes = tuple(notes)
 
     def levels(self) -> Table:
         """Every cell under every condition."""

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, TTFD
 from care_sim.reports.engine.measures import Measure, Recall
-from care_sim.reports.engine.tables import minus_table
-from care_sim.reports.protocol.differences import PolicyPair
+from care_sim.reports.engine.tables import minus_tables
+from care_sim.reports.protocol.comparisons import PolicyPair
 from care_sim.reports.protocol.formatting import claims_of_paper
 from care_sim.reports.protocol.notes import UNITS_OF_DIFFERENCES, left_out, papers, played
 from care_sim.reports.protocol.paper import Claims, claims_about
@@ -22,23 +22,22 @@ def protocol_contrast_tables(plays: SettingPlays) -> list[Table]:
     """
     # CARE first, as in the paper; then history, the base without a camera. Equal scene weights
     # answer whether a few rich scenes drive the result, and go to the files alone.
-    wanted = ((REFERENCE, False), (HISTORY, False), (REFERENCE, True))
     return [
-        _table(plays, base, equal_scenes, base_first=base != HISTORY)
-        for base, equal_scenes in wanted
-        if plays.other_than(base)
+        *_tables(plays, REFERENCE),
+        *_tables(plays, HISTORY, base_first=False),
+        *_tables(plays, REFERENCE, equal_scenes=True),
     ]
 
 
 def protocol_minus(rows: Sequence[Row], policy: str) -> list[Table]:
     """One policy, named with its parameters, less every other, in every setting that has it."""
-    settings = [plays for plays in plays_by_setting(rows) if plays.other_than(policy)]
-    return [_table(plays, policy) for plays in settings]
+    return [table for plays in plays_by_setting(rows) for table in _tables(plays, policy)]
 
 
-def _table(
+def _tables(
     plays: SettingPlays, base: str, equal_scenes: bool = False, base_first: bool = True
-) -> Table:
+) -> list[Table]:
+    others = plays.other_than(base)
     kinds = () if equal_scenes else [kind for kind, count in plays.newcomers.items() if count]
     measures = [
         *(Recall(FIRST_SIGHTING, kind, equal_scenes) for kind in ("", *kinds)),
@@ -51,9 +50,8 @@ def _table(
         pair = (base, policy) if base_first else (policy, base)
         return said.get(PolicyPair(*pair, measure.ratio, measure.within, measure.equal_scenes))
 
-    others = plays.other_than(base)
-    quoted = [found for each in measures for p in others if (found := claims(each, p))]
-    return minus_table(
+    quoted = [found for each in measures for policy in others if (found := claims(each, policy))]
+    return minus_tables(
         plays,
         base,
         others,

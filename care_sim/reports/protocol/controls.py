@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL
-from care_sim.reports.engine.controls import BEST_CONTROL, RULE, named_by_budget
+from care_sim.reports.engine.controls import BEST_CONTROL, named_by_budget
 from care_sim.reports.engine.measures import Recall
 from care_sim.reports.engine.parts import OverControl
 from care_sim.reports.protocol.rows import SettingPlays
 
-__all__ = ["RULE", "OverControl", "named_controls", "over_controls"]
+__all__ = ["OverControl", "named_controls", "over_controls"]
 
 
 def over_controls(plays: SettingPlays) -> list[OverControl]:

@@ -1,6 +1,6 @@
 """The notes under the protocol's tables: how much was played, and what is missing."""
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Sequence
 
 from care_sim.base.errors import counted, percent
 from care_sim.evaluation.recall import Tally
@@ -13,7 +13,7 @@ UNITS_OF_DIFFERENCES = "Recall in points; TTFD in keyframes, less is better."
 
 def played(plays: SettingPlays) -> str:
     """Scenes, events, object frames and floor seeds."""
-    total = counts(plays.scenes.values())
+    total = _counts(plays.scenes.values())
     # The most that any policy has at a budget: some may have been played with fewer.
     seeds = {
         len(plays.seeds(policy, budget)) for policy in plays.policies for budget in plays.budgets
@@ -26,7 +26,7 @@ def played(plays: SettingPlays) -> str:
     )
 
 
-def by_both_counts(scenes: Collection[Row]) -> str:
+def _by_both_counts(scenes: Collection[Row]) -> str:
     """How many events there are by the other presence, given one row of every scene; nothing where
     rows do not tell.
     """
@@ -36,11 +36,11 @@ def by_both_counts(scenes: Collection[Row]) -> str:
     emerging = sum(row["emerging"] for row in scenes)
     if any(row.get("presence") == VISIBLE for row in scenes):
         return f" Presence {ANNOTATED} does not count {emerging:,} of them."
-    every = counts(scenes).events + emerging
+    every = _counts(scenes).events + emerging
     return f" Presence {VISIBLE} counts {counted(emerging, 'more event')}, {every:,.0f} in all."
 
 
-def counts(scenes: Iterable[Row]) -> Tally:
+def _counts(scenes: Iterable[Row]) -> Tally:
     """Events and object frames, given one row of every scene."""
     return sum((Tally(events=row["events"], frames=row["frames"]) for row in scenes), Tally())
 
@@ -73,3 +73,16 @@ def _missing(plays: SettingPlays) -> Iterator[str]:
             yield f"{policy} {', '.join(listed)}"
     if plays.full and (count := len(plays.scenes) - len(plays.tallies(FULL, 1.0))):
         yield f"{FULL} {count}"
+
+
+def protocol_closing(rows: Sequence[Row]) -> list[str]:
+    """The size of the study."""
+    # Events and object frames belong to the film: one row of a scene is enough.
+    scenes = {(row["source"], row["scene"]): row for row in rows}
+    total = _counts(scenes.values())
+    keyframes = sum(row["keyframes"] for row in scenes.values())
+    return [
+        f"Scenes: {len(scenes):,}, with {total.events:,.0f} first sightings and "
+        f"{total.frames:,.0f} object frames in {keyframes:,} keyframes; plays: "
+        f"{len(rows):,}.{_by_both_counts(scenes.values())}"
+    ]

@@ -8,8 +8,12 @@ from typing import NamedTuple
 
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, TTFD, Ratio
 from care_sim.reports.protocol import quotes
-from care_sim.reports.protocol.differences import Comparison, PolicyPair
-from care_sim.reports.protocol.thirds import DENSE_LESS_SPARSE, SceneThird
+from care_sim.reports.protocol.comparisons import (
+    DENSE_LESS_SPARSE,
+    Comparison,
+    PolicyPair,
+    SceneThird,
+)
 from care_sim.study.rows.settings import Setting
 
 PAPER_BUDGETS = (0.10, 0.20, 0.35)
@@ -59,22 +63,23 @@ class PublishedLevel(NamedTuple):
     ttfd: float | None = None
 
 
-def _difference(
-    mean: float, ends: tuple[float, float] | None = None, upper: float | None = None
-) -> Claim:
-    """A claim of more or of less: the sign is that of the mean."""
-    return Claim(1 if mean > 0 else -1, mean, ends, upper)
+_Said = float | tuple[float, float, float] | Claim | None
+"""A difference, one with the ends of its interval, any other claim; None where nothing is said."""
 
 
-def _everywhere(claim: Claim, source: str) -> Claims:
-    """The same claim at all of the paper's budgets."""
-    return Claims(dict.fromkeys(PAPER_BUDGETS, claim), source)
+def _said(source: str, *by_budget: _Said) -> Claims:
+    """One claim for each budget of the paper, or the same claim for all."""
+    every = by_budget * len(PAPER_BUDGETS) if len(by_budget) == 1 else by_budget
+    claims = dict(zip(PAPER_BUDGETS, map(_claim, every), strict=True))
+    return Claims({budget: claim for budget, claim in claims.items() if claim}, source)
 
 
-def _by_budget(*claims: Claim | None, source: str) -> Claims:
-    """One claim per budget of the paper, None where it says nothing."""
-    by_budget = zip(PAPER_BUDGETS, claims, strict=True)
-    return Claims({budget: claim for budget, claim in by_budget if claim}, source)
+def _claim(said: _Said) -> Claim | None:
+    """A difference is a claim of more or of less: the sign is that of the mean."""
+    if said is None or isinstance(said, Claim):
+        return said
+    mean, *ends = said if isinstance(said, tuple) else (said,)
+    return Claim(1 if mean > 0 else -1, mean, (ends[0], ends[1]) if ends else None)
 
 
 _MORE = Claim(1)
@@ -84,93 +89,60 @@ _TIED = Claim(0)
 # Differences as the tables take them. Where the paper words one the other way round ("the policy
 # gives up 17.4 points"), the sign here is that of the first named.
 _PLAIN: dict[Comparison, Claims] = {
-    PolicyPair("care", "history", FIRST_SIGHTING): _by_budget(
-        _difference(5.2, (4.3, 6.2)),
-        _difference(5.2, (4.3, 6.2)),
-        _difference(4.3, (3.5, 5.1)),
-        source=quotes.TABLE_1,
+    PolicyPair("care", "history", FIRST_SIGHTING): _said(
+        quotes.TABLE_1, (5.2, 4.3, 6.2), (5.2, 4.3, 6.2), (4.3, 3.5, 5.1)
     ),
-    PolicyPair("care", "uncertainty", FIRST_SIGHTING): _by_budget(
-        _difference(3.5, (2.6, 4.4)),
-        _difference(2.7, (1.7, 3.8)),
-        _difference(2.1, (1.1, 3.1)),
-        source=quotes.TABLE_1,
+    PolicyPair("care", "uncertainty", FIRST_SIGHTING): _said(
+        quotes.TABLE_1, (3.5, 2.6, 4.4), (2.7, 1.7, 3.8), (2.1, 1.1, 3.1)
     ),
-    PolicyPair("care", "beam-reduce", FIRST_SIGHTING): _by_budget(
-        _difference(2.0), _TIED, _TIED, source=quotes.BEAMS
+    PolicyPair("care", "beam-reduce", FIRST_SIGHTING): _said(quotes.BEAMS, 2.0, _TIED, _TIED),
+    PolicyPair("care", "all-camera", FIRST_SIGHTING): _said(quotes.CAMERA, _TIED),
+    PolicyPair("care", "learned-scorer", FIRST_SIGHTING): _said(quotes.LEARNED, _TIED),
+    PolicyPair("care", "history-oracle", FIRST_SIGHTING): _said(
+        quotes.ORACLE, Claim(1, 3.7, upper=4.7)
     ),
-    PolicyPair("care", "all-camera", FIRST_SIGHTING): _everywhere(_TIED, quotes.CAMERA),
-    PolicyPair("care", "learned-scorer", FIRST_SIGHTING): _everywhere(_TIED, quotes.LEARNED),
-    PolicyPair("care", "history-oracle", FIRST_SIGHTING): _everywhere(
-        _difference(3.7, upper=4.7), quotes.ORACLE
-    ),
-    PolicyPair("history-oracle", "history", FIRST_SIGHTING): _everywhere(
-        Claim(0, at_most=0.5), quotes.ORACLE
+    PolicyPair("history-oracle", "history", FIRST_SIGHTING): _said(
+        quotes.ORACLE, Claim(0, at_most=0.5)
     ),
     # The paper does not say in which measure it falls below, so that both are tested.
-    PolicyPair("history-uniform", "history", FIRST_SIGHTING): _everywhere(_LESS, quotes.UNIFORM),
-    PolicyPair("care-priority", "care", FIRST_SIGHTING): _everywhere(
-        Claim(0, at_most=0.2), quotes.PRIORITY
+    PolicyPair("history-uniform", "history", FIRST_SIGHTING): _said(quotes.UNIFORM, _LESS),
+    PolicyPair("care-priority", "care", FIRST_SIGHTING): _said(
+        quotes.PRIORITY, Claim(0, at_most=0.2)
     ),
-    PolicyPair("care", "history", FIRST_SIGHTING, equal_scenes=True): _by_budget(
-        _difference(5.3), _difference(5.2), _difference(4.2), source=quotes.EQUAL_SCENES
+    PolicyPair("care", "history", FIRST_SIGHTING, equal_scenes=True): _said(
+        quotes.EQUAL_SCENES, 5.3, 5.2, 4.2
     ),
-    PolicyPair("care", "history", OVERALL): _by_budget(
-        _difference(-0.8), _difference(-0.5), _difference(0.6), source=quotes.HISTORY_OVERALL
+    PolicyPair("care", "history", OVERALL): _said(quotes.HISTORY_OVERALL, -0.8, -0.5, 0.6),
+    PolicyPair("care", "uncertainty", OVERALL): _said(quotes.UNCERTAINTY, -1.0, -2.2, -0.5),
+    PolicyPair("care", "beam-reduce", OVERALL): _said(
+        quotes.TABLE_1, (17.4, 15.9, 19.0), (11.5, 10.4, 12.7), (6.4, 5.4, 7.5)
     ),
-    PolicyPair("care", "uncertainty", OVERALL): _by_budget(
-        _difference(-1.0), _difference(-2.2), _difference(-0.5), source=quotes.UNCERTAINTY
+    PolicyPair("care", "learned-scorer", OVERALL): _said(
+        quotes.TABLE_1, (2.4, 1.9, 3.0), (0.7, 0.4, 1.0), (0.6, 0.3, 0.9)
     ),
-    PolicyPair("care", "beam-reduce", OVERALL): _by_budget(
-        _difference(17.4, (15.9, 19.0)),
-        _difference(11.5, (10.4, 12.7)),
-        _difference(6.4, (5.4, 7.5)),
-        source=quotes.TABLE_1,
+    PolicyPair("care", "all-camera", OVERALL): _said(
+        quotes.TABLE_1, (-0.13, -0.26, -0.01), (0.5, 0.3, 0.8), (0.7, 0.4, 1.0)
     ),
-    PolicyPair("care", "learned-scorer", OVERALL): _by_budget(
-        _difference(2.4, (1.9, 3.0)),
-        _difference(0.7, (0.4, 1.0)),
-        _difference(0.6, (0.3, 0.9)),
-        source=quotes.TABLE_1,
+    PolicyPair("history-oracle", "history", OVERALL): _said(
+        quotes.ORACLE, Claim(1, 0.5, upper=0.7)
     ),
-    PolicyPair("care", "all-camera", OVERALL): _by_budget(
-        _difference(-0.13, (-0.26, -0.01)),
-        _difference(0.5, (0.3, 0.8)),
-        _difference(0.7, (0.4, 1.0)),
-        source=quotes.TABLE_1,
-    ),
-    PolicyPair("history-oracle", "history", OVERALL): _everywhere(
-        _difference(0.5, upper=0.7), quotes.ORACLE
-    ),
-    PolicyPair("history-uniform", "history", OVERALL): _everywhere(_LESS, quotes.UNIFORM),
+    PolicyPair("history-uniform", "history", OVERALL): _said(quotes.UNIFORM, _LESS),
     # "No significant loss" is a tie. The paper gives no number at 35%.
-    PolicyPair("care-sbf", "care", OVERALL, "range/below 20 m"): _by_budget(
-        Claim(0, -0.5, (-1.7, 0.4)), _difference(-3.1, (-4.7, -1.5)), None, source=quotes.GUARD
+    PolicyPair("care-sbf", "care", OVERALL, "range/below 20 m"): _said(
+        quotes.GUARD, Claim(0, -0.5, (-1.7, 0.4)), (-3.1, -4.7, -1.5), None
     ),
-    PolicyPair("care", "history", TTFD): _by_budget(
-        _difference(-0.12), _difference(-0.13), _difference(-0.12), source=quotes.MEAN_TTFD
-    ),
-    SceneThird("dense", "tracks", OVERALL): _by_budget(
-        None, _difference(0.7), _difference(1.0), source=quotes.DENSE
-    ),
-    SceneThird("sparse", "tracks", OVERALL): _by_budget(None, _TIED, _TIED, source=quotes.DENSE),
-    SceneThird(DENSE_LESS_SPARSE, "tracks", OVERALL): _by_budget(
-        None, _difference(0.7), _difference(1.3), source=quotes.DENSE
-    ),
-    SceneThird("dense", "tracks", FIRST_SIGHTING): _everywhere(_TIED, quotes.DENSE),
-    SceneThird("middle", "tracks", FIRST_SIGHTING): _by_budget(
-        _TIED, _difference(-1.3), _TIED, source=quotes.DENSE
-    ),
-    SceneThird("sparse", "tracks", FIRST_SIGHTING): _everywhere(_TIED, quotes.DENSE),
+    PolicyPair("care", "history", TTFD): _said(quotes.MEAN_TTFD, -0.12, -0.13, -0.12),
+    SceneThird("dense", "tracks", OVERALL): _said(quotes.DENSE, None, 0.7, 1.0),
+    SceneThird("sparse", "tracks", OVERALL): _said(quotes.DENSE, None, _TIED, _TIED),
+    SceneThird(DENSE_LESS_SPARSE, "tracks", OVERALL): _said(quotes.DENSE, None, 0.7, 1.3),
+    SceneThird("dense", "tracks", FIRST_SIGHTING): _said(quotes.DENSE, _TIED),
+    SceneThird("middle", "tracks", FIRST_SIGHTING): _said(quotes.DENSE, _TIED, -1.3, _TIED),
+    SceneThird("sparse", "tracks", FIRST_SIGHTING): _said(quotes.DENSE, _TIED),
     # "The same pattern" is a sign without a number.
-    SceneThird(DENSE_LESS_SPARSE, "explained", OVERALL): _by_budget(
-        None, _MORE, _MORE, source=quotes.DENSE
-    ),
+    SceneThird(DENSE_LESS_SPARSE, "explained", OVERALL): _said(quotes.DENSE, None, _MORE, _MORE),
 }
 _STRICT_CAUSAL: dict[Comparison, Claims] = {
-    PolicyPair("care", "history", FIRST_SIGHTING): _by_budget(
-        _difference(4.6), _difference(5.3), _difference(2.6), source=quotes.CAUSAL
-    ),
+    PolicyPair("care", "history", FIRST_SIGHTING): _said(quotes.CAUSAL, 4.6, 5.3, 2.6),
 }
 PUBLISHED_LEVELS = {
     ("full", 1.0): PublishedLevel(24.5, 100.0, 49.4, 100.0),
@@ -195,21 +167,19 @@ def published_level(ratio: Ratio, policy: str, budget: float) -> float | None:
     """A recall in % that the paper gives of a policy, itself or as a share of the full scan's; None
     where it gives neither, and for TTFD.
     """
-    said = PUBLISHED_LEVELS.get((policy, budget), PublishedLevel())
-    full = PUBLISHED_LEVELS["full", 1.0]
-    if ratio is FIRST_SIGHTING:
-        own = said.first
-        share = said.first_of_full
-        ceiling = full.first
-    elif ratio is OVERALL:
-        own = said.overall
-        share = said.overall_of_full
-        ceiling = full.overall
-    else:
+    if ratio not in (FIRST_SIGHTING, OVERALL):
         return None
+    own, full = (
+        PUBLISHED_LEVELS.get(key, PublishedLevel()) for key in ((policy, budget), ("full", 1.0))
+    )
+    level, share, ceiling = (
+        (own.first, own.first_of_full, full.first)
+        if ratio is FIRST_SIGHTING
+        else (own.overall, own.overall_of_full, full.overall)
+    )
     # A share of the ceiling is a level once it is multiplied by the ceiling.
-    if own is not None or share is None or ceiling is None:
-        return own
+    if level is not None or share is None or ceiling is None:
+        return level
     return share * ceiling / 100
 
 

@@ -22,8 +22,8 @@ from care_sim.evaluation.scene_contrasts import (
 from care_sim.evaluation.strata import ENTRY, NEWCOMERS
 from care_sim.reports.engine.contrasts import Contrast, of_interval
 from care_sim.reports.engine.frames import Frame, by_floor_seed
-from care_sim.reports.engine.measures import Measure, Recall, tally_of
-from care_sim.reports.engine.parts import Part
+from care_sim.reports.engine.measures import OPEN_LOOP, Measure, Recall, loop_of, tally_of
+from care_sim.reports.engine.parts import Part, parts
 from care_sim.study.rows.settings import Setting
 from care_sim.study.run_config import FULL, Row
 
@@ -51,11 +51,6 @@ class SettingPlays(Part):
     def title(self) -> str:
         """The setting and the number of its scenes."""
         return f"{self.setting.label}: {counted(len(self.scenes), 'scene')}"
-
-    @cached_property
-    def full(self) -> Sequence[Row]:
-        """The full scans of the scenes, which may come from another setting."""
-        return self.rows(FULL, 1.0)
 
     def other_than(self, base: str) -> tuple[str, ...]:
         """All but one and the full scan; none where that one was not played."""
@@ -157,3 +152,12 @@ def plays_by_setting(rows: Sequence[Row]) -> list[SettingPlays]:
     plays = [SettingPlays(frame, setting) for setting in frame.scenes]
     # The full scans alone are no setting to report, unless nothing else was played.
     return [each for each in plays if each.tags] or plays
+
+
+def main_settings(rows: Sequence[Row]) -> Sequence[Part]:
+    """The settings of a study of either loop under no condition, or all where each has some."""
+    if loop_of(rows) is OPEN_LOOP:
+        found: Sequence[Part] = plays_by_setting(rows)
+    else:
+        found = [part for part in parts(rows) if part.tags]
+    return [part for part in found if not part.setting.conditions] or found

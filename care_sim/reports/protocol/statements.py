@@ -56,6 +56,5 @@ def statements_tables(plays: SettingPlays) -> list[Table]:
             (f"{verdicts.total()} verdicts, the paper's difference in brackets: {listed}.",),
             papers(sources),
             files_only=("interval",),
-            whole=("statement",),
         )
     ]

@@ -14,8 +14,7 @@ from care_sim.evaluation.scene_contrasts import (
 from care_sim.reports.engine.tables import PAPER, control_tables
 from care_sim.reports.protocol.contrasts import protocol_contrast_tables
 from care_sim.reports.protocol.controls import over_controls
-from care_sim.reports.protocol.details import allocation_tables, thirds_tables
-from care_sim.reports.protocol.earlier import earlier_tables
+from care_sim.reports.protocol.details import allocation_tables, earlier_tables, thirds_tables
 from care_sim.reports.protocol.formatting import rounded, share, share_ends, written
 from care_sim.reports.protocol.notes import left_out, of_full, papers
 from care_sim.reports.protocol.paper import LEVEL_SOURCES, PUBLISHED_LEVELS, PublishedLevel
@@ -24,6 +23,8 @@ from care_sim.reports.protocol.statements import statements_tables
 from care_sim.reports.protocol.strata import entry_tables, strata_tables
 from care_sim.reports.table import Table, TableRow
 from care_sim.study.run_config import FULL, Row
+
+_RATIOS = {"first sightings %": FIRST_SIGHTING, "overall %": OVERALL, "TTFD": TTFD}
 
 
 def protocol_tables(rows: Sequence[Row]) -> list[Table]:
@@ -60,7 +61,7 @@ def levels_tables(plays: SettingPlays) -> list[Table]:
             f"{plays.setting.label}: levels",
             columns,
             tuple(lines),
-            (*of_full(plays), *left_out(plays), *plays.notes),
+            (*of_full(plays), *left_out(plays)),
             papers(LEVEL_SOURCES) if any(line[1] == PAPER for line in lines) else (),
             files_only=details,
             whole=tuple(name for name in columns if name != "policy"),
@@ -73,9 +74,12 @@ def _columns(
 ) -> list[tuple[str, str, str]]:
     """The columns of a line: the name, what was measured, and what the paper says."""
     paper = said or PublishedLevel()
-    first, overall, ttfd = (
-        plays.level(ratio, policy, budget) for ratio in (FIRST_SIGHTING, OVERALL, TTFD)
-    )
+    levels = {name: plays.level(ratio, policy, budget) for name, ratio in _RATIOS.items()}
+    kinds = {kind: plays.level(FIRST_SIGHTING, policy, budget, kind) for kind in plays.newcomers}
+
+    def level(name: str, of_paper: float | None) -> tuple[str, str, str]:
+        ratio = _RATIOS[name]
+        return name, written(ratio, levels[name].by_event), written(ratio, of_paper)
 
     def of_full(ratio: Ratio, of_paper: float | None) -> list[tuple[str, str, str]]:
         # The paper gives its shares without an interval.
@@ -86,23 +90,19 @@ def _columns(
         ]
         return columns if plays.full else []
 
-    kinds = {kind: plays.level(FIRST_SIGHTING, policy, budget, kind) for kind in plays.newcomers}
     return [
         ("budget", percent(budget), ""),
         ("policy", plays.marked(policy), ""),
-        (
-            "first sightings %",
-            written(FIRST_SIGHTING, first.by_event),
-            written(FIRST_SIGHTING, paper.first),
-        ),
+        level("first sightings %", paper.first),
         *of_full(FIRST_SIGHTING, paper.first_of_full),
         *((f"{kind} %", written(FIRST_SIGHTING, own.by_event), "") for kind, own in kinds.items()),
-        ("overall %", written(OVERALL, overall.by_event), written(OVERALL, paper.overall)),
+        level("overall %", paper.overall),
         *of_full(OVERALL, paper.overall_of_full),
-        ("TTFD", written(TTFD, ttfd.by_event), written(TTFD, paper.ttfd)),
-        ("equal scenes: first sightings %", written(FIRST_SIGHTING, first.by_scene), ""),
-        ("equal scenes: overall %", written(OVERALL, overall.by_scene), ""),
-        ("equal scenes: TTFD", written(TTFD, ttfd.by_scene), ""),
+        level("TTFD", paper.ttfd),
+        *(
+            (f"equal scenes: {name}", written(_RATIOS[name], own.by_scene), "")
+            for name, own in levels.items()
+        ),
         ("seeds: first sightings ±", _deviation(plays, FIRST_SIGHTING, policy, budget), ""),
         ("seeds: overall ±", _deviation(plays, OVERALL, policy, budget), ""),
         ("scenes", str(len(plays.tallies(policy, budget))), ""),

@@ -3,15 +3,13 @@ policies have over each, and what each has over the best control.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 from care_sim.base.errors import percent
 from care_sim.evaluation.censoring import Quartiles
-from care_sim.reports.engine.frames import Frame
-from care_sim.reports.engine.levels import Cell, level_of
-from care_sim.reports.engine.measures import AVOIDED, BRAKED, DETECTED, DETECTION, Measure
-from care_sim.reports.engine.parts import Part
-from care_sim.reports.engine.tables import control_tables, minus_table
+from care_sim.reports.engine.levels import Cell, levels
+from care_sim.reports.engine.measures import BRAKED, DETECTED, DETECTION
+from care_sim.reports.engine.parts import Part, parts
+from care_sim.reports.engine.tables import control_tables, minus_tables
 from care_sim.reports.formatting import ends, marked, spread, unsigned
 from care_sim.reports.table import Table
 from care_sim.study.designs.paper import (
@@ -20,33 +18,17 @@ from care_sim.study.designs.paper import (
     paper_cells,
     published_result,
 )
-from care_sim.study.rows.reading import is_avoided
 from care_sim.study.run_config import FULL, REFERENCE, Row
 
-SWEEP_COLUMNS = (
-    "budget",
-    "policy",
-    "first detection m",
-    "never",
-    "braked",
-    "pass m",
-    "clearance m",
-    "collisions",
-    "regret m",
-    "interval",
-    "as full",
-    "paper",
-)
 _FILES_ONLY = ("pass m", "clearance m", "interval", "as full")
 """Columns that 80 characters of a terminal leave no room for."""
-_WHOLE = tuple(column for column in SWEEP_COLUMNS if column not in ("policy", "paper"))
 
 
 def sweep_tables(rows: Sequence[Row]) -> list[Table]:
     """Levels and contrasts, one setting after the other."""
     tables = []
-    for part in _parts(rows):
-        cells = _cells(part)
+    for part in parts(rows):
+        cells = levels(part.frame, part.setting)
         # A map that serves as a control is held against the others in the table of controls.
         learned = [
             p for p, tags in part.tags.items() if "learned" in tags and "control" not in tags
@@ -62,49 +44,26 @@ def sweep_tables(rows: Sequence[Row]) -> list[Table]:
 
 def sweep_minus(rows: Sequence[Row], policy: str) -> list[Table]:
     """One policy, named with its parameters, less every other, in every setting that has it."""
-    own = [part for part in _parts(rows) if policy in part.tags]
-    return [table for part in own for table in _minus(part, policy, _cells(part))]
-
-
-def _parts(rows: Sequence[Row]) -> list[Part]:
-    frame = Frame(rows)
-    return [Part(frame, setting) for setting in dict.fromkeys(key[0] for key in frame.groups)]
-
-
-def _cells(part: Part) -> list[Cell]:
-    """The cells of the setting by budget; its full scan comes last."""
-    keys = sorted(
-        (key for key in part.frame.groups if key[0] == part.setting), key=lambda key: key[2]
-    )
-    return [cell for key in keys if (cell := level_of(part.frame, key))]
+    return [
+        table
+        for part in parts(rows)
+        if policy in part.tags
+        for table in _minus(part, policy, levels(part.frame, part.setting))
+    ]
 
 
 def _minus(part: Part, base: str, cells: Sequence[Cell]) -> list[Table]:
-    """The base minus every other policy and the full scan; none of a policy that ran alone."""
-    played = dict.fromkeys([*(cell.policy for cell in cells), *([FULL] if part.full else [])])
-    others = [policy for policy in played if policy != base]
-    return [minus_table(part, base, others, _measures(part, cells))] if others else []
-
-
-def _measures(part: Part, cells: Sequence[Cell]) -> list[Measure]:
-    """What is compared: detections and collisions where any policy has some."""
-    further = (
-        (DETECTED, any(cell.never for cell in cells)),
-        (_preventable(part), any(cell.collisions for cell in cells)),
-    )
-    return [DETECTION, BRAKED, *(measure for measure, differs in further if differs)]
-
-
-def _preventable(part: Part) -> Measure:
-    """Collisions avoided, on the seeds on which the full scan has none, if it was played."""
-    if not part.full:
-        return AVOIDED
-    spared = {row["seed"] for row in part.full if is_avoided(row)}
-    return replace(
-        AVOIDED,
-        name="Preventable collisions avoided",
-        read=lambda row: AVOIDED.read(row) if row["seed"] in spared else None,
-    )
+    """The base minus every other policy and the full scan, in detections and collisions where any
+    policy has some.
+    """
+    played = [*dict.fromkeys(cell.policy for cell in cells if cell.policy != FULL)]
+    others = [policy for policy in (*played, *([FULL] if part.full else [])) if policy != base]
+    further = {
+        DETECTED: any(cell.never for cell in cells),
+        part.avoided: any(cell.collisions for cell in cells),
+    }
+    measures = [DETECTION, BRAKED, *(measure for measure, differs in further.items() if differs)]
+    return minus_tables(part, base, others, measures)
 
 
 def _over_controls(part: Part) -> list[Table]:
@@ -121,47 +80,55 @@ def _over_controls(part: Part) -> list[Table]:
 def _levels_table(part: Part, cells: Sequence[Cell]) -> Table:
     """Medians, counts and regret, one row per cell."""
     published = [_published(cell) for cell in cells]
-    sentences = dict.fromkeys(f'Paper: "{result.sentence}"' for result in published if result)
-    lines = (_line(cell, result) for cell, result in zip(cells, published, strict=True))
-    missing = [] if part.full else ["Regret: full not run."]
-    told = " ".join([*missing, *_nobody_notes(cells)])
+    quotes = dict.fromkeys(f'Paper: "{result.sentence}"' for result in published if result)
+    lines = [_line(cell, result) for cell, result in zip(cells, published, strict=True)]
+    columns = tuple(lines[0])
+    missing = "" if part.full else "Regret: full not run."
     # A terminal has no room for columns of zeros.
-    counted = {"never": [cell.never for cell in cells], "collisions": [c.collisions for c in cells]}
-    hidden = (*_FILES_ONLY, *(column for column, counts in counted.items() if not any(counts)))
+    zeros = [
+        column
+        for column, counts in (
+            ("never", [cell.never for cell in cells]),
+            ("collisions", [cell.collisions for cell in cells]),
+        )
+        if not any(counts)
+    ]
     return Table(
         part.setting.label,
-        SWEEP_COLUMNS,
-        tuple(lines),
-        (*part.notes, *([told] if told else [])),
-        tuple(sentences),
-        hidden,
-        _WHOLE,
+        columns,
+        tuple(tuple(line.values()) for line in lines),
+        (f"{missing} {_nobody_note(cells)}".strip(),),
+        tuple(quotes),
+        files_only=(*_FILES_ONLY, *zeros),
+        whole=tuple(column for column in columns if column not in ("policy", "paper")),
     )
 
 
 def _published(cell: Cell) -> PublishedResult | None:
     # Other physics or conditions than the paper's are no cell of its study, even where the
     # scenario, policy and budget are.
-    if (cell.setting, cell.policy, cell.budget) not in paper_cells():
+    if cell.key not in paper_cells():
         return None
     return published_result(cell.setting.world, cell.policy, cell.budget, cell.setting.faults)
 
 
-def _line(cell: Cell, published: PublishedResult | None) -> tuple[str, ...]:
-    return (
-        percent(cell.budget),
-        marked(cell.policy, cell.tags),
-        spread(cell.detection),
-        f"{cell.never}/{cell.met}",
-        _share(cell.braked, cell),
-        _median(cell.closest_pass, cell),
-        _median(cell.clearance, cell),
-        _share(cell.collisions, cell),
-        unsigned(cell.regret),
-        ends(cell.regret) if cell.regret else "",
-        f"{cell.as_full}/{cell.regret.difference.pairs}" if cell.regret else "",
-        _paper(published) if published else "",
-    )
+def _line(cell: Cell, published: PublishedResult | None) -> dict[str, str]:
+    """The entries of a row by column."""
+    regret = cell.regret
+    return {
+        "budget": percent(cell.budget),
+        "policy": marked(cell.policy, cell.tags),
+        "first detection m": spread(cell.detection),
+        "never": f"{cell.never}/{cell.met}",
+        "braked": f"{cell.braked}/{cell.episodes}",
+        "pass m": _median(cell.closest_pass, cell),
+        "clearance m": _median(cell.clearance, cell),
+        "collisions": f"{cell.collisions}/{cell.episodes}",
+        "regret m": unsigned(regret),
+        "interval": ends(regret),
+        "as full": f"{cell.as_full}/{regret.difference.pairs}" if regret else "",
+        "paper": _paper(published) if published else "",
+    }
 
 
 def _paper(result: PublishedResult) -> str:
@@ -174,26 +141,17 @@ def _paper(result: PublishedResult) -> str:
     return f"{result.detection_m:g}{braked}"
 
 
-def _nobody_notes(cells: Sequence[Cell]) -> list[str]:
+def _nobody_note(cells: Sequence[Cell]) -> str:
     """How many episodes first detections leave out, where there are any."""
     left_out = sorted({(cell.episodes - cell.met, cell.episodes) for cell in cells})
-    named = [f"{count} of {all_of}" for count, all_of in left_out if count]
-    if not named:
-        return []
-    return [
-        f"{', '.join(named)} episodes have no first-sighting actor: first detection, never and "
-        "regret leave them out."
-    ]
-
-
-def _share(count: int, cell: Cell) -> str:
-    return f"{count}/{cell.episodes}"
+    named = ", ".join(f"{count} of {all_of}" for count, all_of in left_out if count)
+    rest = "episodes have no first-sighting actor: first detection, never and regret leave them out"
+    return f"{named} {rest}." if named else ""
 
 
 def _median(values: Quartiles | None, cell: Cell) -> str:
     if values is None:
         return "never in view"
     # Fewer values than episodes: the actor never came into view in the others.
-    return f"{values.median:.1f}" + (
-        f" (of {values.count})" if values.count < cell.episodes else ""
-    )
+    of = f" (of {values.count})" if values.count < cell.episodes else ""
+    return f"{values.median:.1f}{of}"

@@ -9,9 +9,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import DEFAULTS
 from care_sim.study.designs.variants import Place, Variant
 from care_sim.study.episode_config import EpisodeConfig
-from care_sim.study.rows.reading import setting_of
-from care_sim.study.rows.settings import Setting
-from care_sim.study.run_config import FULL, Row
+from care_sim.study.run_config import Row
 
 FAULT_PLACES = (Place("dartout", 0.10), Place("dense", 0.03))
 """The paper's own: the budget at which it injects faults, and the one at which it tells the
@@ -135,9 +133,3 @@ def fault_study(
 def faults_alone(rows: Sequence[Row]) -> list[Row]:
     """The rows as if nothing but the faults had been asked for: what all share is left out."""
     return [{name: value for name, value in row.items() if name not in _SHARED} for row in rows]
-
-
-def common_conditions(rows: Sequence[Row]) -> Setting:
-    """What all rows share but the faults."""
-    row = next((each for each in rows if each["policy"] != FULL), rows[0])
-    return setting_of({name: value for name, value in row.items() if name not in _VARIED})

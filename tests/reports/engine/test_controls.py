@@ -3,7 +3,7 @@
 import pytest
 
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL
-from care_sim.reports.engine.controls import best_control, is_control, named_by_budget
+from care_sim.reports.engine.controls import is_control, named_by_budget
 from care_sim.reports.engine.frames import Frame
 from care_sim.reports.engine.measures import DETECTION, Recall
 from care_sim.reports.engine.parts import Part
@@ -26,29 +26,19 @@ def plays(rows=PLAYS):
     ("tags", "control"),
     [
         (("causal", "control"), True),
-        (("control",), True),
         (("causal",), False),
         (("generator", "control"), False),
         (("privileged", "control"), False),
         (("non-causal", "control"), False),
-        (("",), False),
     ],
 )
 def test_a_control_is_one_that_a_car_can_have(tags, control):
     assert is_control(tags) == control
 
 
-def test_the_best_control_has_the_highest_level_and_of_equal_ones_is_the_first():
-    assert best_control({"a": 1.0, "b": 3.0, "c": 3.0, "d": None}) == "b"
-    assert best_control({"a": 0.0}) == "a"
-    assert best_control({"a": None}) is None
-    assert best_control({}) is None
-
-
 @pytest.mark.parametrize(
     ("controls", "words"),
     [
-        ({0.03: "fan"}, "fan at every budget"),
         ({0.01: "fan", 0.03: "fan"}, "fan at every budget"),
         ({0.01: "fan", 0.03: "rows", 0.05: "fan"}, "fan at 1%, 5% and rows at 3%"),
     ],
@@ -111,8 +101,3 @@ def test_a_missed_actor_counts_as_in_differences():
     """At 3 m for the actor that it missed the mean of the fan is 7.8 m; at 4.5 m it is 8.1 m."""
     assert of_seeds([9.0, 9.0, 9.0, 9.0, None], [10.0, 9.0, 10.0, 9.0, 2.0]) == "stride"
     assert of_seeds([9.0, 9.0, 9.0, 9.0, 4.5], [10.0, 9.0, 10.0, 9.0, 2.0]) == "fan"
-
-
-def test_controls_are_compared_on_the_seeds_that_all_of_them_have():
-    """`fan` lacks the seed with the late actor, and of the others `stride` sees all farther."""
-    assert of_seeds([9.0] * 4, [9.5] * 4 + [2.0]) == "stride"

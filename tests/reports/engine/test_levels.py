@@ -4,25 +4,16 @@ import pytest
 
 from care_sim.evaluation.censoring import Bound
 from care_sim.reports.engine.frames import Frame
-from care_sim.reports.engine.levels import level, level_of, levels
+from care_sim.reports.engine.levels import level, levels
 from care_sim.reports.engine.measures import AVOIDED, DETECTION
 from care_sim.reports.formatting import spread
-from care_sim.study.episode_config import EpisodeConfig, grid
-from care_sim.study.rows.reading import key_of, with_added_columns
+from care_sim.study.episode_config import grid
+from care_sim.study.rows.reading import with_added_columns
 from tests.helpers.made_rows import NEAREST_M, STUDY, row, rows
 
 
 def cell(policy, study=STUDY):
     return next(cell for cell in levels(Frame(study)) if cell.policy == policy)
-
-
-def key(policy, **fields):
-    return key_of(EpisodeConfig("dense", policy, 0.03, **fields).row())
-
-
-def test_medians_rank_the_never_detected_last():
-    history = cell("history").detection
-    assert (history.low, history.median, history.high) == (None, 4.0, 6.0)
 
 
 def test_regret_is_what_the_full_scan_has_over_a_policy():
@@ -70,20 +61,6 @@ def test_a_drive_that_meets_nobody_has_no_first_detection():
     ]
     (alone,) = levels(Frame(theirs[1:2]))
     assert (alone.met, spread(alone.detection)) == (0, "-")
-
-
-def test_cells_and_differences_are_found_by_key_and_what_was_not_played_is_none():
-    frame = Frame([*rows("care", [15.0, 16.0]), *rows("history-oracle", [9.0, 12.0])])
-    assert level_of(frame, key("care")).detection.median == 15.5
-    assert frame.contrast(DETECTION, key("care"), key("history-oracle")).mean == 5.0
-    assert frame.of(key("care", camera_latency=1)) == ()
-    assert level_of(frame, key("history")) is None
-    assert frame.contrast(DETECTION, key("care"), key("history")) is None
-
-
-def test_a_number_is_the_same_key_as_an_int_and_as_a_float():
-    whole, real = (key("care-sbf", policy_parameters=(("k_safe", value),)) for value in (1, 1.0))
-    assert whole == real != key("care-sbf")
 
 
 def test_levels_in_words():

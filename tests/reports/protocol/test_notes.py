@@ -3,7 +3,7 @@ none, and how much was played.
 """
 
 from care_sim.reports.findings import gate_tables
-from care_sim.reports.protocol.closing import protocol_closing
+from care_sim.reports.protocol.notes import protocol_closing
 from care_sim.reports.protocol.tables import protocol_tables
 from care_sim.reports.report import read_results
 from care_sim.reports.table import Bold
@@ -47,14 +47,6 @@ def test_what_rests_on_an_interval_over_events_is_marked_and_explained():
     assert gate.rows[0][5:] == ("+80.0", interval, "care")
     for table in (shown[CONTRASTS], shown[STATEMENTS], gate):
         assert "°: interval over events" in table.lines[-1]
-
-
-def test_intervals_over_scenes_have_no_mark_and_no_note():
-    shown = tables(study(BOTH, scenes=5))
-    entries = [entry for table in shown.values() for row in table.rows for entry in row]
-    assert "°" not in "".join(entries)
-    few = tables(study({"care": (3, 5), "history": (1, 6)}, scenes=1, events=4))
-    assert "°" not in "".join(entry for row in few[CONTRASTS].rows for entry in row)
 
 
 def test_the_closing_counts_events_by_both_presences_where_the_rows_do():

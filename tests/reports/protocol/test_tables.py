@@ -1,7 +1,6 @@
 """Tables of the protocol on plays with known answers, and the paper's numbers beside them."""
 
 import pytest
-from rich.console import Console
 
 from care_sim.evaluation.bootstrap import Interval
 from care_sim.evaluation.scene_contrasts import OVERALL
@@ -17,8 +16,6 @@ from care_sim.reports.protocol.paper import (
     claims_about,
 )
 from care_sim.reports.protocol.tables import protocol_tables
-from care_sim.reports.report import print_report, write_report
-from care_sim.reports.studies import STUDIES
 from care_sim.reports.table import Bold
 from care_sim.study.rows.parquet import read_rows, with_tuples, write_rows
 from care_sim.study.rows.settings import Setting
@@ -34,6 +31,7 @@ FOUND = {
     "full": (8, 8),
 }
 ROWS = study(FOUND)
+ENTRIES = "first-sighting recall by entry"
 
 
 def tables(rows=ROWS):
@@ -50,6 +48,7 @@ def block(table, heading):
 
 
 def test_contrasts_stand_above_the_papers():
+    assert list(tables())[:2] == ["care minus each policy", "each policy minus history"]
     table = tables()["care minus each policy"]
     assert table.columns == ("care minus", "10%", "20%", "35%")
     assert block(table, "First sightings") == (
@@ -68,54 +67,23 @@ def test_contrasts_stand_above_the_papers():
     assert block(table, "First sightings, entering")[0] == ("history", *["+15.4 [15.4,15.4]"] * 3)
     assert block(table, "Overall recall")[0] == ("history", *["-10.0 [-10.0,-10.0]"] * 3)
     assert block(table, "Censored TTFD")[0] == ("history", *["-0.60 [-0.60,-0.60]"] * 3)
-    assert any(
-        "6 scenes, 120 events (42 emerging, 78 entering), 1,200 object frames; 3 floor seeds"
-        in note
-        for note in table.notes
-    )
-    assert any(note.startswith("†") for note in table.notes)
+    counted = "6 scenes, 120 events (42 emerging, 78 entering), 1,200 object frames; 3 floor seeds"
+    assert any(counted in note for note in table.notes)
+    assert "†: knows the truth" in table.lines[-1]
     assert any(quote.startswith('Paper: "Table 1') for quote in table.quotes)
 
 
-def test_every_policy_is_held_against_history_right_after_care():
-    shown = tables()
-    assert list(shown)[:2] == ["care minus each policy", "each policy minus history"]
-    table = shown["each policy minus history"]
-    assert table.terminal
+def test_every_policy_is_held_against_history_and_every_scene_weighs_alike_in_the_files():
+    table = tables()["each policy minus history"]
     assert table.columns == ("minus history", "10%", "20%", "35%")
-    assert block(table, "First sightings") == (
-        ("all-camera", *["+10.0 [10.0,10.0]"] * 3),
-        ("care", *["+10.0 [10.0,10.0]"] * 3),
-        ("(paper)", "+5.2 [4.3,6.2]", "+5.2 [4.3,6.2]", "+4.3 [3.5,5.1]"),
+    assert block(table, "First sightings")[3:] == (
         ("mine", *["+5.0 [5.0,5.0]"] * 3),
         ("history-oracle †", *["+0.0 [0.0,0.0]"] * 3),
         ("(paper)", *["tied, at most 0.5"] * 3),
     )
-    assert [isinstance(line[1], Bold) for line in block(table, "First sightings")][3:5] == [
-        True,
-        False,
-    ]
-    overall = {line[0]: line[1] for line in block(table, "Overall recall")}
-    assert overall["mine"] == "-10.0 [-10.0,-10.0]"
-    assert block(table, "Censored TTFD")[-1] == ("history-oracle †", *["+0.00 [0.00,0.00]"] * 3)
-
-
-def test_an_idea_is_held_against_history_without_care():
-    shown = tables(study({"history": (4, 6), "mine": (5, 5)}))
-    assert block(shown["each policy minus history"], "First sightings") == (
-        ("mine", *["+5.0 [5.0,5.0]"] * 3),
-    )
-    assert "care minus each policy" not in shown
-    assert "each policy minus history" not in tables(study({"care": (6, 5), "mine": (5, 5)}))
-
-
-def test_equal_scene_weights_have_a_table_in_the_files():
-    table = tables()["care minus each policy, equal scene weights"]
-    assert not table.terminal
-    assert block(table, "First sightings, equal scenes")[:2] == (
-        ("history", *["+10.0 [10.0,10.0]"] * 3),
-        ("(paper)", "+5.3", "+5.2", "+4.2"),
-    )
+    equal = tables()["care minus each policy, equal scene weights"]
+    assert not equal.terminal
+    assert block(equal, "First sightings, equal scenes")[1] == ("(paper)", "+5.3", "+5.2", "+4.2")
 
 
 def test_levels_are_shares_of_what_the_full_scan_finds():
@@ -124,145 +92,79 @@ def test_levels_are_shares_of_what_the_full_scan_finds():
     assert lines["20%", "care"][2:11] == (
         *("30.0", "75", "[75,75]", "28.6", "30.8", "50.0", "62", "[62,62]", "4.20"),
     )
-    assert lines["100%", "full"][2:11] == (
-        *("40.0", "100", "[100,100]", "42.9", "38.5", "80.0", "100", "[100,100]", "3.60"),
-    )
     assert lines["20%", "care"][11:] == ("30.0", "50.0", "4.20", "0.0", "0.0", "6")
-    said = [line for line in table.rows if line[1] == "(paper)"]
-    assert said[-1][2:11] == ("24.5", "100", "", "", "", "49.4", "100", "", "")
-    assert ("", "(paper)", "", "88", "", "", "", "", "94", "", "3.33") in {
-        line[:11] for line in said
-    }
-    assert {len(line) for line in table.rows} == {len(table.columns)}
+    assert lines["100%", "full"][2:5] == ("40.0", "100", "[100,100]")
+    assert table.rows[-1][2:11] == ("24.5", "100", "", "", "", "49.4", "100", "", "")
+    without = tables(study({"care": (6, 5)}))["levels"]
+    assert without.rows[0][:7] == ("10%", "care", "30.0", "28.6", "30.8", "50.0", "4.20")
+    assert without.notes[0] == "Of full: the full scan was not played."
 
 
-def test_without_a_full_scan_there_is_no_column_of_shares_and_a_note_says_why():
-    levels = tables(study({"care": (6, 5)}))["levels"]
-    assert levels.columns[:7] == (
-        *("budget", "policy", "first sightings %", "emerging %", "entering %", "overall %", "TTFD"),
-    )
-    assert levels.rows[0][:7] == ("10%", "care", "30.0", "28.6", "30.8", "50.0", "4.20")
-    assert levels.notes[0] == "Of full: the full scan was not played."
-
-
-def test_a_full_scan_that_finds_nothing_has_no_share():
-    levels = tables(study({"care": (6, 5), "full": (0, 5)}))["levels"]
-    care = dict(zip(levels.columns[2:5], levels.rows[0][2:5], strict=True))
-    assert care == {"first sightings %": "30.0", "of full %": "", "interval": ""}
-    assert levels.rows[0][7:10] == ("50.0", "100", "[100,100]")
-
-
-def unequal(policy, sighted, scenes):
-    return [
-        play(f"{n}", policy, found(10, count), [count] * 10)
-        for n, count in enumerate((sighted * scenes)[:scenes])
-    ]
-
-
-def test_the_interval_of_a_share_rests_on_scenes_and_on_no_fewer_than_five():
+@pytest.mark.parametrize(("scenes", "share"), [(4, ("50", "")), (5, ("45", "[25,65]"))])
+def test_the_interval_of_a_share_rests_on_scenes_and_on_no_fewer_than_five(scenes, share):
     """In turns one and three of the four that the full scan finds."""
-    for scenes, ends in ((4, False), (5, True)):
-        rows = [*unequal("care", [1, 3], scenes), *unequal("full", [4], scenes)]
-        levels = tables(rows)["levels"]
-        line = levels.rows[0][3:5]
-        assert line[0] == ("50" if scenes == 4 else "45")
-        assert bool(line[1]) == ends
-        assert line[1] in ("", "[25,65]")
+    rows = [
+        play(f"{n}", policy, found(10, sighted), [sighted] * 10)
+        for n in range(scenes)
+        for policy, sighted in (("care", (1, 3)[n % 2]), ("full", 4))
+    ]
+    assert tables(rows)["levels"].rows[0][3:5] == share
 
 
-def test_the_floor_seed_farthest_from_the_mean_is_named():
+def test_seeds_and_scenes_that_differ_are_told():
     rows = [
         play(f"{n}", "care", found(10, sighted), [sighted] * 10, floor_seed=seed)
         for n in range(2)
         for seed, sighted in enumerate((1, 2, 6))
     ]
-    (line,) = [line for line in tables(rows)["levels"].rows if line[1] == "care"]
-    assert line[2] == "30.0"
-    assert line[-3:] == ("30.0", "30.0", "2")
-
-
-def test_the_share_of_the_ceiling_is_of_the_scenes_that_both_have():
+    line = tables(rows)["levels"].rows[0]
+    # The seed that is farthest from the mean of 30.
+    assert (line[2], *line[-3:]) == ("30.0", "30.0", "30.0", "2")
+    # The share of the ceiling is of the scenes that both have.
     rows = [play("a", "care", found(10, 2), [2] * 10), play("b", "care", found(10, 8), [8] * 10)]
     rows += [play("a", "full", found(10, 4), [4] * 10)]
-    (line,) = [line for line in tables(rows)["levels"].rows if line[1] == "care"]
-    assert (line[2], line[3]) == ("50.0", "50")
-
-
-def test_a_scene_without_a_play_is_out_of_that_policys_contrasts_and_counted():
-    lacking = [
-        row
-        for row in ROWS
-        if (row["scene"], row["policy"], row["budget"]) != ("scene 001", "mine", 0.2)
-    ]
-    shown = tables(lacking)
+    assert tables(rows)["levels"].rows[0][2:4] == ("50.0", "50")
+    missing = ("scene 001", "mine", 0.2)
+    lacking = [row for row in ROWS if (row["scene"], row["policy"], row["budget"]) != missing]
     note = "Scenes without a play, left out: mine 1 at 20%."
+    shown = tables(lacking)
     assert shown["care minus each policy"].notes[0].endswith(note)
     assert note in shown["levels"].notes
-    lines = {(line[0], line[1]): line[-1] for line in shown["levels"].rows}
-    assert (lines["20%", "mine"], lines["10%", "mine"]) == ("5", "6")
 
 
 def test_statements_are_judged_at_the_papers_budgets():
     table = tables()["the paper's statements"]
     lines = {line[0]: line[1::2] for line in block(table, "First sightings")}
-    assert lines["care minus history"] == (
-        "+10.0 met (+5.2)",
-        "+10.0 met (+5.2)",
-        "+10.0 met (+4.3)",
-    )
-    assert lines["care minus all-camera"] == ("+0.0 met (tied)",) * 3
+    met = ("+10.0 met (+5.2)", "+10.0 met (+5.2)", "+10.0 met (+4.3)")
+    assert lines["care minus history"] == met
     assert lines["history-oracle minus history"] == ("+0.0 met (tied)",) * 3
     overall = {line[0]: line for line in block(table, "Overall recall")}
     assert overall["care minus history"][5:] == ("-10.0 not met (+0.6)", "[-10.0,-10.0]")
     assert overall["care minus all-camera"][1] == "+0.0 undecided (-0.13)"
-    assert table.notes[0].endswith(
-        "27 verdicts, the paper's difference in brackets: 20 met, 1 not met, 6 undecided."
-    )
+    assert table.notes[0].startswith("27 verdicts")
+    assert table.notes[0].endswith("20 met, 1 not met, 6 undecided.")
     assert "the paper's statements" not in tables(study(FOUND, budgets=(0.05,)))
     assert "the paper's statements" not in tables(study(FOUND, reserve_fraction=0.5))
 
 
-GAPS = {
-    "above": of_interval(Recall(OVERALL), Interval(1, 0.5, 2), 5),
-    "below": of_interval(Recall(OVERALL), Interval(-1, -2, -0.5), 5),
-    "zero": of_interval(Recall(OVERALL), Interval(0.2, -1, 1), 5),
-    "none": of_interval(Recall(OVERALL), Interval(1, 0.5, 2), 4),
-}
-
-
 @pytest.mark.parametrize(
-    ("difference", "claimed", "says"),
+    ("ends", "scenes", "verdicts"),
     [
-        *(
-            (difference, 1, says)
-            for difference, says in zip(
-                GAPS, ("met", "not met", "undecided", "undecided"), strict=True
-            )
-        ),
-        *(
-            (difference, -1, says)
-            for difference, says in zip(
-                GAPS, ("not met", "met", "undecided", "undecided"), strict=True
-            )
-        ),
-        *(
-            (difference, 0, says)
-            for difference, says in zip(
-                GAPS, ("not met", "not met", "met", "undecided"), strict=True
-            )
-        ),
+        ((1, 0.5, 2), 5, ("met", "not met", "not met")),
+        ((-1, -2, -0.5), 5, ("not met", "met", "not met")),
+        ((0.2, -1, 1), 5, ("undecided", "undecided", "met")),
+        ((1, 0.5, 2), 4, ("undecided",) * 3),
     ],
 )
-def test_the_rule_of_met(difference, claimed, says):
-    assert verdict(GAPS[difference], claimed) == says
+def test_the_rule_of_met(ends, scenes, verdicts):
+    difference = of_interval(Recall(OVERALL), Interval(*ends), scenes)
+    assert tuple(verdict(difference, claimed) for claimed in (1, -1, 0)) == verdicts
 
 
 def test_every_claim_of_the_paper_has_the_sign_of_its_numbers_at_its_budgets():
     for claims in claims_about(Setting("streets", detector="returns")).values():
-        assert claims.by_budget
         assert {*claims.by_budget} <= {*PAPER_BUDGETS}
         for claim in claims.by_budget.values():
-            assert claim.sign in (-1, 0, 1)
             assert not claim.sign or claim.mean is None or claim.mean * claim.sign > 0
             assert claim.ends is None or claim.ends[0] < claim.mean < claim.ends[1]
             assert claim.ends is None or (claim.ends[0] > 0) - (claim.ends[1] < 0) == claim.sign
@@ -272,13 +174,9 @@ def test_every_claim_of_the_paper_has_the_sign_of_its_numbers_at_its_budgets():
 @pytest.mark.parametrize(
     ("claim", "text", "short"),
     [
-        (Claim(1, 5.2, (4.3, 6.2)), "+5.2 [4.3,6.2]", "+5.2"),
         (Claim(-1, -0.13, (-0.26, -0.01)), "-0.13 [-0.26,-0.01]", "-0.13"),
-        (Claim(1, 2.0), "+2.0", "+2.0"),
         (Claim(1, 3.7, upper=4.7), "+3.7 to 4.7", "+3.7 to 4.7"),
-        (Claim(1), "above", "above"),
         (Claim(-1), "below", "below"),
-        (Claim(0), "tied", "tied"),
         (Claim(0, at_most=0.5), "tied, at most 0.5", "tied"),
         (Claim(0, -0.5, (-1.7, 0.4)), "tied, -0.5 [-1.7,0.4]", "tied"),
     ],
@@ -289,7 +187,6 @@ def test_claims_are_printed_as_the_paper_has_them(claim, text, short):
     assert claims_of_paper(claims, (0.2,)) == ()
     ours = of_interval(Recall(OVERALL), Interval(1.0, 0.5, 1.5), 5)
     assert judged(ours, claim).endswith(f" ({short})")
-    assert judged(ours, None) == "+1.0"
 
 
 def test_the_strict_causal_variant_has_the_papers_own_numbers():
@@ -300,9 +197,9 @@ def test_the_strict_causal_variant_has_the_papers_own_numbers():
         "care minus each policy"
     )
     assert shown[title].rows[2] == ("(paper)", "+4.6", "+5.3", "+2.6")
+    # The full scan of the plain setting is the ceiling of this one, too.
     levels = shown[title.replace("care minus each policy", "levels")]
     assert [line[3] for line in levels.rows if line[1] == "care"] == ["75"] * 3
-    assert not any(line[1] == "(paper)" for line in levels.rows)
 
 
 def test_strata_have_the_level_of_every_policy_and_contrasts():
@@ -320,83 +217,22 @@ def test_strata_have_the_level_of_every_policy_and_contrasts():
         "care minus history": "+14.3 [14.3,14.3]",
         "care minus all-camera": "+0.0 [0.0,0.0]",
     }
-    assert any(note.startswith("†") for note in table.notes)
-    assert not table.terminal
     assert block(tables()["overall recall by stratum"], "azimuth: side, 420 object frames")
-
-
-def dense(scenes):
-    """CARE finds two frames more an event than all-camera in the third with the most tracks."""
-    better = [n >= 2 * scenes / 3 for n in range(scenes)]
-    care = [
-        play(
-            f"{n:02d}",
-            "care",
-            found(10, 3),
-            [7 if better[n] else 5] * 10,
-            tracks=float(n),
-            explained=float(n % 3),
-        )
-        for n in range(scenes)
-    ]
-    return [*care, *(play(f"{n:02d}", "all-camera", found(10, 3), [5] * 10) for n in range(scenes))]
-
-
-def test_thirds_are_shown_with_what_they_are_ranked_by():
-    table = tables(dense(15))["care minus all-camera in thirds of the scenes"]
-    assert block(table, "Tracked objects a keyframe") == (
-        ("dense third", "12.0"),
-        ("middle third", "7.0"),
-        ("sparse third", "2.0"),
-    )
-    lines = block(table, "Overall recall, by tracks")
-    assert [line[1] for line in lines if line[0] != "(paper)"] == [
-        "+20.0 [20.0,20.0]",
-        "+0.0 [0.0,0.0]",
-        "+0.0 [0.0,0.0]",
-        "+20.0 [20.0,20.0]",
-    ]
-    assert block(table, "First sightings, by explained")[0] == ("dense third", "+0.0 [0.0,0.0]")
-    statements = tables(dense(15))["the paper's statements"]
-    assert block(statements, "Overall recall, by tracks")[0][1] == "+20.0"
-
-
-def test_thirds_take_nine_scenes_and_all_camera():
-    def have(rows):
-        return "care minus all-camera in thirds of the scenes" in tables(rows)
-
-    assert [have(dense(9)), have(dense(8))] == [True, False]
-    assert not have([row for row in dense(9) if row["policy"] == "care"])
 
 
 def test_differing_allocations_stand_above_the_papers():
     table = tables()["keyframes on which the allocation differs from that of care"]
-    assert table.rows[:3] == (
-        ("history", *["10%, 50 cells"] * 3),
+    assert table.rows[1:3] == (
         ("all-camera", *["10%, 50 cells"] * 3),
         ("(paper)", "17%", "", "68%"),
     )
 
 
-def test_one_policy_without_care_has_levels_and_strata():
-    shown = tables(study({"history": (4, 6), "full": (8, 8)}))
-    assert list(shown) == [
-        "levels",
-        "first-sighting recall by entry",
-        "first-sighting recall by stratum",
-        "overall recall by stratum",
-    ]
-    assert list(tables(study({"full": (8, 8)}))) == ["levels"]
-
-
 def test_the_gain_is_held_against_the_papers_gate_at_the_papers_budgets():
-    (gate,) = gate_tables(ROWS)
-    assert [line[1:] for line in gate.rows] == [
-        (budget, "first sightings, points", "care", "history", "+10.0", "[10.0,10.0]", "care")
-        for budget in ("10%", "20%", "35%")
-    ]
     (small,) = gate_tables(study({"care": (5, 5), "history": (4, 5)}, events=25, budgets=(0.1,)))
     assert small.rows[0][-3:] == ("+4.0", "[4.0,4.0]", "no")
+    (behind,) = gate_tables(study({"care": (4, 6), "history": (12, 6)}, budgets=(0.1,)))
+    assert behind.rows[0][-1] == "history"
     assert gate_tables(study({"care": (5, 5)})) == []
     assert gate_tables(study({"care": (6, 5), "history": (4, 6)}, budgets=(0.05,))) == []
 
@@ -409,103 +245,49 @@ def test_a_file_changes_nothing_in_the_tables(tmp_path):
     assert protocol_tables(read) == protocol_tables(rows)
 
 
-def test_the_study_is_shown_in_three_forms(tmp_path, capsys):
-    protocol = STUDIES["protocol"]
-    write_report(ROWS, tmp_path, protocol)
-    print_report(ROWS, Console(width=100), protocol, verbose=True)
-    printed, markdown, latex = (
-        capsys.readouterr().out,
-        *((tmp_path / name).read_text() for name in ("tables.md", "tables.tex")),
-    )
-    tables = protocol.tables(ROWS)
-    assert all(table.title in printed for table in tables)
-    assert all(f"## {table.title}\n" in markdown for table in tables)
-    assert latex.count(r"\begin{table}") == len(tables)
-    assert max(map(len, printed.splitlines())) <= 100
-
-
-def test_at_budgets_of_which_the_paper_does_not_speak_it_has_no_line():
-    scarce = study(
-        {"care": (5, 5), "history": (4, 5), "all-camera": (5, 5), "full": (9, 9)},
-        scenes=9,
-        budgets=(0.03, 0.05),
-    )
-    for table in protocol_tables(scarce):
-        if "levels" not in table.title:
-            assert not [row for row in table.rows if "(paper)" in row]
-            assert not table.quotes
-
-
 def test_every_policy_is_held_against_the_control_of_its_own_budget():
     table = tables(PLAYS)["each policy minus the best control"]
-    assert table.columns == ("minus the best control", "10%", "20%")
-    assert table.rows == (
+    assert table.rows[:4] == (
         ("First sightings",),
         ("best control", "place", "rows"),
         ("care", "+5.0 [5.0,5.0]", "-5.0 [-5.0,-5.0]"),
         ("seed-finder §", "+20.0 [20.0,20.0]", "+10.0 [10.0,10.0]"),
-        ("Overall recall",),
-        ("best control", "rows", "rows"),
-        ("care", "-30.0 [-30.0,-30.0]", "-10.0 [-10.0,-10.0]"),
-        ("seed-finder §", "+10.0 [10.0,10.0]", "+30.0 [30.0,30.0]"),
     )
     assert isinstance(table.rows[2][1], Bold)
     assert "Candidates: rows, place." in table.notes[0]
     for played in ({"care": (6, 5), "full": (8, 8)}, {"rows": (4, 8), "place": (5, 3)}):
         assert "each policy minus the best control" not in tables(study(played))
-    lone = tables([*PLAYS, *study({"care": (6, 5)}, budgets=(0.35,))])
-    lines = lone["each policy minus the best control"].rows
-    assert {line[-1] for line in lines if len(line) > 1} == {""}
-
-
-ENTRIES_TABLE = "first-sighting recall by entry"
 
 
 def test_recall_and_its_share_of_the_full_scans_by_entry():
-    """Of 20 events a scene 7, 7 and 6 enter in turns, so that of 6 found at once each has 2."""
-    table = tables(study({"care": (6, 5), "history": (3, 5), "full": (8, 8)}))[ENTRIES_TABLE]
-    headings = [line[0] for line in table.rows if len(line) == 1]
-    assert headings == [
-        "entry: emergence, 42 events",
-        "entry: ring, 42 events",
-        "entry: beyond, 36 events",
-    ]
-    assert block(table, headings[0]) == (
-        ("care", *["28.6 (67 [67,67])"] * 3),
-        ("history", *["14.3 (33 [33,33])"] * 3),
-        ("full", *["42.9"] * 3),
-        ("care minus history", *["+14.3 [14.3,14.3]"] * 3),
-    )
-    assert "nearer than 45 m, ring up to 50 m" in table.notes[0]
-    without = tables(study({"care": (6, 5)}))[ENTRIES_TABLE]
-    assert block(without, headings[0]) == (("care", *["28.6"] * 3),)
-
-
-def test_an_entry_that_no_object_took_has_no_block_and_one_not_found_no_share():
     """Two events a scene, of which the full scan finds the first: the third entry has none."""
     rows = [
         play(f"{n}", policy, found(2, sighted), [1, 1])
         for n in range(6)
-        for policy, sighted in (("care", 2), ("full", 1))
+        for policy, sighted in (("care", 2), ("history", 1), ("full", 1))
     ]
-    table = tables(rows)[ENTRIES_TABLE]
+    table = tables(rows)[ENTRIES]
     assert table.rows == (
         ("entry: emergence, 6 events",),
         ("care", "100.0 (100 [100,100])"),
+        ("history", "100.0 (100 [100,100])"),
         ("full", "100.0"),
+        ("care minus history", "+0.0 [0.0,0.0]"),
         ("entry: ring, 6 events",),
         ("care", "100.0"),
+        ("history", "0.0"),
         ("full", "0.0"),
+        ("care minus history", "+100.0 [100.0,100.0]"),
     )
-    assert ENTRIES_TABLE not in tables([play("a", "care", [], [])])
+    assert "nearer than 45 m, ring up to 50 m" in table.notes[0]
 
 
-@pytest.mark.parametrize("number", [0, 6, -1])
+@pytest.mark.parametrize("number", [0, -1])
 def test_where_a_row_lacks_entries_nothing_is_told_by_entry(number):
-    """The first of all, one of another seed, and one of the full scan."""
+    """The first of all, and one of the full scan."""
     old = {name: value for name, value in ROWS[number].items() if not name.startswith("entry/")}
     shown = tables([old if row is ROWS[number] else row for row in ROWS])
-    assert ENTRIES_TABLE not in shown
+    assert ENTRIES not in shown
     assert not any("entry" in line[0] for line in shown["overall recall by stratum"].rows)
     assert not any("emerging" in name for name in shown["levels"].columns)
 

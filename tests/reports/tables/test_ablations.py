@@ -2,8 +2,8 @@
 
 import pytest
 
-from care_sim.reports.closings import open_ablation_closing
 from care_sim.reports.protocol.paper_ablations import PUBLISHED_CHANGES, USUAL
+from care_sim.reports.studies import STUDIES
 from care_sim.reports.table import Bold
 from care_sim.reports.tables.ablations import ablation_tables
 from care_sim.sources.scenes import Scene, Streets
@@ -109,10 +109,11 @@ def test_released_cells_are_not_told_where_a_row_of_before_lacks_them(plays):
 
 
 def test_the_closing_tells_what_the_full_scan_finds(plays):
+    closing = STUDIES["ablate-open-loop"].closing
     told = "The full scan finds: first sightings 80.0%, below 20 m 90.0%, overall 90.0%."
-    assert open_ablation_closing(plays)[-1] == told
+    assert closing(plays)[-1] == told
     without = [row for row in plays if row["policy"] != "full"]
-    assert not any("full scan" in sentence for sentence in open_ablation_closing(without))
+    assert not any("full scan" in sentence for sentence in closing(without))
 
 
 def test_all_that_the_paper_says_is_of_levels_and_bases_that_are_shown():

@@ -1,6 +1,6 @@
 """The paper's statements by order of cells, in both loops. The published rows hold the numbers."""
 
-from care_sim.reports.closings import open_order_closing
+from care_sim.reports.studies import STUDIES
 from care_sim.reports.table import Bold
 from care_sim.reports.tables.order import order_closing, order_tables
 from care_sim.study.designs.order import ORDERS, order_study
@@ -66,6 +66,8 @@ def test_statements_on_plays_are_judged_under_every_order():
     # A difference of exactly nothing bears no sign out.
     assert (CLAIM, "met", "undecided") in verdicts.rows
     assert (CLAIM, "+10.0 [10.0,10.0]", "+0.0 [0.0,0.0]") in measured.rows
-    assert "0 of 4 statements have the same verdict" in open_order_closing(plays)[-1]
+    assert (
+        "0 of 4 statements have the same verdict" in STUDIES["order-open-loop"].closing(plays)[-1]
+    )
     assert len(order_tables([row for row in plays if row["budget"] in (0.03, 1.0)])) == 2
     assert order_tables([row for row in plays if row["policy"] == "full"]) == []
