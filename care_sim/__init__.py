@@ -103,7 +103,9 @@ def __getattr__(name: str) -> object:
     if name == "__version__":
         from importlib.metadata import version
 
-        return version("care-sim")
+        # Kept: it is read from a file, and every task of a study asks for it.
+        globals()[name] = version("care-sim")
+        return globals()[name]
     if name in _PLACES:
         return getattr(import_module(f"care_sim.{_PLACES[name]}"), name)
     if name in ("core", "policies", "perception"):

@@ -4,15 +4,13 @@ import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from matplotlib.figure import Figure
 from rich.console import Console
 
 from care_sim.base.errors import InvalidInput, counted, printable, unknown
 from care_sim.base.files import write_text
 from care_sim.base.json_text import json_content
-from care_sim.reports.figures.files import default_style, remove_others, save
 from care_sim.reports.latex import PREAMBLE, latex, paragraph
 from care_sim.reports.studies import STUDIES, SWEEP, study_of
 from care_sim.reports.study import Study
@@ -23,6 +21,9 @@ from care_sim.study.rows.parquet import read_notes, read_rows, read_table
 from care_sim.study.rows.reading import policy_of
 from care_sim.study.run_config import FULL, Row
 from care_sim.study.unfinished import UNFINISHED, how_far
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 TABLES = "tables.md"
 """Name of the file in a folder of results that holds all tables."""
@@ -71,13 +72,16 @@ class StudyReport:
     """What a study makes of its rows: the texts of its files of tables by name, and its figures."""
 
     texts: Mapping[str, str]
-    figures: Mapping[str, Figure]
+    figures: Mapping[str, "Figure"]
 
     @classmethod
     def of(
         cls, rows: Sequence[Row], study: Study = SWEEP, left_out: Sequence[str] = ()
     ) -> "StudyReport":
         """The report of a study that lacks what is `left_out`."""
+        # Imported here and below because it loads Matplotlib, before anything is printed.
+        from care_sim.reports.figures.files import default_style
+
         tables = study.tables(rows)
         with default_style():
             figures = study.figures(rows)
@@ -91,6 +95,8 @@ class StudyReport:
 
     def write(self, folder: Path) -> None:
         """Write tables and figures into a folder; then figures of an earlier study are removed."""
+        from care_sim.reports.figures.files import remove_others, save
+
         # New files first, then what is no longer of this study: whoever stops it in between keeps
         # both.
         for name, text in self.texts.items():

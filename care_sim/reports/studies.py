@@ -1,36 +1,11 @@
 """The studies by name: what is shown of their rows."""
 
 from collections.abc import Callable, Sequence
+from importlib import import_module
 from pathlib import Path
-from typing import TypeVar
-
-from matplotlib.figure import Figure
+from typing import TYPE_CHECKING, TypeVar
 
 from care_sim.base.errors import unknown
-from care_sim.reports.figures.closed_loop import (
-    BUDGET_FIGURES,
-    FAULT_FIGURES,
-    fault_figures,
-    firing_figures,
-    order_figures,
-    sweep_figures,
-    validation_figures,
-    vehicle_figures,
-)
-from care_sim.reports.figures.open_loop import (
-    PROTOCOL_FIGURES,
-    open_order_figures,
-    protocol_figures,
-)
-from care_sim.reports.figures.study_maps import (
-    ablation_figures,
-    crowding_figures,
-    ncap_figures,
-    open_ablation_figures,
-    open_realism_figures,
-    r157_figures,
-    realism_figures,
-)
 from care_sim.reports.findings import (
     collisions,
     gate_tables,
@@ -57,6 +32,7 @@ from care_sim.reports.tables.sweep import sweep_minus, sweep_tables
 from care_sim.reports.tables.validate import validation_closing, validation_tables
 from care_sim.reports.tables.vehicle import vehicle_tables
 from care_sim.study.designs.crowding import VEHICLES_COLUMN
+from care_sim.study.designs.faults import FAULT_PLACES
 from care_sim.study.designs.ncap import (
     REPORTED_COLUMN,
     SPEED_COLUMN,
@@ -72,8 +48,27 @@ from care_sim.study.run_config import Row
 _T = TypeVar("_T")
 
 
-def _no_figures(_rows: Sequence[Row]) -> dict[str, Figure]:
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_Figures = Callable[[Sequence[Row]], dict[str, "Figure"]]
+
+
+def _no_figures(_rows: Sequence[Row]) -> dict[str, "Figure"]:
     return {}
+
+
+def _drawn(place: str) -> _Figures:
+    """The function MODULE:NAME of `care_sim.reports.figures`. Its module loads Matplotlib, a third
+    of a second, and is imported when it is called.
+    """
+    module, _, name = place.partition(":")
+
+    def draw(rows: Sequence[Row]) -> dict[str, "Figure"]:
+        own: _Figures = getattr(import_module(f"care_sim.reports.figures.{module}"), name)
+        return own(rows)
+
+    return draw
 
 
 def _joined(*makers: Callable[[Sequence[Row]], list[_T]]) -> Callable[[Sequence[Row]], list[_T]]:
@@ -91,15 +86,27 @@ _NCAP_COLUMNS = {
 }
 
 
+_FAULT_FIGURES = tuple(
+    f"faults-{place.scenario}-{name}"
+    for place in FAULT_PLACES
+    for name in ("detection", "braked", "clearance")
+)
+_PROTOCOL_FIGURES = tuple(
+    f"{kind}-{{world}}{rest}" for kind in ("pareto", "levels", "controls") for rest in ("", "-*")
+)
+"""Every figure that a folder may hold of a source, as patterns: behind the source stands what is
+not usual in detector and conditions. Earlier versions drew `pareto`, which is removed.
+"""
+
 _ALL = (
     *(
         Study(
             name,
             title,
             _joined(leads_tables, statement_tables, sweep_tables),
-            sweep_figures,
+            _drawn("closed_loop:sweep_figures"),
             _joined(ties, in_short, collisions),
-            BUDGET_FIGURES,
+            ("{world}-budget",),
             minus=sweep_minus,
             headline=headline,
         )
@@ -112,7 +119,7 @@ _ALL = (
         "crowding",
         "Crowding in the closed loop",
         crowding_tables,
-        crowding_figures,
+        _drawn("study_maps:crowding_figures"),
         collisions,
         ("crowding",),
         columns={VEHICLES_COLUMN: COUNT},
@@ -121,7 +128,7 @@ _ALL = (
         "r157",
         "Cut-ins of UN Regulation 157",
         r157_tables,
-        r157_figures,
+        _drawn("study_maps:r157_figures"),
         collisions,
         ("r157-avoided",),
         columns=_CASE_COLUMNS,
@@ -130,7 +137,7 @@ _ALL = (
         "ablate",
         "Ablations of the closed loop",
         ablation_tables,
-        ablation_figures,
+        _drawn("study_maps:ablation_figures"),
         collisions,
         ("ablations",),
     ),
@@ -138,15 +145,15 @@ _ALL = (
         "faults",
         "Faults in the closed loop",
         fault_tables,
-        fault_figures,
+        _drawn("closed_loop:fault_figures"),
         _joined(collisions, shared_conditions),
-        FAULT_FIGURES,
+        _FAULT_FIGURES,
     ),
     Study(
         "vehicle",
         "The vehicle study",
         vehicle_tables,
-        vehicle_figures,
+        _drawn("closed_loop:vehicle_figures"),
         collisions,
         ("vehicle",),
         VEHICLE,
@@ -155,7 +162,7 @@ _ALL = (
         "ncap",
         "Euro NCAP tests",
         ncap_tables,
-        ncap_figures,
+        _drawn("study_maps:ncap_figures"),
         _joined(collisions, shared_conditions),
         ("ncap",),
         columns=_NCAP_COLUMNS,
@@ -165,7 +172,7 @@ _ALL = (
         "order",
         "Order of cells in the closed loop",
         order_tables,
-        order_figures,
+        _drawn("closed_loop:order_figures"),
         _joined(collisions, order_closing),
         ("order",),
         columns=_ORDER_COLUMNS,
@@ -174,7 +181,7 @@ _ALL = (
         "firing",
         "Hardware in the closed loop",
         firing_tables,
-        firing_figures,
+        _drawn("closed_loop:firing_figures"),
         collisions,
         ("firing",),
     ),
@@ -182,7 +189,7 @@ _ALL = (
         "realism",
         "Headline orders under realistic conditions, closed loop",
         realism_tables,
-        realism_figures,
+        _drawn("study_maps:realism_figures"),
         collisions,
         ("realism",),
     ),
@@ -190,7 +197,7 @@ _ALL = (
         "validate",
         "Validation of a world",
         validation_tables,
-        validation_figures,
+        _drawn("closed_loop:validation_figures"),
         _joined(collisions, validation_closing),
         ("validation",),
     ),
@@ -198,7 +205,7 @@ _ALL = (
         "order-open-loop",
         "Order of cells in the open loop",
         order_tables,
-        open_order_figures,
+        _drawn("open_loop:open_order_figures"),
         _joined(protocol_closing, order_closing),
         ("order-open-loop",),
         PLAYS,
@@ -217,7 +224,7 @@ _ALL = (
         "realism-open-loop",
         "Headline orders under realistic conditions, open loop",
         realism_tables,
-        open_realism_figures,
+        _drawn("study_maps:open_realism_figures"),
         protocol_closing,
         ("realism-open-loop",),
         PLAYS,
@@ -226,7 +233,7 @@ _ALL = (
         "ablate-open-loop",
         "Ablations of the open loop",
         ablation_tables,
-        open_ablation_figures,
+        _drawn("study_maps:open_ablation_figures"),
         _joined(protocol_closing, ceiling),
         ("ablations-open-loop",),
         PLAYS,
@@ -235,9 +242,9 @@ _ALL = (
         "protocol",
         "First sightings in the open loop",
         _joined(leads_tables, gate_tables, protocol_tables),
-        protocol_figures,
+        _drawn("open_loop:protocol_figures"),
         _joined(ties, protocol_closing),
-        PROTOCOL_FIGURES,
+        _PROTOCOL_FIGURES,
         PLAYS,
         minus=protocol_minus,
         headline=headline,

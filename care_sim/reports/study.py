@@ -2,8 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-
-from matplotlib.figure import Figure
+from typing import TYPE_CHECKING
 
 from care_sim.reports.table import Table
 from care_sim.scenarios import SCENARIOS
@@ -12,6 +11,9 @@ from care_sim.study.rows.reading import setting_of
 from care_sim.study.rows.schema import Column, Schema
 from care_sim.study.rows.settings import SOURCES, Setting
 from care_sim.study.run_config import Row
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -29,7 +31,7 @@ class Study:
     name: str
     title: str
     tables: Callable[[Sequence[Row]], list[Table]]
-    figures: Callable[[Sequence[Row]], dict[str, Figure]]
+    figures: Callable[[Sequence[Row]], dict[str, "Figure"]]
     closing: Callable[[Sequence[Row]], list[str]]
     figure_names: tuple[str, ...]
     results: ResultsFormat = EPISODES

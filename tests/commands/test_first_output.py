@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-SLOW = {"highway_env", "matplotlib.pyplot", "pandas", "scipy.stats", "torch"}
+SLOW = {"highway_env", "matplotlib", "pandas", "scipy.stats", "torch"}
 FIRST = """
 import os, sys
 

@@ -32,8 +32,6 @@ from care_sim.study.rows.reading import detections, setting_of
 from care_sim.study.rows.settings import Setting
 from care_sim.study.run_config import FULL, REFERENCE, Row
 
-BUDGET_FIGURES = ("{world}-budget",)
-"""Every figure that a sweep can draw of a scenario."""
 _Read = Callable[[Sequence[Row]], Point | None]
 
 
@@ -124,10 +122,6 @@ _FAULT_MEASURES: Mapping[str, tuple[str, _Read]] = {
     "braked": ("episodes with braking, %", _percent("braked")),
     "clearance": ("clearance, median, m", _clearance),
 }
-FAULT_FIGURES = tuple(
-    f"faults-{place.scenario}-{name}" for place in FAULT_PLACES for name in _FAULT_MEASURES
-)
-"""Every figure that the study can draw."""
 
 
 def fault_figures(rows: Sequence[Row]) -> dict[str, Figure]:

@@ -16,13 +16,6 @@ from care_sim.reports.protocol.rows import SettingPlays, plays_by_setting
 from care_sim.study.designs.order import rows_by_order
 from care_sim.study.run_config import FULL, Row
 
-PROTOCOL_FIGURES = tuple(
-    f"{kind}-{{world}}{rest}" for kind in ("pareto", "levels", "controls") for rest in ("", "-*")
-)
-"""Every figure that a folder may hold of a source, as patterns: behind the source stands what is
-not usual in detector and conditions. Earlier versions drew `pareto`, which is removed.
-"""
-
 
 def protocol_figures(rows: Sequence[Row]) -> dict[str, Figure]:
     """Levels for each setting that has two budgets, by name, and what policies have over controls

@@ -5,7 +5,6 @@ import pytest
 from matplotlib import rc_context
 
 from care_sim.reports.figures.closed_loop import (
-    FAULT_FIGURES,
     fault_figures,
     firing_figures,
     order_figures,
@@ -19,6 +18,7 @@ from care_sim.reports.figures.study_maps import (
     open_ablation_figures,
 )
 from care_sim.reports.report import StudyReport
+from care_sim.reports.studies import STUDIES
 from care_sim.study.designs.ablations import ablation_study
 from care_sim.study.designs.faults import FAULTS, fault_study
 from care_sim.study.designs.firing import firing_study
@@ -95,7 +95,7 @@ def test_faults_have_a_figure_a_place_and_measure_with_a_panel_a_fault():
     configs = [c for c in fault_study([0, 1]) if c.scenario == "dartout"]
     made = [row(each, 9.0 - each.seed) | {"braked": each.seed == 0} for each in configs]
     figures = fault_figures(made)
-    assert {*figures} == {name for name in FAULT_FIGURES if "dartout" in name}
+    assert {*figures} == {name for name in STUDIES["faults"].figure_names if "dartout" in name}
     for name, height in (("detection", 8.5), ("braked", 50.0)):
         figure = figures[f"faults-dartout-{name}"]
         assert titles(figure) == [fault.title for fault in FAULTS]

@@ -3,7 +3,8 @@ import pytest
 from care_sim.core.conditions import LOCALISATION, Sensing
 from care_sim.core.return_settings import RETURN_SETTINGS
 from care_sim.reports.engine.frames import Frame
-from care_sim.reports.figures.closed_loop import FAULT_FIGURES, fault_figures
+from care_sim.reports.figures.closed_loop import fault_figures
+from care_sim.reports.studies import STUDIES
 from care_sim.reports.table import Bold
 from care_sim.reports.tables.faults import fault_tables, order
 from care_sim.study.designs.faults import FAULT_PLACES, FAULTS, fault_study
@@ -83,7 +84,7 @@ def test_the_full_scan_is_played_only_where_it_feels_the_fault():
 
 def test_a_figure_for_every_place_and_measure(rows):
     figures = fault_figures(rows)
-    assert tuple(figures) == FAULT_FIGURES
+    assert tuple(figures) == STUDIES["faults"].figure_names
     missed, *_ = figures["faults-dartout-detection"].axes
     assert heights(missed)["care"] == [16.0, 16.0, 16.0, 11.0, 11.0, 0.0]
     hollow = [line for line in missed.lines if line.get_markerfacecolor() == "none"]
