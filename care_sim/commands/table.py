@@ -198,10 +198,13 @@ FAMILIES = {
 }
 """First words that need a second one, and what the commands behind them are for."""
 
-_STUDY_NAMES = [name.split()[1] for name in COMMANDS if name.startswith("study ")]
+_STUDIES = (
+    *("ablate", "crowding", "faults", "firing", "mechanism", "ncap", "order", "r157", "realism"),
+    *("validate", "vehicle"),
+)
 _KINDS = ("policies", "agents", "scenarios", "sources", "detectors", "sensors")
 RENAMED = {
-    **{name: f"study {name}" for name in _STUDY_NAMES},
+    **{name: f"study {name}" for name in _STUDIES},
     **{kind: f"list {kind}" for kind in _KINDS},
     "enjoy": "run",
     "merge": "report",
