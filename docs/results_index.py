@@ -1,6 +1,6 @@
 """The index of the published rows, `results/data/README.md`, made from the folders.
 
-`python docs/results_index.py` writes it anew; a test says where it is not as the folders are.
+`python docs/results_index.py` writes it anew; a test fails when it is out of date.
 """
 
 import json

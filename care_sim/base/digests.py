@@ -30,11 +30,10 @@ def file_digest(path: Path) -> str | None:
     found = [path] if os.path.isfile(path) else [*islice(files_below(path), MOST_FILES + 1)]
     if len(found) > MOST_FILES:
         return None
-    # Compiled Python is left out: the interpreter writes it while a policy plays.
     hashes = [
         f"{file.relative_to(path)} {content_digest(file)}"
         for file in sorted(found)
-        if file.suffix != ".pyc"
+        if not is_compiled(file)
     ]
     return combined_digest(hashes) if hashes else ""
 
@@ -97,6 +96,11 @@ def files_below(folder: Path, above: tuple[Path, ...] = ()) -> Iterator[Path]:
             yield from files_below(path, (*above, real))
         elif os.path.isfile(path) and not (path.is_symlink() and is_of_the_system(path)):
             yield path
+
+
+def is_compiled(path: Path) -> bool:
+    """Whether Python or Numba writes a file while code runs, so that no author did."""
+    return path.suffix == ".pyc" or "__pycache__" in path.parts
 
 
 def is_of_the_system(path: Path) -> bool:

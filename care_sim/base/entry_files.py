@@ -9,7 +9,7 @@ from itertools import islice
 from pathlib import Path
 
 from care_sim.base.checks import LONGEST_PATH
-from care_sim.base.digests import MOST_FILES, files_below, is_of_the_system
+from care_sim.base.digests import MOST_FILES, files_below, is_compiled, is_of_the_system
 from care_sim.base.errors import InvalidInput
 
 _SITES = {"site-packages", "dist-packages"}
@@ -18,11 +18,11 @@ CODE = (".py", ".so", ".pyd")
 
 
 def entry_files(entry: EntryPoint) -> dict[str, Path] | None:
-    """The files by name: all below its package's folder; of a single module the file and, where no
-    installer has put it, the code beside it, which it may import; and what it declares in `files`.
-    None where its code is in no file, or in too many.
+    """The files by name. A package: all files in its folder. A single module: its file, and code
+    beside it unless it was installed. Both: the files in `files`. None where its code is in no
+    file, or in too many.
 
-    Raises InvalidInput for `files` that are no names.
+    Raises InvalidInput for `files` that are no names, or that are missing.
     """
     roots = _roots(entry.module.partition(".")[0])
     files = {
@@ -61,10 +61,11 @@ def _roots(top: str) -> list[Path]:
 
 def _of_root(root: Path) -> Iterator[Path]:
     if root.is_dir():
-        # Compiled Python is left out: the interpreter writes it while a policy plays.
-        yield from (file for file in files_below(root) if file.suffix != ".pyc")
+        yield from (file for file in files_below(root) if not is_compiled(file))
     elif _SITES.isdisjoint(root.parts):
-        yield from (file for file in sorted(root.parent.iterdir()) if file.suffix in CODE)
+        yield from (
+            file for file in sorted(root.parent.iterdir()) if file.suffix in CODE and file.is_file()
+        )
     else:
         yield root
 
@@ -88,4 +89,8 @@ def _declared(entry: EntryPoint) -> list[Path]:
     ):
         raise InvalidInput(f"{entry.value}: files must be a tuple of names, got {declared!r}")
     home = Path(sys.modules[entry.module].__file__ or "").parent
-    return [home / Path(name).expanduser() for name in declared]
+    paths = [home / Path(name).expanduser() for name in declared]
+    for path in paths:
+        if not path.exists():
+            raise InvalidInput(f"{entry.value}: files names {path}, which does not exist")
+    return paths

@@ -1,5 +1,6 @@
 """What goes wrong between the pictures of all worlds and the detections that arrive, in each world
-by its own faults; see `care_sim.sensors.camera_faults`.
+by its own faults; see `care_sim.sensors.camera_faults`. Their random numbers are drawn for many
+keyframes at once.
 """
 
 from collections.abc import Callable, Sequence

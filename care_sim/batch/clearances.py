@@ -2,6 +2,8 @@
 
 PyBullet's exact distance costs more than all else that is scored. So the moments are kept, with a
 bound that is no greater, and it is asked about those alone that matter.
+
+And which bodies the egos touch.
 """
 
 import math

@@ -20,8 +20,21 @@ _STEADY_MPS = 0.1
 
 
 class CarefulHuman:
-    """Brakes on tracks. `front_m` and `half_width_m` are the ego's extents seen from its sensor,
-    metres; it cruises at `cruise_mps`.
+    """The competent and careful human driver of UN Regulation 157, who brakes on tracks.
+
+    It acts on tracks, as the fixed controller does, so that a late detection delays it. A track
+    ahead is in the way where its box overlaps the strip that the ego sweeps straight ahead, and it
+    cuts in where it moves towards that strip and its middle is more than `wander_m` off the middle
+    of the next lane. What has done either for `evaluation_s` is perceived as a risk. It is a danger
+    once its time to collision along the road is at most `danger_s`.
+
+    From the first danger on the driver brakes as `care_sim.driving.human_model` says, until no
+    perceived risk is slower than the ego. Then it holds its speed as long as a risk is ahead, and
+    without one gains speed at `comfort_mps2` up to its cruising speed: the regulation does not tell
+    what comes after the braking.
+
+    `front_m` and `half_width_m` are the ego's extents seen from its sensor, metres; it cruises at
+    `cruise_mps`.
     """
 
     def __init__(

@@ -25,7 +25,7 @@ from care_sim.reports.formatting import MARKS, emphasised, ends, signed
 from care_sim.reports.protocol.notes import papers
 from care_sim.reports.protocol.paper import PAPER_BUDGETS
 from care_sim.reports.protocol.quotes import GATE
-from care_sim.reports.protocol.rows import HISTORY, main_settings, plays_by_setting
+from care_sim.reports.protocol.rows import HISTORY, plays_by_setting, settings
 from care_sim.reports.table import Table, TableRow
 from care_sim.study.rows.reading import setting_of, stops_for_nothing
 from care_sim.study.run_config import FULL, REFERENCE, Row
@@ -68,26 +68,26 @@ class Lead:
         return (*names, shown, ends(self.difference), reached)
 
 
-def leads(rows: Sequence[Row]) -> list[Lead]:
-    """The best policy over the best control at every budget of the main settings: in first
-    sightings, or in first detections and, where there are any, in collisions.
+def leads(rows: Sequence[Row], plain: bool = False) -> list[Lead]:
+    """The best policy over the best control at every budget of every setting, or of the `plain`
+    ones: in first sightings, or in first detections and, where there are any, in collisions.
 
     The best are chosen among policies that a car can have, by the seeds or scenes that all of
     them have. Their difference is over those that the two share.
     """
     found = (
         _lead(part, budget, measure)
-        for part in main_settings(rows)
+        for part in settings(rows, plain)
         for budget in part.budgets
         for measure in ((DETECTION, part.avoided) if "seed" in rows[0] else (_SIGHTINGS,))
     )
     return [lead for lead in found if lead]
 
 
-def leads_tables(rows: Sequence[Row]) -> list[Table]:
+def leads_tables(rows: Sequence[Row], plain: bool = False) -> list[Table]:
     """The best policy against the best control; none without leads."""
     title = f"The best policy against the {BEST_CONTROL}"
-    return _table(title, "best", BEST_CONTROL, leads(rows), _CHOSEN)
+    return _table(title, "best", BEST_CONTROL, leads(rows, plain), _CHOSEN)
 
 
 def gate_tables(rows: Sequence[Row]) -> list[Table]:
@@ -107,10 +107,10 @@ def gate_tables(rows: Sequence[Row]) -> list[Table]:
 
 def headline(rows: Sequence[Row]) -> Table:
     """Median first detections, or recalls of first sightings, of the main policies, of the best
-    control and of the full scan, in the main settings.
+    control and of the full scan; of the closed loop in plain settings.
     """
     measure = loop_of(rows).measures[0]
-    parts = main_settings(rows)
+    parts = settings(rows, plain=measure is DETECTION)
     tags = {policy: own for part in parts for policy, own in part.tags.items()}
     played = [policy for policy in tags if not is_control(tags[policy])]
     main = [policy for policy in _MAIN if policy in played]
@@ -138,9 +138,9 @@ def headline(rows: Sequence[Row]) -> Table:
     return Table(title, columns, tuple(lines), whole=columns[1:], names=2)
 
 
-def ties(rows: Sequence[Row]) -> list[str]:
+def ties(rows: Sequence[Row], plain: bool = False) -> list[str]:
     """One sentence per measure: how often the best policy is ahead of the best control."""
-    found = [lead for lead in leads(rows) if lead.second]
+    found = [lead for lead in leads(rows, plain) if lead.second]
     sentences = []
     for measure in dict.fromkeys(lead.measure for lead in found):
         signs = [lead.sign for lead in found if lead.measure == measure]
@@ -200,7 +200,7 @@ def _table(title: str, first: str, second: str, found: Sequence[Lead], *notes: s
 
 
 def _lead(part: Part, budget: float, measure: Measure | Recall) -> Lead | None:
-    """The best that is no control against the best control; None where nobody is to compare."""
+    """The best that is no control against the best control; None without two policies."""
     real = [policy for policy, tags in part.tags.items() if {*MARKS}.isdisjoint(tags)]
     # A policy that lacks a hard seed or scene would lead by that.
     units = shared_units({policy: part.units(measure, policy, budget) for policy in real})

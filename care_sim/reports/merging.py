@@ -68,6 +68,7 @@ class Merged:
         write_rows(self.rows, folder / kind.file, self.study.name, self.left_out, self.study.schema)
         told = {
             "study": self.study.name,
+            "command": "care-sim report FOLDER... --out FOLDER",
             "versions": _joined(self.descriptions.values(), "versions"),
             "machine": _joined(self.descriptions.values(), "machine"),
             "failed": [],

@@ -1,6 +1,7 @@
 """The studies by name: what is shown of their rows."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
@@ -103,16 +104,26 @@ _ALL = (
         Study(
             name,
             title,
-            _joined(leads_tables, statement_tables, sweep_tables),
+            tables,
             _drawn("closed_loop:sweep_figures"),
-            _joined(ties, in_short, collisions),
+            closing,
             ("{world}-budget",),
             minus=sweep_minus,
             headline=headline,
         )
-        for name, title in (
-            ("sweep", "Sweep of the closed loop"),
-            ("paper", "The paper's closed-loop study"),
+        for name, title, tables, closing in (
+            (
+                "sweep",
+                "Sweep of the closed loop",
+                _joined(leads_tables, sweep_tables),
+                _joined(ties, collisions),
+            ),
+            (
+                "paper",
+                "The paper's closed-loop study",
+                _joined(partial(leads_tables, plain=True), statement_tables, sweep_tables),
+                _joined(partial(ties, plain=True), in_short, collisions),
+            ),
         )
     ),
     Study(

@@ -217,8 +217,8 @@ def in_batches(tasks: Sequence[RunConfig], most: int | None = None) -> list[list
 
 def collected(plain: Sequence[dict[str, Any]], axis: str, plural: str) -> dict[str, Any]:
     """Configurations as plain data, each once, with all values of an axis under its plural and all
-    policies under `policies`. What all have alike is told once, under `common`: a study of
-    thousands of configurations else writes megabytes.
+    policies under `policies`. Shared values are stored once, under `common`: otherwise large
+    studies write megabytes.
     """
     listed = _grouped(_grouped(plain, axis, plural), "policy", "policies")
     common = {
@@ -232,7 +232,7 @@ def collected(plain: Sequence[dict[str, Any]], axis: str, plural: str) -> dict[s
 
 
 def _grouped(plain: Sequence[dict[str, Any]], name: str, plural: str) -> list[dict[str, Any]]:
-    """Those that are alike but for one value as one, with the list of the values."""
+    """Configurations that differ only in `name` as one, with the list of its values."""
     grouped: dict[str, dict[str, Any]] = {}
     for one in plain:
         rest = {other: value for other, value in one.items() if other != name}

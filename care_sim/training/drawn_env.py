@@ -1,4 +1,6 @@
-"""An environment whose episodes differ in what they are played in."""
+"""An environment whose episodes differ in what they are played in. With streets whose films are
+kept, and left and right exchanged.
+"""
 
 from collections.abc import Callable, Sequence
 from functools import lru_cache

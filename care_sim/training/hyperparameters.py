@@ -86,11 +86,6 @@ def read_hyperparameters(
     return Hyperparameters(values, path, table)
 
 
-def table_of(envs: Sequence[str]) -> str:
-    """The table of an environment, or that of several."""
-    return envs[0] if len(envs) == 1 else DEFAULT
-
-
 def as_table(env: str, values: Mapping[str, Any]) -> str:
     """A file of one environment's table, as `read_hyperparameters` takes it."""
     lines = [f"{name} = {_toml(value)}" for name, value in values.items()]

@@ -52,7 +52,7 @@ def found_colour(keyframe: SceneKeyframe, row: int) -> Colour:
 
 
 def box_colour(known: bool, false: bool) -> Colour:
-    """That of a camera box: a false one is told, whether a track explains it or not."""
+    """Return the colour of a camera box. False boxes have one colour, explained or not."""
     if false:
         return FALSE_COLOUR
     return EXPLAINED_COLOUR if known else UNEXPLAINED_COLOUR

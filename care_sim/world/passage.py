@@ -76,7 +76,8 @@ class Passage:
 
 class LeastClearance:
     """Between the hulls of an `ego` and an `other` body of these kinds, at the moments that were
-    noted.
+    noted. PyBullet's exact distance costs more than everything else that is scored in a step, so it
+    is asked about few: while two bodies come nearer, about the last moment alone.
     """
 
     def __init__(self, judge: ClearanceJudge, ego: BodyKind, other: BodyKind):

@@ -6,7 +6,7 @@
 
 Run it again to add trials. The first trial has the default values. A trial ends early where its
 curve is below the median of the others. All trials are evaluated on the same validation seeds, so
-only other seeds tell how good the best is.
+only other seeds show how good the best is.
 """
 
 import sys

@@ -97,14 +97,15 @@ def test_the_sentence_counts_ties_leads_and_what_trails_in_plain_settings():
         for one in episodes({"care": 16.0, "place": place}, budget=budget)
     ]
     late = [one | {"camera_latency": 2} for one in rows]
-    assert ties([*late, *rows]) == [
+    assert ties([*late, *rows], plain=True) == [
         "The best control ties the best policy in 1 of 4 comparisons (first detection, m), leads "
         "in 1, trails in 2."
     ]
+    assert "2 of 8 comparisons" in ties([*late, *rows])[0]
     (table,) = leads_tables(rows)
     assert [line[5] for line in table.rows] == ["+1.0", "+4.0*", "-4.0*", "+0.0"]
     # Without a plain setting those with conditions are shown.
-    assert leads(late)[0].setting == "dense, camera latency 2"
+    assert leads(late, plain=True)[0].setting == "dense, camera latency 2"
 
 
 def test_medians_of_main_and_further_policies_and_of_the_best_control():

@@ -57,7 +57,10 @@ def lay(tmp_path, monkeypatch):
         for file in (module, other):
             file.parent.mkdir(parents=True, exist_ok=True)
             file.write_text("1")
-        module.write_text(MINE.format(files=FILES))
+        for name in ("code/table.csv", "home/table.csv", "home/tables/a/b.csv"):
+            (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+            (tmp_path / name).touch()
+        module.write_text(MINE.format(files=FILES if module.name == "mine.py" else ()))
         return other
 
     yield put
@@ -76,12 +79,30 @@ def test_what_decides_a_policy_counts(layout, lay):
     assert keys[0] == keys[2] != keys[1]
 
 
-@pytest.mark.parametrize("name", ["log.txt", "data/w.npz", "__pycache__/mine.nbi"])
-def test_what_lies_beside_a_module_and_is_no_code_does_not_count(name, lay):
+@pytest.mark.parametrize(
+    "layout",
+    [
+        ("mine.py", "log.txt"),
+        ("mine.py", "data/w.npz"),
+        ("mine.py", "__pycache__/mine.nbi"),
+        ("mine/__init__.py", "mine/__pycache__/mine.nbi"),
+        ("mine.py", "../home/tables/__pycache__/a.pyc"),
+    ],
+    ids=lambda layout: layout[1],
+)
+def test_what_is_no_code_beside_a_module_and_what_python_writes_do_not_count(layout, lay):
     """A log that the shell writes there must not end the study that it tells of."""
-    before = policy_digest("mine:Mine") if lay(("mine.py", name)) else None
-    lay(("mine.py", name)).write_text("2")
+    file = lay(layout)
+    before = policy_digest("mine:Mine")
+    file.write_text("2")
     assert policy_digest("mine:Mine") == before
+
+
+def test_a_lock_of_an_editor_and_a_folder_called_as_code_are_passed_over(lay, tmp_path):
+    lay(("mine.py", "net.py"))
+    (tmp_path / "code" / ".#mine.py").symlink_to("user@host.1")
+    (tmp_path / "code" / "folder.py").mkdir()
+    assert policy_digest("mine:Mine")
 
 
 def test_of_an_installed_module_its_neighbours_do_not_count_and_its_version_does(install, tmp_path):
@@ -108,10 +129,17 @@ def test_code_in_the_root_of_the_clone_does_not_come_with_this_package():
     assert not {name for name in names if name.startswith("care_sim/")}
 
 
-@pytest.mark.parametrize("files", ["'table.csv'", "(1,)", "{}"])
-def test_declared_files_must_be_names(files, lay):
+@pytest.mark.parametrize(
+    ("files", "line"),
+    [
+        ("'table.csv'", "files must be a tuple of names, got 'table.csv'"),
+        ("(1,)", r"files must be a tuple of names, got \(1,\)"),
+        ("('tabel.py',)", "files names .*tabel.py, which does not exist"),
+    ],
+)
+def test_declared_files_must_be_names_of_files(files, line, lay):
     lay(("mine.py", "table.csv")).with_name("mine.py").write_text(MINE.format(files=files))
-    with pytest.raises(InvalidInput, match="mine:Mine: files must be a tuple of names, got "):
+    with pytest.raises(InvalidInput, match=f"mine:Mine: {line}"):
         policy_digest("mine:Mine")
 
 
@@ -176,6 +204,7 @@ def test_a_file_that_changes_while_a_study_runs_fails_what_met_it_late(weights, 
 def test_a_detector_is_known_by_its_files_too(install, tmp_path):
     source = "class Near:\n    files = ('model.bin',)\n    def detect(self, points): return []\n"
     install("near_detector", source, group="care_sim.detectors", near="Near")
+    (tmp_path / "near_detector" / "model.bin").write_text("1")
     streets = source_of("streets")
     (config,) = play_grid(streets, streets.scenes()[:1], ["care"], [0.1], detector="near")
     before, theirs = config.digest(), detector_digest("near")

@@ -241,4 +241,4 @@ class Certify(WorkerOptions):
         super().__post_init__()
         if self.episode is not None:
             check_whole("episode", self.episode, 0, ALL_EPISODES - 1)
-            _refuse((self.all, "episode plays one alone: give not all with it"))
+            _refuse((self.all, "episode plays one episode: remove all"))

@@ -1,6 +1,8 @@
 """A study, from its configurations to a folder of results."""
 
 import json
+import re
+import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -91,6 +93,18 @@ def run_study(
     return failures
 
 
+def _shareable(command: str) -> str:
+    """A command without what only this machine knows: where results go and recordings lie."""
+    words = shlex.split(command)
+    if "--out" in words:
+        at = words.index("--out")
+        del words[at : at + 2]
+    if "--source" in words:
+        at = words.index("--source") + 1
+        words[at] = re.sub(":.*", ":FOLDER", words[at])
+    return shlex.join(words)
+
+
 def _journal(folder: Path, study: Study) -> Journal:
     if folder.is_file():
         raise InvalidInput(f"{folder} is a file, --out wants a folder")
@@ -156,7 +170,7 @@ def _write(
     report = StudyReport.of(kept, study, left_out)
     settings = {
         "study": study.name,
-        "command": command,
+        "command": _shareable(command),
         "versions": versions(),
         "machine": machine(),
         "failed": [*map(str, failures)],

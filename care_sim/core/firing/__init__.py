@@ -1,1 +1,1 @@
-"""What the hardware of a LiDAR can fire of a demand, one kind of hardware a file."""
+"""What the hardware of a LiDAR can fire of a demand, a family of hardware a file."""

@@ -1,4 +1,6 @@
-"""The arguments of a vector environment; every world may have its own of some of them."""
+"""The arguments of a vector environment; every world may have its own of some of them. And which
+environments can be played as arrays.
+"""
 
 from collections.abc import Mapping, Sequence
 from functools import partial

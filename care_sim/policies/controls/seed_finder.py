@@ -84,7 +84,7 @@ class SeedFinder(Policy):
         self._speed = speed
 
     def demand(self, belief: Belief) -> Demand:
-        """Hulls, and those of whom nobody has seen."""
+        """Hulls of tracked objects, then of hidden ones."""
         tracked = self.rig.hulls(belief.tracks.boxes)
         hidden = self.rig.hulls(self._expected())
         if self._hidden_first:

@@ -93,7 +93,7 @@ class CareUnits(CareSightlines):
     worth the most per cell paid, too. With free cells that is `care-sightlines`, cell for cell.
 
     Where cells may be fired several times, each has the shots that what is known to stand there
-    takes to return (`care_sim.policies.own.care_units`), as far as the budget goes.
+    takes to return (`TargetShots`), as far as the budget goes.
     """
 
     name = "care-units"

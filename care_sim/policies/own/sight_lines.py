@@ -1,5 +1,5 @@
 """Where something new can come into view: along lines of sight that are open, and at the edges of
-what hides.
+what hides. And in the sector ahead, where what the car drives towards enters the range of scoring.
 """
 
 import math

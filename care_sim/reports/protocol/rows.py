@@ -154,10 +154,12 @@ def plays_by_setting(rows: Sequence[Row]) -> list[SettingPlays]:
     return [each for each in plays if each.tags] or plays
 
 
-def main_settings(rows: Sequence[Row]) -> Sequence[Part]:
-    """The settings of a study of either loop under no condition, or all where each has some."""
+def settings(rows: Sequence[Row], plain: bool = False) -> Sequence[Part]:
+    """The settings of a study of either loop; `plain` ones are under no condition, or all where
+    each has some.
+    """
     if loop_of(rows) is OPEN_LOOP:
         found: Sequence[Part] = plays_by_setting(rows)
     else:
         found = [part for part in parts(rows) if part.tags]
-    return [part for part in found if not part.setting.conditions] or found
+    return (plain and [part for part in found if not part.setting.conditions]) or found

@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 from care_sim.base.errors import counted, percent
 from care_sim.reports.engine.frames import Frame
-from care_sim.reports.engine.levels import Cell, level_of
 from care_sim.reports.engine.measures import OPEN_LOOP
 from care_sim.reports.engine.varied import Varied
 from care_sim.reports.formatting import interval
@@ -22,7 +21,6 @@ from care_sim.study.designs.order import (
     rows_by_order,
     without_order,
 )
-from care_sim.study.rows.reading import Key
 from care_sim.study.run_config import FULL, Row
 
 
@@ -42,10 +40,6 @@ class OrderCells(Varied):
         frames = {order: Frame(own) for order, own in rows_by_order(rows).items()}
         super().__init__("order of cells", frames, notes)
         self.orders = tuple(frames)
-
-    def cell(self, order: str, key: Key) -> Cell | None:
-        """What was measured of episodes; None where nothing was played."""
-        return level_of(self.frames[order], key)
 
 
 def order_tables(rows: Sequence[Row]) -> list[Table]:

@@ -163,8 +163,3 @@ class NcapTest:
     variations: tuple[Variation, ...]
     obstruction: Obstruction | None = None
     start_s: float = 4.0
-
-    @property
-    def speeds_kph(self) -> tuple[float, ...]:
-        """The ego's speeds, each once, in their order."""
-        return tuple(dict.fromkeys(each.ego_kph for each in self.variations))

@@ -1,4 +1,6 @@
-"""Folders of nuScenes databases."""
+"""Folders of nuScenes databases. And which scenes a split holds: the official splits, and those of
+`splits.json`.
+"""
 
 import os
 from dataclasses import dataclass

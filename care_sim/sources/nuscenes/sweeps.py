@@ -1,4 +1,6 @@
-"""Recorded LiDAR sweeps as clouds of the angular grid."""
+"""Recorded LiDAR sweeps as clouds of the angular grid. And the sweeps between the keyframes, at 20
+Hz, which nobody annotated.
+"""
 
 import os
 from collections.abc import Sequence

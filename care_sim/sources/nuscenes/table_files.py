@@ -1,4 +1,6 @@
-"""The JSON files of a nuScenes database: rows of plain data, each field of its kind."""
+"""The JSON files of a nuScenes database: rows of plain data, each field of its kind. Tables that
+take long to make are kept in files that later processes map into their memory.
+"""
 
 import fcntl
 import hashlib

@@ -1,4 +1,6 @@
-"""Films of logs without labels."""
+"""Films of logs without labels. Camera boxes are those that a 2D detector reported on their
+pictures.
+"""
 
 from collections import defaultdict
 from collections.abc import Sequence

@@ -179,14 +179,6 @@ OPEN_ABLATIONS = (
     IDEAS,
 )
 """Those of the open loop, with one floor as in the paper; the last is ours."""
-OPEN_POLICIES = frozenset(
-    [
-        FULL,
-        *(name for ablation in OPEN_ABLATIONS for name in (ablation.policy, *ablation.references)),
-        *(level.policy for ablation in OPEN_ABLATIONS for level in ablation.levels if level.policy),
-    ]
-)
-"""The policies that the study plays by itself."""
 _QUARTER = 4
 """The paper's ablations take every fourth scene (Sec. 5.4)."""
 

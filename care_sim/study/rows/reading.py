@@ -5,7 +5,7 @@ budget form a cell. Some columns are added when a study is written: what only ro
 the policies, tell.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import fields
 from functools import lru_cache
 from typing import Any
@@ -41,7 +41,6 @@ _USUAL_PLAY = (
 
 Key = tuple[Setting, str, float]
 """Setting, policy with its parameters, budget."""
-Groups = Mapping[Key, Sequence[Row]]
 
 
 def setting_of(row: Row) -> Setting:
@@ -154,11 +153,6 @@ def grouped(rows: Sequence[Row]) -> dict[Key, list[Row]]:
     for row in rows:
         groups.setdefault(key_of(row), []).append(row)
     return groups
-
-
-def full_of(groups: Groups, setting: Setting) -> Sequence[Row] | None:
-    """The rows of the full scan in the same worlds, None where it was not run."""
-    return groups.get((setting.for_full(), "full", 1.0))
 
 
 def detection(row: Row) -> Reading | None:

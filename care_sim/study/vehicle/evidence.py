@@ -1,4 +1,6 @@
-"""How old the camera's evidence is, and what the compensation of the car's turn does to it."""
+"""How old the camera's evidence is, and what the compensation of the car's turn does to it. And how
+far forecasts are off.
+"""
 
 import numpy as np
 

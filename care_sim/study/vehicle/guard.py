@@ -1,5 +1,5 @@
 """The guard of SBF at standstill, and the cells that forgetting releases with and without the
-margin of Eq. 4.
+margin of Eq. 4. And what policies do while the camera is away.
 """
 
 from collections.abc import Mapping

@@ -63,7 +63,7 @@ def cameras_picture(scene: BulletWorld, loop: ClosedLoop) -> Image.Image:
 
 
 def _picture(scene: BulletWorld, loop: ClosedLoop, number: int, width: int) -> Image.Image:
-    """That of camera `number`, `width` pixels wide."""
+    """Draw the picture of camera `number`, `width` pixels wide."""
     camera, seen = loop.rig.cameras[number], loop.belief.detections
     scale = width / camera.width
     small = replace(camera, width=width, height=round(camera.height * scale))
