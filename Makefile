@@ -2,7 +2,8 @@
 # make setup      create .venv and install what the benchmark needs (half a minute)
 # make reproduce  set up, run the paper's closed-loop study, print it beside the paper's figures (a minute)
 # make smoke      set up with pytest, run a few tests per promise (a minute)
-# make test       set up with the development tools, run every test (26 minutes)
+# make test       set up with the development tools, run the tests (7 minutes)
+# make test-long  run those that take longer, all published streets among them (15 minutes)
 # make dist       build the sdist, and the wheel from it, in dist/
 # make test-installed   install that wheel in an environment of its own, run the sdist's tests with it
 # make test-extras   install that wheel with one extra after the other, each alone, and use it; EXTRAS="viewer video"
@@ -64,7 +65,7 @@ endef
 IS_FIT := "import ensurepip, sys; print('yes' if (3, 11) <= sys.version_info < (3, 14) else 'no')"
 comma := ,
 
-.PHONY: setup reproduce smoke test test-installed test-extras bench parity test-speed dist check docs lint torture official official-precision test-official clean
+.PHONY: setup reproduce smoke test test-long test-installed test-extras bench parity test-speed dist check docs lint torture official official-precision test-official clean
 
 setup: $(VENV)/.installed
 
@@ -96,7 +97,10 @@ smoke: $(VENV)/.testing
 	$(BIN)/python -m pytest -m smoke $(SPREAD) $(sort $(shell grep -rl "@pytest.mark.smoke" --include=test_*.py tests))
 
 test: $(VENV)/.developing
-	$(BIN)/python -m pytest $(SPREAD)
+	$(BIN)/python -m pytest -m "not slow and not speed" $(SPREAD)
+
+test-long: $(VENV)/.developing
+	$(BIN)/python -m pytest -m "slow and not speed" $(SPREAD)
 
 # From nothing: setuptools would pack what its last lists of files name.
 dist: $(VENV)/.developing

@@ -5,6 +5,7 @@ test.
 import os
 import shutil
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,6 +22,17 @@ from tests.helpers.misbehaving import ENTRY_POINTS, THIRD_PARTY
 from tests.helpers.places import PUBLISHED
 from tests.helpers.recordings import Read
 from tests.helpers.short_streets import few_and_short
+
+SLOW = {*(Path(__file__).with_name("slow.txt").read_text().split())}
+"""Tests that took a second and a half of two cores, which `make test-long` runs: from
+`--durations=0`."""
+
+
+def pytest_collection_modifyitems(items):
+    for item in items:
+        if item.nodeid.partition("[")[0] in SLOW:
+            item.add_marker(pytest.mark.slow)
+
 
 # An unpacked sdist holds no published results, nor what else only a clone has: what is tested there
 # is the installed package (`make test-installed`).

@@ -36,12 +36,12 @@ class Mine(BeamReduce):
             self._stride = int(file["stride"])
 """
 LAYOUTS = {
-    "code of a package": ("mine/__init__.py", "mine/deep/net.py"),
-    "data of a package": ("mine/__init__.py", "mine/weights/dense.pth"),
-    "code beside a module": ("mine.py", "net.py"),
-    "a declared file beside a module": ("mine.py", "table.csv"),
-    "a declared file elsewhere": ("mine.py", "../home/table.csv"),
-    "a file in a declared folder": ("mine.py", "../home/tables/a/b.csv"),
+    "code of a package": ("declaring/__init__.py", "declaring/deep/net.py"),
+    "data of a package": ("declaring/__init__.py", "declaring/weights/dense.pth"),
+    "code beside a module": ("declaring.py", "net.py"),
+    "a declared file beside a module": ("declaring.py", "table.csv"),
+    "a declared file elsewhere": ("declaring.py", "../home/table.csv"),
+    "a file in a declared folder": ("declaring.py", "../home/tables/a/b.csv"),
 }
 FILES = ("table.csv", "~/table.csv", "../home/tables")
 
@@ -60,11 +60,11 @@ def lay(tmp_path, monkeypatch):
         for name in ("code/table.csv", "home/table.csv", "home/tables/a/b.csv"):
             (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
             (tmp_path / name).touch()
-        module.write_text(MINE.format(files=FILES if module.name == "mine.py" else ()))
+        module.write_text(MINE.format(files=FILES if module.name == "declaring.py" else ()))
         return other
 
     yield put
-    for name in [name for name in sys.modules if name.partition(".")[0] == "mine"]:
+    for name in [name for name in sys.modules if name.partition(".")[0] == "declaring"]:
         del sys.modules[name]
 
 
@@ -75,50 +75,50 @@ def test_what_decides_a_policy_counts(layout, lay):
     for text in ("1", "2", "1"):
         file.write_text(text)
         provenance._loaded.cache_clear()
-        keys.append(policy_digest("mine:Mine"))
+        keys.append(policy_digest("declaring:Mine"))
     assert keys[0] == keys[2] != keys[1]
 
 
 @pytest.mark.parametrize(
     "layout",
     [
-        ("mine.py", "log.txt"),
-        ("mine.py", "data/w.npz"),
-        ("mine.py", "__pycache__/mine.nbi"),
-        ("mine/__init__.py", "mine/__pycache__/mine.nbi"),
-        ("mine.py", "../home/tables/__pycache__/a.pyc"),
+        ("declaring.py", "log.txt"),
+        ("declaring.py", "data/w.npz"),
+        ("declaring.py", "__pycache__/a.nbi"),
+        ("declaring/__init__.py", "declaring/__pycache__/a.nbi"),
+        ("declaring.py", "../home/tables/__pycache__/a.pyc"),
     ],
     ids=lambda layout: layout[1],
 )
 def test_what_is_no_code_beside_a_module_and_what_python_writes_do_not_count(layout, lay):
     """A log that the shell writes there must not end the study that it tells of."""
     file = lay(layout)
-    before = policy_digest("mine:Mine")
+    before = policy_digest("declaring:Mine")
     file.write_text("2")
-    assert policy_digest("mine:Mine") == before
+    assert policy_digest("declaring:Mine") == before
 
 
 def test_a_lock_of_an_editor_and_a_folder_called_as_code_are_passed_over(lay, tmp_path):
-    lay(("mine.py", "net.py"))
-    (tmp_path / "code" / ".#mine.py").symlink_to("user@host.1")
+    lay(("declaring.py", "net.py"))
+    (tmp_path / "code" / ".#declaring.py").symlink_to("user@host.1")
     (tmp_path / "code" / "folder.py").mkdir()
-    assert policy_digest("mine:Mine")
+    assert policy_digest("declaring:Mine")
 
 
 def test_of_an_installed_module_its_neighbours_do_not_count_and_its_version_does(install, tmp_path):
     install("site-packages", "", mine="Mine")
     place = tmp_path / "site-packages"
-    for name in ("site-packages.py", "mine.py", "stranger.py"):
+    for name in ("site-packages.py", "declaring.py", "stranger.py"):
         (place / name).write_text(MINE.format(files=()))
     (info,) = place.glob("*.dist-info")
-    (info / "entry_points.txt").write_text("[care_sim.policies]\nmine = mine:Mine\n")
+    (info / "entry_points.txt").write_text("[care_sim.policies]\nmine = declaring:Mine\n")
     before = policy_digest("mine")
     (place / "stranger.py").write_text("of another distribution")
     provenance._loaded.cache_clear()
     assert policy_digest("mine") == before
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: mine\nVersion: 1.6\n")
     assert policy_digest("mine") != before
-    del sys.modules["mine"]
+    del sys.modules["declaring"]
 
 
 def test_code_in_the_root_of_the_clone_does_not_come_with_this_package():
@@ -138,16 +138,18 @@ def test_code_in_the_root_of_the_clone_does_not_come_with_this_package():
     ],
 )
 def test_declared_files_must_be_names_of_files(files, line, lay):
-    lay(("mine.py", "table.csv")).with_name("mine.py").write_text(MINE.format(files=files))
-    with pytest.raises(InvalidInput, match=f"mine:Mine: {line}"):
-        policy_digest("mine:Mine")
+    lay(("declaring.py", "table.csv")).with_name("declaring.py").write_text(
+        MINE.format(files=files)
+    )
+    with pytest.raises(InvalidInput, match=f"declaring:Mine: {line}"):
+        policy_digest("declaring:Mine")
 
 
 def test_code_counts_as_this_process_has_it_loaded(lay):
-    module = lay(("mine.py", "table.csv")).with_name("mine.py")
-    before = policy_digest("mine:Mine")
+    module = lay(("declaring.py", "table.csv")).with_name("declaring.py")
+    before = policy_digest("declaring:Mine")
     module.write_text("edited = True\n")
-    assert policy_digest("mine:Mine") == before
+    assert policy_digest("declaring:Mine") == before
 
 
 def test_what_lies_behind_links_counts_and_links_that_lead_back_end(lay, tmp_path):
@@ -156,9 +158,9 @@ def test_what_lies_behind_links_counts_and_links_that_lead_back_end(lay, tmp_pat
     (tmp_path / "data" / "w").write_text("1")
     (tmp_path / "data" / "back").symlink_to(inner.parent)
     (inner / "data").symlink_to(tmp_path / "data")
-    before = policy_digest("mine:Mine")
+    before = policy_digest("declaring:Mine")
     (tmp_path / "data" / "w").write_text("2")
-    assert policy_digest("mine:Mine") != before
+    assert policy_digest("declaring:Mine") != before
 
 
 @pytest.fixture

@@ -125,9 +125,9 @@ def test_it_trains_keeps_and_goes_on(capsys, tmp_path):
     assert play == f"care-sim run {out}"
     # It goes as it is told, and learns of the parameters of the training.
     assert beside == (
-        "care-sim sweep --scenario-parameters duration_s=1.0 "
+        "care-sim sweep --policies care ppo --budgets 0.03 "
         f"--policy-parameters ppo.path={out / 'weights.npz'} "
-        "--scenarios dense --policies care ppo --budgets 0.03"
+        "--scenario-parameters duration_s=1.0 --scenarios dense"
     )
     assert parsed_command(shlex.split(beside)[1:])[1].budgets == (0.03,)
     code, played, complaint = care(capsys, *shlex.split(play)[1:], "--seed", "5")
