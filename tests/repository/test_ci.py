@@ -44,7 +44,13 @@ def test_the_browser_is_installed_without_a_question_before_the_tests(clone):
     assert update == "apt-get update -qq noninteractive"
     assert install.startswith("apt-get install")
     assert install.endswith("chromium noninteractive")
-    assert [line.split()[1] for line in made] == ["test", "test-long", "test-speed", "test-official", "lint"]
+    assert [line.split()[1] for line in made] == [
+        "test",
+        "test-long",
+        "test-speed",
+        "test-official",
+        "lint",
+    ]
     assert all(" PYTHON=python3.11 " in line for line in made)
 
 
