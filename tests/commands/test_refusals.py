@@ -148,7 +148,7 @@ export nuscenes --source argoverse2:x --out y | source must be nuscenes:FOLDER
 export nuscenes --source nuscenes:nowhere --out y | nowhere is no folder
 view NOWHERE/x.rrd                        | No such file
 view TABLE                                | is no recording of `care-sim run --record`
-certify --episode 3 --all                 | episode plays one alone
+certify --episode 3 --all                 | episode plays one episode: remove all
 certify --episode 10000                   | episode must be a whole number >= 0 and <= 9999
 train learned-scorer --out TABLE          | table.png
 train learned-sets --out NOWHERE          | is a folder, a file is wanted
