@@ -3,7 +3,7 @@
 # make reproduce  set up, run the paper's closed-loop study, print it beside the paper's figures (a minute)
 # make smoke      set up with pytest, run a few tests per promise (a minute)
 # make test       set up with the development tools, run the tests (7 minutes)
-# make test-long  run those that take longer, all published streets among them (15 minutes)
+# make test-long  run those that take longer, all published streets among them (12 minutes)
 # make dist       build the sdist, and the wheel from it, in dist/
 # make test-installed   install that wheel in an environment of its own, run the sdist's tests with it
 # make test-extras   install that wheel with one extra after the other, each alone, and use it; EXTRAS="viewer video"

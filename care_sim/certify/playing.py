@@ -92,7 +92,7 @@ def episode_batches(episodes: Sequence[Drawn]) -> list[list[Drawn]]:
 
 
 def attempt(batch: Sequence[Drawn], source: str) -> Trails:
-    """What a worker does: play a batch; `source` names the recordings of the replay."""
+    """Play a batch in a worker; `source` names the recordings of the replay."""
     return {episode.number: result_or_reason(play_alone, episode, source) for episode in batch}
 
 

@@ -15,6 +15,7 @@ from care_sim.reports.engine.measures import (
     AVOIDED,
     DETECTION,
     GATE_POINTS,
+    OPEN_LOOP,
     Measure,
     Recall,
     Units,
@@ -75,11 +76,12 @@ def leads(rows: Sequence[Row], plain: bool = False) -> list[Lead]:
     The best are chosen among policies that a car can have, by the seeds or scenes that all of
     them have. Their difference is over those that the two share.
     """
+    is_open = loop_of(rows) is OPEN_LOOP
     found = (
         _lead(part, budget, measure)
         for part in settings(rows, plain)
         for budget in part.budgets
-        for measure in ((DETECTION, part.avoided) if "seed" in rows[0] else (_SIGHTINGS,))
+        for measure in ((_SIGHTINGS,) if is_open else (DETECTION, part.avoided))
     )
     return [lead for lead in found if lead]
 
@@ -172,12 +174,12 @@ def shared_conditions(rows: Sequence[Row]) -> list[str]:
     """
     # The full scan does not feel all conditions.
     own = [row for row in rows if row["policy"] != FULL] or rows
-    settings = [
+    found = [
         setting_of({name: row[name] for name in row if not name.startswith("scenario.")})
         for row in own
     ]
-    shared = set.intersection(*({*setting.conditions} for setting in settings))
-    kept = replace(settings[0], conditions=tuple(c for c in settings[0].conditions if c in shared))
+    shared = set.intersection(*({*setting.conditions} for setting in found))
+    kept = replace(found[0], conditions=tuple(c for c in found[0].conditions if c in shared))
     changed = kept.label.removeprefix(f"{kept.world}, ")
     return [f"Conditions of all episodes: {changed}."] if shared else []
 

@@ -1,5 +1,8 @@
 import json
+import re
 from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
 
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -7,6 +10,7 @@ from rich.console import Console
 
 from care_sim.base.errors import InvalidInput
 from care_sim.commands.shared.run_study import run_study
+from care_sim.reports import studies
 from care_sim.reports.report import StudyReport, print_report
 from care_sim.reports.studies import STUDIES, study_of
 from care_sim.study.designs import (
@@ -56,6 +60,14 @@ def test_a_column_that_no_row_fills_may_be_missing(tmp_path):
     write_rows(wrong, tmp_path / "episodes.parquet", "ncap")
     with pytest.raises(InvalidInput, match=f"its column {ncap.REPORTED_COLUMN} must hold"):
         read_rows(tmp_path / "episodes.parquet", study.schema)
+
+
+def test_figures_that_are_named_by_text_are_there():
+    """Studies import what draws them late, so that a wrong name shows only when it is drawn."""
+    places = re.findall(r'_drawn\("(\w+):(\w+)"\)', Path(studies.__file__).read_text())
+    assert len(places) == len({name for _, name in places}) == 15
+    for module, name in places:
+        assert callable(getattr(import_module(f"care_sim.reports.figures.{module}"), name))
 
 
 @pytest.mark.parametrize(("name", "rows"), EPISODES.items())

@@ -126,3 +126,10 @@ def test_what_is_missing_is_said_in_one_line_before_anything_is_installed(tmp_pa
 def test_with_everything_there_the_environment_is_installed(tmp_path, given):
     done = official(tmp_path, *given, "VERSION=v1.0-mini")
     assert done.stdout.startswith(f"false -m venv --clear {tmp_path / 'environment'}")
+
+
+def test_the_slow_tests_are_tests():
+    """A test of another name would be run by `make test` without a word."""
+    for line in (ROOT / "tests" / "slow.txt").read_text().split():
+        file, *_, name = line.split("::")
+        assert f"def {name}(" in (ROOT / file).read_text(), line

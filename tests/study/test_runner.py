@@ -66,6 +66,14 @@ def test_a_study_writes_its_files_and_equals_the_same_episodes_at_home(tmp_path)
     assert names == {"config.json", JOURNAL, EPISODES.file, "tables.md", "tables.tex"}
 
 
+def test_a_study_keeps_its_command_without_what_only_this_machine_knows(tmp_path):
+    command = "care-sim protocol --source kitti:/home/me/drives --out /tmp/x --policies mine:Mine"
+    run_study(short(["history", "full"]), tmp_path, workers=1, command=command)
+    content = json.loads((tmp_path / "config.json").read_text())
+    assert content["command"] == "care-sim protocol --source kitti:FOLDER --policies mine:Mine"
+    assert [each["policies"] for each in content["configurations"]] == [["history"], ["full"]]
+
+
 def test_an_interrupted_study_loses_and_repeats_nothing(tmp_path):
     configs = short(["history", "care", "random"])
     run_study(configs[:2], tmp_path, workers=1)

@@ -12,7 +12,7 @@ from care_sim.commands.options.shared import EpisodeOptions, RecordingOptions
 
 @dataclass(frozen=True, kw_only=True)
 class WatchOptions(RecordingOptions, EpisodeOptions):
-    """What is played before one's eyes, in either loop, and where it is kept."""
+    """Options of commands that show a play of either loop, and keep it in files."""
 
     scene: str | None = None
     """For a source of scenes: the name of the scene. Without it streets play that of the seed,

@@ -32,16 +32,16 @@ def is_source(text: str) -> bool:
     name = source_name(text)
     if name in (_STREET, *SOURCES.names()):
         return True
-    # What is no source, or cannot be loaded, is told of as a scenario.
+    # A scenario's message fits whatever is no source or cannot be loaded.
     return is_place(name) and means_source(name)
 
 
 def maker_of(
     options: WatchOptions, named: str, policies: Sequence[str], budget: float
 ) -> Callable[[Sequence[str]], Sequence[EpisodeConfig | PlayConfig]]:
-    """What makes one task for each of some of the `policies`: an episode of the scenario that is
-    `named`, or a play of one scene of that source. Raises InvalidInput for options that the loop
-    does not have.
+    """Return a function that makes one task for each of some `policies`: an episode of the scenario
+    that is `named`, or a play of one scene of that source. Raises InvalidInput for options that the
+    loop does not have.
     """
     given = arguments_of(options, policies)
     if not is_source(named):

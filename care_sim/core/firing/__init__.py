@@ -1,1 +1,1 @@
-"""What the hardware of a LiDAR can fire of a demand, a family of hardware a file."""
+"""Hardware of a LiDAR: how much of a demand it can fire. A family of hardware per file."""

@@ -1,4 +1,4 @@
-"""What hardware is: cells that fire together, and a choice of them for what is demanded.
+"""Hardware: cells that fire together, and a choice of them for what is demanded.
 
 Hardware may fire a cell more than once: it then stands as often among what fired.
 """

@@ -188,7 +188,7 @@ class Energy(FreeCells):
         numbers = range(1, self.most_shots + 1)
         rounds = [cells[: budget // number] for number in numbers]
         claims = [flat[cells] / number for number, cells in zip(numbers, rounds, strict=True)]
-        # Of equal claims the one to the lower number of a shot comes first, then the lower cell's.
+        # Equal claims are ranked by the number of the shot, then by the cell, lower first.
         dealt = np.argsort(-np.concatenate(claims), kind="stable")[:budget]
         fired = np.concatenate(rounds)[dealt]
         if floor is not None and len(fired) < budget:

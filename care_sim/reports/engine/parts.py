@@ -10,7 +10,7 @@ from care_sim.reports.engine.contrasts import Contrast
 from care_sim.reports.engine.controls import best_of, is_control
 from care_sim.reports.engine.frames import Frame
 from care_sim.reports.engine.measures import AVOIDED, Measure, Recall, Units
-from care_sim.study.rows.reading import Key, is_avoided
+from care_sim.study.rows.reading import Key, spared_seeds
 from care_sim.study.rows.settings import Setting
 from care_sim.study.run_config import FULL, Row
 
@@ -65,7 +65,7 @@ class Part:
         """Collisions avoided, on the seeds on which the full scan has none, if it was played."""
         if not self.full:
             return AVOIDED
-        spared = {row["seed"] for row in self.full if is_avoided(row)}
+        spared = spared_seeds(self.full)
         return replace(
             AVOIDED,
             name="Preventable collisions avoided",

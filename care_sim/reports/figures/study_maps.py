@@ -149,7 +149,7 @@ def _verdicts(measure: str, conditions: Sequence[str], orders: Sequence[Order]) 
     for line, condition in enumerate(conditions):
         for column, order in enumerate(orders):
             if standing := order.standings.get(condition):
-                texts[line][column] = signed(standing.difference)
+                texts[line][column] = signed(standing)
                 if verdict := order.verdict(condition):
                     kinds[line, column] = [*_VERDICT_COLOURS].index(verdict)
     return Map(measure, kinds, texts)

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import partial
-from typing import NamedTuple
 
 from care_sim.base.errors import percent
 from care_sim.evaluation.censoring import FEWEST_PAIRS
@@ -28,20 +27,6 @@ _OF_THE_FILM = ("sensor", "sensor_hash", *READ_WITH)
 """Columns of a source, which are no conditions."""
 
 
-class Standing(NamedTuple):
-    """How the first of two policies stands to the second."""
-
-    difference: Contrast
-
-    @property
-    def sign(self) -> int | None:
-        """1 or -1 where the interval excludes zero, else 0; None of fewer pairs than carry a
-        claim.
-        """
-        enough = self.difference.difference.pairs >= FEWEST_PAIRS
-        return self.difference.sign if enough else None
-
-
 class Verdict(StrEnum):
     """What a condition makes of an order: a lead that holds, is lost or flips; a tie that stays
     tied, or from which a lead arises.
@@ -60,7 +45,7 @@ class Order:
 
     headline: str
     pair: Pair
-    standings: Mapping[str, Standing]
+    standings: Mapping[str, Contrast]
 
     @property
     def label(self) -> str:
@@ -70,8 +55,8 @@ class Order:
     def verdict(self, condition: str) -> Verdict | None:
         """None where one of the two was not played, or rests on too few pairs."""
         before, here = (
-            standing.sign if (standing := self.standings.get(each)) else None
-            for each in (IDEAL.label, condition)
+            found.sign if found and found.difference.pairs >= FEWEST_PAIRS else None
+            for found in map(self.standings.get, (IDEAL.label, condition))
         )
         if condition == IDEAL.label or before is None or here is None:
             return None
@@ -128,7 +113,7 @@ class _Block:
     def order(self, pair: Pair, conditions: Sequence[Variant]) -> Order:
         """How the first policy stands to the second under every condition."""
         found = ((each.label, self._contrast(*((p, each) for p in pair))) for each in conditions)
-        return Order(self.label, pair, {name: Standing(one) for name, one in found if one})
+        return Order(self.label, pair, {name: one for name, one in found if one})
 
     def _contrast(self, ours: tuple[str, Variant], theirs: tuple[str, Variant]) -> Contrast | None:
         by_cases = len(self.places) > 1
@@ -246,8 +231,7 @@ def _order_tables(study: RealismStudy) -> Iterator[Table]:
 
 
 def _difference(order: Order, condition: str) -> str:
-    standing = order.standings.get(condition)
-    return interval(standing.difference) if standing else ""
+    return interval(order.standings.get(condition))
 
 
 def _entry(order: Order, condition: str) -> str:

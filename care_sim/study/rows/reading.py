@@ -191,9 +191,14 @@ def is_avoided(row: Row) -> bool:
     return not (row["collision"] or stops_for_nothing(row))
 
 
+def spared_seeds(full: Sequence[Row]) -> set[int]:
+    """The seeds on which the full scan avoids the collision."""
+    return {row["seed"] for row in full if is_avoided(row)}
+
+
 def preventable(full: Sequence[Row], rows: Sequence[Row]) -> list[Row]:
     """The rows of the seeds on which the full scan avoids the collision."""
-    spared = {row["seed"] for row in full if is_avoided(row)}
+    spared = spared_seeds(full)
     return [row for row in rows if row["seed"] in spared]
 
 

@@ -8,7 +8,7 @@ from care_sim.reports.engine.contrasts import of_interval
 from care_sim.reports.engine.measures import Recall
 from care_sim.reports.studies import STUDIES
 from care_sim.reports.table import Bold
-from care_sim.reports.tables.realism import Order, Standing, realism_tables
+from care_sim.reports.tables.realism import Order, realism_tables
 from care_sim.study.designs.realism import (
     FILM_CONDITIONS,
     HEADLINES,
@@ -56,7 +56,7 @@ def lines(tables, part):
 )
 def test_an_order_holds_is_lost_flips_or_arises(before, here, pairs, verdict):
     standings = {
-        name: Standing(of_interval(Recall(OVERALL), Interval(sum(ends) / 2, *ends), pairs))
+        name: of_interval(Recall(OVERALL), Interval(sum(ends) / 2, *ends), pairs)
         for name, ends in (("ideal", before), ("here", here))
     }
     order = Order("", ("a", "b"), standings)
