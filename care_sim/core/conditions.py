@@ -70,7 +70,7 @@ class CameraFaults:
     camera_latency_s: float = bounded(0.0, 0, LONGEST_LATENCY_S)
     """Age of the camera's detections in seconds; not together with `camera_latency`. The picture is
     of that instant, or of the newest before it at which there is one: in the closed loop the world
-    steps every 0.05 s, a film has its keyframes (`care_sim.sensors.picture_timing`).
+    steps every 0.05 s, a film has its keyframes (`care_sim.sensors.camera`).
     """
     camera_jitter: int = bounded(0, 0, MOST_KEYFRAMES)
     """Most keyframes by which a picture may come later still; drawn evenly from 0 to this."""
@@ -151,7 +151,7 @@ class Sensing(CameraFaults, LidarFaults, ReturnSettings):
     """Fired rays that must hit an object for it to be detected."""
     camera_confidence: float = bounded(CAMERA_CONFIDENCE, 0, 1)
     """Least confidence of a camera detection, 0 to 1; visible pixels decide, and the least box has
-    0.25 (`care_sim.sensors.confidence`).
+    0.25 (`care_sim.sensors.pictures`).
     """
 
     def __post_init__(self) -> None:

@@ -46,22 +46,22 @@ class ReturnSettings:
     rain_mm_h: float = bounded(0.0, 0, 1000)
     """Rain, millimetres per hour (`care_sim.sensors.signal`). The cameras see on as before."""
     lidar_divergence_mrad: float = bounded(0.0, 0, 100)
-    """Angle between opposite edges of a beam, milliradians (`care_sim.sensors.bundle`). A beam may
+    """Angle between opposite edges of a beam, milliradians (`care_sim.sensors.beams`). A beam may
     then meet several bodies. At 0 it is one ray.
     """
     lidar_returns: str = one_of(STRONGEST, RETURNS_KEPT)
     """Which echo a beam returns that has several: `strongest`, `last` or `both`
-    (`care_sim.sensors.echoes`).
+    (`care_sim.sensors.signal`).
     """
     lidar_sweep_s: float = bounded(0.0, 0, 1)
     """How long a sweep takes, seconds: columns fire one after another, the last at the keyframe
-    (`care_sim.sensors.sweep`). At 0 all fire at once.
+    (`care_sim.sensors.beams`). At 0 all fire at once.
     """
     lidar_compensated: bool = False
     """Whether points of a sweep are moved by how the ego moved since. Ranges stay as measured."""
     lidar_crosstalk: float = bounded(0.0, 0, 1)
     """Share of the cells that take the pulse of another LiDAR for their return, 0 to 1
-    (`care_sim.sensors.crosstalk`).
+    (`care_sim.sensors.lidar_faults`).
     """
 
     def __post_init__(self) -> None:

@@ -30,8 +30,8 @@ from care_sim.loops.truth import TrackObjects
 from care_sim.perception.base import Detector
 from care_sim.perception.tracker import TrackMemory
 from care_sim.sensors.beams import Beams
-from care_sim.sensors.box_pool import EMPTY_POOL, BoxPool
 from care_sim.sensors.engines import make_engine
+from care_sim.sensors.false_boxes import EMPTY_POOL, BoxPool
 from care_sim.sensors.lidar import Lidar
 from care_sim.world.approach import ClosestApproach
 from care_sim.world.world import World

@@ -14,7 +14,7 @@ from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.film import Film
 from care_sim.loops.seeds import SensorSeeds
 from care_sim.perception.base import Detector
-from care_sim.sensors.box_pool import BoxPool
+from care_sim.sensors.false_boxes import BoxPool
 from care_sim.world.world import World
 
 NEAR_S = 2.0

@@ -25,10 +25,10 @@ from care_sim.loops.truth import TrackObjects
 from care_sim.perception.base import Detector
 from care_sim.perception.tracker import TrackMemory
 from care_sim.sensors.annotated import Cloud
-from care_sim.sensors.box_pool import EMPTY_POOL
 from care_sim.sensors.camera import CameraDetector
 from care_sim.sensors.camera_profiles import invents_boxes
-from care_sim.sensors.recorded_lidar import RecordedLidar
+from care_sim.sensors.false_boxes import EMPTY_POOL
+from care_sim.sensors.lidar import RecordedLidar
 
 
 @dataclass(frozen=True)

@@ -354,7 +354,7 @@ def allocation(case):
 def rig(case):
     """The rig, and what it covers."""
     from care_sim import AngularGrid, Rig
-    from care_sim.sensors.camera import FRONT_CAMERA
+    from care_sim.sensors.pictures import FRONT_CAMERA
 
     known = _fields_of(Rig) | {"grid": AngularGrid, "cameras": lambda: (FRONT_CAMERA,)}
     made = Rig(**draw(case, known))

@@ -15,8 +15,7 @@ from care_sim.core.frames import Frame
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import ImageDetections
 from care_sim.sensors.annotated import Annotations, IdentifiedDetections
-from care_sim.sensors.camera import CAMERA_HEIGHT, CAMERA_WIDTH
-from care_sim.sensors.confidence import MIN_PIXELS, confidence_of
+from care_sim.sensors.pictures import CAMERA_HEIGHT, CAMERA_WIDTH, MIN_PIXELS, confidence_of
 from care_sim.sensors.surround import View
 
 PICTURE = (1600, 900)

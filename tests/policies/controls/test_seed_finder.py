@@ -15,7 +15,7 @@ from care_sim.policies import contenders, policy_names, tags_of
 from care_sim.policies.controls.learned_place import rehearsal
 from care_sim.policies.controls.seed_finder import SeedFinder
 from care_sim.scenarios.base import Scenario
-from care_sim.sensors.camera import FRONT_CAMERA
+from care_sim.sensors.pictures import FRONT_CAMERA
 from care_sim.world.crosser import Crosser, Meeting
 from care_sim.world.traffic import Traffic
 from care_sim.world.walker import Walk
