@@ -16,10 +16,8 @@ from care_sim.core.observation_limits import Limits
 from care_sim.core.rig import Rig
 from care_sim.core.types import Command, Scan, Tracks
 from care_sim.driving.corridor import along_route
-from care_sim.driving.cruising import Cruising, CruisingRules
-from care_sim.driving.drivers import make_driver
-from care_sim.driving.localisation import Localisation
-from care_sim.driving.odometry import Odometry
+from care_sim.driving.drivers import Cruising, CruisingRules, make_driver
+from care_sim.driving.localisation import Localisation, Odometry
 from care_sim.loops.cameras import Cameras
 from care_sim.loops.needless import NeedlessBraking, UnfoundedBraking
 from care_sim.loops.records import Keyframe, Sight
@@ -27,7 +25,7 @@ from care_sim.loops.scan_detection import ScanDetection
 from care_sim.loops.seeds import SensorSeeds
 from care_sim.loops.told import Told, told_by
 from care_sim.loops.truth import TrackObjects
-from care_sim.perception.base import Detector
+from care_sim.perception.points_only import Detector
 from care_sim.perception.tracker import TrackMemory
 from care_sim.sensors.beams import Beams
 from care_sim.sensors.engines import make_engine

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from care_sim.core.types import Command, Tracks
-from care_sim.driving.cruising import Cruising, CruisingRules
+from care_sim.driving.drivers import Cruising, CruisingRules
 from care_sim.world.route import Route
 from care_sim.world.speed_plan import SpeedPlan
 

@@ -16,7 +16,7 @@ from care_sim.core.cell_sets import CellSets
 from care_sim.core.grid import Cells
 from care_sim.core.residual import camera_layers_of
 from care_sim.core.rig import Rig
-from care_sim.perception.cluster.road import KERB_CLEARANCE_M
+from care_sim.perception.cluster.points import KERB_CLEARANCE_M
 from care_sim.policies.learned.block_kernels import AboveRoad, draw_pictures
 from care_sim.policies.learned.tiling import Tiling
 

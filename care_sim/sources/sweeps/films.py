@@ -18,7 +18,7 @@ from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.core.types import ImageDetections
 from care_sim.loops.film import Film, Shot
-from care_sim.perception.cluster.road import SETTLING_M
+from care_sim.perception.cluster.points import SETTLING_M
 from care_sim.sensors.annotated import NO_ANNOTATIONS, Annotations, IdentifiedDetections
 from care_sim.sensors.surround import SURROUND_CAMERAS
 from care_sim.sources.car_motion import motions
