@@ -22,7 +22,7 @@ from care_sim.sensors.camera import CameraDetector
 from care_sim.sensors.false_boxes import EMPTY_POOL, MOST_DRAWS, BoxPool, FalseBoxes
 from care_sim.sensors.pictures import FRONT_CAMERA
 from care_sim.sensors.surround import SURROUND_CAMERAS
-from care_sim.sources.argoverse2 import films as argoverse2
+from care_sim.sources.argoverse2 import recordings as argoverse2
 from care_sim.sources.installed import recordings
 from care_sim.sources.nuscenes.tables import CAMERA_CHANNELS
 from care_sim.sources.street_films import record
