@@ -103,27 +103,6 @@ def test_each_casts_as_if_it_were_alone_where_it_stands(street, engine):
     assert len({*bodies.tolist()} - {NO_BODY, street.ground}) == 3
 
 
-@every_engine
-def test_cells_in_any_order_and_of_some_lidars_alone(street, engine):
-    rays = make_engine(engine, street, STACK)
-    ranges, bodies = rays.cast(SENSOR, EVERY_CELL)
-    cells = np.random.default_rng(1).permutation(STACK.size)[:300]
-    for some in (cells, cells[cells >= 512], cells[:0]):
-        part, met = rays.cast(SENSOR, some)
-        assert np.array_equal(part, ranges[some])
-        assert np.array_equal(met, bodies[some])
-
-
-def test_the_first_engine_draws_the_cameras_pictures(street):
-    from care_sim.sensors.pictures import FRONT_CAMERA
-
-    window = (0, 0, FRONT_CAMERA.width, FRONT_CAMERA.height)
-    for name, make in ENGINES.items():
-        drawn = make_engine(name, street, STACK).body_ids(FRONT_CAMERA, SENSOR, window)
-        alone = make(street, STACK.grids[0]).body_ids(FRONT_CAMERA, SENSOR, window)
-        assert np.array_equal(drawn, alone)
-
-
 def test_a_full_sweep_holds_every_return_at_its_place():
     """Casting every cell of every LiDAR finds the same; the road is a plane of its own."""
     poses = {"bus": (15.0, 4.0, 0.3), "car": (4.5, -4.0, 1.2), "pedestrian": (-9.0, 3.0, 0.0)}
