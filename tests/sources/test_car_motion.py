@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 
 from care_sim.core.frames import Frame
-from care_sim.core.types import Ego
 from care_sim.sources.box_films import motions
 
 TIMES = np.array([0.0, 0.5, 1.0, 1.6, 2.0, 2.5])
@@ -35,12 +34,6 @@ def test_nothing_of_the_future_is_in_it(turn):
     before = motions(TIMES, on_a_line(way))
     assert motions(TIMES, turned)[:turn] == before[:turn]
     assert motions(TIMES, turned)[turn] != before[turn]
-
-
-def test_the_first_pose_has_no_motion_and_the_second_a_speed():
-    first, second = motions(TIMES[:2], on_a_line([0.0, 2.0]))
-    assert first == Ego()
-    assert (second.speed, second.acceleration) == (pytest.approx(4.0), 0.0)
 
 
 def test_after_a_keyframe_of_braking_all_of_it_is_told():

@@ -1,6 +1,5 @@
 """Tables without recorded sweeps: boxes become bodies, and rays are cast at them."""
 
-import json
 import shutil
 
 import gymnasium as gym
@@ -17,9 +16,9 @@ from care_sim.sources.named import source_of
 from care_sim.sources.nuscenes.recordings import NuScenes
 from care_sim.sources.scenes import film_of
 from care_sim.study.scene_play import film_hash
-from tests.helpers.nuscenes_database import SENSORS, annotated, as_recorded, change, pose, write
-from tests.helpers.nuscenes_drive import SPEED, write_drive
-from tests.helpers.nuscenes_scene import CAR, SCENE, WORLD, database, first
+from tests.helpers.nuscenes_database import annotated, as_recorded, pose, write
+from tests.helpers.nuscenes_drive import write_drive
+from tests.helpers.nuscenes_scene import CAR, WORLD, database, first
 
 PERSON = annotated("human.pedestrian.adult", (15.0, -3.0, 0.9), (0.7, 0.7, 1.8), instance="p")
 TRAILER = annotated("vehicle.trailer", (12.0, 1.2, 1.5), (3.0, 2.0, 3.0), instance="t")
@@ -89,21 +88,6 @@ def test_recorded_cameras_show_what_projection_shows(tmp_path):
     assert rendered.cameras[0].width < 340
 
 
-def test_what_lies_beside_the_recorded_picture_is_not_shown(tmp_path):
-    """The back camera's principal point is 29 pixels off the middle, so its pinhole is wider."""
-    beside = 1640.0
-    focal, u, _ = SENSORS["CAM_BACK"][2]
-    away = SENSORS["CAM_BACK"][0][0] - 10.0, (beside - u) / focal * 10.0
-    thin = annotated("vehicle.bicycle", (*away, 1.0), (0.1, 0.1, 2.0), instance="thin")
-    movie = first(alone(tmp_path, thin))
-    (shot,) = movie.shots
-    back = movie.cameras[5]
-    ((x, _),), (depth,) = back.project(shot.annotations.boxes[:, :3])
-    assert 320 < x < back.width, "the pinhole would show it"
-    assert depth > 0
-    assert 5 not in shot.seen.detections.cameras
-
-
 def test_what_is_outside_the_classes_hides_and_is_no_object(tmp_path):
     (free,), (hidden,) = (
         first(alone(tmp_path / str(n), CAR, *more)).shots for n, more in enumerate([(), (TRAILER,)])
@@ -125,35 +109,6 @@ def test_a_box_without_a_point_is_neither_annotated_nor_a_body_unless_asked_for(
     assert "scene-0103: 1 of 2 boxes within 50 m hold no recorded point: 0 newcomers" in told
 
 
-def test_newcomers_with_and_without_empty_boxes_are_said_as_the_protocol_counts_them(
-    tmp_path, capsys
-):
-    filled = [[CAR], [CAR], [CAR, PERSON]]
-    late = TRAILER | {"category": "vehicle.bus.rigid", "num_lidar_pts": 0}
-    samples = [
-        ([*boxes, *([late] if n else [])], pose(), as_recorded(WORLD))
-        for n, boxes in enumerate(filled)
-    ]
-    root = database(tmp_path, samples)
-    counts = [
-        len(
-            Sightings.of("", [shot.annotations for shot in movie.shots], hidden=movie.hidden).events
-        )
-        for movie in (first(root), first(root, empty_boxes=True))
-    ]
-    assert counts == [1, 2]
-    told = capsys.readouterr().err
-    assert "2 of 6 boxes within 50 m hold no recorded point: 1 newcomers without these" in told
-    assert "2 with them" in told
-
-
-def test_a_missing_sweep_among_others_is_named(tmp_path):
-    root = database(tmp_path, [([CAR], pose(), as_recorded(WORLD))] * 2)
-    (root / "samples" / "LIDAR_TOP" / f"{SCENE}-1.pcd.bin").unlink()
-    with pytest.raises(InvalidInput, match=f"LIDAR_TOP/{SCENE}-1.pcd.bin: no such file"):
-        first(root)
-
-
 def test_sweeps_that_are_not_there_cannot_be_gathered(tmp_path):
     root = alone(tmp_path, CAR)
     with pytest.raises(InvalidInput, match=r"no recorded sweeps .*: sweeps must be 1, got 3"):
@@ -173,17 +128,6 @@ def test_sweeps_that_come_later_make_another_film(tmp_path):
     assert film_hash(film_of(source, scene)) != hash_before
 
 
-def test_boxes_of_a_detector_take_the_place_of_rendered_ones(tmp_path):
-    root = alone(tmp_path, CAR, keyframes=3)
-    path = tmp_path / "boxes.json"
-    found = {"sample_data_token": f"{SCENE}-0-CAM_FRONT", "bbox_corners": [700, 400, 780, 470]}
-    path.write_text(json.dumps([found | {"category_name": "bus", "score": 0.5}]))
-    movie = NuScenes(root, camera_detections=path).film(SCENE)
-    assert movie.detected
-    assert movie.cameras[0].width > 1600
-    assert [len(shot.seen) for shot in movie.shots] == [1, 0, 0]
-
-
 def test_the_environment_plays_them(tmp_path):
     root = write_drive(tmp_path / "drive")
     shutil.rmtree(root / "samples")
@@ -194,18 +138,6 @@ def test_the_environment_plays_them(tmp_path):
         for _ in range(4):
             observation, *_ = env.step(policy(observation))
         assert env.unwrapped.loop.belief.tracks.ids.size
-
-
-@pytest.mark.parametrize(
-    ("options", "told"),
-    [
-        ({"camera_times": "late"}, "unknown camera_times 'late'; known: own, sweep"),
-        ({"empty_boxes": 2}, "empty_boxes must be True or False, got 2"),
-    ],
-)
-def test_odd_options_are_refused(tmp_path, options, told):
-    with pytest.raises(InvalidInput, match=told):
-        source_of(f"nuscenes:{tmp_path}", **options)
 
 
 def test_a_split_that_is_held_in_part_names_what_is_missing(tmp_path, capsys):
@@ -226,19 +158,6 @@ def test_a_split_that_is_held_in_part_names_what_is_missing(tmp_path, capsys):
     NuScenes(root, split="mini_val").scenes()
     NuScenes(root, split="all").scenes()
     assert not capsys.readouterr().err
-
-
-def test_boxes_in_the_frame_of_the_car_are_told(tmp_path, capsys):
-    root = write_drive(tmp_path / "drive")
-
-    def seen_from_the_car(rows):
-        for row in rows:
-            row["translation"][0] -= SPEED * int(row["sample_token"].split("-")[2])
-
-    change(root, "sample_annotation", seen_from_the_car)
-    source = source_of(f"nuscenes:{root}")
-    film_of(source, source.scenes()[0])
-    assert "scene-0103: its boxes move against the car" in capsys.readouterr().err
 
 
 def test_the_metadata_of_two_real_scenes_plays(tmp_path, recorded):

@@ -1,7 +1,6 @@
 """Columns by sample hold what the JSON tables hold."""
 
 import json
-import pickle
 import tempfile
 from pathlib import Path
 
@@ -10,11 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
-from care_sim.sources.nuscenes.films import nuscenes_film
-from care_sim.sources.nuscenes.recordings import split_scenes
 from care_sim.sources.nuscenes.tables import Database
 from tests.helpers.nuscenes_database import change
-from tests.helpers.nuscenes_drive import write_drive
 from tests.helpers.nuscenes_scene import SCENE, database, first
 
 SAMPLES = ["one", "two", "", "drei ü"]
@@ -120,21 +116,6 @@ def placed(row, places):
     if pose is None:
         return None
     return {name: [*map(float, pose[name])] for name in ("translation", "rotation")}
-
-
-def test_a_film_of_mapped_tables_is_that_of_tables_just_read(tmp_path):
-    tables = write_drive(tmp_path / "nuscenes")
-    made, mapped = (fingerprints(tables) for _ in range(2))
-    assert made == mapped
-    assert len(list(tables.glob("v1.0-*/*.arrow"))) == 2
-    for kept in tables.glob("v1.0-*/*.arrow"):
-        kept.unlink()
-    assert fingerprints(tables) == made
-
-
-def fingerprints(root):
-    tables = Database(root)
-    return [pickle.dumps(nuscenes_film(tables, scene)) for scene in split_scenes(tables)]
 
 
 def test_odd_numbers_are_refused_where_they_are_needed_alone(tmp_path):

@@ -1,6 +1,5 @@
 """Tables that are kept in files: made once, made anew when they must be."""
 
-import errno
 import os
 from concurrent.futures import ThreadPoolExecutor
 from time import sleep
@@ -8,8 +7,6 @@ from time import sleep
 import pyarrow as pa
 import pytest
 
-from care_sim.base.errors import InvalidInput
-from care_sim.sources.nuscenes import table_files
 from care_sim.sources.nuscenes.table_files import cached_table
 
 PLACE = "kept.arrow"
@@ -51,12 +48,6 @@ def test_a_table_is_made_once(maker):
     assert {path.name for path in maker.source.parent.iterdir()} == {PLACE, "source.json"}
 
 
-def test_a_table_of_another_form_is_made_anew(maker):
-    maker.cached()
-    maker.cached(form="2")
-    assert maker.made == 2
-
-
 def test_a_changed_source_is_read_again_though_its_size_and_time_are_as_before(maker):
     maker.cached()
     before = maker.source.stat()
@@ -95,15 +86,6 @@ def test_where_nothing_can_be_written_every_process_makes_its_own(maker, tmp_pat
     assert maker.made == 2
 
 
-def test_on_a_full_disk_a_table_is_made_once_and_stays_in_memory(maker, monkeypatch):
-    def full(place, table):
-        raise OSError(errno.ENOSPC, "no space left on device")
-
-    monkeypatch.setattr(table_files, "_write", full)
-    assert maker.cached() == kept("one")
-    assert maker.made == 1
-
-
 def test_who_wants_it_meanwhile_waits(maker):
     make = maker.__call__
 
@@ -118,12 +100,3 @@ def test_who_wants_it_meanwhile_waits(maker):
         tables = [*pool.map(ask, range(4))]
     assert maker.made == 1
     assert all(table["rows"].to_pylist() == kept("one") for table in tables)
-
-
-def test_a_source_that_is_refused_leaves_nothing(maker):
-    def refuse():
-        raise InvalidInput("no such file")
-
-    with pytest.raises(InvalidInput, match="no such file"):
-        cached_table(maker.source.parent / PLACE, "1", [maker.source], refuse)
-    assert {path.name for path in maker.source.parent.iterdir()} == {"source.json"}

@@ -1,7 +1,5 @@
 """Each camera's picture is that of the camera where it was when the picture was taken."""
 
-import json
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -11,7 +9,6 @@ from care_sim.core.residual import wedges
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES
 from care_sim.envs.open_loop import FilmEnv
-from care_sim.sources.nuscenes.detections import DetectionFile
 from tests.helpers.nuscenes_database import SENSORS, START_US, annotated, as_recorded, change, pose
 from tests.helpers.nuscenes_scene import SCENE, WORLD, database, first
 
@@ -110,12 +107,6 @@ def test_boxes_have_the_age_and_turn_of_their_picture(tmp_path):
         assert not shot.seen.detections.yaw_changes.any()
 
 
-def test_a_picture_just_after_the_sweep_has_age_0_and_its_turn(tmp_path):
-    seen = first(timed(tmp_path, early_s=-0.001)).shots[0].seen.detections
-    assert not seen.ages.any()
-    assert seen.yaw_changes[seen.cameras == 1] == pytest.approx(-0.001 * TURN, abs=1e-6)
-
-
 def test_a_turn_across_the_back_of_the_compass_is_small(tmp_path):
     root = timed(tmp_path)
     yaw = np.pi - TURN * (0.5 - EARLY_S / 2)
@@ -147,20 +138,6 @@ def test_wedges_are_turned_back_to_where_the_object_is(tmp_path):
     assert len(van) == 1
     assert turned_back > 0.8
     assert as_seen < 0.5
-
-
-def test_detections_from_a_file_lie_on_the_object_of_their_picture(tmp_path):
-    root = timed(tmp_path, own_pose=as_turned)
-    then = projected_by_hand(VAN, as_turned(0.5 - EARLY_S), LEFT)
-    found = {"sample_data_token": f"{SCENE}-1-{LEFT}", "bbox_corners": then.tolist()}
-    path = tmp_path / "boxes.json"
-    path.write_text(json.dumps([found | {"category_name": "truck", "score": 0.9}]))
-    shot = first(root, detections=DetectionFile(path)).shots[1]
-    seen = shot.seen
-    (row,) = np.flatnonzero(shot.annotations.objects == seen.objects[0])
-    assert CLASSES[shot.annotations.classes[row]] == "truck"
-    assert seen.detections.ages == pytest.approx([EARLY_S])
-    assert seen.detections.yaw_changes == pytest.approx([-np.radians(20)], abs=1e-6)
 
 
 def test_latency_adds_to_the_age_and_false_boxes_have_that_of_their_picture(tmp_path):
@@ -196,10 +173,3 @@ def test_times_in_other_units_are_named(tmp_path):
     ):
         first(root)
     assert first(root, camera_times="sweep")
-
-
-def test_a_picture_without_a_pose_is_named(tmp_path):
-    root = timed(tmp_path)
-    change(root, "ego_pose", lambda rows: rows.pop(2))
-    with pytest.raises(InvalidInput, match=f"ego_pose.json: no row .*'pose-{SCENE}-0-{LEFT}'"):
-        first(root)

@@ -7,7 +7,6 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.grid import AngularGrid
 from care_sim.sensors.annotated import NO_OBJECT
 from care_sim.sources.named import source_of
-from care_sim.study.scene_play import film_hash
 from tests.helpers.nuscenes_database import START_US, as_recorded, change, pose
 from tests.helpers.nuscenes_scene import CAR, SCENE, WORLD, database, first
 
@@ -38,10 +37,6 @@ def add_sweep(root, moment, filed):
     change(root, "ego_pose", lambda rows: rows.append({"token": name} | pose(x)))
     (root / file).parent.mkdir(parents=True, exist_ok=True)
     as_recorded(SEEN - [x, 0, 0]).astype("<f4").tofile(root / file)
-
-
-def test_a_film_serves_none_unless_asked(tmp_path):
-    assert all(shot.sweeps == () for shot in first(swept(tmp_path, 0.1, 0.2)).shots)
 
 
 @pytest.mark.parametrize("filed", [0, 1, 2])
@@ -82,24 +77,6 @@ def test_sweeps_that_nobody_recorded_are_refused(tmp_path):
         "has one sweep a keyframe",
     ):
         first(swept(tmp_path), sweeps=10)
-
-
-def test_a_sweep_that_is_gone_is_named(tmp_path):
-    root = swept(tmp_path, 0.2)
-    next(root.glob("sweeps/LIDAR_TOP/*")).unlink()
-    with pytest.raises(InvalidInput, match=r"sweep-0\.2\.pcd\.bin: no such file"):
-        first(root, sweeps=2)
-    assert len(first(root).shots) == 3
-
-
-def test_rows_tell_the_sweeps_and_the_film_is_another(tmp_path):
-    root = swept(tmp_path, 0.2)
-    plain, ten = (source_of(f"nuscenes:{root}", sweeps=count) for count in (1, 10))
-    (scene,) = plain.scenes()
-    differing = ten.row(scene).items() - plain.row(scene).items()
-    assert {name for name, _ in differing} == {"sweeps", "recording"}
-    assert source_of(f"nuscenes:{root}").row(scene) == plain.row(scene)
-    assert film_hash(plain.film(scene)) != film_hash(ten.film(scene))
 
 
 @pytest.mark.parametrize(

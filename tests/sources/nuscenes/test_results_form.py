@@ -1,15 +1,11 @@
-import json
-
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from care_sim.core.frames import Frame
 from care_sim.core.types import CLASSES, Detections, Ego, ImageDetections
 from care_sim.loops.film import Shot
 from care_sim.sensors.annotated import Annotations, Cloud, IdentifiedDetections
-from care_sim.sources.nuscenes.detections import MOST_BOXES, attribute, confidences, result_boxes
+from care_sim.sources.nuscenes.detections import MOST_BOXES, attribute, result_boxes
 from care_sim.sources.nuscenes.films import nuscenes_film
 from care_sim.sources.nuscenes.recordings import split_scenes
 from care_sim.sources.nuscenes.tables import Database
@@ -47,21 +43,6 @@ def test_a_box_has_the_place_heading_and_velocity_of_the_world_and_its_width_fir
         "detection_score": 5 / 8,
         "attribute_name": "vehicle.moving",
     }
-
-
-angles = st.floats(-np.pi, np.pi)
-
-
-@given(st.floats(-500, 500), st.floats(-500, 500), angles, angles)
-def test_a_box_of_the_world_comes_back_from_any_sensor_that_stands_upright(x, y, yaw, heading):
-    sensor = Frame(x, y, 1.84, yaw)
-    world = np.array([[3.0, -4.0, 0.8, 4.6, 1.9, 1.7, heading]])
-    (found,) = result_boxes(
-        shot(sensor), detections("car", box=sensor.boxes_to_local(world)[0]), np.zeros((1, 2))
-    )
-    assert found["translation"] == pytest.approx(world[0, :3], abs=1e-9)
-    w, _, _, z = found["rotation"]
-    assert (w * np.cos(heading / 2) + z * np.sin(heading / 2)) ** 2 == pytest.approx(1.0)
 
 
 def test_the_annotations_of_a_database_come_back_as_its_tables_hold_them(tmp_path):
@@ -105,13 +86,6 @@ def test_the_speed_tells_the_attribute(name, standing, moving):
     assert [box["attribute_name"] for box in found] == [standing, moving]
 
 
-def test_confidence_grows_with_the_returns_and_is_never_0_or_1():
-    scores = confidences(detections(*["car"] * 5, returns=[1, 3, 4, 30, 10**6]))
-    assert scores[1] == 0.5
-    assert np.all(np.diff(scores) > 0)
-    assert 0 < scores[0] < scores[-1] < 1
-
-
 def test_a_detectors_own_scores_count():
     given_scores = np.array([0.2, 0.9, 0.9])
     found = result_boxes(
@@ -135,11 +109,3 @@ def test_a_sample_holds_at_most_the_500_surest():
     )
     assert len(found) == 500
     assert [box["detection_score"] for box in found] == sorted(scores, reverse=True)[:500]
-
-
-def test_boxes_are_plain_json_and_none_are_none():
-    found = result_boxes(
-        shot(Frame(1, 2, 3, 4, 0.1, 0.2)), detections("car", "bicycle"), np.ones((2, 2))
-    )
-    assert json.loads(json.dumps(found)) == found
-    assert result_boxes(shot(Frame(0, 0, 0, 0)), detections(), np.empty((0, 2))) == []

@@ -81,21 +81,6 @@ def test_a_damaged_bag_is_told_in_a_line(tmp_path, storage):
         assert "\n" not in str(caught.value)
 
 
-def test_a_topic_that_the_bag_lacks_is_refused(tmp_path):
-    bag = write_bag(tmp_path / "drive")
-    for topic in ("/nothing", "/note"):
-        source = recordings(f"sweeps:{bag}", {"topics": (topic,)})
-        with pytest.raises(InvalidInput, match=f"{topic} is no topic of points or poses; the bag"):
-            source.film(source.scenes()[0])
-
-
-def test_topics_are_a_column_so_that_others_play_again(tmp_path):
-    bag = write_bag(tmp_path / "drive", more=["/front/points"])
-    assert recordings(f"sweeps:{bag}", {"topics": ("/points", "/pose")}).columns() == {
-        "topics": "/points /pose"
-    }
-
-
 def test_rows_of_an_organised_cloud_may_be_padded():
     points = np.arange(12, dtype="<f4").reshape(2, 2, 3)
     padded = np.concatenate([points.view(np.uint8).reshape(2, 24), np.full((2, 5), 7, np.uint8)], 1)

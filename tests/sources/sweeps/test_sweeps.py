@@ -198,14 +198,3 @@ def test_camera_boxes_have_an_age_and_their_object(tmp_path, film, capsys):
     assert CLASSES[seen[4].detections.classes[0]] == "car"
     assert seen[4].objects.tolist() == [NO_OBJECT]
     assert seen[4].detections.ages == pytest.approx([0.4], abs=1e-6)
-
-
-def test_without_camera_boxes_a_line_says_that_care_has_no_residual(folder, capsys, film):
-    from care_sim.sources.sweeps.films import _report_no_camera
-
-    _report_no_camera.cache_clear()
-    film_of(folder)
-    told = "no camera_boxes.json: the camera reports nothing, so CARE has no residual"
-    assert told in capsys.readouterr().err
-    assert film.cameras
-    assert sum(len(shot.seen) for shot in film.shots) == 0
