@@ -1,4 +1,6 @@
-"""The drivers: the careful human of UN Regulation 157, and comfort before anything calls for the brake."""
+"""The drivers: the careful human of UN Regulation 157, and comfort before anything calls for the
+brake.
+"""
 
 from functools import cache
 

@@ -22,15 +22,15 @@ from care_sim.sensors.camera import (
     mounted,
     picture_timing,
 )
+from care_sim.sensors.engines.picture_kernels import visible_boxes
 from care_sim.sensors.pictures import (
     FRONT_CAMERA,
     FULL_CONFIDENCE,
     MIN_PIXELS,
-    Picture,
     class_table,
     confidence_of,
     faultless_detections,
-    window_on,
+    is_shown,
 )
 from care_sim.world.bodies import CATALOGUE
 
@@ -63,26 +63,23 @@ def picture(*boxes, shape=(180, 320)):
     ids = np.full(shape, -1)
     for body, left, top, right, bottom in boxes:
         ids[top:bottom, left:right] = body
-    return Picture.of(ids)
+    return visible_boxes(ids)
 
 
 def test_boxes_are_the_outer_edges_of_the_visible_pixels():
     seen = picture((3, 10, 20, 30, 60), (7, 100, 0, 320, 180))
-    assert seen.bodies.tolist() == [3, 7]
-    assert seen.boxes.tolist() == [[10, 20, 30, 60], [100, 0, 320, 180]]
-    assert seen.pixels.tolist() == [20 * 40, 220 * 180]
+    assert seen.tolist() == [[3, 10, 20, 30, 60, 20 * 40], [7, 100, 0, 320, 180, 220 * 180]]
 
 
 def test_a_body_in_two_pieces_has_one_box_around_both():
     seen = picture((3, 10, 20, 50, 60), (7, 20, 0, 40, 180))
-    assert seen.boxes[0].tolist() == [10, 20, 50, 60]
-    assert seen.pixels[0] == 20 * 40
+    assert seen[0].tolist() == [3, 10, 20, 50, 60, 20 * 40]
 
 
 @pytest.mark.parametrize(("pixels", "visible"), [(MIN_PIXELS - 1, False), (MIN_PIXELS, True)])
 def test_a_sliver_has_no_box(pixels, visible):
     seen = picture((3, 0, 0, pixels, 1))
-    assert seen.shows(3) is visible
+    assert is_shown(seen, 3) is visible
     assert len(detector({3: 0}).detect(seen, 0.0)) == int(visible)
 
 
@@ -156,7 +153,7 @@ def test_rendering_only_a_window_shows_the_same_bodies(bullet, heading):
         [[*at, CATALOGUE[n].size[2] / 2, *CATALOGUE[n].size, 0.3] for n, at in looked_for.values()]
     )
     sensor = Frame(0.0, 0.0, 1.84, heading)
-    window = window_on(FRONT_CAMERA, sensor.boxes_to_local(boxes))
+    window = FRONT_CAMERA.window_on(sensor.boxes_to_local(boxes))
     whole, part = (
         bullet.body_ids(FRONT_CAMERA, sensor),
         bullet.body_ids(FRONT_CAMERA, sensor, window),
@@ -178,8 +175,8 @@ def test_nothing_to_look_for_is_an_empty_window(bullet):
     bullet.add(CATALOGUE["car"], (10.0, 0.0, 0.0))
     behind = np.array([[-10.0, 0.0, -1.0, 4.0, 2.0, 1.5, 0.0]])
     for boxes in (behind, np.empty((0, 7))):
-        window = window_on(FRONT_CAMERA, boxes)
-        assert Picture.of(bullet.body_ids(FRONT_CAMERA, SENSOR, window), window).bodies.size == 0
+        window = FRONT_CAMERA.window_on(boxes)
+        assert bullet.body_ids(FRONT_CAMERA, SENSOR, window).size == 0
 
 
 NEAR, FAR = np.full(40, 10.0), np.full(40, 30.0)
