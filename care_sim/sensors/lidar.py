@@ -15,7 +15,7 @@ from care_sim.core.grid_stack import Grid
 from care_sim.core.types import Scan
 from care_sim.sensors.annotated import Cloud
 from care_sim.sensors.beams import Beams
-from care_sim.sensors.engines import RayEngine
+from care_sim.sensors.engines import Engine
 from care_sim.sensors.lidar_faults import CellFaults, crosstalk_of
 from care_sim.world.bullet import NO_BODY
 
@@ -28,7 +28,7 @@ class Lidar:
     def __init__(
         self,
         grid: Grid,
-        engine: RayEngine,
+        engine: Engine,
         sensing: Sensing,
         seed: np.random.SeedSequence,
         beams: Beams | None = None,

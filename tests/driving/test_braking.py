@@ -11,7 +11,7 @@ from care_sim.core.driver_settings import DriverSettings
 from care_sim.core.frames import Frame
 from care_sim.core.types import Ego, Tracks
 from care_sim.driving.braking import BrakingController
-from care_sim.driving.corridor import along_route, enters_strip, in_strip, leaves_strip_s
+from care_sim.driving.corridor import along_route, enters_strip, leaves_s
 from care_sim.world.route import Route
 
 FRONT, HALF_WIDTH, KEYFRAME = 2.5, 0.9, 0.1
@@ -178,10 +178,10 @@ def test_the_strip_reaches_from_the_bumper_on_and_to_either_side():
     """
     inside = [(5.0, 1.9, 0.0), (5.0, -1.9, 0.0), (0.6, 0.0, 0.0)]
     outside = [(5.0, 1.91, 0.0), (5.0, -1.91, 0.0), (0.5, 0.0, 0.0)]
-    assert in_strip(rows_of(*inside), 1.5, 0.9).all()
-    assert not in_strip(rows_of(*outside), 1.5, 0.9).any()
+    assert enters_strip(rows_of(*inside), 1.5, 0.9).all()
+    assert not enters_strip(rows_of(*outside), 1.5, 0.9).any()
     crossing = rows_of((5.0, 3.0, -1.0), (5.0, -3.0, 1.0), (5.0, 3.0, 1.0))
-    assert not in_strip(crossing, 1.5, 0.9).any()
+    assert not enters_strip(crossing, 1.5, 0.9).any()
     assert enters_strip(crossing, 1.5, 0.9, 1.2).tolist() == [True, True, False]
 
 
@@ -257,7 +257,7 @@ def test_more_speed_of_the_other_never_brakes_later(gap, y, nearing, sideways, t
 @given(st.floats(-10.0, 10.0), st.floats(-15.0, 15.0))
 def test_who_enters_the_strip_is_followed_until_it_leaves_or_for_two_seconds(y, sideways):
     track = car(20.0, y, -5.0, sideways)
-    (until,) = leaves_strip_s(track, REACH, 2.0)
+    until = leaves_s((20.0, y, LENGTH / 2, WIDTH / 2), sideways, (0.0, REACH, 2.0))
 
     def beside(time):
         return abs(y + sideways * time)

@@ -13,7 +13,6 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats
 from care_sim.sources.film_checks import STAMPS_NS, ValueRange, check_span
 from care_sim.sources.nuscenes.table_files import (
-    FORM,
     JsonRow,
     boxes_by_sample,
     cached_table,
@@ -179,8 +178,7 @@ class Database:
         )
 
     def _cached(self, name: str, tables: tuple[str, ...], make: Callable[[], pa.Table]) -> pa.Table:
-        file = self.folder / f"care-sim-{name}.arrow"
-        return cached_table(file, FORM, map(self.path, tables), make)
+        return cached_table(self.folder, name, map(self.path, tables), make)
 
     def _calibrated(self, *channels: str) -> list[str]:
         """The tokens under which sensors were calibrated."""
