@@ -22,12 +22,12 @@ from care_sim.base.files import check_output, told_if_replaced, write_text
 from care_sim.base.json_text import json_content
 from care_sim.commands.options.results import Leaderboard
 from care_sim.policies.isolation import isolated_policies
-from care_sim.reports.figures.files import FORMATS, check_figure, save
 from care_sim.reports.figures.leaderboard import (
     LEADERBOARD_FIGURE,
     leaderboard_figure,
     score_chart,
 )
+from care_sim.reports.figures.styles import FORMATS, check_figure, save
 from care_sim.reports.leaderboard import CONTROL, leaderboard_table, leads_table, names_in
 from care_sim.study.benchmark.made_by import elsewhere, own_code_of
 from care_sim.study.benchmark.player import Player, player_in

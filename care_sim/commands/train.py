@@ -54,7 +54,7 @@ def end_of_training(config: AgentConfig) -> Iterator[str]:
 def curves(options: Curves) -> int:
     """Draw learning curves, and print their table."""
     # Imported here because training draws nothing.
-    from care_sim.reports.figures.files import check_figure, save
+    from care_sim.reports.figures.styles import check_figure, save
     from care_sim.training.curves import grouped_runs, read_run
     from care_sim.training.curves_figure import curves_figure
     from care_sim.training.curves_table import curves_table

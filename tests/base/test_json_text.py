@@ -19,7 +19,7 @@ from care_sim.base.json_text import (
     parsed_json,
 )
 from care_sim.policies.learned.weights import load_weights
-from care_sim.reports.page.provenance import CONFIG, description_in
+from care_sim.reports.page.build import CONFIG, description_in
 from care_sim.sources.nuscenes.table_files import LARGEST_TABLE, read_json
 from care_sim.study.journal import LARGEST_JOURNAL, Journal
 from care_sim.training.folder import read_config, read_curve

@@ -24,7 +24,6 @@ from care_sim.certify.design import (
     STREET,
     drawn,
 )
-from care_sim.certify.drive import write_drive
 from care_sim.certify.playing import (
     FARTHEST,
     attempt,
@@ -34,6 +33,7 @@ from care_sim.certify.playing import (
     play_alone,
     playable_here,
     trails_of,
+    write_drive,
 )
 from care_sim.certify.trail import (
     CONFIGURATION,

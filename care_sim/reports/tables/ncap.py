@@ -15,7 +15,7 @@ from care_sim.evaluation.ncap_score import score
 from care_sim.reports.engine.contrasts import Contrast, contrast
 from care_sim.reports.engine.controls import BEST_CONTROL, best_of
 from care_sim.reports.engine.measures import Measure, Units
-from care_sim.reports.engine.policy_rows import PolicyRows
+from care_sim.reports.engine.parts import PolicyRows
 from care_sim.reports.engine.tables import under_headings
 from care_sim.reports.formatting import interval, tag_notes
 from care_sim.reports.table import Table, TableRow

@@ -11,7 +11,7 @@ from care_sim.evaluation.collision_outcomes import CollisionOutcome, collision_o
 from care_sim.reports.engine.contrasts import contrast_of_rows
 from care_sim.reports.engine.controls import BEST_CONTROL, best_of
 from care_sim.reports.engine.measures import AVOIDANCE
-from care_sim.reports.engine.policy_rows import PolicyRows
+from care_sim.reports.engine.parts import PolicyRows
 from care_sim.reports.engine.tables import under_headings
 from care_sim.reports.formatting import interval, tag_notes
 from care_sim.reports.table import Table, TableRow
