@@ -11,7 +11,7 @@ import pytest
 from care_sim.base.interrupts import SIGNALS
 from care_sim.cli import main
 from care_sim.commands.options.studies import Reproduce
-from care_sim.commands.studies.closed_loop import fixed_study
+from care_sim.commands.studies import fixed_study
 from care_sim.policies import contenders
 from care_sim.scenarios import SCENARIOS
 from care_sim.sources.installed import SOURCES

@@ -73,7 +73,7 @@ def test_a_folder_in_which_another_process_writes_is_left_alone(here, sweep):
 
 
 def test_a_world_and_a_source_have_folders_of_their_own(monkeypatch, capsys, tmp_path):
-    from care_sim.commands.shared import play_study
+    from care_sim.commands.shared import run_study
 
     (tmp_path / "own_worlds").mkdir()
     (tmp_path / "own_worlds" / "street.py").write_text(
@@ -95,7 +95,7 @@ def test_a_world_and_a_source_have_folders_of_their_own(monkeypatch, capsys, tmp
         ("study ablate --source streets --scenes 1", "ablate-streets"),
         ("reproduce --seeds 1 --also", "reproduce"),
     ):
-        monkeypatch.setattr(play_study, "run_study", named)
+        monkeypatch.setattr(run_study, "run_study", named)
         with pytest.raises(SystemExit):
             main(line.split())
         # Who raises it here is no part of the package, and is told so.
