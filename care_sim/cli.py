@@ -12,12 +12,13 @@ from typing import Any, NoReturn
 
 import care_sim
 from care_sim.base import interrupts
-from care_sim.base.causes import causes
 from care_sim.base.errors import (
     LONGEST,
     InvalidInput,
     MissingExtra,
+    causes,
     error_line,
+    foreign_place,
     is_own_fault,
     one_line,
     report_problems,
@@ -25,8 +26,7 @@ from care_sim.base.errors import (
     shown,
     unknown,
 )
-from care_sim.base.exit_codes import BAD_INPUT, FAILED, INTERRUPTED, UNEXPECTED, UNREAD
-from care_sim.base.foreign_code import foreign_place
+from care_sim.base.interrupts import BAD_INPUT, FAILED, INTERRUPTED, UNEXPECTED, UNREAD
 from care_sim.base.limits import limit_in
 from care_sim.commands.table import COMMANDS, FAMILIES, GROUPS, MOVED, RENAMED, Command
 

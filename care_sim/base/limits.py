@@ -1,20 +1,81 @@
-"""Limits of memory, processes and open files that a shell, a batch system or a container sets.
+"""What the machine allows this process: cores, memory, processes, open files.
 
-The command `care-sim` checks them before it imports its libraries, which end a process in their own
-words where they find too little. So this module imports nothing that takes time.
+The command `care-sim` checks the limits that a shell, a batch system or a container sets before it
+imports its libraries, which end a process in their own words where they find too little. So this
+module imports nothing that takes time.
 """
 
 import errno
 import os
 import resource
+import stat
+import sys
+import tempfile
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from math import ceil
+from pathlib import Path
+from typing import Any
 
-from care_sim.base.causes import causes
-from care_sim.base.cores import CORES
-from care_sim.base.interrupts import is_command
+from care_sim.base.errors import causes
+from care_sim.base.interrupts import FAILED, is_command
 
-FAILED = 1
-"""Exit code of a command that a limit has ended."""
+
+def usable_cores(
+    groups: Path = Path("/sys/fs/cgroup"), own: Path = Path("/proc/self/cgroup")
+) -> int:
+    """Count the cores that the affinity and the control groups of Linux leave to this process.
+
+    `groups` is where control groups of version 1 or 2 are mounted. `own` lists those of the
+    process.
+    """
+    affinity = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return max(1, min([affinity or 1, *(ceil(quota) for quota in _quotas(groups, own))]))
+
+
+def _quotas(groups: Path, own: Path) -> Iterator[float]:
+    """Yield the cores that each control group of the process allows, and each group above."""
+    lines = own.read_text().splitlines() if own.exists() else []
+    for line in lines:
+        _, controllers, path = line.split(":", 2)
+        if controllers and "cpu" not in controllers.split(","):
+            continue
+        mount = groups / "cpu" if controllers else groups
+        # In a container the path may be the host's, of which only the mount's root is there.
+        for folder in (mount, *(mount / part for part in _ancestry(path.strip("/")))):
+            with suppress(OSError, ValueError, ZeroDivisionError):
+                quota, period = _quota(folder, version=1 if controllers else 2)
+                if quota > 0:
+                    yield quota / period
+
+
+def _ancestry(path: str) -> Iterator[str]:
+    parts = path.split("/")
+    return ("/".join(parts[:count]) for count in range(1, len(parts) + 1))
+
+
+def _quota(folder: Path, version: int) -> tuple[int, int]:
+    """Microseconds of processor time and the period in which they are allowed.
+
+    Raises ValueError for version 2's "max", which allows all. Version 1 says -1.
+    """
+    if version == 2:
+        quota, period = (folder / "cpu.max").read_text().split()
+    else:
+        quota = (folder / "cpu.cfs_quota_us").read_text()
+        period = (folder / "cpu.cfs_period_us").read_text()
+    return int(quota), int(period)
+
+
+CORES = usable_cores()
+"""Cores that this process may use, as counted when the package was imported."""
+MOST_WORKERS = 1024
+"""Most worker processes; each takes about 100 MB."""
+WORKERS = min(CORES, MOST_WORKERS)
+"""Workers unless another number is asked for."""
+
+
 _BYTES_PER_THREAD = 100_000_000
 _MEMORY = {
     "address space": (resource.RLIMIT_AS, 3_000_000_000, "ulimit -v"),
@@ -137,5 +198,65 @@ def check_at_start() -> None:
     os.environ["ARROW_DEFAULT_MEMORY_POOL"] = "system"
 
 
+@contextmanager
+def one_thread(torch: Any) -> Iterator[None]:
+    """Let PyTorch compute in one thread while this lasts."""
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(threads)
+
+
+def _settle_caches() -> None:
+    """Send the caches of this process, and of those that it starts, to a private temporary folder
+    where the home folder cannot be written. The command `care-sim` says so in one line.
+    """
+    given = os.environ.get("MPLCONFIGDIR")
+    if given and not _can_be_written(given):
+        # Matplotlib would complain with the whole name, and take a new folder at every start.
+        del os.environ["MPLCONFIGDIR"]
+        if is_command():
+            print("care-sim: MPLCONFIGDIR cannot be written, and is ignored", file=sys.stderr)
+    home = os.path.expanduser("~")
+    has_home = os.path.isabs(home)
+    settled = {"XDG_CACHE_HOME", "MPLCONFIGDIR"} <= {*os.environ}
+    if has_home and (settled or os.access(home, os.W_OK)):
+        return
+    try:
+        folder = _private_folder()
+    except OSError:  # a container whose whole disk is read-only
+        folder = Path(os.devnull)
+    if not has_home:
+        os.environ["HOME"] = str(folder)
+    os.environ.setdefault("XDG_CACHE_HOME", str(folder))
+    os.environ.setdefault("MPLCONFIGDIR", str(folder / "matplotlib"))
+    if is_command():
+        print(f"care-sim: no home folder to write to: caches go to {folder}", file=sys.stderr)
+
+
+def _can_be_written(folder: str) -> bool:
+    """Return True if a folder, or the nearest one above it that exists, can be written."""
+    path = Path(folder)
+    try:
+        nearest = next((each for each in (path, *path.parents) if each.exists()), path)
+        return nearest.is_dir() and os.access(nearest, os.W_OK)
+    except OSError:
+        return False
+
+
+def _private_folder() -> Path:
+    """The folder of this user among the temporary files; a new one where somebody else could write
+    to it, since caches of Numba hold code. Raises OSError where there is no place for it.
+    """
+    folder = Path(tempfile.gettempdir()) / f"care-sim-{os.getuid()}"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    found = folder.lstat()
+    is_private = (found.st_uid, stat.S_IMODE(found.st_mode)) == (os.getuid(), 0o700)
+    return folder if is_private and stat.S_ISDIR(found.st_mode) else Path(tempfile.mkdtemp())
+
+
 if is_command():
     check_at_start()
+_settle_caches()

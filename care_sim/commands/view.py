@@ -10,9 +10,9 @@ import sys
 from urllib.parse import quote
 
 from care_sim.base.errors import InvalidInput
-from care_sim.base.exit_codes import FAILED
 from care_sim.base.extras import import_rerun
 from care_sim.base.files import RERUN
+from care_sim.base.interrupts import FAILED
 from care_sim.commands.options.watching import View
 
 _HERE = "127.0.0.1"

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 import care_sim
-from care_sim.base.bounds import allowed, bounded, check_fields, one_of
-from care_sim.base.checks import check_path, check_whole
+from care_sim.base.checks import allowed, bounded, check_fields, check_path, check_whole, one_of
 from care_sim.base.errors import InvalidInput, one_line, shown
 from care_sim.commands.options.shared import seeds_of
 from care_sim.core.allocation import allocate

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from care_sim.base import json_text
+from care_sim.base import files
 from care_sim.base.errors import InvalidInput
-from care_sim.base.json_text import (
+from care_sim.base.files import (
     MOST_BYTES,
     MOST_LEVELS,
     json_content,
@@ -113,8 +113,8 @@ VALUES = st.recursive(
 @pytest.fixture
 def narrow(monkeypatch):
     """A reader that sees few characters at a time."""
-    monkeypatch.setattr(json_text, "_CHUNK", 400)
-    monkeypatch.setattr(json_text, "MOST_CHARACTERS", 400)
+    monkeypatch.setattr(files, "_CHUNK", 400)
+    monkeypatch.setattr(files, "MOST_CHARACTERS", 400)
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])

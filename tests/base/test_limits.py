@@ -11,7 +11,7 @@ import sys
 import pytest
 
 from care_sim.base import limits
-from care_sim.base.causes import causes
+from care_sim.base.errors import causes
 from care_sim.base.limits import LimitReached, check_workers, limit_in
 from care_sim.study.executors import processes
 from tests.torture.processes import ANOTHER_USER, entry_point

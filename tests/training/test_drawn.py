@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from care_sim import SensorSetup
 from care_sim.base.errors import InvalidInput
-from care_sim.base.seed_ranges import TRAINING, VALIDATION, split_of
+from care_sim.base.seeds import TRAINING, VALIDATION, split_of
 from care_sim.core.grid import AngularGrid
 from care_sim.envs import make_env
 from care_sim.envs.sensing import sensing

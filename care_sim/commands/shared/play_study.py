@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from care_sim.base.console import TableConsole
 from care_sim.base.errors import print_lines, report_problems
-from care_sim.base.exit_codes import DONE, FAILED
+from care_sim.base.interrupts import DONE, FAILED
 from care_sim.commands.options.shared import StudyOptions
 from care_sim.commands.shared.command_line import command_line
+from care_sim.commands.shared.console import TableConsole
 from care_sim.commands.shared.folder_checks import free_folder
 from care_sim.commands.shared.run_study import run_study
 from care_sim.reports.report import next_steps, print_report, read_results

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from care_sim.base.json_text import json_content
+from care_sim.base.files import json_content
 from care_sim.core.conditions import DEFAULTS
 from care_sim.study.provenance import code_digest
 from care_sim.study.results_formats import is_parameter
