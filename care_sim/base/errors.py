@@ -6,7 +6,7 @@ import inspect
 import site
 import sys
 import sysconfig
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -22,33 +22,28 @@ _FOLDERS = (
     site.getusersitepackages(),
 )
 _LIBRARIES = [Path(folder) for folder in dict.fromkeys(_FOLDERS)]
-_GROUPS = "care_sim."
-"""How the names of our groups of entry points begin."""
 
 
 def foreign_place(error: BaseException) -> str:
     """File and line, in brackets after a space, where an error left the code of a user or of a
     package that adds something to the benchmark; empty where no such code was running.
     """
-    places = [
-        f" ({Path(frame.f_code.co_filename).name}, line {line})"
-        for frame, line in walk_tb(error.__traceback__)
-        if _is_foreign(frame)
-    ]
     # The innermost one: what it calls is ours or a library's, and was called wrongly.
-    return places[-1] if places else ""
-
-
-def raised_place(error: BaseException) -> str:
-    """File and line that raised an error, in brackets after a space; empty where there is none."""
-    places = [(frame.f_code.co_filename, line) for frame, line in walk_tb(error.__traceback__)]
-    return f" ({Path(places[-1][0]).name}, line {places[-1][1]})" if places else ""
+    return next((_place(*at) for at in _frames(error) if _is_foreign(at[0])), "")
 
 
 def is_raised_by_foreign(error: BaseException) -> bool:
     """Whether foreign code raised an error itself, not what it called."""
-    frames = [frame for frame, _ in walk_tb(error.__traceback__)]
-    return bool(frames) and _is_foreign(frames[-1])
+    return any(_is_foreign(frame) for frame, _ in _frames(error)[:1])
+
+
+def _frames(error: BaseException) -> list[tuple[FrameType, int]]:
+    """The frames and lines that an error came through, the innermost first."""
+    return [*walk_tb(error.__traceback__)][::-1]
+
+
+def _place(frame: FrameType, line: int) -> str:
+    return f" ({Path(frame.f_code.co_filename).name}, line {line})"
 
 
 def class_place(kind: type) -> str:
@@ -77,26 +72,16 @@ def _plugged_in() -> set[str]:
         installed = entry_points()
     except (OSError, MemoryError):  # the error at hand may be of a limit that holds here, too
         return set()
-    ours = [group for group in installed.groups if group.startswith(_GROUPS)]
-    return {_top(entry.module) for group in ours for entry in installed.select(group=group)}
+    return {
+        _top(entry.module)
+        for group in installed.groups
+        if group.startswith("care_sim.")
+        for entry in installed.select(group=group)
+    }
 
 
 def _top(module: str) -> str:
     return module.partition(".")[0]
-
-
-def causes(error: BaseException | None) -> Iterator[BaseException]:
-    """Yield an error, the error that led to it, and so on, as Python's trace shows them.
-
-    An error raised `from None` has no cause. Each error comes once: code that raises an error again
-    while it handles another one may close a circle.
-    """
-    known: set[int] = set()
-    while error is not None and id(error) not in known:
-        known.add(id(error))
-        yield error
-        is_hidden = error.__cause__ is not None or error.__suppress_context__
-        error = error.__cause__ if is_hidden else error.__context__
 
 
 _QUOTED = 120
@@ -187,16 +172,15 @@ def failure_line(error: BaseException) -> str:
     """
     if isinstance(error, InvalidInput):
         return shortened(one_line(_text(error, LONGEST)), LONGEST)
-    return error_line(error) + ("" if foreign_place(error) else raised_place(error))
+    raised = [] if foreign_place(error) else _frames(error)[:1]
+    return error_line(error) + "".join(_place(*at) for at in raised)
 
 
 def _text(error: BaseException, most: int = _SAID) -> str:
     """The first `most` characters of what an error says."""
     try:
         text = str(error)
-    except KeyboardInterrupt:
-        raise
-    except BaseException:  # An error of foreign code may fail in its own `__str__`.
+    except Exception:  # An error of foreign code may fail in its own `__str__`.
         return "its text cannot be read"
     return text if len(text) <= most else f"{text[:most]}..."
 
@@ -225,7 +209,7 @@ def shown(value: object) -> str:
     try:
         text = one_line(repr(value))
     except Exception:  # whatever a foreign object does; an int of 4,300 digits refuses, too
-        text = f"{'an' if isinstance(value, int) else 'a value of type'} {type(value).__name__}"
+        text = f"a value of type {type(value).__name__}"
     return shortened(text, _QUOTED)
 
 

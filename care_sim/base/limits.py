@@ -1,4 +1,4 @@
-"""What the machine allows this process: cores, memory, processes, open files.
+"""What the machine allows this process: cores, memory, processes, a folder for caches.
 
 The command `care-sim` checks the limits that a shell, a batch system or a container sets before it
 imports its libraries, which end a process in their own words where they find too little. So this
@@ -18,7 +18,6 @@ from math import ceil
 from pathlib import Path
 from typing import Any
 
-from care_sim.base.errors import causes
 from care_sim.base.interrupts import FAILED, is_command
 
 
@@ -42,17 +41,15 @@ def _quotas(groups: Path, own: Path) -> Iterator[float]:
         if controllers and "cpu" not in controllers.split(","):
             continue
         mount = groups / "cpu" if controllers else groups
+        place = mount / path.strip("/")
         # In a container the path may be the host's, of which only the mount's root is there.
-        for folder in (mount, *(mount / part for part in _ancestry(path.strip("/")))):
+        for folder in (place, *place.parents):
             with suppress(OSError, ValueError, ZeroDivisionError):
                 quota, period = _quota(folder, version=1 if controllers else 2)
                 if quota > 0:
                     yield quota / period
-
-
-def _ancestry(path: str) -> Iterator[str]:
-    parts = path.split("/")
-    return ("/".join(parts[:count]) for count in range(1, len(parts) + 1))
+            if folder == mount:
+                break
 
 
 def _quota(folder: Path, version: int) -> tuple[int, int]:
@@ -75,7 +72,6 @@ MOST_WORKERS = 1024
 WORKERS = min(CORES, MOST_WORKERS)
 """Workers unless another number is asked for."""
 
-
 _BYTES_PER_THREAD = 100_000_000
 _MEMORY = {
     "address space": (resource.RLIMIT_AS, 3_000_000_000, "ulimit -v"),
@@ -87,10 +83,6 @@ libraries hang or abort where one of their threads cannot start.
 _TASKS_OF_A_WORKER = 4
 _TASKS_OF_A_POOL = 16
 """The fork server, the tracker of resources, and threads of libraries."""
-_FILES = 16
-"""Files that a command opens beside those that it inherits. Rerun aborts where it is imported with
-fewer than 5.
-"""
 _STACK_BYTES = 2**16
 _UNMAPPED = ("failed to map segment", "cannot allocate memory", "cannot create shared object")
 """How the system's loader says that there is no room for a library."""
@@ -123,6 +115,20 @@ def _library_threads() -> int:
 def check_workers(workers: int) -> None:
     """Raise LimitReached unless so many worker processes can be started now."""
     _check_tasks(_TASKS_OF_A_WORKER * workers + _TASKS_OF_A_POOL, ", or lower --workers")
+
+
+def causes(error: BaseException | None) -> Iterator[BaseException]:
+    """Yield an error, the error that led to it, and so on, as Python's trace shows them.
+
+    An error raised `from None` has no cause. Each error comes once: code that raises an error again
+    while it handles another one may close a circle.
+    """
+    known: set[int] = set()
+    while error is not None and id(error) not in known:
+        known.add(id(error))
+        yield error
+        is_hidden = error.__cause__ is not None or error.__suppress_context__
+        error = error.__cause__ if is_hidden else error.__context__
 
 
 def limit_in(error: BaseException) -> str:
@@ -165,29 +171,10 @@ def _check_tasks(count: int, instead: str = "") -> None:
             thread.join()
 
 
-def check_files() -> None:
-    """Raise LimitReached unless a command can open the files that it needs."""
-    opened = list[int]()
-    try:
-        while len(opened) < _FILES:
-            opened.append(os.open(os.devnull, os.O_RDONLY))
-    except OSError as error:
-        if error.errno not in (errno.EMFILE, errno.ENFILE):
-            raise
-        raise LimitReached(
-            f"{len(opened)} files can be opened, and care-sim needs {_FILES}: raise the limit "
-            "(ulimit -n)"
-        ) from None
-    finally:
-        for file in opened:
-            os.close(file)
-
-
 def check_at_start() -> None:
     """End the process in one line where its limits leave too little for the libraries."""
     try:
         check_memory()
-        check_files()
         # Linear algebra starts its threads when it is imported.
         _check_tasks(_library_threads() + 1)
     except LimitReached as reached:
@@ -213,12 +200,6 @@ def _settle_caches() -> None:
     """Send the caches of this process, and of those that it starts, to a private temporary folder
     where the home folder cannot be written. The command `care-sim` says so in one line.
     """
-    given = os.environ.get("MPLCONFIGDIR")
-    if given and not _can_be_written(given):
-        # Matplotlib would complain with the whole name, and take a new folder at every start.
-        del os.environ["MPLCONFIGDIR"]
-        if is_command():
-            print("care-sim: MPLCONFIGDIR cannot be written, and is ignored", file=sys.stderr)
     home = os.path.expanduser("~")
     has_home = os.path.isabs(home)
     settled = {"XDG_CACHE_HOME", "MPLCONFIGDIR"} <= {*os.environ}
@@ -234,16 +215,6 @@ def _settle_caches() -> None:
     os.environ.setdefault("MPLCONFIGDIR", str(folder / "matplotlib"))
     if is_command():
         print(f"care-sim: no home folder to write to: caches go to {folder}", file=sys.stderr)
-
-
-def _can_be_written(folder: str) -> bool:
-    """Return True if a folder, or the nearest one above it that exists, can be written."""
-    path = Path(folder)
-    try:
-        nearest = next((each for each in (path, *path.parents) if each.exists()), path)
-        return nearest.is_dir() and os.access(nearest, os.W_OK)
-    except OSError:
-        return False
 
 
 def _private_folder() -> Path:
