@@ -6,7 +6,7 @@ import numpy as np
 
 from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers, Mask
-from care_sim.core.driver_settings import DriverSettings
+from care_sim.core.conditions import DriverSettings
 from care_sim.core.rig import Rig
 from care_sim.core.types import Tracks
 from care_sim.driving.braking import braking_rules

@@ -1,4 +1,4 @@
-"""The cells that the actions of all worlds fire, as `care_sim.core.firing.free_cells` chooses them,
+"""The cells that the actions of all worlds fire, as `care_sim.core.firing.base` chooses them,
 each world with its own shared floor.
 """
 
@@ -9,9 +9,16 @@ from care_sim.base.compiled import compiled
 from care_sim.batch.state import Fired
 from care_sim.core.arrays import Integers, Mask
 from care_sim.core.conditions import Conditions
-from care_sim.core.firing.free_cells import choose_demanded, list_chosen, top_up
-from care_sim.core.pcg64 import WordStreams, seed_stream, word_streams
-from care_sim.core.random_floor import FloorCells, draw_floor, floor_cells, floor_seed
+from care_sim.core.firing.base import choose_demanded, list_chosen, top_up
+from care_sim.core.firing.floor import (
+    FloorCells,
+    WordStreams,
+    draw_floor,
+    floor_cells,
+    floor_seed,
+    seed_stream,
+    word_streams,
+)
 from care_sim.core.rig import Rig
 
 

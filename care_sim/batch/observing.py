@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from care_sim.base.compiled import compiled
 from care_sim.batch.state import BatchState
 from care_sim.core.arrays import Floats, Integers, Mask
-from care_sim.core.observation_limits import Limits
+from care_sim.core.observation.limits import Limits
 from care_sim.core.rig import Rig
 from care_sim.core.types import Ego, ImageDetections, Tracks
 

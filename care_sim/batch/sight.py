@@ -15,12 +15,11 @@ from care_sim.batch.camera_faults import BatchDelay, BatchMisses, Detected
 from care_sim.batch.sensor_frames import seen_by
 from care_sim.batch.state import BatchState, Bodies, Outlines, Reported, Sensors
 from care_sim.core.arrays import Floats, Integers, Mask
-from care_sim.core.boxes import planar_ranges
+from care_sim.core.cells.boxes import planar_ranges
 from care_sim.core.conditions import Sensing
 from care_sim.core.frames import turned_alike
-from care_sim.core.grid_kernels import copy_rows
-from care_sim.core.pinhole import NEAR_M
-from care_sim.core.pinhole_kernels import CameraModels, model_of, window_on
+from care_sim.core.grid import copy_rows
+from care_sim.core.pinhole import NEAR_M, CameraModels, model_of, window_on
 from care_sim.core.rig import Rig
 from care_sim.core.types import ImageDetections
 from care_sim.sensors.camera_kernels import reported_boxes, surest_first

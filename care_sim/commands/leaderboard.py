@@ -8,7 +8,6 @@ from random import SystemRandom
 from tempfile import TemporaryDirectory
 
 from care_sim.base.checks import check_known
-from care_sim.base.console import TableConsole
 from care_sim.base.errors import (
     InvalidInput,
     MissingExtra,
@@ -17,10 +16,10 @@ from care_sim.base.errors import (
     report_problems,
     unknown,
 )
-from care_sim.base.exit_codes import DONE, FAILED
-from care_sim.base.files import check_output, told_if_replaced, write_text
-from care_sim.base.json_text import json_content
+from care_sim.base.files import check_output, json_content, told_if_replaced, write_text
+from care_sim.base.interrupts import DONE, FAILED
 from care_sim.commands.options.results import Leaderboard
+from care_sim.commands.shared.console import TableConsole
 from care_sim.policies.isolation import isolated_policies
 from care_sim.reports.figures.leaderboard import (
     LEADERBOARD_FIGURE,

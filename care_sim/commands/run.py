@@ -10,13 +10,13 @@ from functools import partial
 from pathlib import Path
 from urllib.parse import quote
 
-from care_sim.base.console import TableConsole
 from care_sim.base.errors import InvalidInput, report_problems
-from care_sim.base.exit_codes import FAILED
 from care_sim.base.extras import import_rerun
 from care_sim.base.files import RERUN
+from care_sim.base.interrupts import FAILED
 from care_sim.commands.options.watching import Run, View
 from care_sim.commands.shared.agent_play import AgentPlay
+from care_sim.commands.shared.console import TableConsole
 from care_sim.commands.shared.one_scene import finish_files, is_source, maker_of
 from care_sim.envs.wrappers.export_scans import ExportScans
 from care_sim.envs.wrappers.record_rerun import RecordRerun

@@ -3,11 +3,11 @@
 from collections.abc import Iterator
 from dataclasses import fields
 
-from care_sim.base.console import TableConsole
 from care_sim.base.errors import InvalidInput, print_lines
 from care_sim.base.files import told_if_replaced
 from care_sim.commands.options.learning import Curves, Learner
 from care_sim.commands.shared.agent_play import AgentPlay
+from care_sim.commands.shared.console import TableConsole
 from care_sim.training.agents import Agent
 from care_sim.training.closing import how_to_play
 from care_sim.training.config import AgentConfig

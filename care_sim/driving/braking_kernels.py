@@ -25,7 +25,7 @@ Rules = tuple[float, float, float, float, float, float, float, float, float]
 
 
 class BrakingRules(NamedTuple):
-    """What of `care_sim.core.driver_settings.DriverSettings` the decision follows, in its units;
+    """What of `care_sim.core.conditions.DriverSettings` the decision follows, in its units;
     where the strip that is guarded begins, `front_m`, and its reach to either side, `reach_m`; and
     the time between keyframes.
     """

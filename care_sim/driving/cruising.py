@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from care_sim.core.boxes import half_extents
+from care_sim.core.cells.boxes import half_extents
 from care_sim.core.types import Command, Tracks
 from care_sim.driving.corridor import in_strip
-from care_sim.world.speed_plan import SpeedPlan
+from care_sim.world.route import SpeedPlan
 
 
 @dataclass(frozen=True)

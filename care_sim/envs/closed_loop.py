@@ -81,7 +81,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     | `misses` | keyframes since it was last detected |
     | `hits` | keyframes at which it was detected |
 
-    `care_sim.core.observation_limits` says which rows are kept if there are more, and what becomes
+    `care_sim.core.observation.limits` says which rows are kept if there are more, and what becomes
     of numbers that no sensor can tell.
 
     ### Reward
@@ -140,7 +140,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     the cameras, if it has its own.
 
     A `secret` is a text that enters everything that a seed draws
-    (`care_sim.base.random_streams`). An agent that holds this package can then not look its
+    (`care_sim.base.seeds`). An agent that holds this package can then not look its
     episodes up. Take at least 16 random bytes, since a word can be tried like a seed. False, the
     default, means none.
     """

@@ -12,11 +12,10 @@ from numpy.typing import NDArray
 from care_sim.base.checks import check_arguments, check_choice
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.arrays import Mask
-from care_sim.core.conditions import IDEAL_CAMERA
+from care_sim.core.cells.stack import Grid
+from care_sim.core.conditions import IDEAL_CAMERA, changed_settings
 from care_sim.core.grid import Place
-from care_sim.core.grid_stack import Grid
 from care_sim.core.pinhole import PinholeCamera
-from care_sim.core.return_settings import changed_settings
 from care_sim.core.types import Action
 from care_sim.envs.detection import detector_of
 from care_sim.envs.sensing import Observed, SensingEnv, arguments_of, split_conditions

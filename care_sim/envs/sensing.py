@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 
 from care_sim.base.checks import check_flag, check_seed
 from care_sim.base.errors import InvalidInput, shown
-from care_sim.base.random_streams import check_secret, streams
+from care_sim.base.seeds import check_secret, streams
 from care_sim.core.belief import OBSERVED
+from care_sim.core.cells.stack import Grid
 from care_sim.core.conditions import Conditions
+from care_sim.core.firing.floor import RandomFloor
 from care_sim.core.firing.listing import hardware_of
 from care_sim.core.grid import Cells, Place
-from care_sim.core.grid_stack import Grid
 from care_sim.core.pinhole import PinholeCamera
-from care_sim.core.random_floor import RandomFloor
 from care_sim.core.rig import Rig
 from care_sim.core.types import Action
 from care_sim.envs.spaces import checked_scores, observation_space
@@ -135,7 +135,7 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         return int(seed) if seed is not None else int(self.np_random.integers(2**32))
 
     def _streams(self, *entropy: int, count: int) -> list[np.random.SeedSequence]:
-        """`count` independent streams of an episode; see `care_sim.base.random_streams`.
+        """`count` independent streams of an episode; see `care_sim.base.seeds`.
 
         No policy enters the seed, so all meet the same world, faults and floor.
         """

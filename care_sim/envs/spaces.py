@@ -10,7 +10,7 @@ from care_sim.base.checks import as_array
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats
 from care_sim.core.belief import MAX_DETECTIONS, MAX_TRACKS
-from care_sim.core.observation_limits import Limits
+from care_sim.core.observation.limits import Limits
 from care_sim.core.rig import Rig
 
 
@@ -18,7 +18,7 @@ def observation_space(rig: Rig) -> spaces.Space[Any]:
     """The bounded observation space of a rig.
 
     Keys and columns are as in `care_sim.core.types`, bounds as in
-    `care_sim.core.observation_limits`.
+    `care_sim.core.observation.limits`.
     """
     grid = rig.grid
     limits = Limits(rig)

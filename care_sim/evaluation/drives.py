@@ -5,7 +5,7 @@ from dataclasses import asdict
 
 from care_sim.evaluation.metrics import outcome
 from care_sim.loops.records import DriveOutcome, EncounterOutcome, Keyframe, Sight
-from care_sim.world.crosser import Meeting
+from care_sim.world.motions import Meeting
 
 
 def drive_outcome(

@@ -6,13 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.core.arrays import Floats, Integers
-from care_sim.core.belief import Belief
-from care_sim.core.belief_kernels import range_image
-from care_sim.core.boxes import planar_ranges
+from care_sim.core.belief import Belief, range_image
+from care_sim.core.cells.boxes import planar_ranges
 from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.frames import Frame
 from care_sim.core.grid import Cells
-from care_sim.core.observation_limits import Limits
+from care_sim.core.observation.limits import Limits
 from care_sim.core.rig import Rig
 from care_sim.core.types import Command, Scan, Tracks
 from care_sim.driving.corridor import along_route

@@ -11,7 +11,7 @@ from care_sim.core.arrays import Floats, Integers
 from care_sim.core.belief import Belief
 from care_sim.core.conditions import Sensing
 from care_sim.core.grid import Cells
-from care_sim.core.observation_limits import Limits
+from care_sim.core.observation.limits import Limits
 from care_sim.core.rig import Rig
 from care_sim.core.types import Detections, Scan, Tracks
 from care_sim.driving.localisation import Localisation

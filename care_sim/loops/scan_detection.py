@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from care_sim.core.arrays import Floats, Integers
-from care_sim.core.grid_stack import Grid
+from care_sim.core.cells.stack import Grid
 from care_sim.core.types import Detections, Scan
 from care_sim.perception.base import Detector
 from care_sim.perception.matching import found_objects

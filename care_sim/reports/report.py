@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 
 from care_sim.base.errors import InvalidInput, counted, printable, unknown
-from care_sim.base.files import write_text
-from care_sim.base.json_text import json_content
+from care_sim.base.files import json_content, write_text
 from care_sim.reports.studies import STUDIES, SWEEP, study_of
 from care_sim.reports.study import Study
 from care_sim.reports.table import Bold, Table, TableRow, unmarked

@@ -6,9 +6,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from care_sim.base.bounds import bounded, check_fields
-from care_sim.base.errors import BrokenScenario, InvalidInput, error_line
-from care_sim.base.foreign_code import foreign_place, is_raised_by_foreign
+from care_sim.base.checks import bounded, check_fields
+from care_sim.base.errors import (
+    BrokenScenario,
+    InvalidInput,
+    error_line,
+    foreign_place,
+    is_raised_by_foreign,
+)
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.streets.dimensions import LANE_WIDTH_M, PARKING_WIDTH_M, SPEED_LIMIT_MPS

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from care_sim.base.bounds import bounded
+from care_sim.base.checks import bounded
 from care_sim.scenarios.base import LEFT_PARKING_Y, RIGHT_PARKING_Y
 from care_sim.scenarios.crossing import CrossingScenario
 from care_sim.streets.dimensions import LANE_WIDTH_M, Range, draw

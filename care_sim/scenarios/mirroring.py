@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from care_sim.base.bounds import one_of
+from care_sim.base.checks import one_of
 from care_sim.core.frames import Pose
 from care_sim.scenarios.base import Scenario
 from care_sim.world.bodies import BodyKind

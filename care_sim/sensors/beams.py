@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from care_sim.core.arrays import Floats, Integers
+from care_sim.core.cells.stack import Grid
+from care_sim.core.conditions import ReturnSettings
 from care_sim.core.frames import Frame
 from care_sim.core.grid import Cells
-from care_sim.core.grid_stack import Grid
-from care_sim.core.return_settings import ReturnSettings
 from care_sim.core.types import Scan
 from care_sim.sensors.bundle import bundle
 from care_sim.sensors.echoes import Echoes, echoes_of, reported
@@ -20,7 +20,7 @@ from care_sim.sensors.signal import Signal
 from care_sim.sensors.surfaces import brightness
 from care_sim.sensors.sweep import RollingSweep
 from care_sim.world.bullet import NO_BODY, BulletWorld
-from care_sim.world.linear_motion import LinearMotion
+from care_sim.world.motions import LinearMotion
 
 
 class Beams:

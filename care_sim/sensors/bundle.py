@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from care_sim.core.cells.stack import Grid
 from care_sim.core.grid import AngularGrid
-from care_sim.core.grid_stack import Grid
 
 _RING = np.sqrt(7 / 12)
 """How far from the middle the six lie, in half beams. So the seven rays, of equal weight, have the

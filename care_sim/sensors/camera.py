@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from care_sim.core.arrays import Floats, Integers
-from care_sim.core.boxes import planar_ranges
+from care_sim.core.cells.boxes import planar_ranges
 from care_sim.core.conditions import Sensing
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import ImageDetections

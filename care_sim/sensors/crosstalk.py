@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 
 from care_sim.core.arrays import Floats, Integers, Mask
-from care_sim.core.grid_stack import Grid
-from care_sim.core.return_settings import ReturnSettings
+from care_sim.core.cells.stack import Grid
+from care_sim.core.conditions import ReturnSettings
 from care_sim.core.types import Scan
 from care_sim.sensors.annotated import NO_OBJECT, Cloud, joined
 from care_sim.sensors.lidar_faults import NEAREST_M

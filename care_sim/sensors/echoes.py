@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from care_sim.core.arrays import Floats, Integers
-from care_sim.core.return_settings import LAST, STRONGEST
+from care_sim.core.conditions import LAST, STRONGEST
 
 SEPARATION_M = 1.0
 """Surfaces are told apart from this distance on (Velodyne, VLP-16 manual, dual returns)."""

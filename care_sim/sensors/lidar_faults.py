@@ -6,9 +6,9 @@ import numpy as np
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.cells.stack import Grid
 from care_sim.core.conditions import LidarFaults
 from care_sim.core.grid import Cells
-from care_sim.core.grid_stack import Grid
 
 NEAREST_M = 0.01
 """A noisy return stays this far from 0 m (not fired) and from the reach (no return)."""

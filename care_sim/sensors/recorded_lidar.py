@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 
 from care_sim.core.arrays import Floats, Integers
+from care_sim.core.cells.stack import Grid
 from care_sim.core.conditions import Sensing
 from care_sim.core.firing.base import shots_by_cell
 from care_sim.core.grid import Cells
-from care_sim.core.grid_stack import Grid
 from care_sim.sensors.annotated import Cloud
 from care_sim.sensors.crosstalk import crosstalk_of
 from care_sim.sensors.lidar_faults import CellFaults

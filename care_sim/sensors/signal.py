@@ -19,7 +19,7 @@ import math
 import numpy as np
 
 from care_sim.core.arrays import Floats, Integers, Mask
-from care_sim.core.return_settings import ReturnSettings
+from care_sim.core.conditions import ReturnSettings
 
 
 class Signal:

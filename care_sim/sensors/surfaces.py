@@ -6,9 +6,9 @@ import numpy as np
 
 from care_sim.core.arrays import Floats, Integers
 from care_sim.sensors.engines.surface_kernels import met_surfaces
+from care_sim.world.bodies import ASPHALT, REFLECTANCES
 from care_sim.world.body_tables import Primitives
 from care_sim.world.bullet import NO_BODY
-from care_sim.world.materials import ASPHALT, REFLECTANCES
 
 
 def brightness(

@@ -8,8 +8,8 @@ nothing is known of what comes after.
 import numpy as np
 
 from care_sim.core.arrays import Floats, Integers
+from care_sim.core.cells.stack import Grid
 from care_sim.core.grid import Cells
-from care_sim.core.grid_stack import Grid
 
 MOST_INSTANTS = 64
 """Columns share an instant with their neighbours, 64 in a sweep. In 0.1 s and 512 columns that is

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from care_sim.core.arrays import Floats
+from care_sim.core.cells.stack import Grid
 from care_sim.core.frames import Frame
-from care_sim.core.grid_stack import Grid
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import CLASSES
 from care_sim.sensors.annotated import Annotations, Cloud, IdentifiedDetections

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from care_sim.core.arrays import Mask
-from care_sim.core.boxes import planar_ranges
+from care_sim.core.cells.boxes import planar_ranges
 from care_sim.sensors.annotated import Annotations
 from care_sim.sources.film_checks import report_once
 

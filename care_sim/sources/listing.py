@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from dataclasses import fields
 from typing import Any
 
-from care_sim.base.bounds import option_text
+from care_sim.base.checks import option_text
 from care_sim.base.errors import InvalidInput
 from care_sim.base.plugins import package_of
 from care_sim.sources.installed import SOURCES

@@ -12,7 +12,7 @@ from care_sim.core.arrays import Floats
 from care_sim.core.frames import Pose, turned
 from care_sim.core.sensor_setup import LIDAR_POSITION
 from care_sim.world.bodies import CATALOGUE
-from care_sim.world.speed_plan import SpeedPlan
+from care_sim.world.route import SpeedPlan
 
 EGO_LENGTH_M, EGO_WIDTH_M, _ = CATALOGUE["ego"].size
 BEFORE_M = 50.0

@@ -28,8 +28,7 @@ from care_sim.streets.hiding import Spot
 from care_sim.streets.layouts import LAYOUTS, Joining, Plan, Road
 from care_sim.streets.people import populate
 from care_sim.streets.room import keep_room, keep_walkers_off
-from care_sim.world.route import Route, through
-from care_sim.world.speed_plan import SpeedPlan
+from care_sim.world.route import Route, SpeedPlan, through
 
 CRUISE_MPS: Range = (7.0, SPEED_LIMIT_MPS)
 """From what the slowest of the other drivers want to the limit."""

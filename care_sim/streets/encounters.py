@@ -26,7 +26,7 @@ from care_sim.streets.hiding import Hiding, Spot, draw_hiding, is_reported
 from care_sim.streets.layouts import Road, Side
 from care_sim.streets.sight import Sight, sight_of
 from care_sim.world.bodies import CATALOGUE
-from care_sim.world.walker import Walk
+from care_sim.world.motions import Walk
 
 MOST_SIGHT_S = 2.7
 """A car that comes from the left at 4 m/s across the narrowest street is in sight for 2.6 s."""

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from care_sim.core.arrays import Floats, Mask
-from care_sim.core.driver_settings import DriverSettings
+from care_sim.core.conditions import DriverSettings
 from care_sim.core.frames import Pose, turned
 from care_sim.perception.tracker import MemoryRules
 from care_sim.streets.approach import Approach, Arrival
 from care_sim.world.bodies import CATALOGUE
-from care_sim.world.walker import Walk
+from care_sim.world.motions import Walk
 
 SHOWN_M = 0.3
 """Of who comes out, what must stick out for three returns at 15 m, where columns are 0.18 m apart.

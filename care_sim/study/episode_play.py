@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import care_sim
+from care_sim.base.digests import portable_bytes
 from care_sim.base.errors import failure_line
-from care_sim.base.portable_hash import portable_bytes
 from care_sim.core.arrays import Floats
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.loops.closed_loop import ClosedLoop
@@ -50,7 +50,7 @@ def run_episode(config: EpisodeConfig) -> Row:
     Every parameter of `EpisodeConfig.row`; `version` and `digest` of the configuration; as
     `drawn.NAME` the parameters of the scenario that the seed drew; the fields of
     `care_sim.loops.records.Outcome`; `keyframes`; `wall_s`; `peak_rss_mb` of the process so far;
-    `episode_hash` over cells fired, ranges returned and poses (`care_sim.base.portable_hash`); and
+    `episode_hash` over cells fired, ranges returned and poses (`care_sim.base.digests`); and
     of a scenario that is not built in `world_hash` (`care_sim.study.world_hash`).
     """
     return trace(config)[0]

@@ -15,8 +15,7 @@ from typing import NamedTuple, Self
 import pyarrow as pa
 
 from care_sim.base.errors import InvalidInput
-from care_sim.base.files import check_no_link
-from care_sim.base.json_text import check_file_size, parsed_json
+from care_sim.base.files import check_file_size, check_no_link, parsed_json
 from care_sim.study.rows.parquet import with_tuples
 from care_sim.study.rows.schema import PARAMETERS, Schema
 from care_sim.study.run_config import Row, RunConfig

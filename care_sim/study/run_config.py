@@ -15,8 +15,7 @@ from typing import Any, Self
 import gymnasium
 
 import care_sim
-from care_sim.base.digests import file_digest
-from care_sim.base.entry_files import paths_in
+from care_sim.base.digests import file_digest, paths_in
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.conditions import DEFAULTS, UNUSED_BY_FULL_SCAN
 from care_sim.policies import check_policy, make_policy

@@ -8,7 +8,7 @@ from dataclasses import asdict, astuple, dataclass, fields
 import numpy as np
 
 import care_sim
-from care_sim.base.portable_hash import portable_bytes
+from care_sim.base.digests import portable_bytes
 from care_sim.core.belief import Belief
 from care_sim.core.forgetting import released_cells
 from care_sim.core.grid import Cells
@@ -166,7 +166,7 @@ def _released(policy: Policy, belief: Belief) -> int | None:
 
 def film_hash(film: Film) -> str:
     """A hash over what a film shows and who is hidden at its start, measured numbers rounded
-    (`care_sim.base.portable_hash`).
+    (`care_sim.base.digests`).
 
     Of a return it holds the cell and the object, not the range: Bullet finds where a ray meets a
     round body by iteration, which makes a millimetre of a last bit.

@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Self
 
 from care_sim.base.errors import counted
-from care_sim.base.files import write_text
-from care_sim.base.json_text import json_content
+from care_sim.base.files import json_content, write_text
 from care_sim.study.journal import JOURNAL, is_written, read_journal
 
 UNFINISHED = "unfinished.json"

@@ -8,10 +8,10 @@ from contextlib import closing
 
 import numpy as np
 
+from care_sim.base.digests import Content, portable_bytes
 from care_sim.base.errors import InvalidInput
-from care_sim.base.portable_hash import Content, portable_bytes
 from care_sim.base.times import LAST_BITS_S
-from care_sim.core.driver_settings import DriverSettings
+from care_sim.core.conditions import DriverSettings
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.study.run_config import Row
 from care_sim.world.world import World
@@ -19,7 +19,7 @@ from care_sim.world.world import World
 
 def world_hash(env: ClosedLoopEnv, seed: int) -> str:
     """Return a hash of what stands in the world of a seed, and how it moves while the ego keeps its
-    speed, and while it brakes; measured numbers rounded (`care_sim.base.portable_hash`). The world
+    speed, and while it brakes; measured numbers rounded (`care_sim.base.digests`). The world
     is built anew.
     """
     content = hashlib.sha256()

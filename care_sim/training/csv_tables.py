@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from care_sim.base.errors import InvalidInput
-from care_sim.base.json_text import check_file_size
+from care_sim.base.files import check_file_size
 
 _Row = TypeVar("_Row")
 

@@ -17,11 +17,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from care_sim.base.errors import InvalidInput, print_lines, report_problems
-from care_sim.base.exit_codes import FAILED
 from care_sim.base.extras import import_torch
 from care_sim.base.files import ZIP, check_output
-from care_sim.base.seed_ranges import TRAINING, VALIDATION
-from care_sim.base.torch_threads import one_thread
+from care_sim.base.interrupts import FAILED
+from care_sim.base.limits import one_thread
+from care_sim.base.seeds import TRAINING, VALIDATION
 from care_sim.core.arrays import Floats
 from care_sim.perception.pillars.weights import CALIBRATION, save_detector
 from care_sim.study.executors import Processes, processes

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.grid_stack import Grid
+from care_sim.core.cells.stack import Grid
 from care_sim.core.rig import Rig
 from care_sim.envs.scenes import StreetEnv
 from care_sim.envs.sensing import Observed, SensingEnv, sensing

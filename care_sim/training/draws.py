@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from care_sim.base.seed_ranges import SPLITS, split_of
+from care_sim.base.seeds import SPLITS, split_of
 
 STREETS = 24
 """Of every split so many are drawn. A street takes 2.5 s to film, as long as 2,500 keyframes take

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import gymnasium
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
-from care_sim.base.cores import CORES
+from care_sim.base.limits import CORES
 from care_sim.base.processes import following, starting
 from care_sim.envs import CLOSED_LOOP, OPEN_LOOP, installed_ids, make_env
 from care_sim.envs.wrappers.grid_observation import GridObservation

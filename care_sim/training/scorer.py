@@ -20,8 +20,8 @@ from care_sim.base.array_files import Arrays
 from care_sim.base.errors import print_lines
 from care_sim.base.extras import import_torch
 from care_sim.base.files import ZIP, check_output
-from care_sim.base.seed_ranges import TRAINING, VALIDATION
-from care_sim.base.torch_threads import one_thread
+from care_sim.base.limits import one_thread
+from care_sim.base.seeds import TRAINING, VALIDATION
 from care_sim.core.grid import AngularGrid
 from care_sim.policies.learned.weights import Card, save_weights
 from care_sim.sensors.setups import DEFAULT_SETUP, sensor_setup

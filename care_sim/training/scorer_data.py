@@ -26,7 +26,7 @@ import numpy as np
 
 from care_sim.core.arrays import Mask
 from care_sim.core.belief import Belief
-from care_sim.core.boxes import planar_ranges
+from care_sim.core.cells.boxes import planar_ranges
 from care_sim.core.conditions import MIN_RETURNS
 from care_sim.core.grid import Cells
 from care_sim.envs.open_loop import FilmEnv

@@ -14,7 +14,7 @@ from pathlib import Path
 from care_sim.base.errors import print_lines
 from care_sim.base.extras import import_torch
 from care_sim.base.files import ZIP, check_output
-from care_sim.base.seed_ranges import TRAINING, VALIDATION
+from care_sim.base.seeds import TRAINING, VALIDATION
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
 from care_sim.policies.learned.learned_sets import LearnedSets

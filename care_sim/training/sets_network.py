@@ -12,7 +12,7 @@ import numpy as np
 
 from care_sim.base.array_files import Arrays
 from care_sim.base.extras import import_torch
-from care_sim.base.torch_threads import one_thread
+from care_sim.base.limits import one_thread
 from care_sim.policies.learned.set_items import ITEM_INPUTS, MIRRORED, STRIP_INPUTS
 from care_sim.policies.learned.set_network import STEPS
 from care_sim.training.set_ablations import kept_weights

@@ -4,8 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
-from care_sim.base.bounds import bounded, check_fields
-from care_sim.base.checks import LARGEST_INTEGER, check_known
+from care_sim.base.checks import LARGEST_INTEGER, bounded, check_fields, check_known
 
 SetsPart = Literal["attention", "inputs", "place", "faults"]
 """What `learned-sets` can be trained without (`care_sim.training.set_ablations`)."""

@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_sim.base.random_streams import streams
+from care_sim.base.seeds import streams
 from care_sim.batch.choice import Choice
 from care_sim.core.conditions import ClosedLoopConditions
+from care_sim.core.firing.floor import RandomFloor
 from care_sim.core.grid import AngularGrid
-from care_sim.core.random_floor import RandomFloor
 from care_sim.core.rig import Rig
 from care_sim.envs.sensing import sensing
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from care_sim.batch.observing import Observing
 from care_sim.batch.state import BatchState
 from care_sim.core.belief import MAX_DETECTIONS, MAX_TRACKS
-from care_sim.core.observation_limits import Limits
+from care_sim.core.observation.limits import Limits
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES, Ego, ImageDetections, Tracks
 from care_sim.envs.spaces import observation_space

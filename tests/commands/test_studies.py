@@ -3,7 +3,7 @@
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.return_settings import RETURN_SETTINGS
+from care_sim.core.conditions import RETURN_SETTINGS
 from care_sim.reports.report import read_results
 from care_sim.reports.studies import STUDIES
 from care_sim.reports.tables.validate import played_worlds

@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.conditions import ClosedLoopConditions
-from care_sim.core.driver_settings import DriverSettings
+from care_sim.core.conditions import ClosedLoopConditions, DriverSettings
 from care_sim.core.types import Ego, Tracks
 from care_sim.driving.braking import BrakingController
 from care_sim.driving.drivers import CarefulHuman, brake_delay_s, check_driver, make_driver

@@ -13,8 +13,7 @@ from care_sim.loops.seeds import SensorSeeds
 from care_sim.perception.tracker import MemoryRules
 from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.world.bodies import CATALOGUE
-from care_sim.world.route import Route
-from care_sim.world.speed_plan import SpeedPlan
+from care_sim.world.route import Route, SpeedPlan
 from care_sim.world.traffic import Traffic
 from care_sim.world.world import World
 

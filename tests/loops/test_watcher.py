@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import care_sim
-from care_sim.core.actions import EXPLOITATION, FLOOR, RESERVE
+from care_sim.core.firing.actions import EXPLOITATION, FLOOR, RESERVE
 from care_sim.core.sensor_setup import LIDAR_POSITION
 from care_sim.envs.wrappers.watching import Watching
 from care_sim.loops.watcher import WAY_M, Watcher

@@ -17,7 +17,7 @@ from pyarrow.parquet import read_schema
 
 from care_sim import cli
 from care_sim.base.errors import InvalidInput
-from care_sim.base.seed_ranges import SPLITS
+from care_sim.base.seeds import SPLITS
 from care_sim.commands.table import COMMANDS
 from care_sim.core.conditions import DEFAULTS
 from care_sim.core.types import CLASSES, ImageDetections, Tracks

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from care_sim import cli
-from care_sim.base.seed_ranges import TRAINING
+from care_sim.base.seeds import TRAINING
 from care_sim.loops.seeds import EpisodeSeeds
 from care_sim.policies import BUILT_IN
 from care_sim.scenarios import make_scenario

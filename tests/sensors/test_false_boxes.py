@@ -27,7 +27,7 @@ from care_sim.sources.kinds import recordings
 from care_sim.sources.nuscenes.tables import CAMERA_CHANNELS
 from care_sim.sources.street_films import record
 from care_sim.streets.street import make_street
-from care_sim.world import bullet_clients as clients
+from care_sim.world import bullet_bodies as clients
 from tests.helpers.nuscenes_drive import write_drive
 from tests.helpers.short_streets import part_of
 from tests.helpers.telling_apart import CHANCE, areas_under_the_curve

@@ -7,7 +7,7 @@ from itertools import islice
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.base.seed_ranges import LAST, split_of
+from care_sim.base.seeds import LAST, split_of
 from care_sim.study.benchmark.player import player_in
 from care_sim.study.benchmark.screening import reachable
 from care_sim.study.benchmark.tasks import (

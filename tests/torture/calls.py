@@ -238,8 +238,7 @@ def _check_cells(cells, budget, size):
 
 def policy(case):
     """Make a policy and ask it."""
-    from care_sim import make_policy, policy_names
-    from care_sim.policies import BUILT_IN, maker
+    from care_sim.policies import BUILT_IN, make_policy, maker, policy_names
     from care_sim.policies.makers import settable
 
     name = case.rng.choice([*policy_names(), some(case)])
@@ -322,14 +321,15 @@ _CHANGES = (
 
 def belief(case):
     """Read an observation back."""
-    from care_sim import Belief
+    from care_sim.core.belief import Belief
 
     Belief.from_observation(_observation(case)).to_observation()
 
 
 def allocation(case):
     """Algorithm 1."""
-    from care_sim import Demand, allocate
+    from care_sim.core.allocation import allocate
+    from care_sim.core.types import Demand
 
     rng = case.rng
 
@@ -353,7 +353,8 @@ def allocation(case):
 
 def rig(case):
     """The rig, and what it covers."""
-    from care_sim import AngularGrid, Rig
+    from care_sim.core.grid import AngularGrid
+    from care_sim.core.rig import Rig
     from care_sim.sensors.camera import FRONT_CAMERA
 
     known = _fields_of(Rig) | {"grid": AngularGrid, "cameras": lambda: (FRONT_CAMERA,)}
@@ -381,7 +382,7 @@ def _bundles(case):
 
 def grid(case):
     """The angular grid and its cells."""
-    from care_sim import AngularGrid
+    from care_sim.core.grid import AngularGrid
 
     made = AngularGrid(**draw(case, _fields_of(AngularGrid)))
     if (
@@ -500,7 +501,7 @@ def weights(case):
 
 def tables(case):
     """Tracks and detections from rows."""
-    from care_sim import ImageDetections, Tracks
+    from care_sim.core.types import ImageDetections, Tracks
 
     kind = case.rng.choice((ImageDetections, Tracks))
     rows = np.ones((3, len(kind.COLUMNS)))

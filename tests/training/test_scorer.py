@@ -5,7 +5,7 @@ from contextlib import closing
 import numpy as np
 import pytest
 
-from care_sim.base.seed_ranges import TRAINING, VALIDATION
+from care_sim.base.seeds import TRAINING, VALIDATION
 from care_sim.cli import main
 from care_sim.envs.scenarios import DriveEnv
 from care_sim.policies import make_policy

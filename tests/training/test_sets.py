@@ -8,7 +8,7 @@ import pytest
 
 import care_sim
 from care_sim.cli import main
-from care_sim.core.boxes import planar_ranges
+from care_sim.core.cells.boxes import planar_ranges
 from care_sim.core.grid import AngularGrid
 from care_sim.envs.scenarios import DriveEnv
 from care_sim.policies.learned.set_items import ITEM_INPUTS, STRIP_INPUTS, ItemReader, Items

@@ -9,12 +9,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from care_sim.base.checks import check_whole
-from care_sim.base.console import TableConsole
 from care_sim.base.errors import InvalidInput, counted, print_lines, report_problems
-from care_sim.base.exit_codes import DONE, FAILED
 from care_sim.base.files import write_text
+from care_sim.base.interrupts import DONE, FAILED
 from care_sim.commands.options.shared import StudyOptions
 from care_sim.commands.shared.command_line import command_line
+from care_sim.commands.shared.console import TableConsole
 from care_sim.commands.shared.folder_checks import check_folder, free_folder, lost
 from care_sim.reports.report import (
     CONFIG,

@@ -8,7 +8,7 @@ from gymnasium.vector import VectorWrapper
 
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.belief import Observation
-from care_sim.core.beliefs import Beliefs
+from care_sim.core.observation.beliefs import Beliefs
 from care_sim.core.rig import Rig
 
 

@@ -11,7 +11,7 @@ from care_sim.base.checks import check_flag
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.arrays import Floats, Mask
 from care_sim.core.belief import OBSERVED, Observation
-from care_sim.core.beliefs import Beliefs
+from care_sim.core.observation.beliefs import Beliefs
 from care_sim.envs.wrappers.grid_observation import (
     GridArrays,
     GridObservation,

@@ -7,7 +7,7 @@ apart (1 m at 45 m), then need no bridging, only the columns, 0.012 rad apart, d
 import numpy as np
 
 from care_sim.core.arrays import Floats, Integers
-from care_sim.core.grid_stack import Grid
+from care_sim.core.cells.stack import Grid
 
 NEAR_RADIUS_M = 0.3
 """Two people a metre apart, each 0.66 m wide, leave 0.34 m between them: the radius must stay

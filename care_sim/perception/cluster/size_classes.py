@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from care_sim.core.arrays import Floats, Integers
-from care_sim.core.grid_stack import Grid
+from care_sim.core.cells.stack import Grid
 from care_sim.core.types import CLASSES
 from care_sim.perception.cluster.box_fitting import DECIMALS, Sides
 from care_sim.perception.cluster.grouping import COLUMNS_APART, NEAR_RADIUS_M, cluster_radius

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from care_sim.base.checks import check_number
 from care_sim.base.errors import InvalidInput
 from care_sim.base.extras import import_torch
-from care_sim.base.torch_threads import one_thread
+from care_sim.base.limits import one_thread
 from care_sim.core.arrays import Floats
 from care_sim.core.types import Detections
 from care_sim.perception.pillars.box_kernels import points_within

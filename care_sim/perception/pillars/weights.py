@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from care_sim.base.array_files import Arrays, read_arrays, write_arrays
 from care_sim.base.errors import InvalidInput
-from care_sim.base.json_text import parsed_json
+from care_sim.base.files import parsed_json
 from care_sim.core.types import CLASSES
 from care_sim.perception.pillars.network import shapes
 

@@ -11,7 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from care_sim.base.checks import check_known, check_whole
-from care_sim.base.seed_ranges import training_seeds
+from care_sim.base.seeds import training_seeds
 from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig

@@ -11,7 +11,7 @@ import numpy as np
 from care_sim.base.checks import check_flag, check_whole
 from care_sim.core.arrays import Floats
 from care_sim.core.belief import Belief
-from care_sim.core.boxes import planar_ranges
+from care_sim.core.cells.boxes import planar_ranges
 from care_sim.core.frames import Frame
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand

@@ -8,9 +8,9 @@ from os import PathLike
 from typing import ClassVar
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.beliefs import Beliefs
+from care_sim.core.cells.sets import WorldSets
+from care_sim.core.observation.beliefs import Beliefs
 from care_sim.core.rig import Rig
-from care_sim.core.world_sets import WorldSets
 from care_sim.policies.base import RowPolicy
 from care_sim.policies.learned.grid_features import GridFeatures
 from care_sim.policies.learned.score_map import ScoreMap

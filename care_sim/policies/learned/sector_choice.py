@@ -8,14 +8,13 @@ from itertools import accumulate, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.core.allocator import Allocator
 from care_sim.core.arrays import Integers
-from care_sim.core.beliefs import Beliefs
-from care_sim.core.cell_sets import CellSets
+from care_sim.core.cells.sets import CellSets, WorldSets
+from care_sim.core.firing.actions import Allocator
 from care_sim.core.grid import Cells
+from care_sim.core.observation.beliefs import Beliefs
 from care_sim.core.rig import Rig
 from care_sim.core.types import Action
-from care_sim.core.world_sets import WorldSets
 from care_sim.policies.learned.tiling import Tiling, enough_beside_hulls
 
 

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 from care_sim.base.checks import check_flag, check_whole
 from care_sim.core.belief import Belief
-from care_sim.core.cell_sets import CellSets
+from care_sim.core.cells.sets import CellSets
 from care_sim.core.conditions import MIN_RETURNS
 from care_sim.core.residual import camera_layers
 from care_sim.core.rig import Rig

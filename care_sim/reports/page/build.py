@@ -15,8 +15,7 @@ from markupsafe import Markup
 
 import care_sim
 from care_sim.base.errors import InvalidInput, counted, printable_lines
-from care_sim.base.files import HTML, replacing
-from care_sim.base.json_text import json_content
+from care_sim.base.files import HTML, json_content, replacing
 from care_sim.core.conditions import DEFAULTS
 from care_sim.evaluation.recall import CENSORED_AT
 from care_sim.evaluation.sightings import RANGE_M

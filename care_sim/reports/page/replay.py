@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from care_sim.core.return_settings import FilmedReturns
+from care_sim.core.conditions import FilmedReturns
 from care_sim.core.types import CLASSES
 from care_sim.evaluation.recall import CENSORED_AT
 from care_sim.loops.closed_loop import ClosedLoop

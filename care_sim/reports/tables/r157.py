@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from care_sim.base.errors import percent
-from care_sim.core.driver_settings import FIXED
+from care_sim.core.conditions import FIXED
 from care_sim.evaluation.collision_outcomes import CollisionOutcome, collision_outcome
 from care_sim.reports.engine.contrasts import contrast_of_rows
 from care_sim.reports.engine.controls import BEST_CONTROL, best_of

@@ -11,8 +11,7 @@ from care_sim.core.frames import Pose
 from care_sim.scenarios.ncap.forms import Across, Ahead, BrakingAhead, Target
 from care_sim.scenarios.ncap.meeting import CLEAR_M, Crossing, Ego, Following, Meeting
 from care_sim.world.bodies import CATALOGUE
-from care_sim.world.straight_way import StraightWay
-from care_sim.world.walker import Walk
+from care_sim.world.motions import StraightWay, Walk
 
 
 def across(way: Across, target: Target, speed: float, ego: Ego) -> Meeting:

@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from care_sim.base.bounds import bounded, one_of
+from care_sim.base.checks import bounded, one_of
 from care_sim.base.errors import InvalidInput
 from care_sim.core.frames import Pose
 from care_sim.scenarios.base import LONGEST_EPISODE_S, NO_LIMIT_MPS, Scenario

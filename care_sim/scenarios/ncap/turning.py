@@ -24,8 +24,8 @@ from care_sim.scenarios.ncap.forms import (
 from care_sim.scenarios.ncap.meeting import CLEAR_M, Crossing, Ego, Meeting
 from care_sim.streets.dimensions import LANE_WIDTH_M
 from care_sim.world.bodies import CATALOGUE, BodyKind, Triple, sized
+from care_sim.world.motions import StraightWay
 from care_sim.world.route import Leg, Route
-from care_sim.world.straight_way import StraightWay
 
 _SLACKEST_M = 1500.0
 """Radius at which the clothoids begin."""

@@ -4,7 +4,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from care_sim.base.bounds import bounded, one_of
+from care_sim.base.checks import bounded, one_of
 from care_sim.base.errors import InvalidInput
 from care_sim.driving.human_model import HUMAN_MODEL
 from care_sim.scenarios.base import LONGEST_EPISODE_S, Scenario
@@ -23,7 +23,7 @@ from care_sim.scenarios.r157.grid import (
 )
 from care_sim.scenarios.r157.preventable import preventable
 from care_sim.streets.dimensions import Range, draw
-from care_sim.world.lane_change import LaneChange
+from care_sim.world.motions import LaneChange
 from care_sim.world.traffic import Traffic
 from care_sim.world.world import World
 

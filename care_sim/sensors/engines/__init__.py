@@ -10,9 +10,9 @@ from typing import Protocol
 
 from care_sim.base.checks import check_known
 from care_sim.core.arrays import Floats, Integers
+from care_sim.core.cells.stack import Grid
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid, Cells
-from care_sim.core.grid_stack import Grid
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.sensors.engines.bullet import Bullet
 from care_sim.sensors.engines.fast import Fast

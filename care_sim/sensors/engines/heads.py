@@ -6,9 +6,9 @@ from typing import Protocol
 import numpy as np
 
 from care_sim.core.arrays import Floats, Integers
+from care_sim.core.cells.stack import GridStack
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid, Cells
-from care_sim.core.grid_stack import GridStack
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.world.bullet import NO_BODY, BulletWorld, PixelWindow
 

@@ -20,8 +20,8 @@ from care_sim.sensors.engines.silhouette_kernels import (
     room_for,
 )
 from care_sim.sensors.engines.view_kernels import Lens, Meshes, PlacedCamera
+from care_sim.world.body_tables import Tables
 from care_sim.world.bullet import NO_BODY, PixelWindow
-from care_sim.world.polyhedra import Tables
 
 _LOTS = np.uint64(2**64 - LOT)
 """The bits of a column that say in which lot it is."""

@@ -16,8 +16,7 @@ import pyarrow as pa
 
 from care_sim.base.digests import file_stamp
 from care_sim.base.errors import InvalidInput
-from care_sim.base.files import check_output, replacing
-from care_sim.base.json_text import json_content, listed_values
+from care_sim.base.files import check_output, json_content, listed_values, replacing
 from care_sim.core.arrays import Floats
 
 JsonRow = dict[str, Any]

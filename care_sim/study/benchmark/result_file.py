@@ -9,7 +9,7 @@ from typing import Any
 
 from care_sim.base.checks import LARGEST_INTEGER
 from care_sim.base.errors import InvalidInput, counted, printable, shown
-from care_sim.base.json_text import json_content
+from care_sim.base.files import json_content
 from care_sim.core.defaults import CELL_ORDERS
 from care_sim.policies import POLICIES, maker, tags_of
 from care_sim.policies.base import TAGS

@@ -14,9 +14,8 @@ from pathlib import Path
 from typing import NamedTuple, Protocol, TypeVar
 
 from care_sim.base.errors import InvalidInput
-from care_sim.base.files import write_text
-from care_sim.base.json_text import check_file_size, parsed_json
-from care_sim.base.random_streams import check_secret, secret_entropy
+from care_sim.base.files import check_file_size, parsed_json, write_text
+from care_sim.base.seeds import check_secret, secret_entropy
 
 BENCHMARK_VERSION = 1
 """Of worlds, conditions and scorer together. Whatever changes a published row makes another one."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from care_sim.base.errors import InvalidInput
-from care_sim.base.seed_ranges import split_of
+from care_sim.base.seeds import split_of
 from care_sim.core.conditions import YOLOX_CAMERA
 from care_sim.core.defaults import CELLS
 from care_sim.core.firing.listing import HARDWARE, settled

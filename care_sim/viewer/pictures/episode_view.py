@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from PIL import Image, ImageDraw
 
-from care_sim.core.boxes import planar_ranges
+from care_sim.core.cells.boxes import planar_ranges
 from care_sim.core.frames import Frame
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.residual import explained

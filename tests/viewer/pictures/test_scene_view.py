@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from care_sim.core.actions import EXPLOITATION, FLOOR, RESERVE
+from care_sim.core.firing.actions import EXPLOITATION, FLOOR, RESERVE
 from care_sim.core.residual import wedge_rays
 from care_sim.envs.wrappers.watching import Watching
 from care_sim.sources.named import source_of

@@ -5,11 +5,13 @@ The sensor frame is level, so that boxes in it stand upright, whatever the tilt 
 the grid is tilted, the corners of the boxes are measured along its axes.
 """
 
+import math
+
 import numpy as np
 
+from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Mask
 from care_sim.core.frames import turned
-from care_sim.core.grid_kernels import silhouettes
 
 _AROUND = ((0.5, 0.5), (0.5, -0.5), (-0.5, -0.5), (-0.5, 0.5))
 _CORNERS = np.array([[x, y, z] for z in (-0.5, 0.5) for x, y in _AROUND])
@@ -102,3 +104,43 @@ def _extreme_points(corners: Floats) -> Floats:
     shares = np.divide(behind, beyond, out=np.zeros_like(z), where=beyond != 0)
     points: Floats = starts + np.clip(shares, 0.0, 1.0)[..., None] * ways
     return points
+
+
+@compiled()
+def silhouettes(boxes: Floats) -> tuple[Floats, Floats, Mask]:
+    """What of boxes (n, 7) bounds their hulls, seen from the origin, and which of them surround it.
+
+    Returns x and y (n, 5, 2) of the centre and the four corners. Then (n, 2, 2) the heights of
+    bottom and top, each with the distance in the x, y plane at which it appears lowest or highest.
+    Then (n,) whether a box stands around the origin.
+    """
+    planar = np.empty((len(boxes), 5, 2))
+    upright = np.empty((len(boxes), 2, 2))
+    around = np.empty(len(boxes), np.bool_)
+
+    for n, (x, y, z, length, width, height, yaw) in enumerate(boxes):
+        # How far the origin lies beyond the sides, in the axes of the box. Negative means between
+        # two sides and counts as 0. So the distance to the nearest point of the footprint follows,
+        # and it is 0 for an origin inside.
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        beyond = abs(cos * x + sin * y) - length / 2, abs(sin * x - cos * y) - width / 2
+        near = math.hypot(max(beyond[0], 0.0), max(beyond[1], 0.0))
+
+        # Seen from outside, a rectangle spans the directions between two of its corners. Its
+        # farthest point is a corner, too, since distance is a convex function. The centre goes
+        # first, as the direction that all are compared with.
+        far = 0.0
+        planar[n, 0] = x, y
+        for k, (front, left) in enumerate(((0.5, 0.5), (0.5, -0.5), (-0.5, -0.5), (-0.5, 0.5))):
+            along, across = front * length, left * width
+            corner = x + (cos * along - sin * across), y + (sin * along + cos * across)
+            planar[n, k + 1] = corner
+            far = max(far, math.hypot(corner[0], corner[1]))
+
+        # A bottom below the horizon appears lowest where it is nearest, one above it where it is
+        # farthest; a top the other way round.
+        bottom, top = z - height / 2, z + height / 2
+        upright[n, 0] = bottom, near if bottom < 0 else far
+        upright[n, 1] = top, near if top > 0 else far
+        around[n] = near <= 0.0
+    return planar, upright, around

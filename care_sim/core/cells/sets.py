@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from functools import cached_property
 from itertools import accumulate, pairwise
-from typing import Any, overload
+from typing import Any, NamedTuple, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,3 +106,37 @@ def _parts(cells: Integers, sizes: Integers, first: int, last: int) -> tuple[Int
     starts = np.cumsum(sizes) - sizes + np.minimum(first, sizes)
     part_sizes = np.minimum(last, sizes) - np.minimum(first, sizes)
     return _gathered(cells, starts, part_sizes), part_sizes
+
+
+class WorldSets(NamedTuple):
+    """All the `sets`, and how many of them are of each world: `counts` (W,)."""
+
+    sets: CellSets
+    counts: Integers
+
+    @classmethod
+    def nothing(cls, worlds: int) -> "WorldSets":
+        """No sets of so many worlds."""
+        return cls(CellSets.of([]), np.zeros(worlds, np.int64))
+
+    def take(self, kept: Mask) -> "WorldSets":
+        """Some of the sets, by mask."""
+        return WorldSets(self.sets.take(kept), kept_of_each(kept, self.counts))
+
+    def part(self, first: int, last: int) -> "WorldSets":
+        """Of every set its cells from place `first` up to, not including, `last`."""
+        return WorldSets(self.sets.part(first, last), self.counts)
+
+
+@compiled()
+def kept_of_each(kept: Mask, counts: Integers) -> Integers:
+    """(W,) how many rows of each world are `kept` (n,), of which the first `counts[0]` are of world
+    0, the next `counts[1]` of world 1, and so on.
+    """
+    found = np.zeros(len(counts), np.int64)
+    row = 0
+    for world, count in enumerate(counts):
+        for _ in range(count):
+            found[world] += kept[row]
+            row += 1
+    return found

@@ -11,11 +11,18 @@ from numpy.typing import NDArray
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats, Integers, Mask
-from care_sim.core.belief import HIGHEST, OBSERVED, Belief, Observation, array_of, rows_of
-from care_sim.core.belief_kernels import lie_between
+from care_sim.core.belief import (
+    HIGHEST,
+    OBSERVED,
+    Belief,
+    Observation,
+    array_of,
+    lie_between,
+    rows_of,
+)
+from care_sim.core.cells.sets import WorldSets
 from care_sim.core.rig import Rig
 from care_sim.core.types import ImageDetections, Tracks
-from care_sim.core.world_sets import WorldSets
 
 _ONE = np.ones(1, np.bool_)
 

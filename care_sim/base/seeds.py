@@ -1,13 +1,9 @@
-"""Which seeds are for what, disjoint by construction: the table is in docs/environments/index.md.
+"""Seeds: which are for what, and the independent streams of random numbers that each holds."""
 
-No training episode can have a seed below 10,000, whatever `--seed` is, and nothing is chosen by a
-seed below 1,000 but `care-sector` and `place-hulls`, which were first tried on the streets 0 to 19.
-A study of several seeds takes them of one split; one episode, of a command or of an environment
-that is reset by hand, takes any. Where episodes differ by the recording and not by the seed
-(`CARE-Replay-v0`), hold out recordings.
-"""
-
+import hmac
 from collections.abc import Iterable, Sequence
+
+import numpy as np
 
 from care_sim.base.checks import check_seed
 from care_sim.base.errors import InvalidInput
@@ -65,3 +61,38 @@ def check_benchmark_seeds(seeds: Sequence[int]) -> None:
 def training_seeds(count: int) -> range:
     """The first `count` seeds of the training."""
     return range(TRAINING, TRAINING + count)
+
+
+def streams(entropy: tuple[int, ...], count: int, secret: str = "") -> list[np.random.SeedSequence]:
+    """`count` streams of an episode; `entropy` is its seed, and in the open loop a number of its
+    scene's.
+    """
+    return np.random.SeedSequence(
+        secret_entropy("episode", entropy, secret) if secret else entropy
+    ).spawn(count)
+
+
+def secret_entropy(what: str, entropy: tuple[int, ...], secret: str) -> int:
+    """256 bits of what is drawn, its seed and a secret (HMAC-SHA-256), of which neither can be
+    told. An episode and a street of one seed have nothing in common.
+    """
+    # As plain decimal numbers, so that an integer of NumPy gives what one of Python does.
+    message = " ".join([what, *(str(int(number)) for number in entropy)])
+    return int.from_bytes(hmac.digest(secret.encode(), message.encode(), "sha256"))
+
+
+def check_secret(secret: object) -> None:
+    """Raise InvalidInput unless it is False, for none, or a text that can be encoded. An empty text
+    and None are what an environment variable gives that is not set; they would leave everything
+    open.
+    """
+    if secret is False:
+        return
+    if not isinstance(secret, str):
+        raise InvalidInput(f"secret must be a text, got one of type {type(secret).__name__}")
+    if not secret:
+        raise InvalidInput(
+            "secret must not be empty: leave it out, or give False, where there is none"
+        )
+    if not secret.isascii():
+        raise InvalidInput("secret must be of ASCII characters alone")

@@ -27,8 +27,7 @@ from functools import cached_property
 import numpy as np
 
 from care_sim.core.arrays import Floats, Integers
-from care_sim.core.belief import HIGHEST, MAX_DETECTIONS, MAX_TRACKS, Belief
-from care_sim.core.belief_kernels import rows_within
+from care_sim.core.belief import HIGHEST, MAX_DETECTIONS, MAX_TRACKS, Belief, rows_within
 from care_sim.core.residual import explaining_tracks
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES, Ego, ImageDetections, Tracks

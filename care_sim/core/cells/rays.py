@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from care_sim.base.bounds import bounded, check_fields
-from care_sim.base.checks import check_number
+from care_sim.base.checks import bounded, check_fields, check_number
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.arrays import Floats
 

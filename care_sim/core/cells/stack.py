@@ -16,10 +16,10 @@ from numpy.typing import ArrayLike
 from care_sim.base.checks import check_number
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.arrays import Floats, Integers
-from care_sim.core.cell_sets import CellSets
+from care_sim.core.cells.rays import MOST_ROWS
+from care_sim.core.cells.sets import CellSets
 from care_sim.core.defaults import AZIMUTH_MARGIN, ELEVATION_MARGIN
 from care_sim.core.grid import AngularGrid, Cells, Head, Place
-from care_sim.core.grid_rays import MOST_ROWS
 
 MOST_APART_M = 40.0
 """Two LiDARs of a car are at most this far apart along each axis."""
