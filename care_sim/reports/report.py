@@ -15,12 +15,12 @@ from care_sim.reports.latex import PREAMBLE, latex, paragraph
 from care_sim.reports.studies import STUDIES, SWEEP, study_of
 from care_sim.reports.study import Study
 from care_sim.reports.table import Table, unmarked
+from care_sim.study.journal import UNFINISHED, how_far
 from care_sim.study.results_formats import results_format_in
-from care_sim.study.row_checks import RowChecks
+from care_sim.study.rows.checks import RowChecks
 from care_sim.study.rows.parquet import read_notes, read_rows, read_table
 from care_sim.study.rows.reading import policy_of
 from care_sim.study.run_config import FULL, Row
-from care_sim.study.unfinished import UNFINISHED, how_far
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -32,13 +32,12 @@ from care_sim.envs import ENVIRONMENT_IDS
 from care_sim.scenarios.ncap.table import TESTS
 from care_sim.study.designs.crowding import crowding_study
 from care_sim.study.designs.faults import fault_study
-from care_sim.study.designs.ncap import ncap_cases, ncap_study
 from care_sim.study.designs.paper import paper_study
-from care_sim.study.designs.r157 import r157_study
+from care_sim.study.designs.standards import ncap_cases, ncap_study, r157_study
 from care_sim.study.designs.validate import levels_of, validation_study
 from care_sim.study.designs.vehicle import vehicle_study
 from care_sim.study.episode_config import EpisodeConfig, grid, of_seeds
-from care_sim.study.parameters import parameters
+from care_sim.study.run_config import parameters
 
 CONTROLS = ("fan",)
 """The best pattern without a camera in these scenes."""

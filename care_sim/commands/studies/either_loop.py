@@ -22,8 +22,13 @@ from care_sim.sensors.setups import DEFAULT_SETUP
 from care_sim.sources.scenes import chosen_scenes
 from care_sim.study.designs.ablations import ablation_plays, ablation_study, quarter_of
 from care_sim.study.designs.defaults import FIRING_POLICIES
-from care_sim.study.designs.firing import firing_plays, firing_study, fitting
-from care_sim.study.designs.order import order_plays, order_study
+from care_sim.study.designs.firing import (
+    firing_plays,
+    firing_study,
+    fitting,
+    order_plays,
+    order_study,
+)
 from care_sim.study.designs.realism import (
     HEADLINES,
     film_conditions,

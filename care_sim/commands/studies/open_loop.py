@@ -15,8 +15,7 @@ from care_sim.commands.shared.selection import (
     source_named,
 )
 from care_sim.sources.scenes import chosen_scenes
-from care_sim.study.mechanism_config import mechanism_plays
-from care_sim.study.play_config import PlayConfig, play_grid
+from care_sim.study.play_config import PlayConfig, mechanism_plays, play_grid
 
 
 def play_scenes(

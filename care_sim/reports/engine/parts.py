@@ -10,8 +10,7 @@ from care_sim.reports.engine.contrasts import Contrast
 from care_sim.reports.engine.controls import best_of, is_control
 from care_sim.reports.engine.frames import Frame
 from care_sim.reports.engine.measures import AVOIDED, Measure, Recall, Units
-from care_sim.study.rows.reading import Key, spared_seeds
-from care_sim.study.rows.settings import Setting
+from care_sim.study.rows.reading import Key, Setting, spared_seeds
 from care_sim.study.run_config import FULL, Row
 
 

@@ -14,7 +14,7 @@ from care_sim.reports.protocol.comparisons import (
     PolicyPair,
     SceneThird,
 )
-from care_sim.study.rows.settings import Setting
+from care_sim.study.rows.reading import Setting
 
 PAPER_BUDGETS = (0.10, 0.20, 0.35)
 

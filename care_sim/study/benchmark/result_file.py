@@ -15,11 +15,12 @@ from care_sim.policies import POLICIES, maker, tags_of
 from care_sim.policies.base import TAGS
 from care_sim.policies.makers import check_parameters
 from care_sim.study.benchmark.result import RESULT_MARK, BenchmarkResult, ResultRow
-from care_sim.study.benchmark.tasks import CAMERAS, Entry
-from care_sim.study.benchmark.worlds import (
+from care_sim.study.benchmark.suite import (
     BENCHMARK_VERSION,
+    CAMERAS,
     PARTS,
     SIZES,
+    Entry,
     published_worlds,
     quick_tenth,
 )
