@@ -30,8 +30,13 @@ from care_sim.reports.figures.leaderboard import (
 )
 from care_sim.reports.leaderboard import CONTROL, leaderboard_table, leads_table, names_in
 from care_sim.study.benchmark.play import Player, player_in, replayed, screened_worlds
-from care_sim.study.benchmark.result import BenchmarkResult, elsewhere, own_code_of
-from care_sim.study.benchmark.result_file import is_result, read_result
+from care_sim.study.benchmark.result import (
+    BenchmarkResult,
+    elsewhere,
+    is_result,
+    own_code_of,
+    read_result,
+)
 from care_sim.study.benchmark.suite import Salt, World
 
 _HEAD = (

@@ -10,7 +10,7 @@ from random import Random
 import pytest
 
 from care_sim.study.benchmark import suite
-from care_sim.study.benchmark.result_file import read_result
+from care_sim.study.benchmark.result import read_result
 from care_sim.study.benchmark.suite import PARTS, Entry, published_worlds
 from tests.helpers.commands import run
 from tests.helpers.places import ROOT
