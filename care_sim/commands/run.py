@@ -27,7 +27,7 @@ from care_sim.reports.episodes.timeline import episode_timeline, scene_timeline
 from care_sim.scenarios import scenario_names
 from care_sim.study.episode_play import GymEnv, trace
 from care_sim.study.play_config import PlayConfig
-from care_sim.study.scene_trace import trace_scene
+from care_sim.study.scene_play import trace_scene
 from care_sim.training.agents import find_agent, shipped_agents
 
 _RECORD = Path("runs/run.rrd")

@@ -47,11 +47,14 @@ from care_sim.study.designs.ablations import ablation_plays, ablation_study, qua
 from care_sim.study.designs.crowding import crowding_study
 from care_sim.study.designs.defaults import FIRING_POLICIES
 from care_sim.study.designs.faults import fault_study
-from care_sim.study.designs.firing import firing_plays, firing_study, fitting
-from care_sim.study.designs.ncap import ncap_cases, ncap_study
-from care_sim.study.designs.order import order_plays, order_study
+from care_sim.study.designs.firing import (
+    firing_plays,
+    firing_study,
+    fitting,
+    order_plays,
+    order_study,
+)
 from care_sim.study.designs.paper import paper_study
-from care_sim.study.designs.r157 import r157_study
 from care_sim.study.designs.realism import (
     HEADLINES,
     film_conditions,
@@ -59,12 +62,12 @@ from care_sim.study.designs.realism import (
     realism_plays,
     realism_study,
 )
+from care_sim.study.designs.standards import ncap_cases, ncap_study, r157_study
 from care_sim.study.designs.validate import levels_of, validation_study
 from care_sim.study.designs.vehicle import vehicle_study
 from care_sim.study.episode_config import EpisodeConfig, grid, of_seeds
-from care_sim.study.mechanism_config import mechanism_plays
-from care_sim.study.parameters import parameters
-from care_sim.study.play_config import PlayConfig, play_grid
+from care_sim.study.play_config import PlayConfig, mechanism_plays, play_grid
+from care_sim.study.run_config import parameters
 
 
 def play_scenes(

@@ -17,7 +17,7 @@ from care_sim.envs import reward as rewards
 from care_sim.envs.conditions_page import CONDITIONS
 from care_sim.envs.detection import detector_of
 from care_sim.envs.sensing import Observed, SensingEnv, arguments_of, split_conditions
-from care_sim.evaluation.metrics import outcome
+from care_sim.evaluation.outcomes import outcome
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.episode import Episode
 from care_sim.loops.false_box_pools import pool_of_another_drive

@@ -14,12 +14,12 @@ from care_sim.base.files import json_content, write_text
 from care_sim.reports.studies import STUDIES, SWEEP, study_of
 from care_sim.reports.study import Study
 from care_sim.reports.table import Bold, Table, TableRow, unmarked
+from care_sim.study.journal import UNFINISHED, how_far
 from care_sim.study.results_formats import results_format_in
-from care_sim.study.row_checks import RowChecks
+from care_sim.study.rows.checks import RowChecks
 from care_sim.study.rows.parquet import read_notes, read_rows, read_table
 from care_sim.study.rows.reading import policy_of
 from care_sim.study.run_config import FULL, Row
-from care_sim.study.unfinished import UNFINISHED, how_far
 
 PREAMBLE = "% \\usepackage{booktabs,adjustbox}\n"
 _FIT = "max width=\\textwidth,max totalheight=0.85\\textheight"

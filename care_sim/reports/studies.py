@@ -33,13 +33,13 @@ from care_sim.reports.tables.validate import validation_closing, validation_tabl
 from care_sim.reports.tables.vehicle import vehicle_tables
 from care_sim.study.designs.crowding import VEHICLES_COLUMN
 from care_sim.study.designs.faults import FAULT_PLACES
-from care_sim.study.designs.ncap import (
+from care_sim.study.designs.standards import (
+    CASE_COLUMNS,
     REPORTED_COLUMN,
     SPEED_COLUMN,
     TARGET_COLUMN,
     TEST_COLUMN,
 )
-from care_sim.study.designs.r157 import CASE_COLUMNS
 from care_sim.study.results_formats import MECHANISM, PLAYS, VEHICLE
 from care_sim.study.rows.parquet import read_notes
 from care_sim.study.rows.schema import COUNT, FLAG, SUM, TEXT, as_optional

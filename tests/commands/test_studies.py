@@ -9,8 +9,7 @@ from care_sim.reports.studies import STUDIES
 from care_sim.reports.tables.validate import played_worlds
 from care_sim.study.designs.ablations import OPEN_ABLATIONS
 from care_sim.study.designs.faults import fault_study
-from care_sim.study.designs.firing import FIRINGS
-from care_sim.study.designs.order import ORDERS
+from care_sim.study.designs.firing import FIRINGS, ORDERS
 from care_sim.study.designs.realism import FILM_CONDITIONS
 from tests.helpers.commands import run
 from tests.helpers.made_rows import row

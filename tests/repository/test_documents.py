@@ -23,10 +23,9 @@ from care_sim.core.conditions import DEFAULTS
 from care_sim.core.types import CLASSES, ImageDetections, Tracks
 from care_sim.envs import IDS
 from care_sim.sources.street_films import street_film
-from care_sim.study.benchmark.player import player_in
-from care_sim.study.benchmark.result_file import read_result
-from care_sim.study.benchmark.tasks import tasks_of
-from care_sim.study.benchmark.worlds import PARTS, published_worlds
+from care_sim.study.benchmark.play import player_in
+from care_sim.study.benchmark.result import read_result
+from care_sim.study.benchmark.suite import PARTS, published_worlds, tasks_of
 from care_sim.study.results_formats import RESULTS_FORMATS
 from care_sim.training.config import PpoConfig
 from care_sim.training.folder import read_curve

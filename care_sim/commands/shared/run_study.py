@@ -28,9 +28,10 @@ from care_sim.reports.studies import STUDIES, SWEEP, study_of
 from care_sim.reports.study import Study
 from care_sim.study import executors
 from care_sim.study.executors import ExecutorFactory, processes
-from care_sim.study.journal import JOURNAL, Journal
+from care_sim.study.journal import JOURNAL, UNFINISHED, Journal, Unfinished, forget
 from care_sim.study.progress import run_with_progress
 from care_sim.study.provenance import code_digest, machine, versions
+from care_sim.study.rows.checks import check_worlds
 from care_sim.study.rows.parquet import (
     check_columns,
     read_table,
@@ -39,8 +40,6 @@ from care_sim.study.rows.parquet import (
 )
 from care_sim.study.run_config import Row, RunConfig
 from care_sim.study.runner import Failure, by_reason
-from care_sim.study.unfinished import UNFINISHED, Unfinished, forget
-from care_sim.study.world_hash import check_worlds
 
 
 def play_study(
@@ -87,7 +86,7 @@ def run_study(
     failed.
 
     Names the folder, and leaves in it how large the study is and the `command` that plays it, until
-    it has ended (`care_sim.study.unfinished`). Writes `journal.jsonl` as tasks finish, and when all
+    it has ended (`care_sim.study.journal`). Writes `journal.jsonl` as tasks finish, and when all
     have ended and some did not fail, the results: `config.json`, Parquet files, tables and figures
     of `study`. No other study can take the folder until then. A folder that holds all of it
     stays as it is, unless `force`; `report` draws lost figures. Where the folder holds rows

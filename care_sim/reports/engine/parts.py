@@ -11,8 +11,7 @@ from care_sim.reports.engine.controls import best_of, is_control
 from care_sim.reports.engine.frames import Frame
 from care_sim.reports.engine.measures import AVOIDED, Measure, Recall, Units
 from care_sim.reports.formatting import marked
-from care_sim.study.rows.reading import Key, policy_of, spared_seeds, tags_of_row
-from care_sim.study.rows.settings import Setting
+from care_sim.study.rows.reading import Key, Setting, policy_of, spared_seeds, tags_of_row
 from care_sim.study.run_config import FULL, Row
 
 

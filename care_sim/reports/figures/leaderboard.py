@@ -12,7 +12,7 @@ from care_sim.base.errors import percent
 from care_sim.reports.figures.styles import BLUE, INK, ORANGE, YELLOW, default_style
 from care_sim.reports.leaderboard import names_in, ranked
 from care_sim.study.benchmark.result import BenchmarkResult
-from care_sim.study.benchmark.tasks import BENCHMARK_BUDGET
+from care_sim.study.benchmark.suite import BENCHMARK_BUDGET
 
 LEADERBOARD_FIGURE = "leaderboard"
 _PARTS = {"drives": (ORANGE, "v"), "tests": (YELLOW, "s"), "streets": (BLUE, "^")}

@@ -13,7 +13,7 @@ from care_sim.reports.figures.curves import BUDGET, Panel, Point, curves_figure,
 from care_sim.reports.protocol.contrasts import OverControl, named_controls, over_controls
 from care_sim.reports.protocol.paper import published_level
 from care_sim.reports.protocol.rows import SettingPlays, plays_by_setting
-from care_sim.study.designs.order import rows_by_order
+from care_sim.study.designs.firing import rows_by_order
 from care_sim.study.run_config import FULL, Row
 
 

@@ -15,7 +15,7 @@ from matplotlib.patches import Patch, Rectangle
 
 from care_sim.base.errors import counted, percent
 from care_sim.core.arrays import Floats
-from care_sim.evaluation.ncap_score import BEST_SCORE
+from care_sim.evaluation.outcomes import BEST_SCORE
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL
 from care_sim.reports.engine.contrasts import Contrast
 from care_sim.reports.engine.measures import DETECTION, GATE_M, Measure, Recall
@@ -29,7 +29,7 @@ from care_sim.reports.tables.ncap import NcapRows
 from care_sim.reports.tables.r157 import cut_in_rows
 from care_sim.reports.tables.realism import Order, RealismStudy, Verdict
 from care_sim.study.designs.ablations import ABLATION_PLACES
-from care_sim.study.designs.r157 import case_of
+from care_sim.study.designs.standards import case_of
 from care_sim.study.designs.variants import USUAL_VARIANT, FilmPlace, Place
 from care_sim.study.rows.reading import is_avoided
 from care_sim.study.run_config import FULL, Row

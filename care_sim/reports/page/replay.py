@@ -27,8 +27,7 @@ from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.episode_play import trace
 from care_sim.study.play_config import PlayConfig
 from care_sim.study.run_config import Row
-from care_sim.study.scene_play import SUMS
-from care_sim.study.scene_trace import trace_scene
+from care_sim.study.scene_play import SUMS, trace_scene
 from care_sim.world.bodies import CATALOGUE
 
 _WAY_STEP_M = 2.0

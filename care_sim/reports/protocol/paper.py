@@ -24,7 +24,7 @@ from care_sim.study.designs.ablations import (
     RESERVE_ORDER,
     SIGMA,
 )
-from care_sim.study.rows.settings import Setting
+from care_sim.study.rows.reading import Setting
 
 PAPER_BUDGETS = (0.10, 0.20, 0.35)
 

@@ -27,7 +27,7 @@ from care_sim.reports.table import Table, TableRow
 from care_sim.study.designs import ablations as design
 from care_sim.study.designs.ablations import Ablation
 from care_sim.study.designs.variants import USUAL_VARIANT, FilmPlace, Place
-from care_sim.study.rows.settings import Setting
+from care_sim.study.rows.reading import Setting
 from care_sim.study.run_config import FULL, Row
 
 _OPEN_MEASURES = {

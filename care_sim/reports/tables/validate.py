@@ -19,13 +19,13 @@ from care_sim.reports.formatting import interval, mean, median, tag_notes
 from care_sim.reports.table import Bold, Table, TableRow
 from care_sim.study.designs.validate import CAMERA_POLICIES, MEMORISER, is_training
 from care_sim.study.rows.reading import (
+    Setting,
     detections,
     is_avoided,
     is_missed,
     preventable,
     setting_of,
 )
-from care_sim.study.rows.settings import Setting
 from care_sim.study.run_config import FULL, Row
 
 BEST_CAMERA = "best camera policy"

@@ -20,7 +20,7 @@ from care_sim.study.designs import vehicle as design
 from care_sim.study.designs.variants import Group, Variant
 from care_sim.study.rows.reading import detections
 from care_sim.study.run_config import REFERENCE, Row
-from care_sim.study.vehicle.play import ASKED
+from care_sim.study.vehicle_play import ASKED
 
 _Entries = Callable[[Group, Variant, Sequence[Row]], TableRow]
 """The entries of a level in a group of places, given the rows of CARE there."""

@@ -14,7 +14,7 @@ from care_sim.core.frames import Frame
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.residual import explained
 from care_sim.core.types import CLASSES
-from care_sim.evaluation.metrics import outcome
+from care_sim.evaluation.outcomes import outcome
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.records import Keyframe
 from care_sim.loops.watcher import sought, way_ahead

@@ -3,22 +3,62 @@ every column known.
 """
 
 from collections import Counter
-from collections.abc import Collection, Iterator, Sequence
-from functools import reduce
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from functools import lru_cache, reduce
 from operator import or_
 from pathlib import Path
 from typing import Any
 
 import care_sim
 from care_sim.base.errors import InvalidInput, counted, printable
+from care_sim.core.conditions import DEFAULTS
 from care_sim.envs.closed_loop import KEYFRAME_S
+from care_sim.evaluation.sightings import ANNOTATED
 from care_sim.perception.detectors import PROXY
 from care_sim.study.results_formats import UNREAD, is_parameter
-from care_sim.study.row_identity import Task, identity, row_label
 from care_sim.study.rows.parquet import with_tuples
 from care_sim.study.rows.reading import setting_of
 from care_sim.study.rows.schema import Schema
 from care_sim.study.run_config import Row, flat
+
+USUAL = DEFAULTS | {"presence": ANNOTATED}
+"""Parameters of a row that does not name them: rows of older versions lack what was added since."""
+Task = frozenset[tuple[str, Any]]
+"""The parameters of a task that are not the default, by name."""
+_LABEL_NAMES = ("scene", "scenario", "policy", "budget")
+_LABEL_SEEDS = ("seed", "floor_seed")
+
+
+def asked_with(row: Row) -> Row:
+    """The parameters of a row that differ from the defaults."""
+    asked = {
+        name: value
+        for name in _parameters(tuple(row))
+        if (value := row[name]) is not None and value != USUAL.get(name)
+    }
+    # A row holds the digest of a file of camera detections. It counts only whether one was given,
+    # so that the same command may replace its own rows after the file has changed.
+    if "camera_detections" in asked:
+        asked["camera_detections"] = True
+    return asked
+
+
+@lru_cache
+def _parameters(names: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the parameters among columns. Thousands of rows share the same `names`."""
+    return tuple(filter(is_parameter, names))
+
+
+def identity(row: Row) -> Task:
+    """Equal for rows of one task, whatever code played it."""
+    return frozenset(asked_with(row).items())
+
+
+def row_label(row: Row) -> str:
+    """A short name for people: world, policy, budget, and seeds that are not 0."""
+    main = [str(row[name]) for name in _LABEL_NAMES if row.get(name) is not None]
+    return " ".join([*main, *(f"{name} {row[name]}" for name in _LABEL_SEEDS if row.get(name))])
+
 
 _OF_THE_PLAYING = ("version", "digest", "wall_s", "peak_rss_mb")
 _OF_THE_FOLDER = ("tags", "regret_m", "censored", "differing_keyframes", "differing_cells")
@@ -151,3 +191,21 @@ def _plain_rows(given: Row) -> list[Row]:
         for policy in given.get("policies", [given.get("policy")])
         for seed in given[plural]
     ]
+
+
+def check_worlds(rows: Iterable[Row]) -> None:
+    """Raise InvalidInput where two rows of one scenario and seed met different worlds. Rows without
+    a `world_hash` are not checked: the built-in scenarios draw everything from the seed.
+    """
+    first: dict[object, Row] = {}
+    for row in rows:
+        if not row.get("world_hash"):
+            continue
+        given = sorted((name, repr(row[name])) for name in row if name.startswith("scenario."))
+        other = first.setdefault((row["scenario"], row["seed"], *given), row)
+        if other["world_hash"] != row["world_hash"]:
+            raise InvalidInput(
+                f"scenario {row['scenario']} builds one world for {other['policy']} and another "
+                f"for {row['policy']} of the seed {row['seed']}: it draws outside its rng, or its "
+                "code has changed; draw everything from the rng that build receives"
+            )

@@ -1,4 +1,4 @@
-"""How often, and by how many cells, two policies fired differently at the same keyframes."""
+"""How two policies differ keyframe by keyframe and event by event."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -59,3 +59,33 @@ def _moved(ours: Cells, theirs: Cells) -> int:
     size = max(ours.max(initial=0), theirs.max(initial=0)) + 1
     shared = np.minimum(np.bincount(ours, minlength=size), np.bincount(theirs, minlength=size))
     return max(len(ours), len(theirs)) - int(shared.sum())
+
+
+@dataclass(frozen=True)
+class DetectionOrder:
+    """Events that the first policy detected earlier, later, or at the same keyframe as the second;
+    they add. Two that never detect it within the censoring time are tied.
+    """
+
+    earlier: int = 0
+    later: int = 0
+    tied: int = 0
+
+    def __add__(self, other: "DetectionOrder") -> "DetectionOrder":
+        return DetectionOrder(
+            *(getattr(self, column.name) + getattr(other, column.name) for column in fields(self))
+        )
+
+
+def detection_order(ours: Sequence[int], theirs: Sequence[int]) -> DetectionOrder:
+    """Compare the censored times to first detection, in keyframes, event by event. Raises
+    InvalidInput for unequal lengths.
+    """
+    if len(ours) != len(theirs):
+        raise InvalidInput(f"delays must be of the same events, got {len(ours)} and {len(theirs)}")
+    leads = [their - our for our, their in zip(ours, theirs, strict=True)]
+    return DetectionOrder(
+        sum(lead > 0 for lead in leads),
+        sum(lead < 0 for lead in leads),
+        sum(lead == 0 for lead in leads),
+    )

@@ -1,14 +1,25 @@
-"""The study of the Euro NCAP tests: test by speed by policy by budget."""
+"""The studies of the Euro NCAP tests and of the cut-ins of UN Regulation 157."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
+import numpy as np
+
+from care_sim.core.conditions import FIXED
 from care_sim.scenarios.ncap.forms import Across, NcapTest
 from care_sim.scenarios.ncap.table import TESTS
-from care_sim.study.designs.defaults import NCAP_BUDGETS, NCAP_POLICIES, NCAP_STEP_KPH
+from care_sim.scenarios.r157.grid import CutInCase, kinds_in_turn
+from care_sim.scenarios.r157.preventable import preventable
+from care_sim.study.designs.defaults import (
+    NCAP_BUDGETS,
+    NCAP_POLICIES,
+    NCAP_STEP_KPH,
+    R157_BUDGETS,
+    R157_POLICIES,
+)
 from care_sim.study.episode_config import EpisodeConfig, grid, of_cases
-from care_sim.study.parameters import Parameters
+from care_sim.study.run_config import Parameters, Row
 
 TEST_COLUMN = "scenario.test"
 SPEED_COLUMN = "scenario.speed_kph"
@@ -72,3 +83,35 @@ def ncap_study(
     # The cases are the protocols' own, which need no check: policies and budgets are checked once.
     cases = [case.parameters for case in ncap_cases(tests, step_kph)]
     return of_cases(grid(["ncap"], policies, budgets, seeds, **common), cases)
+
+
+CASE_COLUMNS = tuple(f"scenario.{name}" for name in CutInCase.__dataclass_fields__)
+"""The columns of a case."""
+
+
+def r157_study(
+    seeds: Sequence[int],
+    policies: Sequence[str] = R157_POLICIES,
+    budgets: Sequence[float] = R157_BUDGETS,
+    every: int = 1,
+    driver: str = FIXED,
+) -> list[EpisodeConfig]:
+    """The preventable cases of the grid, the kinds and sides in turn, or one of `every` of them,
+    under every policy and budget. `driver` is that of all.
+    """
+    # The cases are the grid's own, which need no check: policies and budgets are checked once.
+    cases = [tuple(asdict(case).items()) for case in _some(preventable(kinds_in_turn()), every)]
+    return of_cases(grid(["r157"], policies, budgets, seeds, driver=driver), cases)
+
+
+def _some(cases: Sequence[CutInCase], every: int) -> list[CutInCase]:
+    """One case of `every`, in their order."""
+    # By lot, the same at every call: kinds and sides come in turn, and every fifth case would be
+    # of nearly one kind.
+    lot = np.random.default_rng(0).permutation(len(cases))
+    return [cases[number] for number in sorted(lot[::every].tolist())]
+
+
+def case_of(row: Row) -> CutInCase:
+    """The case that was played."""
+    return CutInCase(*(row[column] for column in CASE_COLUMNS))
