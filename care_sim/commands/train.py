@@ -9,11 +9,11 @@ from care_sim.base.files import told_if_replaced
 from care_sim.commands.options.learning import Curves, Learner
 from care_sim.commands.shared.agent_play import AgentPlay
 from care_sim.training.agents import Agent
-from care_sim.training.closing import how_to_play
 from care_sim.training.config import AgentConfig
 from care_sim.training.folder import CHECKPOINT, CURVE, RULES, WEIGHTS, read_curve, read_rules
 from care_sim.training.hyperparameters import read_hyperparameters
 from care_sim.training.run import train_agent
+from care_sim.training.supervised.config import how_to_play
 
 CHANCE = "random"
 """The rule that whoever has learned something is better than."""
@@ -55,9 +55,8 @@ def curves(options: Curves) -> int:
     """Draw learning curves, and print their table."""
     # Imported here because training draws nothing.
     from care_sim.reports.figures.files import check_figure, save
-    from care_sim.training.curves import grouped_runs, read_run
+    from care_sim.training.curves import curves_table, grouped_runs, read_run
     from care_sim.training.curves_figure import curves_figure
-    from care_sim.training.curves_table import curves_table
 
     if not options.folders:
         raise InvalidInput(

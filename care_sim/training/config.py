@@ -17,7 +17,7 @@ from care_sim.core.wrapping import Wrapping
 from care_sim.study.parameters import parameters
 
 Part = Literal["pictures", "place", "tracks", "faults"]
-"""What can be left out (`care_sim.training.ablations`)."""
+"""What can be left out (`care_sim.training.networks`)."""
 HOW_LONG = ("steps", "out", "resume", "tensorboard", "threads", "processes")
 """Fields in which a resumed run may differ from the run before."""
 BEFORE: Mapping[str, Any] = {"drawn": False, "without": []}

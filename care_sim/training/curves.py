@@ -1,22 +1,27 @@
-"""Learning curves of training runs, read from their folders and grouped.
+"""Learning curves of training runs: read from their folders, grouped, and what each group reached.
 
-Runs of a group differ by their seed alone.
+Runs of a group differ by their seed alone. What several seeds reach together, and how sure that is,
+follows Agarwal et al. 2021, "Deep reinforcement learning at the edge of the statistical precipice":
+scores are (runs, tasks).
 """
 
 import json
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
+from scipy import stats
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats
+from care_sim.reports.table import Table
+from care_sim.study.progress import rounded_duration
 from care_sim.training.config import BEFORE, HOW_LONG
-from care_sim.training.episodes import LEARNER, EpisodeRow, read_episodes
 from care_sim.training.folder import (
     CONFIG,
     CURVE,
@@ -26,6 +31,90 @@ from care_sim.training.folder import (
     read_curve,
     read_rules,
 )
+from care_sim.training.validation import LEARNER, EpisodeRow, read_episodes
+
+RESAMPLES = 2_000
+"""Drawn for one interval."""
+CONFIDENCE = 0.95
+_CUT = 0.25
+"""Share of the scores that is left out at either end."""
+
+
+class Aggregate(NamedTuple):
+    """A number over all runs, and the ends of its interval, which are None for a single run."""
+
+    value: float
+    low: float | None
+    high: float | None
+
+    def __str__(self) -> str:
+        if self.low is None or self.high is None:
+            return f"{self.value:.2f}"
+        return f"{self.value:.2f} [{self.low:.2f}, {self.high:.2f}]"
+
+
+def interquartile_mean(scores: ArrayLike) -> Aggregate:
+    """The mean of the middle half of all scores (runs, tasks).
+
+    The interval is that of the stratified bootstrap: in every task the runs are drawn with
+    replacement, independently of the other tasks, so that no task is left out of a resample. Raises
+    InvalidInput for scores that are empty or not finite.
+    """
+    table = _table(scores)
+    return Aggregate(float(_middle(table.ravel())), *_ends(table, _middle))
+
+
+def performance_profile(scores: ArrayLike, levels: ArrayLike) -> list[Aggregate]:
+    """The share of the scores (runs, episodes) that lie above each of `levels`.
+
+    The interval is that of the bootstrap over whole runs: a run plays all episodes, and what it is
+    better or worse at than another shows in all of them. Drawn episode by episode, runs would
+    cancel, and the interval would vanish as episodes become more.
+    """
+    table = _table(scores)
+    shares = [
+        (table > level).mean(axis=1, keepdims=True)
+        for level in np.atleast_1d(np.asarray(levels, float))
+    ]
+    return [Aggregate(float(each.mean()), *_ends(each, _mean)) for each in shares]
+
+
+def _middle(scores: Floats) -> Floats:
+    result: Floats = np.asarray(stats.trim_mean(scores, _CUT, axis=-1))
+    return result
+
+
+def _mean(scores: Floats) -> Floats:
+    result: Floats = np.asarray(scores.mean(axis=-1))
+    return result
+
+
+def _ends(
+    table: Floats, statistic: Callable[[Floats], Floats]
+) -> tuple[float, float] | tuple[None, None]:
+    """Of the interval of a statistic of all scores, which it takes along the last axis."""
+    if len(table) < 2:
+        return None, None
+    interval = stats.bootstrap(
+        tuple(table.T),
+        lambda *tasks, axis: statistic(
+            np.concatenate([np.moveaxis(task, axis, -1) for task in tasks], axis=-1)
+        ),
+        n_resamples=RESAMPLES,
+        confidence_level=CONFIDENCE,
+        method="percentile",
+        vectorized=True,
+        rng=np.random.default_rng(0),
+    ).confidence_interval
+    return float(interval.low), float(interval.high)
+
+
+def _table(scores: ArrayLike) -> Floats:
+    table: Floats = np.asarray(scores, float)
+    if table.ndim != 2 or not table.size or not np.isfinite(table).all():
+        raise InvalidInput(f"scores must be finite (runs, tasks), got the shape {table.shape}")
+    return table
+
 
 NOTHING, EVERYTHING = "random", "full"
 """The rules between which scores are measured where environments differ: 0 and 1."""
@@ -181,3 +270,53 @@ def recipe_name(config: Mapping[str, Any]) -> str:
     without = " ".join(config.get("without", ()))
     drawn = ", drawn" if config.get("drawn") else ""
     return f"{config['algorithm']}, {envs}{drawn}" + (f", without {without}" if without else "")
+
+
+COLUMNS = ("recipe", "seeds", "steps", "reached", "unit", "ahead of", "time")
+
+
+def curves_table(groups: Sequence[Sequence[TrainingRun]]) -> Table:
+    """A row per recipe."""
+    return Table(
+        "Training runs",
+        COLUMNS,
+        tuple(map(_row, groups)),
+        notes=(
+            "reached: interquartile mean of training seeds and environments at the last evaluation "
+            "that all runs of a recipe have, no chosen one; of two seeds or more with the interval "
+            "of a stratified bootstrap, 95%.",
+            "ahead of: rules, and the steps from which on that mean stays above them.",
+            "time: the median of a run's learning, evaluations left out, on the machine and under "
+            "the load that it had.",
+        ),
+    )
+
+
+def _row(runs: Sequence[TrainingRun]) -> tuple[str, ...]:
+    shared = shared_steps(runs)
+    name, seeds = recipe_name(runs[0].config), str(len(runs))
+    if not shared:
+        return name, seeds, "-", "-", runs[0].unit, "-", "-"
+    reached = [interquartile_mean(scores_at(runs, steps)) for steps in shared]
+    seconds = [dict(zip(run.steps, (row[1] for row in run.curve), strict=True)) for run in runs]
+    return (
+        name,
+        seeds,
+        f"{shared[-1]:,}",
+        str(reached[-1]),
+        runs[0].unit,
+        _ahead(runs, shared, [one.value for one in reached]),
+        rounded_duration(float(np.median([each[shared[-1]] for each in seconds]))),
+    )
+
+
+def _ahead(runs: Sequence[TrainingRun], steps: Sequence[int], reached: Sequence[float]) -> str:
+    """The rules that are left behind for good, and from when on."""
+    told = []
+    for rule, scores in runs[0].marks.items():
+        mark = interquartile_mean(scores[None]).value
+        # The last evaluation that is not above the rule; before the first one there is none.
+        behind = max((n for n, value in enumerate(reached) if value <= mark), default=-1)
+        if behind + 1 < len(steps):
+            told.append(f"{rule} from {steps[behind + 1]:,}")
+    return ", ".join(told) or "none"

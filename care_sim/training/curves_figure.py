@@ -15,9 +15,15 @@ from care_sim.core.arrays import Floats
 from care_sim.reports.figures.files import default_style
 from care_sim.reports.figures.names import name_ends
 from care_sim.reports.figures.styles import colours
-from care_sim.training.aggregates import interquartile_mean, performance_profile
-from care_sim.training.curves import TrainingRun, recipe_name, scores_at, shared_steps
-from care_sim.training.episodes import LEARNER
+from care_sim.training.curves import (
+    TrainingRun,
+    interquartile_mean,
+    performance_profile,
+    recipe_name,
+    scores_at,
+    shared_steps,
+)
+from care_sim.training.validation import LEARNER
 
 _LEVELS = 60
 """Points of a profile."""

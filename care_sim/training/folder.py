@@ -34,16 +34,16 @@ from care_sim.policies.learned.weights import Card, save_weights
 from care_sim.scenarios import PLUGINS
 from care_sim.study.provenance import machine_line, package_versions, scenario_digest
 from care_sim.training.config import ALGORITHMS, AgentConfig
-from care_sim.training.csv_tables import read_table
-from care_sim.training.episodes import (
+from care_sim.training.seeds import validation_seeds
+from care_sim.training.validation import (
     LEARNER,
     EpisodeRow,
     Played,
+    ValidationScore,
     read_episodes,
+    read_table,
     write_episodes,
 )
-from care_sim.training.seeds import validation_seeds
-from care_sim.training.validation import ValidationScore
 
 if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm

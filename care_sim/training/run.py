@@ -1,5 +1,10 @@
-"""A training run from the first step, or a checkpoint, to the last."""
+"""A training run from the first step, or a checkpoint, to the last.
 
+Learners are those of Stable-Baselines3 and sb3-contrib. Both libraries are imported when a learner
+is trained, since their extra 'rl' is optional.
+"""
+
+import math
 import sys
 import time
 from collections.abc import Callable
@@ -12,14 +17,122 @@ from care_sim.base.errors import InvalidInput, counted, print_lines
 from care_sim.base.extras import import_torch, missing_extra
 from care_sim.base.files import check_no_link
 from care_sim.envs.sensing import sensing
-from care_sim.study.progress import ProgressLines, Show, progress_bar
-from care_sim.training import algorithms
-from care_sim.training.config import AgentConfig, OnPolicy
+from care_sim.policies.learned.grid_features import CHANNELS
+from care_sim.study.progress import ProgressLines, Show, progress_bar, rounded_duration
+from care_sim.training.config import AgentConfig, OnPolicy, PpoConfig, RecurrentPpoConfig, SacConfig
 from care_sim.training.environments import plain, side_by_side, validation_episodes, wrapped
-from care_sim.training.episodes import Played
 from care_sim.training.folder import Folder
-from care_sim.training.pace import Pace
-from care_sim.training.validation import acting, play, rule
+from care_sim.training.validation import Played, acting, play, rule
+
+_LEAST_S = 1.0
+"""Seconds of learning from which a rate is told."""
+
+
+class Pace:
+    """Steps a second over whole rounds of acting and learning, the first one left out.
+
+    The first round compiles what is not compiled yet, and a part of a round is acting alone: an
+    estimate from either is minutes or hours off. `steps` are those of the whole training.
+    """
+
+    def __init__(self, steps: int):
+        self._steps = steps
+        self._updates: int | None = None
+        self._begun: tuple[int, float] | None = None
+        self._rate = 0.0
+
+    def told(self, done: int, updates: int, seconds: float) -> str:
+        """What to say after so many steps, updates of the network and seconds of learning; empty
+        before anything is known.
+        """
+        # Learners update after acting: where their number grows, a round is over.
+        if self._updates is not None and updates > self._updates:
+            if self._begun is None:
+                self._begun = done, seconds
+            elif seconds - self._begun[1] >= _LEAST_S:
+                self._rate = (done - self._begun[0]) / (seconds - self._begun[1])
+        self._updates = updates
+        if not self._rate:
+            return ""
+        left = rounded_duration(max(self._steps - done, 0) / self._rate)
+        return f"{self._rate:.0f} steps/s, {left} left"
+
+
+if TYPE_CHECKING:
+    from stable_baselines3.common.base_class import BaseAlgorithm
+
+TENSORBOARD = "tensorboard"
+"""Folder of the logs for TensorBoard, in that of the run."""
+
+
+def algorithm(name: str) -> Any:
+    """The class of a learner, a `BaseAlgorithm`.
+
+    Raises MissingExtra for one that is not installed.
+    """
+    try:
+        if name == "recurrent-ppo":
+            from sb3_contrib import RecurrentPPO
+
+            return RecurrentPPO
+        from stable_baselines3 import PPO, SAC
+    except ImportError as error:
+        raise missing_extra(name, "rl", error) from error
+    return {"ppo": PPO, "sac": SAC}[name]
+
+
+def make_learner(config: AgentConfig, envs: Any, goes_round: bool = True) -> "BaseAlgorithm":
+    """A learner that has learned nothing yet; `goes_round` says whether the grid does."""
+    policy, options = _settings(config, goes_round)
+    log = str(config.out / TENSORBOARD) if config.tensorboard else None
+    learner: BaseAlgorithm = algorithm(config.algorithm)(
+        policy=policy,
+        env=envs,
+        learning_rate=config.learning_rate,
+        gamma=config.discount,
+        seed=config.seed,
+        device="cpu",
+        tensorboard_log=log,
+        **options,
+    )
+    return learner
+
+
+def _settings(config: AgentConfig, goes_round: bool) -> tuple[Any, dict[str, Any]]:
+    """The policy, and the options that are the learner's own."""
+    # The module subclasses PyTorch's and Stable-Baselines3's classes: optional extra 'rl'.
+    from care_sim.training.networks import Sectored, SectorPolicy
+
+    shape = len(CHANNELS), config.rows, config.columns
+    seen = {"shape": shape, "goes_round": goes_round, "without": config.without}
+    # PPO scores sectors with the network that `ppo` later runs in NumPy. The others keep their own
+    # networks behind features of the sectors, since their critics or memories need a vector.
+    own = {
+        "features_extractor_class": Sectored,
+        "features_extractor_kwargs": seen | {"sectors": (config.elevations, config.azimuths)},
+    }
+    if isinstance(config, PpoConfig):
+        kwargs = seen | {"hidden": config.hidden, "log_std_init": math.log(config.noise)}
+        return SectorPolicy, _on_policy(config) | {"policy_kwargs": kwargs}
+    if isinstance(config, RecurrentPpoConfig):
+        kwargs = own | {"log_std_init": math.log(config.noise)}
+        return "MultiInputLstmPolicy", _on_policy(config) | {"policy_kwargs": kwargs}
+    assert isinstance(config, SacConfig)
+    return "MultiInputPolicy", {
+        "buffer_size": config.memory,
+        "batch_size": config.batch,
+        "policy_kwargs": own,
+    }
+
+
+def _on_policy(config: OnPolicy) -> dict[str, Any]:
+    return {
+        "n_steps": config.rollout,
+        "batch_size": config.batch,
+        "n_epochs": config.epochs,
+        "gae_lambda": 0.9,
+    }
+
 
 if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm
@@ -49,7 +162,7 @@ def train_agent(
     Raises InvalidInput for what does not fit, MissingExtra for a library that is not installed.
     """
     # What is missing is told before the folder is made.
-    algorithms.algorithm(config.algorithm)
+    algorithm(config.algorithm)
     _check_tensorboard(config)
     import_torch().set_num_threads(config.threads)
     folder = Folder(config)
@@ -59,7 +172,7 @@ def train_agent(
         model = (
             _resumed(config, folder, envs)
             if config.resume
-            else algorithms.make_learner(config, envs, sensing(env).rig.grid.goes_round)
+            else make_learner(config, envs, sensing(env).rig.grid.goes_round)
         )
         folder.begin(model)
         # Whatever SAC does beyond its steps is fewer than it has environments.
@@ -80,7 +193,7 @@ def _resumed(config: AgentConfig, folder: Folder, envs: Any) -> "BaseAlgorithm":
         f"resuming from {folder.checkpoint}: loading a checkpoint runs code from it, so resume "
         "your own runs only"
     )
-    model: BaseAlgorithm = algorithms.algorithm(config.algorithm).load(
+    model: BaseAlgorithm = algorithm(config.algorithm).load(
         folder.checkpoint, env=envs, device="cpu"
     )
     if model.num_timesteps >= config.steps and folder.evaluated(model):
@@ -210,7 +323,7 @@ class Stopwatch:
 
 def _check_tensorboard(config: AgentConfig) -> None:
     # A resumed learner writes its log without the option, too.
-    check_no_link(config.out / algorithms.TENSORBOARD)
+    check_no_link(config.out / TENSORBOARD)
     if config.tensorboard:
         try:
             import tensorboard  # noqa: F401

@@ -1,15 +1,104 @@
-"""Episodes of validation seeds, without exploration."""
+"""Episodes of validation seeds, without exploration, and the table of them: `episodes.csv` of a
+run.
 
-from collections.abc import Callable, Mapping, Sequence
+A row is an episode of a rule, or of the learner after so many steps. Means hide in which episodes
+a learner is good; performance profiles need each.
+"""
+
+import csv
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
 import care_sim
-from care_sim.training.episodes import Played
+from care_sim.base.checks import LARGEST_INTEGER, is_number
+from care_sim.base.errors import InvalidInput
+from care_sim.base.files import replacing
+from care_sim.base.json_text import check_file_size
+
+_Row = TypeVar("_Row")
+
+
+def read_table(
+    path: Path, columns: Sequence[str], row_of: Callable[[list[str]], _Row]
+) -> list[_Row]:
+    """The rows of a table, none of one that is not there; `row_of` raises ValueError for one that
+    is damaged. Raises InvalidInput for a damaged file.
+    """
+    if not path.exists():
+        return []
+    try:
+        check_file_size(path)
+        with path.open(newline="", encoding="utf-8") as file:
+            head, *rows = csv.reader(file)
+        if head != [*columns]:
+            raise ValueError(f"its columns are not {', '.join(columns)}")
+        return [row_of(row) for row in rows]
+    except (ValueError, csv.Error) as error:
+        raise InvalidInput(f"{path} is damaged: {error}") from error
+
+
+EPISODES = "episodes.csv"
+LEARNER = "learner"
+"""In the place of a rule's name."""
+_LARGEST_DRAWN = 1e30
+
+
+class Played(NamedTuple):
+    """How an episode was played: the return, and the metres at which the first-sighting actor was
+    detected, 0 where it never was; None in the open loop.
+    """
+
+    seed: int
+    env: str
+    total: float
+    distance_m: float | None
+
+
+class EpisodeRow(NamedTuple):
+    """An episode of the policy of that name; of the learner after so many environment steps."""
+
+    policy: str
+    steps: int
+    played: Played
+
+
+COLUMNS = ("policy", "steps", "seed", "env", "return", "distance_m")
+
+
+def write_episodes(folder: Path, rows: Iterable[EpisodeRow]) -> None:
+    """Write the table anew."""
+    with replacing(folder / EPISODES) as unfinished, unfinished.open("w", newline="") as file:
+        csv.writer(file).writerows(
+            [COLUMNS, *((policy, steps, *played) for policy, steps, played in rows)]
+        )
+
+
+def read_episodes(folder: Path) -> list[EpisodeRow]:
+    """The table of a run; of a run before there was one it is empty. Raises InvalidInput for a
+    damaged file.
+    """
+    return read_table(folder / EPISODES, COLUMNS, _row)
+
+
+def _row(row: Sequence[str]) -> EpisodeRow:
+    """A row of the table. Raises ValueError for what is no number that can be drawn."""
+    policy, steps, seed, env, total, metres = row
+    distance = float(metres) if metres else None
+    numbers = [float(total), *([] if distance is None else [distance])]
+    whole = int(steps), int(seed)
+    if not (
+        all(0 <= number <= LARGEST_INTEGER for number in whole)
+        and all(is_number(number) and abs(number) <= _LARGEST_DRAWN for number in numbers)
+    ):
+        raise ValueError(f"{', '.join(row)} are no numbers of an episode")
+    return EpisodeRow(policy, whole[0], Played(whole[1], env, numbers[0], distance))
+
 
 Choose = Callable[[Any, bool], NDArray[np.float32]]
 """The action for an observation. The flag tells that the episode begins with it."""

@@ -10,7 +10,7 @@ from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
 from care_sim.policies.controls.patterns import Place, Rows, likeliest_cells
-from care_sim.policies.own.care_spread import CORE_FIRST, Round
+from care_sim.policies.own.care import CORE_FIRST, Round
 
 
 class HistoryPattern(Policy):

@@ -16,8 +16,10 @@ from care_sim.policies.learned.cell_inputs import (
     SCAN_INPUTS,
     CellFeatures,
     CellInputs,
+    MarkWeights,
+    RigTerms,
+    network_scores,
 )
-from care_sim.policies.learned.cell_kernels import MarkWeights, RigTerms, network_scores
 from care_sim.policies.learned.weights import Weights, load_weights, shipped_weights
 
 

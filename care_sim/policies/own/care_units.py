@@ -10,7 +10,7 @@ from care_sim.core.grid import Cells
 from care_sim.core.residual import ray_starts, wedge_rays, wedges
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES, Demand, ImageDetections, Tracks
-from care_sim.policies.own.care_sightlines import CareSightlines
+from care_sim.policies.own.care import CareSightlines
 from care_sim.sensors.signal import Signal
 from care_sim.world.bodies import CATALOGUE
 

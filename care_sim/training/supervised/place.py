@@ -21,8 +21,7 @@ from care_sim.sensors.setups import DEFAULT_SETUP, sensor_setup
 from care_sim.sources.street_films import street_film
 from care_sim.streets.street import CALIBRATION_SEEDS
 from care_sim.study.provenance import machine_line, package_versions
-from care_sim.training.closing import how_to_play
-from care_sim.training.weights_config import PlaceConfig
+from care_sim.training.supervised.config import PlaceConfig, how_to_play
 
 
 def train_place(config: PlaceConfig) -> int:

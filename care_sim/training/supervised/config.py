@@ -1,5 +1,6 @@
 """What is trained into one file of weights or a map, and how long."""
 
+import shlex
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
@@ -7,8 +8,14 @@ from typing import Literal, get_args
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.checks import LARGEST_INTEGER, check_known
 
+
+def how_to_play(*words: object) -> str:
+    """The command that plays what was learned."""
+    return f"play it: {shlex.join(['care-sim', *map(str, words)])}"
+
+
 SetsPart = Literal["attention", "inputs", "place", "faults"]
-"""What `learned-sets` can be trained without (`care_sim.training.set_ablations`)."""
+"""What `learned-sets` can be trained without (`care_sim.training.supervised.sets`)."""
 
 
 @dataclass(frozen=True)
