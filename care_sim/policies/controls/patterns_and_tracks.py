@@ -58,8 +58,10 @@ MAP_SHARE = 0.35
 
 
 class PlaceHulls(Policy):
-    """`MAP_SHARE` of the budget for the likeliest cells of the map `place`, then two rounds of a
-    few cells for every hull, the undilated core first as in `care-spread`; what is left goes on
+    """The likeliest cells of the map `place`, then a few cells of every hull.
+
+    `MAP_SHARE` of the budget goes to the likeliest cells of the map `place`, then two rounds of a
+    few cells to every hull, the undilated core first as in `care-spread`; what is left goes on
     down the map. What a camera must beat in a policy that serves its tracks as sparingly.
 
     `path` is a map as for `place`.

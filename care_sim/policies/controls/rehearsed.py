@@ -58,8 +58,10 @@ def rehearsal(scenario: Scenario, seed: int, rig: Rig) -> ClosedLoop:
 
 
 class LearnedPlace(FixedPolicy):
-    """Fires the cells in which a full scan first detected the first-sighting actor in the first
-    `seeds` training seeds of the scenario: the pattern that is learned here, and no other.
+    """Fires the cells in which this very scenario hid its actor in other seeds.
+
+    They are those in which a full scan first detected the first-sighting actor in the first `seeds`
+    training seeds of the scenario.
 
     `make_policy` tells it the `scenario` of the environment, with its parameters. Raises
     InvalidInput for an unknown scenario.
@@ -134,7 +136,9 @@ class HistoryLearnedPlace(HistoryPattern):
 
 
 class SeedFinder(Policy):
-    """What an agent can do that holds this package. Of the first `seeds` seeds of a public
+    """A warning: it finds the seed by the first observation and knows the episode from then on.
+
+    Of the first `seeds` seeds of a public
     `scenario` it takes the one whose ego begins at the speed that it reads, and of several such the
     one whose first picture it sees. It lets a twin of that episode's world go on beside it, its ego
     driven as the own car drives, and reserves the hulls of where all who come out of hiding are by

@@ -95,7 +95,9 @@ object that has no track; it is worth 1 at most. Chosen on the streets 2000 to 2
 
 
 class LearnedSets(Policy):
-    """Every camera box and every track is an item of a set, and so are strips of cells for whatever
+    """Camera boxes and tracks as a set, each with a learned chance; cells go where they gain most.
+
+    Every camera box and every track is an item of a set, and so are strips of cells for whatever
     neither tells of. A small network with attention over the items says of each the chance that
     its first 3, 4, 5, ... cells detect an object. The cells of the budget go, piece by piece, where
     a cell gains most.

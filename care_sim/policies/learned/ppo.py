@@ -97,8 +97,9 @@ class ScoreMap:
 
 
 class PpoPolicy(RowPolicy):
-    """Acts as the learner does behind its wrappers, without exploration. Scores and allocator are
-    the same.
+    """A small network, trained by proximal policy optimisation, scores sectors of the grid.
+
+    The policy acts as the learner does behind its wrappers, without exploration.
 
     `path` is a file of weights that `care-sim train ppo` wrote. Without it those act that come with
     the package, learned on the dense street at all budgets of its tables. Raises InvalidInput for

@@ -84,7 +84,7 @@ class TargetShots:
 
 
 class CareUnits(CareSightlines):
-    """`care-sightlines`, whose cells vote for the units of the hardware (`care_sim.core.firing`).
+    """`care-sightlines`, whose cells vote for the units of the hardware.
 
     Projected in its own order, a demand spends a unit on every first cell, however few others share
     it. Here a unit is worth the cells that it holds of those that the allocator takes. The first of
