@@ -40,8 +40,9 @@ def _study(options: str, run: str, about: str) -> Command:
 
 
 def _weights(options: str, run: str, about: str) -> Command:
-    """A trainer, whose options and function are both in `training`."""
-    return Command(f"training.supervised.config:{options}", f"training.supervised.{run}", about)
+    """A trainer, whose options and function are both in its module of `training.supervised`."""
+    module = run.partition(":")[0]
+    return Command(f"training.supervised.{module}:{options}", f"training.supervised.{run}", about)
 
 
 GROUPS: dict[str, dict[str, Command]] = {

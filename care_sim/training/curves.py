@@ -21,23 +21,167 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats
 from care_sim.reports.table import Table
 from care_sim.study.progress import rounded_duration
-from care_sim.training.config import BEFORE, HOW_LONG
-from care_sim.training.folder import (
-    CONFIG,
-    CURVE,
-    RULES,
-    Evaluation,
-    read_config,
-    read_curve,
-    read_rules,
-)
-from care_sim.training.validation import LEARNER, EpisodeRow, read_episodes
+from care_sim.training.config import HOW_LONG
+from care_sim.training.folder import CONFIG, CURVE, EPISODES, LEARNER, read_config, read_table
+from care_sim.training.validation import Row
 
+NOTHING, EVERYTHING = "random", "full"
+"""The rules between which scores are measured where environments differ: 0 and 1."""
+COLUMNS = ("recipe", "seeds", "steps", "reached", "unit", "ahead of", "time")
 RESAMPLES = 2_000
 """Drawn for one interval."""
 CONFIDENCE = 0.95
 _CUT = 0.25
 """Share of the scores that is left out at either end."""
+
+
+@dataclass(frozen=True)
+class TrainingRun:
+    """A run: its configuration, its evaluations, and the episodes of these and of the rules."""
+
+    config: Mapping[str, Any]
+    curve: Sequence[Row]
+    episodes: Sequence[Row]
+
+    @property
+    def recipe(self) -> str:
+        """What is the same in all runs of a panel: the configuration without seed and length."""
+        left_out = ("seed", *HOW_LONG)
+        return json.dumps(
+            {name: told for name, told in self.config.items() if name not in left_out},
+            sort_keys=True,
+        )
+
+    @property
+    def closed_loop(self) -> bool:
+        """Whether a first detection has a distance; the return alone is measured otherwise."""
+        return all(row["distance_m"] is not None for row in self.episodes)
+
+    @property
+    def unit(self) -> str:
+        """Of the scores."""
+        if len(self.tasks) > 1:
+            return f"score ({NOTHING} 0, {EVERYTHING} 1)"
+        return "first detection (m; 0 if never)" if self.closed_loop else "return"
+
+    @cached_property
+    def tasks(self) -> list[str]:
+        """The environments that are scored each by itself; one that `NOTHING` plays as well as
+        `EVERYTHING` tells nothing, unless it is the only one.
+        """
+        names = [*dict.fromkeys(row["env"] for row in self.episodes)]
+        if len(names) == 1:
+            return names
+        low, high = (self._means.get((rule, 0), {}) for rule in (NOTHING, EVERYTHING))
+        return [name for name in names if name in low and low[name] < high.get(name, -np.inf)]
+
+    @property
+    def rules(self) -> list[str]:
+        """The rules that the learner is beside."""
+        return [*dict.fromkeys(row["policy"] for row in self.episodes if row["policy"] != LEARNER)]
+
+    @property
+    def steps(self) -> list[int]:
+        """Environment steps at each evaluation."""
+        return [row["steps"] for row in self.curve]
+
+    def scores(self, policy: str = LEARNER, steps: int = 0) -> Floats:
+        """(tasks,) of one environment metres of the first detection, or the return; of several the
+        return between those of `NOTHING` and `EVERYTHING`, which has no unit.
+
+        Raises InvalidInput where episodes are missing.
+        """
+        if len(self.tasks) > 1:
+            low, high, reached = (
+                self._returns(*one) for one in ((NOTHING, 0), (EVERYTHING, 0), (policy, steps))
+            )
+            return np.asarray((reached - low) / (high - low))
+        if len(own := self.each(policy, steps)):
+            return np.array([np.mean(own)])
+        raise self._missing(policy, steps)
+
+    def each(self, policy: str, steps: int = 0) -> Floats:
+        """(episodes,) what a policy reached in every episode, by ascending seed, in the unit of
+        `scores` of one environment; of several the return.
+        """
+        column = "distance_m" if len(self.tasks) < 2 and self.closed_loop else "return"
+        rows = sorted(
+            (row["seed"], row[column])
+            for row in self.episodes
+            if (row["policy"], row["steps"]) == (policy, steps)
+        )
+        return np.array([value for _, value in rows])
+
+    def _returns(self, policy: str, steps: int) -> Floats:
+        means = self._means.get((policy, steps), {})
+        if not {*self.tasks} <= {*means}:
+            raise self._missing(policy, steps)
+        return np.array([means[task] for task in self.tasks])
+
+    def _missing(self, policy: str, steps: int) -> InvalidInput:
+        return InvalidInput(
+            f"the episodes of a run of seed {self.config.get('seed')} lack some of {policy} after "
+            f"{steps} steps"
+        )
+
+    @cached_property
+    def _means(self) -> dict[tuple[str, int], dict[str, float]]:
+        """The mean return of a policy after so many steps, by environment."""
+        totals: dict[tuple[str, int], dict[str, list[float]]] = {}
+        for row in self.episodes:
+            played = totals.setdefault((row["policy"], row["steps"]), {})
+            played.setdefault(row["env"], []).append(row["return"])
+        return {
+            which: {env: float(np.mean(each)) for env, each in played.items()}
+            for which, played in totals.items()
+        }
+
+
+def read_run(folder: Path) -> TrainingRun:
+    """The run in a folder. Raises InvalidInput for one without an evaluation."""
+    for name in (CONFIG, CURVE, EPISODES):
+        if not (folder / name).is_file():
+            raise InvalidInput(f"{folder} holds no evaluated training run: no {name}")
+    run = TrainingRun(
+        read_config(folder / CONFIG), read_table(folder / CURVE), read_table(folder / EPISODES)
+    )
+    if not run.curve:
+        raise InvalidInput(f"{folder} holds no evaluated training run: {CURVE} has no evaluation")
+    return run
+
+
+def grouped_runs(runs: Iterable[TrainingRun]) -> list[list[TrainingRun]]:
+    """The runs of every recipe, in the order of the first."""
+    groups: dict[str, list[TrainingRun]] = {}
+    for run in runs:
+        groups.setdefault(run.recipe, []).append(run)
+    return list(groups.values())
+
+
+def shared_steps(runs: Sequence[TrainingRun]) -> list[int]:
+    """Environment steps at which all runs were evaluated, ascending."""
+    return sorted(set.intersection(*(set(run.steps) for run in runs)))
+
+
+def scores_at(runs: Sequence[TrainingRun], steps: int) -> Floats:
+    """(runs, tasks) the scores of all runs after so many steps. Raises InvalidInput for runs that
+    were scored in different environments.
+    """
+    if any(run.tasks != runs[0].tasks for run in runs):
+        raise InvalidInput(
+            "runs of one recipe were scored in different environments: "
+            + "; ".join(", ".join(run.tasks) or "none" for run in runs)
+        )
+    return np.array([run.scores(steps=steps) for run in runs])
+
+
+def recipe_name(config: Mapping[str, Any]) -> str:
+    """The learner, its environments, whether episodes were drawn, and what was left out."""
+    named = Counter(np.atleast_1d(config["env"]).tolist())
+    envs = ", ".join(f"{env} x{often}" if often > 1 else env for env, often in named.items())
+    without = " ".join(config.get("without", ()))
+    drawn = ", drawn" if config.get("drawn") else ""
+    return f"{config['algorithm']}, {envs}{drawn}" + (f", without {without}" if without else "")
 
 
 class Aggregate(NamedTuple):
@@ -54,13 +198,12 @@ class Aggregate(NamedTuple):
 
 
 def interquartile_mean(scores: ArrayLike) -> Aggregate:
-    """The mean of the middle half of all scores (runs, tasks).
+    """The mean of the middle half of all scores (runs, tasks), which are finite.
 
     The interval is that of the stratified bootstrap: in every task the runs are drawn with
-    replacement, independently of the other tasks, so that no task is left out of a resample. Raises
-    InvalidInput for scores that are empty or not finite.
+    replacement, independently of the other tasks, so that no task is left out of a resample.
     """
-    table = _table(scores)
+    table: Floats = np.asarray(scores, float)
     return Aggregate(float(_middle(table.ravel())), *_ends(table, _middle))
 
 
@@ -71,7 +214,7 @@ def performance_profile(scores: ArrayLike, levels: ArrayLike) -> list[Aggregate]
     better or worse at than another shows in all of them. Drawn episode by episode, runs would
     cancel, and the interval would vanish as episodes become more.
     """
-    table = _table(scores)
+    table: Floats = np.asarray(scores, float)
     shares = [
         (table > level).mean(axis=1, keepdims=True)
         for level in np.atleast_1d(np.asarray(levels, float))
@@ -109,174 +252,8 @@ def _ends(
     return float(interval.low), float(interval.high)
 
 
-def _table(scores: ArrayLike) -> Floats:
-    table: Floats = np.asarray(scores, float)
-    if table.ndim != 2 or not table.size or not np.isfinite(table).all():
-        raise InvalidInput(f"scores must be finite (runs, tasks), got the shape {table.shape}")
-    return table
-
-
-NOTHING, EVERYTHING = "random", "full"
-"""The rules between which scores are measured where environments differ: 0 and 1."""
-
-
-@dataclass(frozen=True)
-class TrainingRun:
-    """A run: its configuration, what rules score on its validation seeds, its evaluations, and the
-    episodes of all, of which a run of before has none.
-    """
-
-    config: Mapping[str, Any]
-    rules: Mapping[str, Mapping[str, float]]
-    curve: Sequence[Evaluation]
-    episodes: Sequence[EpisodeRow] = ()
-
-    @property
-    def recipe(self) -> str:
-        """What is the same in all runs of a panel: the configuration without seed and length."""
-        told = {**BEFORE, **self.config}
-        return json.dumps(
-            {name: told[name] for name in told if name not in ("seed", *HOW_LONG)}, sort_keys=True
-        )
-
-    @property
-    def closed_loop(self) -> bool:
-        """Whether a first detection has a distance; the return alone is measured otherwise."""
-        return all(distance is not None for *_, distance in self.curve)
-
-    @property
-    def unit(self) -> str:
-        """Of the scores."""
-        if len(self.tasks) > 1:
-            return f"score ({NOTHING} 0, {EVERYTHING} 1)"
-        return "first detection (m; 0 if never)" if self.closed_loop else "return"
-
-    @cached_property
-    def tasks(self) -> list[str]:
-        """The environments that are scored each by itself; one that `NOTHING` plays as well as
-        `EVERYTHING` tells nothing, unless it is the only one.
-        """
-        names = [*dict.fromkeys(row.played.env for row in self.episodes)]
-        if len(names) < 2:
-            return names or [" ".join(np.atleast_1d(self.config["env"]))]
-        low, high = (self._means(rule, 0) for rule in (NOTHING, EVERYTHING))
-        return [name for name in names if name in low and low[name] < high.get(name, -np.inf)]
-
-    @cached_property
-    def marks(self) -> dict[str, Floats]:
-        """(tasks,) what the rules reach by name, measured as `scores`."""
-        if len(self.tasks) > 1:
-            return {rule: self._normalised(rule, 0) for rule in self.rules}
-        scores = self.rules.items()
-        return {
-            name: np.array([s["mean_return"] if s["distance_m"] is None else s["distance_m"]])
-            for name, s in scores
-        }
-
-    @property
-    def steps(self) -> list[int]:
-        """Environment steps at each evaluation."""
-        return [steps for steps, *_ in self.curve]
-
-    @cached_property
-    def scores(self) -> Floats:
-        """(evaluations, tasks) of one environment metres of the first detection, or the return; of
-        several the return between those of `NOTHING` and `EVERYTHING`, which has no unit.
-        """
-        if len(self.tasks) > 1:
-            return np.array([self._normalised(LEARNER, steps) for steps in self.steps])
-        return np.array(
-            [[value if distance is None else distance] for _, _, value, distance in self.curve]
-        )
-
-    def each(self, policy: str, steps: int = 0) -> Floats:
-        """(episodes,) what a policy reached in every episode, by ascending seed, in the unit of
-        `scores` of one environment; of several the return. Nothing where the run does not tell.
-        """
-        metres = len(self.tasks) == 1 and self.closed_loop
-        rows = sorted(
-            (row.played.seed, (row.played.distance_m or 0.0) if metres else row.played.total)
-            for row in self.episodes
-            if (row.policy, row.steps) == (policy, steps)
-        )
-        return np.array([value for _, value in rows])
-
-    def _normalised(self, policy: str, steps: int) -> Floats:
-        low, high, own = (
-            self._means(*one) for one in ((NOTHING, 0), (EVERYTHING, 0), (policy, steps))
-        )
-        try:
-            return np.array([(own[t] - low[t]) / (high[t] - low[t]) for t in self.tasks])
-        except KeyError as error:
-            raise InvalidInput(
-                f"the episodes of a run of seed {self.config['seed']} lack those of {policy} after "
-                f"{steps} steps in {error}"
-            ) from error
-
-    def _means(self, policy: str, steps: int) -> dict[str, float]:
-        """The mean return of a policy by environment."""
-        totals: dict[str, list[float]] = {}
-        for row in self.episodes:
-            if (row.policy, row.steps) == (policy, steps):
-                totals.setdefault(row.played.env, []).append(row.played.total)
-        return {name: float(np.mean(each)) for name, each in totals.items()}
-
-
-def read_run(folder: Path) -> TrainingRun:
-    """The run in a folder. Raises InvalidInput for one without an evaluation."""
-    for name in (CONFIG, RULES, CURVE):
-        if not (folder / name).is_file():
-            raise InvalidInput(f"{folder} holds no evaluated training run: no {name}")
-    run = TrainingRun(
-        read_config(folder / CONFIG),
-        read_rules(folder / RULES),
-        read_curve(folder / CURVE),
-        read_episodes(folder),
-    )
-    if not run.curve:
-        raise InvalidInput(f"{folder} holds no evaluated training run: {CURVE} has no evaluation")
-    return run
-
-
-def grouped_runs(runs: Iterable[TrainingRun]) -> list[list[TrainingRun]]:
-    """The runs of every recipe, in the order of the first."""
-    groups: dict[str, list[TrainingRun]] = {}
-    for run in runs:
-        groups.setdefault(run.recipe, []).append(run)
-    return list(groups.values())
-
-
-def shared_steps(runs: Sequence[TrainingRun]) -> list[int]:
-    """Environment steps at which all runs were evaluated, ascending."""
-    return sorted(set.intersection(*(set(run.steps) for run in runs)))
-
-
-def scores_at(runs: Sequence[TrainingRun], steps: int) -> Floats:
-    """(runs, tasks) the scores of all runs after so many steps. Raises InvalidInput for runs that
-    were scored in different environments.
-    """
-    if any(run.tasks != runs[0].tasks for run in runs):
-        raise InvalidInput(
-            "runs of one recipe were scored in different environments: "
-            + "; ".join(", ".join(run.tasks) or "none" for run in runs)
-        )
-    return np.array([run.scores[run.steps.index(steps)] for run in runs])
-
-
-def recipe_name(config: Mapping[str, Any]) -> str:
-    """The learner, its environments, whether episodes were drawn, and what was left out."""
-    named = Counter(np.atleast_1d(config["env"]).tolist())
-    envs = ", ".join(f"{env} x{often}" if often > 1 else env for env, often in named.items())
-    without = " ".join(config.get("without", ()))
-    drawn = ", drawn" if config.get("drawn") else ""
-    return f"{config['algorithm']}, {envs}{drawn}" + (f", without {without}" if without else "")
-
-
-COLUMNS = ("recipe", "seeds", "steps", "reached", "unit", "ahead of", "time")
-
-
 def curves_table(groups: Sequence[Sequence[TrainingRun]]) -> Table:
-    """A row per recipe."""
+    """What every recipe reached, how soon, and in how long: a row per recipe."""
     return Table(
         "Training runs",
         COLUMNS,
@@ -298,23 +275,23 @@ def _row(runs: Sequence[TrainingRun]) -> tuple[str, ...]:
     if not shared:
         return name, seeds, "-", "-", runs[0].unit, "-", "-"
     reached = [interquartile_mean(scores_at(runs, steps)) for steps in shared]
-    seconds = [dict(zip(run.steps, (row[1] for row in run.curve), strict=True)) for run in runs]
+    seconds = [row["seconds"] for run in runs for row in run.curve if row["steps"] == shared[-1]]
     return (
         name,
         seeds,
         f"{shared[-1]:,}",
         str(reached[-1]),
         runs[0].unit,
-        _ahead(runs, shared, [one.value for one in reached]),
-        rounded_duration(float(np.median([each[shared[-1]] for each in seconds]))),
+        _ahead(runs[0], shared, [one.value for one in reached]),
+        rounded_duration(float(np.median(seconds))),
     )
 
 
-def _ahead(runs: Sequence[TrainingRun], steps: Sequence[int], reached: Sequence[float]) -> str:
+def _ahead(run: TrainingRun, steps: Sequence[int], reached: Sequence[float]) -> str:
     """The rules that are left behind for good, and from when on."""
     told = []
-    for rule, scores in runs[0].marks.items():
-        mark = interquartile_mean(scores[None]).value
+    for rule in run.rules:
+        mark = interquartile_mean(run.scores(rule)[None]).value
         # The last evaluation that is not above the rule; before the first one there is none.
         behind = max((n for n, value in enumerate(reached) if value <= mark), default=-1)
         if behind + 1 < len(steps):

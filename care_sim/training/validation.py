@@ -1,105 +1,19 @@
-"""Episodes of validation seeds, without exploration, and the table of them: `episodes.csv` of a
-run.
+"""Episodes of validation seeds, without exploration."""
 
-A row is an episode of a rule, or of the learner after so many steps. Means hide in which episodes
-a learner is good; performance profiles need each.
-"""
-
-import csv
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import Any, Protocol
 
 import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
 import care_sim
-from care_sim.base.checks import LARGEST_INTEGER, is_number
-from care_sim.base.errors import InvalidInput
-from care_sim.base.files import replacing
-from care_sim.base.json_text import check_file_size
 
-_Row = TypeVar("_Row")
-
-
-def read_table(
-    path: Path, columns: Sequence[str], row_of: Callable[[list[str]], _Row]
-) -> list[_Row]:
-    """The rows of a table, none of one that is not there; `row_of` raises ValueError for one that
-    is damaged. Raises InvalidInput for a damaged file.
-    """
-    if not path.exists():
-        return []
-    try:
-        check_file_size(path)
-        with path.open(newline="", encoding="utf-8") as file:
-            head, *rows = csv.reader(file)
-        if head != [*columns]:
-            raise ValueError(f"its columns are not {', '.join(columns)}")
-        return [row_of(row) for row in rows]
-    except (ValueError, csv.Error) as error:
-        raise InvalidInput(f"{path} is damaged: {error}") from error
-
-
-EPISODES = "episodes.csv"
-LEARNER = "learner"
-"""In the place of a rule's name."""
-_LARGEST_DRAWN = 1e30
-
-
-class Played(NamedTuple):
-    """How an episode was played: the return, and the metres at which the first-sighting actor was
-    detected, 0 where it never was; None in the open loop.
-    """
-
-    seed: int
-    env: str
-    total: float
-    distance_m: float | None
-
-
-class EpisodeRow(NamedTuple):
-    """An episode of the policy of that name; of the learner after so many environment steps."""
-
-    policy: str
-    steps: int
-    played: Played
-
-
-COLUMNS = ("policy", "steps", "seed", "env", "return", "distance_m")
-
-
-def write_episodes(folder: Path, rows: Iterable[EpisodeRow]) -> None:
-    """Write the table anew."""
-    with replacing(folder / EPISODES) as unfinished, unfinished.open("w", newline="") as file:
-        csv.writer(file).writerows(
-            [COLUMNS, *((policy, steps, *played) for policy, steps, played in rows)]
-        )
-
-
-def read_episodes(folder: Path) -> list[EpisodeRow]:
-    """The table of a run; of a run before there was one it is empty. Raises InvalidInput for a
-    damaged file.
-    """
-    return read_table(folder / EPISODES, COLUMNS, _row)
-
-
-def _row(row: Sequence[str]) -> EpisodeRow:
-    """A row of the table. Raises ValueError for what is no number that can be drawn."""
-    policy, steps, seed, env, total, metres = row
-    distance = float(metres) if metres else None
-    numbers = [float(total), *([] if distance is None else [distance])]
-    whole = int(steps), int(seed)
-    if not (
-        all(0 <= number <= LARGEST_INTEGER for number in whole)
-        and all(is_number(number) and abs(number) <= _LARGEST_DRAWN for number in numbers)
-    ):
-        raise ValueError(f"{', '.join(row)} are no numbers of an episode")
-    return EpisodeRow(policy, whole[0], Played(whole[1], env, numbers[0], distance))
-
-
+Row = dict[str, Any]
+"""How an episode was played: `seed`, `env`, `return`, and `distance_m`, the metres at which the
+first-sighting actor was detected, 0 where it never was; None in the open loop.
+"""
 Choose = Callable[[Any, bool], NDArray[np.float32]]
 """The action for an observation. The flag tells that the episode begins with it."""
 
@@ -116,10 +30,8 @@ class Learner(Protocol):
 
 @dataclass(frozen=True)
 class ValidationScore:
-    """Means over episodes: the return, and the first-detection distance.
-
-    That is the distance at which the first-sighting actor was detected, metres; 0 where it never
-    was, None unless every episode has one: in the open loop there is none.
+    """Means over episodes: the return, and the first-detection distance, None unless every episode
+    has one.
     """
 
     episodes: int
@@ -127,11 +39,11 @@ class ValidationScore:
     distance_m: float | None
 
     @classmethod
-    def of(cls, played: Sequence[Played]) -> "ValidationScore":
+    def of(cls, played: Sequence[Row]) -> "ValidationScore":
         """The means of one episode or more."""
-        metres = [one.distance_m for one in played if one.distance_m is not None]
-        mean_m = float(np.mean(metres)) if len(metres) == len(played) else None
-        return cls(len(played), float(np.mean([one.total for one in played])), mean_m)
+        metres = [row["distance_m"] for row in played]
+        mean_m = None if None in metres else float(np.mean(metres))
+        return cls(len(played), float(np.mean([row["return"] for row in played])), mean_m)
 
     def __str__(self) -> str:
         seen = (
@@ -142,7 +54,7 @@ class ValidationScore:
         return f"return {self.mean_return:.2f}{seen}"
 
 
-def play(env: gymnasium.Env[Any, Any], choose: Choose, episodes: Mapping[int, str]) -> list[Played]:
+def play(env: gymnasium.Env[Any, Any], choose: Choose, episodes: Mapping[int, str]) -> list[Row]:
     """Play the episodes of the seeds, whose environments are named."""
     return [_episode(env, choose, seed, name) for seed, name in episodes.items()]
 
@@ -178,7 +90,7 @@ def rule(name: str, env: gymnasium.Env[Any, Any]) -> Choose:
     return choose
 
 
-def _episode(env: gymnasium.Env[Any, Any], choose: Choose, seed: int, name: str) -> Played:
+def _episode(env: gymnasium.Env[Any, Any], choose: Choose, seed: int, name: str) -> Row:
     observation, _ = env.reset(seed=seed)
     total = 0.0
     begins = True
@@ -192,4 +104,4 @@ def _episode(env: gymnasium.Env[Any, Any], choose: Choose, seed: int, name: str)
     # An actor who is never detected counts as 0 m, the worst there is. The open loop has no such
     # distance.
     distance = outcome["detection_distance_m"] or 0.0 if "detection_distance_m" in outcome else None
-    return Played(seed, name, total, distance)
+    return {"seed": seed, "env": name, "return": total, "distance_m": distance}

@@ -9,15 +9,16 @@ import sys
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
-from concurrent.futures import BrokenExecutor, Executor
+from concurrent.futures import Executor
 from contextlib import contextmanager
+from dataclasses import dataclass
 from itertools import islice
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from care_sim.base.errors import InvalidInput, print_lines, report_problems
-from care_sim.base.exit_codes import FAILED
+from care_sim.base.bounds import bounded
+from care_sim.base.errors import print_lines
 from care_sim.base.extras import import_torch
 from care_sim.base.files import ZIP, check_output
 from care_sim.base.seed_ranges import TRAINING, VALIDATION
@@ -29,18 +30,16 @@ from care_sim.perception.pillars.decoding import Peaks, peaks_of
 from care_sim.perception.pillars.detector import CALIBRATION, LEAST_SCORE, save_detector
 from care_sim.sensors.annotated import Annotations
 from care_sim.study.executors import Processes, processes
-from care_sim.study.progress import Show, rounded_duration, shown_progress
 from care_sim.study.provenance import machine_line, package_versions
-from care_sim.study.runner import DIED
-from care_sim.training.supervised.config import DetectorConfig, how_to_play
 from care_sim.training.supervised.detector_data import (
     Example,
     Targets,
     loss,
     play,
     targets_of,
-    within_plan,
+    turned_example,
 )
+from care_sim.training.supervised.fit import FitConfig, fit, print_end
 
 if TYPE_CHECKING:
     from care_sim.training.supervised.detector_network import Learning
@@ -55,6 +54,174 @@ NEWTON_STEPS = 30
 RIDGE = 1e-3
 """Keeps the fit finite where all peaks above some logit are right."""
 
+BATCH = 4
+"""Scans per gradient."""
+LEARNING_RATE = 2e-3
+"""Of AdamW, at its highest."""
+WEIGHT_DECAY = 0.01
+STEEPEST = 10.0
+"""The longest gradient; longer ones are shortened to it."""
+SHUFFLED = 512
+"""Examples from which a batch is drawn: those of some twenty plays, so that a batch holds several
+streets."""
+AHEAD = 4
+"""Plays that are under way before they are needed."""
+RISING = 0.05
+"""Share of the steps in which the rate of learning rises."""
+CURVE_STEPS = 250
+"""Steps between two points of the curve that the card tells, after which the weights are written,
+too."""
+CALIBRATING = range(VALIDATION, VALIDATION + 24)
+HELD_OUT = range(VALIDATION + 24, VALIDATION + 48)
+"""Seeds of plays that nothing is learned from: those that scores are fitted to, and those by which
+the card tells what was reached."""
+
+
+@dataclass(frozen=True)
+class DetectorConfig(FitConfig):
+    """Train the detector `pillars` on generated streets and drives.
+
+    It writes a file of weights; needs the extra `rl`.
+    """
+
+    steps: int = bounded(10_000, 1, 1_000_000)
+    """Batches of four scans that are learned from."""
+
+
+def train_pillars(config: DetectorConfig) -> int:
+    """Train the detector and write its weights; returns the exit code of the command."""
+    torch = import_torch()
+    from care_sim.training.supervised.detector_network import Learning
+
+    check_output(config.out, ZIP)
+    started = time.perf_counter()
+    torch.manual_seed(config.seed)
+    network = Learning()
+
+    def save(
+        losses: list[float], calibration: Floats = PLAIN, result: dict[str, float] | None = None
+    ) -> None:
+        arrays = network.arrays() | {CALIBRATION: calibration.astype(np.float32)}
+        save_detector(config.out, arrays, _card(config, network, losses, result))
+
+    def keep(losses: list[float]) -> None:
+        # Whatever ends the learning, or the check of it, what was learned until then is kept.
+        if len(losses) % CURVE_STEPS == 0 or len(losses) == config.steps:
+            save(losses)
+
+    with one_thread(torch), _player() as executor:
+        print_lines(f"playing {SHUFFLED} scans before the first step", file=sys.stderr)
+        batches = _batches(played(executor, TRAINING), np.random.default_rng(config.seed))
+        losses = train_detector(network, batches, config.steps, keep)
+        network.eval()
+        count = len(CALIBRATING) + len(HELD_OUT)
+        print_lines(f"checking {config.out} on {count} further plays", file=sys.stderr)
+        fitted, apart = (
+            [example for examples in executor.map(play, seeds) for example in examples]
+            for seeds in (CALIBRATING, HELD_OUT)
+        )
+        calibration = calibration_of(scores_by_scan(network, fitted))
+        result = judged(scores_by_scan(network, apart, calibration))
+    save(losses, calibration, result)
+    play_with = ("street", "--detector", "pillars", "--detector-parameters", f"file={config.out}")
+    print_end(config.out, started, result, *play_with)
+    return 0
+
+
+def train_detector(
+    network: "Learning",
+    batches: Iterator[list[Example]],
+    steps: int,
+    after: Callable[[list[float]], None] = lambda _losses: None,
+) -> list[float]:
+    """Let the network learn from so many batches; see `care_sim.training.supervised.fit.fit`."""
+    torch = import_torch()
+    network.train()
+    optimizer = torch.optim.AdamW(network.parameters(), lr=LEARNING_RATE, weight_decay=WEIGHT_DECAY)
+
+    def shorten(*_: object) -> None:
+        torch.nn.utils.clip_grad_norm_(network.parameters(), STEEPEST)
+
+    optimizer.register_step_pre_hook(shorten)
+    # Of so few steps that the rate would rise in one at most it rises in none: PyTorch divides by
+    # the steps after the first in which it does.
+    rising = RISING if RISING * steps > 1 else 0.0
+    schedule = torch.optim.lr_scheduler.OneCycleLR(
+        optimizer, LEARNING_RATE, total_steps=steps, pct_start=rising, cycle_momentum=False
+    )
+
+    def off(batch: list[Example]) -> Any:
+        return loss(torch, network(batch), Targets(*map(torch.from_numpy, targets_of(batch))))
+
+    return fit(off, batches, steps, (optimizer, schedule), after)
+
+
+def played(executor: Executor, first: int) -> Iterator[Example]:
+    """The examples of the plays of seeds from `first` on, in order, without end."""
+    under_way = deque(executor.submit(play, first + number) for number in range(AHEAD))
+    while True:
+        first += 1
+        examples = under_way.popleft().result()
+        under_way.append(executor.submit(play, first + AHEAD - 1))
+        yield from examples
+
+
+@contextmanager
+def _player() -> Iterator[Executor]:
+    """One process that plays. What it is still at when all is learned, or when the learning is
+    broken off, nobody waits for.
+    """
+    executor = processes(1)
+    try:
+        yield executor
+    finally:
+        if isinstance(executor, Processes):
+            executor.end_at_once()
+        executor.shutdown(cancel_futures=True)
+
+
+def _batches(examples: Iterator[Example], rng: np.random.Generator) -> Iterator[list[Example]]:
+    """Batches of examples, turned, each drawn from SHUFFLED that wait, whose places others take."""
+    waiting = [*islice(examples, SHUFFLED)]
+    while True:
+        batch = []
+        for place in rng.choice(len(waiting), BATCH, replace=False).tolist():
+            batch.append(turned_example(waiting[place], rng))
+            waiting[place] = next(examples)
+        yield batch
+
+
+def _card(
+    made: DetectorConfig,
+    network: "Learning",
+    losses: list[float],
+    result: dict[str, float] | None,
+) -> dict[str, Any]:
+    """What the file says of itself; without a `result` nobody has checked the weights."""
+    numbers = sum(array.size for array in network.arrays().values())
+    parts = [losses[n : n + CURVE_STEPS] for n in range(0, len(losses), CURVE_STEPS)]
+    return {
+        "kind": "pillars",
+        "network": f"{numbers} numbers",
+        "data": f"{len(losses) * BATCH} scans of generated streets and drives, of every budget, by "
+        "the policies that know any grid; see care_sim.training.supervised.detector_data",
+        "seeds": {
+            "training from": TRAINING,
+            "calibration of scores": [CALIBRATING[0], CALIBRATING[-1]],
+            "held out": [HELD_OUT[0], HELD_OUT[-1]],
+            "training": made.seed,
+        },
+        "steps": len(losses),
+        "steps asked for": made.steps,
+        "batch": BATCH,
+        "curve": [round(float(np.mean(part)), 3) for part in parts],
+        "result": "not checked, scores not calibrated"
+        if result is None
+        else {name: round(value, 4) for name, value in result.items()},
+        "machine": machine_line(),
+        "versions": package_versions("care-sim", "numpy", "torch"),
+    }
+
 
 class Judged(NamedTuple):
     """The peaks of a scan, `right` (n,) those that serve an object, and how many `objects` with
@@ -68,9 +235,10 @@ class Judged(NamedTuple):
 
 
 def scores_by_scan(
-    torch: Any, network: "Learning", examples: list[Example], calibration: Floats = PLAIN
+    network: "Learning", examples: list[Example], calibration: Floats = PLAIN
 ) -> list[Judged]:
     """What the network makes of every example."""
+    torch = import_torch()
     made = []
     for one in examples:
         with torch.no_grad():
@@ -140,242 +308,3 @@ def _fitted(logits: Floats, hits: Mask) -> Floats:
 
 if TYPE_CHECKING:
     from care_sim.training.supervised.detector_network import Learning
-
-BATCH = 4
-"""Scans per gradient."""
-LEARNING_RATE = 2e-3
-"""Of AdamW, at its highest."""
-WEIGHT_DECAY = 0.01
-STEEPEST = 10.0
-"""The longest gradient; longer ones are shortened to it."""
-SHUFFLED = 512
-"""Examples from which a batch is drawn: those of some twenty plays, so that a batch holds several
-streets."""
-AHEAD = 4
-"""Plays that are under way before they are needed."""
-MOST_TURN = 0.4
-"""Radians by which a scan is turned for the learning, either way; every second one is mirrored,
-too. Generated streets are mostly straight."""
-RISING = 0.05
-"""Share of the steps in which the rate of learning rises."""
-CURVE_STEPS = 250
-"""Steps between two points of the curve that the card tells, after which the weights are written,
-too."""
-CALIBRATING = range(VALIDATION, VALIDATION + 24)
-HELD_OUT = range(VALIDATION + 24, VALIDATION + 48)
-"""Seeds of plays that nothing is learned from: those that scores are fitted to, and those by which
-the card tells what was reached."""
-
-
-def train_pillars(config: DetectorConfig) -> int:
-    """Train the detector and write its weights; returns the exit code of the command."""
-    torch = import_torch()
-    from care_sim.training.supervised.detector_network import Learning
-
-    check_output(config.out, ZIP)
-    started = time.perf_counter()
-    torch.manual_seed(config.seed)
-    network = Learning()
-    kept = 0
-
-    def keep(curve: list[float], steps: int) -> None:
-        nonlocal kept
-        _save(config, network, curve, steps, PLAIN)
-        kept = steps
-
-    # Whatever ends the learning, or the check of it, what was learned until then is in the
-    # file.
-    try:
-        with one_thread(torch), _player() as executor:
-            waiting = _waiting(played(executor, TRAINING))
-            batches = _batches(*waiting, np.random.default_rng(config.seed))
-            with shown_progress(config.steps, "steps") as show:
-                curve = train_detector(torch, network, batches, config.steps, keep, show)
-            network.eval()
-            _say(f"checking on {len(CALIBRATING) + len(HELD_OUT)} further plays")
-            fitted, apart = (
-                [example for examples in executor.map(play, seeds) for example in examples]
-                for seeds in (CALIBRATING, HELD_OUT)
-            )
-            calibration = calibration_of(scores_by_scan(torch, network, fitted))
-            result = judged(scores_by_scan(torch, network, apart, calibration))
-    except BaseException as error:
-        if kept:
-            _say(f"{config.out} holds what {kept} steps have taught, not checked")
-        if isinstance(error, BrokenExecutor):
-            report_problems([f"{DIED} that plays what is learned from"])
-            return FAILED
-        raise
-    _save(config, network, curve, config.steps, calibration, result)
-    told = ", ".join(f"{name} {value:.3f}" for name, value in result.items())
-    print_lines(f"{config.out}: {told}; {time.perf_counter() - started:.0f} s")
-    file = f"file={config.out}"
-    print_lines(
-        how_to_play("run", "street", "--detector", "pillars", "--detector-parameters", file)
-    )
-    return 0
-
-
-def _save(
-    config: DetectorConfig,
-    network: "Learning",
-    curve: list[float],
-    steps: int,
-    calibration: Floats,
-    result: dict[str, float] | None = None,
-) -> None:
-    """Write what was learned in so many steps; without a `result` nobody has checked it."""
-    arrays = network.arrays() | {CALIBRATION: calibration.astype(np.float32)}
-    save_detector(config.out, arrays, _card(config, network, curve, steps, result))
-
-
-def train_detector(
-    torch: Any,
-    network: "Learning",
-    batches: Iterator[list[Example]],
-    steps: int,
-    keep: Callable[[list[float], int], None] = lambda curve, steps: None,
-    show: Show = lambda steps, told: None,
-) -> list[float]:
-    """Let the network learn from so many batches. Returns the mean loss of every CURVE_STEPS, which
-    `keep` is handed every time, with the steps so far, and after the last step. `show` is told of
-    every step.
-
-    Raises InvalidInput where the loss is no number any more.
-    """
-    network.train()
-    optimizer = torch.optim.AdamW(network.parameters(), lr=LEARNING_RATE, weight_decay=WEIGHT_DECAY)
-    # Of so few steps that the rate would rise in one at most it rises in none: PyTorch divides by
-    # the steps after the first in which it does.
-    rising = RISING if RISING * steps > 1 else 0.0
-    schedule = torch.optim.lr_scheduler.OneCycleLR(
-        optimizer, LEARNING_RATE, total_steps=steps, pct_start=rising, cycle_momentum=False
-    )
-    losses: list[float] = []
-    started = time.monotonic()
-    for step, batch in zip(range(steps), batches, strict=False):
-        wanted = Targets(*map(torch.from_numpy, targets_of(batch)))
-        off = loss(torch, network(batch), wanted)
-        # Every later step would be no number, either.
-        if not torch.isfinite(off):
-            raise InvalidInput(
-                f"the training diverged: the loss of step {step + 1} is {off.item()}; another "
-                "--seed may do better"
-            )
-        optimizer.zero_grad()
-        off.backward()
-        torch.nn.utils.clip_grad_norm_(network.parameters(), STEEPEST)
-        optimizer.step()
-        schedule.step()
-        losses.append(off.item())
-        left = (time.monotonic() - started) / (step + 1) * (steps - step - 1)
-        lately = np.mean(losses[-CURVE_STEPS:])
-        show(step + 1, f"loss {lately:.3f}, {rounded_duration(left)} left")
-        if (step + 1) % CURVE_STEPS == 0 or step + 1 == steps:
-            keep(_curve(losses), step + 1)
-    return _curve(losses)
-
-
-def _say(line: str) -> None:
-    print_lines(line, file=sys.stderr)
-
-
-def _curve(losses: list[float]) -> list[float]:
-    parts = [losses[n : n + CURVE_STEPS] for n in range(0, len(losses), CURVE_STEPS)]
-    return [round(float(np.mean(part)), 3) for part in parts]
-
-
-def played(executor: Executor, first: int) -> Iterator[Example]:
-    """The examples of the plays of seeds from `first` on, in order, without end."""
-    under_way = deque(executor.submit(play, first + number) for number in range(AHEAD))
-    while True:
-        first += 1
-        examples = under_way.popleft().result()
-        under_way.append(executor.submit(play, first + AHEAD - 1))
-        yield from examples
-
-
-@contextmanager
-def _player() -> Iterator[Executor]:
-    """One process that plays. What it is still at when all is learned, or when the learning is
-    broken off, nobody waits for.
-    """
-    executor = processes(1)
-    try:
-        yield executor
-    finally:
-        if isinstance(executor, Processes):
-            executor.end_at_once()
-        executor.shutdown(cancel_futures=True)
-
-
-def _waiting(examples: Iterator[Example]) -> tuple[list[Example], Iterator[Example]]:
-    """The first SHUFFLED examples, and those after them."""
-    with shown_progress(SHUFFLED, "scans played before the first step") as show:
-        first = []
-        for example in islice(examples, SHUFFLED):
-            first.append(example)
-            show(len(first), "")
-    return first, examples
-
-
-def _batches(
-    waiting: list[Example], examples: Iterator[Example], rng: np.random.Generator
-) -> Iterator[list[Example]]:
-    """Batches of examples, turned, each drawn from those that wait, whose places others take."""
-    while True:
-        batch = []
-        for place in rng.choice(len(waiting), BATCH, replace=False).tolist():
-            batch.append(turned_example(waiting[place], rng))
-            waiting[place] = next(examples)
-        yield batch
-
-
-def turned_example(example: Example, rng: np.random.Generator) -> Example:
-    """The example as another way of the sensor would have it: mirrored or not, and turned. What
-    stood in a corner of the plan may stand beside it then, and is left out.
-    """
-    side = float(rng.choice([-1.0, 1.0]))
-    turn = float(rng.uniform(-MOST_TURN, MOST_TURN))
-    cos, sin = np.cos(turn), np.sin(turn)
-    matrix = np.array([[cos, -sin * side], [sin, cos * side]])
-    points, boxes = example.points.copy(), example.boxes.copy()
-    points[:, :2] = points[:, :2] @ matrix.T.astype(np.float32)
-    boxes[:, :2] = boxes[:, :2] @ matrix.T
-    boxes[:, 6] = side * boxes[:, 6] + turn
-    kept = within_plan(boxes)
-    return Example(
-        points, example.sensor_height_m, example.classes[kept], boxes[kept], example.full
-    )
-
-
-def _card(
-    made: DetectorConfig,
-    network: "Learning",
-    curve: list[float],
-    steps: int,
-    result: dict[str, float] | None,
-) -> dict[str, Any]:
-    numbers = sum(array.size for array in network.arrays().values())
-    return {
-        "kind": "pillars",
-        "network": f"{numbers} numbers",
-        "data": f"{steps * BATCH} scans of generated streets and drives, of "
-        "every budget, by the policies that know any grid; see "
-        "care_sim.training.supervised.detector_data",
-        "seeds": {
-            "training from": TRAINING,
-            "calibration of scores": [CALIBRATING[0], CALIBRATING[-1]],
-            "held out": [HELD_OUT[0], HELD_OUT[-1]],
-            "training": made.seed,
-        },
-        "steps": steps,
-        "steps asked for": made.steps,
-        "batch": BATCH,
-        "curve": curve,
-        "result": "not checked, scores not calibrated"
-        if result is None
-        else {name: round(value, 4) for name, value in result.items()},
-        "machine": machine_line(),
-        "versions": package_versions("care-sim", "numpy", "torch"),
-    }

@@ -61,6 +61,9 @@ SHARE_KEPT = 1 / 3
 RARE = (CLASSES.index("bus"), CLASSES.index("bicycle"))
 """Of the objects of the streets under 1 and 3 in a hundred: a keyframe with a return of one
 always becomes an example."""
+MOST_TURN = 0.4
+"""Radians by which a scan is turned for the learning, either way; every second one is mirrored,
+too. Generated streets are mostly straight."""
 DRIVE_KEYFRAME_S = 0.5
 """As far apart as those of a street."""
 _ROUND_BOX_M = 0.2
@@ -175,6 +178,24 @@ def _example(points: Floats, sensor_height_m: float, present: Annotations, full:
 def within_plan(boxes: Floats) -> Mask:
     """(n,) which of boxes (n, 7) have their middle on the plan."""
     return np.asarray(np.abs(boxes[:, :2]).max(axis=1, initial=0) < REACH_M)
+
+
+def turned_example(example: Example, rng: np.random.Generator) -> Example:
+    """The example as another way of the sensor would have it: mirrored or not, and turned. What
+    stood in a corner of the plan may stand beside it then, and is left out.
+    """
+    side = float(rng.choice([-1.0, 1.0]))
+    turn = float(rng.uniform(-MOST_TURN, MOST_TURN))
+    cos, sin = np.cos(turn), np.sin(turn)
+    matrix = np.array([[cos, -sin * side], [sin, cos * side]])
+    points, boxes = example.points.copy(), example.boxes.copy()
+    points[:, :2] = points[:, :2] @ matrix.T.astype(np.float32)
+    boxes[:, :2] = boxes[:, :2] @ matrix.T
+    boxes[:, 6] = side * boxes[:, 6] + turn
+    kept = within_plan(boxes)
+    return Example(
+        points, example.sensor_height_m, example.classes[kept], boxes[kept], example.full
+    )
 
 
 SPREAD_M = (0.8, 1.6)

@@ -23,17 +23,19 @@ evaluation's train it, and no more. The rest was decided before a result was see
   other.
 """
 
-import sys
 import time
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
+from functools import partial
+from itertools import product
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.array_files import Arrays
-from care_sim.base.errors import print_lines
+from care_sim.base.bounds import bounded
+from care_sim.base.checks import LARGEST_INTEGER
 from care_sim.base.extras import import_torch
 from care_sim.base.files import ZIP, check_output
 from care_sim.base.seed_ranges import TRAINING, VALIDATION
@@ -42,19 +44,17 @@ from care_sim.core.arrays import Mask
 from care_sim.core.belief import Belief
 from care_sim.core.boxes import planar_ranges
 from care_sim.core.conditions import MIN_RETURNS
-from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.grid import Cells
 from care_sim.envs.open_loop import FilmEnv
 from care_sim.evaluation.sightings import RANGE_M
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.open_loop import OpenLoop
 from care_sim.policies.learned.cell_inputs import CellInputs, Float32s
-from care_sim.policies.learned.weights import Card, save_weights
+from care_sim.policies.learned.weights import save_weights
 from care_sim.policies.paper.tracks import History
-from care_sim.sensors.setups import DEFAULT_SETUP, sensor_setup
 from care_sim.sources.street_films import street_film
 from care_sim.streets.street import CALIBRATION_SEEDS
-from care_sim.study.provenance import machine_line, package_versions
-from care_sim.training.supervised.config import ScorerConfig, how_to_play
+from care_sim.training.supervised.fit import FitConfig, adam, card_of, fit, one_by_one, print_end
 from care_sim.training.supervised.worlds import (
     LEAST_BUDGET,
     MOST_BUDGET,
@@ -77,6 +77,20 @@ OTHER_CELLS = 200
 
 
 @dataclass(frozen=True)
+class ScorerConfig(FitConfig):
+    """Train `learned-scorer` on the 20 calibration streets, or in worlds that differ.
+
+    It writes a file of weights; needs the extra `rl`.
+    """
+
+    steps: int = bounded(4000, 1, LARGEST_INTEGER)
+    """Batches that are learned from."""
+    drawn: bool = False
+    """Learn from drives, tests of Euro NCAP and streets of training seeds, with budgets and faults
+    of the camera drawn for every play, instead of from the calibration streets."""
+
+
+@dataclass(frozen=True)
 class Examples:
     """Cells to learn from."""
 
@@ -91,15 +105,12 @@ class Examples:
         return len(self.positive)
 
 
-def examples(seeds: Iterable[int]) -> Iterator[Examples]:
-    """The examples of the streets of some seeds, one play at a time."""
-    for seed in seeds:
-        film = street_film(seed)
-        for number, (shown, budget) in enumerate(
-            (shown, b) for shown in (film, front_alone(film)) for b in SCORER_BUDGETS
-        ):
-            rng = np.random.default_rng([seed, number])
-            yield _joined([*_play(FilmEnv(shown, budget=budget), seed, rng)])
+def examples(seed: int) -> Iterator[Examples]:
+    """The examples of the street of a seed, one play at a time."""
+    film = street_film(seed)
+    for number, (shown, budget) in enumerate(product((film, front_alone(film)), SCORER_BUDGETS)):
+        rng = np.random.default_rng([seed, number])
+        yield _joined([*_play(FilmEnv(shown, budget=budget), seed, rng)])
 
 
 def drawn_examples(kind: str, seed: int) -> Iterator[Examples]:
@@ -176,16 +187,20 @@ HIDDEN_UNITS = 16
 """As many as score a keyframe within half a millisecond on one core."""
 BATCH = 4096
 """Cells per gradient."""
-LEARNING_RATE = 3e-3
-"""Of Adam, at the first step."""
-HELD_OUT = tuple(range(2000, 2004))
-"""Streets that belong neither to the calibration nor to the evaluation. The card tells the loss on
-them.
+STREETS: Mapping[str, tuple[int, ...]] = {
+    "calibration": CALIBRATION_SEEDS,
+    "held out": tuple(range(2000, 2004)),
+}
+"""Seeds of streets to learn from, and of those that belong neither to the calibration nor to the
+evaluation. The card tells the loss on both.
 """
-DRAWN: Mapping[str, int] = {"drive": 48, "ncap": 144, "street": 8}
-"""Worlds of training seeds with `--drawn`: about 6,500 keyframes, 2,560 of them of streets."""
-DRAWN_HELD_OUT: Mapping[str, int] = {"drive": 6, "ncap": 18, "street": 1}
-"""Worlds of validation seeds, for the loss that the card tells."""
+DRAWN: Mapping[str, tuple[int, Mapping[str, int]]] = {
+    "learned": (TRAINING, {"drive": 48, "ncap": 144, "street": 8}),
+    "held out": (VALIDATION, {"drive": 6, "ncap": 18, "street": 1}),
+}
+"""With `--drawn`, the first seed and how many worlds of each kind: about 6,500 keyframes to learn
+from, 2,560 of them of streets.
+"""
 
 
 def train_learned_scorer(config: ScorerConfig) -> int:
@@ -193,16 +208,21 @@ def train_learned_scorer(config: ScorerConfig) -> int:
     import_torch()
     check_output(config.out, ZIP)
     started = time.perf_counter()
-    data = _drawn() if config.drawn else _streets()
+    data, told = _drawn_lessons() if config.drawn else _street_lessons()
     arrays, losses = train_scorer(data, config.seed, config.steps)
-    save_weights(config.out, arrays, _card(config, next(iter(data.values())), losses))
-    told = ", ".join(f"{name} {loss:.4f}" for name, loss in losses.items())
-    took = f"{time.perf_counter() - started:.0f} s"
-    print_lines(f"{config.out}: loss {told}; {took}", how_to_play("run", config.out))
+    learned = next(iter(data.values()))
+    cells = f"{len(learned)} cells, {int(learned.positive.sum())} of them positive, of "
+    card = card_of(
+        "learned-scorer",
+        scenario=told["scenario"],
+        data=f"{cells}{told['data']}; {OTHER_CELLS} others per keyframe",
+        seeds=told["seeds"] | {"training": config.seed},
+        steps=config.steps,
+        result={f"loss {name}": round(loss, 5) for name, loss in losses.items()},
+    )
+    save_weights(config.out, arrays, card)
+    print_end(config.out, started, card.result, str(config.out))
     return 0
-
-
-_STREETS = {"calibration": CALIBRATION_SEEDS, "held out": HELD_OUT}
 
 
 def train_scorer(
@@ -220,42 +240,36 @@ def train_scorer(
             torch.nn.ReLU(),
             torch.nn.Linear(HIDDEN_UNITS, 1, bias=False),
         )
-        _descend(torch, network, learned, np.random.default_rng(seed), steps)
-        losses = {name: _loss_of(torch, network, cells) for name, cells in data.items()}
+        batches = _batches(np.random.default_rng(seed), len(learned))
+        fit(partial(_loss, network, learned), batches, steps, adam(network.parameters(), steps))
+        with torch.no_grad():
+            losses = {
+                name: float(_loss(network, cells, np.arange(len(cells))))
+                for name, cells in data.items()
+            }
     # PyTorch holds (units, inputs); the policy multiplies inputs (n, inputs) from the left.
     layer, bias, out = (parameter.detach().numpy() for parameter in network.parameters())
     return {"layer": layer.T, "bias": bias, "out": out[0]}, losses
 
 
-def _descend(
-    torch: Any, network: Any, learned: Examples, rng: np.random.Generator, steps: int
-) -> None:
-    optimizer = torch.optim.Adam(network.parameters(), lr=LEARNING_RATE)
-    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, steps)
-    for rows in _batches(rng, len(learned), steps):
-        optimizer.zero_grad()
-        _loss(torch, network, learned, rows).backward()
-        optimizer.step()
-        schedule.step()
-
-
-def _batches(rng: np.random.Generator, count: int, steps: int) -> Iterator[NDArray[np.int64]]:
-    """Rows (n,) of `steps` batches.
+def _batches(rng: np.random.Generator, count: int) -> Iterator[NDArray[np.int64]]:
+    """Rows (n,) of batches without end.
 
     Each pass over the examples is in random order; what does not fill a batch at its end is left
     out.
     """
     size = min(BATCH, count)
     order = np.empty(0, np.int64)
-    for _ in range(steps):
+    while True:
         if len(order) < size:
             order = rng.permutation(count)
         batch, order = np.split(order, [size])
         yield batch
 
 
-def _loss(torch: Any, network: Any, data: Examples, rows: NDArray[np.int64]) -> Any:
+def _loss(network: Any, data: Examples, rows: NDArray[np.int64]) -> Any:
     """The weighted logistic loss over some examples."""
+    torch = import_torch()
     inputs, positive, weights = (
         torch.from_numpy(column[rows]) for column in (data.inputs, data.positive, data.weights)
     )
@@ -264,74 +278,40 @@ def _loss(torch: Any, network: Any, data: Examples, rows: NDArray[np.int64]) -> 
     return torch.nn.functional.binary_cross_entropy_with_logits(scores, positive.float(), weights)
 
 
-def _loss_of(torch: Any, network: Any, data: Examples) -> float:
-    with torch.no_grad():
-        return float(_loss(torch, network, data, np.arange(len(data))))
+def _street_lessons() -> tuple[dict[str, Examples], dict[str, Any]]:
+    """The examples of streets by name, and what the card says of them."""
+    data = {
+        name: balanced(
+            part for seed in one_by_one(seeds, f"{name} street") for part in examples(seed)
+        )
+        for name, seeds in STREETS.items()
+    }
+    budgets = ", ".join(f"{budget:g}" for budget in SCORER_BUDGETS)
+    return data, {
+        "scenario": "CARE-Street-v0",
+        "data": f"generated streets under history at {budgets} of the cells, with six cameras and "
+        "with the front one",
+        "seeds": {name: list(seeds) for name, seeds in STREETS.items()},
+    }
 
 
-def _streets() -> dict[str, Examples]:
-    return {name: _gathered(name, seeds) for name, seeds in _STREETS.items()}
-
-
-def _gathered(name: str, seeds: tuple[int, ...]) -> Examples:
-    plays: list[Examples] = []
-    for number, seed in enumerate(seeds, 1):
-        print(f"{name} street {number} of {len(seeds)}", end="\r", file=sys.stderr, flush=True)
-        plays += examples([seed])
-    return balanced(plays)
-
-
-def _drawn() -> dict[str, Examples]:
-    return {
+def _drawn_lessons() -> tuple[dict[str, Examples], dict[str, Any]]:
+    """The same of worlds that differ."""
+    data = {
         name: balanced(
             part
             for kind, seed in seeds_of_worlds(worlds, first)
             for part in drawn_examples(kind, seed)
         )
-        for name, (worlds, first) in _drawn_worlds().items()
+        for name, (first, worlds) in DRAWN.items()
     }
-
-
-def _drawn_worlds() -> dict[str, tuple[Mapping[str, int], int]]:
-    return {"learned": (DRAWN, TRAINING), "held out": (DRAWN_HELD_OUT, VALIDATION)}
-
-
-def _card(made: ScorerConfig, learned: Examples, losses: dict[str, float]) -> Card:
-    positive = int(learned.positive.sum())
-    scenario, of, seeds = _told_of_drawn() if made.drawn else _told_of_streets()
-    return Card(
-        "learned-scorer",
-        AngularGrid(),
-        setup=sensor_setup(DEFAULT_SETUP).label,
-        scenario=scenario,
-        data=f"{len(learned)} cells, {positive} of them positive, of {of}; "
-        f"{OTHER_CELLS} others per keyframe",
-        seeds=seeds | {"training": made.seed},
-        steps=made.steps,
-        machine=machine_line(),
-        versions=package_versions("care-sim", "numpy", "torch"),
-        result={f"loss {name}": round(loss, 5) for name, loss in losses.items()},
-    )
-
-
-def _told_of_streets() -> tuple[str, str, dict[str, Any]]:
-    budgets = ", ".join(f"{budget:g}" for budget in SCORER_BUDGETS)
-    return (
-        "CARE-Street-v0",
-        f"generated streets under history at {budgets} of the cells, with six cameras and with the "
-        "front one",
-        {name: list(seeds) for name, seeds in _STREETS.items()},
-    )
-
-
-def _told_of_drawn() -> tuple[str, str, dict[str, Any]]:
-    worlds = ", ".join(f"{count} of {kind}" for kind, count in DRAWN.items())
-    return (
-        SCENARIOS,
-        f"worlds {worlds} under history at {LEAST_BUDGET:g} to {MOST_BUDGET:g} of the cells, with "
-        "faults of the camera, streets with six cameras and with the front one",
-        {
+    learned = ", ".join(f"{count} of {kind}" for kind, count in DRAWN["learned"][1].items())
+    return data, {
+        "scenario": SCENARIOS,
+        "data": f"worlds {learned} under history at {LEAST_BUDGET:g} to {MOST_BUDGET:g} of the "
+        "cells, with faults of the camera, streets with six cameras and with the front one",
+        "seeds": {
             name: [first, first + max(worlds.values()) - 1]
-            for name, (worlds, first) in _drawn_worlds().items()
+            for name, (first, worlds) in DRAWN.items()
         },
-    )
+    }

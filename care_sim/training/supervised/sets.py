@@ -29,54 +29,101 @@ form of any other, and acts as such.
 
 import sys
 import time
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from care_sim.base.array_files import Arrays
+from care_sim.base.bounds import bounded
+from care_sim.base.checks import LARGEST_INTEGER, check_known
 from care_sim.base.errors import print_lines
 from care_sim.base.extras import import_torch
 from care_sim.base.files import ZIP, check_output
 from care_sim.base.seed_ranges import TRAINING, VALIDATION
 from care_sim.base.torch_threads import one_thread
-from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
 from care_sim.policies.learned.learned_sets import STEPS, LearnedSets
 from care_sim.policies.learned.set_items import ITEM_INPUTS, MIRRORED, STRIP_INPUTS, ItemReader
 from care_sim.policies.learned.weights import Card, save_weights
-from care_sim.sensors.setups import DEFAULT_SETUP, sensor_setup
-from care_sim.study.provenance import machine_line, package_versions
-from care_sim.training.supervised.config import SetsConfig, how_to_play
+from care_sim.training.supervised.fit import FitConfig, adam, card_of, fit, print_end
 from care_sim.training.supervised.sets_data import Example, play
 from care_sim.training.supervised.worlds import SCENARIOS, seeds_of_worlds
 
+Part = Literal["attention", "inputs", "place", "faults"]
 KIND = ("is a camera box", "explained")
 """The inputs that tell an item's kind."""
-
-
-def kept_weights(without: Collection[str]) -> Arrays:
-    """By the name of an array, 1 for the weights that learn and 0 for those that are taken away, of
-    a form that can be multiplied with it. Arrays of which all is kept are not named, nor is the
-    map, of which one chance is left.
-    """
-    kept: Arrays = {}
-    if "attention" in without:
-        kept["value"] = np.zeros(1, np.float32)
-    if "inputs" in without:
-        kept["first"] = np.isin(ITEM_INPUTS, KIND).astype(np.float32)[:, None]
-        kept["strip"] = np.zeros((len(STRIP_INPUTS), 1), np.float32)
-    return kept
-
-
 UNITS, WIDTH, STRIP_UNITS = 48, 16, 16
 KEYFRAMES = 64
 """Per gradient."""
-LEARNING_RATE = 3e-3
-"""Of Adam, at the first step."""
 RARE = 0.001
 """About the chance of a strip, from which the map begins."""
+ROUNDS: tuple[Mapping[str, int], ...] = (
+    {"drive": 24, "ncap": 48, "street": 10},
+    {"drive": 48, "ncap": 96, "street": 20},
+)
+"""How many worlds of each kind are played in each round."""
+HELD_OUT: Mapping[str, int] = {"drive": 4, "ncap": 8, "street": 2}
+"""Worlds of validation seeds, played as in the second round; the card tells the loss on them."""
+
+
+@dataclass(frozen=True)
+class SetsConfig(FitConfig):
+    """Train `learned-sets` on drives, Euro NCAP tests and streets of training seeds.
+
+    It writes a file of weights, also at the end of the first round; needs the extra `rl`.
+    """
+
+    steps: int = bounded(3000, 1, LARGEST_INTEGER)
+    """Batches that are learned from in each round."""
+    without: tuple[Part, ...] = ()
+    """What to leave out, to see what it is worth: what an item is told of the others; all that is
+    told of it but its kind; the map of places; faults of the camera."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for part in self.without:
+            check_known("part to be without", part, get_args(Part))
+
+
+def train_sets(config: SetsConfig) -> int:
+    """Train the policy and write its weights; returns the exit code of the command."""
+    import_torch()
+    check_output(config.out, ZIP)
+    started = time.perf_counter()
+    places = int(ItemReader(Rig(), 1).places.max()) + 1
+    examples: list[Example] = []
+    first = TRAINING
+    for number, worlds in enumerate(ROUNDS, 1):
+        own = config.out if number > 1 else None
+        examples += gathered(worlds, first, own, "faults" not in config.without)
+        first += max(worlds.values())
+        arrays = learn(examples, places, config.seed, config.steps, config.without)
+        save_weights(config.out, arrays, _card(config, examples, ROUNDS[:number]))
+        told = f"{config.out} holds what {number} of {len(ROUNDS)} rounds have taught"
+        print_lines(told, file=sys.stderr)
+    held_out = gathered(HELD_OUT, VALIDATION, config.out)
+    losses = {
+        f"loss per {what}, {name}": round(loss, 5)
+        for name, data in (("learned", examples), ("held out", held_out))
+        for what, loss in losses_of(arrays, data).items()
+    }
+    save_weights(config.out, arrays, _card(config, examples, ROUNDS, losses))
+    print_end(config.out, started, losses, str(config.out))
+    return 0
+
+
+def gathered(
+    worlds: Mapping[str, int], first: int, own: Path | None, faulty: bool = True
+) -> list[Example]:
+    """The keyframes of so many worlds of each kind, with seeds from the first on."""
+    return [
+        example
+        for kind, seed in seeds_of_worlds(worlds, first)
+        for example in play(kind, seed, own, faulty)
+    ]
 
 
 def learn(
@@ -86,25 +133,19 @@ def learn(
     steps: int,
     without: Collection[str] = (),
 ) -> Arrays:
-    """The weights, after so many steps over shuffled batches; one thread. `without` is what is left
-    out (`care_sim.training.supervised.sets`).
-    """
+    """The weights, after so many steps over shuffled batches, `without` what is left out."""
     torch = import_torch()
     with one_thread(torch):
         torch.manual_seed(seed)
         arrays = _first_weights(torch, places)
         _leave_out(torch, arrays, without)
-        optimizer = torch.optim.Adam(arrays.values(), lr=LEARNING_RATE)
-        schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, steps)
-        rng = np.random.default_rng(seed)
-        for _ in range(steps):
-            rows = rng.integers(0, len(examples), KEYFRAMES)
-            # Left and right are exchanged in half of them.
-            signs = np.where(rng.random(KEYFRAMES) < 0.5, 1.0, -1.0)
-            optimizer.zero_grad()
-            sum(_losses(torch, arrays, [examples[row] for row in rows], signs)).backward()
-            optimizer.step()
-            schedule.step()
+        batches = _batches(examples, np.random.default_rng(seed))
+        fit(
+            lambda batch: sum(_losses(torch, arrays, *batch)),
+            batches,
+            steps,
+            adam(arrays.values(), steps),
+        )
         return {name: array.detach().numpy() for name, array in arrays.items()}
 
 
@@ -114,11 +155,20 @@ def losses_of(arrays: Arrays, examples: Sequence[Example]) -> dict[str, float]:
     with one_thread(torch), torch.no_grad():
         held = {name: torch.from_numpy(np.asarray(array)) for name, array in arrays.items()}
         both = [
-            [float(loss) for loss in _losses(torch, held, examples[first : first + 64])]
-            for first in range(0, len(examples), 64)
+            [float(loss) for loss in _losses(torch, held, examples[first : first + KEYFRAMES])]
+            for first in range(0, len(examples), KEYFRAMES)
         ]
     items, strips = np.mean(both, axis=0)
     return {"items": float(items), "strips": float(strips)}
+
+
+def _batches(
+    examples: Sequence[Example], rng: np.random.Generator
+) -> Iterator[tuple[list[Example], Any]]:
+    """Examples drawn, and 1 or -1 for each: left and right are exchanged in half of them."""
+    while True:
+        rows = rng.integers(0, len(examples), KEYFRAMES)
+        yield [examples[row] for row in rows], np.where(rng.random(KEYFRAMES) < 0.5, 1.0, -1.0)
 
 
 def _first_weights(torch: Any, places: int) -> dict[str, Any]:
@@ -146,7 +196,13 @@ def _first_weights(torch: Any, places: int) -> dict[str, Any]:
 
 def _leave_out(torch: Any, arrays: dict[str, Any], without: Collection[str]) -> None:
     """What is not kept becomes 0 and gets no gradient; a map without places is one number."""
-    for name, told in kept_weights(without).items():
+    kept: Arrays = {}
+    if "attention" in without:
+        kept["value"] = np.zeros(1, np.float32)
+    if "inputs" in without:
+        kept["first"] = np.isin(ITEM_INPUTS, KIND).astype(np.float32)[:, None]
+        kept["strip"] = np.zeros((len(STRIP_INPUTS), 1), np.float32)
+    for name, told in kept.items():
         mask = torch.from_numpy(told)
         arrays[name].data *= mask
         arrays[name].register_hook(mask.mul)
@@ -190,66 +246,6 @@ def _losses(
     return items, loss / weights.sum()
 
 
-ROUNDS: tuple[Mapping[str, int], ...] = (
-    {"drive": 24, "ncap": 48, "street": 10},
-    {"drive": 48, "ncap": 96, "street": 20},
-)
-"""How many worlds of each kind are played in each round."""
-HELD_OUT: Mapping[str, int] = {"drive": 4, "ncap": 8, "street": 2}
-"""Worlds of validation seeds, played as in the second round; the card tells the loss on them."""
-
-
-def train_sets(config: SetsConfig) -> int:
-    """Train the policy and write its weights; returns the exit code of the command."""
-    import_torch()
-    check_output(config.out, ZIP)
-    started = time.perf_counter()
-    places = place_count()
-    examples: list[Example] = []
-    first = TRAINING
-    rounds = 0
-    # Whatever ends the learning, what the rounds before have taught is in the file.
-    try:
-        for worlds in ROUNDS:
-            own = config.out if rounds else None
-            examples += gathered(worlds, first, own, "faults" not in config.without)
-            first += max(worlds.values())
-            arrays = learn(examples, places, config.seed, config.steps, config.without)
-            rounds += 1
-            save_weights(config.out, arrays, _card(config, examples, ROUNDS[:rounds]))
-        held_out = gathered(HELD_OUT, VALIDATION, config.out)
-    except BaseException:
-        if rounds:
-            told = f"{config.out} holds what {rounds} of {len(ROUNDS)} rounds have taught"
-            print_lines(told, file=sys.stderr)
-        raise
-    losses = {
-        f"loss per {what}, {name}": loss
-        for name, data in (("learned", examples), ("held out", held_out))
-        for what, loss in losses_of(arrays, data).items()
-    }
-    save_weights(config.out, arrays, _card(config, examples, ROUNDS, losses))
-    told = ", ".join(f"{name} {loss:.4f}" for name, loss in losses.items())
-    took = f"{time.perf_counter() - started:.0f} s"
-    print_lines(f"{config.out}: {told}; {took}", how_to_play("run", config.out))
-    return 0
-
-
-def place_count() -> int:
-    """How many places of strips there are on the paper's grid."""
-    return int(ItemReader(Rig(), 1).places.max()) + 1
-
-
-def gathered(
-    worlds: Mapping[str, int], first: int, own: Path | None, faulty: bool = True
-) -> list[Example]:
-    """The keyframes of so many worlds of each kind, with seeds from the first on."""
-    examples: list[Example] = []
-    for kind, seed in seeds_of_worlds(worlds, first):
-        examples += play(kind, seed, own, faulty)
-    return examples
-
-
 def _card(
     made: SetsConfig,
     examples: Sequence[Example],
@@ -261,17 +257,13 @@ def _card(
     )
     items = sum(len(one.answers) for one in examples)
     last = TRAINING + sum(max(worlds.values()) for worlds in rounds) - 1
-    return Card(
+    return card_of(
         LearnedSets.name,
-        AngularGrid(),
-        setup=sensor_setup(DEFAULT_SETUP).label,
         scenario=SCENARIOS,
         data=f"{items} boxes and tracks of {len(examples)} keyframes; worlds {played}"
         + (", the second time mostly by itself" if len(rounds) > 1 else "")
         + (f"; without {' and '.join(made.without)}" if made.without else ""),
         seeds={"worlds": [TRAINING, last], "training": made.seed},
         steps=made.steps,
-        machine=machine_line(),
-        versions=package_versions("care-sim", "numpy", "torch"),
-        result={name: round(loss, 5) for name, loss in (losses or {}).items()},
+        result=losses or {},
     )
