@@ -40,8 +40,9 @@ def _study(options: str, run: str, about: str) -> Command:
 
 
 def _weights(options: str, run: str, about: str) -> Command:
-    """A trainer, whose options and function are both in `training`."""
-    return Command(f"training.weights_config:{options}", f"training.{run}", about)
+    """A trainer, whose options and function are both in its module of `training.supervised`."""
+    module = run.partition(":")[0]
+    return Command(f"training.supervised.{module}:{options}", f"training.supervised.{run}", about)
 
 
 GROUPS: dict[str, dict[str, Command]] = {
@@ -163,7 +164,7 @@ GROUPS: dict[str, dict[str, Command]] = {
         ),
         "train learned-sets": _weights("SetsConfig", "sets:train_sets", "Train `learned-sets`."),
         "train place": _weights(
-            "PlaceConfig", "place_map:train_place", "Make the map of the control `place`."
+            "PlaceConfig", "place:train_place", "Make the map of the control `place`."
         ),
         "train detector": _weights(
             "DetectorConfig", "detector:train_pillars", "Train the detector `pillars`."

@@ -131,7 +131,7 @@ class ProgressReporter(RunListener):
     """Shows how far a run is, and how long the rest of it should take.
 
     What was begun before the first task had ended tells nothing of the rest, as the first round of
-    a training does not (`care_sim.training.pace`): it may have compiled what is not compiled yet.
+    a training does not (`care_sim.training.run`): it may have compiled what is not compiled yet.
     """
 
     def __init__(

@@ -16,10 +16,8 @@ from care_sim.envs.wrappers.sector_actions import SectorReserve, SectorScores
 from care_sim.envs.wrappers.vector_grid_observation import VectorGridObservation
 from care_sim.envs.wrappers.vector_sector_actions import VectorSectorReserve, VectorSectorScores
 from care_sim.envs.wrappers.vectors import AnyVector
-from care_sim.training.chances import MissedChances
 from care_sim.training.config import AgentConfig
-from care_sim.training.drawn_env import DrawnEnv, DrawnStreet, Mirrored
-from care_sim.training.draws import Draw, drawn
+from care_sim.training.drawn import Draw, DrawnEnv, DrawnStreet, Mirrored, MissedChances, drawn
 from care_sim.training.seeds import TrainingSeeds, VectorTrainingSeeds, validation_seeds
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.rig import Rig
-from care_sim.policies.controls.learned_place import rehearsal
+from care_sim.policies.controls.rehearsed import rehearsal
 from care_sim.scenarios import SCENARIOS, make_scenario
 from care_sim.scenarios.mirroring import MirrorableScenario, MirroredWorld
 

@@ -14,8 +14,7 @@ from care_sim.core.sensor_setup import SensorSetup
 from care_sim.envs import make_env
 from care_sim.envs.sensing import sensing
 from care_sim.training.config import PpoConfig, RecurrentPpoConfig, SacConfig
-from care_sim.training.drawn_env import Mirrored
-from care_sim.training.draws import STREETS, drawn
+from care_sim.training.drawn import STREETS, Mirrored, drawn
 from care_sim.training.environments import plain, training, validation_episodes, wrapped
 from care_sim.wrappers import GridObservation, SectorReserve
 

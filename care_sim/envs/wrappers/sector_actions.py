@@ -12,8 +12,7 @@ from care_sim.core.types import Action
 from care_sim.envs.sensing import sensing, shows_belief
 from care_sim.envs.spaces import checked_scores
 from care_sim.envs.wrappers.reading import Reading, ReadsBeliefs, read_one, reading_inside
-from care_sim.policies.learned.sector_choice import SectorActions
-from care_sim.policies.learned.tiling import Tiling
+from care_sim.policies.learned.sectors import SectorActions, Tiling
 
 
 class _Sectors(gymnasium.ActionWrapper[Any, NDArray[np.float32], Action], RecordConstructorArgs):

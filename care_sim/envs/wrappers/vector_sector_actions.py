@@ -14,8 +14,7 @@ from care_sim.envs.spaces import checked_scores
 from care_sim.envs.wrappers.reading import Reading, ReadsBeliefs, reading_inside
 from care_sim.envs.wrappers.sector_actions import SectorReserve, SectorScores, sectors_space
 from care_sim.envs.wrappers.vectors import AnyVector, WorldsWrapper, rig_of, shows_beliefs
-from care_sim.policies.learned.sector_choice import SectorActions
-from care_sim.policies.learned.tiling import Tiling
+from care_sim.policies.learned.sectors import SectorActions, Tiling
 
 
 class _VectorSectors(WorldsWrapper):

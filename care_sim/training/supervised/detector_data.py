@@ -13,12 +13,16 @@ Truth is used here, at training, and nowhere else.
 - Policies track what they find by the paper's proxy. So what they aim at does not hang on a
   detector that is still to be trained.
 - An object counts from one return on. What has none cannot be told from nothing.
+
+What the network should answer, and by how much its answer is off, follows CenterPoint (Yin, Zhou,
+Kraehenbuehl 2021, Sec. 4): a focal loss that forgives answers near a centre, and absolute
+differences of what is told of the box.
 """
 
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,8 +34,8 @@ from care_sim.core.types import CLASSES
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.envs.open_loop import FilmEnv
 from care_sim.envs.scenarios import DriveEnv
-from care_sim.perception.pillars.box_kernels import points_within
-from care_sim.perception.pillars.plan import REACH_M
+from care_sim.perception.pillars.decoding import points_within
+from care_sim.perception.pillars.network import BOX_OUTPUTS, CELL_M, CELLS, REACH_M
 from care_sim.policies import make_policy
 from care_sim.sensors.annotated import Annotations
 from care_sim.sensors.setups import DEFAULT_SETUP
@@ -57,6 +61,9 @@ SHARE_KEPT = 1 / 3
 RARE = (CLASSES.index("bus"), CLASSES.index("bicycle"))
 """Of the objects of the streets under 1 and 3 in a hundred: a keyframe with a return of one
 always becomes an example."""
+MOST_TURN = 0.4
+"""Radians by which a scan is turned for the learning, either way; every second one is mirrored,
+too. Generated streets are mostly straight."""
 DRIVE_KEYFRAME_S = 0.5
 """As far apart as those of a street."""
 _ROUND_BOX_M = 0.2
@@ -171,3 +178,106 @@ def _example(points: Floats, sensor_height_m: float, present: Annotations, full:
 def within_plan(boxes: Floats) -> Mask:
     """(n,) which of boxes (n, 7) have their middle on the plan."""
     return np.asarray(np.abs(boxes[:, :2]).max(axis=1, initial=0) < REACH_M)
+
+
+def turned_example(example: Example, rng: np.random.Generator) -> Example:
+    """The example as another way of the sensor would have it: mirrored or not, and turned. What
+    stood in a corner of the plan may stand beside it then, and is left out.
+    """
+    side = float(rng.choice([-1.0, 1.0]))
+    turn = float(rng.uniform(-MOST_TURN, MOST_TURN))
+    cos, sin = np.cos(turn), np.sin(turn)
+    matrix = np.array([[cos, -sin * side], [sin, cos * side]])
+    points, boxes = example.points.copy(), example.boxes.copy()
+    points[:, :2] = points[:, :2] @ matrix.T.astype(np.float32)
+    boxes[:, :2] = boxes[:, :2] @ matrix.T
+    boxes[:, 6] = side * boxes[:, 6] + turn
+    kept = within_plan(boxes)
+    return Example(
+        points, example.sensor_height_m, example.classes[kept], boxes[kept], example.full
+    )
+
+
+SPREAD_M = (0.8, 1.6)
+"""Standard deviation of the bump at a centre: of a person, and of the longest bus; between them a
+quarter of the length."""
+TOLD_FROM = 0.2
+"""Where a bump is higher, the cell is asked for the box: neighbours of the centre tell of it, too.
+"""
+BOX_SHARE = 1.0
+"""Of the differences of boxes in the loss."""
+
+
+class Targets(NamedTuple):
+    """Of s scans: `sure` (s, classes, CELLS, CELLS) bumps of height 1 at the centres, `boxes`
+    (s, BOX_OUTPUTS, CELLS, CELLS), and how much each cell's box counts, `weights` (s, 1, CELLS,
+    CELLS).
+    """
+
+    sure: NDArray[np.float32]
+    boxes: NDArray[np.float32]
+    weights: NDArray[np.float32]
+
+
+def targets_of(examples: list[Example]) -> Targets:
+    """What the network should answer."""
+    s = len(examples)
+    made = Targets(
+        np.zeros((s, len(CLASSES), CELLS, CELLS), np.float32),
+        np.zeros((s, len(BOX_OUTPUTS), CELLS, CELLS), np.float32),
+        np.zeros((s, 1, CELLS, CELLS), np.float32),
+    )
+    for number, example in enumerate(examples):
+        for label, box in zip(example.classes.tolist(), example.boxes, strict=True):
+            own = Targets(*(table[number] for table in made))
+            _mark(own, label, box, example.sensor_height_m)
+    return made
+
+
+def loss(torch: Any, answer: Any, wanted: Any) -> Any:
+    """How much an answer (s, OUTPUTS, CELLS, CELLS) is off the `Targets` as tensors."""
+    sure, told = answer[:, : len(CLASSES)], answer[:, len(CLASSES) :]
+    log = torch.nn.functional.logsigmoid
+    chance = torch.sigmoid(sure)
+    centre = wanted.sure == 1
+    missed = (1 - chance) ** 2 * log(sure) * centre
+    invented = (1 - wanted.sure) ** 4 * chance**2 * log(-sure)
+    centres = centre.sum().clamp(min=1)
+
+    off = ((told - wanted.boxes).abs() * wanted.weights).sum() / wanted.weights.sum().clamp(min=1)
+    return -(missed + invented).sum() / centres + BOX_SHARE * off
+
+
+def box_told(
+    box: Floats, sensor_height_m: float, rows: Integers, columns: Integers
+) -> NDArray[np.float32]:
+    """(BOX_OUTPUTS, n) what cells in these `rows` (n,) and `columns` (n,) should tell of a box
+    (7,).
+    """
+    x, y, z, length, width, height, yaw = box.tolist()
+    away_x = x - ((rows + 0.5) * CELL_M - REACH_M)
+    away_y = y - ((columns + 0.5) * CELL_M - REACH_M)
+    alike = [
+        z + sensor_height_m, *np.log([length, width, height]),
+        np.cos(yaw), np.sin(yaw), np.cos(2 * yaw), np.sin(2 * yaw),
+    ]  # fmt: skip
+    rest = np.repeat(np.array(alike)[:, None], len(rows), axis=1)
+    return np.concatenate([away_x[None], away_y[None], rest]).astype(np.float32)
+
+
+def _mark(own: Targets, label: int, box: Floats, sensor_height_m: float) -> None:
+    """Enter an object into the targets of its scan."""
+    spread = float(np.clip(box[3] / 4, *SPREAD_M)) / CELL_M
+    centre = np.minimum(((box[:2] + REACH_M) / CELL_M).astype(np.int64), CELLS - 1)
+    reach = int(np.ceil(3 * spread))
+    low, high = np.maximum(centre - reach, 0), np.minimum(centre + reach + 1, CELLS)
+    rows, columns = np.mgrid[low[0] : high[0], low[1] : high[1]].reshape(2, -1)
+    away = (rows - centre[0]) ** 2 + (columns - centre[1]) ** 2
+    bump = np.exp(-away / (2 * spread**2)).astype(np.float32)
+    own.sure[label, rows, columns] = np.maximum(own.sure[label, rows, columns], bump)
+
+    # A cell between two objects tells of the one whose bump is higher there.
+    near = (bump > TOLD_FROM) & (bump > own.weights[0, rows, columns])
+    rows, columns = rows[near], columns[near]
+    own.weights[0, rows, columns] = bump[near]
+    own.boxes[:, rows, columns] = box_told(box, sensor_height_m, rows, columns)

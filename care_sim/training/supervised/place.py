@@ -2,40 +2,50 @@
 calibration's streets.
 """
 
-import sys
+import time
 from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
-from care_sim.base.errors import print_lines
 from care_sim.base.files import ZIP, check_output
 from care_sim.core.defaults import AZIMUTH_MARGIN, ELEVATION_MARGIN
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.envs.open_loop import FilmEnv
 from care_sim.loops.film import Film
-from care_sim.policies.learned.weights import Card, save_weights
+from care_sim.policies.learned.weights import save_weights
 from care_sim.policies.paper.blind import Full
-from care_sim.sensors.setups import DEFAULT_SETUP, sensor_setup
 from care_sim.sources.street_films import street_film
 from care_sim.streets.street import CALIBRATION_SEEDS
-from care_sim.study.provenance import machine_line, package_versions
-from care_sim.training.closing import how_to_play
-from care_sim.training.weights_config import PlaceConfig
+from care_sim.training.supervised.fit import card_of, one_by_one, print_end
+
+
+@dataclass(frozen=True)
+class PlaceConfig:
+    """Make the map of `place` from the 20 calibration streets and write it."""
+
+    out: Path
+    """File to write."""
 
 
 def train_place(config: PlaceConfig) -> int:
     """Make the map and write it; returns the exit code of the command."""
     check_output(config.out, ZIP)
-    grid = AngularGrid()
-    found: list[Cells] = []
-    for number, seed in enumerate(CALIBRATION_SEEDS, 1):
-        told = f"calibration street {number} of {len(CALIBRATION_SEEDS)}"
-        print(told, end="\r", file=sys.stderr, flush=True)
-        found += first_returns(street_film(seed))
-    save_weights(config.out, {"sightings": sighting_map(found, grid)}, _card(grid, len(found)))
-    print_lines(f"{config.out}: {len(found)} first sightings", how_to_play("run", config.out))
+    started = time.perf_counter()
+    seeds = one_by_one(CALIBRATION_SEEDS, "calibration street")
+    found = [cells for seed in seeds for cells in first_returns(street_film(seed))]
+    card = card_of(
+        "place",
+        "scipy",
+        scenario="CARE-Street-v0",
+        data=f"cells of {len(found)} first sightings that a full scan detects at once",
+        seeds={"calibration": list(CALIBRATION_SEEDS)},
+    )
+    save_weights(config.out, {"sightings": sighting_map(found, AngularGrid())}, card)
+    print_end(config.out, started, {"first sightings": len(found)}, str(config.out))
     return 0
 
 
@@ -66,16 +76,3 @@ def sighting_map(found: list[Cells], grid: AngularGrid) -> NDArray[np.float32]:
         (ELEVATION_MARGIN, AZIMUTH_MARGIN),
         mode=("nearest", "wrap"),
     ).astype(np.float32)
-
-
-def _card(grid: AngularGrid, count: int) -> Card:
-    return Card(
-        "place",
-        grid,
-        setup=sensor_setup(DEFAULT_SETUP).label,
-        scenario="CARE-Street-v0",
-        data=f"cells of {count} first sightings that a full scan detects at once",
-        seeds={"calibration": list(CALIBRATION_SEEDS)},
-        machine=machine_line(),
-        versions=package_versions("care-sim", "numpy", "scipy"),
-    )

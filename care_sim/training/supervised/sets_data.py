@@ -2,7 +2,7 @@
 
 Truth is used here, at training, and nowhere else.
 
-- Worlds, budgets and faults of the camera are those of `care_sim.training.drawn_worlds`, under
+- Worlds, budgets and faults of the camera are those of `care_sim.training.supervised.worlds`, under
   training seeds. What aims is drawn, too: somebody else's policy, or, in later rounds, this one
   with the weights of the round before, so that it learns from what its own choice leads to (DAgger:
   Ross, Gordon and Bagnell, A reduction of imitation learning, 2011).
@@ -26,11 +26,10 @@ from care_sim.core.cells.boxes import planar_ranges
 from care_sim.evaluation.sightings import RANGE_M
 from care_sim.policies import make_policy
 from care_sim.policies.base import Policy
-from care_sim.policies.learned.learned_sets import LearnedSets
+from care_sim.policies.learned.learned_sets import LEARNED_RETURNS, STEPS, LearnedSets
 from care_sim.policies.learned.set_items import ItemReader, Items
 from care_sim.policies.learned.set_kernels import Numbers, needed_cells
-from care_sim.policies.learned.set_network import LEARNED_RETURNS, STEPS
-from care_sim.training.drawn_worlds import AnyEnv, kept, keyframes, plays, present
+from care_sim.training.supervised.worlds import AnyEnv, kept, keyframes, plays, present
 
 OTHERS = ("care-spread", "care", "care-sightlines", "care-sector", "all-camera", "history-rows")
 """Policies that are played besides this one."""

@@ -8,7 +8,6 @@ A play is one street, drive or test of Euro NCAP under a seed. Its budget is dra
 street is played with all cameras and with the front one alone: the closed loop has no other.
 """
 
-import sys
 from collections.abc import Iterator, Mapping
 from contextlib import closing
 from dataclasses import fields, replace
@@ -28,6 +27,7 @@ from care_sim.loops.open_loop import OpenLoop
 from care_sim.policies.base import Policy
 from care_sim.sources.street_films import record
 from care_sim.streets.street import make_street
+from care_sim.training.supervised.fit import one_by_one
 
 SCENARIOS = "CARE-Drive-v0, CARE-NCAP-v0 and CARE-Street-v0"
 LEAST_BUDGET, MOST_BUDGET = 0.005, 0.2
@@ -56,14 +56,10 @@ class Present(NamedTuple):
 
 
 def seeds_of_worlds(worlds: Mapping[str, int], first: int) -> Iterator[tuple[str, int]]:
-    """The kind and the seed of so many worlds of each kind, with seeds from the first on. How far
-    it has come is told on stderr.
-    """
+    """The kind and the seed of so many worlds of each kind, with seeds from the first on."""
     for kind, count in worlds.items():
-        for number in range(count):
-            told = f"{kind} {number + 1} of {count}"
-            print(told, end="   \r", file=sys.stderr, flush=True)
-            yield kind, first + number
+        for seed in one_by_one(range(first, first + count), kind):
+            yield kind, seed
 
 
 def plays(

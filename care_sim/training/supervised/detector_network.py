@@ -10,13 +10,14 @@ from care_sim.base.array_files import Arrays
 from care_sim.core.types import CLASSES
 from care_sim.perception.pillars.network import (
     LAYERS,
+    PILLARS,
     POINT_LAYERS,
     Layer,
     answers,
+    on_plan,
     place_planes,
 )
-from care_sim.perception.pillars.plan import PILLARS, on_plan
-from care_sim.training.detector_data import Example
+from care_sim.training.supervised.detector_data import Example
 
 RARE = -4.0
 """The logit that a centre lies in a cell, before anything is learned: one cell in fifty. From even
