@@ -10,13 +10,14 @@ from care_sim.batch.sensor_frames import placed_by, seen_by
 from care_sim.batch.state import BatchState, Bodies, Reported, Sensors, TrackTables
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.types import Tracks
-from care_sim.perception.track_kernels import (
+from care_sim.perception.tracker import (
+    MemoryRules,
+    assigned,
     forecast_in_place,
     lived_on,
     possible_pairs,
     seen_nearest_first,
 )
-from care_sim.perception.tracker import MemoryRules, assigned
 
 _BOX, _BOX_END = Tracks.BOX.start, Tracks.BOX.stop
 

@@ -27,9 +27,9 @@ from care_sim.loops.seeds import EpisodeSeeds
 from care_sim.perception.detectors import PROXY
 from care_sim.scenarios import make_scenario, scenario_class
 from care_sim.scenarios.base import Scenario
-from care_sim.sensors.box_pool import EMPTY_POOL, BoxPool
 from care_sim.sensors.camera_profiles import invents_boxes
 from care_sim.sensors.engines import check_engine
+from care_sim.sensors.false_boxes import EMPTY_POOL, BoxPool
 from care_sim.sensors.setups import DEFAULT_SETUP, Sensor, sensor_setup
 from care_sim.world.world import WORLD_STEP_S, World, whole_steps
 

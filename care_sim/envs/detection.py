@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.conditions import MIN_RETURNS, Conditions
 from care_sim.core.rig import Rig
-from care_sim.perception.base import Detector
 from care_sim.perception.detectors import CLUSTER, PROXY, check_detector, make_detector
+from care_sim.perception.points_only import Detector
 
 
 def detector_of(

@@ -15,10 +15,8 @@ from care_sim.core.observation.limits import Limits
 from care_sim.core.rig import Rig
 from care_sim.core.types import Command, Scan, Tracks
 from care_sim.driving.corridor import along_route
-from care_sim.driving.cruising import Cruising, CruisingRules
-from care_sim.driving.drivers import make_driver
-from care_sim.driving.localisation import Localisation
-from care_sim.driving.odometry import Odometry
+from care_sim.driving.drivers import Cruising, CruisingRules, make_driver
+from care_sim.driving.localisation import Localisation, Odometry
 from care_sim.loops.cameras import Cameras
 from care_sim.loops.needless import NeedlessBraking, UnfoundedBraking
 from care_sim.loops.records import Keyframe, Sight
@@ -26,11 +24,11 @@ from care_sim.loops.scan_detection import ScanDetection
 from care_sim.loops.seeds import SensorSeeds
 from care_sim.loops.told import Told, told_by
 from care_sim.loops.truth import TrackObjects
-from care_sim.perception.base import Detector
+from care_sim.perception.points_only import Detector
 from care_sim.perception.tracker import TrackMemory
 from care_sim.sensors.beams import Beams
-from care_sim.sensors.box_pool import EMPTY_POOL, BoxPool
 from care_sim.sensors.engines import make_engine
+from care_sim.sensors.false_boxes import EMPTY_POOL, BoxPool
 from care_sim.sensors.lidar import Lidar
 from care_sim.world.approach import ClosestApproach
 from care_sim.world.world import World

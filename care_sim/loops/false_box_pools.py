@@ -12,8 +12,8 @@ from care_sim.core.rig import Rig
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.film import Film
 from care_sim.loops.seeds import SensorSeeds
-from care_sim.perception.base import Detector
-from care_sim.sensors.box_pool import BoxPool
+from care_sim.perception.points_only import Detector
+from care_sim.sensors.false_boxes import BoxPool
 from care_sim.world.world import World
 
 NEAR_S = 2.0

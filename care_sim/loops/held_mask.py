@@ -9,7 +9,7 @@ import numpy as np
 from care_sim.core.grid import Cells
 from care_sim.loops.film import Shot
 from care_sim.sensors.annotated import Cloud, joined
-from care_sim.sensors.recorded_lidar import RecordedLidar
+from care_sim.sensors.lidar import RecordedLidar
 
 
 def with_sweeps(returned: Cloud, lidar: RecordedLidar, held: Cells, shot: Shot) -> Cloud:

@@ -7,8 +7,8 @@ import numpy as np
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.cells.stack import Grid
 from care_sim.core.types import Detections, Scan
-from care_sim.perception.base import Detector
 from care_sim.perception.matching import found_objects
+from care_sim.perception.points_only import Detector
 from care_sim.perception.proxy import ReturnsRule
 from care_sim.sensors.annotated import NO_OBJECT, Annotations, cloud_of
 

@@ -15,7 +15,7 @@ from care_sim.base.errors import (
     is_raised_by_foreign,
 )
 from care_sim.core.pinhole import PinholeCamera
-from care_sim.sensors.camera import FRONT_CAMERA
+from care_sim.sensors.pictures import FRONT_CAMERA
 from care_sim.streets.dimensions import LANE_WIDTH_M, PARKING_WIDTH_M, SPEED_LIMIT_MPS
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.world import World

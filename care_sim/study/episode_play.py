@@ -39,7 +39,7 @@ from care_sim.world.world import World
 
 def world_hash(env: ClosedLoopEnv, seed: int) -> str:
     """Return a hash of what stands in the world of a seed, and how it moves while the ego keeps its
-    speed, and while it brakes; measured numbers rounded (`care_sim.base.portable_hash`). The world
+    speed, and while it brakes; measured numbers rounded (`care_sim.base.digests`). The world
     is built anew.
     """
     content = hashlib.sha256()

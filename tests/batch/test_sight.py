@@ -13,8 +13,7 @@ from care_sim.batch.state import BatchState
 from care_sim.core.conditions import CameraFaults
 from care_sim.core.types import ImageDetections
 from care_sim.sensors.annotated import IdentifiedDetections
-from care_sim.sensors.camera_faults import Delay, Misses
-from care_sim.sensors.picture_timing import PictureTiming
+from care_sim.sensors.camera import Delay, Misses, PictureTiming
 
 FAULTS = {
     "false_negative_rate": 0.2,

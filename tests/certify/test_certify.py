@@ -54,8 +54,7 @@ from care_sim.perception.tracker import TrackMemory
 from care_sim.policies import make_policy, maker
 from care_sim.policies.makers import is_privileged
 from care_sim.sensors.camera import CameraDetector
-from care_sim.sensors.lidar import Lidar
-from care_sim.sensors.recorded_lidar import RecordedLidar
+from care_sim.sensors.lidar import Lidar, RecordedLidar
 from care_sim.world.world import World
 from tests.helpers.places import ROOT
 

@@ -11,7 +11,7 @@ from care_sim.core.types import CLASSES
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.seeds import SensorSeeds
 from care_sim.perception.tracker import MemoryRules
-from care_sim.sensors.camera import FRONT_CAMERA
+from care_sim.sensors.pictures import FRONT_CAMERA
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.route import Route, SpeedPlan
 from care_sim.world.traffic import Traffic

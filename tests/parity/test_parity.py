@@ -11,8 +11,8 @@ from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.scenarios import SCENARIOS
-from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.sensors.engines import ENGINES
+from care_sim.sensors.pictures import FRONT_CAMERA
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.world.bodies import CATALOGUE
 from tests.parity import episodes as parity_episodes

@@ -10,8 +10,7 @@ from care_sim.loops.told import told_by
 from care_sim.sensors.annotated import Cloud
 from care_sim.sensors.beams import Beams
 from care_sim.sensors.engines import ENGINES
-from care_sim.sensors.lidar import Lidar
-from care_sim.sensors.recorded_lidar import RecordedLidar
+from care_sim.sensors.lidar import Lidar, RecordedLidar
 from care_sim.sensors.signal import Signal
 from care_sim.world.bodies import BodyKind, Part
 from care_sim.world.motions import LinearMotion

@@ -355,7 +355,7 @@ def rig(case):
     """The rig, and what it covers."""
     from care_sim.core.grid import AngularGrid
     from care_sim.core.rig import Rig
-    from care_sim.sensors.camera import FRONT_CAMERA
+    from care_sim.sensors.pictures import FRONT_CAMERA
 
     known = _fields_of(Rig) | {"grid": AngularGrid, "cameras": lambda: (FRONT_CAMERA,)}
     made = Rig(**draw(case, known))

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from care_sim.core.frames import Frame
-from care_sim.sensors.camera import FRONT_CAMERA
+from care_sim.sensors.pictures import FRONT_CAMERA
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.bullet import NO_BODY, BulletWorld
 from care_sim.world.bullet_bodies import borrow, give_back, pybullet

@@ -19,7 +19,7 @@ from care_sim.core.grid import Cells
 from care_sim.core.observation.beliefs import Beliefs
 from care_sim.core.residual import camera_layers_of
 from care_sim.core.rig import Rig
-from care_sim.perception.cluster.road import KERB_CLEARANCE_M
+from care_sim.perception.cluster.points import KERB_CLEARANCE_M
 from care_sim.policies.learned.sectors import Tiling
 
 BlockPictures = NDArray[np.float32]

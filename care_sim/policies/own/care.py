@@ -18,7 +18,7 @@ from care_sim.policies.controls.patterns import cells_by_row, entry_cells
 from care_sim.policies.own.sight_lines import SightLines, columns_ahead
 
 CORE_FIRST = "core-spread"
-"""The order of the cells in hulls and wedges (`care_sim.core.cell_order`), unless the rig has one:
+"""The order of the cells in hulls and wedges (`care_sim.core.cells.order`), unless the rig has one:
 the rim is there for errors of the forecast, without which the object lies in the core alone."""
 HULL_CELLS_PER_RETURN = 2
 """Cells that a hull gets in a round for every return that a detection needs."""

@@ -6,7 +6,7 @@ is above v_rel / (2 * 6 m/s^2) + 0.35 s. The intrusion is when the outside of it
 a line 0.3 m beyond the lane marking. Here the tyre is the side of the box, and the marking a line.
 """
 
-from care_sim.driving.human_model import HUMAN_MODEL
+from care_sim.driving.drivers import HUMAN_MODEL
 from care_sim.scenarios.r157.grid import KPH, CutInCase
 
 VISIBLE_S = 0.72

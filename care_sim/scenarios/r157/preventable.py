@@ -1,7 +1,7 @@
 """Which cut-ins the careful human driver of UN Regulation 157 prevents from ending in a collision.
 
 Both vehicles are boxes along the road. The other moves at even speed, along and across; the ego
-keeps its speed until its driver brakes, as `care_sim.driving.human_model` says, and then slows down
+keeps its speed until its driver brakes, as `care_sim.driving.drivers` says, and then slows down
 to the other's speed. So the distance between them follows in closed form, and no step of time
 enters.
 """
@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from care_sim.driving.human_model import HUMAN_MODEL
+from care_sim.driving.drivers import HUMAN_MODEL
 from care_sim.scenarios.r157.grid import KPH, CutInCase
 from care_sim.world.bodies import CATALOGUE
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from care_sim.base.checks import bounded, one_of
 from care_sim.base.errors import InvalidInput
-from care_sim.driving.human_model import HUMAN_MODEL
+from care_sim.driving.drivers import HUMAN_MODEL
 from care_sim.scenarios.base import LONGEST_EPISODE_S, Scenario
 from care_sim.scenarios.r157.grid import (
     EGO_KPH,

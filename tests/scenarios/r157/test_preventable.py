@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from care_sim.driving.human_model import HUMAN_MODEL as HUMAN
+from care_sim.driving.drivers import HUMAN_MODEL as HUMAN
 from care_sim.scenarios.r157.grid import (
     GAP_STEP_M,
     KINDS,
