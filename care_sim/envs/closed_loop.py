@@ -15,15 +15,12 @@ from care_sim.core.types import Action
 from care_sim.driving.drivers import check_driver
 from care_sim.envs import reward as rewards
 from care_sim.envs.conditions_page import CONDITIONS
-from care_sim.envs.detection import detector_of
-from care_sim.envs.sensing import Observed, SensingEnv, arguments_of, split_conditions
+from care_sim.envs.sensing import Observed, SensingEnv, arguments_of, detector_of, split_conditions
 from care_sim.evaluation.metrics import outcome
 from care_sim.loops.closed_loop import ClosedLoop
-from care_sim.loops.episode import Episode
+from care_sim.loops.episode import Episode, EpisodeSeeds
 from care_sim.loops.false_box_pools import pool_of_another_drive
-from care_sim.loops.record_columns import Records
-from care_sim.loops.records import Keyframe, Outcome
-from care_sim.loops.seeds import EpisodeSeeds
+from care_sim.loops.records import Keyframe, Outcome, Records
 from care_sim.perception.detectors import PROXY
 from care_sim.scenarios import make_scenario, scenario_class
 from care_sim.scenarios.base import Scenario

@@ -18,14 +18,12 @@ from care_sim.core.grid_stack import Grid
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.return_settings import changed_settings
 from care_sim.core.types import Action
-from care_sim.envs.detection import detector_of
-from care_sim.envs.sensing import Observed, SensingEnv, arguments_of, split_conditions
+from care_sim.envs.sensing import Observed, SensingEnv, arguments_of, detector_of, split_conditions
 from care_sim.evaluation.recall import SceneScore
 from care_sim.evaluation.sightings import ANNOTATED, Sightings, check_presence
+from care_sim.loops.episode import SensorSeeds
 from care_sim.loops.film import Film
-from care_sim.loops.open_loop import OpenLoop, OpenLoopKeyframe
-from care_sim.loops.scene_records import SceneKeyframe
-from care_sim.loops.seeds import SensorSeeds
+from care_sim.loops.open_loop import OpenLoop, OpenLoopKeyframe, SceneKeyframe
 from care_sim.perception import matching
 from care_sim.perception.detectors import PROXY
 

@@ -4,8 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from care_sim.loops.record_columns import Records
-from care_sim.loops.records import Keyframe, Outcome
+from care_sim.loops.records import Keyframe, Outcome, Records
 from care_sim.world.approach import Impact
 
 

@@ -1,5 +1,6 @@
 """One keyframe of the closed loop: fire, detect, track, act, let the world move, look."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -12,29 +13,73 @@ from care_sim.core.boxes import planar_ranges
 from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.frames import Frame
 from care_sim.core.grid import Cells
+from care_sim.core.grid_stack import Grid
 from care_sim.core.observation_limits import Limits
 from care_sim.core.rig import Rig
-from care_sim.core.types import Command, Scan, Tracks
+from care_sim.core.types import Command, Detections, Scan, Tracks
 from care_sim.driving.corridor import along_route
 from care_sim.driving.cruising import Cruising, CruisingRules
 from care_sim.driving.drivers import make_driver
 from care_sim.driving.localisation import Localisation
 from care_sim.driving.odometry import Odometry
 from care_sim.loops.cameras import Cameras
+from care_sim.loops.episode import SensorSeeds
 from care_sim.loops.needless import NeedlessBraking, UnfoundedBraking
 from care_sim.loops.records import Keyframe, Sight
-from care_sim.loops.scan_detection import ScanDetection
-from care_sim.loops.seeds import SensorSeeds
-from care_sim.loops.told import Told, told_by
-from care_sim.loops.truth import TrackObjects
+from care_sim.loops.truth import Told, TrackObjects, told_by
 from care_sim.perception.base import Detector
+from care_sim.perception.matching import found_objects
+from care_sim.perception.proxy import ReturnsRule
 from care_sim.perception.tracker import TrackMemory
+from care_sim.sensors.annotated import NO_OBJECT, Annotations, cloud_of
 from care_sim.sensors.beams import Beams
 from care_sim.sensors.box_pool import EMPTY_POOL, BoxPool
 from care_sim.sensors.engines import make_engine
 from care_sim.sensors.lidar import Lidar
 from care_sim.world.approach import ClosestApproach
 from care_sim.world.world import World
+
+
+class ScanDetection:
+    """The detector of an episode. Without one the paper's proxy detects what enough fired rays hit.
+
+    `labels` maps the ids of reported bodies to classes.
+    """
+
+    def __init__(
+        self,
+        grid: Grid,
+        labels: Mapping[int, int],
+        min_returns: int,
+        detector: Detector | None,
+    ):
+        self._grid = grid
+        self._reported = np.array(list(labels), np.int64)
+        self._classes = np.array(list(labels.values()), np.int64)
+        self._returns_rule = ReturnsRule(labels, min_returns)
+        self._detector = detector
+
+    def detect(
+        self, scan: Scan, bodies: Integers, boxes_of: Callable[[Integers], Floats]
+    ) -> tuple[Detections, Integers, Integers]:
+        """The detections, the body behind each or NO_OBJECT, and all bodies that were found.
+
+        `bodies` are those behind the returns; `boxes_of` gives the (n, 7) sensor-frame boxes of
+        bodies (n,). The proxy alone may ask whose return each is. What another detector finds is
+        scored by the class-consistent 2 m match (paper, Remark 1), and only what a box has returns
+        of: else a box on the end of a lorry would find who is hidden behind it.
+        """
+        if self._detector is None:
+            detections, detected = self._returns_rule.detections(bodies, boxes_of)
+            return detections, detected, detected
+        objects = np.where(np.isin(bodies, self._reported), bodies, NO_OBJECT)
+        cloud = cloud_of(scan, objects, self._grid)
+        present = Annotations(self._reported, self._classes, boxes_of(self._reported))
+        detections, behind = self._detector.detect(cloud, present)
+        hit = np.isin(present.objects, behind)
+        candidates = Annotations(present.objects[hit], present.classes[hit], present.boxes[hit])
+        found = found_objects(candidates, detections)
+        return detections, behind, candidates.objects[found]
 
 
 class ClosedLoop:

@@ -15,8 +15,7 @@ from gymnasium.vector.utils import create_empty_array
 from numpy.typing import NDArray
 
 from care_sim.base.errors import InvalidInput
-from care_sim.envs.sensing import Observed
-from care_sim.envs.spaces import checked_scores
+from care_sim.envs.sensing import Observed, checked_scores
 from care_sim.envs.vector.arguments import why_separate
 from care_sim.envs.vector.worlds import CompiledWorlds, Stepped
 from care_sim.policies.vector import vector_policy

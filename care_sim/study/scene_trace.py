@@ -9,8 +9,7 @@ import care_sim
 from care_sim.envs.open_loop import OpenLoopEnv
 from care_sim.evaluation.recall import SceneScore
 from care_sim.loops.film import Film
-from care_sim.loops.open_loop import OpenLoop
-from care_sim.loops.scene_records import SceneKeyframe
+from care_sim.loops.open_loop import OpenLoop, SceneKeyframe
 from care_sim.policies.base import Policy
 from care_sim.study.episode_play import GymEnv
 from care_sim.study.play_config import PlayConfig

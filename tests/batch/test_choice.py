@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.base.random_streams import streams
-from care_sim.batch.choice import Choice
+from care_sim.batch.scanning import Choice
 from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.grid import AngularGrid
 from care_sim.core.random_floor import RandomFloor

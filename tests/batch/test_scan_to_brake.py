@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from care_sim.batch.braking import Braking
 from care_sim.batch.scanning import Scanning
-from care_sim.batch.tracking import Tracking
+from care_sim.batch.tracking import Braking, Tracking
 from care_sim.core.types import Tracks
 from care_sim.driving.drivers import make_driver
 from tests.helpers.side_by_side import SideBySide

@@ -4,8 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_sim.batch.sensor_frames import place_sensors, placed_by, seen_by, seen_by_each
-from care_sim.batch.state import BatchState
+from care_sim.batch.state import BatchState, place_sensors, placed_by, seen_by, seen_by_each
 from care_sim.core.frames import Frame
 
 POSES = st.tuples(*[st.floats(-200, 200)] * 2, st.floats(-4, 4))

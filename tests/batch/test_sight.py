@@ -7,9 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from care_sim.batch.camera_faults import BatchDelay, BatchMisses, Detected, DrawnAhead
-from care_sim.batch.loading import load
 from care_sim.batch.sight import Sight
-from care_sim.batch.state import BatchState
+from care_sim.batch.state import BatchState, load
 from care_sim.core.conditions import CameraFaults
 from care_sim.core.types import ImageDetections
 from care_sim.sensors.annotated import IdentifiedDetections

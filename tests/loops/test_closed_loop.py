@@ -9,7 +9,7 @@ from care_sim.core.rig import Rig
 from care_sim.core.sensor_setup import LIDAR_POSITION
 from care_sim.core.types import CLASSES
 from care_sim.loops.closed_loop import ClosedLoop
-from care_sim.loops.seeds import SensorSeeds
+from care_sim.loops.episode import SensorSeeds
 from care_sim.perception.tracker import MemoryRules
 from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.world.bodies import CATALOGUE

@@ -8,9 +8,9 @@ import pytest
 from care_sim.core.conditions import Sensing
 from care_sim.core.frames import Frame
 from care_sim.core.rig import Rig
+from care_sim.loops.episode import SensorSeeds
 from care_sim.loops.film import Sweep
 from care_sim.loops.open_loop import OpenLoop
-from care_sim.loops.seeds import SensorSeeds
 from care_sim.perception.proxy import ReturnsProxy
 from care_sim.sensors.annotated import Cloud
 from care_sim.sensors.surround import SURROUND_CAMERAS

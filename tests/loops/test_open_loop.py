@@ -10,9 +10,9 @@ from care_sim.core.frames import Frame
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES, Detections, Ego, ImageDetections
 from care_sim.driving.localisation import Localisation
+from care_sim.loops.episode import SensorSeeds
 from care_sim.loops.film import Film, Shot
 from care_sim.loops.open_loop import OpenLoop
-from care_sim.loops.seeds import SensorSeeds
 from care_sim.perception.points_only import PointsOnly
 from care_sim.perception.proxy import ReturnsProxy
 from care_sim.sensors.annotated import NO_OBJECT, Annotations, Cloud, IdentifiedDetections

@@ -11,7 +11,7 @@ import pytest
 
 from care_sim import cli
 from care_sim.base.seed_ranges import TRAINING
-from care_sim.loops.seeds import EpisodeSeeds
+from care_sim.loops.episode import EpisodeSeeds
 from care_sim.policies import BUILT_IN
 from care_sim.scenarios import make_scenario
 from care_sim.study.benchmark.made_by import processor_of

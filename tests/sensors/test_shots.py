@@ -7,7 +7,7 @@ from scipy.optimize import brentq
 from care_sim.core.conditions import Sensing
 from care_sim.core.frames import Frame
 from care_sim.core.return_settings import ReturnSettings
-from care_sim.loops.told import told_by
+from care_sim.loops.truth import told_by
 from care_sim.sensors.annotated import Cloud
 from care_sim.sensors.beams import Beams
 from care_sim.sensors.engines import ENGINES

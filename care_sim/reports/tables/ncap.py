@@ -19,8 +19,7 @@ from care_sim.reports.engine.policy_rows import PolicyRows
 from care_sim.reports.engine.tables import under_headings
 from care_sim.reports.formatting import interval, tag_notes
 from care_sim.reports.table import Table, TableRow
-from care_sim.scenarios.ncap.forms import Ahead
-from care_sim.scenarios.ncap.table import TESTS
+from care_sim.scenarios.ncap.table import TESTS, Ahead
 from care_sim.study.designs import ncap as design
 from care_sim.study.rows.reading import stops_for_nothing
 from care_sim.study.run_config import FULL, REFERENCE, Row

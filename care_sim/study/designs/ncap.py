@@ -4,8 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from care_sim.scenarios.ncap.forms import Across, NcapTest
-from care_sim.scenarios.ncap.table import TESTS
+from care_sim.scenarios.ncap.table import TESTS, Across, NcapTest
 from care_sim.study.designs.defaults import NCAP_BUDGETS, NCAP_POLICIES, NCAP_STEP_KPH
 from care_sim.study.episode_config import EpisodeConfig, grid, of_cases
 from care_sim.study.parameters import Parameters

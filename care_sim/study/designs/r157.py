@@ -6,8 +6,7 @@ from dataclasses import asdict
 import numpy as np
 
 from care_sim.core.driver_settings import FIXED
-from care_sim.scenarios.r157.grid import CutInCase, kinds_in_turn
-from care_sim.scenarios.r157.preventable import preventable
+from care_sim.scenarios.r157 import CutInCase, kinds_in_turn, preventable
 from care_sim.study.designs.defaults import R157_BUDGETS, R157_POLICIES
 from care_sim.study.episode_config import EpisodeConfig, grid, of_cases
 from care_sim.study.run_config import Row
