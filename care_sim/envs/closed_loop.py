@@ -226,7 +226,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     def first_info(self, entropy: int, world: World) -> dict[str, Any]:
         """The info of `reset`."""
         drawn = {"drawn": dict(world.drawn)} if world.drawn else {}
-        return self._info_of({}, {"seed": entropy, **drawn})
+        return {"seed": entropy, **drawn} if self.scoring_info else {}
 
     def keyframe_info(
         self, scan: dict[str, Any], record: Keyframe | Records, terms: Mapping[str, Any]
@@ -235,14 +235,16 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         told, and the terms of the reward.
         """
         own = {**scan, "braking": record.braking, "time_s": record.time_s}
-        scoring = {
+        if not self.scoring_info:
+            return own
+        return {
+            **own,
             "detected": record.detected,
             "in_view": record.in_view,
             "clearance_m": record.clearance_m,
             "speed_mps": record.speed_mps,
             "reward_terms": terms,
         }
-        return self._info_of(own, scoring)
 
     def step(self, action: Action) -> tuple[Observed, float, bool, bool, dict[str, Any]]:
         """Fire the cells that `action` scores highest and go on to the next keyframe.
@@ -264,7 +266,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         info = self.keyframe_info(self._scan_info(fired), record, terms)
         if self._over:
             info["outcome"] = asdict(self._outcome())
-        return self.observed(), reward, terminated, truncated, info
+        return loop.belief.to_observation(), reward, terminated, truncated, info
 
     def render(self) -> NDArray[np.uint8] | None:
         """A picture (H, W, 3) of the last keyframe: chase view, camera, fired cells."""

@@ -148,7 +148,8 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         self._masks = []
         seeds = SensorSeeds(camera, lidar, odometry)
         loop = OpenLoop(film, self.rig, self.conditions, seeds, self._detector)
-        return self._begin(loop, floor), self._info_of({}, {"seed": seed, "scene": film.name})
+        info = {"seed": seed, "scene": film.name} if self.scoring_info else {}
+        return self._begin(loop, floor), info
 
     def step(self, action: Action) -> tuple[Observed, float, bool, bool, dict[str, Any]]:
         """Fire the cells that `action` scores highest and go on to the next keyframe.
@@ -165,8 +166,9 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         self._masks.append(found)
         scored = found[self._sightings.scored(record.index)]
         self._over = loop.over
-        own = {**self._scan_info(fired), "time_s": shot.time_s}
-        info = self._info_of(own, {"objects": len(scored), "found": int(scored.sum())})
+        info = {**self._scan_info(fired), "time_s": shot.time_s}
+        if self.scoring_info:
+            info |= {"objects": len(scored), "found": int(scored.sum())}
         if self._over:
             info["outcome"] = asdict(self.score.outcome())
         # A keyframe without annotated objects misses none of them.

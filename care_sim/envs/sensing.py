@@ -27,7 +27,7 @@ from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.random_floor import RandomFloor
 from care_sim.core.rig import Rig
 from care_sim.core.types import Action
-from care_sim.loops.truth import EpisodeTruth, Loop, Truth
+from care_sim.loops.truth import Loop, Truth
 from care_sim.perception.base import Detector
 from care_sim.perception.detectors import CLUSTER, PROXY, check_detector, make_detector
 from care_sim.sensors.lidar_faults import check_dead_rows
@@ -190,7 +190,7 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
     @property
     def truth(self) -> Truth:
         """What privileged policies may ask for; `make_policy` hands it to them alone."""
-        return EpisodeTruth(self)
+        return Truth(self)
 
     def _reseed(self, seed: int | None, options: dict[str, Any] | None) -> None:
         """Begin the environment's own generator anew if a seed is given.
@@ -217,13 +217,6 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         No policy enters the seed, so all meet the same world, faults and floor.
         """
         return streams(entropy, count, self._secret)
-
-    def _info_of(self, own: dict[str, Any], scoring: dict[str, Any]) -> dict[str, Any]:
-        """`info`: what the car itself knows, and what only the scoring may know.
-
-        The latter is left out where `scoring_info` is off.
-        """
-        return own | scoring if self.scoring_info else own
 
     def _begin(self, loop: AnyLoop, floor: np.random.SeedSequence) -> Observed:
         """Start an episode over a loop and a floor; its first observation."""
@@ -271,9 +264,8 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         length.
         """
         scan = {"fired": fired, **self.loop.told}
-        if self.conditions.floor:
-            return {name: values.copy() for name, values in scan.items()}
-        return {name: values.tolist() for name, values in scan.items()}
+        floor = self.conditions.floor
+        return {name: values.copy() if floor else values.tolist() for name, values in scan.items()}
 
 
 def split_conditions(

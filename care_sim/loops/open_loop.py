@@ -129,7 +129,7 @@ class OpenLoop:
 
         # In the order of the closed loop, but for the car: a film moves on by itself.
         cloud = self._lidar.fire(fired, shot.cloud)
-        self.told = told_by(fired, cloud.cells, intensities=cloud.intensities, times_s=cloud.times)
+        self.told = told_by(fired, cloud.cells, cloud.intensities, cloud.times)
         gathered = with_sweeps(cloud, self._lidar, self._held, shot)
         self._held = fired
         detections, objects = self._detector.detect(gathered, shot.annotations)

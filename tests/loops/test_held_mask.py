@@ -117,8 +117,3 @@ def test_every_sweep_has_its_own_faults():
     kept = [set(clouds[1].cells[clouds[1].times == t]) for t in np.unique(clouds[1].times)]
     assert all(1800 < len(one) < 2200 for one in kept)
     assert kept[0] != kept[1]
-
-
-def test_a_film_without_sweeps_plays_as_ever():
-    clouds, *_ = played(handmade_film(), returns_of(AHEAD, 0))
-    assert clouds[0].times is None
