@@ -12,8 +12,7 @@ import numpy as np
 
 from care_sim.base.compiled import compiled
 from care_sim.batch.camera_faults import BatchDelay, BatchMisses, Detected
-from care_sim.batch.sensor_frames import seen_by
-from care_sim.batch.state import BatchState, Bodies, Outlines, Reported, Sensors
+from care_sim.batch.state import BatchState, Bodies, Outlines, Reported, Sensors, seen_by
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.cells.boxes import planar_ranges
 from care_sim.core.conditions import Sensing
@@ -81,7 +80,7 @@ class Sight:
         self._is_ever_dark = any(each.blackout_s for each in conditions)
 
     def begin(self, world: int, built: World, seed: np.random.SeedSequence) -> None:
-        """Begin an episode; `seed` is that of the camera (`care_sim.loops.seeds.SensorSeeds`)."""
+        """Begin an episode; `seed` is that of the camera (`care_sim.loops.episode.SensorSeeds`)."""
         self._misses.begin(world, seed, len(built.labels()))
         if self._is_late:
             # The streams are those of `care_sim.sensors.camera.CameraDetector`.

@@ -23,8 +23,7 @@ from care_sim.base.times import LAST_BITS_S
 from care_sim.core.arrays import Floats
 from care_sim.core.conditions import DriverSettings
 from care_sim.envs.closed_loop import ClosedLoopEnv
-from care_sim.envs.sensing import Observed
-from care_sim.envs.spaces import checked_scores
+from care_sim.envs.sensing import Observed, checked_scores
 from care_sim.envs.vector.arguments import why_separate
 from care_sim.envs.vector.worlds import CompiledWorlds, Stepped
 from care_sim.loops.closed_loop import ClosedLoop

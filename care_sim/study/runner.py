@@ -14,7 +14,7 @@ from care_sim.base.compiled import lacks_code
 from care_sim.base.errors import error_line
 from care_sim.batch import sight
 from care_sim.batch.loop import BatchLoop
-from care_sim.batch.sensor_frames import place_sensors
+from care_sim.batch.state import place_sensors
 from care_sim.core.arrays import Mask
 from care_sim.envs.sensing import Observed
 from care_sim.study.episode_config import EpisodeConfig, closed_loop

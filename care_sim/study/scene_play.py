@@ -21,8 +21,7 @@ from care_sim.evaluation.differences import AllocationDifference, allocation_dif
 from care_sim.evaluation.recall import SceneScore, Tally
 from care_sim.evaluation.strata import strata
 from care_sim.loops.film import Film
-from care_sim.loops.open_loop import OpenLoop, OpenLoopKeyframe
-from care_sim.loops.scene_records import SceneKeyframe
+from care_sim.loops.open_loop import OpenLoop, OpenLoopKeyframe, SceneKeyframe
 from care_sim.policies.base import Policy
 from care_sim.study.episode_play import GymEnv, peak_rss_mb, result_or_reason
 from care_sim.study.play_config import PlayConfig

@@ -77,7 +77,7 @@ def test_a_world_and_a_source_have_folders_of_their_own(monkeypatch, capsys, tmp
 
     (tmp_path / "own_worlds").mkdir()
     (tmp_path / "own_worlds" / "street.py").write_text(
-        "from care_sim.scenarios.dense import Dense\n\n\nclass Street(Dense):\n    pass\n"
+        "from care_sim.scenarios.dartout import Dense\n\n\nclass Street(Dense):\n    pass\n"
     )
     monkeypatch.syspath_prepend(tmp_path)
 

@@ -11,7 +11,7 @@ import pytest
 
 from care_sim import cli
 from care_sim.base.seeds import TRAINING
-from care_sim.loops.seeds import EpisodeSeeds
+from care_sim.loops.episode import EpisodeSeeds
 from care_sim.policies import BUILT_IN
 from care_sim.scenarios import make_scenario
 from care_sim.study.benchmark.result import processor_of, read_result

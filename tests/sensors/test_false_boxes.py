@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from care_sim.core.conditions import Sensing
 from care_sim.core.types import CLASSES, ImageDetections
 from care_sim.envs.open_loop import FilmEnv
-from care_sim.scenarios.dense import Dense
+from care_sim.scenarios.dartout import Dense
 from care_sim.sensors.annotated import NO_OBJECT, IdentifiedDetections
 from care_sim.sensors.camera import CameraDetector
 from care_sim.sensors.false_boxes import EMPTY_POOL, MOST_DRAWS, BoxPool, FalseBoxes

@@ -3,8 +3,7 @@ from collections import Counter
 import numpy as np
 
 from care_sim.scenarios import make_scenario
-from care_sim.scenarios.r157.grid import kinds_in_turn
-from care_sim.scenarios.r157.preventable import preventable
+from care_sim.scenarios.r157 import kinds_in_turn, preventable
 from care_sim.study.designs import standards
 from care_sim.study.episode_config import EpisodeConfig, grid
 

@@ -21,7 +21,7 @@ from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.loops.closed_loop import ClosedLoop
-from care_sim.loops.seeds import EpisodeSeeds
+from care_sim.loops.episode import EpisodeSeeds
 from care_sim.policies.base import FixedPolicy, Policy
 from care_sim.policies.controls.patterns import likeliest_first
 from care_sim.policies.controls.patterns_and_tracks import HistoryPattern

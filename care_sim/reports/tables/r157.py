@@ -15,7 +15,7 @@ from care_sim.reports.engine.parts import PolicyRows
 from care_sim.reports.engine.tables import under_headings
 from care_sim.reports.formatting import interval, tag_notes
 from care_sim.reports.table import Table, TableRow
-from care_sim.scenarios.r157.grid import KPH
+from care_sim.scenarios.r157 import KPH
 from care_sim.study.designs.standards import case_of
 from care_sim.study.rows.reading import is_avoided, stops_for_nothing
 from care_sim.study.run_config import REFERENCE, Row

@@ -1,31 +1,159 @@
-"""How the ego and its target come to meet in the tests in which the ego turns at a junction of two
-roads with two lanes of 3.5 m each.
+"""How the ego and its target come to meet, on straight ways and in turns, and when a test is over.
 
-The ego's first lane is along x with its middle at y = 0. The middle of the car follows the
-protocol's line; the protocol leads the middle of the front axle along it. Right-hand traffic.
+A test ends as the protocol's does: with a contact, when the ego stands before the target's way or
+the target has left the ego's, or when the ego is no faster than the target that it follows.
+
+An ego that does not brake goes along x and has its front at the target at `hit_s`. Right-hand
+traffic. In a turn the ego's first lane is along x with its middle at y = 0, at a junction of two
+roads with two lanes of 3.5 m each. The middle of the car follows the protocol's line; the protocol
+leads the middle of the front axle along it.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from care_sim.core.frames import Pose
-from care_sim.scenarios.ncap.approach import run_up
-from care_sim.scenarios.ncap.forms import (
+from care_sim.scenarios.ncap.table import (
+    Across,
     AcrossExit,
+    Ahead,
     Bend,
+    BrakingAhead,
     Obstruction,
     ParkedAlong,
     StandingAcross,
     Target,
     WaitingBeside,
 )
-from care_sim.scenarios.ncap.meeting import CLEAR_M, Crossing, Ego, Meeting
-from care_sim.streets.dimensions import LANE_WIDTH_M
+from care_sim.streets.layouts import LANE_WIDTH_M
 from care_sim.world.bodies import CATALOGUE, BodyKind, Triple, sized
-from care_sim.world.motions import StraightWay
+from care_sim.world.motions import StraightWay, Walk
 from care_sim.world.route import Leg, Route
+from care_sim.world.world import Motion, World
+
+CLEAR_M = 0.2
+"""So far apart nothing touches: far more than the centimetres by which hulls are padded."""
+
+
+@dataclass(frozen=True)
+class Ego:
+    """Speed in m/s, size in metres, and when its front hits if it does not brake."""
+
+    speed: float
+    length: float
+    width: float
+    hit_s: float
+
+    def share(self, overlap: float) -> float:
+        """How far the place at a share of the width lies from the middle, in the direction in which
+        the share grows.
+        """
+        return self.width * (overlap - 0.5)
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """The ways of both cross.
+
+    The ego's front is on the target's way from where its centre has gone `enter_m`, its rear off it
+    at `leave_m`. The target has left the ego's way at `clear_s`.
+    """
+
+    enter_m: float
+    leave_m: float
+    clear_s: float
+
+    def is_over(self, world: World) -> bool:
+        """Whether no contact can follow."""
+        gone = world.along_m
+        stands_before = world.ego.speed == 0.0 and gone < self.enter_m
+        return world.time >= self.clear_s or gone > self.leave_m or stands_before
+
+
+@dataclass(frozen=True)
+class Following:
+    """The target goes ahead of the ego, in the end at `speed` m/s."""
+
+    speed: float
+
+    def is_over(self, world: World) -> bool:
+        """Whether the ego is no faster than the target."""
+        return world.ego.speed <= self.speed
+
+
+@dataclass(frozen=True)
+class Meeting:
+    """The target's motion, and when the test is over; the middle line x of the way of a target that
+    crosses, which obstructions stand by; the ego's route where it turns.
+    """
+
+    motion: Motion
+    end: Crossing | Following
+    line_x: float = 0.0
+    route: Route | None = None
+
+
+def across(way: Across, target: Target, speed: float, ego: Ego) -> Meeting:
+    """A target that comes from the right at `speed` m/s, from the left if far."""
+    length, width, _ = CATALOGUE[target.body].size
+    # The ego's front comes to the side of the target, whose middle line is half its width beyond.
+    hit_x = ego.length / 2 + ego.speed * ego.hit_s
+    line_x = hit_x + width / 2
+    middle = ego.share(way.overlap) + target.point_m
+    sign = -1.0 if way.far else 1.0
+    heading = sign * np.pi / 2
+    # Its tail has left the ego's way, the middle of which is 0.
+    clear = (ego.width + length) / 2 + CLEAR_M
+    motion: Walk | StraightWay
+    if way.run_up_m:
+        walk = run_up((line_x, -sign * way.start_m), heading, speed, way.run_up_m)
+        motion = walk.setting_off(ego.hit_s - walk.duration_to(way.start_m + middle))
+        clear_s = motion.starts_s + walk.duration_to(way.start_m + clear)
+    else:
+        motion = StraightWay((line_x, sign * middle), heading, speed, ego.hit_s)
+        clear_s = ego.hit_s + (clear - middle) / speed
+    reach = (ego.length + width) / 2
+    return Meeting(motion.pose, Crossing(line_x - reach, line_x + reach + CLEAR_M, clear_s), line_x)
+
+
+def ahead(way: Ahead, target: Target, speed: float, ego: Ego) -> Meeting:
+    """A target that goes the ego's way at `speed` m/s, or stands."""
+    hit_x = ego.length / 2 + ego.speed * ego.hit_s
+    x = hit_x + CATALOGUE[target.body].size[0] / 2
+    y = ego.share(way.overlap)
+    if not way.run_up_m:
+        standing = StraightWay((x, y), 0.0, speed, ego.hit_s)
+        return Meeting(standing.pose, Following(speed))
+    gone = way.run_up_m + way.steady_m
+    walk = run_up((x - gone, y), 0.0, speed, way.run_up_m)
+    moving = walk.setting_off(ego.hit_s - walk.duration_to(gone))
+    return Meeting(moving.pose, Following(speed))
+
+
+def braking_ahead(way: BrakingAhead, target: Target, ego: Ego) -> Meeting:
+    """A car that drives ahead at the ego's speed and brakes."""
+    start_x = (ego.length + CATALOGUE[target.body].size[0]) / 2 + way.headway_s * ego.speed
+    final = way.final_kph / 3.6
+    return Meeting(partial(_braking, way, start_x, ego.speed, final), Following(final))
+
+
+def _braking(way: BrakingAhead, start_x: float, speed: float, final: float, time: float) -> Pose:
+    """Return the pose of a car that starts at `start_x` and brakes from `speed` to `final` m/s."""
+    longest_s = (speed - final) / way.deceleration
+    braking = min(max(time - way.delay_s, 0.0), longest_s)
+    after = max(time - way.delay_s - longest_s, 0.0)
+    before = min(time, way.delay_s)
+    way_m = speed * (before + braking) - way.deceleration * braking**2 / 2 + final * after
+    return start_x + way_m, 0.0, 0.0
+
+
+def run_up(start: tuple[float, float], heading: float, speed: float, over_m: float) -> Walk:
+    """A walk without an end that gains its speed over `over_m`."""
+    return Walk(start, heading, speed, acceleration=speed**2 / (2 * over_m), length_m=np.inf)
+
 
 _SLACKEST_M = 1500.0
 """Radius at which the clothoids begin."""
