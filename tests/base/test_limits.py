@@ -15,7 +15,7 @@ from care_sim.base.causes import causes
 from care_sim.base.limits import LimitReached, check_workers, limit_in
 from care_sim.study.executors import processes
 from tests.torture.processes import ANOTHER_USER, entry_point
-from tests.torture.warm import TINY
+from tests.torture.commands import TINY
 
 
 def ended(arguments, prefix=(), limited=None):

@@ -149,16 +149,9 @@ def test_the_line_beside_care_is_that_of_its_loop_and_conditions(env, given, lin
     ("named", "message"),
     [
         ("nobody", "unknown scenario 'nobody'; known: "),
-        (
-            "no/body",
-            "unknown agent 'no/body'; known: learned-scorer, learned-sets, place, ppo, ppo-dartout",
-        ),
-        (".", "holds no agent: no weights.npz"),
         ("torn.npz", "weights torn.npz: no .npz of weights of care-sim train, or damaged"),
         ("sac", "sac holds no weights.npz: an agent of sac acts from its checkpoint alone"),
         ("placeless.npz", "placeless.npz: the card names no environment"),
-        ("ppo --budget 2", "budget must lie in (0, 1]"),
-        ("ppo --scenario nowhere", "unknown scenario 'nowhere'"),
     ],
 )
 def test_what_is_no_agent_is_told_in_one_line(capsys, tmp_path, monkeypatch, named, message):
@@ -178,9 +171,6 @@ def test_what_is_no_agent_is_told_in_one_line(capsys, tmp_path, monkeypatch, nam
     "config",
     [
         {"budget": ["much"]},
-        {"budget": 3},
-        {"budget": []},
-        {"env_parameters": [3, None]},
         {"env_parameters": "x"},
     ],
 )

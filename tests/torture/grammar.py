@@ -8,157 +8,43 @@ from pathlib import Path
 from types import UnionType
 
 from tests.torture import hostile
+from tests.torture.case import words
 
-PIECES = (
-    "dartout",
-    "dense",
-    "cutin",
-    "care",
-    "history",
-    "full",
-    "all-camera",
-    "ppo",
-    "learned-scorer",
-    "random",
-    "all",
-    "fast",
-    "bullet",
-    "returns",
-    "cluster",
-    "pillars",
-    "torchscript",
-    "streets",
-    "evaluation",
-    "calibration",
-    "val",
-    "street-0000",
-    "CARE-Dense-v0",
-    "CARE-Street-v0",
-    "SectorScores",
-    "0.03",
-    "0.1",
-    "1",
-    "2",
-    "3",
-    "0",
-    "0.5",
-    "31",
-)
+PIECES = [
+    *words("dartout dense cutin care history full all-camera ppo learned-scorer random all fast"),
+    *words("bullet returns cluster pillars torchscript streets evaluation calibration val"),
+    *words("street-0000 CARE-Dense-v0 CARE-Street-v0 SectorScores 0.03 0.1 1 2 3 0 0.5 31"),
+]
 """Values that fit somewhere."""
-PATHS = (
-    "out",
-    "out/deep/er",
-    "results",
-    "results/episodes.parquet",
-    "results/config.json",
-    "results/journal.jsonl",
-    "empty",
-    "text",
-    "text/under",
-    "none",
-    "link",
-    "loop",
-    "broken-link",
-    "null",
-    "zero",
-    "full",
-    "pipe",
-    "locked",
-    "x.png",
-    "x.gif",
-    "x.webp",
-    "x.mp4",
-    "x.rrd",
-    "x.html",
-    "x.npz",
-    "x.json",
-    "x.",
-    ".x",
-    "x.PNG",
-    "a b.png",
-    "ü.png",
-    "\udcff.png",
-    "n" * 300,
-    "/proc/self/nothing/out",
-    "",
-    ".",
-    "..",
-    "x\x00y",
-    "-x",
-    "\x1b[31m.png",
-)
-CLUSTERS = (
-    "nonsense",
-    "",
-    "ucx://x",
-    "tls://x",
-    "tcp://",
-    "x://y",
-    "inproc://x",
-    ":",
-    "tcp://127.0.0.1:99999",
-    "a b",
-    "\n",
-)
-SOURCES = (
-    "streets",
-    "argoverse2:drive",
-    "nuscenes:base",
-    "argoverse2:none",
-    "nuscenes:empty",
-    "argoverse2:",
-    ":",
-    "nuscenes",
-    "argoverse2:text",
-    "nuscenes:\x00",
-)
+PATHS = [
+    *words("out out/deep/er results results/episodes.parquet results/config.json"),
+    *words("results/journal.jsonl empty text text/under none link loop broken-link null zero"),
+    *words("full pipe locked x.png x.gif x.webp x.mp4 x.rrd x.html x.npz x.json x. .x x.PNG"),
+    *words("ü.png . .. -x /proc/self/nothing/out"),
+    *("", "a b.png", "\udcff.png", "n" * 300, "x\x00y", "\x1b[31m.png"),
+]
+CLUSTERS = [
+    *words("nonsense ucx://x tls://x tcp:// x://y inproc://x : tcp://127.0.0.1:99999"),
+    *("", "a b", "\n"),
+]
+SOURCES = [
+    *words("streets argoverse2:drive nuscenes:base argoverse2:none nuscenes:empty argoverse2:"),
+    *(":", "nuscenes", "argoverse2:text", "nuscenes:\x00"),
+]
 WORK = {
-    "seeds",
-    "scenes",
-    "episodes",
-    "steps",
-    "repeats",
-    "samples",
-    "resets",
-    "seconds",
-    "floor_seeds",
-    "evaluate_every",
-    "environments",
-    "rollout",
-    "epochs",
-    "batch",
-    "memory",
+    *words("seeds scenes episodes steps repeats samples resets seconds floor_seeds"),
+    *words("evaluate_every environments rollout epochs batch memory"),
 }
 """Options that say how much is to be done; a large value honestly takes its time."""
-TINY = {
-    "workers": "1",
-    "seeds": "1",
-    "scenes": "1",
-    "episodes": "0",
-    "episode": "0",
-    "floor_seeds": "1",
-    "steps": "64",
-    "repeats": "1",
-    "samples": "1",
-    "resets": "1",
-    "seconds": "0.01",
-    "environments": "1",
-    "rollout": "8",
-    "evaluate_every": "64",
-}
-LONG = (
-    "reproduce",
-    "sweep",
-    "protocol",
-    "study",
-    "judge",
-    "certify",
-    "benchmark",
-    "leaderboard",
-    "train",
-    "report",
-    "export",
+TINY = dict.fromkeys(
+    words("workers seeds scenes floor_seeds repeats samples resets environments"), "1"
 )
+TINY |= {"episodes": "0", "episode": "0", "steps": "64", "evaluate_every": "64"}
+TINY |= {"seconds": "0.01", "rollout": "8"}
+LONG = {
+    *words("reproduce sweep protocol study judge certify benchmark leaderboard train"),
+    *words("report export"),
+}
 """Commands that may take their time."""
 
 

@@ -2,44 +2,19 @@
 
 import io
 import json
-import os
 import zipfile
+from contextlib import suppress
 
 import numpy as np
 
+from tests.torture.case import words
+
 DEEP = 100_000
-PLAIN = (
-    None,
-    True,
-    0,
-    -1,
-    1,
-    0.5,
-    1e308,
-    -1e308,
-    10**22,
-    2**63,
-    float("nan"),
-    float("inf"),
-    "",
-    "x",
-    "care",
-    "\ud800",
-    "\x00",
-    "\x1b[31m",
-    "x" * 100_000,
-    [],
-    {},
-    [[]],
-    [1, 2],
-    {"a": 1},
-    "<script>",
-    "$x_1$",
-    "2**9",
-    [None],
-    [[1, [2]]],
-    5e-324,
-)
+PLAIN = [
+    *(None, True, 0, -1, 1, 0.5, 1e308, -1e308, 10**22, 2**63, float("nan"), float("inf"), 5e-324),
+    *("", "x", "care", "\ud800", "\x00", "\x1b[31m", "x" * 100_000, "<script>", "$x_1$", "2**9"),
+    *([], {}, [[]], [1, 2], {"a": 1}, [None], [[1, [2]]]),
+]
 """What may stand in JSON where something else belongs."""
 
 
@@ -77,19 +52,8 @@ def _blank(rng, data, _):
 
 def _insert(rng, data, _):
     at = rng.randrange(len(data) + 1)
-    data[at:at] = rng.choice(
-        (
-            b"\0",
-            b"\xff\xfe",
-            b"[" * 1000,
-            b"9" * 400,
-            b"\n",
-            b'"',
-            b"\r\n",
-            b"NaN",
-            rng.randbytes(64),
-        )
-    )
+    odd = (b"\0", b"\xff\xfe", b"[" * 1000, b"9" * 400, b"\n", b'"', b"\r\n", b"NaN")
+    data[at:at] = rng.choice((*odd, rng.randbytes(64)))
     return data
 
 
@@ -187,91 +151,48 @@ def table(rng, read, write):
     import pyarrow as pa
 
     whole = read()
-    change = rng.choice(
-        (
-            "drop",
-            "rename",
-            "values",
-            "values",
-            "values",
-            "no rows",
-            "rows",
-            "double",
-            "type",
-            "notes",
-        )
-    )
     name = rng.choice(whole.column_names)
     at = whole.column_names.index(name)
-    count = len(whole)
+    change = rng.choice(words("drop rename value value value empty rows double type notes"))
     if change == "drop":
         whole = whole.drop_columns([name])
     elif change == "rename":
-        whole = whole.rename_columns(
-            [
-                *whole.column_names[:at],
-                rng.choice(("x", "", "\x1b[31m", "seed")),
-                *whole.column_names[at + 1 :],
-            ]
-        )
-    elif change == "no rows":
+        names = [*whole.column_names]
+        names[at] = rng.choice(("x", "", "\x1b[31m", "seed"))
+        whole = whole.rename_columns(names)
+    elif change == "empty":
         whole = whole.slice(0, 0)
     elif change == "rows":
-        whole = whole.take(pa.array([rng.randrange(count) for _ in range(rng.randrange(1, 5))]))
+        whole = whole.take(rng.choices(range(len(whole)), k=rng.randrange(1, 5)))
     elif change == "double":
         whole = pa.concat_tables([whole, whole])
     elif change == "notes":
-        notes = {
-            key: rng.choice(
-                (b"", b"x", b"\xff", b"[", b"[1", b"[[", b"{}", b"5", b"[null]", b"[[[1]]]")
-            )
-            for key in whole.schema.metadata or {b"a": b""}
-        }
-        whole = whole.replace_schema_metadata(notes)
-        return f"notes {notes}"
+        odd = (b"", b"x", b"\xff", b"[", b"[1", b"[[", b"{}", b"5", b"[null]", b"[[[1]]]")
+        notes = {key: rng.choice(odd) for key in whole.schema.metadata or {b"a": b""}}
+        whole, change = whole.replace_schema_metadata(notes), f"notes {notes}"
     else:
-        values = whole.column(at).to_pylist()
-        with_others = _other_column(rng, values, every=change == "type")
-        whole = whole.set_column(at, name, with_others)
-        change = f"{change} {with_others.type} {ascii(with_others[0].as_py())[:60]}"
+        values = _other_column(rng, whole.column(at).to_pylist(), change == "type")
+        whole = whole.set_column(at, name, values)
+        change = f"{change} {values.type} {ascii(values[0].as_py())[:60]}"
     write(whole)
     return f"column {name!r}: {change}"
+
+
+ODD_CELLS = [
+    *(None, float("nan"), float("inf"), -1, 0, 1e308, 2**62, -(2**62), "x", "", "\x1b[31m"),
+    *("$x_1$", b"\xff", [1], [], {"a": 1}, True, 5e-324),
+]
 
 
 def _other_column(rng, values, every):
     """A column with one value that does not belong, or of another kind from top to bottom."""
     import pyarrow as pa
 
-    odd = rng.choice(
-        (
-            None,
-            float("nan"),
-            float("inf"),
-            -1,
-            0,
-            1e308,
-            2**62,
-            -(2**62),
-            "x",
-            "",
-            "\x1b[31m",
-            "$x_1$",
-            b"\xff",
-            [1],
-            [],
-            {"a": 1},
-            True,
-            5e-324,
-        )
-    )
-    if not every:
-        changed = [*values]
-        if changed:
-            changed[rng.randrange(len(changed))] = odd
-        try:
-            return pa.array(changed)
-        except (pa.ArrowException, OverflowError, TypeError, ValueError):
-            pass
+    odd = rng.choice(ODD_CELLS)
+    if not every and values:
+        values[rng.randrange(len(values))] = odd
+        with suppress(pa.ArrowException, OverflowError, TypeError, ValueError):
+            return pa.array(values)
     return pa.array([odd] * len(values))
 
 
@@ -362,9 +283,3 @@ def points(rng, path):
     values[rng.randrange(len(values))] = rng.choice((np.nan, np.inf, -np.inf, 1e30, -1e30, 0))
     path.write_bytes(values.tobytes() * rng.choice((1, 1, 2)) + b"\0" * rng.choice((0, 0, 1, 4)))
     return "numbers"
-
-
-def sparse(path, size):
-    """A file of so many bytes that takes no space."""
-    with path.open("wb") as file:
-        os.truncate(file.fileno(), size)
