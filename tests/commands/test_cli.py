@@ -202,7 +202,7 @@ class Seedless(Generated):
         ("sweep --scenarios dartout --policies faulty:Slips --seeds 1", 1, "faulty.py, line 11"),
         ("run faulty:Peopled", 1, "faulty.py, line 17"),
         # Ours stumbles over what it gave.
-        ("run faulty:Single", 1, "class Single, faulty.py, line 26"),
+        ("run faulty:Single", 1, "class Single, faulty.py, line 25"),
         ("run faulty:Refuses", 2, "no such gap"),
         ("run faulty:Seedless", 2, "source faulty:Seedless cannot be loaded: faulty:Seedless"),
         ("run faulty:Nobody", 2, "scenario faulty:Nobody cannot be loaded: AttributeError"),

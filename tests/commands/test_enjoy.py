@@ -8,7 +8,6 @@ from types import SimpleNamespace
 import pytest
 
 from care_sim.cli import parsed_command
-from care_sim.commands import run as run_command
 from care_sim.commands.options.shared import EpisodeOptions
 from care_sim.commands.shared.agent_play import AgentPlay
 from care_sim.policies.learned.weights import load_weights, save_weights, shipped_weights
@@ -87,21 +86,6 @@ def test_a_shipped_agent_plays_by_either_name_and_is_filmed(capsys, tmp_path):
     assert out.endswith(f"Filmed in {film}\n")
     assert film.read_bytes().startswith(b"GIF8")
     assert hash_of(run(capsys, "run", "ppo-dense", *SHORT)[1]) == wanted
-
-
-def test_the_viewer_opens_on_the_episode(capsys, monkeypatch, tmp_path):
-    pytest.importorskip("rerun")
-    seen = []
-
-    def view(options):
-        seen.append((str(options.file), options.file.read_bytes()[:4]))
-        return 0
-
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(run_command, "view", view)
-    for more in ((), ("--record", "other.rrd")):
-        assert run(capsys, "run", "ppo", *SHORT, "--view", *more)[0] == 0
-    assert seen == [("runs/run.rrd", b"RRF2"), ("other.rrd", b"RRF2")]
 
 
 def test_every_agent_of_the_package_is_found_and_has_a_world():

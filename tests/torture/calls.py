@@ -11,7 +11,6 @@ with any numbers in them.
 from contextlib import suppress
 from dataclasses import MISSING, fields
 from functools import lru_cache, partial
-from numbers import Real
 from warnings import catch_warnings, simplefilter
 
 import numpy as np
@@ -360,27 +359,6 @@ WRAPPERS = {
 }
 
 
-def vector(case):
-    """Several environments side by side."""
-    import gymnasium
-
-    from care_sim.envs import CLOSED_LOOP
-
-    count = some(case, 1, 2)
-    # Gymnasium makes as many as it is asked for, and NumPy no array of True rows.
-    if isinstance(count, Real) and count > 4:
-        return
-    count = int(count) if isinstance(count, bool) else count
-    name = case.rng.choice([*CLOSED_LOOP])
-    given = draw(case, {"budget": lambda: 0.1, "min_returns": lambda: 2, "floor": lambda: True})
-    env = gymnasium.make_vec(name, num_envs=count, vectorization_mode="sync", **given)
-    try:
-        env.reset(seed=some(case, 0, [1, 2], None))
-        env.step(some(case, np.zeros((count, 32, 512), np.float32)))
-    finally:
-        env.close()
-
-
 def detector(case):
     """Detectors by name."""
     from care_sim.perception.detectors import detector_names, make_detector
@@ -388,15 +366,6 @@ def detector(case):
     name = case.rng.choice([*detector_names(), some(case)])
     known = dict.fromkeys(("min_returns", "file", "grid", "unknown"))
     make_detector(name, some(case, 1.84), **draw(case, known))
-
-
-def weights(case):
-    """Files of weights that are none."""
-    from care_sim.policies.learned.weights import load_weights
-
-    path = some(case, "nowhere", ".", "")
-    if not isinstance(path, int):  # a file descriptor, which is open for reading elsewhere
-        load_weights(path)
 
 
 def tables(case):
@@ -419,9 +388,7 @@ ACTIONS = {
     scenario: 4,
     configuration: 8,
     wrapper: 3,
-    vector: 1,
     detector: 2,
-    weights: 1,
     tables: 2,
 }
 """What is called, and how often."""

@@ -40,7 +40,7 @@ TINY = dict.fromkeys(
     words("workers seeds scenes floor_seeds repeats samples resets environments"), "1"
 )
 TINY |= {"episodes": "0", "episode": "0", "steps": "64", "evaluate_every": "64"}
-TINY |= {"seconds": "0.01", "rollout": "8"}
+TINY |= {"seconds": "0.01", "rollout": "8", "scenario_parameters": "duration_s=0.2"}
 LONG = {
     *words("reproduce sweep protocol study judge certify benchmark leaderboard train"),
     *words("report export"),
@@ -85,24 +85,14 @@ class Grammar:
         rng = self._rng
         if rng.random() < 0.03:
             return [self._text() for _ in range(rng.randrange(4))]
-        words, kind = rng.choice(list(commands().items()))
-        self.long = words[0] in LONG
-        known = list(options(kind))
-        given = [
-            one for one in known if one[2] or one[3] or rng.random() < min(1.0, 2.5 / len(known))
-        ]
-        tiny = [
-            (name, TINY[name])
-            for name, *_ in known
-            if name in TINY and name not in {one[0] for one in given}
-        ]
-        if any(name == "scenario_parameters" for name, *_ in known):
-            tiny.append(("scenario_parameters", "duration_s=0.2"))
-        arguments = [piece for one in given for piece in self._option(*one)]
-        rest = [
-            piece for name, value in tiny if rng.random() < 0.97 for piece in (_flag(name), value)
-        ]
-        line = [*words, *arguments, *rest]
+        first, kind = rng.choice([*commands().items()])
+        self.long = first[0] in LONG
+        known, share = [*options(kind)], 2.5
+        given = [one for one in known if one[2] or one[3] or rng.random() < share / len(known)]
+        names = {one[0] for one in known} - {one[0] for one in given}
+        tiny = {name: TINY[name] for name in sorted(names & {*TINY}) if rng.random() < 0.97}
+        line = [*first, *(piece for one in given for piece in self._option(*one))]
+        line += [piece for name, value in tiny.items() for piece in (_flag(name), value)]
         return self._spoilt(line) if rng.random() < 0.05 else line
 
     def _option(self, name, hint, positional, _needed):
@@ -111,21 +101,16 @@ class Grammar:
             return [_flag(name) if rng.random() < 0.5 else f"--no-{name.replace('_', '-')}"]
         if positional:
             return values
-        return (
-            [_flag(name), *values]
-            if rng.random() < 0.95
-            else [f"{_flag(name)}={value}" for value in values[:1]]
-        )
+        if rng.random() < 0.05:
+            return [f"{_flag(name)}={value}" for value in values[:1]]
+        return [_flag(name), *values]
 
     def _values(self, name, hint):
         """One value, several or none, as the option's type has it; now and then not."""
-        several = typing.get_origin(hint) is tuple
-        inner = typing.get_args(hint)[0] if several else hint
-        count = (
-            self._rng.choice((0, 1, 1, 1, 2, 3))
-            if several
-            else (1 if self._rng.random() < 0.97 else 2)
-        )
+        if typing.get_origin(hint) is tuple:
+            inner, count = typing.get_args(hint)[0], self._rng.choice((0, 1, 1, 1, 2, 3))
+        else:
+            inner, count = hint, 1 + (self._rng.random() < 0.03)
         return [self._value(name, inner) for _ in range(count)]
 
     def _value(self, name, hint):
@@ -152,20 +137,10 @@ class Grammar:
         from care_sim.policies import policy_names
         from care_sim.scenarios import SCENARIOS
 
-        names = {
-            "scenario": [*SCENARIOS],
-            "scenarios": [*SCENARIOS, "all"],
-            "policy": policy_names(),
-        }
-        names |= {
-            "policies": [*policy_names(), "all"],
-            "also": policy_names(),
-            "engine": ["fast", "bullet"],
-            "cell_order": [*CELL_ORDERS],
-            "firing": [*HARDWARE, "tiles:2x16"],
-            "driver": [*DRIVERS],
-        }
-        return names.get(name, []) * 6
+        names = {"scenario": [*SCENARIOS], "scenarios": [*SCENARIOS, "all"]}
+        names |= {"policy": policy_names(), "policies": [*policy_names(), "all"]}
+        names |= {"engine": ["fast", "bullet"], "cell_order": [*CELL_ORDERS], "driver": [*DRIVERS]}
+        return (names | {"firing": [*HARDWARE, "tiles:2x16"]}).get(name, []) * 6
 
     def _parameter(self, option):
         """NAME=VALUE, or something like it."""
@@ -231,27 +206,10 @@ def _parameter_names(option):
 
     if option in ("scenario_parameters", "env_parameters"):
         names = [field.name for scenario in SCENARIOS.values() for field in fields(scenario)]
-        return [
-            *names,
-            "budget",
-            "keyframe_s",
-            "render_mode",
-            "detector",
-            "source",
-            "reward_weights",
-            "floor",
-            "self",
-        ]
+        more = "budget keyframe_s render_mode detector source reward_weights floor self"
+        return [*names, *words(more)]
     if option == "detector_parameters":
-        return ["file", "min_returns", "grid", "x", "self"]
+        return words("file min_returns grid x self")
     names = [text.partition("=")[0] for name in BUILT_IN for text in parameter_texts(maker(name))]
-    return [
-        *names,
-        *(f"care-sbf.{name}" for name in names),
-        "path",
-        "ppo.path",
-        "learned-scorer.path",
-        "learned-sets.path",
-        "none.x",
-        "rig",
-    ]
+    more = "path ppo.path learned-scorer.path learned-sets.path none.x rig"
+    return [*names, *(f"care-sbf.{name}" for name in names), *words(more)]

@@ -18,90 +18,83 @@ PLAIN = [
 """What may stand in JSON where something else belongs."""
 
 
+ODD_BYTES = (
+    b"\0",
+    b"\xff\xfe",
+    b"[" * 1000,
+    b"9" * 400,
+    b"\n",
+    b'"',
+    b"\r\n",
+    b"NaN",
+    b"\x9d" * 64,
+)
+
+
 def raw(rng, path, others=()):
     """Damage bytes; `others` are files whose content may take the place of this one's. Says what
     was done.
     """
-    data = bytearray(path.read_bytes())
-    change = rng.choice(_RAW)
-    path.write_bytes(change(rng, data, others))
-    return change.__name__
-
-
-def _flip_bits(rng, data, _):
-    for _ in range(rng.choice((1, 1, 3, 30))):
-        if data:
-            data[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
-    return data
-
-
-def _cut(rng, data, _):
-    return data[: rng.randrange(len(data) + 1)]
-
-
-def _cut_the_front(rng, data, _):
-    return data[rng.randrange(len(data) + 1) :]
-
-
-def _blank(rng, data, _):
-    start = rng.randrange(len(data) + 1)
-    end = min(len(data), start + rng.choice((8, 512, 4096)))
-    data[start:end] = rng.choice((b"\0", b"\xff", b" ", b"9")) * (end - start)
-    return data
-
-
-def _insert(rng, data, _):
+    data = path.read_bytes()
     at = rng.randrange(len(data) + 1)
-    odd = (b"\0", b"\xff\xfe", b"[" * 1000, b"9" * 400, b"\n", b'"', b"\r\n", b"NaN")
-    data[at:at] = rng.choice((*odd, rng.randbytes(64)))
+    end = min(len(data), at + rng.choice((8, 512, 4096)))
+    name = rng.choices([*RAW], [share for share, _ in RAW.values()])[0]
+    if name == "another" and others:
+        path.write_bytes(rng.choice(others).read_bytes())
+    else:
+        path.write_bytes(RAW[name][1](rng, data, at, end))
+    return name
+
+
+def _flipped(rng, data, *_):
+    data = bytearray(data)
+    for _ in range(rng.choice((1, 1, 3, 30)) if data else 0):
+        data[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
     return data
 
 
-def _repeat(rng, data, _):
-    start = rng.randrange(len(data) + 1)
-    end = min(len(data), start + rng.choice((8, 512, 4096)))
-    data[end:end] = data[start:end] * rng.choice((1, 1, 50))
-    return data
+def _blank(rng, data, at, end):
+    return data[:at] + rng.choice((b"\0", b"\xff", b" ", b"9")) * (end - at) + data[end:]
 
 
-def _of_another(rng, data, others):
-    return rng.choice(others).read_bytes() if others else data
+def _repeated(rng, data, at, end):
+    return data[:end] + data[at:end] * rng.choice((1, 1, 50)) + data[end:]
 
 
-def _nothing(_rng, _data, _others):
-    return b""
-
-
-def _deep(rng, _data, _others):
+def _deep(rng, *_):
     return rng.choice((b"[" * DEEP, b'{"a":' * DEEP, b"[" * DEEP + b"]" * DEEP))
 
 
-def _noise(rng, data, _others):
-    return rng.randbytes(min(len(data), 5000))
-
-
-_RAW = (
-    (_flip_bits,) * 6
-    + (_cut,) * 3
-    + (_cut_the_front, _blank, _blank, _insert, _insert, _repeat, _repeat)
-)
-_RAW += (_of_another, _nothing, _deep, _noise)
+RAW = {
+    "bits": (6, _flipped),
+    "cut": (3, lambda rng, data, at, end: data[:at]),
+    "front cut": (1, lambda rng, data, at, end: data[at:]),
+    "blank": (2, _blank),
+    "inserted": (2, lambda rng, data, at, end: data[:at] + rng.choice(ODD_BYTES) + data[at:]),
+    "repeated": (2, _repeated),
+    "another": (1, lambda rng, data, at, end: data),
+    "empty": (1, lambda rng, data, at, end: b""),
+    "deep": (1, _deep),
+    "noise": (1, lambda rng, data, at, end: rng.randbytes(min(len(data), 5000))),
+}
+"""How often bytes are damaged in a way, and how: from the byte `at` on, or up to `end`."""
 
 
 def instead(rng, path):
     """Put something that is no file in its place."""
     path.unlink()
-    change = rng.choice(("folder", "gone", "loop", "zeros", "locked"))
-    if change == "folder":
-        path.mkdir()
-    elif change == "loop":
-        path.symlink_to(path.name)
-    elif change == "zeros":
-        path.symlink_to("/dev/zero")
-    elif change == "locked":
-        path.write_bytes(b"x")
-        path.chmod(0)
+    change = rng.choice([*INSTEAD])
+    INSTEAD[change](path)
     return change
+
+
+INSTEAD = {
+    "folder": lambda path: path.mkdir(),
+    "gone": lambda path: None,
+    "loop": lambda path: path.symlink_to(path.name),
+    "zeros": lambda path: path.symlink_to("/dev/zero"),
+    "locked": lambda path: path.touch(0),
+}
 
 
 def json_node(rng, path):
