@@ -12,8 +12,8 @@ import pytest
 from care_sim.base import limits
 from care_sim.base.limits import LimitReached, causes, check_workers, limit_in
 from care_sim.study.executors import processes
+from tests.torture.commands import TINY
 from tests.torture.processes import ANOTHER_USER, entry_point
-from tests.torture.warm import TINY
 
 
 def ended(arguments, prefix=(), limited=None):
