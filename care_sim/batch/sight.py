@@ -12,15 +12,13 @@ import numpy as np
 
 from care_sim.base.compiled import compiled
 from care_sim.batch.camera_faults import BatchDelay, BatchMisses, Detected
-from care_sim.batch.sensor_frames import seen_by
-from care_sim.batch.state import BatchState, Bodies, Outlines, Reported, Sensors
+from care_sim.batch.state import BatchState, Bodies, Outlines, Reported, Sensors, seen_by
 from care_sim.core.arrays import Floats, Integers, Mask
-from care_sim.core.boxes import planar_ranges
+from care_sim.core.cells.boxes import planar_ranges
 from care_sim.core.conditions import Sensing
 from care_sim.core.frames import turned_alike
-from care_sim.core.grid_kernels import copy_rows
-from care_sim.core.pinhole import NEAR_M
-from care_sim.core.pinhole_kernels import CameraModels, model_of, window_on
+from care_sim.core.grid import copy_rows
+from care_sim.core.pinhole import NEAR_M, CameraModels, model_of, window_on
 from care_sim.core.rig import Rig
 from care_sim.core.types import ImageDetections
 from care_sim.sensors.camera import picture_timing
@@ -82,7 +80,7 @@ class Sight:
         self._is_ever_dark = any(each.blackout_s for each in conditions)
 
     def begin(self, world: int, built: World, seed: np.random.SeedSequence) -> None:
-        """Begin an episode; `seed` is that of the camera (`care_sim.loops.seeds.SensorSeeds`)."""
+        """Begin an episode; `seed` is that of the camera (`care_sim.loops.episode.SensorSeeds`)."""
         self._misses.begin(world, seed, len(built.labels()))
         if self._is_late:
             # The streams are those of `care_sim.sensors.camera.CameraDetector`.

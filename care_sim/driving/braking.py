@@ -10,7 +10,7 @@ v * t_reaction + v^2 / (2 b) + s_0, less what a track that drives ahead needs to
 v_x^2 / (2 b) (Shalev-Shwartz et al. 2017, RSS). It acts with b at the first keyframe that is at
 least `brake_reaction_s` later. It stays on while any counting track is not faster than the ego, and
 for `brake_release_s` after the last one. Then the ego gains speed at `comfort_mps2` up to its
-cruising speed. Numbers and sources are those of `care_sim.core.driver_settings`.
+cruising speed. Numbers and sources are those of `care_sim.core.conditions`.
 
 With `brake_for_oncoming` the gap to a track with v_x < 0 is the least that it will have before it
 leaves the strip, at most `brake_horizon_s` after it has entered: x - |v_x| * t for x. So an ego
@@ -27,7 +27,7 @@ import numpy as np
 from care_sim.base.compiled import compiled
 from care_sim.base.times import LAST_BITS_S
 from care_sim.core.arrays import Floats
-from care_sim.core.driver_settings import DriverSettings
+from care_sim.core.conditions import DriverSettings
 from care_sim.core.types import Command, Ego, Tracks
 from care_sim.driving.corridor import Turns, enters, footprint, leaves_s
 
@@ -44,7 +44,7 @@ Rules = tuple[float, float, float, float, float, float, float, float, float]
 
 
 class BrakingRules(NamedTuple):
-    """What of `care_sim.core.driver_settings.DriverSettings` the decision follows, in its units;
+    """What of `care_sim.core.conditions.DriverSettings` the decision follows, in its units;
     where the strip that is guarded begins, `front_m`, and its reach to either side, `reach_m`; and
     the time between keyframes.
     """

@@ -9,12 +9,12 @@ import numpy as np
 from care_sim.base.errors import InvalidInput
 from care_sim.base.times import LAST_BITS_S
 from care_sim.core.arrays import Floats, Mask
-from care_sim.core.boxes import half_extents
-from care_sim.core.driver_settings import BRAKING_RULES, CAREFUL_HUMAN, FIXED, DriverSettings
+from care_sim.core.cells.boxes import half_extents
+from care_sim.core.conditions import BRAKING_RULES, CAREFUL_HUMAN, FIXED, DriverSettings
 from care_sim.core.types import Command, Ego, Tracks
 from care_sim.driving.braking import BrakingController
 from care_sim.driving.corridor import enters_strip
-from care_sim.world.speed_plan import SpeedPlan
+from care_sim.world.route import SpeedPlan
 
 _STANDARD_GRAVITY = 9.80665
 """m/s^2, by definition (ISO 80000-3)."""

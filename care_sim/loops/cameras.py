@@ -31,6 +31,9 @@ class Cameras:
     scoring and people.
     """
 
+    after_s: float
+    """Seconds from a keyframe to the pictures that the detector is given, 0 at the keyframe."""
+
     def __init__(
         self,
         world: World,
@@ -49,17 +52,13 @@ class Cameras:
         self._detector = CameraDetector(
             list(labels), sensing, rig.keyframe_s, seed, rig.cameras, pool, step_s=WORLD_STEP_S
         )
-
-    @property
-    def after_s(self) -> float:
-        """Seconds from a keyframe to the pictures that the detector is given, 0 at the keyframe."""
-        return self._detector.timing.after_s
+        self.after_s = self._detector.timing.after_s
 
     def look(self, sensor: Frame, heading: float) -> IdentifiedDetections:
         """Take the pictures of a keyframe, the LiDAR at `sensor` and the car taken to have the
         `heading`: the newest detections that are due.
         """
-        boxes = self._boxes(sensor)
+        boxes = sensor.boxes_to_local(self._world.boxes_of(self._bodies))
         self.pictures = taken = self._photographed(self._designed, sensor, boxes)
         if self._detector.mounted != self._designed:
             taken = self._photographed(self._detector.mounted, sensor, boxes)
@@ -70,7 +69,7 @@ class Cameras:
 
     def look_between(self, sensor: Frame, heading: float) -> None:
         """Take the pictures that the detector is given, `after_s` after a keyframe; see `look`."""
-        boxes = self._boxes(sensor)
+        boxes = sensor.boxes_to_local(self._world.boxes_of(self._bodies))
         taken = self._photographed(self._detector.mounted, sensor, boxes)
         seen = faultless_detections(taken, self._classes)
         self._detector.take(seen, heading, boxes, self._world.time)
@@ -85,12 +84,11 @@ class Cameras:
         """
         return faultless_detections(self.pictures, self._classes)
 
-    def _boxes(self, sensor: Frame) -> Floats:
-        """(n, 7) of all that the detector may ever report, in the sensor frame."""
-        return sensor.boxes_to_local(self._world.boxes_of(self._bodies))
-
     def _photographed(
         self, cameras: tuple[PinholeCamera, ...], sensor: Frame, boxes: Floats
     ) -> tuple[Integers, ...]:
+        """The pictures around boxes (n, 7) of all that the detector may ever report, in the sensor
+        frame.
+        """
         windows = [(camera, camera.window_on(boxes)) for camera in cameras]
         return tuple(self._engine.visible_boxes(camera, sensor, at) for camera, at in windows)

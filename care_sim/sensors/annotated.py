@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.cells.stack import Grid
 from care_sim.core.grid import Cells
-from care_sim.core.grid_stack import Grid
 from care_sim.core.types import ImageDetections, Scan
 
 NO_OBJECT = -1

@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 
 from care_sim.core.arrays import Floats, Integers
+from care_sim.core.cells.stack import Grid
+from care_sim.core.conditions import ReturnSettings
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid, Cells
-from care_sim.core.grid_stack import Grid
-from care_sim.core.return_settings import ReturnSettings
 from care_sim.core.types import Scan
 from care_sim.sensors.engines import Engine, make_engine
 from care_sim.sensors.signal import Echoes, Signal, brightness, echoes_of, reported
 from care_sim.world.bullet import NO_BODY, BulletWorld
-from care_sim.world.linear_motion import LinearMotion
+from care_sim.world.motions import LinearMotion
 
 MOST_INSTANTS = 64
 """Columns share an instant with their neighbours, 64 in a sweep. In 0.1 s and 512 columns that is

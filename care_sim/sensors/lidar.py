@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.cells.stack import Grid
 from care_sim.core.conditions import Sensing
 from care_sim.core.firing.base import shots_by_cell
 from care_sim.core.frames import Frame
 from care_sim.core.grid import Cells
-from care_sim.core.grid_stack import Grid
 from care_sim.core.types import Scan
 from care_sim.sensors.annotated import Cloud
 from care_sim.sensors.beams import Beams

@@ -7,10 +7,9 @@ import numpy as np
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats, Integers, Mask
-from care_sim.core.conditions import LidarFaults
+from care_sim.core.cells.stack import Grid
+from care_sim.core.conditions import LidarFaults, ReturnSettings
 from care_sim.core.grid import Cells
-from care_sim.core.grid_stack import Grid
-from care_sim.core.return_settings import ReturnSettings
 from care_sim.core.types import Scan
 from care_sim.sensors.annotated import NO_OBJECT, Cloud, joined
 from care_sim.sensors.beams import RollingSweep

@@ -21,11 +21,11 @@ from typing import NamedTuple
 import numpy as np
 
 from care_sim.core.arrays import Floats, Integers, Mask
-from care_sim.core.return_settings import LAST, STRONGEST, ReturnSettings
+from care_sim.core.conditions import LAST, STRONGEST, ReturnSettings
 from care_sim.sensors.engines.solid_kernels import met_surfaces
+from care_sim.world.bodies import ASPHALT, REFLECTANCES
 from care_sim.world.body_tables import Primitives
 from care_sim.world.bullet import NO_BODY
-from care_sim.world.materials import ASPHALT, REFLECTANCES
 
 
 class Signal:

@@ -12,8 +12,8 @@ import numpy as np
 from care_sim.base.checks import as_array, check_known
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.arrays import Floats, Mask
+from care_sim.core.cells.stack import Grid
 from care_sim.core.frames import Frame
-from care_sim.core.grid_stack import Grid
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.core.types import CLASSES, Ego

@@ -13,7 +13,7 @@ import numpy as np
 
 from care_sim.base.errors import InvalidInput, report_problems, shown
 from care_sim.core.arrays import Floats, Integers, Mask
-from care_sim.core.boxes import planar_ranges
+from care_sim.core.cells.boxes import planar_ranges
 from care_sim.core.frames import Frame
 from care_sim.core.types import CLASSES
 from care_sim.loops.film import Film, Shot

@@ -12,10 +12,17 @@ from pathlib import Path
 from typing import Any
 
 from care_sim.base.checks import check_known, check_path
-from care_sim.base.errors import BrokenSource, InvalidInput, MissingExtra, error_line, shown
-from care_sim.base.foreign_code import class_place, foreign_place
+from care_sim.base.errors import (
+    BrokenSource,
+    InvalidInput,
+    MissingExtra,
+    class_place,
+    error_line,
+    foreign_place,
+    shown,
+)
 from care_sim.base.plugins import Plugins, dataclass_faults
-from care_sim.core.return_settings import RAYS, FilmedReturns
+from care_sim.core.conditions import RAYS, FilmedReturns
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.loops.film import Film
 from care_sim.sources.argoverse2.recordings import Argoverse2

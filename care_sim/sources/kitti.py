@@ -22,7 +22,7 @@ from scipy.spatial.transform import Rotation
 
 from care_sim.base.checks import check_known
 from care_sim.base.errors import InvalidInput, shown, unknown
-from care_sim.base.json_text import check_file_size
+from care_sim.base.files import check_file_size
 from care_sim.core.arrays import Floats
 from care_sim.core.frames import Frame
 from care_sim.core.sensor_setup import SensorSetup, between, on_car

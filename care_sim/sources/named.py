@@ -11,8 +11,7 @@ from dataclasses import fields
 from importlib.util import find_spec
 from typing import Any
 
-from care_sim.base.bounds import option_text
-from care_sim.base.checks import check_known
+from care_sim.base.checks import check_known, option_text
 from care_sim.base.errors import InvalidInput
 from care_sim.base.plugins import is_place, package_of
 from care_sim.core.sensor_setup import SensorSetup

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from care_sim.core.arrays import Floats
-from care_sim.core.boxes import planar_ranges
+from care_sim.core.cells.boxes import planar_ranges
 from care_sim.core.types import Detections
-from care_sim.envs.detection import detector_of
+from care_sim.envs.sensing import detector_of
 from care_sim.evaluation.detector_quality import SceneBoxes, scene_boxes
 from care_sim.evaluation.sightings import RANGE_M
 from care_sim.loops.film import Film

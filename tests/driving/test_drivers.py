@@ -10,8 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.conditions import ClosedLoopConditions
-from care_sim.core.driver_settings import DriverSettings
+from care_sim.core.conditions import ClosedLoopConditions, DriverSettings
 from care_sim.core.types import Command, Ego, Tracks
 from care_sim.driving.braking import BrakingController
 from care_sim.driving.drivers import HUMAN_MODEL as HUMAN
@@ -23,8 +22,7 @@ from care_sim.driving.drivers import (
     check_driver,
     make_driver,
 )
-from care_sim.world.route import Route
-from care_sim.world.speed_plan import SpeedPlan
+from care_sim.world.route import Route, SpeedPlan
 
 FRONT, HALF_WIDTH, KEYFRAME = 2.5, 0.9, 0.1
 BESIDE = HALF_WIDTH + 1.0

@@ -7,7 +7,7 @@ import numpy as np
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.frames import Frame
-from care_sim.evaluation.metrics import outcome
+from care_sim.evaluation.outcomes import outcome
 from care_sim.loops.records import Keyframe
 from care_sim.sensors.engines.picture_kernels import visible_boxes
 from care_sim.study.designs.paper import paper_study

@@ -3,18 +3,17 @@
 import numpy as np
 import pytest
 
-from care_sim.core.conditions import Sensing
+from care_sim.core.conditions import ReturnSettings, Sensing
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
-from care_sim.core.return_settings import ReturnSettings
-from care_sim.loops.told import told_by
+from care_sim.loops.truth import told_by
 from care_sim.sensors.annotated import Cloud, cloud_of
 from care_sim.sensors.beams import Beams, RollingSweep, bundle
 from care_sim.sensors.engines import ENGINES
 from care_sim.sensors.lidar import Lidar, RecordedLidar
 from care_sim.sensors.signal import Signal
 from care_sim.world.bodies import CATALOGUE, BodyKind, Part
-from care_sim.world.linear_motion import LinearMotion
+from care_sim.world.motions import LinearMotion
 
 SENSOR = Frame(0.0, 0.0, 1.84, 0.3)
 STATED = {"lidar_stated_range_m": 40.0}

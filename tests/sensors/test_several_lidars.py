@@ -5,11 +5,10 @@ from contextlib import closing
 import numpy as np
 import pytest
 
-from care_sim.core.conditions import Sensing
+from care_sim.core.cells.stack import GridStack
+from care_sim.core.conditions import ReturnSettings, Sensing
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
-from care_sim.core.grid_stack import GridStack
-from care_sim.core.return_settings import ReturnSettings
 from care_sim.core.types import Scan
 from care_sim.perception.proxy import ReturnsRule
 from care_sim.sensors.annotated import Cloud, cloud_of
@@ -20,7 +19,7 @@ from care_sim.sensors.lidar_faults import CellFaults, Crosstalk
 from care_sim.sensors.surround import full_sweep
 from care_sim.world.bodies import CATALOGUE, BodyKind, Part
 from care_sim.world.bullet import NO_BODY, BulletWorld
-from care_sim.world.linear_motion import LinearMotion
+from care_sim.world.motions import LinearMotion
 from tests.helpers.lidars import DEGREE, STACK
 
 SENSOR = Frame(3.0, -2.0, 1.84, 0.6)

@@ -5,9 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_sim.core.conditions import Sensing
+from care_sim.core.conditions import ReturnSettings, Sensing
 from care_sim.core.frames import Frame
-from care_sim.core.return_settings import ReturnSettings
 from care_sim.sensors.beams import Beams
 from care_sim.sensors.engines import ENGINES
 from care_sim.sensors.lidar import Lidar
@@ -19,9 +18,8 @@ from care_sim.sensors.signal import (
     rain_extinction,
     reported,
 )
-from care_sim.world.bodies import CATALOGUE, BodyKind, Part
+from care_sim.world.bodies import CATALOGUE, REFLECTANCES, BodyKind, Part
 from care_sim.world.bullet import NO_BODY, pybullet
-from care_sim.world.materials import REFLECTANCES
 
 METRES = np.linspace(1, 200, 2000)
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from care_sim.core.arrays import Floats, Integers
-from care_sim.core.grid_stack import Grid
+from care_sim.core.cells.stack import Grid
 from care_sim.core.types import CLASSES
 from care_sim.perception.cluster.points import COLUMNS_APART, NEAR_RADIUS_M, cluster_radius
 from care_sim.world.bodies import CATALOGUE

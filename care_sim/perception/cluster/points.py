@@ -3,7 +3,7 @@
 import numpy as np
 
 from care_sim.core.arrays import Floats, Integers, Mask
-from care_sim.core.grid_stack import Grid
+from care_sim.core.cells.stack import Grid
 
 STEEPEST = 0.03
 """The most by which the road may slope against the car's own plane: 1 degree of pitch, as under

@@ -8,9 +8,8 @@ from care_sim.sources.installed import RECORDING_KINDS
 from care_sim.sources.named import source_of
 from care_sim.sources.scenes import SPLITS, Scene, Source, Streets
 from care_sim.study.episode_config import PLAIN_FIELDS, EpisodeConfig
-from care_sim.study.parameters import Parameters
 from care_sim.study.play_config import PlayConfig
-from care_sim.study.run_config import Row
+from care_sim.study.run_config import Parameters, Row
 
 
 def in_open_loop(row: Row) -> bool:

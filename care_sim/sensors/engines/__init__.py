@@ -12,9 +12,9 @@ import numpy as np
 
 from care_sim.base.checks import check_known
 from care_sim.core.arrays import Floats, Integers
+from care_sim.core.cells.stack import Grid, GridStack
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid, Cells
-from care_sim.core.grid_stack import Grid, GridStack
 from care_sim.core.pinhole import NEAR_M, PinholeCamera
 from care_sim.sensors.engines.picture_kernels import (
     View,

@@ -19,8 +19,8 @@ from care_sim.sensors.engines.silhouette_kernels import (
     room_for,
 )
 from care_sim.sensors.engines.view_kernels import Lens, Meshes, PlacedCamera
+from care_sim.world.body_tables import Tables
 from care_sim.world.bullet import NO_BODY, PixelWindow
-from care_sim.world.polyhedra import Tables
 
 
 @compiled()

@@ -28,7 +28,7 @@ class NuScenes(Recordings):
 
     The cameras' boxes come from the file `camera_detections`, or else from annotations. A detector
     gets `sweeps` of the LiDAR at a keyframe: its own, and the last of those since the keyframe
-    before, under whose mask they were fired (`care_sim.loops.held_mask`). `camera_times` says when
+    before, under whose mask they were fired (`care_sim.loops.open_loop`). `camera_times` says when
     pictures are taken: each camera at its `own` time, or all at that of the `sweep`. With
     `empty_boxes` also boxes without a recorded point are annotated.
     """

@@ -22,8 +22,7 @@ import pyarrow.compute as pc
 
 from care_sim.base.digests import file_stamp
 from care_sim.base.errors import InvalidInput
-from care_sim.base.files import replacing
-from care_sim.base.json_text import json_content, listed_values
+from care_sim.base.files import json_content, listed_values, replacing
 from care_sim.core.arrays import Floats
 
 JsonRow = dict[str, Any]

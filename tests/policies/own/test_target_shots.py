@@ -8,9 +8,9 @@ import pytest
 
 import care_sim
 from care_sim.base.errors import InvalidInput
+from care_sim.core.cells.stack import GridStack
 from care_sim.core.conditions import Conditions
 from care_sim.core.grid import AngularGrid
-from care_sim.core.grid_stack import GridStack
 from care_sim.core.residual import wedges
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
