@@ -187,7 +187,6 @@ class Driver(Protocol):
         """Decide from the tracks of this keyframe, as they lie before a car that drives straight
         ahead, and the ego's motion.
         """
-        ...
 
 
 _KINDS: dict[str, Callable[..., Driver]] = {

@@ -9,10 +9,11 @@ from care_sim.core.frames import Frame
 from care_sim.core.types import Scan
 from care_sim.sensors.annotated import NO_OBJECT, Cloud
 from care_sim.sensors.engines import ENGINES, check_engine
-from care_sim.sensors.lidar import Lidar, RecordedLidar
-from care_sim.sensors.lidar_faults import (
+from care_sim.sensors.lidar import (
     CellFaults,
     Crosstalk,
+    Lidar,
+    RecordedLidar,
     check_dead_rows,
     crosstalk_of,
     noisy,

@@ -14,8 +14,7 @@ from care_sim.perception.proxy import ReturnsRule
 from care_sim.sensors.annotated import Cloud, cloud_of
 from care_sim.sensors.beams import Beams
 from care_sim.sensors.engines import ENGINES, make_engine
-from care_sim.sensors.lidar import Lidar, RecordedLidar
-from care_sim.sensors.lidar_faults import CellFaults, Crosstalk
+from care_sim.sensors.lidar import CellFaults, Crosstalk, Lidar, RecordedLidar
 from care_sim.sensors.surround import full_sweep
 from care_sim.world.bodies import CATALOGUE, BodyKind, Part
 from care_sim.world.bullet import NO_BODY, BulletWorld

@@ -35,20 +35,17 @@ class Engine(Protocol):
         Returns ranges (n,) in metres, inf without a hit within the grid's reach, and body ids (n,),
         NO_BODY where there is no hit.
         """
-        ...
 
     def body_ids(self, camera: PinholeCamera, sensor: Frame, window: PixelWindow) -> Integers:
         """The id of the body that each pixel of a window of `camera` shows, NO_BODY where there is
         none; see `care_sim.world.bullet.BulletWorld.body_ids`.
         """
-        ...
 
     def visible_boxes(self, camera: PinholeCamera, sensor: Frame, window: PixelWindow) -> Integers:
         """(n, 6) the bodies in a window of `camera` in ascending order: id; left, top, right,
         bottom of the box that holds all its pixels, counted from the corner of the picture; their
         number.
         """
-        ...
 
 
 class Bullet:

@@ -74,12 +74,8 @@ def read_json(path: Path) -> Any:
 
     Raises InvalidInput for a file that is missing, truncated or larger than `LARGEST_TABLE`.
     """
-    try:
+    with _readable(path):
         return json_content(path, LARGEST_TABLE)
-    except FileNotFoundError:
-        raise InvalidInput(f"{path}: no such file") from None
-    except (OSError, ValueError) as error:
-        raise InvalidInput(f"{path}: no readable JSON file ({error})") from error
 
 
 def table_rows(path: Path, is_needed: Callable[[JsonRow], bool] | None = None) -> Iterator[JsonRow]:
@@ -121,8 +117,14 @@ def finite_numbers(value: object, *shape: int) -> Floats | None:
 
 
 def _values(path: Path) -> Iterator[Any]:
-    try:
+    with _readable(path):
         yield from listed_values(path, LARGEST_TABLE)
+
+
+@contextmanager
+def _readable(path: Path) -> Iterator[None]:
+    try:
+        yield
     except FileNotFoundError:
         raise InvalidInput(f"{path}: no such file") from None
     except (OSError, ValueError) as error:
