@@ -9,14 +9,14 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from time import process_time, sleep
 
-import pyarrow as pa
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
+from care_sim.sources.nuscenes import table_files
 from care_sim.sources.nuscenes.recordings import NuScenes
-from care_sim.sources.nuscenes.table_files import cached_table
+from care_sim.sources.nuscenes.table_files import FIELDS, table_rows
 from care_sim.sources.nuscenes.tables import Database
 from tests.helpers.nuscenes_database import change
 from tests.helpers.nuscenes_scene import SCENE, database, first
@@ -71,6 +71,9 @@ def written(folder, **tables):
         "sample": [{"token": t, "timestamp": 0, "next": ""} for t in TOKENS],
         "sensor": [{"token": t, "channel": name} for t, name in sensors.items()],
         "calibrated_sensor": [{"token": t, "sensor_token": t, **empty} for t in sensors],
+        "sample_data": [],
+        "sample_annotation": [],
+        "ego_pose": [],
         **tables,
     }
     (folder / "v1.0-x").mkdir()
@@ -79,24 +82,24 @@ def written(folder, **tables):
     return folder
 
 
+def read(row, table):
+    """What is read of a row."""
+    return {name: row[name] for name in ("token", *FIELDS[table])}
+
+
 @given(BOX_ROWS)
 def test_boxes_come_as_their_table_holds_them(boxes):
     boxes = [row | {"instance_token": row["token"]} for row in boxes]
     with tempfile.TemporaryDirectory() as folder:
         root = written(Path(folder), sample_annotation=boxes)
-        for _ in ("made", "mapped"):
+        for _ in ("made", "kept"):
             tables = Database(root)
             for sample in TOKENS:
-                wanted = [
-                    {name: row[name] for name in ("token", "instance_token", "visibility_token")}
-                    | {
-                        name: [*map(float, row[name])]
-                        for name in ("translation", "size", "rotation")
-                    }
-                    | {"has_points": row["num_lidar_pts"] + row["num_radar_pts"] > 0}
-                    for row in boxes
-                    if row["sample_token"] == sample
-                ]
+                wanted = []
+                for row in boxes:
+                    told = read(row, "sample_annotation")
+                    told["has_points"] = told.pop("num_lidar_pts") + told.pop("num_radar_pts") > 0
+                    wanted += [told] if row["sample_token"] == sample else []
                 assert tables.annotations(sample) == wanted
 
 
@@ -107,25 +110,18 @@ def test_recordings_come_with_the_poses_that_their_tables_hold(recordings, poses
         if places and chance.random() < 0.7:
             row["ego_pose_token"] = chance.choice([*places])
     with tempfile.TemporaryDirectory() as folder:
-        root = written(Path(folder), sample_data=recordings, ego_pose=poses)
-        for _ in ("made", "mapped"):
-            tables = Database(root)
-            for sample in TOKENS:
-                wanted = [
-                    {name: value for name, value in row.items() if name != "sample_token"}
-                    | {"pose": placed(row, places)}
-                    for row in recordings
-                    if row["sample_token"] == sample
-                    and (row["is_key_frame"] or row["calibrated_sensor_token"] == "lidar")
-                ]
-                assert tables.recordings(sample) == wanted
-
-
-def placed(row, places):
-    pose = places.get(row["ego_pose_token"])
-    if pose is None:
-        return None
-    return {name: [*map(float, pose[name])] for name in ("translation", "rotation")}
+        tables = Database(written(Path(folder), sample_data=recordings, ego_pose=poses))
+        for sample in TOKENS:
+            wanted = [
+                read(row, "sample_data")
+                for row in recordings
+                if row["sample_token"] == sample
+                and (row["is_key_frame"] or row["calibrated_sensor_token"] == "lidar")
+            ]
+            assert tables.recordings(sample) == wanted
+            for row in wanted:
+                if row["ego_pose_token"] in places:
+                    assert tables.pose_of(row) == places[row["ego_pose_token"]]
 
 
 def test_odd_numbers_are_refused_where_they_are_needed_alone(tmp_path):
@@ -141,36 +137,12 @@ def test_odd_numbers_are_refused_where_they_are_needed_alone(tmp_path):
         Database(root).numbers("ego_pose", pose, "translation", 3)
 
 
-@pytest.mark.parametrize(
-    ("table", "edit"),
-    [
-        ("sample_data", {"timestamp": 10**22}),
-        ("sample_data", {"filename": "\ud800"}),
-        ("sample_annotation", {"instance_token": "\ud800"}),
-        ("sample", {"token": "\ud800"}),
-    ],
-)
-def test_what_no_column_holds_is_named(tmp_path, table, edit):
+@pytest.mark.parametrize("table", ["sample_data", "sample_annotation", "sample"])
+def test_half_a_character_is_named(tmp_path, table):
     root = database(tmp_path)
-    change(root, table, lambda rows: rows.append(rows[0] | edit))
-    with pytest.raises(InvalidInput, match=f"{table}.json: half a character or too large a number"):
+    change(root, table, lambda rows: rows.append(rows[0] | {"token": "\ud800"}))
+    with pytest.raises(InvalidInput, match=f"{table}.json: half a character"):
         first(root)
-
-
-class Maker:
-    """Makes a table of a source, and counts how often."""
-
-    def __init__(self, source):
-        self.source = source
-        self.made = 0
-
-    def __call__(self):
-        self.made += 1
-        return pa.table({"rows": [[{"text": self.source.read_text()}], []]})
-
-    def cached(self):
-        table = cached_table(self.source.parent, "kept", [self.source], self)
-        return table["rows"].to_pylist()
 
 
 @pytest.fixture
@@ -179,56 +151,59 @@ def caches(tmp_path, monkeypatch):
     return tmp_path / "caches"
 
 
-@pytest.fixture
-def maker(tmp_path, caches):
-    source = tmp_path / "source.json"
-    source.write_text("one")
-    return Maker(source)
+def read_by(root):
+    """The names of the tables that are read for a film."""
+    read = []
+
+    def watched(path, *needed):
+        read.append(path.stem)
+        return table_rows(path, *needed)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(table_files, "table_rows", watched)
+        first(root)
+    return read
 
 
-def kept(text):
-    return [[{"text": text}], []]
-
-
-def test_a_table_is_made_once_until_its_source_changes(maker):
+def test_a_store_is_made_once_until_a_table_changes(tmp_path, caches):
     """Though size and time are as before."""
-    assert [maker.cached() for _ in range(3)] == [kept("one")] * 3
-    assert maker.made == 1
-    before = maker.source.stat()
-    maker.source.write_text("two")
-    os.utime(maker.source, ns=(before.st_atime_ns, before.st_mtime_ns))
-    assert maker.cached() == kept("two")
+    root = database(tmp_path)
+    assert "sample_data" in read_by(root)
+    assert read_by(root) == []
+    (kept,) = caches.rglob("*.sqlite")
+    table = root / "v1.0-trainval" / "sample_data.json"
+    before = table.stat()
+    table.write_text(table.read_text())
+    os.utime(table, ns=(before.st_atime_ns, before.st_mtime_ns))
+    assert "sample_data" in read_by(root)
+    (again,) = caches.rglob("*.sqlite")
+    assert again.name != kept.name
+    again.write_bytes(again.read_bytes()[:5000])
+    with pytest.raises(InvalidInput, match="delete it, it is damaged"):
+        first(root)
 
 
-@pytest.mark.parametrize("size", [0, 10, 200, -1])
-def test_a_torn_table_is_made_anew(maker, caches, size):
-    maker.cached()
-    (place,) = caches.rglob("*.arrow")
-    os.truncate(place, size if size >= 0 else place.stat().st_size - 1)
-    assert [maker.cached() for _ in range(2)] == [kept("one")] * 2
-    assert maker.made == 2
-
-
-def test_where_nothing_can_be_written_every_process_makes_its_own(maker, caches):
+def test_where_nothing_can_be_written_every_process_makes_its_own(tmp_path, caches):
+    root = database(tmp_path)
     caches.write_text("a file")
-    assert [maker.cached() for _ in range(2)] == [kept("one")] * 2
-    assert maker.made == 2
+    assert "sample_data" in read_by(root)
+    assert "sample_data" in read_by(root)
 
 
-def test_who_wants_it_meanwhile_waits(maker):
-    make = maker.__call__
+def test_who_wants_it_meanwhile_waits(tmp_path, caches):
+    root = database(tmp_path)
 
-    def slow():
-        sleep(0.2)
-        return make()
+    def slow(path, *needed):
+        made.append(path.stem)
+        sleep(0.1)
+        return table_rows(path, *needed)
 
-    def ask(_):
-        return cached_table(maker.source.parent, "kept", [maker.source], slow)
-
-    with ThreadPoolExecutor(4) as pool:
-        tables = [*pool.map(ask, range(4))]
-    assert maker.made == 1
-    assert all(table["rows"].to_pylist() == kept("one") for table in tables)
+    made = []
+    with pytest.MonkeyPatch.context() as patch, ThreadPoolExecutor(4) as pool:
+        patch.setattr(table_files, "table_rows", slow)
+        films = [*pool.map(lambda _: first(root), range(4))]
+    assert made.count("sample_annotation") == 1
+    assert len({len(film.shots) for film in films}) == 1
 
 
 MOST_PARSES = 2.5
