@@ -57,13 +57,6 @@ def test_errors_are_correlated_by_the_exponential_of_the_time_between():
     assert correlation(lasting, 3) == pytest.approx(np.exp(-1.5), abs=0.05)
 
 
-def test_one_spread_leaves_the_other_error_as_it_is():
-    both = errors(5, ego_position_sigma_m=0.4, ego_yaw_sigma_deg=2.0)
-    position = errors(5, ego_position_sigma_m=0.4)
-    np.testing.assert_array_equal(position[:, :2], both[:, :2])
-    assert not position[:, 2].any()
-
-
 def played(**conditions):
     """The episode's observations and the closed loop, with every cell fired."""
     arguments = {"budget": 1.0, "disable_env_checker": True, **conditions}

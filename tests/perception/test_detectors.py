@@ -10,7 +10,6 @@ import pytest
 from care_sim.base.errors import InvalidInput
 from care_sim.perception.detectors import DETECTORS, detector_names, make_detector
 from care_sim.perception.points_only import BrokenDetector, PointsOnly
-from care_sim.perception.proxy import ReturnsProxy
 from care_sim.sensors.annotated import Annotations, Cloud
 from tests.helpers.made_points import HEIGHT, shell
 
@@ -93,12 +92,6 @@ def test_an_installed_detector_is_listed_made_and_handed_points_only(installed):
 
 def test_a_maker_that_takes_parameters_by_any_name_is_handed_them(installed):
     assert make_detector("loose", HEIGHT, label=2).detect(CLOUD, CAR)[0].classes.tolist() == [2]
-
-
-def test_a_built_in_name_is_taken(installed):
-    assert isinstance(make_detector("returns", HEIGHT), ReturnsProxy)
-    with pytest.raises(InvalidInput, match="detector torchscript needs the parameter file"):
-        make_detector("torchscript", HEIGHT)
 
 
 @pytest.mark.parametrize(

@@ -60,16 +60,6 @@ def test_the_road_is_lost_where_it_is_met_too_flat(street, grid, engine):
     assert scan.ranges[road].max() > 14
 
 
-def test_cells_return_the_same_alone_and_among_others(street, grid, engine):
-    full, bodies = cast(street, grid, engine, **STATED)
-    cells = np.arange(5, grid.size, 7)
-    beams = Beams(street, grid, ReturnSettings(**STATED), engine, standing)
-    part, found = beams.cast(SENSOR, cells)
-    assert np.array_equal(part.ranges, full.ranges[cells])
-    assert np.array_equal(part.intensities, full.intensities[cells])
-    assert np.array_equal(found, bodies[cells])
-
-
 def faulty(world, grid, **faults):
     sensing = Sensing(**STATED, **faults)
     beams = Beams(world, grid, sensing, "fast", standing)
@@ -88,15 +78,6 @@ def test_faults_come_on_top_of_what_returns(street, grid):
     assert not scan.intensities[lost].any()
     assert (bodies[lost] == -1).all()
     assert np.array_equal(scan.intensities[~lost], whole.intensities[~lost])
-
-
-def test_truth_is_what_would_return(street, grid):
-    """The bound of the reward, and what privileged policies are told."""
-    one = faulty(street, grid)
-    cells = np.arange(grid.size)
-    scan, bodies = one.fire(cells, SENSOR)
-    assert np.array_equal(one.peek(SENSOR).ranges, scan.ranges)
-    assert one.hits(bodies.max(), cells, SENSOR) == np.count_nonzero(bodies == bodies.max())
 
 
 GRIDS = [

@@ -42,12 +42,6 @@ def errors(boxes, draws, spreads=SPREADS):
     return jittered(boxes, draws, np.tile(spreads, (len(boxes), 1)), zeros, [FRONT_CAMERA])
 
 
-def test_middle_draws_and_no_spread_leave_a_box_as_it_is():
-    box = [[100.0, 50.0, 140.0, 110.0]]
-    assert errors(box, [[0.5] * 4]) == pytest.approx(np.array(box))
-    assert errors(box, [[0.1, 0.9, 0.3, 0.7]], [0.0] * 4) == pytest.approx(np.array(box))
-
-
 def test_one_sigma_moves_and_stretches_by_the_spread():
     one_sigma = 0.8413447460685429
     ((left, top, right, bottom),) = errors([[100.0, 50.0, 140.0, 110.0]], [[one_sigma] * 4])
@@ -72,13 +66,6 @@ def test_a_box_stays_a_box_within_its_picture(edges, draws):
 
 
 MATRIX = YOLOX.confusion_matrix()
-
-
-def test_rows_of_the_matrix_are_chances():
-    assert MATRIX.sum(axis=1) == pytest.approx(1.0)
-    assert np.all(MATRIX >= 0)
-    assert MATRIX[BICYCLE, PEDESTRIAN] == 0.20
-    assert MATRIX[PEDESTRIAN, BICYCLE] == 0.0
 
 
 @pytest.mark.parametrize("true", range(len(CLASSES)))
@@ -144,14 +131,6 @@ def test_a_share_that_the_source_annotates_counts():
     assert seen_as(told, box, [FRONT_CAMERA], 480.0)[1].tolist() == [0.7]
 
 
-def test_boxes_end_at_the_edges_of_the_picture_and_behind_it_there_are_none():
-    beside = np.array([[3.0, 3.0, -1.0, 4.0, 2.0, 1.6, 0.0], [-9.0, 0.0, -1.0, 4.0, 2.0, 1.6, 0.0]])
-    spans = whole_boxes(FRONT_CAMERA, beside)
-    assert spans[0, 0] == 0.0
-    assert np.all((spans >= 0) & (spans <= [320, 180, 320, 180]))
-    assert spans[1].tolist() == [0, 0, 0, 0]
-
-
 def ratio_from_all_sides(bullet, kind):
     """Areas of the box round the pixels over that of the whole box, alone in the picture."""
     size, label = CATALOGUE[kind].size, CLASSES.index(CATALOGUE[kind].label)
@@ -182,12 +161,6 @@ def drawn(keyframes=400, objects=200, times_s=(0.2, 1.0), seed=0):
     return np.array([draws.next() for _ in range(keyframes)])
 
 
-def test_at_every_keyframe_all_numbers_are_equally_likely():
-    numbers = drawn()
-    for keyframe in (0, 1, 399):
-        assert np.histogram(numbers[keyframe], 4, (0, 1))[0] / 400 == pytest.approx(0.25, abs=0.07)
-
-
 @pytest.mark.parametrize(("column", "time_s"), [(0, 0.2), (1, 1.0)])
 @pytest.mark.parametrize("recall", [0.3, 0.9])
 def test_misses_are_correlated_as_stated(column, time_s, recall):
@@ -198,13 +171,6 @@ def test_misses_are_correlated_as_stated(column, time_s, recall):
     for lag in (1, 3, 8):
         correlation = np.mean(away[lag:] * away[:-lag]) / np.mean(away**2)
         assert correlation == pytest.approx(np.exp(-lag * KEYFRAME_S / time_s), abs=0.04)
-
-
-def test_what_is_done_with_the_numbers_does_not_move_them():
-    assert np.array_equal(drawn(5), drawn(5))
-    assert not np.array_equal(drawn(5), drawn(5, seed=1))
-    # Those of the first objects are not those of fewer objects: draws are by keyframe.
-    assert drawn(3, objects=0).shape == (3, 0, 2)
 
 
 POOLED = 50
@@ -269,12 +235,6 @@ def test_a_ghost_moves_as_the_object_that_it_follows():
     assert len(steps) > 12
     assert np.median(steps) == pytest.approx(3.0, abs=0.3)
     assert np.mean(np.abs(np.array(steps) - 3.0) < 1.1) > 0.7
-
-
-def test_it_ends_where_its_object_leaves_the_pictures():
-    lives_on = shown(pool(pictures=30, objects=POOLED), 3.0, 1e6, 31)
-    assert len(lives_on[0]) > 0
-    assert len(lives_on[-1]) == 0
 
 
 def test_it_is_hidden_by_a_box_of_its_class_and_comes_back():
@@ -392,11 +352,6 @@ def test_the_faults_come_on_top_and_leave_the_profile_as_it_is():
     alone, missing = boxes(), boxes(false_negative_rate=0.5)
     assert all(fewer <= all_ for fewer, all_ in zip(missing, alone, strict=True))
     assert sum(map(len, missing)) < sum(map(len, alone))
-
-
-def test_an_unknown_profile_is_refused_by_name():
-    with pytest.raises(InvalidInput, match=r"camera_profile.*ideal.*yolox"):
-        gymnasium.make("CARE-Dense-v0", camera_profile="yolo")
 
 
 def test_detections_of_a_file_have_errors_of_their_own():

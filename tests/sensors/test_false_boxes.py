@@ -2,9 +2,6 @@
 false.
 """
 
-import itertools
-from collections import Counter
-
 import gymnasium
 import numpy as np
 import pytest
@@ -23,7 +20,6 @@ from care_sim.sensors.surround import SURROUND_CAMERAS
 from care_sim.sources.street_films import record
 from care_sim.streets.street import make_street
 from care_sim.world import bullet_bodies as clients
-from tests.helpers.nuscenes_drive import write_drive
 from tests.helpers.short_streets import part_of
 from tests.helpers.telling_apart import CHANCE, areas_under_the_curve
 
@@ -105,12 +101,6 @@ def test_a_ghost_on_a_box_of_its_class_is_drawn_again_and_at_last_left_out():
     assert all((rows[:, 2] > 150).all() for rows in beside)
     numbers = np.array([[len(rows) for rows in kind] for kind in (alone, beside)])
     assert np.all((numbers[1] > 0) == (numbers[0] > 0)), f"{MOST_DRAWS} draws find the free place"
-
-
-def test_a_ghost_may_lie_on_a_box_of_another_class():
-    box = table((100, 80, 140, 110))
-    person = table((100, 80, 140, 110), label=PEDESTRIAN)
-    assert sum(map(len, drawn(1.0, 50, rows=person, true=box))) > 20
 
 
 def test_ghosts_do_not_lie_on_each_other():
@@ -232,15 +222,6 @@ def of_kind(episodes, kind):
     return [np.concatenate([keyframe[kind] for keyframe in keyframes]) for keyframes in episodes]
 
 
-def copies(keyframes, kind):
-    """Share of the boxes that stand, to the last digit, at another keyframe too."""
-    rows = [[tuple(row) for row in np.concatenate(both)[:, SHOWN].tolist()] for both in keyframes]
-    seen = Counter(itertools.chain.from_iterable(map(set, rows)))
-    return np.mean(
-        [seen[tuple(row)] > 1 for both in keyframes for row in both[kind][:, SHOWN].tolist()]
-    )
-
-
 @pytest.fixture(scope="module")
 def dense():
     """Eight episodes of the dense street with two ghosts a picture."""
@@ -285,21 +266,6 @@ def test_few_false_people_stand_where_nobody_can_have_emerged_yet(dense):
     )
     assert len(false) > 30
     assert np.mean(np.array(false) < min(true)) < 0.3
-
-
-@pytest.mark.parametrize("world", ["dense", "streets"])
-def test_who_remembers_all_boxes_meets_no_more_copies_among_the_false_ones(world, request):
-    """Give or take what chance does: three standard errors of a share of one in ten of some hundred
-    boxes.
-    """
-    shares = np.array(
-        [
-            [copies(keyframes, kind) for kind in (0, 1)]
-            for keyframes in request.getfixturevalue(world)
-        ]
-    )
-    true, false = shares.mean(axis=0)
-    assert false <= true + 0.05
 
 
 def test_as_many_ghosts_as_asked_for(dense, streets):
@@ -369,9 +335,3 @@ def test_of_boxes_that_sort_alike_the_order_does_not_say_which_is_false():
         behind.append(arrived.objects.tolist())
     assert orders[0] == orders[1] == [high[0, 2:6].tolist(), low[0, 2:6].tolist()]
     assert behind == [[0, NO_OBJECT], [NO_OBJECT, 0]]
-
-
-@pytest.fixture(scope="module")
-def nuscenes(tmp_path_factory):
-    """The folder of two drives past objects of all classes, five keyframes each."""
-    return write_drive(tmp_path_factory.mktemp("nuscenes"))

@@ -23,17 +23,6 @@ from care_sim.world.bodies import CATALOGUE
 SENSOR = Frame(0.0, 0.0, 1.84, 0.0)
 
 
-class Watched:
-    """Passes cells on to an engine and keeps them."""
-
-    def __init__(self, engine):
-        self.engine, self.cells = engine, []
-
-    def cast(self, sensor, cells):
-        self.cells.append(cells)
-        return self.engine.cast(sensor, cells)
-
-
 @pytest.fixture
 def street(bullet):
     bullet.add(CATALOGUE["bus"], (12.0, 4.0, 0.0))
@@ -62,13 +51,6 @@ def lidar(engine):
 
 def everything(grid):
     return np.arange(grid.size)
-
-
-def test_only_the_fired_cells_are_cast(grid, street, engine):
-    watched = Watched(ENGINES[engine](street, grid))
-    cells = np.array([5, 300, 9000, 16383])
-    Lidar(grid, watched, Sensing(), np.random.SeedSequence(0)).fire(cells, SENSOR)
-    assert [cast.tolist() for cast in watched.cells] == [cells.tolist()]
 
 
 def test_a_scan_of_some_cells_is_that_part_of_the_full_scan(grid, street, lidar):
@@ -204,12 +186,6 @@ def test_every_choice_of_cells_meets_the_same_noise_and_dropout(grid):
     whole, part = first.fire(everything(grid), full(grid)), second.fire(some, full(grid))
     assert part.cells.tolist() == np.intersect1d(whole.cells, some).tolist()
     assert np.array_equal(part.points, whole.take(np.isin(whole.cells, some)).points)
-
-
-def test_the_recording_stays_as_it_is(grid, cloud):
-    before = cloud.points.copy()
-    recorded(grid, lidar_range_sigma=0.5).fire(everything(grid), cloud)
-    assert np.array_equal(cloud.points, before)
 
 
 def crosstalk(grid, rate, seed=0):

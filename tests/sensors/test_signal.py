@@ -14,7 +14,6 @@ from care_sim.sensors.signal import (
     Signal,
     brightness,
     echoes_of,
-    fog_extinction,
     rain_extinction,
     reported,
 )
@@ -77,12 +76,6 @@ def test_weather_never_brightens(brightness, metres, visibility, rain):
         )
     )
     assert 0 <= both <= fog <= clear == brightness
-
-
-def test_at_the_visibility_two_per_cent_of_the_light_are_left():
-    for visibility in (30.0, 50.0, 1000.0):
-        left = math.exp(-fog_extinction(visibility) * visibility)
-        assert left == pytest.approx(0.02, rel=1e-3)
 
 
 def test_rain_takes_what_the_itu_says_from_a_kilometre():
