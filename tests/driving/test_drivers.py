@@ -228,9 +228,10 @@ def test_who_drives_ahead_is_followed_at_the_gap_of_the_model():
         (12.0, 0.0, 0.0),
         (12.0, 3.5, 5.0),
         (-8.0, 0.0, 5.0),
+        (2.0, 0.0, 5.0),
         (12.0, 0.0, -5.0),
     ],
-    ids=["stands", "beside", "behind", "oncoming"],
+    ids=["stands", "beside", "behind", "at the bumper", "oncoming"],
 )
 def test_only_who_drives_ahead_in_the_way_is_followed(other):
     assert eased(other) == eased()

@@ -103,6 +103,12 @@ def test_a_ghost_on_a_box_of_its_class_is_drawn_again_and_at_last_left_out():
     assert np.all((numbers[1] > 0) == (numbers[0] > 0)), f"{MOST_DRAWS} draws find the free place"
 
 
+def test_a_ghost_may_lie_on_a_box_of_another_class_or_picture():
+    place = (100, 80, 140, 110)
+    for beside in (table(place, label=PEDESTRIAN), table(place, camera=1)):
+        assert sum(map(len, drawn(1.0, 50, rows=table(place), true=beside))) > 20
+
+
 def test_ghosts_do_not_lie_on_each_other():
     for rows in drawn(8.0, 60, rows=spread(30)):
         assert np.all(overlaps(rows, rows) - np.eye(len(rows)) < 0.5)

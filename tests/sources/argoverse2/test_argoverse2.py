@@ -21,7 +21,7 @@ from care_sim.sources.argoverse2.recordings import (
     argoverse2_film,
     logs,
 )
-from care_sim.sources.argoverse2.tables import annotation_file, read_boxes, read_points
+from care_sim.sources.argoverse2.tables import read_boxes, read_points
 from care_sim.sources.box_films import annotations_of
 from care_sim.sources.named import source_of
 from care_sim.sources.nuscenes.sweeps import owners
@@ -133,20 +133,6 @@ def test_keyframes_stay_half_a_second_apart_where_sweeps_hold_nobody(tmp_path):
     assert [shot.time_s for shot in movie.shots] == pytest.approx([0.0, 0.5, 1.0])
 
 
-def test_sweeps_that_jitter_are_still_the_nearest_to_every_half_second(tmp_path):
-    log = write(tmp_path, [[CAR_AHEAD]] * 11, [at()] * 11)
-    for name in ("annotations.feather", "city_SE3_egovehicle.feather"):
-        rewrite(log / name, lambda t: shifted(t, {stamp(5): 9_000_000, stamp(10): -4_000_000}))
-    assert [shot.token for shot in argoverse2_film(log).shots] == [
-        str(s) for s in (stamp(0), stamp(5) + 9_000_000, stamp(10) - 4_000_000)
-    ]
-
-
-def shifted(table, shifts):
-    stamps = [s + shifts.get(s, 0) for s in table["timestamp_ns"].to_pylist()]
-    return replaced(table, "timestamp_ns", stamps)
-
-
 def test_the_cars_motion_comes_from_its_poses(tmp_path):
     """4 m/s gaining 2 m/s every second on a circle of 20 m."""
     times = np.arange(16) / 10
@@ -172,18 +158,6 @@ def test_a_log_with_sensor_recordings_loads_and_either_name_of_the_annotations(t
         len({argoverse2_film(path).shots[0].annotations.boxes.tobytes() for path in logs(tmp_path)})
         == 1
     )
-
-
-def test_of_several_annotations_the_plain_name_counts(tmp_path):
-    log = parked(tmp_path, CAR_AHEAD, sweeps=3)
-    copy = log / "annotations (1).feather"
-    copy.write_bytes(b"of a download that broke off")
-    assert annotation_file(log) == log / "annotations.feather"
-    (log / "annotations.feather").rename(log / "annotations_old.feather")
-    with pytest.raises(
-        InvalidInput, match=r"annotations \(1\).feather, annotations_old.feather: c"
-    ):
-        annotation_file(log)
 
 
 def test_a_log_is_called_by_its_folder_from_wherever_it_is_asked_for(tmp_path, monkeypatch):
@@ -339,26 +313,6 @@ def sweep(recorded):
     table = feather.read_table(path)
     points = np.stack([table[axis].to_numpy().astype(float) for axis in "xyz"], axis=1)
     return points - UP_LIDAR, table["laser_number"].to_numpy()
-
-
-def test_the_mount_is_where_the_recorded_lasers_meet(sweep):
-    """Seen from the right place, and from no other, every laser keeps its elevation at all ranges
-    and azimuths.
-    """
-
-    def spread(shift):
-        points = sweep[0] - shift
-        ranges = np.linalg.norm(points, axis=1)
-        near = (ranges > 3) & (ranges < 15)
-        lasers = [
-            np.arcsin(points[:, 2] / ranges)[near & (sweep[1] == laser)] for laser in range(32)
-        ]
-        return np.rad2deg(
-            np.median([np.std(elevations) for elevations in lasers if len(elevations) > 50])
-        )
-
-    assert spread(np.zeros(3)) < 0.005
-    assert min(spread(shift) for shift in 0.1 * np.vstack([np.eye(3), -np.eye(3)])) > 0.015
 
 
 def test_cast_returns_lie_where_the_recorded_sweep_has_them(recorded, sweep):

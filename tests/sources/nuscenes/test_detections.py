@@ -109,18 +109,6 @@ def test_a_detection_that_cannot_be_read_is_named(tmp_path, row, reason):
         DetectionFile(path)
 
 
-@pytest.mark.parametrize(
-    "content", [{"annotations": 3}, {"results": 3}, {"results": {"t": 3}}, None, "x"]
-)
-def test_a_file_without_detections_is_named(tmp_path, content):
-    path = tmp_path / "found.json"
-    path.write_text(json.dumps(content))
-    with pytest.raises(
-        InvalidInput, match=r"found.json: must hold a list of detections, or a map `results`"
-    ):
-        DetectionFile(path)
-
-
 def test_a_detection_on_no_picture_of_the_database_is_named(tmp_path):
     path = tmp_path / "found.json"
     path.write_text(json.dumps([OWN | {"sample_data_token": "nowhere"}]))

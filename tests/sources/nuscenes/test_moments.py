@@ -11,7 +11,6 @@ from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES
 from care_sim.envs.open_loop import FilmEnv
 from care_sim.sensors.annotated import NO_OBJECT
-from care_sim.sources.named import source_of
 from tests.helpers.nuscenes_database import SENSORS, START_US, annotated, as_recorded, change, pose
 from tests.helpers.nuscenes_scene import CAR, SCENE, WORLD, database, first
 
@@ -245,19 +244,3 @@ def test_sweeps_that_nobody_recorded_are_refused(tmp_path):
         "has one sweep a keyframe",
     ):
         first(swept(tmp_path), sweeps=10)
-
-
-@pytest.mark.parametrize(
-    ("source", "sweeps", "reason"),
-    [
-        ("streets", 10, "sweeps has no meaning for streets"),
-        ("argoverse2", 10, "sweeps has no meaning for argoverse2 recordings"),
-        ("nuscenes", 0, "sweeps must be a whole number >= 1"),
-        ("nuscenes", True, "sweeps must be a whole number >= 1"),
-        ("nuscenes", 2.5, "sweeps must be a whole number >= 1"),
-    ],
-)
-def test_what_has_no_sweeps_refuses_them_in_one_line(tmp_path, source, sweeps, reason):
-    text = source if source == "streets" else f"{source}:{tmp_path}"
-    with pytest.raises(InvalidInput, match=reason):
-        source_of(text, sweeps=sweeps)

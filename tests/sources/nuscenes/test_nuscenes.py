@@ -3,12 +3,10 @@
 import json
 import shutil
 
-import gymnasium as gym
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-import care_sim
 from care_sim.base.errors import InvalidInput
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
@@ -200,21 +198,6 @@ def test_splits_choose_scenes(tmp_path):
         split_scenes(tables, "x")
 
 
-def test_an_empty_split_names_those_that_hold_scenes(tmp_path):
-    root = write(tmp_path, {"scene-0061": [([CAR], pose(), as_recorded(WORLD))]})
-    with pytest.raises(
-        InvalidInput,
-        match=r"scene.json: holds no scene of the split 'val'; .*: all, train, mini_train$",
-    ):
-        split_scenes(Database(root))
-    own = {"mine": ["scene-0061"], "gone": ["scene-9"], "none": []}
-    (root / "v1.0-trainval" / "splits.json").write_text(json.dumps(own))
-    with pytest.raises(
-        InvalidInput, match=r"the split 'val'; splits it holds: all, train, mini_train, mine$"
-    ):
-        split_scenes(Database(root))
-
-
 @pytest.fixture
 def sweep(recorded):
     (path,) = (recorded / "nuscenes").glob("*.pcd.bin")
@@ -342,38 +325,6 @@ def test_sweeps_that_come_later_make_another_film(tmp_path):
     assert "points" not in source.row(scene)
     assert source.row(scene)["recording"] != before
     assert film_hash(film_of(source, scene)) != hash_before
-
-
-def test_the_environment_plays_them(tmp_path):
-    root = write_drive(tmp_path / "drive")
-    shutil.rmtree(root / "samples")
-    options = {"camera_times": "sweep", "empty_boxes": True}
-    with gym.make("CARE-Replay-v0", source=f"nuscenes:{root}", **options) as env:
-        policy = care_sim.make_policy("care", env)
-        observation, _ = env.reset(seed=0)
-        for _ in range(4):
-            observation, *_ = env.step(policy(observation))
-        assert env.unwrapped.loop.belief.tracks.ids.size
-
-
-def test_a_split_that_is_held_in_part_names_what_is_missing(tmp_path, capsys):
-    sample = [([CAR], pose(), as_recorded(WORLD))]
-    root = write(tmp_path, {"scene-0103": sample, "scene-0916": sample, "scene-1100": sample})
-    held = {split: NuScenes(root, split=split).scenes() for split in ("val", "train", "mini_train")}
-    assert held["val"] == ["scene-0103", "scene-0916"]
-    assert held["train"] == held["mini_train"] == ["scene-1100"]
-    lines = [line.partition("scene.json: ")[2] for line in capsys.readouterr().err.splitlines()]
-    assert lines == [
-        "holds 2 of the 150 scenes of the split val; missing: scene-0003, scene-0012, scene-0013 "
-        "and 145 more",
-        "holds 1 of the 700 scenes of the split train; missing: scene-0001, scene-0002, scene-0004 "
-        "and 696 more",
-        "holds 1 of the 8 scenes of the split mini_train; missing: scene-0061, scene-0553, "
-        "scene-0655 and 4 more",
-    ]
-    NuScenes(root, split="mini_val").scenes()
-    NuScenes(root, split="all").scenes()
-    assert not capsys.readouterr().err
 
 
 def test_the_metadata_of_two_real_scenes_plays(tmp_path, recorded):
