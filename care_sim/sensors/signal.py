@@ -139,7 +139,7 @@ class Echoes(NamedTuple):
 
     def take(self, rows: Integers) -> "Echoes":
         """Some of the echoes, by index."""
-        return self._make(column[rows] for column in self)
+        return Echoes._make(column[rows] for column in self)
 
 
 def echoes_of(ranges: Floats, intensities: Floats, bodies: Integers) -> Echoes:
