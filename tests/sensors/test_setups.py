@@ -256,15 +256,6 @@ def test_what_names_no_set_up_is_refused_in_one_line(sensor, said):
         gymnasium.make("CARE-Dense-v0", sensor=sensor)
 
 
-@pytest.mark.parametrize("text", ["rows = " + "9" * 5000, "x = " + "[" * 5000])
-def test_a_file_that_cannot_be_read_is_refused_in_one_line(tmp_path, text):
-    path = tmp_path / "odd.toml"
-    path.write_text(text)
-    with pytest.raises(InvalidInput, match=r"odd\.toml") as refused:
-        sensor_setup(path)
-    assert "\n" not in str(refused.value)
-
-
 TWO = """
 name = "two"
 

@@ -3,7 +3,6 @@ as ours.
 """
 
 import sys
-import tomllib
 
 import gymnasium
 import pytest
@@ -19,7 +18,6 @@ from tests.helpers.pages import fenced
 from tests.helpers.places import ROOT
 
 CROSSINGS = example("source")
-(TOML,) = fenced(ROOT / "docs" / "write" / "source.md", "toml")
 LOGS = '''
 from dataclasses import dataclass
 from care_sim.sources.argoverse2.recordings import argoverse2_film, logs
@@ -54,13 +52,6 @@ def run(*arguments):
     with pytest.raises(SystemExit) as end:
         main([*map(str, arguments)])
     return end.value.code
-
-
-def test_the_example_has_thirty_lines_or_so():
-    body = CROSSINGS[CROSSINGS.index("@dataclass") : CROSSINGS.index("if __name__")]
-    assert len([line for line in body.splitlines() if line.strip()]) <= 35
-    (entries,) = tomllib.loads(TOML)["project"]["entry-points"].items()
-    assert entries == (SOURCES.group, {"crossings": "crossings:Crossings"})
 
 
 def test_the_protocol_plays_it_and_names_it(installed, tmp_path, capsys):
