@@ -61,6 +61,16 @@ def test_a_full_sweep_holds_every_return_at_its_place(bare, grid):
         assert set(bodies.tolist()) == {NO_BODY, *range(len(poses))}
 
 
+def test_the_road_is_where_a_ground_plane_would_be_hit(bullet, grid):
+    upright = Frame(3.0, -2.0, 1.84, 0.6)
+    with closing(BulletWorld(ground=False)) as bare:
+        cloud = full_sweep(bare, grid, upright, np.empty((0, 7)), 1.84)
+    ranges, _ = bullet.cast(upright.origin, upright.vectors_to_world(grid.directions), grid.range_m)
+    assert np.array_equal(cloud.cells, np.flatnonzero(np.isfinite(ranges)))
+    assert np.linalg.norm(cloud.points, axis=1) == pytest.approx(ranges[cloud.cells], abs=1e-9)
+    assert set(cloud.objects.tolist()) == {NO_BODY}
+
+
 def test_cameras_report_labelled_bodies_alone(bullet):
     bus, van = (
         bullet.add(CATALOGUE["bus"], (20.0, -2.0, 0.0)),

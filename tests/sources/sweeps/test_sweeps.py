@@ -13,6 +13,7 @@ from care_sim.sensors.annotated import NO_OBJECT
 from care_sim.sources.film_checks import check_film
 from care_sim.sources.installed import recordings
 from care_sim.sources.sweeps.logs import log_of_folder
+from care_sim.sources.sweeps.points import in_seconds
 from tests.helpers.commands import run
 from tests.helpers.examples import EXAMPLES, loaded
 from tests.helpers.places import ROOT
@@ -149,6 +150,12 @@ def test_times_in_a_file_and_several_scenes(tmp_path, film):
     shots = source.film("b").shots
     assert [shot.time_s for shot in shots] == pytest.approx([shot.time_s for shot in film.shots])
     assert tmp_path / "b" / "times.csv" in source.files("b")
+
+
+@pytest.mark.parametrize("unit", [1e-9, 1e-6, 1e-3, 1.0])
+def test_times_are_told_in_any_usual_unit(unit):
+    seconds = np.array([1.6e9, 1.6e9 + 0.5])
+    assert in_seconds(seconds / unit) == pytest.approx(seconds, abs=1e-6)
 
 
 def test_a_car_that_stands_has_a_single_pose(tmp_path):
