@@ -188,8 +188,7 @@ def _look(
             )
             for n in range(len(table)):
                 shown[w, table[n, 0]] |= table[n, 5] >= MIN_PIXELS
-            outlined = table[:, 1:5].astype(np.float64)
-            rows, _ = reported_boxes(table[:, 0], outlined, table[:, 5], classes, camera)
+            rows, _ = reported_boxes(table, classes, camera)
             copy_rows(rows, seen.rows[w, count:])
             count += len(rows)
         rows = seen.rows[w, :count]

@@ -118,7 +118,7 @@ class ReturnSettings:
     """Whether points of a sweep are moved by how the ego moved since. Ranges stay as measured."""
     lidar_crosstalk: float = bounded(0.0, 0, 1)
     """Share of the cells that take the pulse of another LiDAR for their return, 0 to 1
-    (`care_sim.sensors.lidar_faults`).
+    (`care_sim.sensors.lidar`).
     """
 
     def __post_init__(self) -> None:

@@ -42,39 +42,16 @@ def along_route(tracks: Tracks, route: Route, sensor: Frame) -> Tracks:
     return replace(tracks, boxes=straight, velocities=turned(tracks.velocities, -turn))
 
 
-def in_strip(ahead: Tracks, front_m: float, reach_m: float) -> Mask:
-    """(n,) which tracks lie ahead of `front_m` within `reach_m` to either side of the way, now.
-
-    Tracks as `along_route` gives them.
-    """
-    return enters_strip(ahead, front_m, reach_m, horizon_s=0.0)
-
-
-def enters_strip(ahead: Tracks, front_m: float, reach_m: float, horizon_s: float) -> Mask:
+def enters_strip(ahead: Tracks, front_m: float, reach_m: float, horizon_s: float = 0.0) -> Mask:
     """(n,) which tracks lie ahead of `front_m` within `reach_m` to either side of the way, or will
     within `horizon_s` if they keep their velocities. Tracks as `along_route` gives them.
     """
-    strip = float(front_m), float(reach_m), float(horizon_s)
-    found: Mask = _all_enter(*_as_arrays(ahead), strip)
-    return found
-
-
-def leaves_strip_s(ahead: Tracks, reach_m: float, horizon_s: float) -> Floats:
-    """(n,) seconds until tracks that enter the strip have left it, if they keep their velocities;
-    at most `horizon_s` after they have entered it. Of tracks that never enter it says nothing. The
-    strip and the tracks are those of `enters_strip`.
-    """
-    strip = 0.0, float(reach_m), float(horizon_s)
-    leaves: Floats = _all_leave_s(*_as_arrays(ahead), strip)
-    return leaves
-
-
-def _as_arrays(tracks: Tracks) -> tuple[Floats, Turns, Floats]:
-    """Boxes (n, 7), the cosines and sines (n,) of their headings, and velocities (n, 2)."""
-    boxes = np.ascontiguousarray(tracks.boxes)
+    boxes = np.ascontiguousarray(ahead.boxes)
     # The sines and cosines are NumPy's, on every machine.
     turns = np.cos(boxes[:, 6]), np.sin(boxes[:, 6])
-    return boxes, turns, np.ascontiguousarray(tracks.velocities)
+    strip = float(front_m), float(reach_m), float(horizon_s)
+    found: Mask = _all_enter(boxes, turns, np.ascontiguousarray(ahead.velocities), strip)
+    return found
 
 
 @compiled()
@@ -82,22 +59,10 @@ def _all_enter(boxes: Floats, turns: Turns, velocities: Floats, strip: Strip) ->
     """See `enters_strip`."""
     found = np.empty(len(boxes), np.bool_)
     for n in range(len(boxes)):
-        found[n] = enters(_footprint_of(boxes[n], turns, n), velocities[n, 1], strip)
+        box = boxes[n]
+        of = footprint((box[0], box[1]), (box[3], box[4]), (turns[0][n], turns[1][n]))
+        found[n] = enters(of, velocities[n, 1], strip)
     return found
-
-
-@compiled()
-def _all_leave_s(boxes: Floats, turns: Turns, velocities: Floats, strip: Strip) -> Floats:
-    """See `leaves_strip_s`."""
-    seconds = np.empty(len(boxes))
-    for n in range(len(boxes)):
-        seconds[n] = leaves_s(_footprint_of(boxes[n], turns, n), velocities[n, 1], strip)
-    return seconds
-
-
-@compiled()
-def _footprint_of(box: Floats, turns: Turns, n: int) -> Footprint:
-    return footprint((box[0], box[1]), (box[3], box[4]), (turns[0][n], turns[1][n]))
 
 
 @compiled()
@@ -127,7 +92,9 @@ def enters(of: Footprint, sideways: float, strip: Strip) -> bool:
 
 @compiled(error_model="numpy")
 def leaves_s(of: Footprint, sideways: float, strip: Strip) -> float:
-    """When a footprint that enters the strip has left it; see `leaves_strip_s`."""
+    """Seconds until a footprint that moves `sideways`, m/s, and enters the strip has left it; at
+    most the horizon after it has entered it. Of one that never enters it says nothing.
+    """
     _, y, _, half_y = of
     _, reach_m, horizon_s = strip
     reach = reach_m + half_y

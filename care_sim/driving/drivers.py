@@ -13,7 +13,7 @@ from care_sim.core.cells.boxes import half_extents
 from care_sim.core.conditions import BRAKING_RULES, CAREFUL_HUMAN, FIXED, DriverSettings
 from care_sim.core.types import Command, Ego, Tracks
 from care_sim.driving.braking import BrakingController
-from care_sim.driving.corridor import in_strip
+from care_sim.driving.corridor import enters_strip
 from care_sim.world.route import SpeedPlan
 
 _STANDARD_GRAVITY = 9.80665
@@ -162,7 +162,7 @@ class CarefulHuman:
         towards_mps = -np.sign(tracks.boxes[:, 1]) * tracks.velocities[:, 1]
         off_its_lane = np.abs(tracks.boxes[:, 1]) < HUMAN_MODEL.lane_m - HUMAN_MODEL.wander_m
         cuts_in = ahead & off_its_lane & (towards_mps > _STEADY_MPS)
-        return in_strip(tracks, self._front_m, self._half_width_m) | cuts_in
+        return enters_strip(tracks, self._front_m, self._half_width_m) | cuts_in
 
     def _perceived(self, tracks: Tracks, risky: Mask) -> Mask:
         """(n,) which tracks have been risky for as long as their evaluation takes."""
@@ -187,7 +187,6 @@ class Driver(Protocol):
         """Decide from the tracks of this keyframe, as they lie before a car that drives straight
         ahead, and the ego's motion.
         """
-        ...
 
 
 _KINDS: dict[str, Callable[..., Driver]] = {
@@ -285,7 +284,7 @@ class Cruising:
         rules = self._rules
         half_x, _ = half_extents(tracks.boxes)
         gaps = tracks.boxes[:, 0] - half_x - self._front_m
-        in_the_way = in_strip(tracks, self._front_m, self._half_width_m)
+        in_the_way = enters_strip(tracks, self._front_m, self._half_width_m)
         leads = in_the_way & (gaps > 0) & (tracks.velocities[:, 0] > rules.moving_mps)
         if not leads.any():
             return np.inf

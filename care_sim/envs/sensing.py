@@ -30,7 +30,7 @@ from care_sim.core.types import Action
 from care_sim.loops.truth import Loop, Truth
 from care_sim.perception.detectors import CLUSTER, PROXY, check_detector, make_detector
 from care_sim.perception.points_only import Detector
-from care_sim.sensors.lidar_faults import check_dead_rows
+from care_sim.sensors.lidar import check_dead_rows
 
 
 def observation_space(rig: Rig) -> spaces.Space[Any]:

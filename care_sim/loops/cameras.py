@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from care_sim.core.arrays import Floats
+from care_sim.core.arrays import Floats, Integers
 from care_sim.core.conditions import Sensing
 from care_sim.core.frames import Frame
 from care_sim.core.pinhole import PinholeCamera
@@ -11,7 +11,7 @@ from care_sim.sensors.annotated import IdentifiedDetections
 from care_sim.sensors.camera import CameraDetector
 from care_sim.sensors.engines import Engine
 from care_sim.sensors.false_boxes import BoxPool
-from care_sim.sensors.pictures import Picture, class_table, faultless_detections, window_on
+from care_sim.sensors.pictures import class_table, faultless_detections, is_shown
 from care_sim.world.world import WORLD_STEP_S, World
 
 
@@ -22,8 +22,10 @@ class Cameras:
     mounted; without an error of the mount the same pictures serve both.
     """
 
-    pictures: tuple[Picture, ...]
-    """What each camera as it was designed shows. Truth: for scoring and people."""
+    pictures: tuple[Integers, ...]
+    """The table of boxes (`care_sim.sensors.pictures`) of each camera as it was designed. Truth:
+    for scoring and people.
+    """
     seen: IdentifiedDetections
     """What the cameras as they are mounted show, before misses, false boxes and delay. Truth: for
     scoring and people.
@@ -74,7 +76,7 @@ class Cameras:
 
     def shows(self, body: int) -> bool:
         """Whether a camera shows enough of a body for a box. Truth: for scoring and people."""
-        return any(picture.shows(body) for picture in self.pictures)
+        return any(is_shown(table, body) for table in self.pictures)
 
     def faultless(self) -> IdentifiedDetections:
         """What a detector without faults would report of the cameras as designed. Truth: for
@@ -84,11 +86,9 @@ class Cameras:
 
     def _photographed(
         self, cameras: tuple[PinholeCamera, ...], sensor: Frame, boxes: Floats
-    ) -> tuple[Picture, ...]:
+    ) -> tuple[Integers, ...]:
         """The pictures around boxes (n, 7) of all that the detector may ever report, in the sensor
         frame.
         """
-        return tuple(
-            Picture.listed(self._engine.visible_boxes(camera, sensor, window_on(camera, boxes)))
-            for camera in cameras
-        )
+        windows = [(camera, camera.window_on(boxes)) for camera in cameras]
+        return tuple(self._engine.visible_boxes(camera, sensor, at) for camera, at in windows)

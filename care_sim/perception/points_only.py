@@ -26,7 +26,6 @@ class Detector(Protocol):
         """Detections in the sensor frame from the returns of the fired cells, and (n,) the
         annotated object behind each, or NO_OBJECT, for privileged policies and the scoring.
         """
-        ...
 
 
 MOST_DETECTIONS = 500
@@ -53,7 +52,6 @@ class PointDetector(Protocol):
         is returned becomes a track, so what is too unsure to act on is left out here; at most
         MOST_DETECTIONS.
         """
-        ...
 
 
 class PointsOnly:

@@ -16,7 +16,7 @@ from care_sim.core.types import ImageDetections
 from care_sim.sensors.annotated import NO_OBJECT, IdentifiedDetections
 from care_sim.sensors.camera_errors import ProfiledDetector
 from care_sim.sensors.camera_profiles import PROFILES
-from care_sim.sensors.false_boxes import EMPTY_POOL, BoxPool, FalseBoxes
+from care_sim.sensors.false_boxes import EMPTY_POOL, NO_ROWS, BoxPool, FalseBoxes
 from care_sim.sensors.pictures import surest_first
 
 
@@ -165,9 +165,7 @@ class Delay:
             return NOTHING_SEEN
         # Jitter lets a picture overtake the ones before it, which are then never handed out.
         self._sent = self._sent[arrived[-1] :]
-        return self._aged(self._sent[0], heading)
-
-    def _aged(self, picture: _SentPicture, heading: float) -> IdentifiedDetections:
+        picture = self._sent[0]
         age_s = (self._keyframe - picture.keyframe) * self.keyframe_s - self.timing.after_s
         detections = picture.seen.detections.aged(age_s, heading - picture.heading)
         return IdentifiedDetections(detections, picture.seen.objects)
@@ -210,14 +208,18 @@ class CameraDetector:
         self._sensing = sensing
         self._least_confidence = float(sensing.camera_confidence)
         self._misses = Misses(len(objects), sensing, np.random.default_rng(seed))
-        self._false_boxes = FalseBoxes(pool, sensing.false_positive_rate, len(cameras), false_boxes)
+        rate = sensing.false_positive_rate
+        self._false_boxes = FalseBoxes(pool, rate, len(cameras), false_boxes) if rate else None
         self.timing = picture_timing(sensing, keyframe_s, step_s or keyframe_s)
         self._delay = Delay(self.timing, sensing.camera_jitter, keyframe_s, delay)
         self.mounted = tuple(mounted(camera, sensing, mount) for camera in cameras)
         """The cameras as they really stand."""
-        self._profiled = self._profiled_detector(
-            keyframe_s, pool, (errors, jitter, confusion, ghosts)
-        )
+        self._profiled: ProfiledDetector | None = None
+        profile = PROFILES[sensing.camera_profile]
+        if profile is not None:
+            seeds = errors, jitter, confusion, ghosts
+            told = profile, self._objects, self.mounted, keyframe_s, pool, seeds
+            self._profiled = ProfiledDetector(*told)
 
     def detect(
         self, seen: IdentifiedDetections, heading: float, boxes: Floats, time_s: float
@@ -242,9 +244,9 @@ class CameraDetector:
         rows = seen.detections.rows()
         objects = seen.objects
         missed = self._misses.draw(planar_ranges(boxes))
-        false = self._false_boxes.draw(rows, time_s)
+        false = self._false_boxes.draw(rows, time_s) if self._false_boxes else NO_ROWS
         if self._profiled is not None:
-            ghosts = self._profiled.ghosts(np.concatenate([rows, false]), time_s)
+            ghosts = self._profiled.ghosts.draw(np.concatenate([rows, false]), time_s)
             false = np.concatenate([false, ghosts])
             rows, objects = self._profiled.report(seen, boxes)
         if missed.any():
@@ -270,15 +272,6 @@ class CameraDetector:
         first, each with the object behind it.
         """
         return self._delay.newest(heading)
-
-    def _profiled_detector(
-        self, keyframe_s: float, pool: BoxPool, seeds: Sequence[np.random.SeedSequence]
-    ) -> ProfiledDetector | None:
-        """The detector of the profile, None of the ideal camera."""
-        profile = PROFILES[self._sensing.camera_profile]
-        if profile is None:
-            return None
-        return ProfiledDetector(profile, self._objects, self.mounted, keyframe_s, pool, seeds)
 
 
 def _with_false_boxes(rows: Floats, objects: Integers, false: Floats) -> tuple[Floats, Integers]:

@@ -255,7 +255,7 @@ class ProfiledDetector:
         self._confusion = PersistentDraws(
             len(objects), [profile.confusion_time_s], keyframe_s, confusion
         )
-        self._ghosts = Ghosts(
+        self.ghosts = Ghosts(
             pool,
             profile.ghosts_per_picture,
             profile.ghost_time_s,
@@ -291,10 +291,6 @@ class ProfiledDetector:
             self._cameras,
         )
         return rows, seen.objects[found]
-
-    def ghosts(self, shown: Floats, time_s: float) -> Floats:
-        """(k, 9) the ghosts of this keyframe's pictures, beside the boxes `shown` (n, 9)."""
-        return self._ghosts.draw(shown, time_s)
 
     def _recalls(self, seen: IdentifiedDetections, groups: Integers, boxes: Floats) -> Floats:
         """(m,) the chances to find the objects `seen` (m,) of `groups` (m,) with `boxes` (m, 7)."""

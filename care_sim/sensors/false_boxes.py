@@ -250,8 +250,6 @@ class FalseBoxes:
 
     def draw(self, true: Floats, time_s: float) -> Floats:
         """(k, 9) the false boxes of this keyframe's pictures, beside the `true` boxes (n, 9)."""
-        if not self._mean:
-            return NO_ROWS
         usable = self._pool.usable(time_s)
         number = self._rng.poisson(self._mean * self._pool.relative_density(time_s))
         # All draws at once, tried or not: what is there must not move the ones that follow.

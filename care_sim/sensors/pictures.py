@@ -1,8 +1,10 @@
-"""What a camera without faults shows: the boxes of bodies, read off the visible pixels."""
+"""What a camera without faults shows: the boxes of bodies, read off the visible pixels.
+
+A table of boxes is (n, 6): the id of a body; left, top, right and bottom of the box that holds all
+its pixels; their number (`care_sim.sensors.engines`).
+"""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
@@ -12,8 +14,19 @@ from care_sim.core.arrays import Floats, Integers
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import ImageDetections
 from care_sim.sensors.annotated import IdentifiedDetections
-from care_sim.sensors.engines.picture_kernels import boxes_of_window, visible_boxes
-from care_sim.world.bullet import PixelWindow
+
+CAMERA_FROM_LIDAR = (0.76, 0.0, -0.33)
+"""Metres in the sensor frame: CAM_FRONT of nuScenes is this far before and below LIDAR_TOP."""
+
+
+CAMERA_HEIGHT = 180
+
+
+CAMERA_WIDTH = 320
+
+
+FRONT_CAMERA = PinholeCamera(CAMERA_WIDTH, CAMERA_HEIGHT, np.deg2rad(90.0), CAMERA_FROM_LIDAR)
+"""90 degrees wide, the default of CARLA's RGB camera, in which the paper ran."""
 
 MIN_PIXELS = 12
 """Visible pixels below which an object has no box. At 320 x 180 this is 4 x 12 pixels at 640 x 360,
@@ -24,9 +37,14 @@ FULL_CONFIDENCE = 3 * MIN_PIXELS
 
 Pixels = TypeVar("Pixels", float, Floats)
 
+# Numbers of a module are what compiled code can hold.
+_CLASS, _CONFIDENCE = ImageDetections.CLASS, ImageDetections.CONFIDENCE
+_LEFT, _CAMERA = ImageDetections.LEFT, ImageDetections.CAMERA
+_COLUMNS = len(ImageDetections.COLUMNS)
+
 
 def confidence_of(pixels: Pixels) -> Pixels:
-    """The confidence, from 0 to 1, of a box of so many visible pixels."""
+    """How sure the detector is of a box of so many visible pixels, from 0 to 1."""
     return pixels / (pixels + FULL_CONFIDENCE)
 
 
@@ -36,32 +54,48 @@ def pixels_of(confidences: Floats) -> Floats:
     return FULL_CONFIDENCE * confidences / np.maximum(1 - confidences, 1e-12)
 
 
-# Numbers of a module are what compiled code can hold.
-_CLASS, _CONFIDENCE = ImageDetections.CLASS, ImageDetections.CONFIDENCE
-_LEFT, _CAMERA = ImageDetections.LEFT, ImageDetections.CAMERA
-_COLUMNS = len(ImageDetections.COLUMNS)
+def is_shown(table: Integers, body: int) -> bool:
+    """Whether a picture, as a table of boxes, shows enough of a body for a box."""
+    return bool(((table[:, 0] == body) & (table[:, 5] >= MIN_PIXELS)).any())
+
+
+def class_table(labels: Mapping[int, int]) -> Integers:
+    """The class of every body by its id, -1 of those that `labels` does not map to one."""
+    table = np.full(max(labels, default=-1) + 1, -1)
+    table[list(labels)] = list(labels.values())
+    return table
+
+
+def faultless_detections(tables: Sequence[Integers], classes: Integers) -> IdentifiedDetections:
+    """What the camera detector reports without faults: a box for every body that has a class in the
+    `class_table` and shows enough pixels.
+
+    `tables` of boxes are one per camera of the rig, in its order.
+    """
+    parts = [reported_boxes(table, classes, camera) for camera, table in enumerate(tables)]
+    rows = np.concatenate([np.empty((0, _COLUMNS)), *(rows for rows, _ in parts)])
+    bodies = np.concatenate([np.empty(0, np.int64), *(bodies for _, bodies in parts)])
+    return IdentifiedDetections(ImageDetections.from_checked_rows(rows), bodies)
 
 
 @compiled()
-def reported_boxes(
-    bodies: Integers, boxes: Floats, pixels: Integers, classes: Integers, camera: int
-) -> tuple[Floats, Integers]:
-    """The detections of those `bodies` (n,) that have a class and show enough `pixels` (n,), and
-    their ids (k,). `boxes` (n, 4) are theirs in the picture of `camera`; `classes` by body id, -1
+def reported_boxes(table: Integers, classes: Integers, camera: int) -> tuple[Floats, Integers]:
+    """The detections (k, 9), in the order of `ImageDetections.COLUMNS`, of those bodies in a table
+    of boxes that have a class and show enough pixels, and their ids (k,). `classes` by body id, -1
     without one.
     """
-    rows = np.zeros((len(bodies), _COLUMNS))
-    ids = np.empty(len(bodies), np.int64)
+    rows = np.zeros((len(table), _COLUMNS))
+    ids = np.empty(len(table), np.int64)
     count = 0
-    for n in range(len(bodies)):
-        body = bodies[n]
-        if 0 <= body < len(classes) and classes[body] >= 0 and pixels[n] >= MIN_PIXELS:
+    for n in range(len(table)):
+        body, pixels = table[n, 0], table[n, 5]
+        if 0 <= body < len(classes) and classes[body] >= 0 and pixels >= MIN_PIXELS:
             one = rows[count]
             one[_CLASS] = classes[body]
-            # As `care_sim.sensors.pictures.confidence_of` has it.
-            one[_CONFIDENCE] = pixels[n] / (pixels[n] + FULL_CONFIDENCE)
+            # As `confidence_of` has it.
+            one[_CONFIDENCE] = pixels / (pixels + FULL_CONFIDENCE)
             for k in range(4):
-                one[_LEFT + k] = boxes[n, k]
+                one[_LEFT + k] = table[n, 1 + k]
             one[_CAMERA] = camera
             ids[count] = body
             count += 1
@@ -98,83 +132,3 @@ def _comes_before(one: Floats, other: Floats) -> bool:
     if one[_CONFIDENCE] == other[_CONFIDENCE]:
         return bool(one[_LEFT] < other[_LEFT])
     return bool(one[_CONFIDENCE] > other[_CONFIDENCE])
-
-
-CAMERA_FROM_LIDAR = (0.76, 0.0, -0.33)
-"""Metres in the sensor frame: CAM_FRONT of nuScenes is this far before and below LIDAR_TOP."""
-
-
-CAMERA_HEIGHT = 180
-
-
-CAMERA_WIDTH = 320
-
-
-FRONT_CAMERA = PinholeCamera(CAMERA_WIDTH, CAMERA_HEIGHT, np.deg2rad(90.0), CAMERA_FROM_LIDAR)
-"""90 degrees wide, the default of CARLA's RGB camera, in which the paper ran."""
-
-
-_NO_ROWS = np.empty((0, len(ImageDetections.COLUMNS)))
-
-
-_NO_BODIES = np.empty(0, np.int64)
-
-
-def window_on(camera: PinholeCamera, boxes: Floats) -> PixelWindow:
-    """The rectangle of the picture that holds every sensor-frame box (n, 7); empty when none is in
-    view.
-    """
-    return camera.window_on(boxes)
-
-
-@dataclass(frozen=True)
-class Picture:
-    """What a camera shows: `bodies` (n,) ids, image `boxes` (n, 4) and `pixels` (n,)
-    visible.
-    """
-
-    bodies: Integers
-    boxes: Floats
-    pixels: Integers
-
-    @classmethod
-    def of(cls, ids: Integers, window: PixelWindow | None = None) -> "Picture":
-        """Read the box of every body off a picture of ids (height, width), all of it or that of a
-        window.
-        """
-        return cls.listed(visible_boxes(ids) if window is None else boxes_of_window(ids, window))
-
-    @classmethod
-    def listed(cls, table: Integers) -> "Picture":
-        """What a table of an engine's `visible_boxes` tells."""
-        return cls(table[:, 0], table[:, 1:5].astype(np.float64), table[:, 5])
-
-    def shows(self, body: int) -> bool:
-        """Whether enough of a body is visible for a box."""
-        return body in self._shown
-
-    @cached_property
-    def _shown(self) -> frozenset[int]:
-        return frozenset(self.bodies[self.pixels >= MIN_PIXELS].tolist())
-
-
-def class_table(labels: Mapping[int, int]) -> Integers:
-    """The class of every body by its id, -1 of those that `labels` does not map to one."""
-    table = np.full(max(labels, default=-1) + 1, -1)
-    table[list(labels)] = list(labels.values())
-    return table
-
-
-def faultless_detections(pictures: Sequence[Picture], classes: Integers) -> IdentifiedDetections:
-    """What the camera detector reports without faults: a box for every body that has a class in the
-    `class_table` and shows enough pixels.
-
-    `pictures` are one per camera of the rig, in its order.
-    """
-    parts = [
-        reported_boxes(picture.bodies, picture.boxes, picture.pixels, classes, camera)
-        for camera, picture in enumerate(pictures)
-    ]
-    rows = np.concatenate([_NO_ROWS, *(rows for rows, _ in parts)])
-    bodies = np.concatenate([_NO_BODIES, *(bodies for _, bodies in parts)])
-    return IdentifiedDetections(ImageDetections.from_checked_rows(rows), bodies)

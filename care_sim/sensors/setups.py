@@ -107,7 +107,12 @@ def setup_of_columns(row: Mapping[str, Any]) -> str | SensorSetup:
 
 def setup_lines() -> list[str]:
     """One line per set-up that comes with the package: its name, grid, reach and cameras."""
-    return [_line(sensor_setup(name)) for name in setup_names()]
+    lines = []
+    for setup in map(sensor_setup, setup_names()):
+        lidars = "; ".join(_rays_line(head.grid) for head in setup.grid.heads)
+        cameras = f"{len(setup.cameras)} of its own" if setup.cameras else "the scenario's"
+        lines.append(f"{setup.name:14} {lidars}; cameras: {cameras}")
+    return lines
 
 
 def sensor_columns(sensor: Sensor) -> dict[str, str]:
@@ -124,12 +129,6 @@ def sensor_columns(sensor: Sensor) -> dict[str, str]:
     told = {"sensor": setup.name, "sensor_hash": setup.digest}
     shipped = setup.name in setup_names() and sensor_setup(setup.name) == setup
     return told if shipped else told | {"sensor_setup": setup.to_json()}
-
-
-def _line(setup: SensorSetup) -> str:
-    lidars = "; ".join(_rays_line(head.grid) for head in setup.grid.heads)
-    cameras = f"{len(setup.cameras)} of its own" if setup.cameras else "the scenario's"
-    return f"{setup.name:14} {lidars}; cameras: {cameras}"
 
 
 def _rays_line(grid: AngularGrid) -> str:

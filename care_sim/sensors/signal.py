@@ -135,18 +135,11 @@ class Echoes(NamedTuple):
     @classmethod
     def joined(cls, parts: Sequence["Echoes"]) -> "Echoes":
         """All echoes of some parts, one after the other."""
-        return cls(
-            np.concatenate([part.beams for part in parts]),
-            np.concatenate([part.ranges for part in parts]),
-            np.concatenate([part.intensities for part in parts]),
-            np.concatenate([part.bodies for part in parts]),
-        )
+        return cls._make(map(np.concatenate, zip(*parts, strict=True)))
 
     def take(self, rows: Integers) -> "Echoes":
         """Some of the echoes, by index."""
-        return Echoes(
-            self.beams[rows], self.ranges[rows], self.intensities[rows], self.bodies[rows]
-        )
+        return Echoes._make(column[rows] for column in self)
 
 
 def echoes_of(ranges: Floats, intensities: Floats, bodies: Integers) -> Echoes:

@@ -16,14 +16,13 @@ from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid, Cells, Head
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.sensors.annotated import NO_OBJECT, Cloud, IdentifiedDetections
+from care_sim.sensors.engines.picture_kernels import boxes_of_window
 from care_sim.sensors.pictures import (
     CAMERA_FROM_LIDAR,
     CAMERA_HEIGHT,
     CAMERA_WIDTH,
-    Picture,
     class_table,
     faultless_detections,
-    window_on,
 )
 from care_sim.world.bullet import NO_BODY, BulletWorld, PixelWindow
 
@@ -54,7 +53,7 @@ class View(NamedTuple):
 
     def window_on(self, boxes: Floats) -> PixelWindow:
         """The part of the window that holds every box (n, 7) of the frame."""
-        left, top, right, bottom = window_on(self.camera, boxes)
+        left, top, right, bottom = self.camera.window_on(boxes)
         if self.window is None:
             return left, top, right, bottom
         first, highest, last, lowest = self.window
@@ -72,12 +71,12 @@ def surround_detections(
 
     `boxes` (n, 7) are those of the bodies in the frame `sensor`; nothing outside them is rendered.
     """
-    pictures = []
+    tables = []
     for view in views:
         window = view.window_on(view.sensor.boxes_of(sensor, boxes))
         ids = world.body_ids(view.camera, view.sensor, window)
-        pictures.append(Picture.of(ids, window))
-    return faultless_detections(pictures, class_table(labels))
+        tables.append(boxes_of_window(ids, window))
+    return faultless_detections(tables, class_table(labels))
 
 
 def full_sweep(

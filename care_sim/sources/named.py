@@ -38,18 +38,10 @@ def source_of(text: str, **options: object) -> Source:
     given = {name: value for name, value in options.items() if value is not None}
     if text == Streets.kind:
         return _streets(given)
-    name, folder = _parted(text)
-    if name in RECORDING_KINDS:
-        return Recorded(recordings(text, given))
-    if not _is_foreign(name):
+    name = source_name(text)
+    if name not in RECORDING_KINDS and not _is_foreign(name):
         raise _unknown(text)
-    try:
-        return Installed(name, folder, tuple(given.items()))
-    except InvalidInput as error:
-        # A slip in the name of a kind, `nuscene:FOLDER`, looks like a place.
-        if is_place(name) and find_spec(name.partition(":")[0].partition(".")[0]) is None:
-            raise _unknown(text) from error
-        raise
+    return replayed_source(text, **given)
 
 
 def source_name(text: str) -> str:
@@ -59,10 +51,17 @@ def source_name(text: str) -> str:
 
 def replayed_source(text: str, **options: object) -> Source:
     """The same, of what `CARE-Replay-v0` plays: all but `streets`, which have their own."""
-    name = _parted(text)[0] if isinstance(text, str) else ""
-    if _is_foreign(name):
-        return source_of(text, **options)
-    return Recorded(recordings(text, options))
+    name, folder = _parted(text) if isinstance(text, str) else ("", "")
+    if not _is_foreign(name):
+        return Recorded(recordings(text, options))
+    given = {name: value for name, value in options.items() if value is not None}
+    try:
+        return Installed(name, folder, tuple(given.items()))
+    except InvalidInput as error:
+        # A slip in the name of a kind, `nuscene:FOLDER`, looks like a place.
+        if is_place(name) and find_spec(name.partition(":")[0].partition(".")[0]) is None:
+            raise _unknown(text) from error
+        raise
 
 
 def _streets(given: dict[str, object]) -> Streets:

@@ -41,37 +41,30 @@ class Source(Protocol):
 
     def scenes(self) -> list[Scene]:
         """All of them, in order. Raises InvalidInput where they cannot be listed."""
-        ...
 
     @property
     def kind(self) -> str:
         """What the source is called."""
-        ...
 
     @property
     def sensor(self) -> str | SensorSetup:
         """The set-up, its name or its file, whose grid its films hold."""
-        ...
 
     def film(self, scene: Scene, returns: FilmedReturns = RAYS) -> Film:
         """The film of a scene whose pulses return by `returns`. Raises InvalidInput where it cannot
         be made.
         """
-        ...
 
     def check_returns(self, returns: FilmedReturns) -> None:
         """Raise InvalidInput where no film can be made with `returns`."""
-        ...
 
     def files(self, scene: Scene) -> list[Path]:
         """Return the files and folders that a scene is read from."""
-        ...
 
     def row(self, scene: Scene) -> dict[str, Any]:
         """Columns that tell where a scene comes from: the kind of the source, and of recordings a
         hash of the files that it is read from, wherever they lie.
         """
-        ...
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,8 @@ import pytest
 
 from care_sim.core.conditions import Conditions
 from care_sim.core.frames import Frame, turned
-from care_sim.core.types import Detections
-from care_sim.driving.localisation import Localisation
+from care_sim.core.types import Detections, Ego
+from care_sim.driving.localisation import Localisation, Odometry
 from care_sim.perception.tracker import TrackMemory
 
 SENSOR = Frame(10.0, -4.0, 1.84, 0.5)
@@ -57,27 +57,6 @@ def test_errors_are_correlated_by_the_exponential_of_the_time_between():
     assert correlation(lasting, 3) == pytest.approx(np.exp(-1.5), abs=0.05)
 
 
-def test_an_error_that_outlasts_the_drive_walks_at_random():
-    """The spread after n keyframes grows as the square root of n."""
-    walks = np.array(
-        [
-            errors(41, seed, ego_position_sigma_m=50.0, ego_pose_correlation_s=1e5)[:, 0]
-            for seed in range(400)
-        ]
-    )
-    away = walks - walks[:, :1]
-    step = 50.0 * np.sqrt(2 * KEYFRAME_S / 1e5)
-    assert away[:, 10].std() == pytest.approx(np.sqrt(10) * step, rel=0.1)
-    assert away[:, 40].std() == pytest.approx(np.sqrt(40) * step, rel=0.1)
-
-
-def test_one_spread_leaves_the_other_error_as_it_is():
-    both = errors(5, ego_position_sigma_m=0.4, ego_yaw_sigma_deg=2.0)
-    position = errors(5, ego_position_sigma_m=0.4)
-    np.testing.assert_array_equal(position[:, :2], both[:, :2])
-    assert not position[:, 2].any()
-
-
 def played(**conditions):
     """The episode's observations and the closed loop, with every cell fired."""
     arguments = {"budget": 1.0, "disable_env_checker": True, **conditions}
@@ -88,15 +67,6 @@ def played(**conditions):
             seen.append(env.step(scores)[0])
             loop = env.unwrapped.loop
             yield seen[-1], loop, loop.true_boxes(loop.belief.tracks)
-
-
-def forecast_errors(**conditions):
-    """(n,) metres in the plane, of the forecasts from the third keyframe on."""
-    found = [
-        np.hypot(*(loop.belief.tracks.boxes - true)[:, :2].T)
-        for _, loop, true in played(**conditions)
-    ]
-    return np.concatenate(found[2:])
 
 
 def test_the_forecast_of_a_standing_object_is_off_by_three_errors():
@@ -122,22 +92,44 @@ def test_the_forecast_of_a_standing_object_is_off_by_three_errors():
     np.testing.assert_allclose(forecast - standing.boxes[0, :2], off, atol=1e-12)
 
 
-def test_in_the_loop_an_error_that_stays_moves_no_forecast():
-    exact = forecast_errors()
-    stays = forecast_errors(ego_position_sigma_m=0.05, ego_pose_correlation_s=1e6)
-    anew = forecast_errors(ego_position_sigma_m=0.05)
-    assert np.median(np.abs(stays - exact)) < 0.01
-    assert np.median(np.abs(anew - exact)) > 0.05
-
-
-def test_a_heading_that_is_off_by_a_constant_moves_no_forecast():
-    """Standing tracks: both the scan and the forecast are read in the same wrong axes."""
-    stays = forecast_errors(ego_yaw_sigma_deg=3.0, ego_pose_correlation_s=1e6)
-    anew = forecast_errors(ego_yaw_sigma_deg=3.0)
-    assert np.median(anew) > 4 * np.median(stays)
-
-
 def test_the_truth_stays_where_it_is():
     """Distances, and what is scored, are those of the true pose."""
     for _, loop, _ in played(ego_position_sigma_m=5.0):
         assert loop.sensor == Frame.mounted(loop.world.ego.pose, loop.rig.sensor_position)
+
+
+MOTION = Ego(8.0, 0.1, -1.0)
+
+
+def odometry(sigma, seed=0):
+    return Odometry(sigma, np.random.SeedSequence(seed))
+
+
+def test_without_noise_it_reads_what_is():
+    assert odometry(0.0).reading(MOTION) == MOTION
+
+
+def test_noise_is_on_the_speed_alone_and_seeded():
+    one, again, other = odometry(0.5), odometry(0.5), odometry(0.5, seed=1)
+    readings = [one.reading(MOTION) for _ in range(2000)]
+    assert {(reading.yaw_rate, reading.acceleration) for reading in readings} == {(0.1, -1.0)}
+    speeds = np.array([reading.speed for reading in readings])
+    assert (speeds.mean(), speeds.std()) == pytest.approx((8.0, 0.5), rel=0.05)
+    assert again.reading(MOTION) == readings[0] != other.reading(MOTION)
+
+
+def test_noise_never_turns_the_way_that_the_car_goes():
+    noisy = odometry(0.5)
+    assert min(noisy.reading(Ego(0.1)).speed for _ in range(200)) > 0
+    backwards = [noisy.reading(Ego(-0.1)).speed for _ in range(200)]
+    assert max(backwards) < 0
+    assert min(backwards) < -0.5
+
+
+def test_no_speed_of_a_standing_car_is_exact():
+    """Cut at 0, every second reading would be the truth."""
+    noisy = odometry(0.5)
+    speeds = np.array([noisy.reading(Ego(0.0)).speed for _ in range(2000)])
+    assert speeds.min() > 0
+    assert len(np.unique(speeds)) == len(speeds)
+    assert speeds.mean() == pytest.approx(0.5 * np.sqrt(2 / np.pi), rel=0.05)

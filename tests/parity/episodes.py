@@ -9,7 +9,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.frames import Frame
 from care_sim.evaluation.outcomes import outcome
 from care_sim.loops.records import Keyframe
-from care_sim.sensors.pictures import Picture
+from care_sim.sensors.engines.picture_kernels import visible_boxes
 from care_sim.study.designs.paper import paper_study
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.episode_play import trace
@@ -41,12 +41,12 @@ class PictureCounts:
             self.pictures += 1
             self.pixels += int(np.count_nonzero(expected != NO_BODY))
             self.other_pixels += int(np.count_nonzero(drawn != expected))
-            one, other = Picture.of(drawn), Picture.of(expected)
-            both, mine, theirs = np.intersect1d(one.bodies, other.bodies, return_indices=True)
-            apart = np.abs(one.boxes[mine] - other.boxes[theirs])
-            self.boxes += len(other.bodies)
+            one, other = visible_boxes(drawn), visible_boxes(expected)
+            both, mine, theirs = np.intersect1d(one[:, 0], other[:, 0], return_indices=True)
+            apart = np.abs(one[mine, 1:5] - other[theirs, 1:5])
+            self.boxes += len(other)
             self.other_boxes += int(np.count_nonzero(apart.any(axis=1)))
-            self.in_one_only += len(one.bodies) + len(other.bodies) - 2 * len(both)
+            self.in_one_only += len(one) + len(other) - 2 * len(both)
             self.widest_px = max(self.widest_px, float(apart.max(initial=0.0)))
 
 

@@ -2,16 +2,14 @@
 test writes.
 """
 
-import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from care_sim.base.errors import InvalidInput, MissingExtra
+from care_sim.base.errors import InvalidInput
 from care_sim.perception.detectors import DETECTORS, detector_names, make_detector
 from care_sim.perception.points_only import BrokenDetector, PointsOnly
-from care_sim.perception.proxy import ReturnsProxy
 from care_sim.sensors.annotated import Annotations, Cloud
 from tests.helpers.made_points import HEIGHT, shell
 
@@ -74,16 +72,6 @@ def installed(install):
     )
 
 
-def test_ours_are_known():
-    assert detector_names() == ["returns", "graded", "cluster", "pillars", "torchscript"]
-    assert isinstance(make_detector("returns", HEIGHT, min_returns=5), ReturnsProxy)
-
-
-def test_the_cluster_detector_finds_a_car_and_names_the_object():
-    found, objects = make_detector("cluster", HEIGHT).detect(CLOUD, CAR)
-    assert (found.classes.tolist(), objects.tolist()) == ([0], [3])
-
-
 def test_an_installed_detector_is_listed_made_and_handed_points_only(installed):
     assert detector_names()[5:] == [
         "blind",
@@ -102,33 +90,8 @@ def test_an_installed_detector_is_listed_made_and_handed_points_only(installed):
     assert found.classes.tolist() == [0]
 
 
-def test_a_maker_that_takes_any_number_of_things_needs_none(installed):
-    assert make_detector("listed", HEIGHT).detect(CLOUD, CAR)[0].classes.tolist() == [0]
-
-
 def test_a_maker_that_takes_parameters_by_any_name_is_handed_them(installed):
     assert make_detector("loose", HEIGHT, label=2).detect(CLOUD, CAR)[0].classes.tolist() == [2]
-
-
-def test_a_built_in_name_is_taken(installed):
-    assert isinstance(make_detector("returns", HEIGHT), ReturnsProxy)
-    with pytest.raises(InvalidInput, match="detector torchscript needs the parameter file"):
-        make_detector("torchscript", HEIGHT)
-
-
-def test_of_two_with_one_name_the_first_on_the_path_counts(install):
-    install("behind", MODULE, DETECTORS.group, twin="Stubborn")
-    install("ahead", MODULE, DETECTORS.group, twin="Middle")
-    assert len(make_detector("twin", HEIGHT).detect(CLOUD, CAR)[0]) == 1
-
-
-def test_a_package_that_ends_the_program_gets_one_line(install):
-    install("rude_detectors", "raise SystemExit('no device')", DETECTORS.group, rude="Any")
-    with pytest.raises(
-        BrokenDetector,
-        match=r"rude cannot be loaded: SystemExit: no device \(rude_detectors.py, line 1\)$",
-    ):
-        make_detector("rude", HEIGHT)
 
 
 @pytest.mark.parametrize(
@@ -191,23 +154,6 @@ def scripted(torch, path):
 
 
 @pytest.mark.filterwarnings("ignore:.*torch.jit.*:DeprecationWarning")
-def test_a_torchscript_file_that_gives_no_boxes_is_named(tmp_path):
-    torch = pytest.importorskip("torch")
-
-    class Flat(torch.nn.Module):
-        def forward(self, points: torch.Tensor, sensor_height_m: float):
-            return torch.zeros(2, dtype=torch.int64), points[:2], torch.zeros(2)
-
-    torch.jit.script(Flat()).save(str(tmp_path / "flat.pt"))
-    detector = make_detector("torchscript", HEIGHT, file=tmp_path / "flat.pt")
-    with pytest.raises(
-        BrokenDetector,
-        match=r"torchscript fails .* boxes must have the shape \(n, 7\), got \(2, 3\)",
-    ):
-        detector.detect(CLOUD, CAR)
-
-
-@pytest.mark.filterwarnings("ignore:.*torch.jit.*:DeprecationWarning")
 def test_a_torchscript_file_detects(tmp_path):
     torch = pytest.importorskip("torch")
     detector = make_detector("torchscript", HEIGHT, file=scripted(torch, tmp_path / "middle.pt"))
@@ -238,18 +184,3 @@ def test_a_torchscript_file_is_given_times_if_it_is_told_to(tmp_path):
     ]
     with pytest.raises(InvalidInput, match="times must be"):
         make_detector("torchscript", HEIGHT, file=tmp_path / "clock.pt", times=2)
-
-
-def test_a_file_that_is_none_is_named(tmp_path):
-    pytest.importorskip("torch")
-    broken = tmp_path / "broken.pt"
-    broken.write_bytes(b"PK nothing")
-    for file, line in ((tmp_path / "absent.pt", "no such file"), (broken, "no TorchScript module")):
-        with pytest.raises(InvalidInput, match=f"{file.name}: {line}"):
-            make_detector("torchscript", HEIGHT, file=file)
-
-
-def test_without_torch_one_line_names_the_extra(monkeypatch, tmp_path):
-    monkeypatch.setitem(sys.modules, "torch", None)
-    with pytest.raises(MissingExtra, match=r"pip install -c constraints.txt -e '\.\[rl\]'"):
-        make_detector("torchscript", HEIGHT, file=tmp_path / "any.pt")

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from care_sim.base.errors import InvalidInput, MissingExtra
+from care_sim.base.errors import InvalidInput
 from care_sim.core.types import Detections
 from care_sim.perception.points_only import BrokenDetector, PointsOnly, inside
 from care_sim.perception.proxy import ReturnsProxy
@@ -90,30 +90,6 @@ def test_its_points_are_its_own_to_change_and_lead_nowhere():
     assert np.array_equal(SCENE.points, before)
 
 
-def test_what_it_returned_is_kept_though_it_writes_there_again():
-    """As a network does whose outputs lie in the same place at every keyframe."""
-    said = detections(classes=np.array([0.0]), boxes=CAR[None].copy(), returns=np.array([9.0]))
-    detector = PointsOnly("mine", Says(said), HEIGHT)
-    before, _ = detector.detect(SCENE, OBJECTS)
-    for column in (said.classes, said.boxes, said.returns, said.scores):
-        column *= 0.0
-        column += 1.0
-    kept = [
-        values.tolist() for values in (before.classes, before.boxes, before.returns, before.scores)
-    ]
-    assert kept == [[0], [CAR.tolist()], [9], [0.5]]
-
-
-def test_truth_does_not_change_what_it_finds():
-    strangers = Cloud(SCENE.cells, SCENE.points, np.full(len(SCENE), NO_OBJECT))
-    nobody = Annotations(np.array([], np.int64), np.array([], np.int64), np.empty((0, 7)))
-    found = [
-        PointsOnly("mine", Says(detections()), HEIGHT).detect(*given)[0]
-        for given in ((SCENE, OBJECTS), (strangers, nobody))
-    ]
-    assert np.array_equal(found[0].boxes, found[1].boxes)
-
-
 def test_the_object_behind_a_detection_is_the_one_whose_returns_it_holds():
     nowhere = CAR + np.array([0, 30, 0, 0, 0, 0, 0])
     found = Detections(np.array([4, 0, 0]), np.stack([PERSON, CAR, nowhere]), np.array([3, 3, 3]))
@@ -195,27 +171,6 @@ def test_whatever_a_detector_raises_is_one_line_with_its_name(error, says):
         PointsOnly("mine", Raises(), HEIGHT).detect(SCENE, OBJECTS)
 
 
-def test_a_library_that_is_missing_says_so_itself():
-    class Lacks:
-        def detect(self, points, height):
-            raise MissingExtra("pip install 'mine[gpu]'")
-
-    with pytest.raises(MissingExtra, match=r"^pip install 'mine\[gpu\]'$"):
-        PointsOnly("mine", Lacks(), HEIGHT).detect(SCENE, OBJECTS)
-
-
-def test_a_detector_that_fails_is_named():
-    class Fails:
-        def detect(self, points, height):
-            return {}["weights"]
-
-    with pytest.raises(
-        BrokenDetector,
-        match=rf"^detector mine fails on \d+ points: KeyError: 'weights' {HERE}$",
-    ):
-        PointsOnly("mine", Fails(), HEIGHT).detect(SCENE, OBJECTS)
-
-
 def test_lists_and_no_detections_are_welcome():
     listed, _ = PointsOnly("mine", Says(Detections([4], [PERSON.tolist()], [2])), HEIGHT).detect(
         SCENE, OBJECTS
@@ -251,15 +206,3 @@ def test_the_proxy_with_one_return_and_in_whatever_order_the_objects_come():
     found, objects = ReturnsProxy(min_returns=1).detect(SCENE, OBJECTS)
     assert (objects.tolist(), found.classes.tolist()) == ([7, 30], [4, 0])
     assert found.boxes.tolist() == [PERSON.tolist(), CAR.tolist()]
-
-
-def test_the_proxy_of_an_empty_cloud():
-    empty = Cloud(np.array([], np.int64), np.empty((0, 3)), np.array([], np.int64))
-    found, objects = ReturnsProxy().detect(empty, OBJECTS)
-    assert (len(found), found.boxes.shape, len(objects)) == (0, (0, 7), 0)
-
-
-@pytest.mark.parametrize("min_returns", [0, -1, 2.5])
-def test_an_impossible_threshold_is_refused_by_name(min_returns):
-    with pytest.raises(InvalidInput, match="min_returns"):
-        ReturnsProxy(min_returns)

@@ -17,7 +17,8 @@ from care_sim.core.sensor_setup import LIDAR_POSITION
 from care_sim.core.types import Demand
 from care_sim.scenarios import make_scenario
 from care_sim.sensors.camera import CameraDetector
-from care_sim.sensors.pictures import FRONT_CAMERA, Picture, class_table, faultless_detections
+from care_sim.sensors.engines.picture_kernels import visible_boxes
+from care_sim.sensors.pictures import FRONT_CAMERA, class_table, faultless_detections
 
 pytestmark = pytest.mark.slow
 GRID = AngularGrid()
@@ -60,7 +61,7 @@ def scene(world, sensor, person):
     boxes = sensor.boxes_to_local(world.boxes(tracked))
     nearest_first = boxes[np.argsort(np.hypot(boxes[:, 0], boxes[:, 1]))]
     labels = {actor.body: actor.label for actor in world.actors if actor.label is not None}
-    picture = Picture.of(world.bullet.body_ids(FRONT_CAMERA, sensor))
+    picture = visible_boxes(world.bullet.body_ids(FRONT_CAMERA, sensor))
     camera = CameraDetector(list(labels), Sensing(), 0.1, np.random.SeedSequence(0), [FRONT_CAMERA])
     anywhere = np.zeros((len(labels), 7))
     seen = camera.detect(

@@ -12,7 +12,8 @@ from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.core.sensor_setup import LIDAR_POSITION
 from care_sim.scenarios import make_scenario
-from care_sim.sensors.pictures import FRONT_CAMERA, MIN_PIXELS, Picture
+from care_sim.sensors.engines.picture_kernels import visible_boxes
+from care_sim.sensors.pictures import FRONT_CAMERA, MIN_PIXELS, is_shown
 
 GRID = AngularGrid()
 KEYFRAME = 0.1
@@ -52,14 +53,14 @@ def sight(world):
         ]
     )
     _, ids = world.bullet.cast(sensor.origin, GRID.directions[hull] @ heading.T, GRID.range_m)
-    picture = Picture.of(world.bullet.body_ids(FRONT_CAMERA, sensor))
+    picture = visible_boxes(world.bullet.body_ids(FRONT_CAMERA, sensor))
     others = [other for other in world.actors if other.label is not None and other is not actor]
-    pixels = int(picture.pixels[picture.bodies == actor.body].sum())
+    pixels = int(picture[picture[:, 0] == actor.body, 5].sum())
     passage = world.advance(0.0, KEYFRAME)
     return Sight(
         int(np.sum(ids == actor.body)),
         pixels,
-        sum(picture.shows(other.body) for other in others),
+        sum(is_shown(picture, other.body) for other in others),
         float(box[0, 0]),
         passage.clearance_m,
         passage.impact_speed_mps is not None,

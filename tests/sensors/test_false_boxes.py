@@ -2,11 +2,6 @@
 false.
 """
 
-import itertools
-import json
-from collections import Counter
-from dataclasses import replace
-
 import gymnasium
 import numpy as np
 import pytest
@@ -19,16 +14,12 @@ from care_sim.envs.open_loop import FilmEnv
 from care_sim.scenarios.dartout import Dense
 from care_sim.sensors.annotated import NO_OBJECT, IdentifiedDetections
 from care_sim.sensors.camera import CameraDetector
-from care_sim.sensors.false_boxes import EMPTY_POOL, MOST_DRAWS, BoxPool, FalseBoxes
+from care_sim.sensors.false_boxes import MOST_DRAWS, BoxPool, FalseBoxes
 from care_sim.sensors.pictures import FRONT_CAMERA
 from care_sim.sensors.surround import SURROUND_CAMERAS
-from care_sim.sources.argoverse2 import recordings as argoverse2
-from care_sim.sources.installed import recordings
-from care_sim.sources.nuscenes.tables import CAMERA_CHANNELS
 from care_sim.sources.street_films import record
 from care_sim.streets.street import make_street
 from care_sim.world import bullet_bodies as clients
-from tests.helpers.nuscenes_drive import write_drive
 from tests.helpers.short_streets import part_of
 from tests.helpers.telling_apart import CHANCE, areas_under_the_curve
 
@@ -88,12 +79,6 @@ def test_ghosts_come_in_poisson_numbers():
     assert np.var(numbers) == pytest.approx(3.0, abs=0.6)
 
 
-def test_no_ghosts_by_default_and_none_from_an_empty_pool():
-    assert sum(map(len, drawn(0.0, 20))) == 0
-    empty = FalseBoxes(EMPTY_POOL, 5.0, 1, np.random.default_rng(0))
-    assert sum(len(empty.draw(spread(3), 0.0)) for _ in range(20)) == 0
-
-
 def test_the_rate_is_a_mean_over_the_pictures_and_boxes_come_where_true_ones_do():
     rows = np.concatenate([spread(90), table((10, 10, 50, 50), camera=1)[[0] * 10]])
     false_boxes = FalseBoxes(
@@ -118,10 +103,10 @@ def test_a_ghost_on_a_box_of_its_class_is_drawn_again_and_at_last_left_out():
     assert np.all((numbers[1] > 0) == (numbers[0] > 0)), f"{MOST_DRAWS} draws find the free place"
 
 
-def test_a_ghost_may_lie_on_a_box_of_another_class():
-    box = table((100, 80, 140, 110))
-    person = table((100, 80, 140, 110), label=PEDESTRIAN)
-    assert sum(map(len, drawn(1.0, 50, rows=person, true=box))) > 20
+def test_a_ghost_may_lie_on_a_box_of_another_class_or_picture():
+    place = (100, 80, 140, 110)
+    for beside in (table(place, label=PEDESTRIAN), table(place, camera=1)):
+        assert sum(map(len, drawn(1.0, 50, rows=table(place), true=beside))) > 20
 
 
 def test_ghosts_do_not_lie_on_each_other():
@@ -243,15 +228,6 @@ def of_kind(episodes, kind):
     return [np.concatenate([keyframe[kind] for keyframe in keyframes]) for keyframes in episodes]
 
 
-def copies(keyframes, kind):
-    """Share of the boxes that stand, to the last digit, at another keyframe too."""
-    rows = [[tuple(row) for row in np.concatenate(both)[:, SHOWN].tolist()] for both in keyframes]
-    seen = Counter(itertools.chain.from_iterable(map(set, rows)))
-    return np.mean(
-        [seen[tuple(row)] > 1 for both in keyframes for row in both[kind][:, SHOWN].tolist()]
-    )
-
-
 @pytest.fixture(scope="module")
 def dense():
     """Eight episodes of the dense street with two ghosts a picture."""
@@ -268,25 +244,7 @@ def streets():
     return episodes
 
 
-@pytest.fixture(scope="module")
-def cutin():
-    """Sixteen episodes of the cut-in."""
-    return keyframes_of("CARE-CutIn-v0", 2.0, range(16))
-
-
-@pytest.fixture(scope="module")
-def dartout():
-    """Thirty-two of the dart-out, where 20 keyframes of an episode show a true box."""
-    return keyframes_of("CARE-Dartout-v0", 2.0, range(32))
-
-
-TOLD = {"dense": 0.5, "cutin": 0.63, "dartout": 0.5, "streets": 0.5}
-"""Area under the curve of single boxes, 0.5 where nothing is told. In the cut-in the median of the
-three classifiers was 0.63, measured with 60 drives of CARE at 10%.
-"""
-
-
-@pytest.mark.parametrize("world", TOLD)
+@pytest.mark.parametrize("world", ["dense", "streets"])
 def test_small_classifiers_of_single_boxes_tell_no_more_than_they_did(world, request):
     """With 300 boxes of each kind. What else tells them apart, and how well, is in
     `docs/concepts.md`.
@@ -295,7 +253,7 @@ def test_small_classifiers_of_single_boxes_tell_no_more_than_they_did(world, req
     areas = areas_under_the_curve(
         *(of_kind(episodes, kind) for kind in (0, 1)), np.random.default_rng(0)
     )
-    assert all(0.5 - CHANCE <= area <= TOLD[world] + CHANCE for area in areas.values()), areas
+    assert all(0.5 - CHANCE <= area <= 0.5 + CHANCE for area in areas.values()), areas
 
 
 def test_few_false_people_stand_where_nobody_can_have_emerged_yet(dense):
@@ -314,28 +272,6 @@ def test_few_false_people_stand_where_nobody_can_have_emerged_yet(dense):
     )
     assert len(false) > 30
     assert np.mean(np.array(false) < min(true)) < 0.3
-
-
-@pytest.mark.parametrize("world", ["dense", "streets"])
-def test_who_remembers_all_boxes_meets_no_more_copies_among_the_false_ones(world, request):
-    """Give or take what chance does: three standard errors of a share of one in ten of some hundred
-    boxes.
-    """
-    shares = np.array(
-        [
-            [copies(keyframes, kind) for kind in (0, 1)]
-            for keyframes in request.getfixturevalue(world)
-        ]
-    )
-    true, false = shares.mean(axis=0)
-    assert false <= true + 0.05
-
-
-@pytest.mark.parametrize("world", ["dense", "streets"])
-def test_no_two_boxes_of_a_picture_are_duplicates(world, request):
-    for both in itertools.chain.from_iterable(request.getfixturevalue(world)):
-        rows = np.concatenate(both)
-        assert np.all(overlaps(rows, rows) - np.eye(len(rows)) < 0.5)
 
 
 def test_as_many_ghosts_as_asked_for(dense, streets):
@@ -405,83 +341,3 @@ def test_of_boxes_that_sort_alike_the_order_does_not_say_which_is_false():
         behind.append(arrived.objects.tolist())
     assert orders[0] == orders[1] == [high[0, 2:6].tolist(), low[0, 2:6].tolist()]
     assert behind == [[0, NO_OBJECT], [NO_OBJECT, 0]]
-
-
-@pytest.fixture(scope="module")
-def nuscenes(tmp_path_factory):
-    """The folder of two drives past objects of all classes, five keyframes each."""
-    return write_drive(tmp_path_factory.mktemp("nuscenes"))
-
-
-def ghosts_of(film, rate=1.0, seeds=range(4)):
-    """A table of the false boxes of plays of a film."""
-    env = FilmEnv(film, budget=1.0, false_positive_rate=rate)
-    return np.concatenate([false for seed in seeds for _, false in played(env, seed)]).astype(float)
-
-
-def true_of(film):
-    return np.concatenate([shot.seen.detections.rows() for shot in film.shots])
-
-
-def pixels_of_area(rows):
-    return 36 * rows[:, 1] / (1 - rows[:, 1]) / np.prod(rows[:, 4:6] - rows[:, 2:4], axis=1)
-
-
-def test_ghosts_of_an_argoverse_log_are_like_its_pictures(drive):
-    film = argoverse2.argoverse2_film(drive)
-    ghosts = ghosts_of(film)
-    pixels = 36 * ghosts[:, 1] / (1 - ghosts[:, 1])
-    assert len(ghosts) > 50
-    assert np.array_equal(ghosts[:, 2:6], np.rint(ghosts[:, 2:6]))
-    assert pixels == pytest.approx(np.rint(pixels), rel=1e-4)
-    assert set(map(tuple, ghosts[:, [0, 6]])) <= set(map(tuple, true_of(film)[:, [0, 6]]))
-
-
-def test_ghosts_of_projected_annotations_have_their_visible_shares_and_edges(nuscenes):
-    film = recordings(f"nuscenes:{nuscenes}").film("scene-0103")
-    ghosts, true = ghosts_of(film), true_of(film)
-    assert len(ghosts) > 50
-    assert pixels_of_area(ghosts) == pytest.approx(pixels_of_area(true)[0], rel=1e-3), (
-        "all are wholly visible"
-    )
-    assert not {tuple(row) for row in ghosts[:, 2:6]} & {
-        tuple(row) for row in true[:, 2:6].astype(np.float32)
-    }
-    for camera in np.unique(ghosts[:, 6]):
-        ours, theirs = (rows[rows[:, 6] == camera] for rows in (ghosts, true))
-        assert np.all(ours[:, 2:4] >= theirs[:, 2:4].min(axis=0) - 1e-3)
-        assert np.all(ours[:, 4:6] <= theirs[:, 4:6].max(axis=0) + 1e-3)
-
-
-def test_ghosts_of_a_detection_file_have_its_decimals(nuscenes, tmp_path):
-    """Its boxes have one decimal, its scores two; one lies on nobody."""
-    annotated = recordings(f"nuscenes:{nuscenes}").film("scene-0103")
-    rng, rows = np.random.default_rng(0), []
-    for shot in annotated.shots:
-        seen = shot.seen.detections
-        for label, box, camera in zip(seen.classes, seen.boxes, seen.cameras, strict=True):
-            found = {"category_name": CLASSES[label], "score": round(rng.uniform(0.3, 0.99), 2)}
-            found["sample_data_token"] = f"{shot.token}-{CAMERA_CHANNELS[camera]}"
-            rows.append(
-                found | {"bbox_corners": np.round(np.add(box, (20, 20, 25, 25)), 1).tolist()}
-            )
-    (tmp_path / "found.json").write_text(json.dumps(rows))
-    film = recordings(f"nuscenes:{nuscenes}", {"camera_detections": tmp_path / "found.json"}).film(
-        "scene-0103"
-    )
-    ghosts, true = ghosts_of(film), true_of(film)
-    assert len(ghosts) > 50
-    assert ghosts[:, 1] == pytest.approx(np.round(ghosts[:, 1], 2), abs=1e-6)
-    for camera in np.unique(ghosts[:, 6]):
-        off = true[true[:, 6] == camera][0, 2:6]
-        apart = ghosts[ghosts[:, 6] == camera][:, 2:6] - off
-        assert apart == pytest.approx(np.round(apart, 1), abs=1e-3)
-
-
-@pytest.mark.parametrize("keyframes", [1, 2])
-def test_a_film_too_short_to_lend_other_times_has_fewer_ghosts_and_no_duplicates(drive, keyframes):
-    film = argoverse2.argoverse2_film(drive)
-    short = replace(film, shots=film.shots[:keyframes])
-    for true, false in played(FilmEnv(short, budget=1.0, false_positive_rate=5.0), 0):
-        assert len(false) < 30
-        assert not np.any(overlaps(false, true) >= 0.5)

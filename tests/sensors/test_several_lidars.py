@@ -14,8 +14,7 @@ from care_sim.perception.proxy import ReturnsRule
 from care_sim.sensors.annotated import Cloud, cloud_of
 from care_sim.sensors.beams import Beams
 from care_sim.sensors.engines import ENGINES, make_engine
-from care_sim.sensors.lidar import Lidar, RecordedLidar
-from care_sim.sensors.lidar_faults import CellFaults, Crosstalk
+from care_sim.sensors.lidar import CellFaults, Crosstalk, Lidar, RecordedLidar
 from care_sim.sensors.surround import full_sweep
 from care_sim.world.bodies import CATALOGUE, BodyKind, Part
 from care_sim.world.bullet import NO_BODY, BulletWorld
@@ -100,27 +99,6 @@ def test_each_casts_as_if_it_were_alone_where_it_stands(street, engine):
         assert np.array_equal(ranges[head.cells], own[0])
         assert np.array_equal(bodies[head.cells], own[1])
     assert len({*bodies.tolist()} - {NO_BODY, street.ground}) == 3
-
-
-@every_engine
-def test_cells_in_any_order_and_of_some_lidars_alone(street, engine):
-    rays = make_engine(engine, street, STACK)
-    ranges, bodies = rays.cast(SENSOR, EVERY_CELL)
-    cells = np.random.default_rng(1).permutation(STACK.size)[:300]
-    for some in (cells, cells[cells >= 512], cells[:0]):
-        part, met = rays.cast(SENSOR, some)
-        assert np.array_equal(part, ranges[some])
-        assert np.array_equal(met, bodies[some])
-
-
-def test_the_first_engine_draws_the_cameras_pictures(street):
-    from care_sim.sensors.pictures import FRONT_CAMERA
-
-    window = (0, 0, FRONT_CAMERA.width, FRONT_CAMERA.height)
-    for name, make in ENGINES.items():
-        drawn = make_engine(name, street, STACK).body_ids(FRONT_CAMERA, SENSOR, window)
-        alone = make(street, STACK.grids[0]).body_ids(FRONT_CAMERA, SENSOR, window)
-        assert np.array_equal(drawn, alone)
 
 
 def test_a_full_sweep_holds_every_return_at_its_place():

@@ -126,10 +126,3 @@ def test_own_recordings_read_their_whole_folder_unless_they_say_what(tmp_path, m
     monkeypatch.setattr(digests, "MOST_FILES", 0)
     with pytest.raises(InvalidInput, match="source own_pictures:Mine: logs: a folder may hold 0"):
         keys("own_pictures:Mine:logs")
-
-
-def test_files_that_stay_are_not_read_again(drive, monkeypatch):
-    keys(f"nuscenes:{drive}")
-    before = digests._hashed.cache_info().misses
-    keys(f"nuscenes:{drive}")
-    assert digests._hashed.cache_info().misses == before

@@ -3,7 +3,6 @@ as ours.
 """
 
 import sys
-import tomllib
 
 import gymnasium
 import pytest
@@ -19,7 +18,6 @@ from tests.helpers.pages import fenced
 from tests.helpers.places import ROOT
 
 CROSSINGS = example("source")
-(TOML,) = fenced(ROOT / "docs" / "write" / "source.md", "toml")
 LOGS = '''
 from dataclasses import dataclass
 from care_sim.sources.argoverse2.recordings import argoverse2_film, logs
@@ -56,13 +54,6 @@ def run(*arguments):
     return end.value.code
 
 
-def test_the_example_has_thirty_lines_or_so():
-    body = CROSSINGS[CROSSINGS.index("@dataclass") : CROSSINGS.index("if __name__")]
-    assert len([line for line in body.splitlines() if line.strip()]) <= 35
-    (entries,) = tomllib.loads(TOML)["project"]["entry-points"].items()
-    assert entries == (SOURCES.group, {"crossings": "crossings:Crossings"})
-
-
 def test_the_protocol_plays_it_and_names_it(installed, tmp_path, capsys):
     command = ["protocol", "--source", "crossings", "--scenes", "2", *SHORT]
     assert run(*command, "--out", tmp_path / "out") == 0
@@ -88,27 +79,6 @@ def test_the_documented_source_of_boxes_plays_from_fifteen_lines(tmp_path, monke
     (row,) = read_results(tmp_path / "out")[0]
     assert (row["source"], row["scene"], row["keyframes"]) == ("mine:Mine", "monday", 8)
     assert row["events"] == 1.0
-
-
-def test_its_streets_hold_first_sightings_and_are_filmed_by_any_sensor(installed):
-    source = source_of("crossings", sensor="os1-64")
-    film = source.film(source.scenes()[3])
-    assert (film.name, film.grid.rows) == ("crossings-0003", 64)
-    annotated = [len(shot.annotations.objects) for shot in film.shots]
-    assert annotated[0] == 0
-    assert max(annotated) == 1
-
-
-def test_by_its_place_it_is_the_same(drive, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "path", [*sys.path])
-    (tmp_path / "placed_crossings.py").write_text(CROSSINGS)
-    (tmp_path / "placed_logs.py").write_text(LOGS)
-    streets = source_of("placed_crossings:Crossings")
-    assert streets.scenes()[4] == ("crossings-0004", 4)
-    assert streets.row(streets.scenes()[4])["source"] == "placed_crossings:Crossings"
-    logs = source_of(f"placed_logs:Logs:{drive.parent}")
-    assert [scene.name for scene in logs.scenes()] == ["drive"]
 
 
 def test_recordings_are_asked_for_with_their_folder_and_options(installed, drive):
@@ -142,12 +112,6 @@ def test_an_edit_of_its_code_and_an_option_make_its_plays_others(installed, driv
     assert whole != some
     monkeypatch.setattr("care_sim.study.provenance._entry_digest", lambda _entry: "edited")
     assert digest_of(source_of(f"ownlogs:{drive.parent}", split="d")) != some
-
-
-def test_the_digest_of_our_own_streets_asks_no_package(monkeypatch):
-    before = digest_of(source_of("streets"))
-    monkeypatch.setattr("care_sim.study.provenance._entry_digest", lambda _entry: "edited")
-    assert digest_of(source_of("streets")) == before
 
 
 BROKEN = """
@@ -249,11 +213,3 @@ def test_commands_say_it_in_one_line(broken, installed, tmp_path, capsys):
         error = capsys.readouterr().err
         assert told in error
         assert "Traceback" not in error
-
-
-def test_a_built_in_name_cannot_be_taken(install, capsys):
-    install("usurper_source", CROSSINGS, SOURCES.group, streets="Crossings")
-    assert run("protocol", "--policies", "nobody", "--scenes", "1") == 2
-    refusal = "source streets of usurper_source 1.5 is refused: the built-in one has its name"
-    assert refusal in capsys.readouterr().err
-    assert source_of("streets").scenes()[0].name.startswith("street-0000")

@@ -260,7 +260,7 @@ MOST_SHOTS = 100
 
 class Energy(FreeCells):
     """Free cells, each of which may be fired up to `shots` times at a keyframe; what its receiver
-    counts adds up (`care_sim.sensors.signal`, `care_sim.sensors.lidar_faults`).
+    counts adds up (`care_sim.sensors.signal`, `care_sim.sensors.lidar`).
 
     The scores say how the energy is to be shared. Shots are dealt one by one, each to the cell
     whose score is the highest per shot that it would then have (as seats are dealt to parties by

@@ -26,8 +26,8 @@ from care_sim.sensors.engines.ray_kernels import cast_rays
 from care_sim.world.bullet import FAR_M, NO_BODY, BulletWorld, PixelWindow
 
 
-class RayEngine(Protocol):
-    """Casts the rays of one grid at the bodies of one world."""
+class Engine(Protocol):
+    """Casts the rays of one grid at the bodies of one world, and draws these for cameras."""
 
     def cast(self, sensor: Frame, cells: Cells) -> tuple[Floats, Integers]:
         """Fire `cells` (n,) from the frame `sensor`.
@@ -35,24 +35,17 @@ class RayEngine(Protocol):
         Returns ranges (n,) in metres, inf without a hit within the grid's reach, and body ids (n,),
         NO_BODY where there is no hit.
         """
-        ...
-
-
-class Engine(RayEngine, Protocol):
-    """Casts rays, and draws the bodies for cameras."""
 
     def body_ids(self, camera: PinholeCamera, sensor: Frame, window: PixelWindow) -> Integers:
         """The id of the body that each pixel of a window of `camera` shows, NO_BODY where there is
         none; see `care_sim.world.bullet.BulletWorld.body_ids`.
         """
-        ...
 
     def visible_boxes(self, camera: PinholeCamera, sensor: Frame, window: PixelWindow) -> Integers:
         """(n, 6) the bodies in a window of `camera` in ascending order: id; left, top, right,
         bottom of the box that holds all its pixels, counted from the corner of the picture; their
         number.
         """
-        ...
 
 
 class Bullet:
@@ -63,16 +56,16 @@ class Bullet:
         self._grid = grid
 
     def cast(self, sensor: Frame, cells: Cells) -> tuple[Floats, Integers]:
-        """Ranges and body ids; see `care_sim.sensors.engines.RayEngine`."""
+        """Ranges and body ids; see `Engine`."""
         directions = sensor.vectors_to_world(self._grid.directions[cells])
         return self._world.cast(sensor.origin, directions, self._grid.range_m)
 
     def body_ids(self, camera: PinholeCamera, sensor: Frame, window: PixelWindow) -> Integers:
-        """Body ids of pixels; see `care_sim.sensors.engines.Engine`."""
+        """Body ids of pixels; see `Engine`."""
         return self._world.body_ids(camera, sensor, window)
 
     def visible_boxes(self, camera: PinholeCamera, sensor: Frame, window: PixelWindow) -> Integers:
-        """The bodies in a window; see `care_sim.sensors.engines.Engine`."""
+        """The bodies in a window; see `Engine`."""
         return boxes_of_window(self.body_ids(camera, sensor, window), window)
 
 
@@ -94,7 +87,7 @@ class Fast:
         self._spacing = (*grid.spacing,)
 
     def cast(self, sensor: Frame, cells: Cells) -> tuple[Floats, Integers]:
-        """Ranges and body ids; see `care_sim.sensors.engines.RayEngine`."""
+        """Ranges and body ids; see `Engine`."""
         # The kernel finds the cells of a window by bisection, so it needs them ascending. Most who
         # ask have them so; for others they are sorted, and the answers put back in their order.
         if (cells[1:] < cells[:-1]).any():
@@ -111,11 +104,11 @@ class Fast:
         return self._cast_ascending(sensor, cells)
 
     def body_ids(self, camera: PinholeCamera, sensor: Frame, window: PixelWindow) -> Integers:
-        """Body ids of pixels; see `care_sim.sensors.engines.Engine`."""
+        """Body ids of pixels; see `Engine`."""
         return render_bodies(self._view(camera, sensor, window))
 
     def visible_boxes(self, camera: PinholeCamera, sensor: Frame, window: PixelWindow) -> Integers:
-        """The bodies in a window; see `care_sim.sensors.engines.Engine`."""
+        """The bodies in a window; see `Engine`."""
         return bodies_in_view(self._view(camera, sensor, window))
 
     def _view(self, camera: PinholeCamera, sensor: Frame, window: PixelWindow) -> View:
@@ -157,9 +150,12 @@ class HeadEngines:
     ):
         self._grid = grid
         self._engines = [(head, make(world, head.grid)) for head in grid.heads]
+        _, first = self._engines[0]
+        self.body_ids = first.body_ids
+        self.visible_boxes = first.visible_boxes
 
     def cast(self, sensor: Frame, cells: Cells) -> tuple[Floats, Integers]:
-        """Ranges and body ids; see `care_sim.sensors.engines.RayEngine`."""
+        """Ranges and body ids; see `Engine`."""
         ranges = np.full(len(cells), np.inf)
         ids = np.full(len(cells), NO_BODY)
         lidars = self._grid.lidars_of(cells)
@@ -167,16 +163,6 @@ class HeadEngines:
             own = np.flatnonzero(lidars == number)
             ranges[own], ids[own] = engine.cast(head.frame(sensor), cells[own] - head.first)
         return ranges, ids
-
-    def body_ids(self, camera: PinholeCamera, sensor: Frame, window: PixelWindow) -> Integers:
-        """Body ids of pixels; see `care_sim.sensors.engines.Engine`."""
-        _, first = self._engines[0]
-        return first.body_ids(camera, sensor, window)
-
-    def visible_boxes(self, camera: PinholeCamera, sensor: Frame, window: PixelWindow) -> Integers:
-        """The bodies in a window; see `care_sim.sensors.engines.Engine`."""
-        _, first = self._engines[0]
-        return first.visible_boxes(camera, sensor, window)
 
 
 ENGINES: dict[str, Callable[[BulletWorld, AngularGrid], Engine]] = {"bullet": Bullet, "fast": Fast}

@@ -81,19 +81,6 @@ class RecordedCamera:
         return View(self.pinhole, sensor, (left, top, right, bottom))
 
 
-def recorded_camera(mount: Frame, intrinsic: Floats, lidar: Frame) -> RecordedCamera:
-    """From frames in the car: the camera's (z forward, x right, y down) and the LiDAR's sensor
-    frame.
-    """
-    # From axes x forward, y left, z up to those of the camera.
-    ahead = Rotation.from_matrix([[0, -1, 0], [0, 0, -1], [1, 0, 0]])
-    turn = lidar.rotation.inv() * mount.rotation * ahead
-    frame = Frame.turned_by(turn, lidar.vectors_to_local(mount.origin - lidar.origin))
-    return RecordedCamera(
-        frame, float(intrinsic[0, 0]), (float(intrinsic[0, 2]), float(intrinsic[1, 2]))
-    )
-
-
 def projected_detections(
     cameras: Sequence[RecordedCamera],
     pictures: Sequence[Floats],
@@ -144,6 +131,8 @@ def _rows(columns: list[Floats], camera: int) -> Floats:
 
 FOCALS = (10.0, 1e5)
 """Pixels: of a picture 1600 wide, views of 179 degrees and of one."""
+_CAMERA_FROM_FORWARD = Rotation.from_matrix([[0, -1, 0], [0, 0, -1], [1, 0, 0]])
+"""From axes x forward, y left, z up to those of a camera."""
 _FORWARD_FROM_RIGHT = Rotation.from_euler("z", np.pi / 2)
 """In LIDAR_TOP's own frame x points right and y forward."""
 
@@ -190,7 +179,12 @@ def camera_of(database: Database, data: JsonRow, lidar: Frame) -> RecordedCamera
             "principal point lies "
             f"outside the picture of {PICTURE[0]} x {PICTURE[1]}"
         )
-    return recorded_camera(frame_of(database, "calibrated_sensor", row), intrinsic, lidar)
+    # The camera's own axes are z forward, x right, y down.
+    mount = frame_of(database, "calibrated_sensor", row)
+    turn = lidar.rotation.inv() * mount.rotation * _CAMERA_FROM_FORWARD
+    frame = Frame.turned_by(turn, lidar.vectors_to_local(mount.origin - lidar.origin))
+    (focal, _, u), (_, _, v), _ = intrinsic.tolist()
+    return RecordedCamera(frame, focal, (u, v))
 
 
 OWN, SWEEP = CAMERA_TIMES = ("own", "sweep")

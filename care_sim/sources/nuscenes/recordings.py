@@ -155,9 +155,6 @@ _OFFICIAL = {
     "mini_val": "103 916",
 }
 
-MOST_NAMED = 3
-"""Missing scenes that a line names."""
-
 
 def _names(runs: str) -> tuple[str, ...]:
     ends = [[int(end) for end in run.split("-")] for run in runs.split()]
@@ -203,13 +200,10 @@ def tell_missing(database: Database, split: str) -> None:
     """Print a line once where the database holds only some scenes of an official split."""
     names = () if split in _own_splits(database) else OFFICIAL.get(split, ())
     held = {row["name"] for row in database.rows("scene").values()}
-    missing = [name for name in names if name not in held]
-    if missing:
-        more = len(missing) - MOST_NAMED
+    if count := len(set(names) - held):
         report_once(
-            f"{database.path('scene')}: holds {len(names) - len(missing)} of the {len(names)} "
-            f"scenes of the split {split}; missing: {', '.join(missing[:MOST_NAMED])}"
-            + (f" and {more} more" if more > 0 else "")
+            f"{database.path('scene')}: holds {len(names) - count} of the {len(names)} scenes of "
+            f"the split {split}"
         )
 
 

@@ -9,7 +9,6 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from care_sim.base.errors import InvalidInput
@@ -29,11 +28,6 @@ MOST_SWEEP_BYTES = 2**28
 """Bytes of a file: 13 million points, some hundred times a sweep of any LiDAR."""
 RINGS = 256
 """More than any LiDAR has. nuScenes' has 32."""
-_OTHERS = {
-    4: "x, y, z and intensity (KITTI)",
-    6: "x, y, z, intensity, elongation and another (Waymo)",
-}
-"""Contents of files with another number of values per point."""
 OWN_CAR_M = 1.0
 """Points nearer than this lie on the recording car (the radius within which the devkit drops them
 from sweeps).
@@ -45,7 +39,7 @@ def read_points(path: Path) -> Floats:
     right, y forward.
 
     Raises InvalidInput for a file that is missing, truncated or larger than `MOST_SWEEP_BYTES`, for
-    a place that is not finite, and for a file of another form.
+    a place that is not finite,
     """
     if not os.path.isfile(path):
         raise InvalidInput(f"{path}: no such file")
@@ -60,7 +54,7 @@ def read_points(path: Path) -> Floats:
     if values.size % (4 * VALUES_PER_POINT) or not values.size:
         raise InvalidInput(
             f"{path}: {values.size} bytes are no whole number of points of {4 * VALUES_PER_POINT} "
-            f"bytes{_other_form(values)}"
+            f"bytes"
         )
     rows = values.view("<f4").reshape(-1, VALUES_PER_POINT)
     places, rings = rows[:, :3], rows[:, 4]
@@ -68,29 +62,16 @@ def read_points(path: Path) -> Floats:
     finite = np.isfinite(places).all(axis=1)
     if not finite.all():
         point = f"point {finite.argmin()} has a place that is not finite"
-        raise InvalidInput(f"{path}: {point}{_other_form(values)}")
+        raise InvalidInput(f"{path}: {point}")
     with np.errstate(invalid="ignore"):
         whole = (rings >= 0) & (rings < RINGS) & (rings == np.rint(rings))
     if not (whole.all() and (np.abs(places) <= REACH_M[1]).all()):
         raise InvalidInput(
             f"{path}: must hold float32 x, y, z within {REACH_M[1]:g} m, intensity, and a whole "
-            f"ring from 0 to {RINGS - 1} per point{_other_form(values)}"
+            f"ring from 0 to {RINGS - 1} per point"
         )
     points = places.astype(float)
     return np.column_stack([points[:, 1], -points[:, 0], points[:, 2]])
-
-
-def _other_form(content: NDArray[np.uint8]) -> str:
-    """Return which other form the content of a file seems to have, to end a complaint."""
-    for count, names in _OTHERS.items():
-        if content.size and content.size % (4 * count) == 0:
-            rows = content.view("<f4").reshape(-1, count)
-            # Intensity and elongation are never negative, places on one side of the car are.
-            with np.errstate(invalid="ignore"):
-                fits = (np.abs(rows[:, :3]) <= REACH_M[1]).all() and (rows[:, 3:5] >= 0).all()
-            if fits:
-                return f"; it looks like {count} values per point: {names}"
-    return ""
 
 
 def recorded_cloud(

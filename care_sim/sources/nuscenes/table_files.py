@@ -1,28 +1,24 @@
-"""The JSON files of a nuScenes database: rows of plain data, each field of its kind, and what was
-recorded and annotated at every sample, in columns (Apache Arrow).
-
-The tables `sample_data`, `ego_pose` and `sample_annotation` of all of nuScenes hold six million
-rows in 2.6 GB of text, most of which are of no use here. They are read row by row into tables with
-a list of rows per sample, which are kept in files that later processes map into their memory.
+"""The JSON files of a nuScenes database: rows of plain data, each field of its kind. What was
+recorded and annotated at every sample is kept in a file that all processes share (SQLite).
 """
 
 import fcntl
 import hashlib
+import json
 import os
+import sqlite3
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
-from itertools import islice
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.compute as pc
 
 from care_sim.base.digests import file_stamp
 from care_sim.base.errors import InvalidInput
-from care_sim.base.files import check_output, json_content, listed_values, replacing
+from care_sim.base.files import json_content, listed_values
 from care_sim.core.arrays import Floats
 
 JsonRow = dict[str, Any]
@@ -74,12 +70,8 @@ def read_json(path: Path) -> Any:
 
     Raises InvalidInput for a file that is missing, truncated or larger than `LARGEST_TABLE`.
     """
-    try:
+    with _readable(path):
         return json_content(path, LARGEST_TABLE)
-    except FileNotFoundError:
-        raise InvalidInput(f"{path}: no such file") from None
-    except (OSError, ValueError) as error:
-        raise InvalidInput(f"{path}: no readable JSON file ({error})") from error
 
 
 def table_rows(path: Path, is_needed: Callable[[JsonRow], bool] | None = None) -> Iterator[JsonRow]:
@@ -121,8 +113,14 @@ def finite_numbers(value: object, *shape: int) -> Floats | None:
 
 
 def _values(path: Path) -> Iterator[Any]:
-    try:
+    with _readable(path):
         yield from listed_values(path, LARGEST_TABLE)
+
+
+@contextmanager
+def _readable(path: Path) -> Iterator[None]:
+    try:
+        yield
     except FileNotFoundError:
         raise InvalidInput(f"{path}: no such file") from None
     except (OSError, ValueError) as error:
@@ -139,258 +137,164 @@ def _what_is_wrong(row: JsonRow, number: int, kinds: dict[str, type]) -> str:
     )
 
 
-ARROW = rb"ARROW1"
-_STAMP = b"made of"
+FORM = "3"
+"""Raised whenever the same files make another store."""
+_TABLES = ("sample", "sample_data", "ego_pose", "calibrated_sensor", "sensor", "sample_annotation")
+"""The tables that a store is made of."""
+_SCHEMA = """
+CREATE TABLE sample (token);
+CREATE TABLE sample_data (token, sample, filename, is_key, pose, content);
+CREATE TABLE sample_annotation (token, sample, content);
+CREATE TABLE ego_pose (token, content);
+"""
+TablePath = Callable[[str], Path]
+"""The file of a table by its name."""
 
 
-def cached_table(
-    file: Path, form: str, sources: Iterable[Path], make: Callable[[], pa.Table]
-) -> pa.Table:
-    """The table that `make` makes of the files `sources`, in the given `form`.
+class SampleStore:
+    """The rows of a database by sample.
 
-    It is kept in `file`, or where that cannot be written in the user's cache folder
-    (`XDG_CACHE_HOME`, else `~/.cache`). It is made anew when a source has changed, when the file is
-    cut short, and when nothing can be kept. Of processes that want it at once the first makes it.
+    The tables `sample_data`, `ego_pose` and `sample_annotation` of all of nuScenes hold six million
+    rows in 2.6 GB of text, most of which are of no use here. They are read once, row by row. What
+    is kept of a sample are its boxes, each of which tells whether it `has_points`
+    instead of how many; its recordings of keyframes, and all of the calibrated sensors `lidars`,
+    together about one in four; the poses of the car at these, of cameras only of `cameras`.
+
+    It is kept in the user's cache folder (`XDG_CACHE_HOME`, else `~/.cache`). It is made anew when
+    a table has changed, and by every process where nothing can be kept. Of processes that want it
+    at once the first makes it. Raises InvalidInput as `table_rows` does, for a token that stands
+    twice, and for a box of a sample that there is not.
     """
-    stamp = _stamp(form, sources)
-    for place in _places(file):
-        table = _kept(place, stamp, make)
-        if table is not None:
-            return table
-    return make()
 
+    def __init__(
+        self,
+        path: TablePath,
+        samples: Sequence[str],
+        lidars: Sequence[str],
+        cameras: Sequence[str],
+    ):
+        self._path = path
+        self._samples = samples
+        self._lidars = frozenset(lidars)
+        self._posed = frozenset([*lidars, *cameras])
+        # Tells the tables as they are now from the same at another time.
+        files = [path(table) for table in _TABLES]
+        stamps = [file_stamp(file)[1:] for file in files if file.is_file()]
+        folder = os.fsencode(files[0].parent.resolve())
+        parts = (hashlib.sha256(one).hexdigest()[:16] for one in (folder, repr(stamps).encode()))
+        self._file = self._kept(FORM, *parts)
 
-def _places(file: Path) -> Iterator[Path]:
-    yield file
-    folder = hashlib.sha256(os.fsencode(file.parent.resolve())).hexdigest()[:16]
-    with suppress(RuntimeError):  # the user has no home folder
+    def boxes(self, sample: str) -> list[JsonRow]:
+        """The boxes of a sample, in the order of `sample_annotation`."""
+        return self._contents("sample_annotation", "sample", sample)
+
+    def recordings(self, sample: str) -> list[JsonRow]:
+        """The recordings of a sample, in the order of `sample_data`."""
+        return self._contents("sample_data", "sample", sample)
+
+    def pose(self, token: str) -> JsonRow | None:
+        """The pose of the car with a token, None where there is none."""
+        return next(iter(self._contents("ego_pose", "token", token)), None)
+
+    def pictures(self) -> frozenset[str]:
+        """The tokens and the file names of all recordings of keyframes."""
+        rows = self._asked("SELECT token, filename FROM sample_data WHERE is_key")
+        return frozenset(name for row in rows for name in row)
+
+    def _contents(self, table: str, column: str, value: str) -> list[JsonRow]:
+        query = f"SELECT content FROM {table} WHERE {column} = ? ORDER BY rowid"
+        return [json.loads(content) for (content,) in self._asked(query, value)]
+
+    def _asked(self, query: str, *values: str) -> list[tuple[Any, ...]]:
+        # Opened each time: a connection must not be taken into another process or thread.
+        try:
+            with closing(sqlite3.connect(f"{self._file.as_uri()}?immutable=1", uri=True)) as store:
+                return store.execute(query, values).fetchall()
+        except sqlite3.DatabaseError as error:
+            raise InvalidInput(f"{self._file}: delete it, it is damaged ({error})") from error
+
+    def _kept(self, form: str, database: str, stamp: str) -> Path:
+        """The file of the store, made if it is not there."""
+        name = f"{database}-{form}-{stamp}.sqlite"
         caches = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-        yield caches / "care-sim" / folder / file.name
+        folder = caches / "care-sim" / "nuscenes"
+        # Nothing may be written there, or the disk is full.
+        with suppress(OSError, sqlite3.OperationalError):
+            folder.mkdir(parents=True, exist_ok=True)
+            with _alone(folder):
+                if not (folder / name).exists():
+                    for old in folder.glob(f"{database}-*"):
+                        old.unlink()
+                    self._make(folder / f"{name}.part")
+                    os.replace(folder / f"{name}.part", folder / name)
+            return folder / name
+        self._temporary = TemporaryDirectory()
+        self._make(Path(self._temporary.name) / name)
+        return Path(self._temporary.name) / name
 
+    def _make(self, file: Path) -> None:
+        file.unlink(missing_ok=True)
+        with closing(sqlite3.connect(file)) as store, store:
+            store.executescript(_SCHEMA)
+            self._fill(store, "sample", ((token,) for token in self._samples))
+            self._fill(store, "sample_data", self._recorded())
+            self._fill(store, "sample_annotation", self._annotated())
+            used = "SELECT DISTINCT pose FROM sample_data WHERE pose IS NOT NULL"
+            self._fill(store, "ego_pose", self._poses({token for (token,) in store.execute(used)}))
+            lost = "SELECT sample FROM sample_annotation WHERE sample NOT IN sample LIMIT 1"
+            for (sample,) in store.execute(lost):
+                # A box of a sample that there is not would be missed in silence.
+                raise InvalidInput(f"{self._path('sample')}: no row with the token {sample!r}")
+            for table, column in (("sample_data", "sample"), ("sample_annotation", "sample")):
+                store.execute(f"CREATE INDEX {table}_{column} ON {table} ({column})")
+            store.execute("CREATE INDEX ego_pose_token ON ego_pose (token)")
 
-def _stamp(form: str, sources: Iterable[Path]) -> str:
-    """Tells the sources as they are now from the same at another time."""
-    stamps = [file_stamp(source)[1:] for source in sources if source.is_file()]
-    return hashlib.sha256(repr((form, stamps)).encode()).hexdigest()
+    def _fill(
+        self, store: sqlite3.Connection, table: str, rows: Iterable[tuple[object, ...]]
+    ) -> None:
+        width = len(store.execute(f"SELECT * FROM {table}").description)
+        try:
+            store.executemany(f"INSERT INTO {table} VALUES ({','.join('?' * width)})", rows)
+        except UnicodeEncodeError as error:
+            raise InvalidInput(f"{self._path(table)}: half a character ({error})") from error
+        twice = f"SELECT token, COUNT(*) FROM {table} GROUP BY token HAVING COUNT(*) > 1 LIMIT 1"
+        for token, count in store.execute(twice):
+            raise InvalidInput(f"{self._path(table)}: {count} rows with the token {token!r}")
 
+    def _recorded(self) -> Iterator[tuple[object, ...]]:
+        def is_needed(row: JsonRow) -> bool:
+            # A row that lacks the field stays, to be refused.
+            is_between = row.get("is_key_frame") is False
+            return not is_between or str(row.get("calibrated_sensor_token")) in self._lidars
 
-def _kept(place: Path, stamp: str, make: Callable[[], pa.Table]) -> pa.Table | None:
-    """The table in the file `place`, made if it is not there; None where none can be kept."""
-    table = _mapped(place, stamp)
-    if table is not None:
-        return table
-    try:
-        place.parent.mkdir(parents=True, exist_ok=True)
-    except OSError:
-        return None
-    with _alone(place.parent):
-        # Another process may have made it while this one waited.
-        table = _mapped(place, stamp)
-        if table is None and _can_be_written(place):
-            table = make().replace_schema_metadata({_STAMP: stamp})
-            with suppress(OSError):  # the disk is full: it stays in memory alone
-                _write(place, table)
-                table = _mapped(place, stamp) or table
-    return table
+        for row in table_rows(self._path("sample_data"), is_needed):
+            # No other pose is asked for.
+            is_posed = row["calibrated_sensor_token"] in self._posed
+            pose = row["ego_pose_token"] if is_posed else None
+            key = row["token"], row["sample_token"], row["filename"], row["is_key_frame"]
+            yield *key, pose, json.dumps(row)
 
+    def _annotated(self) -> Iterator[tuple[object, ...]]:
+        for row in table_rows(self._path("sample_annotation")):
+            has_points = row.pop("num_lidar_pts") + row.pop("num_radar_pts") > 0
+            content = json.dumps(row | {"has_points": has_points})
+            yield row["token"], row["sample_token"], content
 
-def _can_be_written(place: Path) -> bool:
-    try:
-        check_output(place, ARROW)
-    except (OSError, InvalidInput):
-        return False
-    return True
-
-
-def _mapped(place: Path, stamp: str) -> pa.Table | None:
-    """The table of the file, which stays on the disk until it is read; None of another one."""
-    try:
-        table = pa.ipc.open_file(pa.memory_map(os.fspath(place))).read_all()
-    # Arrow maps no file whose name is not UTF-8.
-    except (OSError, UnicodeError, pa.ArrowException):
-        return None
-    return table if (table.schema.metadata or {}).get(_STAMP) == stamp.encode() else None
-
-
-def _write(place: Path, table: pa.Table) -> None:
-    with replacing(place, ARROW) as unfinished, unfinished.open("wb") as file:
-        with pa.ipc.new_file(file, table.schema) as writer:
-            writer.write_table(table)
-        # On the disk before it gets its name: after a power cut it would else be there, and empty.
-        file.flush()
-        os.fsync(file.fileno())
+    def _poses(self, tokens: set[str]) -> Iterator[tuple[object, ...]]:
+        """Poses are recorded for every sweep and picture; those of the `tokens` alone are kept."""
+        # A row that lacks its token stays, to be refused.
+        path = self._path("ego_pose")
+        for row in table_rows(path, lambda row: "token" not in row or str(row["token"]) in tokens):
+            yield row["token"], json.dumps(row)
 
 
 @contextmanager
 def _alone(folder: Path) -> Iterator[None]:
     """Other processes that ask for the same wait meanwhile."""
-    try:
-        handle = os.open(folder, os.O_RDONLY)
-    except OSError:  # a folder that may not be listed
-        yield
-        return
+    handle = os.open(folder, os.O_RDONLY)
     try:
         with suppress(OSError):  # a file system without locks
             fcntl.flock(handle, fcntl.LOCK_EX)
         yield
     finally:
         os.close(handle)
-
-
-FORM = "2"
-"""Raised whenever the same files make another table."""
-_VECTOR = pa.list_(pa.float64(), 3)
-_QUATERNION = pa.list_(pa.float64(), 4)
-POSES = pa.schema({"token": pa.string(), "translation": _VECTOR, "rotation": _QUATERNION})
-RECORDINGS = pa.schema(
-    {
-        "token": pa.string(),
-        "sample_token": pa.string(),
-        "ego_pose_token": pa.string(),
-        "calibrated_sensor_token": pa.string(),
-        "filename": pa.string(),
-        "is_key_frame": pa.bool_(),
-        "timestamp": pa.int64(),
-    }
-)
-BOXES = pa.schema(
-    {
-        "token": pa.string(),
-        "sample_token": pa.string(),
-        "instance_token": pa.string(),
-        "visibility_token": pa.string(),
-        "translation": _VECTOR,
-        "size": _VECTOR,
-        "rotation": _QUATERNION,
-        "has_points": pa.bool_(),
-    }
-)
-_ROWS_AT_ONCE = 2**12
-
-TablePath = Callable[[str], Path]
-"""The file of a table by its name."""
-
-
-def boxes_by_sample(path: TablePath, samples: Sequence[str]) -> pa.Table:
-    """The boxes of each of the tokens `samples`, in their order: a column of lists of rows, in the
-    order of `sample_annotation`. Instead of numbers of points each tells whether it `has_points`.
-
-    Raises InvalidInput as `table_rows` does, for a token that stands twice, and for a box of a
-    sample that there is not.
-    """
-    tokens = _column(path("sample"), samples, pa.string())
-    return _grouped(_boxes(path, tokens), tokens)
-
-
-def recordings_by_sample(
-    path: TablePath, samples: Sequence[str], lidars: Sequence[str], cameras: Sequence[str]
-) -> pa.Table:
-    """The recordings of each of the tokens `samples`, as `boxes_by_sample` has the boxes: those of
-    keyframes, and all of the calibrated sensors `lidars`, together about one in four. Those of the
-    lidars, and of the `cameras` at keyframes, have the `pose` of the car, null where `ego_pose`
-    lacks it.
-
-    Raises InvalidInput as `table_rows` does, and for a token that stands twice.
-    """
-    tokens = _column(path("sample"), samples, pa.string())
-    # No other recording of a camera is read.
-    posed = [*lidars, *cameras]
-    return _grouped(_with_poses(path, _recordings(path, lidars), posed), tokens)
-
-
-def _boxes(path: TablePath, samples: pa.Array) -> pa.Table:
-    table = path("sample_annotation")
-    rows = (
-        {**row, "has_points": row["num_lidar_pts"] + row["num_radar_pts"] > 0}
-        for row in table_rows(table)
-    )
-    boxes = _columns(table, rows, BOXES)
-    # A box of a sample that there is not would be missed in silence.
-    is_nowhere = pc.is_null(pc.index_in(boxes["sample_token"], value_set=samples))
-    if pc.any(is_nowhere).as_py():
-        token = boxes["sample_token"].filter(is_nowhere)[0].as_py()
-        raise InvalidInput(f"{path('sample')}: no row with the token {token!r}")
-    return boxes
-
-
-def _recordings(path: TablePath, lidars: Sequence[str]) -> pa.Table:
-    known = frozenset(lidars)
-
-    def is_needed(row: JsonRow) -> bool:
-        # A row that lacks the field stays, to be refused.
-        is_between = row.get("is_key_frame") is False
-        return not is_between or str(row.get("calibrated_sensor_token")) in known
-
-    return _columns(path("sample_data"), table_rows(path("sample_data"), is_needed), RECORDINGS)
-
-
-def _with_poses(path: TablePath, recordings: pa.Table, sensors: Sequence[str]) -> pa.Table:
-    known = _column(path("calibrated_sensor"), sensors, pa.string())
-    is_posed = pc.is_in(recordings["calibrated_sensor_token"], known)
-    tokens = pc.if_else(is_posed, recordings["ego_pose_token"], None)
-    poses = _poses(path("ego_pose"), set(tokens.drop_null().to_pylist()))
-    places = poses.drop_columns("token").to_struct_array().combine_chunks()
-    where = pc.index_in(tokens, value_set=poses["token"].combine_chunks())
-    return recordings.append_column("pose", places.take(where.combine_chunks()))
-
-
-def _poses(path: Path, tokens: set[str]) -> pa.Table:
-    """Poses are recorded for every sweep and picture; those of the `tokens` alone are kept."""
-    # A row that lacks its token stays, to be refused.
-    rows = table_rows(path, lambda row: "token" not in row or str(row["token"]) in tokens)
-    return _columns(path, rows, POSES)
-
-
-def _columns(path: Path, rows: Iterable[JsonRow], schema: pa.Schema) -> pa.Table:
-    """The rows of the table in the file `path`, whose tokens must all be different."""
-    # A few at a time: as Python objects they take several times the memory.
-    left = iter(rows)
-    batches = []
-    while some := list(islice(left, _ROWS_AT_ONCE)):
-        columns = [_column(path, [row[field.name] for row in some], field.type) for field in schema]
-        batches.append(pa.record_batch(columns, schema))
-    table = pa.Table.from_batches(batches, schema)
-    _check_tokens(path, table["token"])
-    return table
-
-
-def _check_tokens(path: Path, tokens: pa.ChunkedArray) -> None:
-    # By their hashes, as all tokens at once take much memory; equal hashes are looked into.
-    hashes = [np.array([*map(hash, some.to_pylist())]) for some in tokens.chunks]
-    if len(hashes) and len(np.unique(np.concatenate(hashes))) < len(tokens):
-        check_tokens(path, tokens.to_pylist())
-
-
-def _column(path: Path, values: Sequence[Any], kind: pa.DataType) -> pa.Array:
-    if not pa.types.is_fixed_size_list(kind):
-        try:
-            return pa.array(values, kind)
-        except (UnicodeEncodeError, OverflowError) as error:
-            raise InvalidInput(
-                f"{path}: half a character or too large a number ({error})"
-            ) from error
-    count = kind.list_size
-    numbers = finite_numbers(values, len(values), count)
-    if numbers is None:
-        # One of them is odd, and must not spoil the others.
-        none = np.full(count, np.nan)
-        found = (finite_numbers(value, count) for value in values)
-        numbers = np.array([none if value is None else value for value in found])
-    return pa.FixedSizeListArray.from_arrays(numbers.ravel(), count)
-
-
-def _grouped(table: pa.Table, samples: pa.Array) -> pa.Table:
-    """A column `rows` with a list for each of the samples; rows of no sample are left out."""
-    numbers = pc.index_in(table["sample_token"], value_set=samples)
-    # The sort is stable and puts nulls last.
-    order = pc.sort_indices(numbers)[: len(numbers) - numbers.null_count]
-    edges = np.searchsorted(numbers.take(order).to_numpy(), np.arange(len(samples) + 1))
-    # Column by column, and what Arrow keeps for later is given back each time: so the table is
-    # never held twice.
-    columns = {}
-    for name in table.drop_columns("sample_token").column_names:
-        columns[name] = table[name].take(order).combine_chunks()
-        table = table.drop_columns(name)
-        pa.default_memory_pool().release_unused()
-    rows = pa.StructArray.from_arrays(list(columns.values()), list(columns))
-    return pa.table({"rows": pa.ListArray.from_arrays(pa.array(edges, pa.int32()), rows)})

@@ -1,25 +1,19 @@
 """The JSON tables of a nuScenes v1.0 database. Errors name the file and the token."""
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
-
-import pyarrow as pa
-import pyarrow.compute as pc
 
 from care_sim.base.checks import check_whole
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats
 from care_sim.sources.film_checks import STAMPS_NS, ValueRange, check_span
 from care_sim.sources.nuscenes.table_files import (
-    FORM,
     JsonRow,
-    boxes_by_sample,
-    cached_table,
+    SampleStore,
     check_tokens,
     finite_numbers,
-    recordings_by_sample,
     table_rows,
 )
 
@@ -97,7 +91,7 @@ class Database:
 
     def recordings(self, sample: str) -> list[JsonRow]:
         """The recordings of the keyframe of a sample, and all of its LiDAR."""
-        return self._of_sample(self._recordings, sample)
+        return self._store.recordings(sample)
 
     def sensor_of(self, data: JsonRow) -> JsonRow:
         """The sensor that made a recording."""
@@ -108,13 +102,14 @@ class Database:
     def pose_of(self, data: JsonRow) -> JsonRow:
         """The pose of the car at a recording of the LiDAR, or at a keyframe's of a camera."""
         token = data["ego_pose_token"]
-        if data["pose"] is None:
+        pose = self._store.pose(token)
+        if pose is None:
             raise InvalidInput(f"{self.path('ego_pose')}: no row with the token {token!r}")
-        return {"token": token, **data["pose"]}
+        return pose
 
     def annotations(self, sample: str) -> Sequence[JsonRow]:
         """The annotated boxes of a sample, one per instance."""
-        boxes = self._of_sample(self._boxes, sample)
+        boxes = self._store.boxes(sample)
         for token, count in Counter(box["instance_token"] for box in boxes).items():
             if count > 1:
                 table = self.path("sample_annotation")
@@ -150,37 +145,12 @@ class Database:
     @cached_property
     def pictures(self) -> frozenset[str]:
         """The tokens and the file names of all recordings of keyframes."""
-        recordings = pc.list_flatten(self._recordings["rows"])
-        keyframes = recordings.filter(pc.struct_field(recordings, "is_key_frame"))
-        names = (pc.struct_field(keyframes, field) for field in ("token", "filename"))
-        return frozenset(name for column in names for name in column.to_pylist())
-
-    def _of_sample(self, table: pa.Table, sample: str) -> list[JsonRow]:
-        rows: list[JsonRow] = table["rows"][self._numbers_of_samples[sample]].as_py()
-        return rows
+        return self._store.pictures()
 
     @cached_property
-    def _boxes(self) -> pa.Table:
-        tables = ("sample", "sample_annotation")
-        return self._cached("boxes", tables, lambda: boxes_by_sample(self.path, self._samples))
-
-    @cached_property
-    def _recordings(self) -> pa.Table:
-        tables = ("sample", "sample_data", "ego_pose", "calibrated_sensor", "sensor")
-        return self._cached(
-            "recordings",
-            tables,
-            lambda: recordings_by_sample(
-                self.path,
-                self._samples,
-                self._calibrated(LIDAR),
-                self._calibrated(*CAMERA_CHANNELS),
-            ),
-        )
-
-    def _cached(self, name: str, tables: tuple[str, ...], make: Callable[[], pa.Table]) -> pa.Table:
-        file = self.folder / f"care-sim-{name}.arrow"
-        return cached_table(file, FORM, map(self.path, tables), make)
+    def _store(self) -> SampleStore:
+        lidars, cameras = self._calibrated(LIDAR), self._calibrated(*CAMERA_CHANNELS)
+        return SampleStore(self.path, list(self.rows("sample")), lidars, cameras)
 
     def _calibrated(self, *channels: str) -> list[str]:
         """The tokens under which sensors were calibrated."""
@@ -190,14 +160,6 @@ class Database:
             for token, row in self.rows("calibrated_sensor").items()
             if sensors.get(row["sensor_token"], {}).get("channel") in channels
         ]
-
-    @property
-    def _samples(self) -> list[str]:
-        return list(self.rows("sample"))
-
-    @cached_property
-    def _numbers_of_samples(self) -> dict[str, int]:
-        return {token: number for number, token in enumerate(self._samples)}
 
 
 def _check_stamp(path: Path, sample: JsonRow) -> None:

@@ -5,13 +5,12 @@ pictures.
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from care_sim.base.errors import InvalidInput, report_problems
+from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
@@ -29,9 +28,10 @@ from care_sim.sensors.annotated import (
     Cloud,
     IdentifiedDetections,
 )
+from care_sim.sensors.camera import NOTHING_SEEN
 from care_sim.sensors.surround import SURROUND_CAMERAS
 from care_sim.sources.box_films import motions
-from care_sim.sources.film_checks import LEAST_KEYFRAMES
+from care_sim.sources.film_checks import LEAST_KEYFRAMES, report_once
 from care_sim.sources.nuscenes.detections import DetectionFile, Found, objects_behind
 from care_sim.sources.nuscenes.sweeps import points_of_grid, recorded_cloud
 from care_sim.sources.sweeps.logs import SWEEPS_KEYFRAME_S, Log
@@ -96,9 +96,6 @@ _LEAST_HEIGHT_M = 0.5
 _BIN_M = 0.1
 _AROUND_CAR_M = 0.3
 """Mirrors, racks and aerials reach so far beyond the body."""
-_NOTHING_SEEN = IdentifiedDetections(
-    ImageDetections.from_rows(np.empty((0, len(ImageDetections.COLUMNS)))), np.empty(0, np.int64)
-)
 
 
 def film_of_log(log: Log, setup: SensorSetup, detector: str, boxes: Path | None) -> Film:
@@ -131,13 +128,15 @@ def film_of_log(log: Log, setup: SensorSetup, detector: str, boxes: Path | None)
     annotated = reference(sweeps, sensors, detector, grid, height_m)
     cameras = CameraBoxes(boxes, setup.cameras, log) if boxes else None
     if cameras is None:
-        _report_no_camera(log.source)
+        report_once(
+            f"{log.source}: no {BOXES_FILE}: the camera reports nothing, so CARE has no residual"
+        )
     shots = []
     for row, points, sensor, annotations in zip(
         rows.tolist(), sweeps, sensors, annotated, strict=True
     ):
         time_s = log.times_s[row]
-        seen = cameras.seen(time_s, cars[row], annotations) if cameras else _NOTHING_SEEN
+        seen = cameras.seen(time_s, cars[row], annotations) if cameras else NOTHING_SEEN
         cloud = recorded_cloud(points, grid, annotations, sensor)
         from_start = float(time_s - log.times_s[0])
         token = f"{log.name}/{row}"
@@ -162,13 +161,6 @@ def _off_the_car(points: Floats, setup: SensorSetup) -> Floats:
     ahead, left = np.abs(points[:, :2] + (x, y)).T
     kept: Floats = points[(ahead > length / 2 + _AROUND_CAR_M) | (left > width / 2 + _AROUND_CAR_M)]
     return kept
-
-
-@lru_cache(maxsize=1000)
-def _report_no_camera(source: str) -> None:
-    report_problems(
-        [f"{source}: no {BOXES_FILE}: the camera reports nothing, so CARE has no residual"]
-    )
 
 
 def _check_height(log: Log, setup: SensorSetup, sweeps: Sequence[Floats]) -> None:

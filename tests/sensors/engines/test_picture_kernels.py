@@ -11,9 +11,8 @@ from care_sim.core.grid import AngularGrid
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.sensors.engines import Bullet, Fast
 from care_sim.sensors.engines.picture_kernels import visible_boxes
-from care_sim.sensors.pictures import FRONT_CAMERA, Picture
+from care_sim.sensors.pictures import FRONT_CAMERA
 from care_sim.world.bodies import CATALOGUE, BodyKind, Part
-from care_sim.world.body_tables import directions, polyhedron
 from care_sim.world.bullet import NO_BODY, BulletWorld
 
 SENSOR = Frame(0.0, 0.0, 1.84, 0.0)
@@ -59,14 +58,12 @@ def test_pictures_of_crowds_are_the_same():
         world.close()
         shown += np.count_nonzero(reference != NO_BODY)
         different += np.count_nonzero(reference != picture)
-        expected, found = Picture.of(reference), Picture.of(picture)
-        if set(expected.bodies) == set(found.bodies):
-            assert np.abs(expected.boxes - found.boxes).max(initial=0) <= 1
-        else:
-            odd = np.setxor1d(expected.bodies, found.bodies)
-            assert all(
-                np.isin(seen.bodies, odd) @ seen.pixels <= 1 for seen in (expected, found)
-            ), seed
+        expected, found = visible_boxes(reference), visible_boxes(picture)
+        odd = np.setxor1d(expected[:, 0], found[:, 0])
+        if not len(odd):
+            assert np.abs(expected - found)[:, 1:5].max(initial=0) <= 1
+        for seen in (expected, found):
+            assert np.isin(seen[:, 0], odd) @ seen[:, 5] <= 1, seed
     assert shown > 1_000_000
     assert different / shown < 1e-5
 
@@ -83,37 +80,10 @@ def test_a_primitive_near_and_far(bullet, shape, x):
     assert np.count_nonzero(reference != picture) <= 1
 
 
-def test_what_stands_in_front_hides(bullet):
-    person = bullet.add(CATALOGUE["pedestrian"], (25.0, 0.0, 0.0))
-    assert person in drawn(bullet)[1]
-    bullet.add(CATALOGUE["trailer"], (12.0, 0.0, np.pi / 2))
-    assert person not in drawn(bullet)[1]
-
-
 def test_transparent_bodies_backdrops_and_the_road_have_no_look(bullet):
     bullet.add(CATALOGUE["car"], (10.0, 0.0, 0.0), transparent=True)
     bullet.add(CATALOGUE["building"], (30.0, 0.0, 0.0), backdrop=True)
     assert set(drawn(bullet)[1].ravel().tolist()) == {NO_BODY}
-
-
-def test_a_camera_inside_a_body_looks_through_it(bullet):
-    inside, beyond = (
-        bullet.add(CATALOGUE["building"], (0.0, 0.0, 0.0)),
-        bullet.add(CATALOGUE["car"], (20.0, 0.0, 0.0)),
-    )
-    reference, picture = drawn(bullet)
-    assert np.array_equal(reference, picture)
-    assert beyond in picture
-    assert inside not in picture
-
-
-def test_a_moved_body_is_seen_where_it_was_put(bullet):
-    body = bullet.add(CATALOGUE["car"], (15.0, 5.0, 0.0))
-    engine = Fast(bullet, AngularGrid())
-    left = np.nonzero(engine.body_ids(FRONT_CAMERA, SENSOR, WHOLE) == body)[1]
-    bullet.move(body, (15.0, -5.0, 0.0))
-    right = np.nonzero(engine.body_ids(FRONT_CAMERA, SENSOR, WHOLE) == body)[1]
-    assert left.max() < 160 < right.min()
 
 
 def test_a_window_is_cut_out_of_the_picture(bullet):
@@ -142,28 +112,6 @@ def test_the_boxes_are_those_of_the_picture(window):
         assert seen.tolist() == expected.tolist()
         boxes += len(seen)
     assert boxes > 40 or window == (0, 0, 0, 0)
-
-
-def test_polyhedra_are_closed():
-    """Euler: corners - edges + faces = 2."""
-    for shape, size in (
-        ("box", (1.0, 2.0, 3.0)),
-        ("cylinder", (0.2, 0.2, 0.8)),
-        ("sphere", (0.3, 0.3, 0.3)),
-    ):
-        corners, faces, edges = polyhedron(shape, size)
-        assert len(corners) - len(edges) + len(faces) == 2
-        assert np.allclose(np.linalg.norm(faces[:, :3], axis=1), 1)
-        assert (corners @ faces[:, :3].T <= faces[:, 3] + 1e-9).all()
-    assert len(polyhedron("box", (1.0, 2.0, 3.0))[1]) == 6
-
-
-def test_directions_are_spread_over_the_sphere():
-    cosines = directions() @ directions().T
-    np.fill_diagonal(cosines, -1)
-    assert len(directions()) == 42
-    assert np.allclose(np.linalg.norm(directions(), axis=1), 1)
-    assert np.allclose(np.rad2deg(np.arccos(cosines.max(axis=1))), 31.717, atol=0.01)
 
 
 @given(

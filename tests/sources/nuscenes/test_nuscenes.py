@@ -1,4 +1,7 @@
+"""Tables without recorded sweeps: boxes become bodies, and rays are cast at them."""
+
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -8,12 +11,17 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.core.types import CLASSES
+from care_sim.evaluation.sightings import Sightings
 from care_sim.sensors.annotated import NO_OBJECT, Annotations
-from care_sim.sources.nuscenes.detections import DETECTION_NAMES, NUSCENES_CATEGORIES
-from care_sim.sources.nuscenes.recordings import OFFICIAL, split_scenes
+from care_sim.sources.film_checks import report_once
+from care_sim.sources.named import source_of
+from care_sim.sources.nuscenes.recordings import OFFICIAL, NuScenes, split_scenes
 from care_sim.sources.nuscenes.sweeps import owners, read_points
 from care_sim.sources.nuscenes.tables import Database
+from care_sim.sources.scenes import film_of
+from care_sim.study.scene_play import film_hash
 from tests.helpers.nuscenes_database import SENSORS, annotated, as_recorded, change, pose, write
+from tests.helpers.nuscenes_drive import write_drive
 from tests.helpers.nuscenes_scene import CAR, SCENE, WORLD, database, first
 
 UPRIGHT = Frame(0.0, 0.0, 1.8, 0.0)
@@ -80,11 +88,6 @@ def test_recordings_between_keyframes_are_no_keyframes(tmp_path):
     assert not any("gone" in name for name in tables.pictures), "they would fill the memory"
 
 
-def test_a_keyframe_without_annotations_plays(tmp_path):
-    (shot,) = first(database(tmp_path, [([], pose(), as_recorded(WORLD))])).shots
-    assert (len(shot.annotations), len(shot.seen.objects), len(shot.cloud)) == (0, 0, 4)
-
-
 def test_the_car_turns_and_drives_and_the_object_stays(tmp_path):
     far = annotated("vehicle.car", (20.0, 2.0, 0.85), instance="a", yaw=0.3)
     samples = [([far], pose(4.0 * n, 0.5 * n, 0.1 * n), as_recorded(WORLD)) for n in range(4)]
@@ -117,16 +120,6 @@ def test_boxes_come_from_visibility_where_no_detector_was_run(tmp_path):
     assert set(shot.seen.detections.cameras.tolist()) == {0}
 
 
-def test_an_object_too_small_for_a_picture_has_no_box(tmp_path):
-    boxes = [
-        annotated("human.pedestrian.adult", (d, 0.0, 0.9), (0.7, 0.7, 1.8), instance=f"{d}")
-        for d in (20, 130)
-    ]
-    (shot,) = first(database(tmp_path, [(boxes, pose(), as_recorded(WORLD))])).shots
-    assert len(shot.annotations) == 2
-    assert len(shot.seen.objects) == 1
-
-
 @pytest.mark.parametrize("channel", [name for name in SENSORS if name.startswith("CAM")])
 def test_cameras_see_what_the_recorded_calibration_projects(tmp_path, channel):
     """Mount, roll and principal point: pixels of the recorded picture come back to a tenth of a
@@ -147,14 +140,6 @@ def test_cameras_see_what_the_recorded_calibration_projects(tmp_path, channel):
     spare = np.array([camera.width, camera.height]) - (1600, 900)
     assert (shift <= spare).all()
     assert (spare < 110).all()
-
-
-def test_every_category_of_the_taxonomy_has_its_place():
-    assert len(NUSCENES_CATEGORIES) == 23 + 9, (
-        "the 23 of the annotations, and 9 more of the lidarseg extension"
-    )
-    assert {*NUSCENES_CATEGORIES.values(), *DETECTION_NAMES.values()} == {*CLASSES, None}
-    assert len(DETECTION_NAMES) == 10
 
 
 def test_what_lies_outside_the_classes_or_holds_no_point_is_left_out(tmp_path):
@@ -195,15 +180,6 @@ def test_the_validation_split_holds_the_150_scenes_of_the_devkit():
     assert {"scene-0037", "scene-0628", "scene-0918", "scene-0970", "scene-1074"}.isdisjoint(val)
 
 
-def test_the_training_split_holds_the_700_other_scenes_that_have_boxes():
-    train, val = (set(OFFICIAL[name]) for name in ("train", "val"))
-    assert len(train) == 700
-    assert len(train | val) == 850
-    assert {"scene-0001", "scene-0161", "scene-0120", "scene-1110"} <= train
-    assert train.isdisjoint({"scene-0077", "scene-0137", "scene-0827", "scene-1043"}), "of test"
-    assert set(OFFICIAL["mini_train"]) - train == {"scene-0553", "scene-0796"} < val
-
-
 def test_splits_choose_scenes(tmp_path):
     sample = [([CAR], pose(), as_recorded(WORLD))]
     root = write(tmp_path, {"scene-0061": sample, "scene-0103": sample, "scene-0916": sample})
@@ -222,35 +198,11 @@ def test_splits_choose_scenes(tmp_path):
         split_scenes(tables, "x")
 
 
-def test_an_empty_split_names_those_that_hold_scenes(tmp_path):
-    root = write(tmp_path, {"scene-0061": [([CAR], pose(), as_recorded(WORLD))]})
-    with pytest.raises(
-        InvalidInput,
-        match=r"scene.json: holds no scene of the split 'val'; .*: all, train, mini_train$",
-    ):
-        split_scenes(Database(root))
-    own = {"mine": ["scene-0061"], "gone": ["scene-9"], "none": []}
-    (root / "v1.0-trainval" / "splits.json").write_text(json.dumps(own))
-    with pytest.raises(
-        InvalidInput, match=r"the split 'val'; splits it holds: all, train, mini_train, mine$"
-    ):
-        split_scenes(Database(root))
-
-
 @pytest.fixture
 def sweep(recorded):
     (path,) = (recorded / "nuscenes").glob("*.pcd.bin")
     rings = np.fromfile(path, "<f4").reshape(-1, 5)[:, 4].astype(int)
     return read_points(path), rings
-
-
-def test_every_real_point_off_our_own_car_falls_inside_the_grid(sweep):
-    points, _ = sweep
-    ranges = np.linalg.norm(points, axis=1)
-    inside = AngularGrid().cells_of(points) >= 0
-    assert inside.mean() == pytest.approx(0.945, abs=0.001)
-    assert inside[ranges > 1.0].all()
-    assert ranges[~inside].max() < 1.0
 
 
 def test_real_rings_are_rows_one_to_one(sweep):
@@ -267,11 +219,126 @@ def test_real_rings_are_rows_one_to_one(sweep):
     assert own_row[ranges > 1.0].mean() == pytest.approx(0.875, abs=0.001)
 
 
-def test_the_real_sweep_plays_in_a_scene(tmp_path, sweep):
-    points, rings = sweep
-    rows = np.column_stack(
-        [-points[:, 1], points[:, 0], points[:, 2], np.zeros(len(points)), rings]
+PERSON = annotated("human.pedestrian.adult", (15.0, -3.0, 0.9), (0.7, 0.7, 1.8), instance="p")
+TRAILER = annotated("vehicle.trailer", (12.0, 1.2, 1.5), (3.0, 2.0, 3.0), instance="t")
+"""It hides CAR, and is outside the five classes."""
+
+
+@pytest.fixture(autouse=True)
+def said_anew():
+    report_once.cache_clear()
+
+
+def alone(folder, *boxes, keyframes=1):
+    """The tables of a standing car, without sweeps."""
+    root = database(folder, [([*boxes], pose(), as_recorded(WORLD))] * keyframes)
+    shutil.rmtree(root / "samples")
+    return root
+
+
+def returns(shot):
+    """How many returns each object has."""
+    return {number: int((shot.cloud.objects == number).sum()) for number in (NO_OBJECT, 0, 1)}
+
+
+def test_rays_meet_the_boxes_and_cameras_show_them(tmp_path, capsys):
+    movie = first(alone(tmp_path, CAR))
+    (shot,) = movie.shots
+    on_car = shot.cloud.points[shot.cloud.objects == 0]
+    world = shot.sensor.origin + shot.sensor.vectors_to_world(on_car)
+    assert len(on_car) > 30
+    assert np.abs(world[:, :2] - (20.0, 2.0)).max(axis=0) == pytest.approx([2.3, 0.95], abs=0.02)
+    assert world[:, 2].max() <= 1.71
+    assert shot.seen.objects.tolist() == [0]
+    assert CLASSES[shot.annotations.classes[0]] == "car"
+    lines = capsys.readouterr().err.splitlines()
+    assert [line.partition("nuscenes: ")[2] for line in lines] == [
+        "no recorded sweeps (samples/LIDAR_TOP): annotated boxes become bodies, and rays are cast "
+        "at them"
+    ]
+
+
+def test_the_road_is_level_however_the_lidar_leans(tmp_path):
+    (shot,) = first(alone(tmp_path, CAR)).shots
+    assert abs(shot.sensor.pitch) > np.radians(1)
+    road = shot.cloud.points[shot.cloud.objects == NO_OBJECT]
+    heights = (shot.sensor.origin + shot.sensor.vectors_to_world(road))[:, 2]
+    assert len(road) > 5000
+    assert np.abs(heights).max() < 1e-6
+
+
+def test_recorded_cameras_show_what_projection_shows(tmp_path):
+    """To a pixel of their small pictures, five of the recorded ones; the LiDAR leans in both."""
+    root = alone(tmp_path, CAR)
+    rendered = first(root)
+    shutil.copytree(
+        database(tmp_path / "swept", [([CAR], pose(), as_recorded(WORLD))]) / "samples",
+        root / "samples",
     )
-    (shot,) = first(database(tmp_path, [([CAR], pose(), rows)])).shots
-    ranges = np.linalg.norm(points, axis=1)
-    assert len(shot.cloud) == np.sum((ranges > 1.0) & (ranges <= 50.0))
+    projected = first(root)
+    boxes = []
+    for movie in (rendered, projected):
+        camera = movie.cameras[0]
+        seen = movie.shots[0].seen.detections
+        assert seen.cameras.tolist() == [0]
+        boxes.append(camera.rays(seen.boxes.reshape(-1, 2, 2))[0])
+    # Metres to the side and up, a metre ahead: 250 pixels.
+    assert np.abs(boxes[0] - boxes[1]).max() < 1.5 / 250
+    assert rendered.cameras[0].width < 340
+
+
+def test_what_is_outside_the_classes_hides_and_is_no_object(tmp_path):
+    (free,), (hidden,) = (
+        first(alone(tmp_path / str(n), CAR, *more)).shots for n, more in enumerate([(), (TRAILER,)])
+    )
+    assert returns(free)[0] > 30
+    assert returns(hidden)[0] == 0
+    assert len(hidden.annotations) == 1, "the car is annotated, for it holds a recorded point"
+    assert hidden.seen.objects.size == 0
+
+
+def test_a_box_without_a_point_is_neither_annotated_nor_a_body_unless_asked_for(tmp_path, capsys):
+    root = alone(tmp_path, CAR, TRAILER | {"num_lidar_pts": 0}, PERSON | {"num_lidar_pts": 0})
+    movie, full = first(root), first(root, empty_boxes=True)
+    assert [len(each.shots[0].annotations) for each in (movie, full)] == [1, 2]
+    assert [len(each.hidden) for each in (movie, full)] == [1, 0]
+    assert returns(movie.shots[0])[0] > 30
+    assert returns(full.shots[0])[0] == 0
+    told = capsys.readouterr().err
+    assert "scene-0103: 1 of 2 boxes within 50 m hold no recorded point: 0 newcomers" in told
+
+
+def test_sweeps_that_are_not_there_cannot_be_gathered(tmp_path):
+    root = alone(tmp_path, CAR)
+    with pytest.raises(InvalidInput, match=r"no recorded sweeps .*: sweeps must be 1, got 3"):
+        first(root, sweeps=3)
+
+
+def test_sweeps_that_come_later_make_another_film(tmp_path):
+    root = write_drive(tmp_path / "drive")
+    (root / "samples").rename(tmp_path / "samples")
+    source = source_of(f"nuscenes:{root}")
+    scene, _ = source.scenes()
+    assert source.row(scene)["points"] == "boxes"
+    before, hash_before = source.row(scene)["recording"], film_hash(film_of(source, scene))
+    (tmp_path / "samples").rename(root / "samples")
+    assert "points" not in source.row(scene)
+    assert source.row(scene)["recording"] != before
+    assert film_hash(film_of(source, scene)) != hash_before
+
+
+def test_the_metadata_of_two_real_scenes_plays(tmp_path, recorded):
+    if not (recorded / "nuscenes-mini").is_dir():
+        pytest.skip("no nuscenes-mini in shared/data")
+    shutil.copytree(
+        recorded / "nuscenes-mini" / "v1.0-mini",
+        tmp_path / "v1.0-mini",
+        ignore=shutil.ignore_patterns("*.arrow"),
+    )
+    source = NuScenes(tmp_path, split="mini_val")
+    assert source.scenes() == ["scene-0103", "scene-0916"]
+    movie = source.film("scene-0103")
+    sightings = Sightings.of("", [shot.annotations for shot in movie.shots], hidden=movie.hidden)
+    assert (len(movie.shots), len(sightings.events)) == (40, 89)
+    ages = np.array([shot.seen.pictures[:, 0] for shot in movie.shots])
+    assert ages.max() == pytest.approx(0.0454, abs=1e-4)

@@ -1,14 +1,10 @@
 """ROS 2 bags and MCAP files hold the same log as a folder."""
 
-from dataclasses import replace
-
-import numpy as np
 import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.sources.installed import recordings
-from care_sim.sources.sweeps.recordings import points_of_cloud
-from tests.helpers.sweeps_log import START_NS, write_log
+from tests.helpers.sweeps_log import write_log
 
 pytest.importorskip("rosbags")
 
@@ -16,7 +12,6 @@ from tests.helpers.sweeps_bag import (
     ODOMETRY,
     POSE,
     SECONDS,
-    cloud,
     write_bag,
 )
 
@@ -79,31 +74,6 @@ def test_a_damaged_bag_is_told_in_a_line(tmp_path, storage):
         with pytest.raises(InvalidInput, match="no bag that can be read") as caught:
             source.film(source.scenes()[0])
         assert "\n" not in str(caught.value)
-
-
-def test_a_topic_that_the_bag_lacks_is_refused(tmp_path):
-    bag = write_bag(tmp_path / "drive")
-    for topic in ("/nothing", "/note"):
-        source = recordings(f"sweeps:{bag}", {"topics": (topic,)})
-        with pytest.raises(InvalidInput, match=f"{topic} is no topic of points or poses; the bag"):
-            source.film(source.scenes()[0])
-
-
-def test_topics_are_a_column_so_that_others_play_again(tmp_path):
-    bag = write_bag(tmp_path / "drive", more=["/front/points"])
-    assert recordings(f"sweeps:{bag}", {"topics": ("/points", "/pose")}).columns() == {
-        "topics": "/points /pose"
-    }
-
-
-def test_rows_of_an_organised_cloud_may_be_padded():
-    points = np.arange(12, dtype="<f4").reshape(2, 2, 3)
-    padded = np.concatenate([points.view(np.uint8).reshape(2, 24), np.full((2, 5), 7, np.uint8)], 1)
-    made = cloud(START_NS)
-    fields = [replace(field, offset=field.offset - 4) for field in made.fields]
-    shape = {"height": 2, "width": 2, "point_step": 12, "row_step": 29}
-    told = replace(made, fields=fields, data=padded.ravel(), **shape)
-    assert np.array_equal(points_of_cloud(told), points.reshape(4, 3))
 
 
 def test_camera_boxes_of_a_file_lie_beside_it(tmp_path):

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.types import CLASSES
@@ -11,6 +12,10 @@ from care_sim.evaluation.sightings import Sightings
 from care_sim.sensors.annotated import NO_OBJECT
 from care_sim.sources.film_checks import check_film
 from care_sim.sources.installed import recordings
+from care_sim.sources.sweeps.logs import log_of_folder
+from care_sim.sources.sweeps.points import in_seconds
+from tests.helpers.commands import run
+from tests.helpers.examples import EXAMPLES, loaded
 from tests.helpers.places import ROOT
 from tests.helpers.sweeps_log import (
     APPEARS_S,
@@ -147,6 +152,12 @@ def test_times_in_a_file_and_several_scenes(tmp_path, film):
     assert tmp_path / "b" / "times.csv" in source.files("b")
 
 
+@pytest.mark.parametrize("unit", [1e-9, 1e-6, 1e-3, 1.0])
+def test_times_are_told_in_any_usual_unit(unit):
+    seconds = np.array([1.6e9, 1.6e9 + 0.5])
+    assert in_seconds(seconds / unit) == pytest.approx(seconds, abs=1e-6)
+
+
 def test_a_car_that_stands_has_a_single_pose(tmp_path):
     own = write_log(tmp_path / "drive", points_of=lambda _: sweep(2.0), seconds=1.5)
     (own / "poses.csv").write_text("time,x,y,z,qx,qy,qz,qw\n0,5,5,0,0,0,1,0\n")
@@ -200,12 +211,65 @@ def test_camera_boxes_have_an_age_and_their_object(tmp_path, film, capsys):
     assert seen[4].detections.ages == pytest.approx([0.4], abs=1e-6)
 
 
-def test_without_camera_boxes_a_line_says_that_care_has_no_residual(folder, capsys, film):
-    from care_sim.sources.sweeps.films import _report_no_camera
+def test_the_protocol_counts_who_detects_a_new_cluster_first(capsys, folder, tmp_path):
+    played = ("--policies", "history", "care", "rows", "full", "--budgets", "0.1")
+    few = ("--floor-seeds", "1", "--workers", "1", "--detector", "cluster")
+    options = (*played, *few, "--out", tmp_path / "out")
+    code, printed, _ = run(
+        capsys, "protocol", "--source", f"sweeps:{folder}", "--verbose", *options
+    )
+    assert code == 0
+    told = " ".join(printed.split())
+    assert "events detected earlier, later or at the same keyframe as history" in told
+    # Without a camera CARE fires as history does.
+    assert "10% care 0.0 0.0 1.0" in told
+    assert (tmp_path / "out" / "plays.parquet").exists()
 
-    _report_no_camera.cache_clear()
-    film_of(folder)
-    told = "no camera_boxes.json: the camera reports nothing, so CARE has no residual"
-    assert told in capsys.readouterr().err
-    assert film.cameras
-    assert sum(len(shot.seen) for shot in film.shots) == 0
+
+@pytest.fixture(scope="module")
+def foggy(recorded, tmp_path_factory):
+    """A recorded sequence in fog (RADIATE), turned into a folder of sweeps by the example."""
+    out = tmp_path_factory.mktemp("radiate") / "tiny_foggy"
+    loaded(EXAMPLES / "radiate_sweeps.py").convert(recorded / "radiate" / "tiny_foggy", out)
+    return out
+
+
+def misfit(foggy, yaw_deg):
+    """Metres in the world between what two sweeps half a second apart show above the road, median
+    of their points.
+    """
+    log = log_of_folder(foggy)
+    cos, sin = np.cos(np.radians(yaw_deg)), np.sin(np.radians(yaw_deg))
+    apart = []
+    for first in (10, 25, 40):
+        world = []
+        for number in (first, first + 5):
+            points = log.points_of(number)
+            ranges = np.hypot(*points[:, :2].T)
+            x, y, z = points[(ranges > 6) & (ranges < 40) & (points[:, 2] > -1.2)].T
+            (car,) = log.cars(log.times_s[[number]])
+            own = np.stack([cos * x - sin * y, sin * x + cos * y, z], axis=1)
+            world.append(car.origin + car.vectors_to_world(own))
+        apart.append(np.median(cKDTree(world[0]).query(world[1])[0]))
+    return float(np.mean(apart))
+
+
+def test_what_stands_stays_in_the_world_with_the_axes_of_the_car(foggy):
+    right = misfit(foggy, 0)
+    assert right < 0.3
+    assert min(misfit(foggy, yaw) for yaw in (-90, 90, 180)) > 4 * right
+
+
+def test_the_film_has_the_speed_of_the_gps_and_a_flat_road_where_the_set_up_has_it(foggy):
+    film = recordings(f"sweeps:{foggy}").film("tiny_foggy")
+    assert len(film.shots) == 12
+    speeds = [shot.ego.speed for shot in film.shots[1:]]
+    assert speeds[0] == pytest.approx(12.1, abs=0.3)
+    assert speeds[-1] == pytest.approx(9.5, abs=0.3)
+    points = np.concatenate([shot.cloud.points for shot in film.shots])
+    ranges = np.hypot(*points[:, :2].T)
+    road = points[(ranges > 3) & (ranges < 12) & (np.abs(points[:, 2] + 2.03) < 0.15)]
+    plane = np.linalg.lstsq(np.column_stack([road[:, :2], np.ones(len(road))]), road[:, 2])[0]
+    assert np.degrees(np.hypot(*plane[:2])) < 1.5
+    sightings = Sightings.of(film.name, [shot.annotations for shot in film.shots])
+    assert 8 <= len(sightings.events) <= 20

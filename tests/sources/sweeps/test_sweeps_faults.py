@@ -1,5 +1,6 @@
 """What is wrong with a log is told in one line that names the file."""
 
+import json
 import shutil
 
 import numpy as np
@@ -36,65 +37,46 @@ def rows(x_of=lambda t: 6 * t, yaw=0.0, shift=0.0, step=1):
     ]
 
 
+def points(**changes):
+    """Write another sweep: rows by number, or all of it."""
+
+    def damage(folder):
+        table = np.array(changes.get("all", sweep(0.5)))
+        for row, value in changes.items():
+            if row != "all":
+                table[int(row[1:]), 1] = value
+        np.save(swept(folder), table)
+
+    return damage
+
+
+def left(numbers):
+    """Leave out some sweeps."""
+
+    def damage(folder):
+        for number in numbers:
+            swept(folder, number=number).unlink()
+
+    return damage
+
+
+def poses(*lines):
+    return lambda folder: posed(folder, lines)
+
+
+def boxes(picture):
+    row = {"image_id": picture, "category_id": 1, "bbox": [0, 0, 9, 9], "score": 1}
+    return lambda folder: (folder / "camera_boxes.json").write_text(json.dumps([row]))
+
+
 def truncated(folder):
     path = swept(folder)
     path.write_bytes(path.read_bytes()[:-100])
 
 
-def scaled(folder):
-    np.save(swept(folder), sweep(0.5) * 1000)
-
-
-def infinite(folder):
-    points = sweep(0.5)
-    points[7, 1] = np.inf
-    np.save(swept(folder), points)
-
-
-def half_missing(folder):
-    points = sweep(0.5)
-    points[7, 1] = np.nan
-    np.save(swept(folder), points)
-
-
-def only_missing(folder):
-    np.save(swept(folder), np.full((9, 3), np.nan))
-
-
-def flat(folder):
-    np.save(swept(folder), sweep(0.5)[:, :2])
-
-
-def pickled(folder):
-    np.save(swept(folder), np.array([{}], object), allow_pickle=True)
-
-
-def two_kinds(folder):
-    (folder / "sweeps" / "1.csv").write_text("1,2,3\n")
-
-
-def no_sweeps(folder):
-    shutil.rmtree(folder / "sweeps")
-    (folder / "sweeps").mkdir()
-
-
 def numbered(folder):
     for number, path in enumerate(sorted((folder / "sweeps").iterdir())):
         path.rename(path.with_name(f"{number:06d}.npy"))
-
-
-def twice(folder):
-    shutil.copy(swept(folder), folder / "sweeps" / f"0{START_NS + 5 * STEP_NS}.npy")
-
-
-def a_gap(folder):
-    for number in range(2, 9):
-        swept(folder, number=number).unlink()
-
-
-def too_short(folder):
-    for number in range(6, 13):
-        swept(folder, number=number).unlink()
 
 
 def upside_down(folder):
@@ -104,54 +86,42 @@ def upside_down(folder):
 
 FAULTS = [
     (truncated, r"\d+\.npy: no sweep \(mmap length"),
-    (scaled, r"\d+\.npy: point 0 lies at .*, must be metres within 500"),
-    (infinite, r"\d+\.npy: point 7 lies at .*inf"),
-    (half_missing, r"\d+\.npy: point 7 lies at .*nan"),
-    (only_missing, r"\d+\.npy: no points"),
-    (flat, r"\d+\.npy: no sweep \(must be numbers \(n, 3 or more\)"),
-    (pickled, r"\d+\.npy: no sweep \("),
-    (lambda folder: swept(folder).write_bytes(b""), r"\d+\.npy: no sweep \("),
-    (two_kinds, r"sweeps must be files of one kind, .*, got \.csv and \.npy"),
-    (no_sweeps, r"sweeps must be files of one kind, .*, got none"),
+    (points(all=sweep(0.5) * 1000), r"\d+\.npy: point 0 lies at .*, must be metres within 500"),
+    (points(r7=np.inf), r"\d+\.npy: point 7 lies at .*inf"),
+    (points(r7=np.nan), r"\d+\.npy: point 7 lies at .*nan"),
+    (points(all=np.full((9, 3), np.nan)), r"\d+\.npy: no points"),
+    (points(all=sweep(0.5)[:, :2]), r"\d+\.npy: no sweep \(must be numbers \(n, 3 or more\)"),
+    (points(all=[{}]), r"\d+\.npy: no sweep \("),
+    (
+        lambda folder: (folder / "sweeps" / "1.csv").write_text("1,2,3\n"),
+        r"sweeps must be files of one kind, .*, got \.csv and \.npy",
+    ),
     (numbered, r"000000\.npy: its name is no time: nano-, micro- or .* write times\.csv"),
-    (twice, r"sweeps: times must ascend, got"),
-    (a_gap, r"sweeps: no sweep within 0\.25 s of second 0\.5 of the log"),
-    (too_short, r"sweeps: a film needs 3 keyframes, 0\.5 s apart, and the sweeps are enough for 2"),
+    (
+        lambda folder: shutil.copy(swept(folder), folder / f"sweeps/0{swept(folder).name}"),
+        r"sweeps: times must ascend, got",
+    ),
+    (left(range(2, 9)), r"sweeps: no sweep within 0\.25 s of second 0\.5 of the log"),
+    (left(range(6, 13)), r"sweeps: a film needs 3 keyframes, .*, and the sweeps are enough for 2"),
     (upside_down, r"sweeps: no returns below the LiDAR within 12 m; z must point up"),
     (lambda folder: (folder / "poses.csv").unlink(), r"poses\.csv: no such file; it holds the"),
-    (lambda folder: posed(folder, []), r"poses\.csv: no CSV table"),
-    (lambda folder: posed(folder, rows()[:1]), r"poses\.csv: times must be finite, at least one"),
-    (lambda folder: posed(folder, ["time,x,y,z", "1,2,3,4"]), r"must have one column qx, has"),
-    (lambda folder: posed(folder, [*rows(), "x,0,0,0,0"]), r"column time must hold numbers"),
-    (lambda folder: posed(folder, [*rows(), ",0,0,0,0"]), r"poses\.csv: times must be finite"),
-    (lambda folder: posed(folder, rows()[::-1][:-1] + rows()[:1]), r"must have one column time"),
-    (lambda folder: posed(folder, [*rows(), rows()[3]]), r"poses\.csv: times must ascend"),
-    (lambda folder: posed(folder, rows(yaw=90.0)), r"yaw must be radians within a full turn, got"),
-    (lambda folder: posed(folder, rows(yaw=1.5)), r"drives 86 degrees off its heading; yaw is"),
-    (lambda folder: posed(folder, rows(lambda t: 6000 * t)), r"drives 6000 m/s; x, y and z must"),
-    (lambda folder: posed(folder, rows(shift=100)), r"sweep at .* s has no pose; poses of .* go"),
-    (lambda folder: posed(folder, rows()[:8]), r"sweep at .* s has no pose; poses of .* go"),
-    (lambda folder: posed(folder, rows(step=12)), r"must be at most 1 s apart"),
-    (
-        lambda folder: posed(folder, ["time,x,y,z,qx,qy,qz,qw", "1,0,0,0,0,0,0,0"]),
-        r"poses\.csv: pose 0 has a quaternion that is not of length 1",
-    ),
+    (poses(), r"poses\.csv: no CSV table"),
+    (poses(*rows()[:1]), r"poses\.csv: times must be finite, at least one"),
+    (poses("time,x,y,z", "1,2,3,4"), r"must have one column qx, has"),
+    (poses(*rows(), "x,0,0,0,0"), r"column time must hold numbers"),
+    (poses(*rows(), rows()[3]), r"poses\.csv: times must ascend"),
+    (poses(*rows(yaw=90.0)), r"yaw must be radians within a full turn, got"),
+    (poses(*rows(yaw=1.5)), r"drives 86 degrees off its heading; yaw is"),
+    (poses(*rows(lambda t: 6000 * t)), r"drives 6000 m/s; x, y and z must"),
+    (poses(*rows(shift=100)), r"sweep at .* s has no pose; poses of .* go"),
+    (poses(*rows(step=12)), r"must be at most 1 s apart"),
+    (poses("time,x,y,z,qx,qy,qz,qw", "1,0,0,0,0,0,0,0"), r"pose 0 has a quaternion that is not"),
     (
         lambda folder: (folder / "times.csv").write_text("file,time\n1.npy,0\n"),
         r"times\.csv: no row of columns file and time for \d+\.npy",
     ),
-    (
-        lambda folder: (folder / "camera_boxes.json").write_text(
-            '[{"image_id": "front", "category_id": 1, "bbox": [0, 0, 9, 9], "score": 1}]'
-        ),
-        r"camera_boxes\.json: the picture 'front' must be named CAMERA/TIME",
-    ),
-    (
-        lambda folder: (folder / "camera_boxes.json").write_text(
-            '[{"image_id": "0/1.5", "category_id": 1, "bbox": [0, 0, 9, 9], "score": 1}]'
-        ),
-        r"camera_boxes\.json: cameras must be numbers from 0 on of the 0 \[\[cameras\]\]",
-    ),
+    (boxes("front"), r"camera_boxes\.json: the picture 'front' must be named CAMERA/TIME"),
+    (boxes("0/1.5"), r"cameras must be numbers from 0 on of the 0 \[\[cameras\]\]"),
 ]
 
 

@@ -1,19 +1,18 @@
 """Each camera's picture is that of the camera where it was when the picture was taken."""
 
-import json
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from care_sim.base.errors import InvalidInput
+from care_sim.core.grid import AngularGrid
 from care_sim.core.residual import wedges
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES
 from care_sim.envs.open_loop import FilmEnv
-from care_sim.sources.nuscenes.detections import DetectionFile
+from care_sim.sensors.annotated import NO_OBJECT
 from tests.helpers.nuscenes_database import SENSORS, START_US, annotated, as_recorded, change, pose
-from tests.helpers.nuscenes_scene import SCENE, WORLD, database, first
+from tests.helpers.nuscenes_scene import CAR, SCENE, WORLD, database, first
 
 LEFT = "CAM_FRONT_LEFT"
 SPEED, TURN = 9.0, -0.3
@@ -110,12 +109,6 @@ def test_boxes_have_the_age_and_turn_of_their_picture(tmp_path):
         assert not shot.seen.detections.yaw_changes.any()
 
 
-def test_a_picture_just_after_the_sweep_has_age_0_and_its_turn(tmp_path):
-    seen = first(timed(tmp_path, early_s=-0.001)).shots[0].seen.detections
-    assert not seen.ages.any()
-    assert seen.yaw_changes[seen.cameras == 1] == pytest.approx(-0.001 * TURN, abs=1e-6)
-
-
 def test_a_turn_across_the_back_of_the_compass_is_small(tmp_path):
     root = timed(tmp_path)
     yaw = np.pi - TURN * (0.5 - EARLY_S / 2)
@@ -147,20 +140,6 @@ def test_wedges_are_turned_back_to_where_the_object_is(tmp_path):
     assert len(van) == 1
     assert turned_back > 0.8
     assert as_seen < 0.5
-
-
-def test_detections_from_a_file_lie_on_the_object_of_their_picture(tmp_path):
-    root = timed(tmp_path, own_pose=as_turned)
-    then = projected_by_hand(VAN, as_turned(0.5 - EARLY_S), LEFT)
-    found = {"sample_data_token": f"{SCENE}-1-{LEFT}", "bbox_corners": then.tolist()}
-    path = tmp_path / "boxes.json"
-    path.write_text(json.dumps([found | {"category_name": "truck", "score": 0.9}]))
-    shot = first(root, detections=DetectionFile(path)).shots[1]
-    seen = shot.seen
-    (row,) = np.flatnonzero(shot.annotations.objects == seen.objects[0])
-    assert CLASSES[shot.annotations.classes[row]] == "truck"
-    assert seen.detections.ages == pytest.approx([EARLY_S])
-    assert seen.detections.yaw_changes == pytest.approx([-np.radians(20)], abs=1e-6)
 
 
 def test_latency_adds_to_the_age_and_false_boxes_have_that_of_their_picture(tmp_path):
@@ -198,8 +177,70 @@ def test_times_in_other_units_are_named(tmp_path):
     assert first(root, camera_times="sweep")
 
 
-def test_a_picture_without_a_pose_is_named(tmp_path):
-    root = timed(tmp_path)
-    change(root, "ego_pose", lambda rows: rows.pop(2))
-    with pytest.raises(InvalidInput, match=f"ego_pose.json: no row .*'pose-{SCENE}-0-{LEFT}'"):
-        first(root)
+SEEN = np.array([[22.0, 2.0, 0.8], [30.0, -5.0, 0.1]])
+"""Points in the world: at the front of CAR, and on the road."""
+
+
+def swept(folder, *moments, filed=1):
+    """Three keyframes, 4 m apart; before the second, sweeps at the `moments` (s), filed under the
+    sample of the number.
+    """
+    samples = [([CAR], pose(4.0 * n), as_recorded(WORLD - [4.0 * n, 0, 0])) for n in range(3)]
+    root = database(folder, samples)
+    for moment in moments:
+        add_sweep(root, moment, filed)
+    return root
+
+
+def add_sweep(root, moment, filed):
+    name = f"sweep-{moment}"
+    x = 8.0 * moment
+    file = f"sweeps/LIDAR_TOP/{name}.pcd.bin"
+    data = {"token": name, "ego_pose_token": name, "is_key_frame": False, "filename": file} | {
+        "timestamp": START_US + round(moment * 1e6),
+        "sample_token": f"{SCENE}-{filed}",
+    }
+    change(root, "sample_data", lambda rows: rows.append(rows[0] | data))
+    change(root, "ego_pose", lambda rows: rows.append({"token": name} | pose(x)))
+    (root / file).parent.mkdir(parents=True, exist_ok=True)
+    as_recorded(SEEN - [x, 0, 0]).astype("<f4").tofile(root / file)
+
+
+@pytest.mark.parametrize("filed", [0, 1, 2])
+def test_the_last_before_a_keyframe_are_served_in_order_of_time_wherever_they_are_filed(
+    tmp_path, filed
+):
+    root = swept(tmp_path, 0.3, 0.1, 0.45, 0.2, filed=filed)
+    shots = first(root, sweeps=4).shots
+    assert [[sweep.time_s for sweep in shot.sweeps] for shot in shots] == [
+        [],
+        pytest.approx([0.2, 0.3, 0.45]),
+        [],
+    ]
+    assert [len(shot.sweeps) for shot in first(root, sweeps=10).shots] == [0, 4, 0]
+
+
+def test_sweeps_before_the_first_keyframe_have_no_mask_and_are_left_out(tmp_path):
+    shots = first(swept(tmp_path, -0.1, 0.2, 1.2), sweeps=10).shots
+    assert [len(shot.sweeps) for shot in shots] == [0, 1, 0]
+
+
+def test_a_sweep_holds_its_own_cells_and_the_points_lie_in_the_boxes_of_the_keyframe(tmp_path):
+    _, shot, _ = first(swept(tmp_path, 0.25), sweeps=2).shots
+    (sweep,) = shot.sweeps
+    assert sweep.sensor.x == pytest.approx(shot.sensor.x - 2.0)
+    assert sweep.cloud.cells.tolist() == AngularGrid().cells_of(sweep.cloud.points).tolist()
+    world = sweep.sensor.origin + sweep.sensor.vectors_to_world(sweep.cloud.points)
+    assert sorted(map(tuple, world.round(3))) == sorted(map(tuple, SEEN))
+    on_the_car = np.isclose(world[:, 0], 22.0, atol=0.01)
+    assert sweep.cloud.objects[on_the_car].tolist() == [shot.annotations.objects[0]]
+    assert sweep.cloud.objects[~on_the_car].tolist() == [NO_OBJECT]
+
+
+def test_sweeps_that_nobody_recorded_are_refused(tmp_path):
+    with pytest.raises(
+        InvalidInput,
+        match=rf"sample_data.json: no LIDAR_TOP between '{SCENE}-0' and '{SCENE}-2': a film of it "
+        "has one sweep a keyframe",
+    ):
+        first(swept(tmp_path), sweeps=10)

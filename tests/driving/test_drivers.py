@@ -1,12 +1,28 @@
+"""The drivers: the careful human of UN Regulation 157, and comfort before anything calls for the
+brake.
+"""
+
+from functools import cache
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import ClosedLoopConditions, DriverSettings
-from care_sim.core.types import Ego, Tracks
+from care_sim.core.types import Command, Ego, Tracks
 from care_sim.driving.braking import BrakingController
 from care_sim.driving.drivers import HUMAN_MODEL as HUMAN
-from care_sim.driving.drivers import CarefulHuman, brake_delay_s, check_driver, make_driver
+from care_sim.driving.drivers import (
+    CarefulHuman,
+    Cruising,
+    CruisingRules,
+    brake_delay_s,
+    check_driver,
+    make_driver,
+)
+from care_sim.world.route import Route, SpeedPlan
 
 FRONT, HALF_WIDTH, KEYFRAME = 2.5, 0.9, 0.1
 BESIDE = HALF_WIDTH + 1.0
@@ -127,11 +143,104 @@ def test_unknown_drivers_and_rules_that_are_not_theirs_are_refused(settings, lin
         check_driver(ClosedLoopConditions(**settings))
 
 
-def test_comfort_is_of_both_drivers():
-    check_driver(DriverSettings(driver="careful-human", comfort_mps2=2.0))
-    check_driver(DriverSettings(brake_mps2=6.0, comfort_mps2=2.0))
-
-
 def test_the_brake_acts_after_the_delay_of_the_driver():
     assert brake_delay_s(DriverSettings(brake_reaction_s=0.2)) == 0.2
     assert brake_delay_s(DriverSettings(driver="careful-human")) == 0.75
+
+
+def test_the_numbers_are_those_of_table_1():
+    """UN Regulation 157, Annex 3, Table 1; 12.65 m/s^3 is what 0.774 g in 0.6 s comes to."""
+    assert (HUMAN.wander_m, HUMAN.evaluation_s, HUMAN.delay_s) == (0.375, 0.4, 0.75)
+    assert (HUMAN.danger_s, HUMAN.jerk_s) == (2.0, 0.6)
+    assert pytest.approx(7.59, abs=0.005) == HUMAN.brake_mps2
+    assert pytest.approx(12.65, abs=0.005) == HUMAN.jerk_mps3
+
+
+def test_the_braking_by_hand():
+    """Nothing for 0.75 s, then half of 7.59 m/s^2 over 0.6 s, then all of it."""
+    times = np.array([0.0, 0.75, 1.35, 2.35])
+    ramp = HUMAN.brake_mps2 * 0.6 / 2
+    assert HUMAN.speed_lost(times) == pytest.approx([0, 0, ramp, ramp + HUMAN.brake_mps2])
+    saved = ramp * 0.6 / 3
+    last = saved + ramp + HUMAN.brake_mps2 / 2
+    assert HUMAN.distance_saved(times) == pytest.approx([0, 0, saved, last])
+
+
+@given(st.floats(0.01, 40))
+def test_the_time_to_lose_a_speed_undoes_the_speed_lost(speed):
+    times = HUMAN.time_to_lose(np.array([speed]))
+    assert HUMAN.speed_lost(times) == pytest.approx([speed])
+
+
+CRUISE = 8.0
+RULES = CruisingRules()
+FREE = Command(1.5, False)
+
+
+def tracks(*rows):
+    """Cars at (x, y) with a velocity along the way, m/s."""
+    count = len(rows)
+    boxes = np.array([(x, y, 0.8, 4.6, 1.9, 1.7, 0.0) for x, y, _ in rows]).reshape(-1, 7)
+    velocities = np.array([(vx, 0.0) for *_, vx in rows]).reshape(-1, 2)
+    none = np.zeros(count, np.int64)
+    return Tracks(np.arange(count), none, boxes, velocities, none, none + 2)
+
+
+STRAIGHT = Route(legs=((300.0, 0.0),))
+
+
+@cache
+def cruising(route):
+    return Cruising(SpeedPlan(route, CRUISE, 2.0, 1.5), FRONT, HALF_WIDTH, KEYFRAME)
+
+
+def eased(*rows, speed=CRUISE, along=0.0, command=FREE, route=STRAIGHT):
+    return cruising(route).eased(command, tracks(*rows), speed, along)
+
+
+def test_a_bend_ahead_slows_the_car():
+    bend = Route(legs=((30.0, 0.0), (12.0, 1 / 8.0), (30.0, 0.0)))
+    speed, along = CRUISE, 0.0
+    fastest = 0.0
+    while along < 42.0:
+        speed += eased(speed=speed, along=along, route=bend).acceleration * KEYFRAME
+        along += speed * KEYFRAME
+        fastest = max(fastest, speed**2 * abs(bend.curvature(along)))
+    # 2 m/s^2 sideways, and a little more within the keyframe in which the bend begins.
+    assert 1.9 < fastest < 2.2
+
+
+def test_who_drives_ahead_is_followed_at_the_gap_of_the_model():
+    gap, speed, lead = 40.0, CRUISE, 6.0
+    for _ in range(900):
+        ahead = FRONT + gap + 2.3
+        speed += eased((ahead, 0.0, lead), speed=speed).acceleration * KEYFRAME
+        gap += (lead - speed) * KEYFRAME
+    # In equilibrium s = (s_0 + v T) / sqrt(1 - (v / v_0)^4).
+    wanted = (2.0 + 6.0 * 1.5) / np.sqrt(1 - (6.0 / CRUISE) ** 4)
+    assert speed == pytest.approx(lead, abs=0.01)
+    assert gap == pytest.approx(wanted, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        (12.0, 0.0, 0.0),
+        (12.0, 3.5, 5.0),
+        (-8.0, 0.0, 5.0),
+        (2.0, 0.0, 5.0),
+        (12.0, 0.0, -5.0),
+    ],
+    ids=["stands", "beside", "behind", "at the bumper", "oncoming"],
+)
+def test_only_who_drives_ahead_in_the_way_is_followed(other):
+    assert eased(other) == eased()
+
+
+def test_the_nearest_is_followed():
+    near, far = (14.0, 0.0, 5.0), (30.0, 0.0, 2.0)
+    assert eased(far, near) == eased(near)
+
+
+def test_slowing_is_never_harder_than_comfortable():
+    assert eased((FRONT + 2.5, 0.0, 1.0)).acceleration == -RULES.slowing_mps2
