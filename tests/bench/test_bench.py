@@ -10,10 +10,10 @@ from care_sim.core.belief import Belief
 from care_sim.core.residual import explained
 from care_sim.core.rig import Rig
 from care_sim.envs import CLOSED_LOOP
-from care_sim.envs.spaces import observation_space
+from care_sim.envs.sensing import observation_space
 from care_sim.policies.paper.reserves import Care
-from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.sensors.engines import ENGINES
+from care_sim.sensors.pictures import FRONT_CAMERA
 from care_sim.world.bodies import CATALOGUE
 from tests.bench.__main__ import BY_THE_CLOCK, bench_report, main, ratios
 from tests.bench.casters import PEERS, SENSOR, casters

@@ -9,10 +9,9 @@ from random import Random
 
 import pytest
 
-from care_sim.study.benchmark import worlds
-from care_sim.study.benchmark.result_file import read_result
-from care_sim.study.benchmark.tasks import Entry
-from care_sim.study.benchmark.worlds import PARTS, published_worlds
+from care_sim.study.benchmark import suite
+from care_sim.study.benchmark.result import read_result
+from care_sim.study.benchmark.suite import PARTS, Entry, published_worlds
 from tests.helpers.commands import run
 from tests.helpers.places import ROOT
 
@@ -59,7 +58,7 @@ def one_of_each(monkeypatch, tmp_path):
     first = {part: next(w for w in published_worlds() if w.part == part) for part in PARTS}
     text = json.dumps({part: [[w.seed, w.reachable]] for part, w in first.items()})
     (tmp_path / "worlds.json").write_text(text)
-    monkeypatch.setattr(worlds, "_PUBLISHED", tmp_path / "worlds.json")
+    monkeypatch.setattr(suite, "_PUBLISHED", tmp_path / "worlds.json")
     published_worlds.cache_clear()
     yield
     published_worlds.cache_clear()
@@ -177,9 +176,9 @@ def test_a_sealed_set_is_played_and_verified_by_its_salt_alone(capsys, here, mon
     for command in ("benchmark", "leaderboard"):
         monkeypatch.setattr(
             f"care_sim.commands.{command}.screened_worlds",
-            lambda _player, salt: [worlds.World("tests", 0, salt.seed("tests", 0), 1)],
+            lambda _player, salt: [suite.World("tests", 0, salt.seed("tests", 0), 1)],
         )
-    monkeypatch.setattr("care_sim.study.benchmark.result_file.SIZES", {"tests": 1})
+    monkeypatch.setattr("care_sim.study.benchmark.result.SIZES", {"tests": 1})
     (here / "salt.txt").write_text("0123456789abcdef" * 4)
     (here / "other.txt").write_text("fedcba9876543210" * 4)
     played = run(
@@ -187,7 +186,7 @@ def test_a_sealed_set_is_played_and_verified_by_its_salt_alone(capsys, here, mon
     )
     assert played[0] == 0
     text = (here / "sealed" / "history.sealed.json").read_text()
-    seed = worlds.Salt.read(here / "salt.txt").seed("tests", 0)
+    seed = suite.Salt.read(here / "salt.txt").seed("tests", 0)
     assert str(seed) not in text
     assert json.loads(text)["sealed"][:12] in played[1]
     assert run(capsys, "leaderboard", "sealed")[0] == 0

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from care_sim.base.seed_ranges import training_seeds
+from care_sim.base.seeds import training_seeds
 from tests.helpers.commands import run
 
 minari = pytest.importorskip("minari")

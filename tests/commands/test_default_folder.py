@@ -74,12 +74,12 @@ def test_a_folder_in_which_another_process_writes_is_left_alone(here, sweep):
     ],
 )
 def test_a_world_and_a_source_have_folders_of_their_own(line, name, monkeypatch, capsys):
-    from care_sim.commands.shared import play_study
+    from care_sim.commands.shared import run_study
 
     def named(*arguments):
         raise InvalidInput(arguments[1].name)
 
-    monkeypatch.setattr(play_study, "run_study", named)
+    monkeypatch.setattr(run_study, "run_study", named)
     with pytest.raises(SystemExit):
         main(line.split())
     assert capsys.readouterr().err == f"care-sim: {name}\n"

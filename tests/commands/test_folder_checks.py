@@ -12,7 +12,7 @@ from care_sim.reports.report import StudyReport
 from care_sim.reports.studies import STUDIES
 from care_sim.sources.named import source_of
 from care_sim.study.episode_config import PLAIN_FIELDS, grid
-from care_sim.study.journal import JOURNAL, Journal
+from care_sim.study.journal import JOURNAL, UNFINISHED, Journal
 from care_sim.study.play_config import PLAY_FIELDS, play_grid
 from care_sim.study.results_formats import (
     _PARAMETERS,
@@ -23,7 +23,6 @@ from care_sim.study.results_formats import (
     VEHICLE,
 )
 from care_sim.study.rows.parquet import read_notes, read_rows, write_rows
-from care_sim.study.unfinished import UNFINISHED
 from tests.helpers.commands import run
 from tests.helpers.made_rows import STUDY, rows
 

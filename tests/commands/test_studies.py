@@ -3,13 +3,12 @@
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.return_settings import RETURN_SETTINGS
+from care_sim.core.conditions import RETURN_SETTINGS
 from care_sim.reports.report import read_results
 from care_sim.reports.studies import STUDIES
 from care_sim.study.designs.ablations import OPEN_ABLATIONS
 from care_sim.study.designs.faults import fault_study
-from care_sim.study.designs.firing import FIRINGS
-from care_sim.study.designs.order import ORDERS
+from care_sim.study.designs.firing import FIRINGS, ORDERS
 from care_sim.study.designs.realism import FILM_CONDITIONS
 from tests.helpers.commands import run
 from tests.helpers.made_rows import row

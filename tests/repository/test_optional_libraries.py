@@ -30,7 +30,7 @@ MODULE_OF = {
 BESIDE = {"dask": {"distributed"}, "jinja2": {"markupsafe"}, "torchrl": {"tensordict"}}
 """Modules that come with another."""
 NEED_LIBRARIES = (
-    "care_sim.training.detector_",
+    "care_sim.training.supervised.detector_network",
     "care_sim.training.networks",
     "care_sim.training.vec_env",
     "care_sim.viewer.recording.",

@@ -205,8 +205,7 @@ def _check_cells(cells, budget, size):
 
 def policy(case):
     """Make a policy and ask it."""
-    from care_sim import make_policy, policy_names
-    from care_sim.policies import BUILT_IN, maker
+    from care_sim.policies import BUILT_IN, make_policy, maker, policy_names
     from care_sim.policies.makers import settable
 
     name = case.rng.choice([*policy_names(), some(case)])
@@ -254,14 +253,15 @@ CHANGES = (
 
 def belief(case):
     """Read an observation back."""
-    from care_sim import Belief
+    from care_sim.core.belief import Belief
 
     Belief.from_observation(_observation(case)).to_observation()
 
 
 def allocation(case):
     """Algorithm 1."""
-    from care_sim import Demand, allocate
+    from care_sim.core.allocation import allocate
+    from care_sim.core.types import Demand
 
     rng = case.rng
 
@@ -284,8 +284,9 @@ def allocation(case):
 
 def geometry(case):
     """The grid and the rig, and what they cover."""
-    from care_sim import AngularGrid, Rig
-    from care_sim.sensors.camera import FRONT_CAMERA
+    from care_sim.core.grid import AngularGrid
+    from care_sim.core.rig import Rig
+    from care_sim.sensors.pictures import FRONT_CAMERA
 
     rng = case.rng
     boxes = np.tile([10.0, 1.0, -1.0, 4.0, 2.0, 1.5, 0.1], (3, 1))
@@ -370,7 +371,7 @@ def detector(case):
 
 def tables(case):
     """Tracks and detections from rows."""
-    from care_sim import ImageDetections, Tracks
+    from care_sim.core.types import ImageDetections, Tracks
 
     kind = case.rng.choice((ImageDetections, Tracks))
     rows = _with_odd_number(case, np.ones((3, len(kind.COLUMNS))))

@@ -131,8 +131,8 @@ class Grammar:
 
     def _names(self, name):
         """What fits an option of this name; thrice, so that it is drawn more often."""
+        from care_sim.core.conditions import DRIVERS
         from care_sim.core.defaults import CELL_ORDERS
-        from care_sim.core.driver_settings import DRIVERS
         from care_sim.core.firing.listing import HARDWARE
         from care_sim.policies import policy_names
         from care_sim.scenarios import SCENARIOS
