@@ -7,8 +7,7 @@ from scipy.spatial import cKDTree
 from care_sim.evaluation.sightings import Sightings
 from care_sim.sources.installed import recordings
 from care_sim.sources.sweeps.logs import log_of_folder
-from tests.helpers.examples import EXAMPLES, loaded
-from tests.helpers.places import ROOT
+from tests.helpers.places import EXAMPLES, ROOT, loaded
 
 FOGGY = ROOT / ".." / "shared" / "data" / "radiate" / "tiny_foggy"
 pytestmark = pytest.mark.skipif(not FOGGY.is_dir(), reason="RADIATE is not at hand")
