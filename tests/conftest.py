@@ -5,6 +5,7 @@ test.
 import os
 import shutil
 import sys
+from collections import defaultdict
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,6 @@ from care_sim.world.bullet import BulletWorld
 from tests.helpers.av2_log import at, box, write
 from tests.helpers.misbehaving import ENTRY_POINTS, THIRD_PARTY
 from tests.helpers.places import PUBLISHED
-from tests.helpers.recordings import Read
 from tests.helpers.short_streets import few_and_short
 
 SLOW = {*(Path(__file__).with_name("slow.txt").read_text().split())}
@@ -185,11 +185,38 @@ def third_party(tmp_path, monkeypatch):
     return site
 
 
+class Read:
+    """What a recording holds: `fixed` entities, and of the others their rows by keyframe."""
+
+    def __init__(self, path):
+        from rerun.chunk import RrdReader
+
+        self.fixed, self.rows, self.seconds = {}, defaultdict(dict), {}
+        for chunk in RrdReader(path).stream().to_chunks():
+            name = chunk.entity_path.lstrip("/")
+            for row in chunk.to_record_batch().to_pylist():
+                if chunk.is_static:
+                    self.fixed.setdefault(name, {}).update(row)
+                else:
+                    self.rows[name][row["keyframe"]] = row
+                    self.seconds[row["keyframe"]] = row["seconds"].total_seconds()
+
+    def column(self, entity, component):
+        """The value of a component at every keyframe, in order: the latest that was logged."""
+        values, latest = [], None
+        for keyframe in sorted(self.seconds) if entity in self.rows else ():
+            latest = self.rows[entity].get(keyframe, {component: latest})[component]
+            values.append(latest)
+        return values
+
+    def numbers(self, entity):
+        """The scalars of an entity."""
+        return [value for (value,) in self.column(entity, "Scalars:scalars")]
+
+
 @pytest.fixture(scope="session")
 def read():
-    """Reads a recording back (`tests.helpers.recordings.Read`); skips what needs it where Rerun is
-    not installed.
-    """
+    """Reads a recording back; skips what needs it where Rerun is not installed."""
     pytest.importorskip("rerun")
     return Read
 

@@ -11,7 +11,7 @@ _LINES = {
     "policies": "policies.listing:policy_paragraphs",
     "agents": "training.agents:agent_lines",
     "scenarios": "scenarios.listing:scenario_lines",
-    "sources": "sources.listing:source_lines",
+    "sources": "sources.named:source_lines",
     "detectors": "perception.detectors:detector_lines",
     "sensors": "sensors.setups:setup_lines",
     "engines": "sensors.engines:engine_lines",

@@ -1,7 +1,7 @@
 """Measure speed, beside known engines and environments: `make bench`.
 
 All but what takes several threads or processes runs on one core. MuJoCo, panda-gym, Open3D and PPO
-are measured where the extra `dev` is installed, EnvPool where somebody has installed it.
+are measured where the extra `dev` is installed.
 """
 
 import argparse
@@ -31,7 +31,7 @@ from tests.bench.environments import (
     middle,
 )
 from tests.bench.scans import REFERENCE, growth, growth_figure, scans
-from tests.bench.vectors import ENVPOOL, PPO, row
+from tests.bench.vectors import PPO, row
 
 BY_THE_CLOCK = "steps/s, "
 """How the names of the ratios begin that depend on how many cores are free."""
@@ -72,12 +72,12 @@ def bench_report(settings, tell=lambda _what: None):
         "main": MAIN,
     }
     # What runs in several threads or processes needs the other cores.
-    report["batches"] = {}
-    for measure in (vectors.batches, vectors.learning):
-        tell(measure.__name__)
-        measured, missing = measure(settings)
-        report["batches"] |= measured
-        skipped += missing
+    tell("batches")
+    report["batches"] = vectors.batches(settings)
+    tell("learning")
+    learned, missing = vectors.learning(settings)
+    report["batches"] |= learned
+    skipped += missing
     tell("vectorised")
     report["vectorised"] = environments.vectorised(settings)
     # All else runs on one, so that libraries with threads of their own gain nothing by them.
@@ -138,9 +138,7 @@ def ratios(report):
         (DRIVE, MAIN),
     ]:
         core[f"steps a CPU second, {name} over {peer}"] = name, peer
-    clock = {
-        f"{BY_THE_CLOCK}{more} over {peer}": (more, peer) for peer in (DRIVING, REACHING, ENVPOOL)
-    }
+    clock = {f"{BY_THE_CLOCK}{more} over {peer}": (more, peer) for peer in (DRIVING, REACHING)}
     clock[f"{BY_THE_CLOCK}{more} over one thread"] = more, many
     rows = {**report["speed"], **report["batches"]}
     made = {

@@ -20,7 +20,7 @@ from tests.bench.casters import PEERS, SENSOR, casters
 from tests.bench.choices import TRACKS, observation
 from tests.bench.environments import DRIVE, DRIVING, REACHING, Settings
 from tests.bench.scans import GROWTH
-from tests.bench.vectors import ENVPOOL, PPO, row
+from tests.bench.vectors import PPO, row
 
 TINY = ["--seconds", "0.01", "--repeats", "2", "--samples", "3"]
 RIG = Rig(cameras=(FRONT_CAMERA,))
@@ -47,7 +47,7 @@ def measured(tmp_path_factory):
 def test_everything_is_measured_in_every_round(measured, known):
     left_out = {line.partition(":")[0] for line in measured["skipped"]}
     assert {*CLOSED_LOOP, DRIVE, DRIVING, REACHING} <= {*measured["speed"], *left_out}
-    assert {PPO, ENVPOOL} <= {*measured["batches"], *left_out}
+    assert {PPO} <= {*measured["batches"], *left_out}
     assert {row(threads, told) for threads in (1, 2) for told in (True, False)} <= {
         *measured["batches"]
     }

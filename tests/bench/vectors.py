@@ -1,11 +1,9 @@
-"""Steps per second of many worlds at once, on threads, in processes, inside a learner; and of
-EnvPool's driving beside them, where it is installed.
-"""
+"""Steps per second of many worlds at once, on threads, in processes, inside a learner."""
 
 import time
 from contextlib import closing
 from functools import partial
-from itertools import cycle, product
+from itertools import product
 
 import gymnasium
 import numpy as np
@@ -23,10 +21,6 @@ WORLDS = 64
 THREADS = {1: "one thread", 2: "two threads"}
 PROCESSES = f"{WORLDS} worlds, two processes"
 """Half of the worlds in each, with a vector and a policy of its own, on one thread."""
-ENVPOOL = "EnvPool HighwayFast-v0"
-"""highway-env's driving in C++: 20 vehicles in three lanes, five of them told as numbers; a step is
-a second of 5 world steps; no LiDAR, no camera, no tracker, no policy.
-"""
 RECIPE = PpoConfig(budget=(0.03, 0.05, 0.1, 0.2, 0.35))
 """How the shipped `ppo-dense` was trained."""
 PPO = f"PPO of Stable-Baselines3, {RECIPE.environments} worlds of {', '.join(RECIPE.env)}"
@@ -40,19 +34,12 @@ def row(threads, scoring_info=True):
 
 def batches(settings):
     """By row `steps_per_s` of all worlds together, and `steps_per_cpu_s`, steps per second that any
-    thread had a core; and in one line each what is left out.
+    thread had a core.
 
     The policy chooses for all worlds, observations are handed out at every step, and episodes that
     are over begin anew. All rows are measured in every round. Not to be called on one core.
     """
     makers = {row(n, told): partial(_ours, n, told) for told, n in product((True, False), THREADS)}
-    skipped = []
-    try:
-        import envpool  # noqa: F401
-    except ImportError as error:
-        skipped = [f"{ENVPOOL}: {error}"]
-    else:
-        makers[ENVPOOL] = _envpool
     # An episode that nobody times: what is compiled late, is compiled in it.
     for told in (True, False):
         speed_of(partial(_ours, 1, told, worlds=2), 0.0)
@@ -62,7 +49,7 @@ def batches(settings):
             | {PROCESSES: speed_of_two(pool, settings.seconds)}
             for _ in range(settings.repeats)
         ]
-    return {name: by_name([one[name] for one in rounds]) for name in rounds[0]}, skipped
+    return {name: by_name([one[name] for one in rounds]) for name in rounds[0]}
 
 
 def speed_of(make, seconds):
@@ -113,19 +100,6 @@ def _ours(threads, scoring_info=True, worlds=WORLDS):
         copy=False,
     )
     return vector, make_policy(EPISODE.policy, vector)
-
-
-def _envpool():
-    import envpool
-
-    vector = envpool.make_gymnasium(
-        "HighwayFast-v0", num_envs=WORLDS, num_threads=2, seed=EPISODE.seed
-    )
-    # Drawn beforehand: the time of drawing is not that of the environment.
-    rng = np.random.default_rng(EPISODE.seed)
-    choices = vector.single_action_space.n
-    drawn = cycle(rng.integers(choices, size=(1000, WORLDS), dtype=np.int32))
-    return vector, lambda _observations: next(drawn)
 
 
 def learning(settings):

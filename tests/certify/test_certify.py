@@ -14,7 +14,7 @@ import pytest
 from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 
 from care_sim.base.errors import InvalidInput, MissingExtra
-from care_sim.certify import ALL_EPISODES, CERTIFIED_EPISODES, design, playing, published, trail
+from care_sim.certify import CERTIFIED_EPISODES, design, playing, published, trail
 from care_sim.certify.design import (
     AS_LISTED,
     CERTIFIED_POLICIES,
@@ -80,28 +80,15 @@ def in_vector(make_vector, episodes, source):
     twins = [make() for make in makers]
     policies = [begun(episode, twin) for episode, twin in zip(episodes, twins, strict=True)]
     with closing(make_vector(makers)) as vector:
-        # One of Stable-Baselines3 gives no infos.
-        begin = vector.reset()
-        observations = begin[0] if isinstance(begin, tuple) else begin
+        observations, _ = vector.reset()
         for _ in range(max(episode.keyframes for episode in episodes)):
-            seen = [
-                {name: rows[n] for name, rows in observations.items()} for n in range(len(twins))
-            ]
+            seen = [{name: rows[n] for name, rows in observations.items()} for n in range(3)]
             chosen = np.stack([policy(one) for policy, one in zip(policies, seen, strict=True)])
             observations = vector.step(chosen)[0]
-        trails = [*(vector.get_attr("played"))]
+        trails = [*vector.get_attr("played")]
     for twin in twins:
         twin.close()
     return trails
-
-
-def of_gymnasium(makers):
-    return AsyncVectorEnv(makers, context="fork")
-
-
-def of_stable_baselines3(makers):
-    vectors = pytest.importorskip("stable_baselines3.common.vec_env")
-    return vectors.SubprocVecEnv(makers, start_method="fork")
 
 
 @pytest.mark.parametrize("environments", [{*CLOSED} - {DRIVE}, {DRIVE}, {REPLAY}])
@@ -110,9 +97,7 @@ def test_no_vector_changes_a_trail(environments, source):
     some = of([e for e in able if not is_privileged(maker(e.policy))], 3)
     trails = [alone(episode, source) for episode in some]
     assert trails == [published.read()[episode.number] for episode in some]
-    vectors = [SyncVectorEnv]
-    vectors += [of_gymnasium, of_stable_baselines3] if DRIVE not in environments else []
-    for make_vector in vectors:
+    for make_vector in (SyncVectorEnv, partial(AsyncVectorEnv, context="fork")):
         assert in_vector(make_vector, some, source) == trails
 
 
@@ -178,9 +163,6 @@ def test_what_needs_an_extra_that_is_missing_is_left_out_and_told(monkeypatch, c
     lacking = next(one.number for one in LIST if one not in able)
     with pytest.raises(MissingExtra, match="extra 'open3d'"):
         certify(Certify(episode=lacking))
-    for wrong in ({"episode": 3, "all": True}, {"episode": ALL_EPISODES}):
-        with pytest.raises(InvalidInput):
-            Certify(**wrong)
 
 
 def test_what_is_said_to_need_no_extra_plays_without(monkeypatch):
@@ -304,21 +286,15 @@ def test_another_configuration_is_named():
 
 def test_the_first_that_differs_is_told_with_what_it_is_made_of_and_a_command():
     trails = [bytes([n]) * (DIGEST_BYTES + 20) for n in range(6)]
-    made = f"  {drawn(4).text}"
     other = trails[4][:-3] + b"abc"
     verdict = verdict_of(dict(enumerate(trails)) | {4: other, 5: trails[0]}, trails)
     lines = [*verdict.lines()]
     assert not verdict.as_published
     assert lines[1].startswith("the first is episode 4, which differs first in")
-    assert lines[2:] == [made, "  care-sim certify --episode 4"]
+    assert lines[2:] == [f"  {drawn(4).text}", "  care-sim certify --episode 4"]
     whole = verdict_of(dict(enumerate(trails)), trails)
     assert whole.as_published
     assert [*whole.lines()] == [f"6 episodes: {published.combined(trails)}, as published"]
-
-    # One alone needs no command of its own.
-    same = [*verdict_of({4: trails[4]}, trails, 1).lines()]
-    assert same == [f"1 episode: {published.combined(trails[4:5])}, as published", made]
-    assert [*verdict_of({4: other}, trails, 1).lines()][2:] == [made]
 
 
 def test_the_combined_hash_is_over_the_order_of_the_numbers():
@@ -329,9 +305,7 @@ def test_the_combined_hash_is_over_the_order_of_the_numbers():
 
 def test_a_missing_or_damaged_list_is_one_line(tmp_path):
     file = tmp_path / "list.parquet"
-    with pytest.raises(
-        InvalidInput, match=r"^the list of certify is missing: install the package again$"
-    ):
+    with pytest.raises(InvalidInput, match="the list of certify is missing"):
         published.read(file)
     published.write([b"12345678" + b"x"], file)
     assert published.read(file) == [b"12345678x"]

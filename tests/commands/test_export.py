@@ -80,14 +80,6 @@ def test_the_origin_is_told(capsys, tmp_path, drive):
     assert len(own["camera_detections"]) == 16, "a hash of the file"
 
 
-def test_the_same_command_writes_the_same_file_and_another_floor_another(capsys, tmp_path, drive):
-    paths = [tmp_path / name for name in ("a.json", "b.json", "c.json")]
-    for path, floor in zip(paths, (0, 0, 1), strict=True):
-        export(capsys, drive, path, "--policy", "random", "--budget", 0.05, "--floor-seed", floor)
-    a, b, c = (json.loads(path.read_text())["results"] for path in paths)
-    assert a == b != c
-
-
 def test_samples_in_which_nothing_is_found_are_there_and_a_file_without_a_box_is_told(
     capsys, tmp_path, drive
 ):

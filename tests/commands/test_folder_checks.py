@@ -7,13 +7,11 @@ import pytest
 from care_sim.base.errors import InvalidInput
 from care_sim.commands.shared.folder_checks import check_folder
 from care_sim.commands.shared.run_study import run_study
-from care_sim.evaluation.sightings import PRESENCES
 from care_sim.reports.report import StudyReport
 from care_sim.reports.studies import STUDIES
-from care_sim.sources.named import source_of
 from care_sim.study.episode_config import PLAIN_FIELDS, grid
 from care_sim.study.journal import JOURNAL, UNFINISHED, Journal
-from care_sim.study.play_config import PLAY_FIELDS, play_grid
+from care_sim.study.play_config import PLAY_FIELDS
 from care_sim.study.results_formats import (
     _PARAMETERS,
     EPISODES,
@@ -222,20 +220,6 @@ def test_made_rows_are_of_the_same_identity_as_played_ones(tmp_path):
         policy_parameters=(("k_safe", 1.0),),
     )
     check_folder(tmp_path, asked, SWEEP)
-
-
-def test_plays_by_one_presence_are_known_by_it_and_are_not_those_of_the_other(tmp_path):
-    streets = source_of("streets")
-    by = {
-        name: play_grid(streets, streets.scenes()[:2], ["care"], [0.1], presence=name)
-        for name in PRESENCES
-    }
-    for own, other in (PRESENCES, PRESENCES[::-1]):
-        write_rows([config.row() for config in by[own]], tmp_path / PLAYS.file, "protocol")
-        check_folder(tmp_path, by[own], STUDIES["protocol"])
-        check_folder(tmp_path, [*by[other], *by[own]], STUDIES["protocol"])
-        with pytest.raises(InvalidInput, match=rf"presence {own}, now {other}\), would be gone"):
-            check_folder(tmp_path, by[other], STUDIES["protocol"])
 
 
 def test_every_parameter_is_a_column_that_is_read():

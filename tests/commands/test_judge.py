@@ -65,11 +65,3 @@ def test_a_detector_that_fails_is_named_and_ends_with_1(drive, tmp_path, monkeyp
     error = capsys.readouterr().err
     assert "failed: drive: " in error
     assert "RuntimeError: too bright" in error
-
-
-def test_parameters_of_a_detector_named_by_its_place_are_its_own(drive, tmp_path, capsys):
-    place = f"{__name__}:Fails"
-    options = ("--source", f"argoverse2:{drive}", "--out", str(tmp_path / "out"))
-    given = ("--detectors", place, "--detector-parameters", f"{place}.least=5")
-    assert run(*options, *given) == 2
-    assert f"unknown parameter of detector {place} 'least'" in capsys.readouterr().err

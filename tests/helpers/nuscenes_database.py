@@ -5,40 +5,30 @@ import json
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-LIDAR = ((0.943713, 0.0, 1.84023), (0.7077955, -0.0064922, 0.0106462, -0.7063073), None)
+_CALIBRATION = """
+LIDAR_TOP       0.943713 0.0 1.84023 0.7077955 -0.0064922 0.0106462 -0.7063073
+CAM_FRONT       1.70079 0.01595 1.51096 0.4998015 -0.5030316 0.4997798 -0.4973708 1266.417 816.267 491.507
+CAM_FRONT_LEFT  1.52388 0.49463 1.50933 0.6757265 -0.6736267 0.2121402 -0.2112283 1272.598 826.615 479.752
+CAM_FRONT_RIGHT 1.55085 -0.4934 1.49575 0.2060348 -0.2026941 0.6824508 -0.6713611 1260.847 807.968 495.334
+CAM_BACK_LEFT   1.03569 0.4848 1.59097 0.6924186 -0.7031619 -0.1164834 0.1120332 1256.741 792.113 492.776
+CAM_BACK_RIGHT  1.01488 -0.48057 1.5624 0.1228098 -0.1324008 -0.7004306 0.690496 1259.514 807.253 501.196
+CAM_BACK        0.02833 0.00345 1.5791 0.5037873 -0.4974025 -0.494185 0.5045496 809.221 829.22 481.778
+"""  # noqa: E501
+"""Of every sensor x, y, z and the quaternion w, x, y, z in the car's frame; of cameras the focal
+length and the principal point, too.
+"""
+
+
+def _mount(numbers):
+    place, turn, camera = numbers[:3], numbers[3:7], numbers[7:]
+    return place, turn, camera or None
+
+
 SENSORS = {
-    "LIDAR_TOP": LIDAR,
-    "CAM_FRONT": (
-        (1.70079, 0.01595, 1.51096),
-        (0.4998015, -0.5030316, 0.4997798, -0.4973708),
-        (1266.417, 816.267, 491.507),
-    ),
-    "CAM_FRONT_LEFT": (
-        (1.52388, 0.49463, 1.50933),
-        (0.6757265, -0.6736267, 0.2121402, -0.2112283),
-        (1272.598, 826.615, 479.752),
-    ),
-    "CAM_FRONT_RIGHT": (
-        (1.55085, -0.49340, 1.49575),
-        (0.2060348, -0.2026941, 0.6824508, -0.6713611),
-        (1260.847, 807.968, 495.334),
-    ),
-    "CAM_BACK_LEFT": (
-        (1.03569, 0.48480, 1.59097),
-        (0.6924186, -0.7031619, -0.1164834, 0.1120332),
-        (1256.741, 792.113, 492.776),
-    ),
-    "CAM_BACK_RIGHT": (
-        (1.01488, -0.48057, 1.56240),
-        (0.1228098, -0.1324008, -0.7004306, 0.6904960),
-        (1259.514, 807.253, 501.196),
-    ),
-    "CAM_BACK": (
-        (0.02833, 0.00345, 1.57910),
-        (0.5037873, -0.4974025, -0.4941850, 0.5045496),
-        (809.221, 829.220, 481.778),
-    ),
+    name: _mount(tuple(map(float, numbers)))
+    for name, *numbers in map(str.split, _CALIBRATION.strip().splitlines())
 }
+LIDAR = SENSORS["LIDAR_TOP"]
 CATEGORIES = (
     "vehicle.car",
     "human.pedestrian.adult",
@@ -109,18 +99,15 @@ def write(root, scenes, version="v1.0-trainval"):
     tables["calibrated_sensor"] = [
         calibration(channel, *values) for channel, values in SENSORS.items()
     ]
-    tables["category"] = [
-        {"token": f"category-{name}", "name": name, "description": ""} for name in CATEGORIES
-    ]
-    tables["attribute"] = [
-        {"token": f"attribute-{name}", "name": name, "description": ""} for name in ATTRIBUTES
-    ]
+    for table, names in (("category", CATEGORIES), ("attribute", ATTRIBUTES)):
+        tables[table] = [
+            {"token": f"{table}-{name}", "name": name, "description": ""} for name in names
+        ]
     tables["visibility"] = [
         {"token": token, "level": level, "description": ""} for token, level in LEVELS.items()
     ]
-    tables["log"] = [
-        {"token": "log", "logfile": "", "vehicle": "n015", "date_captured": "", "location": ""}
-    ]
+    nothing = dict.fromkeys(("logfile", "date_captured", "location"), "")
+    tables["log"] = [{"token": "log", "vehicle": "n015"} | nothing]
     tables["map"] = [
         {"token": "map", "log_tokens": ["log"], "category": "semantic_prior", "filename": ""}
     ]
@@ -134,19 +121,8 @@ def write(root, scenes, version="v1.0-trainval"):
 
 
 TABLES = (
-    "attribute",
-    "calibrated_sensor",
-    "category",
-    "ego_pose",
-    "instance",
-    "log",
-    "map",
-    "sample",
-    "sample_annotation",
-    "sample_data",
-    "scene",
-    "sensor",
-    "visibility",
+    *("attribute", "calibrated_sensor", "category", "ego_pose", "instance", "log", "map"),
+    *("sample", "sample_annotation", "sample_data", "scene", "sensor", "visibility"),
 )
 
 
@@ -180,20 +156,13 @@ def add_scene(tables, root, name, samples):
         }
     )
     for n, (boxes, car, points) in enumerate(samples):
-        links = {
-            "prev": tokens[n - 1] if n else "",
-            "next": tokens[n + 1] if n + 1 < len(tokens) else "",
-        }
+        stamp = START_US + n * 500_000
         tables["sample"].append(
-            {
-                "token": tokens[n],
-                "timestamp": START_US + n * 500_000,
-                "scene_token": f"scene-{name}",
-            }
-            | links
+            {"token": tokens[n], "timestamp": stamp, "scene_token": f"scene-{name}"}
+            | {"prev": tokens[n - 1] if n else "", "next": "".join(tokens[n + 1 : n + 2])}
         )
         for channel in SENSORS:
-            add_data(tables, root, tokens[n], channel, car, points, START_US + n * 500_000)
+            add_data(tables, root, tokens[n], channel, car, points, stamp)
         for m, box in enumerate(boxes):
             add_box(tables, f"{tokens[n]}-{m}", tokens[n], name, box)
 
@@ -239,16 +208,8 @@ def add_box(tables, token, sample, scene, box):
             }
         )
     prev = link(tables, instance, token)
-    tables["sample_annotation"].append(
-        {
-            "token": token,
-            "sample_token": sample,
-            "instance_token": instance,
-            "prev": prev,
-            "next": "",
-        }
-        | box
-    )
+    places = {"token": token, "sample_token": sample, "instance_token": instance}
+    tables["sample_annotation"].append(places | {"prev": prev, "next": ""} | box)
 
 
 def link(tables, instance, token):

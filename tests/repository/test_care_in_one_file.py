@@ -15,7 +15,7 @@ from care_sim.loops.episode import EpisodeSeeds
 from care_sim.perception.tracker import TrackMemory
 from care_sim.study.designs.paper import paper_study
 from care_sim.study.episode_config import EpisodeConfig
-from tests.helpers.examples import EXAMPLES, loaded
+from tests.helpers.places import EXAMPLES, loaded
 
 FILE = EXAMPLES / "care_in_one_file.py"
 SEEDS = [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 5))]

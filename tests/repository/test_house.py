@@ -2,6 +2,8 @@
 
 import ast
 import re
+import subprocess
+import sys
 from graphlib import TopologicalSorter
 
 import pytest
@@ -63,3 +65,18 @@ def test_no_module_needs_itself_by_way_of_others():
         if module not in packages
     }
     TopologicalSorter(needs).prepare()
+
+
+def test_a_link_is_no_package_and_names_the_package():
+    """The links at the top of a clone are for people."""
+    done = subprocess.run(
+        [sys.executable, "-c", "import envs.closed_loop"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1] == (
+        "ImportError: envs is a link and no package: import care_sim.envs instead"
+    )

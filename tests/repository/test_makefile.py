@@ -1,9 +1,11 @@
 """`make` says in one line what stops a set-up, or what it lacks, before it installs anything."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
+import tomllib
 
 import pytest
 
@@ -111,3 +113,26 @@ def test_the_slow_tests_are_tests():
     for line in (ROOT / "tests" / "slow.txt").read_text().split():
         file, *_, name = line.split("::")
         assert f"def {name}(" in (ROOT / file).read_text(), line
+
+
+def named_in(file, pattern):
+    """The words that the one match of a pattern captures in a file."""
+    (found,) = re.findall(pattern, (ROOT / file).read_text())
+    return found.split()
+
+
+def test_the_same_pythons_are_promised_chosen_and_tested():
+    """The versions are the same wherever they are named."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    versions = ["3.11", "3.12", "3.13"]
+    python = "Programming Language :: Python :: 3."
+    assert [each[-4:] for each in project["classifiers"] if each.startswith(python)] == versions
+    assert project["requires-python"] == ">=3.11,<3.14"
+    newest = named_in("Makefile", r"PYTHON \?= \$\(call newest,(.*)\)")
+    assert newest == [f"python{version}" for version in reversed(versions)]
+    assert named_in(".ci/run", "for version in (.*);") == versions[1:]
+
+
+def test_the_file_of_hashes_pins_the_fork_as_the_constraints_do():
+    pin = r"(?m)^(pybullet-arm64==[\d.]+)"
+    assert named_in("requirements-pybullet.txt", pin) == named_in("constraints.txt", pin)

@@ -6,22 +6,14 @@ import re
 import shlex
 from collections import Counter
 
-import numpy as np
 import pytest
 
 from care_sim import cli
-from care_sim.base.seeds import TRAINING
-from care_sim.loops.episode import EpisodeSeeds
 from care_sim.policies import BUILT_IN
-from care_sim.scenarios import make_scenario
-from care_sim.study.benchmark.result import processor_of, read_result
-from care_sim.study.benchmark.suite import TESTS, published_worlds
+from care_sim.study.benchmark.result import read_result
 from care_sim.study.results_formats import EPISODES
 from care_sim.study.rows.parquet import read_rows
-from care_sim.training.supervised.sets import ROUNDS
-from tests.helpers.examples import loaded
-from tests.helpers.pages import RESULTS, links
-from tests.helpers.places import ROOT
+from tests.helpers.places import RESULTS, ROOT, links, loaded
 
 FOLDER = ROOT / "results"
 DATA = FOLDER / "data"
@@ -76,33 +68,6 @@ def test_the_index_and_the_site_lead_to_every_page(page):
     assert f": results/{page.name}\n" in (ROOT / ".mkdocs.yml").read_text()
 
 
-def test_how_many_tests_of_the_suite_are_of_a_kind_that_training_met():
-    """Tests and speeds are few; what else a seed draws differs."""
-    scenario = make_scenario("ncap", test="drawn", speed_kph=0)
-
-    def kind(seed):
-        drawn = scenario.drawn(np.random.default_rng(EpisodeSeeds.of(seed).scenario))
-        return drawn.test, drawn.speed_kph, drawn.target_kph
-
-    # The tests of both rounds of `care_sim.training.supervised.sets`.
-    count = sum(worlds["ncap"] for worlds in ROUNDS)
-    met = {kind(TRAINING + number) for number in range(count)}
-    kinds = {w.number: kind(w.seed) for w in published_worlds() if w.part == TESTS}
-    told = "the 120 have {} pairs of a test and speeds, and {} of the 120 have one that"
-    page = " ".join((FOLDER / "benchmark.md").read_text().split())
-    known = {number for number, one in kinds.items() if one in met}
-    assert told.format(len({*kinds.values()}), len(known)) in page
-
-    def avoided(name):
-        rows = read_result(DATA / f"leaderboard/{name}.json").of_part(TESTS, "measured")
-        return [sum(r.reached for r in rows if (r.world in known) == met) for met in (True, False)]
-
-    told = "It avoids {} of the {}, and {} of the other {}."
-    counts = zip(avoided("learned-sets"), (len(known), len(kinds) - len(known)), strict=True)
-    assert told.format(*(number for pair in counts for number in pair)) in page
-    assert "`care-sightlines` avoids {} and {}.".format(*avoided("care-sightlines")) in page
-
-
 @pytest.mark.parametrize("page", ["README.md", "docs/index.md"])
 def test_the_chart_of_the_headline_is_that_of_its_files_and_its_page_names_their_scores(
     page, tmp_path, capsys
@@ -141,22 +106,6 @@ def test_the_page_of_the_leaderboard_is_of_its_files(tmp_path, capsys):
     capsys.readouterr()
     page = (tmp_path / "leaderboard.md").read_text()
     assert page == (DATA / "leaderboard" / "leaderboard.md").read_text()
-
-
-@pytest.mark.parametrize("page", ["docs/benchmark.md", "results/trust.md"])
-def test_on_another_processor_as_much_is_reached_by_other_cells(page):
-    names = "care-units", "care-sightlines"
-    files = [read_result(DATA / f"leaderboard/{name}.json") for name in names]
-    assert len({*map(processor_of, files)}) == 2
-    one, other = ({row[:3]: row for row in file.rows} for file in files)
-    assert all(one[place].reached == other[place].reached for place in one)
-    others = sum(one[place].hash != other[place].hash for place in one)
-    text = " ".join((ROOT / page).read_text().split())
-    drives = sum(one[place].hash != other[place].hash for place in one if place[0] == "drives")
-    told = (
-        f"{others} of(?: their)? {len(one)} rows differ in hash,(?: {drives} of them in drives,)?"
-    )
-    assert re.search(f"{told} and none in what was reached", text)
 
 
 def test_every_policy_is_on_the_leaderboard_or_its_page_says_why_not():

@@ -20,9 +20,7 @@ from care_sim.scenarios.drive import DriveScenario
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.training.config import PpoConfig
 from care_sim.training.environments import plain
-from tests.helpers.own_world import example
-from tests.helpers.pages import fenced
-from tests.helpers.places import ROOT
+from tests.helpers.places import ROOT, example, fenced
 
 LEFT_BIKE = example("scenario")
 TOML = fenced(ROOT / "docs" / "write" / "scenario.md", "toml")[0]

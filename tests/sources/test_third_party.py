@@ -13,9 +13,7 @@ from care_sim.reports.report import read_results
 from care_sim.sources.installed import SOURCES
 from care_sim.sources.named import source_of
 from care_sim.study.play_config import PlayConfig
-from tests.helpers.own_world import example
-from tests.helpers.pages import fenced
-from tests.helpers.places import ROOT
+from tests.helpers.places import ROOT, example, fenced
 
 CROSSINGS = example("source")
 LOGS = '''

@@ -321,16 +321,25 @@ def scenario(case):
 
 
 def configuration(case):
-    """What a row of a study is made of, and its digest; or the conditions alone."""
+    """What a row of a study is made of, and its digest; the conditions alone; or a detector."""
     from care_sim.core.conditions import ClosedLoopConditions
+    from care_sim.perception.detectors import detector_names, make_detector
     from care_sim.study.episode_config import EpisodeConfig
 
-    if case.rng.random() < 0.5:
+    roll = case.rng.random()
+    if roll < 0.4:
         ClosedLoopConditions(**draw(case, _fields_of(ClosedLoopConditions), 5))
-        return
-    known = _fields_of(EpisodeConfig) | {"scenario": lambda: "dartout", "policy": lambda: "care"}
-    made = EpisodeConfig(**{"scenario": "dartout", "policy": "care"} | draw(case, known))
-    _ = made.digest(), made.label, made.row()
+    elif roll < 0.6:
+        name = case.rng.choice([*detector_names(), some(case)])
+        known = dict.fromkeys(("min_returns", "file", "grid", "unknown"))
+        make_detector(name, some(case, 1.84), **draw(case, known))
+    else:
+        known = _fields_of(EpisodeConfig) | {
+            "scenario": lambda: "dartout",
+            "policy": lambda: "care",
+        }
+        made = EpisodeConfig(**{"scenario": "dartout", "policy": "care"} | draw(case, known))
+        _ = made.digest(), made.label, made.row()
 
 
 def wrapper(case):
@@ -360,15 +369,6 @@ WRAPPERS = {
 }
 
 
-def detector(case):
-    """Detectors by name."""
-    from care_sim.perception.detectors import detector_names, make_detector
-
-    name = case.rng.choice([*detector_names(), some(case)])
-    known = dict.fromkeys(("min_returns", "file", "grid", "unknown"))
-    make_detector(name, some(case, 1.84), **draw(case, known))
-
-
 def tables(case):
     """Tracks and detections from rows."""
     from care_sim.core.types import ImageDetections, Tracks
@@ -387,9 +387,8 @@ ACTIONS = {
     allocation: 8,
     geometry: 8,
     scenario: 4,
-    configuration: 8,
+    configuration: 9,
     wrapper: 3,
-    detector: 2,
     tables: 2,
 }
 """What is called, and how often."""

@@ -108,6 +108,7 @@ def run(arguments, encoding="utf-8", interrupted_after=0.0, before=None, after=N
         if before:
             before()
         raise_them()  # as the command does that has the process to itself
+        signal.signal(signal.SIGALRM, signal.getsignal(signal.SIGINT))
         check_at_start()
         signal.setitimer(signal.ITIMER_REAL, interrupted_after or 0.0)
         with props.inline():

@@ -89,7 +89,7 @@ def _reported(case, template, rows, *others):
 def training(case):
     """Folders of training runs."""
     folder = props.copy("trained", case.folder / "trained")
-    path = folder / case.rng.choice(("config.json", "rules.json", "curve.csv"))
+    path = folder / case.rng.choice(("config.json", "episodes.csv", "curve.csv"))
     spoilt(case, path, spoil.csv if path.suffix == ".csv" else spoil.json_node)
     return run(("train", "curves", "trained", "--out", "curve.png"))
 

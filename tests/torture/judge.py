@@ -36,8 +36,7 @@ NOTICES = (
     r"interrupted: .*",
     r"the car never braked: no picture",
     r"measuring .*",
-    r"(calibration|held out) street \d+ of \d+",
-    r"(street|drive|test) \d+ of \d+ *",
+    r"((calibration|held out) )?(street|drive|test) \d+ of \d+ *",
     r"the first take longer on a machine that has not played before: .*",
 )
 """What a command may say on stderr about how far it is, beside lines of its own name."""
@@ -129,8 +128,8 @@ def _check_count(code, lines, own, told):
         return
     if not own or lines[-1] != own[-1]:
         raise Fault(f"exit code {code} without a last line that says why", told)
-    # What a partial data set lacks is said before anything is read, and stands before a refusal.
-    before = re.compile(r"care-sim: (left out: |failed: |.* scenes of the split )")
+    # The new name of a command, and what a partial data set lacks, stand before a refusal.
+    before = re.compile(r"care-sim: (left out: |failed: |`.*` is now `|.* scenes of the split )")
     if not all(map(before.match, own[:-1])):
         raise Fault("more than one line", told)
 

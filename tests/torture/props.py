@@ -171,17 +171,16 @@ def _make_recording(path):
 
 def _make_trained(path):
     """What `train curves` reads, as `train ppo` leaves it."""
-    import json
-
-    path.mkdir()
-    scores = {"episodes": 2, "mean_return": -3.0, "distance_m": 12.0}
     from care_sim.training.config import PpoConfig
 
+    path.mkdir()
     (path / "config.json").write_text(PpoConfig().to_json())
-    rules = dict.fromkeys(("random", "history", "care", "full"), scores)
-    (path / "rules.json").write_text(json.dumps(rules))
-    curve = "steps,seconds,return,distance_m\n0,0.1,-5.0,8.0\n64,1.5,-4.0,9.5\n"
-    (path / "curve.csv").write_text(curve)
+    rules = [f"{name},0,10000,CARE-Dense-v0,-3.0,12.0" for name in ("random", "care", "full")]
+    heads = {"curve": "steps,seconds", "episodes": "policy,steps,seed,env"}
+    rows = {"curve": ["0,0.1,-5.0,8.0", "64,1.5,-4.0,9.5"], "episodes": rules}
+    for name, head in heads.items():
+        lines = [f"{head},return,distance_m", *rows[name]]
+        (path / f"{name}.csv").write_text("\n".join(lines) + "\n")
 
 
 def lay_out(names, folder):

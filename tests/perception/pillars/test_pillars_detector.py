@@ -23,8 +23,8 @@ from care_sim.perception.pillars.network import (
 )
 from care_sim.perception.points_only import PointsOnly, checked
 from care_sim.sources.street_films import street_film
-from tests.helpers.detector_weights import drawn_arrays, drawn_weights
 from tests.helpers.made_points import HEIGHT, road, shell
+from tests.helpers.untrained import drawn_arrays, drawn_weights
 
 torch = pytest.importorskip("torch")
 POINTS = np.concatenate([shell(8, 6, 0.4, 4.61, 1.95, 1.72), road()])

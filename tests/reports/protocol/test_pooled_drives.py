@@ -10,8 +10,8 @@ from care_sim.core.belief import Belief
 from care_sim.core.types import ImageDetections
 from care_sim.study.results_formats import PLAYS
 from care_sim.study.rows.parquet import write_rows
-from tests.helpers.examples import EXAMPLES, loaded
 from tests.helpers.made_plays import study
+from tests.helpers.places import EXAMPLES, loaded
 
 
 def test_drives_of_several_folders_are_pooled_and_paired(tmp_path, capsys):

@@ -15,8 +15,7 @@ from care_sim.sources.installed import recordings
 from care_sim.sources.sweeps.logs import log_of_folder
 from care_sim.sources.sweeps.points import in_seconds
 from tests.helpers.commands import run
-from tests.helpers.examples import EXAMPLES, loaded
-from tests.helpers.places import ROOT
+from tests.helpers.places import EXAMPLES, ROOT, loaded
 from tests.helpers.sweeps_log import (
     APPEARS_S,
     FORMS,
