@@ -6,9 +6,9 @@ of rows are told.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
@@ -80,14 +80,6 @@ class GridRays:
         ends = listed[0], listed[-1]
         mounted = {"heading": heading, "pitch": pitch, "roll": roll}
         return cls(columns, len(listed), *ends, range_m, field_of_view, listed=listed, **mounted)
-
-    def __getstate__(self) -> dict[str, Any]:
-        # Tables are megabytes for a large grid: a copy, in a worker for example, makes its own.
-        return {one.name: getattr(self, one.name) for one in fields(self)}
-
-    def __deepcopy__(self, _copied: dict[int, Any]) -> Self:
-        # Frozen: within a process a copy may share it, and its tables.
-        return self
 
     def _settle_listed(self) -> None:
         """Check the listed elevations, and make them a tuple of plain numbers."""

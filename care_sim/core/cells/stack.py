@@ -6,9 +6,8 @@ the first LiDAR from its top to its bottom, then those of the second, and so on.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,14 +18,14 @@ from care_sim.core.arrays import Floats, Integers
 from care_sim.core.cells.rays import MOST_ROWS
 from care_sim.core.cells.sets import CellSets
 from care_sim.core.defaults import AZIMUTH_MARGIN, ELEVATION_MARGIN
-from care_sim.core.grid import AngularGrid, Cells, Head, Place
+from care_sim.core.grid import AngularGrid, Head, HeadCells, Place
 
 MOST_APART_M = 40.0
 """Two LiDARs of a car are at most this far apart along each axis."""
 
 
 @dataclass(frozen=True)
-class GridStack:
+class GridStack(HeadCells):
     """The `grids` of several LiDARs, and the `places` (x, y, z) where they stand in the sensor
     frame, in metres: the first at its origin.
 
@@ -67,26 +66,11 @@ class GridStack:
                 f"LiDARs of one set-up must have at most {MOST_ROWS} rows in all, got {self.rows}"
             )
 
-    def __getstate__(self) -> dict[str, Any]:
-        # Tables are megabytes: a copy, in a worker for example, makes its own.
-        return {one.name: getattr(self, one.name) for one in fields(self)}
-
-    def __deepcopy__(self, _copied: dict[int, Any]) -> Self:
-        # Frozen: within a process a copy may share it, and its tables.
-        return self
-
     @cached_property
     def heads(self) -> tuple[Head, ...]:
         """Its LiDARs one by one."""
         firsts = np.cumsum([0, *(grid.size for grid in self.grids)]).tolist()
         return tuple(map(Head, self.grids, self.places, firsts))
-
-    @cached_property
-    def head_rows(self) -> Integers:
-        """(heads, 3) the first row and the last of each, and how many of its columns a whole turn
-        would have.
-        """
-        return np.array([(*head.rows, head.grid.turn) for head in self.heads])
 
     @property
     def columns(self) -> int:
@@ -139,48 +123,6 @@ class GridStack:
         directions = np.concatenate([grid.directions for grid in self.grids])
         directions.flags.writeable = False
         return directions
-
-    def cells_at(self, points: Floats) -> Cells:
-        """(n, heads) the cell of each LiDAR in which a point (n, 3) lies, -1 beyond its rows or its
-        field of view.
-        """
-        found = [(head.grid.cells_of(head.points(points)), head.first) for head in self.heads]
-        return np.stack([np.where(own >= 0, own + first, -1) for own, first in found], axis=1)
-
-    def lidars_of(self, cells: Cells) -> Integers:
-        """(n,) the number, from 0, of the LiDAR of each of `cells` (n,)."""
-        numbers: Integers = self._lidars[cells]
-        return numbers
-
-    @cached_property
-    def _lidars(self) -> Integers:
-        # Looked up in three quarters of the time of a search (3,195 cells of three LiDARs).
-        return np.repeat(np.arange(len(self.grids)), [grid.size for grid in self.grids])
-
-    def origins_of(self, cells: Cells) -> Floats:
-        """(n, 3) where the rays of `cells` (n,) begin in the sensor frame."""
-        return np.array(self.places)[self.lidars_of(cells)]
-
-    def points(self, cells: Cells, ranges: Floats) -> Floats:
-        """(n, 3) where rays of `cells` (n,) end after `ranges` (n,) metres, in the sensor frame."""
-        return self.origins_of(cells) + self.directions[cells] * ranges[:, None]
-
-    def ranges_to(self, cells: Cells, points: Floats) -> Floats:
-        """(n,) how far points (n, 3) are from the LiDAR whose rays, of `cells` (n,), met them."""
-        ranges: Floats = np.linalg.norm(points - self.origins_of(cells), axis=1)
-        return ranges
-
-    def stretched(self, cells: Cells, points: Floats, factors: Floats) -> Floats:
-        """(n, 3) points (n, 3) that rays of `cells` (n,) met, at ranges `factors` (n,) times as
-        long.
-        """
-        origins = self.origins_of(cells)
-        stretched: Floats = origins + (points - origins) * factors[:, None]
-        return stretched
-
-    def reach_of(self, cells: Cells) -> Floats:
-        """(n,) the reach of the rays of `cells` (n,), metres."""
-        return np.array([grid.range_m for grid in self.grids], float)[self.lidars_of(cells)]
 
     def hulls(
         self,
