@@ -4,7 +4,6 @@ file, what was there stays, nothing torn is left.
 A limit on the size of files stands for the full disk: it needs no rights.
 """
 
-import os
 import resource
 from contextlib import contextmanager
 
@@ -17,7 +16,7 @@ from care_sim.base.errors import MissingExtra
 from care_sim.core.grid import AngularGrid
 from care_sim.policies.learned import weights
 from care_sim.reports.figures.files import save
-from care_sim.study.rows.parquet import read_rows, write_rows
+from care_sim.study.rows.parquet import write_rows
 from care_sim.viewer.pictures.clip_files import write_clip
 
 RNG = np.random.default_rng(0)
@@ -90,19 +89,6 @@ every_writer = pytest.mark.parametrize(
         (figure, "a.png"),
     ],
 )
-
-
-@every_writer
-def test_a_name_that_is_not_utf_8_is_written(write, name, tmp_path):
-    folder = tmp_path / os.fsdecode(b"z\xfc")
-    file = folder / (name if write is scans else os.fsdecode(b"\xfc") + name)
-    try:
-        write(file)
-    except MissingExtra as missing:
-        pytest.skip(str(missing))
-    assert file.stat().st_size > 5_000
-    if write is rows:
-        assert len(read_rows(file)) == 5_000
 
 
 @every_writer

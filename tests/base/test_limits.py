@@ -10,10 +10,9 @@ import sys
 import pytest
 
 from care_sim.base import limits
-from care_sim.base.limits import LimitReached, causes, check_workers, limit_in
+from care_sim.base.limits import LimitReached, causes, limit_in
 from care_sim.study.executors import processes
 from tests.torture.processes import ANOTHER_USER, entry_point
-from tests.torture.warm import TINY
 
 
 def ended(arguments, prefix=(), limited=None):
@@ -41,17 +40,6 @@ def test_too_little_memory(name, size):
     assert f"raise the limit ({command})" in line
 
 
-def test_the_module_is_checked_as_the_command_is():
-    done = subprocess.run(
-        [sys.executable, "-m", "care_sim", "policies"],
-        capture_output=True,
-        text=True,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (500_000_000, 500_000_000)),
-    )
-    line = "care-sim: address space is limited to 0.50 GB, and care-sim needs "
-    assert (done.returncode, done.stderr[: len(line)]) == (limits.FAILED, line)
-
-
 def test_many_cores_need_less_with_one_thread_each(monkeypatch):
     monkeypatch.setattr(limits, "CORES", 64)
     monkeypatch.setattr(limits.resource, "getrlimit", lambda _: (8_000_000_000, -1))
@@ -60,17 +48,6 @@ def test_many_cores_need_less_with_one_thread_each(monkeypatch):
         limits.check_memory()
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
     limits.check_memory()
-
-
-@pytest.mark.parametrize(("name", "size"), [("AS", 3_600_000_000), ("DATA", 1_600_000_000)])
-def test_memory_that_suffices(name, size, tmp_path):
-    number = getattr(resource, f"RLIMIT_{name}")
-    code, err = ended(
-        ["run", "dartout", "--record", str(tmp_path / "x.rrd"), *TINY],
-        ("env", "OMP_NUM_THREADS=1"),
-        limited=lambda: resource.setrlimit(number, (size, size)),
-    )
-    assert (code, err) == (0, "")
 
 
 @pytest.mark.skipif(os.geteuid() != 0 or not shutil.which("setpriv"), reason="needs another user")
@@ -99,10 +76,6 @@ def test_workers_that_cannot_be_started(monkeypatch):
     with pytest.raises(LimitReached, match=r"^9 processes .* needs 24: .* or lower --workers$"):
         processes(2)
     assert not any(thread.is_alive() for thread in starts)
-
-
-def test_workers_that_can_be_started():
-    check_workers(2)
 
 
 @pytest.mark.parametrize(

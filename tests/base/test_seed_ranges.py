@@ -1,12 +1,9 @@
 """Which seeds are for what."""
 
-import time
-
-import numpy as np
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.base.seeds import SPLITS, check_benchmark_seeds, split_of, training_seeds
+from care_sim.base.seeds import SPLITS, check_benchmark_seeds, split_of
 
 
 def test_test_seeds_end_where_seeds_begin_that_something_is_chosen_by():
@@ -15,10 +12,6 @@ def test_test_seeds_end_where_seeds_begin_that_something_is_chosen_by():
         check_benchmark_seeds([1000, 1019])
     with pytest.raises(InvalidInput, match=r"got 3 of test and 2000 of validation"):
         check_benchmark_seeds([3, 2000])
-
-
-def test_training_seeds_are_counted_from_the_first():
-    assert list(training_seeds(3)) == [10_000, 10_001, 10_002]
 
 
 @pytest.mark.parametrize("name", SPLITS)
@@ -40,9 +33,3 @@ def test_seeds_that_are_mixed_or_of_none_are_refused_in_one_line(seeds, complain
     with pytest.raises(InvalidInput, match=complaint) as refusal:
         split_of(seeds)
     assert "\n" not in str(refusal.value)
-
-
-def test_a_seed_of_numpy_is_found_as_quickly():
-    begin = time.perf_counter()
-    assert split_of([np.int64(2_000_000_000)]) == "train"
-    assert time.perf_counter() - begin < 1.0

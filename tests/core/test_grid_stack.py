@@ -207,20 +207,6 @@ def test_wedges_keep_the_order_of_their_boxes():
         assert together[n].tolist() == alone.tolist()
 
 
-@given(boxes, st.sampled_from(CELL_ORDERS[1:]), st.integers(0, 200))
-def test_every_order_lists_each_lidar_as_it_is_listed_alone(box, order, most):
-    (hull,) = STACK.hulls(box[None])
-    (listed,) = reordered([hull], order, STACK, MARGINS)
-    assert np.sort(listed).tolist() == hull.tolist()
-    (few,) = reordered([hull], order, STACK, MARGINS, most)
-    assert few.tolist() == listed[:most].tolist()
-    # A permutation of all cells is another one than that of a part of them.
-    for head in STACK.heads if order != "random" else ():
-        own = listed[(listed >= head.first) & (listed < head.cells.stop)] - head.first
-        (alone,) = reordered([np.sort(own)], order, head.grid, MARGINS)
-        assert own.tolist() == alone.tolist()
-
-
 def test_the_cores_of_all_lidars_come_before_all_margins():
     """Each core is a block without its two columns and its row on every side; at the first row of
     its LiDAR the second has no margin, as it has none at the top of a grid.

@@ -9,7 +9,6 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from care_sim.core.frames import Frame
-from care_sim.world import contact
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.bullet import BulletWorld
 from care_sim.world.bullet_bodies import pybullet
@@ -74,15 +73,6 @@ def test_pybullet_is_asked_about_the_parts_that_could_be_the_nearest(judge, monk
     assert len(asked) > 2
 
 
-def test_two_of_one_kind_are_not_one(judge):
-    pair = judge.stand_ins(CATALOGUE["ego"], CATALOGUE["ego"])
-    upright = [0.0, 0.0, 0.0, 1.0]
-    poses = [[x, 0.0, 0.0, *upright] for x in (0.0, 10.0)]
-    apart = 10.0 - CATALOGUE["ego"].size[0]
-    assert judge.clearance(pair, poses) == pytest.approx(apart, abs=0.01)
-    assert np.isinf(judge.clearance(pair, poses, within=1.0))
-
-
 def ahead_by_ten(judge, kind):
     pair = judge.stand_ins(CATALOGUE["ego"], kind)
     return judge.clearance(pair, [[x, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0] for x in (0.0, 10.0)])
@@ -102,28 +92,3 @@ def test_a_judge_whose_client_somebody_else_ends_is_replaced(end):
     end(physicsClientId=lost._client.number)
     assert judge_here() is not lost
     assert ahead_by_ten(judge_here(), CATALOGUE["car"]) == told
-
-
-def test_a_judge_that_was_closed_before_it_was_asked_is_replaced():
-    def ask():
-        judge_here().close()
-        return ahead_by_ten(judge_here(), CATALOGUE["car"])
-
-    # In a thread where none has been asked.
-    with ThreadPoolExecutor(1) as thread:
-        assert thread.submit(ask).result() == ahead_by_ten(judge_here(), CATALOGUE["car"])
-
-
-def test_a_judge_of_many_kinds_is_replaced(monkeypatch):
-    monkeypatch.setattr(contact, "MOST_KINDS", 3)
-
-    def ask(name):
-        judge = judge_here()
-        ahead_by_ten(judge, CATALOGUE[name])
-        return judge
-
-    # In a thread where none has been asked: the ego and two others are three.
-    with ThreadPoolExecutor(1) as thread:
-        first, second, *others = thread.map(ask, KINDS)
-    assert first is second
-    assert len({first, *others}) == len(KINDS) // 2

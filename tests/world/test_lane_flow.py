@@ -37,15 +37,3 @@ def test_the_first_driver_stops_before_what_stands():
     assert flow.places[1] == pytest.approx(0.0, abs=0.7)
     assert flow.places[0] == pytest.approx(-STANDING_GAP_M, abs=2.0)
     assert np.all(flow.speeds < 0.1)
-
-
-def test_who_is_behind_is_nobody_to_follow():
-    flow = LaneFlow([0.0], [8.0])
-    flow.step(1.0, [(-1.0, 0.0)])
-    assert (flow.places[0], flow.speeds[0]) == (8.0, 8.0)
-
-
-def test_a_lane_may_be_empty():
-    flow = LaneFlow([], [])
-    flow.step(STEP, [(0.0, 1.0)])
-    assert len(flow.places) == 0

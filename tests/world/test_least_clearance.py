@@ -76,8 +76,3 @@ def test_of_two_that_come_nearer_only_the_last_moment_is_asked_about():
             pair.note()
         assert pair.least.metres() == pytest.approx(8.2 - 2.04 - 0.33, abs=0.01)
         assert pair.asked == 1
-
-
-def test_without_a_moment_nothing_is_near():
-    with closing(Pair("car")) as pair:
-        assert pair.least.metres() == np.inf

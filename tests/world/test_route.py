@@ -25,12 +25,6 @@ def test_a_quarter_turn_to_the_left_ends_where_the_circle_does():
     assert route.pose(-4.0) == pytest.approx((-3.0, 2.0, 0.0))
 
 
-def test_curvature_is_that_of_the_leg():
-    route = Route(legs=((10.0, 0.0), (5.0, -0.1), (5.0, 0.2)))
-    places = [-1.0, 9.9, 10.1, 14.9, 15.1, 19.9, 20.1]
-    assert [route.curvature(s) for s in places] == [0.0, 0.0, -0.1, -0.1, 0.2, 0.2, 0.0]
-
-
 @given(LEGS, st.floats(-20.0, 150.0), st.floats(-3.0, 3.0))
 @example(((1.0, 2.2e-311),), 1.5, 1.0)
 def test_a_place_beside_the_line_is_found_again(legs, s, d):

@@ -17,10 +17,6 @@ def turning(radius):
     )
 
 
-def test_a_straight_is_driven_at_cruising_speed():
-    assert [STRAIGHT.at(s) for s in (0.0, 77.7, 200.0, 300.0)] == [CRUISE] * 4
-
-
 def test_a_bend_is_driven_with_the_sideways_acceleration_that_is_allowed():
     plan = turning(8.0)
     assert plan.at(65.0) == pytest.approx(4.0)
@@ -58,15 +54,3 @@ def test_a_car_that_goes_as_planned_goes_on_as_planned_behind_a_bend():
     assert plan.seconds_to(65.0, 82.0, 4.0, 0.0) == pytest.approx(planned)
     # One that somebody holds up stays as slow.
     assert plan.seconds_to(65.0, 82.0, 3.0, 0.0) == pytest.approx(17.0 / 3.0)
-
-
-def test_times_on_the_way():
-    assert STRAIGHT.times(np.array([10.0, 18.0, 34.0])).tolist() == pytest.approx([0.0, 1.0, 3.0])
-
-
-def test_a_bend_on_the_way_costs_time():
-    plan = turning(8.0)
-    straight = 120.0 / CRUISE
-    driven = plan.seconds_to(5.0, 125.0, CRUISE, COMFORT)
-    # 10 m at 4 m/s instead of 8, and 16 m on either side at 6 m/s on average.
-    assert driven - straight == pytest.approx(10 / 4 - 10 / 8 + 32 / 6 - 32 / 8, abs=0.1)

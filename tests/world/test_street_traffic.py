@@ -25,12 +25,6 @@ def test_who_is_behind_a_standing_ego_stops():
     assert driven(street, 20.0, 0.0) == pytest.approx(-10.0, abs=1.0)
 
 
-@pytest.mark.parametrize("ego_m", [9.0, 21.0])
-def test_an_ego_that_is_in_another_lane_holds_nobody_up(ego_m):
-    street = StreetTraffic([lane([-40.0], ego_from_m=10.0, ego_to_m=20.0)])
-    assert driven(street, 10.0, ego_m) == pytest.approx(40.0)
-
-
 def test_the_egos_place_in_a_lane_is_shifted():
     street = StreetTraffic([lane([-40.0], ego_from_m=0.0, ego_ahead_m=-100.0)])
     assert driven(street, 20.0, 100.0) == pytest.approx(-10.0, abs=1.0)

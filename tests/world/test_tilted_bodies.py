@@ -9,20 +9,9 @@ from care_sim.core.frames import Frame
 from care_sim.core.types import CLASSES
 from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.world.bodies import CATALOGUE, sized
-from care_sim.world.bullet import NO_BODY, BulletWorld
+from care_sim.world.bullet import NO_BODY
 
 FORWARD = np.array([[1.0, 0.0, 0.0]])
-
-
-def test_a_body_stands_at_any_height(bullet):
-    bus = bullet.add(CATALOGUE["bus"], Frame(30.0, 0.0, 100.0, 0.0))
-    heights = [99.9, 100.1, 103.4, 103.5]
-    assert [bullet.cast([0.0, 0.0, z], FORWARD, 50.0)[1][0] for z in heights] == [
-        NO_BODY,
-        bus,
-        bus,
-        NO_BODY,
-    ]
 
 
 def test_a_pitched_box_presents_its_slanting_front(bullet):
@@ -35,14 +24,6 @@ def test_a_pitched_box_presents_its_slanting_front(bullet):
     ranges, ids = bullet.cast([0.0, 0.0, 5.0], FORWARD, 50.0)
     assert ids.tolist() == [body]
     assert ranges[0] == pytest.approx(10 - 1 / np.cos(0.2), abs=1e-6)
-
-
-def test_a_rolled_box_leans_to_its_right(bullet):
-    slab = sized("slab", None, (4.0, 0.2, 3.0))
-    bullet.add(slab, Frame(10.0, 0.0, 0.0, 0.0, roll=0.3))
-    up, out = 2.8 * np.cos(0.3), -2.8 * np.sin(0.3)
-    hits = [bullet.cast([0.0, y, up], FORWARD, 50.0)[1][0] != NO_BODY for y in (out, -out)]
-    assert hits == [True, False]
 
 
 def test_a_frame_without_tilt_puts_a_body_where_a_pose_does(bullet):
@@ -74,15 +55,6 @@ def test_a_tilted_camera_and_tilted_rays_see_the_same(bullet):
     assert len(np.unique(picture)) == 4
 
 
-def test_a_world_without_ground_returns_nothing_from_below():
-    world = BulletWorld(ground=False)
-    try:
-        ranges, ids = world.cast([0.0, 0.0, 1.84], np.array([[0.0, 0.0, -1.0]]), 50.0)
-        assert (ranges[0], ids[0], world.ground) == (np.inf, NO_BODY, NO_BODY)
-    finally:
-        world.close()
-
-
 @given(st.sampled_from([*CLASSES, None]), st.tuples(*[st.floats(0.2, 15.0)] * 3))
 def test_a_body_of_any_size_fills_its_box_and_stays_within_it(label, size):
     kind = sized("thing", label, size)
@@ -96,12 +68,3 @@ def test_a_body_of_any_size_fills_its_box_and_stays_within_it(label, size):
     boxed = [n for n, part in enumerate(kind.parts) if part.shape == "box"]
     assert high[boxed, 1].max() == pytest.approx(size[1] / 2)
     assert low.min(axis=0)[2] == pytest.approx(0.0, abs=1e-9)
-
-
-def test_the_catalogue_s_own_size_gives_the_catalogue_s_own_parts():
-    for label in CLASSES:
-        for mine, theirs in zip(
-            sized("x", label, CATALOGUE[label].size).parts, CATALOGUE[label].parts, strict=True
-        ):
-            assert mine.size == pytest.approx(theirs.size)
-            assert mine.centre == pytest.approx(theirs.centre)

@@ -30,19 +30,6 @@ def test_covered_distance_worked_by_hand(time, covered):
     assert RUN.covered(time) == pytest.approx(covered)
 
 
-def test_pose_goes_along_the_heading():
-    assert RUN.pose(0.0) == pytest.approx((10.0, -4.0, np.pi / 2))
-    assert RUN.pose(2.5) == pytest.approx((10.0, -0.875, np.pi / 2))
-    assert RUN.pose(60.0)[:2] == pytest.approx((10.0, 4.0))
-
-
-@pytest.mark.parametrize(
-    ("distance", "duration"), [(0.0, 0.0), (0.1, 0.2), (0.625, 0.5), (3.125, 1.5)]
-)
-def test_durations_worked_by_hand(distance, duration):
-    assert RUN.duration_to(distance) == pytest.approx(duration)
-
-
 @given(walks, st.floats(0, 50))
 def test_a_duration_is_when_the_distance_is_covered(walk, distance):
     assert walk.covered(walk.starts_s + walk.duration_to(distance)) == pytest.approx(
@@ -55,12 +42,6 @@ def test_distance_is_the_integral_of_a_speed_that_never_exceeds_the_limit(walk, 
     times = walk.starts_s + np.linspace(0, until, 2001)
     speeds = np.minimum(walk.acceleration * (times - walk.starts_s), walk.speed)
     assert walk.covered(times[-1]) == pytest.approx(np.trapezoid(speeds, times), abs=1e-3)
-
-
-def test_setting_off_changes_only_the_time():
-    later = RUN.setting_off(3.0)
-    assert later.starts_s == 3.0
-    assert later.covered(4.5) == pytest.approx(RUN.covered(2.5))
 
 
 @given(walks, st.lists(st.floats(-5, 50), max_size=50), st.floats(0.1, 60))

@@ -99,42 +99,42 @@ class GridRays:
             )
         object.__setattr__(self, "listed", tuple(map(float, listed)))
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Number of cells N = A * E."""
         return self.columns * self.rows
 
-    @property
+    @cached_property
     def shape(self) -> tuple[int, int]:
         """(rows, columns), the shape of a picture of the grid."""
         return self.rows, self.columns
 
-    @property
+    @cached_property
     def column_width(self) -> float:
         """Azimuth covered by a column, radians."""
         return self.field_of_view / self.columns
 
-    @property
+    @cached_property
     def right(self) -> float:
         """The azimuth at which column 0 begins, radians; the others follow to the left."""
         return self.heading - self.field_of_view / 2
 
-    @property
+    @cached_property
     def turn(self) -> int:
         """How many columns of this width a whole turn has: all are the grid's if it has no gap."""
         return round(2 * np.pi / self.column_width)
 
-    @property
+    @cached_property
     def goes_round(self) -> bool:
         """Whether the last column borders on column 0."""
         return self.columns == self.turn
 
-    @property
+    @cached_property
     def row_height(self) -> float:
         """Elevation between two rows, radians; the mean of it where rows are listed."""
         return (self.top - self.bottom) / (self.rows - 1)
 
-    @property
+    @cached_property
     def is_tilted(self) -> bool:
         """Whether its own up is not that of the sensor frame."""
         return self.pitch != 0 or self.roll != 0

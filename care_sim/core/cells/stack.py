@@ -72,47 +72,47 @@ class GridStack(HeadCells):
         firsts = np.cumsum([0, *(grid.size for grid in self.grids)]).tolist()
         return tuple(map(Head, self.grids, self.places, firsts))
 
-    @property
+    @cached_property
     def columns(self) -> int:
         """Columns of each."""
         return self.grids[0].columns
 
-    @property
+    @cached_property
     def rows(self) -> int:
         """Rows of all."""
         return sum(grid.rows for grid in self.grids)
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Number of cells of all."""
         return self.columns * self.rows
 
-    @property
+    @cached_property
     def shape(self) -> tuple[int, int]:
         """(rows, columns), the shape of a picture of the stack."""
         return self.rows, self.columns
 
-    @property
+    @cached_property
     def range_m(self) -> float:
         """The longest reach. A ray of any LiDAR that returns nothing reads it."""
         return max(grid.range_m for grid in self.grids)
 
-    @property
+    @cached_property
     def column_width(self) -> float:
         """Radians, of the widest columns: between points of an object there are at most such."""
         return max(grid.column_width for grid in self.grids)
 
-    @property
+    @cached_property
     def row_height(self) -> float:
         """Radians, of the LiDAR whose rows are farthest apart."""
         return max(grid.row_height for grid in self.grids)
 
-    @property
+    @cached_property
     def top(self) -> float:
         """Elevation of the highest row of all, radians."""
         return max(grid.top for grid in self.grids)
 
-    @property
+    @cached_property
     def goes_round(self) -> bool:
         """Whether the last column of every LiDAR borders on column 0."""
         return all(grid.goes_round for grid in self.grids)
