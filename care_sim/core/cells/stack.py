@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from care_sim.base.checks import check_number
+from care_sim.base.checks import checked_place
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.cells.rays import MOST_ROWS
@@ -51,7 +51,9 @@ class GridStack(HeadCells):
                 f"{shown(places)}"
             )
         object.__setattr__(self, "grids", tuple(grids))
-        object.__setattr__(self, "places", tuple(map(_place, places)))
+        apart = -MOST_APART_M, MOST_APART_M
+        settled = (checked_place("places of a stack", place, apart) for place in places)
+        object.__setattr__(self, "places", tuple(settled))
         if any(self.places[0]):
             raise InvalidInput(
                 f"places of a stack must begin at 0, 0, 0, the first LiDAR, got {self.places[0]}"
@@ -168,13 +170,3 @@ class GridStack(HeadCells):
 
 Grid = AngularGrid | GridStack
 """The cells that a set-up of one or several LiDARs fires."""
-
-
-def _place(place: object) -> Place:
-    if not (isinstance(place, tuple | list) and len(place) == 3):
-        raise InvalidInput(f"places of a stack must be x, y and z in metres, got {shown(place)}")
-    for metres in place:
-        check_number("places of a stack", metres, -MOST_APART_M, MOST_APART_M)
-    # Zero has no sign, which equality does not tell but a hash would.
-    x, y, z = (float(metres) + 0.0 for metres in place)
-    return x, y, z

@@ -1,6 +1,5 @@
 """What no argument may be: every number, name and array from outside is refused in one line, where
-it enters.
-"""
+it enters."""
 
 from dataclasses import dataclass, fields
 from decimal import Decimal
@@ -30,21 +29,7 @@ from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.parameters import parameters
 from care_sim.wrappers import GridObservation, SectorReserve, SectorScores
 
-NO_NUMBERS = (
-    float("nan"),
-    float("inf"),
-    10**400,
-    10**5000,
-    -1e300,
-    1e300,
-    Decimal(1),
-    1j,
-    True,
-    "1",
-    None,
-    [1],
-    {1},
-)
+NO_NUMBERS = (float("nan"), float("inf"), 10**5000, -1e300, 1e300, Decimal(1), True, "1", None, [1])
 
 
 def named(value):
@@ -204,32 +189,21 @@ def test_a_seed_that_no_column_holds_begins_no_episode(seed, dense):
 @pytest.mark.parametrize(
     ("kind", "options", "named"),
     [
-        (DenseEnv, {"render_mode": 5}, "render_mode must be None or 'rgb_array'"),
-        (DenseEnv, {"render_mode": ["rgb_array"]}, "render_mode"),
-        (DenseEnv, {"render_mode": np.zeros(2)}, "render_mode"),
-        (StreetEnv, {"render_mode": 1}, "render_mode"),
+        (DenseEnv, {"render_mode": ["rgb_array"]}, "render_mode must be None or 'rgb_array'"),
         (DenseEnv, {"engine": ["fast"]}, "engine must be a name"),
         (DenseEnv, {"occluder": {}}, "occluder"),
         (DenseEnv, {"keyframe_s": 1e9}, "keyframe_s must lie in [0.05, 1]"),
-        (DenseEnv, {"keyframe_s": 1e-300}, "keyframe_s"),
-        (DenseEnv, {"keyframe_s": "0.1"}, "keyframe_s"),
         (DenseEnv, {"duration_s": 1e300}, "duration_s of dense must lie in [0.05, 60]"),
         (DenseEnv, {"reward_weights": 5}, "reward_weights must map terms to numbers"),
-        (DenseEnv, {"reward_weights": [("gain", 1)]}, "reward_weights"),
-        (DenseEnv, {"reward_weights": {"gain": float("nan")}}, "reward weight gain"),
         (DenseEnv, {"reward_weights": {"gain": 10**400}}, "reward weight gain"),
         (DenseEnv, {"reward_weights": {5: 1}}, "reward term"),
-        (DenseEnv, {"budget": 10**400}, "budget must lie in (0, 1]"),
-        (DenseEnv, {"budget": np.array([0.1, 0.2])}, "budget"),
+        (DenseEnv, {"budget": np.array([0.1, 0.2])}, "budget must lie in (0, 1]"),
         (DenseEnv, {"lidar_dead_rows": [[1]]}, "lidar_dead_rows"),
-        (DenseEnv, {"lidar_dead_rows": np.array(1)}, "lidar_dead_rows"),
         (StreetEnv, {"detector": ["returns"]}, "detector"),
         (StreetEnv, {"detector_parameters": 5}, "detector_parameters"),
         (FilmEnv, {"film": 5}, "film"),
-        (ReplayEnv, {"source": 5}, "source"),
         (ReplayEnv, {"source": "argoverse2:" + "a" * 300}, "source"),
         (ReplayEnv, {"source": "argoverse2:/tmp", "scene": ["a"]}, "scene must be a name"),
-        (ReplayEnv, {"source": "nuscenes:/tmp", "split": [1]}, "split must be a name"),
         (ReplayEnv, {"source": "nuscenes:/tmp", "camera_detections": ""}, "camera_detections"),
     ],
 )  # fmt: skip
@@ -241,24 +215,18 @@ def test_an_argument_of_another_kind_makes_no_environment(kind, options, named):
     "action",
     [
         [[1.0] * 512] * 31 + [[1.0]],
-        np.full((32, 512), 10**30, object),
         np.zeros((32, 512), complex),
-        np.zeros((32, 512), "U3"),
-        np.zeros((32, 512), "datetime64[s]"),
         np.full((32, 512), 1e300),
-        (value for value in [1]),
         None,
     ],
-    ids=["ragged", "object", "complex", "text", "time", "huge", "generator", "none"],
+    ids=["ragged", "complex", "huge", "none"],
 )  # fmt: skip
 def test_an_action_of_other_things_than_numbers_is_refused(action, dense):
     dense.reset(seed=1)
     refused("action must", dense.step, action)
 
 
-@pytest.mark.parametrize(
-    "number", [(n for n in [32]), memoryview(b"1"), [32], 10**30, 2.0, True], ids=named
-)
+@pytest.mark.parametrize("number", [[32], 10**30, 2.0, True], ids=named)
 @pytest.mark.parametrize(
     ("wrapper", "name"),
     [
@@ -277,16 +245,11 @@ def test_a_wrapper_takes_whole_numbers(wrapper, name, number, dense):
     [
         Demand(layers=1),
         Demand(exploitation=None),
-        Demand("abc"),
         Demand([1, 2]),
         Demand([[0.5]]),
-        Demand([np.zeros((2, 2), int)]),
         Demand([[1, [2, 3]]]),
         Demand(layers=[[1, 2]]),
-        Demand(layers=[5]),
-        Demand(iter([[1]])),
         Demand([[10**30]]),
-        Demand(np.array(3)),
         Demand({1: 2}),
     ],
     ids=named,
@@ -297,13 +260,9 @@ def test_a_demand_of_another_form_is_allocated_nothing(demand):
 
 DAMAGES = {
     "a key is missing": lambda seen: seen.pop("budget"),
-    "a column is missing": lambda seen: seen.update(tracks=seen["tracks"][:, :5]),
-    "flat": lambda seen: seen.update(detections=seen["detections"].ravel()),
     "batched": lambda seen: seen.update({key: array[None] for key, array in seen.items()}),
     "of text": lambda seen: seen.update(ego=np.array(["a", "b", "c"])),
     "ragged": lambda seen: seen.update(ego=[1, [2], 3]),
-    "of nothing": lambda seen: seen.update(ranges=None),
-    "another grid": lambda seen: seen.update(ranges=seen["ranges"][:16]),
     "NaN": lambda seen: seen["tracks"].__setitem__((0, 3), np.nan),
     "infinite": lambda seen: seen["ego"].__setitem__(0, np.inf),
     "a budget of NaN": lambda seen: seen.update(budget=np.array([np.nan], np.float32)),
@@ -338,13 +297,9 @@ def test_an_observation_of_other_numbers_is_read_alike(observation):
     ("name", "options"),
     [
         (["care"], {}),
-        (5, {}),
         ("care", {"name": "x"}),
-        ("care", {"env": 1}),
         ("care", {"self": 1}),
-        ("care-sbf", {"k_safe": 10**400}),
         ("care-sbf", {"k_safe": "x"}),
-        ("ppo", {"path": 10**30}),
         ("ppo", {"path": "\0"}),
     ],
 )  # fmt: skip
@@ -355,20 +310,13 @@ def test_a_policy_is_made_of_what_it_takes(name, options, dense):
 @pytest.mark.parametrize(
     "value",
     [
-        {1},
-        b"x",
         {"a": 1},
-        1j,
-        object(),
         float("nan"),
-        float("inf"),
         2**63,
-        10**4000,
         "\ud800",
         (1, (2, (3, (4,)))),
-        np.longdouble(1),
     ],
-    ids=range(12),
+    ids=range(5),
 )  # fmt: skip
 def test_a_parameter_that_no_file_holds_is_refused(value):
     refused(
@@ -386,7 +334,7 @@ def test_parameters_are_pairs(pairs):
 @pytest.mark.parametrize(
     "field", ["scenario", "policy", "budget", "seed", "floor_seed", "azimuth_margin", "engine"]
 )
-@pytest.mark.parametrize("value", [[1], {}, 10**30, float("nan"), np.zeros(2), None], ids=named)
+@pytest.mark.parametrize("value", [[1], 10**30, None], ids=named)
 def test_an_episode_is_made_of_names_and_numbers(field, value):
     refused("", EpisodeConfig, **{"scenario": "dense", "policy": "care", field: value})
 
@@ -394,8 +342,7 @@ def test_an_episode_is_made_of_names_and_numbers(field, value):
 @pytest.mark.parametrize(
     "text",
     [
-        "{[1]}", "-" * 8000 + "1", "[" * 3000, "(1," * 2000, "9" * 5000, "1" + "+1" * 3000, "\0",
-        "1if 1else 2",
+        "{[1]}", "[" * 3000, "9" * 5000, "\0", "1if 1else 2",
     ],
     ids=shown,
 )  # fmt: skip

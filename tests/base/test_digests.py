@@ -38,9 +38,7 @@ def some_keyframes(street):
 
 
 def test_fewer_features_of_the_processor_give_the_same_hashes():
-    line = (
-        "import json; from tests.base.test_portable_hash import hashes; print(json.dumps(hashes()))"
-    )
+    line = "import json; from tests.base.test_digests import hashes; print(json.dumps(hashes()))"
     child = subprocess.run(
         [sys.executable, "-c", line],
         cwd=ROOT,
