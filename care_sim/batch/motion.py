@@ -15,7 +15,7 @@ from care_sim.batch.lane_columns import SPEED, LaneColumns
 from care_sim.batch.state import BatchState, Bodies, Egos, Passages, filled
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.loops.episode import most_keyframes
-from care_sim.scenarios.mirroring import Reflection
+from care_sim.scenarios.base import Reflection
 from care_sim.world.bullet import NO_BODY
 from care_sim.world.contact import ClearanceJudge
 from care_sim.world.motions import LaneChange, Walk

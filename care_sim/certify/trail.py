@@ -14,7 +14,7 @@ import numpy as np
 from care_sim.base.digests import portable_bytes
 from care_sim.certify.design import Drawn
 from care_sim.envs.closed_loop import ClosedLoopEnv
-from care_sim.evaluation.metrics import outcome
+from care_sim.evaluation.outcomes import outcome
 from care_sim.loops.closed_loop import ClosedLoop
 
 CONFIGURATION = "configuration"

@@ -22,10 +22,10 @@ from care_sim.reports.table import Table
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.episode_play import GymEnv, result_or_reason, trace
 from care_sim.study.play_config import PlayConfig
+from care_sim.study.rows.checks import check_worlds
 from care_sim.study.rows.reading import stops_for_nothing
 from care_sim.study.run_config import Row
-from care_sim.study.scene_trace import trace_scene
-from care_sim.study.world_hash import check_worlds
+from care_sim.study.scene_play import trace_scene
 
 AnyConfig = EpisodeConfig | PlayConfig
 _COLUMNS = {

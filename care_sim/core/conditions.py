@@ -107,22 +107,22 @@ class ReturnSettings:
     rain_mm_h: float = bounded(0.0, 0, 1000)
     """Rain, millimetres per hour (`care_sim.sensors.signal`). The cameras see on as before."""
     lidar_divergence_mrad: float = bounded(0.0, 0, 100)
-    """Angle between opposite edges of a beam, milliradians (`care_sim.sensors.bundle`). A beam may
+    """Angle between opposite edges of a beam, milliradians (`care_sim.sensors.beams`). A beam may
     then meet several bodies. At 0 it is one ray.
     """
     lidar_returns: str = one_of(STRONGEST, RETURNS_KEPT)
     """Which echo a beam returns that has several: `strongest`, `last` or `both`
-    (`care_sim.sensors.echoes`).
+    (`care_sim.sensors.signal`).
     """
     lidar_sweep_s: float = bounded(0.0, 0, 1)
     """How long a sweep takes, seconds: columns fire one after another, the last at the keyframe
-    (`care_sim.sensors.sweep`). At 0 all fire at once.
+    (`care_sim.sensors.beams`). At 0 all fire at once.
     """
     lidar_compensated: bool = False
     """Whether points of a sweep are moved by how the ego moved since. Ranges stay as measured."""
     lidar_crosstalk: float = bounded(0.0, 0, 1)
     """Share of the cells that take the pulse of another LiDAR for their return, 0 to 1
-    (`care_sim.sensors.crosstalk`).
+    (`care_sim.sensors.lidar_faults`).
     """
 
     def __post_init__(self) -> None:
@@ -214,7 +214,7 @@ class CameraFaults:
     camera_latency_s: float = bounded(0.0, 0, LONGEST_LATENCY_S)
     """Age of the camera's detections in seconds; not together with `camera_latency`. The picture is
     of that instant, or of the newest before it at which there is one: in the closed loop the world
-    steps every 0.05 s, a film has its keyframes (`care_sim.sensors.picture_timing`).
+    steps every 0.05 s, a film has its keyframes (`care_sim.sensors.camera`).
     """
     camera_jitter: int = bounded(0, 0, MOST_KEYFRAMES)
     """Most keyframes by which a picture may come later still; drawn evenly from 0 to this."""
@@ -295,7 +295,7 @@ class Sensing(CameraFaults, LidarFaults, ReturnSettings):
     """Fired rays that must hit an object for it to be detected."""
     camera_confidence: float = bounded(CAMERA_CONFIDENCE, 0, 1)
     """Least confidence of a camera detection, 0 to 1; visible pixels decide, and the least box has
-    0.25 (`care_sim.sensors.confidence`).
+    0.25 (`care_sim.sensors.pictures`).
     """
 
     def __post_init__(self) -> None:

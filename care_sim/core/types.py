@@ -261,7 +261,7 @@ class Scan:
     whose pulses have no strength.
     """
     times: Floats | None = None
-    """(n,) seconds from the keyframe, below 0, and 0 without a return (`care_sim.sensors.sweep`);
+    """(n,) seconds from the keyframe, below 0, and 0 without a return (`care_sim.sensors.beams`);
     None where all cells fire at once.
     """
     points: Floats | None = None

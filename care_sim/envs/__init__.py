@@ -92,4 +92,4 @@ def _vector_of(entry_point: str) -> str | None:
     place, _, kind = entry_point.partition(":")
     if place != "care_sim.envs.scenarios":
         return None
-    return f"care_sim.envs.vector.scenarios:{kind.removesuffix('Env')}VectorEnv"
+    return f"care_sim.envs.vector.env:{kind.removesuffix('Env')}VectorEnv"

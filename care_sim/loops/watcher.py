@@ -17,9 +17,8 @@ from care_sim.core.grid import Cells
 from care_sim.core.residual import explained
 from care_sim.core.types import CLASSES, Action, Demand, ImageDetections
 from care_sim.loops.closed_loop import ClosedLoop
-from care_sim.loops.open_loop import OpenLoop
+from care_sim.loops.open_loop import OpenLoop, SceneKeyframe
 from care_sim.loops.records import Keyframe
-from care_sim.loops.scene_records import SceneKeyframe
 from care_sim.sensors.annotated import NO_OBJECT
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.world import Actor, World

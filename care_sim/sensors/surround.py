@@ -16,7 +16,7 @@ from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid, Cells, Head
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.sensors.annotated import NO_OBJECT, Cloud, IdentifiedDetections
-from care_sim.sensors.camera import (
+from care_sim.sensors.pictures import (
     CAMERA_FROM_LIDAR,
     CAMERA_HEIGHT,
     CAMERA_WIDTH,

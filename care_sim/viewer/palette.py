@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from care_sim.loops.scene_records import SceneKeyframe
+from care_sim.loops.open_loop import SceneKeyframe
 
 Colour = tuple[int, int, int]
 

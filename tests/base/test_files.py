@@ -32,8 +32,8 @@ from care_sim.base.files import (
 from care_sim.core.grid import AngularGrid
 from care_sim.policies.learned import weights
 from care_sim.policies.learned.weights import load_weights
-from care_sim.reports.figures.files import save
-from care_sim.reports.page.provenance import CONFIG, description_in
+from care_sim.reports.figures.styles import save
+from care_sim.reports.page.build import CONFIG, description_in
 from care_sim.sources.nuscenes.table_files import LARGEST_TABLE, read_json
 from care_sim.study.journal import LARGEST_JOURNAL, Journal
 from care_sim.study.rows.parquet import write_rows

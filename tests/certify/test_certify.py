@@ -24,7 +24,6 @@ from care_sim.certify.design import (
     STREET,
     drawn,
 )
-from care_sim.certify.drive import write_drive
 from care_sim.certify.playing import (
     FARTHEST,
     attempt,
@@ -34,6 +33,7 @@ from care_sim.certify.playing import (
     play_alone,
     playable_here,
     trails_of,
+    write_drive,
 )
 from care_sim.certify.trail import (
     CONFIGURATION,
@@ -54,8 +54,7 @@ from care_sim.perception.tracker import TrackMemory
 from care_sim.policies import make_policy, maker
 from care_sim.policies.makers import is_privileged
 from care_sim.sensors.camera import CameraDetector
-from care_sim.sensors.lidar import Lidar
-from care_sim.sensors.recorded_lidar import RecordedLidar
+from care_sim.sensors.lidar import Lidar, RecordedLidar
 from care_sim.world.world import World
 from tests.helpers.places import ROOT
 

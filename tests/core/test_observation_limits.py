@@ -11,7 +11,7 @@ from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.residual import explained
 from care_sim.core.rig import Rig
 from care_sim.core.types import Ego, ImageDetections, Tracks
-from care_sim.envs.spaces import observation_space
+from care_sim.envs.sensing import observation_space
 from care_sim.sensors.surround import SURROUND_CAMERAS
 
 RIG = Rig(cameras=SURROUND_CAMERAS, keyframe_s=0.5)

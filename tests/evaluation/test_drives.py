@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from care_sim.evaluation.drives import drive_outcome
+from care_sim.evaluation.outcomes import drive_outcome
 from care_sim.loops.records import Keyframe, Sight
 from care_sim.world.approach import Impact
 from care_sim.world.motions import Crosser, Meeting, Walk

@@ -12,7 +12,7 @@ from care_sim.core.types import Ego, ImageDetections, Tracks
 from care_sim.policies.controls.patterns import Fan, cells_by_row, entry_cells, entry_elevation_deg
 from care_sim.policies.learned.cell_inputs import CellInputs
 from care_sim.policies.learned.grid_features import CHANNELS, GridFeatures
-from care_sim.policies.learned.tiling import Tiling
+from care_sim.policies.learned.sectors import Tiling
 from care_sim.policies.own.sight_lines import AHEAD_RAD, SightLines, columns_ahead
 from care_sim.policies.paper.blind import horizon_rows
 from tests.helpers.lidars import DEGREE, ROOF, STACK

@@ -13,11 +13,9 @@ from care_sim.core.types import Scan
 from care_sim.perception.proxy import ReturnsRule
 from care_sim.sensors.annotated import Cloud, cloud_of
 from care_sim.sensors.beams import Beams
-from care_sim.sensors.crosstalk import Crosstalk
 from care_sim.sensors.engines import ENGINES, make_engine
-from care_sim.sensors.lidar import Lidar
-from care_sim.sensors.lidar_faults import CellFaults
-from care_sim.sensors.recorded_lidar import RecordedLidar
+from care_sim.sensors.lidar import Lidar, RecordedLidar
+from care_sim.sensors.lidar_faults import CellFaults, Crosstalk
 from care_sim.sensors.surround import full_sweep
 from care_sim.world.bodies import CATALOGUE, BodyKind, Part
 from care_sim.world.bullet import NO_BODY, BulletWorld
@@ -116,7 +114,7 @@ def test_cells_in_any_order_and_of_some_lidars_alone(street, engine):
 
 
 def test_the_first_engine_draws_the_cameras_pictures(street):
-    from care_sim.sensors.camera import FRONT_CAMERA
+    from care_sim.sensors.pictures import FRONT_CAMERA
 
     window = (0, 0, FRONT_CAMERA.width, FRONT_CAMERA.height)
     for name, make in ENGINES.items():

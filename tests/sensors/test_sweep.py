@@ -5,9 +5,8 @@ from care_sim.core.conditions import ReturnSettings
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.sensors.annotated import cloud_of
-from care_sim.sensors.beams import Beams
+from care_sim.sensors.beams import Beams, RollingSweep
 from care_sim.sensors.engines import ENGINES
-from care_sim.sensors.sweep import RollingSweep
 from care_sim.world.bodies import BodyKind, Part
 from care_sim.world.motions import LinearMotion
 

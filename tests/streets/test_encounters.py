@@ -7,16 +7,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_sim.streets.approach import EGO_WIDTH_M, Approach
 from care_sim.streets.encounters import (
+    AT_GARDEN,
+    AT_KERB,
+    AT_YARD,
     COMERS,
     ENCROACHMENT_S,
     MOST_SIGHT_S,
     Course,
+    Spot,
     draw_encounter,
 )
-from care_sim.streets.hiding import AT_GARDEN, AT_KERB, AT_YARD, Spot
 from care_sim.streets.layouts import LAYOUTS
+from care_sim.streets.sight import EGO_WIDTH_M, Approach
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.route import Route, SpeedPlan
 

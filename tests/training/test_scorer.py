@@ -11,8 +11,8 @@ from care_sim.envs.scenarios import DriveEnv
 from care_sim.policies import make_policy
 from care_sim.policies.learned.cell_inputs import RIG_INPUTS, SCAN_INPUTS
 from care_sim.policies.learned.weights import load_weights
-from care_sim.training import scorer
-from care_sim.training.scorer_data import Examples, drawn_examples
+from care_sim.training.supervised import scorer
+from care_sim.training.supervised.scorer import Examples, drawn_examples
 
 torch = pytest.importorskip("torch")
 INPUTS = SCAN_INPUTS + len(RIG_INPUTS)

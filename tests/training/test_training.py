@@ -20,14 +20,12 @@ from care_sim.core.wrapping import Wrapping
 from care_sim.policies.learned.weights import load_weights
 from care_sim.scenarios import PLUGINS
 from care_sim.study import provenance
-from care_sim.training.algorithms import algorithm
 from care_sim.training.config import PpoConfig, SacConfig
 from care_sim.training.environments import plain, training
-from care_sim.training.episodes import read_episodes
 from care_sim.training.folder import Folder
-from care_sim.training.run import RULES, played_rules
+from care_sim.training.run import RULES, algorithm, played_rules
 from care_sim.training.seeds import validation_seeds
-from care_sim.training.validation import ValidationScore, play, rule
+from care_sim.training.validation import ValidationScore, play, read_episodes, rule
 
 SHORT = ["--environments", "2", "--episodes", "2", "--env-parameters", "duration_s=1.0"]
 TOLD = ("scoring_info=True",)

@@ -15,7 +15,7 @@ from care_sim.sources.named import source_of
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.episode_play import run_episode, trace
 from care_sim.study.play_config import play_grid
-from care_sim.study.scene_trace import trace_scene
+from care_sim.study.scene_play import trace_scene
 from care_sim.viewer.recording import entities
 from care_sim.viewer.recording.recording import Recording
 from tests.helpers.lidars import CORNERS

@@ -10,7 +10,7 @@ from care_sim.core.frames import Frame
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.sensor_setup import LIDAR_POSITION
 from care_sim.core.types import CLASSES
-from care_sim.sensors.camera import FRONT_CAMERA
+from care_sim.sensors.pictures import FRONT_CAMERA
 from care_sim.world.bodies import CATALOGUE, sized
 from care_sim.world.bullet import NO_BODY, BulletWorld
 from care_sim.world.bullet_bodies import borrow, give_back

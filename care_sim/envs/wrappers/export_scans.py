@@ -21,7 +21,7 @@ from care_sim.core.arrays import Floats
 from care_sim.core.firing.actions import SHARES
 from care_sim.core.grid import Cells
 from care_sim.core.types import CLASSES, Action, Tracks
-from care_sim.envs.wrappers.watching import Watching, numbered
+from care_sim.envs.wrappers.record_rerun import Watching, numbered
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.open_loop import OpenLoop
 from care_sim.loops.records import Keyframe

@@ -19,7 +19,7 @@ from care_sim.policies.learned.set_kernels import (
     look_at_strips,
     look_back,
 )
-from care_sim.policies.own.care_spread import CORE_FIRST
+from care_sim.policies.own.care import CORE_FIRST
 from care_sim.policies.paper.tracks import GROUND_CLEARANCE_M
 
 LOOKED_AT = 24

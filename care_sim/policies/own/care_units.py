@@ -10,7 +10,7 @@ from care_sim.core.grid import Cells
 from care_sim.core.residual import ray_starts, wedge_rays, wedges
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES, Demand, ImageDetections, Tracks
-from care_sim.policies.own.care_sightlines import CareSightlines
+from care_sim.policies.own.care import CareSightlines
 from care_sim.sensors.signal import Signal
 from care_sim.world.bodies import CATALOGUE
 
@@ -84,7 +84,7 @@ class TargetShots:
 
 
 class CareUnits(CareSightlines):
-    """`care-sightlines`, whose cells vote for the units of the hardware (`care_sim.core.firing`).
+    """`care-sightlines`, whose cells vote for the units of the hardware.
 
     Projected in its own order, a demand spends a unit on every first cell, however few others share
     it. Here a unit is worth the cells that it holds of those that the allocator takes. The first of

@@ -82,7 +82,7 @@ def uniform_pattern(grid: Grid, count: int) -> Cells:
 GROUND_CLEARANCE_M = 0.3
 """Returns lower than this above a level road are ground (the threshold of the Argoverse 2 map API).
 A detector that fits the road's plane knows it better: see
-`care_sim.perception.cluster.road.KERB_CLEARANCE_M`.
+`care_sim.perception.cluster.points.KERB_CLEARANCE_M`.
 """
 BOX_MARGIN_M = 0.2
 """Boxes reach this much further: an error of 1 m/s in the car's own speed moves a box by 0.1 m in a

@@ -12,12 +12,12 @@ from care_sim.reports.formatting import marked, tag_notes
 from care_sim.study.rows.reading import (
     READ_WITH,
     Key,
+    Setting,
     grouped,
     policy_of,
     setting_of,
     tags_of_row,
 )
-from care_sim.study.rows.settings import Setting
 from care_sim.study.run_config import FULL, Row
 
 

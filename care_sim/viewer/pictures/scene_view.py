@@ -13,8 +13,7 @@ from care_sim.core.cells.boxes import box_corners, planar_ranges
 from care_sim.core.residual import wedge_rays
 from care_sim.core.rig import Rig
 from care_sim.evaluation.sightings import RANGE_M
-from care_sim.loops.open_loop import OpenLoop
-from care_sim.loops.scene_records import SceneKeyframe
+from care_sim.loops.open_loop import OpenLoop, SceneKeyframe
 from care_sim.loops.watcher import TrueSituation, Watched, returned
 from care_sim.viewer import palette
 from care_sim.viewer.palette import State

@@ -16,7 +16,7 @@ from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
 from care_sim.policies.own.care_units import CareUnits, TargetShots
-from care_sim.sensors.camera import FRONT_CAMERA
+from care_sim.sensors.pictures import FRONT_CAMERA
 from care_sim.world.bodies import CATALOGUE
 
 FOG = {"lidar_stated_range_m": 20.0, "visibility_m": 50.0}
