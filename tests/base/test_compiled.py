@@ -10,7 +10,7 @@ import pytest
 from tests.helpers.forked import Forked
 from tests.helpers.places import ROOT
 
-_BRIEF = ("-k", "not crowds and not window0")
+_BRIEF = ("-k", "not crowds and not window0 and not whole_grids and not more_cells")
 """Leaves out what takes more than a few seconds in Python."""
 NOWHERE = """
 import numba.core.caching as caching
@@ -31,7 +31,7 @@ def test_without_a_folder_for_the_code_it_is_compiled_anew():
 @pytest.mark.slow
 def test_kernels_answer_the_same_without_compiling():
     files = (
-        "core/test_pcg64",
+        "core/firing/test_floor",
         "core/test_cell_sets",
         "perception/test_tracker",
         "batch/test_motion",
