@@ -7,9 +7,9 @@ import numpy as np
 from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.belief import Belief
+from care_sim.core.beliefs import Beliefs
 from care_sim.core.cells.sets import CellSets, WorldSets, kept_of_each
 from care_sim.core.frames import turned
-from care_sim.core.observation.beliefs import Beliefs
 from care_sim.core.pinhole import CameraModels, box_rays, model_of, pixel
 from care_sim.core.rig import Rig
 from care_sim.core.types import ImageDetections, Tracks

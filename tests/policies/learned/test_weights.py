@@ -19,9 +19,9 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
 from care_sim.core.sensor_setup import SensorSetup
-from care_sim.core.wrapping import Wrapping
 from care_sim.policies.learned.weights import (
     Card,
+    Wrapping,
     load_weights,
     save_weights,
     shipped_weights,

@@ -6,12 +6,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.core.belief import MAX_DETECTIONS, MAX_TRACKS, Belief
-from care_sim.core.observation.limits import MAX_AGE_S, MAX_SPEED_MPS, Limits
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.residual import explained
 from care_sim.core.rig import Rig
 from care_sim.core.types import Ego, ImageDetections, Tracks
 from care_sim.envs.sensing import observation_space
+from care_sim.loops.observation_limits import MAX_AGE_S, MAX_SPEED_MPS, Limits
 from care_sim.sensors.surround import SURROUND_CAMERAS
 
 RIG = Rig(cameras=SURROUND_CAMERAS, keyframe_s=0.5)
