@@ -217,8 +217,10 @@ def _bytes_of(part: object) -> bytes:
 def _rounded(numbers: NDArray[np.floating]) -> NDArray[np.int64]:
     """The step that each number lies in."""
     # Compiled for the two kinds of floats that arrays come in; any other is taken as the wider one.
-    kind = np.float32 if numbers.dtype == np.float32 else np.float64
-    return np.asarray(_steps(np.ascontiguousarray(numbers, kind).ravel()).reshape(numbers.shape))
+    table: NDArray[np.floating] = np.ascontiguousarray(
+        numbers, np.float32 if numbers.dtype == np.float32 else np.float64
+    )
+    return np.asarray(_steps(table.reshape(-1)).reshape(numbers.shape))
 
 
 @compiled()

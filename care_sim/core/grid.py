@@ -83,12 +83,17 @@ class Head(NamedTuple):
 
 
 class HeadCells:
-    """What whoever fires cells asks of the grid of one LiDAR or of several: `heads` are its LiDARs
-    one by one, `directions` (N, 3) the unit vectors of the rays, each from its own LiDAR.
-    """
+    """What whoever fires cells asks of the grid of one LiDAR or of several."""
 
-    heads: tuple[Head, ...]
-    directions: Floats
+    @cached_property
+    def heads(self) -> tuple[Head, ...]:
+        """Its LiDARs one by one."""
+        raise NotImplementedError
+
+    @cached_property
+    def directions(self) -> Floats:
+        """(N, 3) unit vectors of the rays, each from its own LiDAR."""
+        raise NotImplementedError
 
     def __getstate__(self) -> dict[str, Any]:
         # Tables are megabytes for a large grid: a copy, in a worker for example, makes its own.
@@ -153,7 +158,7 @@ class HeadCells:
         return self.heads[0].grid.range_m if len(reaches) == 1 else reaches[self.lidars_of(cells)]
 
 
-class AngularGrid(HeadCells, GridRays):
+class AngularGrid(GridRays, HeadCells):
     """`columns` x `rows` firing cells of a LiDAR.
 
     The defaults are the grid of the paper (Remark 1): 512 columns, and the 32 rings of the
