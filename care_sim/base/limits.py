@@ -26,8 +26,7 @@ def usable_cores(
 ) -> int:
     """Count the cores that the affinity and the control groups of Linux leave to this process.
 
-    `groups` is where control groups of version 1 or 2 are mounted. `own` lists those of the
-    process.
+    `groups` is where control groups of version 2 are mounted. `own` lists those of the process.
     """
     affinity = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     return max(1, min([affinity or 1, *(ceil(quota) for quota in _quotas(groups, own))]))
@@ -37,32 +36,16 @@ def _quotas(groups: Path, own: Path) -> Iterator[float]:
     """Yield the cores that each control group of the process allows, and each group above."""
     lines = own.read_text().splitlines() if own.exists() else []
     for line in lines:
-        _, controllers, path = line.split(":", 2)
-        if controllers and "cpu" not in controllers.split(","):
+        if not line.startswith("0::"):
             continue
-        mount = groups / "cpu" if controllers else groups
-        place = mount / path.strip("/")
+        place = groups / line.removeprefix("0::").strip("/")
         # In a container the path may be the host's, of which only the mount's root is there.
         for folder in (place, *place.parents):
-            with suppress(OSError, ValueError, ZeroDivisionError):
-                quota, period = _quota(folder, version=1 if controllers else 2)
-                if quota > 0:
-                    yield quota / period
-            if folder == mount:
+            with suppress(OSError, ValueError, ZeroDivisionError):  # "max" allows all
+                quota, period = map(int, (folder / "cpu.max").read_text().split())
+                yield quota / period
+            if folder == groups:
                 break
-
-
-def _quota(folder: Path, version: int) -> tuple[int, int]:
-    """Microseconds of processor time and the period in which they are allowed.
-
-    Raises ValueError for version 2's "max", which allows all. Version 1 says -1.
-    """
-    if version == 2:
-        quota, period = (folder / "cpu.max").read_text().split()
-    else:
-        quota = (folder / "cpu.cfs_quota_us").read_text()
-        period = (folder / "cpu.cfs_period_us").read_text()
-    return int(quota), int(period)
 
 
 CORES = usable_cores()

@@ -140,16 +140,6 @@ def make_groups(folder, lines, files):
         (["0::/of/the/host"], {"cpu.max": "200000 100000"}, 2),
         (["0::/"], {"cpu.max": "nonsense"}, 4),
         (["0::/"], {}, 4),
-        (
-            ["2:cpuacct,cpu:/job", "1:memory:/", "0::/"],
-            {"cpu/job/cpu.cfs_quota_us": "200000", "cpu/job/cpu.cfs_period_us": "100000"},
-            2,
-        ),
-        (
-            ["1:cpu:/job"],
-            {"cpu/cpu.cfs_quota_us": "-1", "cpu/cpu.cfs_period_us": "100000"},
-            4,
-        ),
         ([], {}, 4),
     ],
 )

@@ -4,9 +4,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.core.belief import Belief
+from care_sim.core.beliefs import Beliefs
 from care_sim.core.frames import turned
 from care_sim.core.pinhole import PinholeCamera
-from care_sim.core.residual import camera_layers, explained, unexplained_layer, wedges
+from care_sim.core.residual import camera_layers, explained, unexplained_layer_of, wedges
 from care_sim.core.rig import Rig
 from care_sim.core.types import Ego, ImageDetections, Tracks
 from care_sim.sensors.surround import SURROUND_CAMERAS
@@ -70,7 +71,7 @@ def test_layers_part_what_memory_explains_from_what_it_does_not(tracks_at, seen)
         ("car", *box_around((30, -6, -1))),
     )
     unexplained, known = camera_layers(belief(boxes, tracks), RIG)
-    alone = unexplained_layer(belief(boxes, tracks), RIG)
+    alone = unexplained_layer_of(Beliefs.of(belief(boxes, tracks), RIG)).sets
     assert [cells.tolist() for cells in alone] == [cells.tolist() for cells in unexplained]
     first, second, third = (wedge.tolist() for wedge in wedges(boxes, RIG))
     assert [wedge.tolist() for wedge in unexplained] == [second]
