@@ -133,10 +133,11 @@ def test_the_rights_of_a_file_stay(tmp_path):
     assert stat.S_IMODE(file.stat().st_mode) == 0o600
 
 
-def test_a_pipe_is_refused(tmp_path):
+def test_a_pipe_and_what_is_the_systems_are_refused(tmp_path):
     os.mkfifo(tmp_path / "pipe")
-    with pytest.raises(InvalidInput, match="pipe is a device, a pipe or a socket"):
-        check_output(tmp_path / "pipe")
+    for path in (tmp_path / "pipe", Path("/dev/stdout"), Path("/dev/null"), Path("/dev/new")):
+        with pytest.raises(InvalidInput, match=f"{path} is a device, a pipe or a socket"):
+            check_output(path)
     assert (tmp_path / "pipe").is_fifo()
 
 

@@ -2,6 +2,7 @@
 
 import errno
 import os
+import re
 import resource
 import shutil
 import subprocess
@@ -48,6 +49,17 @@ def test_many_cores_need_less_with_one_thread_each(monkeypatch):
         limits.check_memory()
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
     limits.check_memory()
+
+
+def test_too_few_files():
+    code, err = ended(
+        ["list", "policies"], limited=lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (9, 9))
+    )
+    assert code == limits.FAILED
+    assert re.fullmatch(
+        r"care-sim: \d files can be opened, and care-sim needs 16: raise the limit \(ulimit -n\)\n",
+        err,
+    )
 
 
 @pytest.mark.skipif(os.geteuid() != 0 or not shutil.which("setpriv"), reason="needs another user")
@@ -234,6 +246,23 @@ def test_a_folder_that_somebody_else_has_made_is_not_trusted(tmp_path):
     ended = as_nobody(SETTLED, work)
     assert ended.returncode == 0
     assert not [*(work / "tmp" / f"care-sim-{NOBODYS}").iterdir()]
+
+
+@pytest.mark.parametrize("folder", ["x" * 5000, "/dev/null/x", "", "new", "."])
+def test_a_folder_for_matplotlib_that_cannot_be_written_is_ignored(folder, tmp_path):
+    program = (
+        "import sys; sys.argv[0] = 'care-sim'; import care_sim.base.limits, matplotlib.font_manager"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", program],
+        cwd=tmp_path,
+        env=os.environ | {"MPLCONFIGDIR": folder},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    is_told = folder not in ("", "new", ".")
+    assert ended.stderr == is_told * "care-sim: MPLCONFIGDIR cannot be written, and is ignored\n"
 
 
 def test_a_home_folder_is_left_as_it_is():
