@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from os import PathLike
 from pathlib import Path
 from typing import Any, TypeVar
-from zipfile import ZipInfo, is_zipfile
+from zipfile import is_zipfile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,9 +56,15 @@ def read_arrays(
     """
     check_path("a file of weights", path)
     try:
-        _check_archive(Path(path))
+        # NumPy would wait for a pipe, and take another file for an array or pickled objects.
+        if Path(path).exists() and not Path(path).is_file():
+            raise ValueError("it is no file")
+        if Path(path).exists() and not is_zipfile(path):
+            raise ValueError("it is no whole archive")
         with np.load(path, allow_pickle=False) as file:
-            _check_contents(file.zip.infolist())
+            # Before anything is unpacked: a small archive can hold more than the memory does.
+            if sum(entry.file_size for entry in file.zip.infolist()) > MOST_UNPACKED_BYTES:
+                raise ValueError(f"unpacked it is larger than {MOST_UNPACKED_BYTES} bytes")
             entries = {name: file[name] for name in file.files}
         card = card_of(bytes(entries.pop(_CARD)).decode())
         return _checked(entries), card
@@ -67,32 +73,10 @@ def read_arrays(
     # Damaged archives raise errors of many kinds in zipfile, zlib and NumPy; all become one line,
     # without NumPy's advice to allow pickled objects.
     except Exception as error:
-        reason = " ".join((str(error) or type(error).__name__).split()).partition(" If you trust")[
-            0
-        ]
+        told = " ".join((str(error) or type(error).__name__).split()).partition(" If you trust")
         raise InvalidInput(
-            f"weights {path}: no .npz of weights of {command}, or damaged ({reason})"
+            f"weights {path}: no .npz of weights of {command}, or damaged ({told[0]})"
         ) from error
-
-
-def _check_archive(path: Path) -> None:
-    """Raise ValueError for what is there and no archive. NumPy would wait for a pipe, and take
-    anything else for an array or pickled objects.
-    """
-    if path.exists():
-        if not path.is_file():
-            raise ValueError("it is no file")
-        if not is_zipfile(path):
-            raise ValueError("it is no whole archive")
-
-
-def _check_contents(entries: list[ZipInfo]) -> None:
-    # Of two entries of one name each reader would take its own; NumPy leaves the ending out.
-    if len({entry.filename.removesuffix(".npy") for entry in entries}) < len(entries):
-        raise ValueError("an entry comes twice")
-    # Before anything is unpacked: a small archive can hold more than the memory does.
-    if sum(entry.file_size for entry in entries) > MOST_UNPACKED_BYTES:
-        raise ValueError(f"unpacked it is larger than {MOST_UNPACKED_BYTES} bytes")
 
 
 def _checked(arrays: dict[str, NDArray[Any]]) -> Arrays:

@@ -1,7 +1,9 @@
 """Checks of values from outside: each raises one line that names the value and what is allowed.
 
 What a field of a dataclass may be is stated beside its default, checked when the dataclass is made,
-and told by lists.
+and told by lists. The kind follows from the default: a flag, text, a whole number, a number, or,
+where it is bounded, a range of numbers (low, high). A field whose default is None may stay None.
+Numbers of any type become Python's own, so that equal configurations are written alike.
 """
 
 import math
@@ -91,6 +93,21 @@ def check_range(name: str, value: Any, least: float = -math.inf, most: float = m
     if not (fits and least <= _finite(value[0]) <= _finite(value[1]) <= most):
         within = f", within [{least:g}, {most:g}]" if (least, most) != (-math.inf, math.inf) else ""
         raise InvalidInput(f"{name} must be two numbers, low and high{within}, got {shown(value)}")
+
+
+def checked_place(
+    name: str, value: Any, *bounds: tuple[float, float]
+) -> tuple[float, float, float]:
+    """x, y and z in metres as plain numbers. Raises InvalidInput for what is none, and for a number
+    beyond its `bounds`: one pair for all three, or one each.
+    """
+    if not (isinstance(value, tuple | list | np.ndarray) and len(value) == 3):
+        raise InvalidInput(f"{name} must be x, y and z in metres, got {shown(value)}")
+    for axis, number, limits in zip("xyz", value, bounds * (3 // len(bounds)), strict=True):
+        check_number(f"{axis} of {name}", number, *limits)
+    # Zero has no sign, which equality does not tell but a hash would.
+    x, y, z = (float(number) + 0.0 for number in value)
+    return x, y, z
 
 
 def check_flag(name: str, value: object) -> None:

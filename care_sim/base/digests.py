@@ -1,4 +1,4 @@
-"""Hashes of files and folders, of what happened, and of what an entry point names."""
+"""Hashes of files and folders, of what an entry point names, and of what happened."""
 
 import hashlib
 import math
@@ -20,13 +20,25 @@ from care_sim.base.errors import InvalidInput
 
 MOST_FILES = 10_000
 """A folder with more files is not read: hashing so many takes a second."""
-
+CODE = (".py", ".so", ".pyd")
+"""Endings of files that a process loads once."""
+_VIEWS = ("/proc/", "/sys/", "/dev/fd/", "/dev/std")
+"""How views of the system begin: nobody's files, which change from moment to moment."""
 Stamp = tuple[int, ...]
 """Numbers of a file that differ after the file is written."""
-_OF_THE_SYSTEM = tuple(
-    map(Path, ("/proc", "/sys", "/dev/fd", "/dev/stdin", "/dev/stdout", "/dev/stderr"))
-)
-"""Views of the system and of this process, nobody's files: they change from moment to moment."""
+
+STEP = 1e-4
+"""Metres, radians, metres per second: what measured numbers are rounded to. A whole episode
+computed with other features of the processor moves poses by less than 1e-13, and the float32 ranges
+of an observation by their last bit, 4e-6; what an outcome rests on (sizes, margins, the spacing of
+rays) is centimetres."""
+SHIFT = (5**0.5 - 1) / 2
+"""Shares of a step by which the borders between steps lie beside the round numbers that scenes are
+made of (0, 0.05, 1.5, a half of anything): a number on a border would be rounded by its last bit.
+"""
+_LARGEST = 2.0**61
+_INFINITE = 2**62
+_NONE = 2**62 + 1
 
 
 def file_digest(path: Path) -> str | None:
@@ -42,7 +54,7 @@ def file_digest(path: Path) -> str | None:
     hashes = [
         f"{file.relative_to(path)} {content_digest(file)}"
         for file in sorted(found)
-        if not is_compiled(file)
+        if not _is_compiled(file)
     ]
     return combined_digest(hashes) if hashes else ""
 
@@ -89,64 +101,18 @@ def _hashed(path: Path, _stamp: Stamp) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()[:16]
 
 
-def files_below(folder: Path, above: tuple[Path, ...] = ()) -> Iterator[Path]:
-    """The regular files below a folder, in order of name, behind links too, but for links back to a
-    folder above.
-    """
-    real = real_path(folder)
-    if real in above or is_of_the_system(real):
-        return
-    try:
-        inner = sorted(folder.iterdir())
-    except OSError:
-        return
-    for path in inner:
-        if os.path.isdir(path):
-            yield from files_below(path, (*above, real))
-        elif os.path.isfile(path) and not (path.is_symlink() and is_of_the_system(path)):
-            yield path
+def files_below(folder: Path) -> Iterator[Path]:
+    """The regular files below a folder, in order of name within each folder, behind links too."""
+    # The system follows some 40 links of a path, so that a link which leads back has an end.
+    for place, folders, names in os.walk(folder, followlinks=True):
+        folders.sort()
+        paths = (os.path.join(place, name) for name in sorted(names))
+        yield from map(Path, filter(os.path.isfile, paths))
 
 
-def is_compiled(path: Path) -> bool:
+def _is_compiled(path: Path) -> bool:
     """Whether Python or Numba writes a file while code runs, so that no author did."""
     return path.suffix == ".pyc" or "__pycache__" in path.parts
-
-
-def is_of_the_system(path: Path) -> bool:
-    """Whether a path, or what it links to, is none of anybody's files but a view of the system."""
-    return any(
-        each.is_relative_to(place) for each in (path, real_path(path)) for place in _OF_THE_SYSTEM
-    )
-
-
-def real_path(path: Path) -> Path:
-    """The path without links. A link that leads back to itself stays what it is: it has no content,
-    and `Path.resolve` would raise.
-    """
-    return Path(os.path.realpath(path))
-
-
-_SITES = {"site-packages", "dist-packages"}
-CODE = (".py", ".so", ".pyd")
-"""Endings of files that a process loads once."""
-
-
-def entry_files(entry: EntryPoint) -> dict[str, Path] | None:
-    """The files by name. A package: all files in its folder. A single module: its file, and code
-    beside it unless it was installed. Both: the files in `files`. None where its code is in no
-    file, or in too many.
-
-    Raises InvalidInput for `files` that are no names, or that are missing.
-    """
-    roots = _roots(entry.module.partition(".")[0])
-    files = {
-        f"{root.name}/{file.relative_to(root if root.is_dir() else root.parent)}": file
-        for root in roots
-        for file in islice(_of_root(root), MOST_FILES + 1)
-    }
-    if not 0 < len(files) <= MOST_FILES:
-        return None
-    return files | {f"declared {number}": path for number, path in enumerate(_declared(entry))}
 
 
 def paths_in(value: object) -> Iterator[Path]:
@@ -157,31 +123,42 @@ def paths_in(value: object) -> Iterator[Path]:
     elif isinstance(value, str | os.PathLike):
         name = os.path.expanduser(os.path.expandvars(str(value)))
         there = 0 < len(name) <= LONGEST_PATH and (os.path.isfile(name) or os.path.isdir(name))
-        if there and not is_of_the_system(Path(name)):
+        if there and not any(f"{at}/".startswith(_VIEWS) for at in (name, os.path.realpath(name))):
             yield Path(name)
 
 
-def _roots(top: str) -> list[Path]:
-    """Where a package or module lies; nowhere, if any of it is in no file."""
+def entry_files(entry: EntryPoint) -> dict[str, Path] | None:
+    """The files by name that decide what an installed policy, detector, scenario or source does. A
+    package: all files in its folder. A single module: its file, and code beside it unless it was
+    installed. Both: the files in `files`. None where its code is in no file, or in too many.
+
+    Raises InvalidInput for `files` that are no names, or that are missing.
+    """
     try:
-        spec = find_spec(top)
+        spec = find_spec(entry.module.partition(".")[0])
     except (ImportError, ValueError):
-        return []
+        return None
     # A namespace package has several places, a module one. In a zip archive none of them is a file.
     places = (spec.submodule_search_locations or [spec.origin or ""]) if spec else []
-    roots = [Path(place) for place in places]
-    return roots if all(root.name and root.exists() for root in roots) else []
+    files = {
+        f"{root.name}/{file.relative_to(root if root.is_dir() else root.parent)}": file
+        for root in map(Path, places)
+        for file in islice(_code_of(root), MOST_FILES + 1)
+    }
+    if not 0 < len(files) <= MOST_FILES:
+        return None
+    return files | {f"declared {number}": path for number, path in enumerate(_declared(entry))}
 
 
-def _of_root(root: Path) -> Iterator[Path]:
+def _code_of(root: Path) -> Iterator[Path]:
+    """The files of a package's folder, or of a module's file."""
     if root.is_dir():
-        yield from (file for file in files_below(root) if not is_compiled(file))
-    elif _SITES.isdisjoint(root.parts):
-        yield from (
-            file for file in sorted(root.parent.iterdir()) if file.suffix in CODE and file.is_file()
-        )
-    else:
+        yield from (file for file in files_below(root) if not _is_compiled(file))
+    elif not {"site-packages", "dist-packages"}.isdisjoint(root.parts):
         yield root
+    elif root.is_file():
+        beside = sorted(root.parent.iterdir())
+        yield from (file for file in beside if file.suffix in CODE and file.is_file())
 
 
 def _declared(entry: EntryPoint) -> list[Path]:
@@ -210,28 +187,16 @@ def _declared(entry: EntryPoint) -> list[Path]:
     return paths
 
 
-STEP = 1e-4
-"""Metres, radians, metres per second: what measured numbers are rounded to. A whole episode
-computed with other features of the processor moves poses by less than 1e-13, and the float32 ranges
-of an observation by their last bit, 4e-6; what an outcome rests on (sizes, margins, the spacing of
-rays) is centimetres."""
-SHIFT = (5**0.5 - 1) / 2
-"""Shares of a step by which the borders between steps lie beside the round numbers that scenes are
-made of (0, 0.05, 1.5, a half of anything): a number on a border would be rounded by its last bit.
-"""
-
-_INFINITE = 2**62
-_NONE = 2**62 + 1
-_LARGEST = 2.0**61
-
 Content = str | ArrayLike
 
 
 def portable_bytes(*parts: Content | tuple[Content, ...]) -> bytes:
-    """The bytes of texts, arrays and numbers, and of tuples of them, with their shapes.
+    """The bytes of texts, arrays and numbers, and of tuples of them, with their shapes, which are
+    equal wherever the same happened.
 
-    Whole numbers and flags are taken exactly, the others to `STEP`; -0.0 is 0, float32 and float64
-    are one, infinities and NaN are numbers of their own.
+    Processors, mathematical libraries and their versions differ in the last bits of sine,
+    arctangent or a matrix product. So whole numbers and flags are taken exactly, the others to
+    `STEP`; -0.0 is 0, float32 and float64 are one, infinities and NaN are numbers of their own.
     """
     return b"".join(map(_bytes_of, parts))
 
@@ -252,9 +217,8 @@ def _bytes_of(part: object) -> bytes:
 def _rounded(numbers: NDArray[np.floating]) -> NDArray[np.int64]:
     """The step that each number lies in."""
     # Compiled for the two kinds of floats that arrays come in; any other is taken as the wider one.
-    is_single = numbers.dtype == np.float32
     table: NDArray[np.floating] = np.ascontiguousarray(
-        numbers, np.float32 if is_single else np.float64
+        numbers, np.float32 if numbers.dtype == np.float32 else np.float64
     )
     return np.asarray(_steps(table.reshape(-1)).reshape(numbers.shape))
 

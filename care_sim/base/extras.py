@@ -52,32 +52,16 @@ def import_open3d() -> ModuleType:
 
 def import_torch() -> ModuleType:
     """PyTorch. Raises MissingExtra with the extra to install."""
-    return _import("torch", "PyTorch", "rl")
-
-
-def import_imageio_ffmpeg() -> ModuleType:
-    """FFmpeg, as imageio-ffmpeg brings it. Raises MissingExtra with the extra to install."""
-    return _import("imageio_ffmpeg", "A film as MP4", "video")
+    return import_extra("torch", "PyTorch", "rl")
 
 
 def import_rerun() -> ModuleType:
     """Rerun. Raises MissingExtra with the extra to install."""
-    return _import("rerun", "Rerun", "viewer")
+    return import_extra("rerun", "Rerun", "viewer")
 
 
-def import_minari() -> ModuleType:
-    """Minari. Raises MissingExtra with the extra to install."""
-    return _import("minari", "A Minari dataset", "minari")
-
-
-def import_rosbags() -> tuple[ModuleType, ModuleType]:
-    """Rosbags' readers and its types. Raises MissingExtra with the extra to install."""
-    _import("rosbags", "A bag", "rosbags")
-    return import_module("rosbags.highlevel"), import_module("rosbags.typesys")
-
-
-def _import(module: str, name: str, extra: str) -> ModuleType:
-    """A module of an `extra`, which a user knows as `name`."""
+def import_extra(module: str, name: str, extra: str) -> ModuleType:
+    """A module, which a user knows as `name`. Raises MissingExtra with the `extra` to install."""
     try:
         return import_module(module)
     except ImportError as error:

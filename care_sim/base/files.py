@@ -75,9 +75,12 @@ def check_output(path: Path, kind: bytes = b"") -> None:
     # at once what the system would not allow at the end.
     if path.is_dir():
         raise InvalidInput(f"{path} is a folder, a file is wanted")
-    if path.exists() and not path.is_symlink():
-        if not path.is_file():
-            raise InvalidInput(f"{path} is a device, a pipe or a socket: name a file")
+    # The system's own links, such as /dev/stdout, are not to be replaced.
+    is_systems = os.path.realpath(path.parent) in ("/dev", os.path.realpath("/proc/self/fd"))
+    is_there = path.exists() and not path.is_symlink()
+    if is_systems or (is_there and not path.is_file()):
+        raise InvalidInput(f"{path} is a device, a pipe or a socket: name a file")
+    if is_there:
         _check_old(path, kind)
     with _beside(path):
         pass

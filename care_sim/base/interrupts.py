@@ -27,6 +27,8 @@ SIGNALS = tuple(
     if hasattr(signal, name)
 )
 """All end a command in the same way."""
+_SOON_S = 0.02
+"""Seconds after which an interrupt that nobody could catch is raised again."""
 _heard: list[int] = []
 
 
@@ -36,14 +38,19 @@ def end_at_once() -> None:
 
 
 def raise_them() -> None:
-    """From now on an interrupt is a KeyboardInterrupt."""
+    """From now on an interrupt is a KeyboardInterrupt; one that falls into code whose errors nobody
+    can catch (finalisers, callbacks) comes again.
+    """
     _listen(_raise)
+    signal.signal(signal.SIGALRM, _raise)
+    sys.unraisablehook = _come_again
 
 
 def end_in_silence() -> None:
     """From now on an interrupt is the system's to handle: all is said, and the interpreter is
     ending.
     """
+    signal.setitimer(signal.ITIMER_REAL, 0)
     _listen(signal.SIG_DFL)
 
 
@@ -70,6 +77,14 @@ def _end(*_: object) -> None:
 def _raise(number: int, _: object) -> None:
     _heard.append(number)
     raise KeyboardInterrupt
+
+
+def _come_again(lost: "sys.UnraisableHookArgs") -> None:
+    """Have an interrupt that nobody could catch raised once more, a moment later."""
+    if issubclass(lost.exc_type, KeyboardInterrupt):
+        signal.setitimer(signal.ITIMER_REAL, _SOON_S)
+    else:
+        sys.__unraisablehook__(lost)
 
 
 def is_command() -> bool:

@@ -26,8 +26,7 @@ def usable_cores(
 ) -> int:
     """Count the cores that the affinity and the control groups of Linux leave to this process.
 
-    `groups` is where control groups of version 1 or 2 are mounted. `own` lists those of the
-    process.
+    `groups` is where control groups of version 2 are mounted. `own` lists those of the process.
     """
     affinity = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     return max(1, min([affinity or 1, *(ceil(quota) for quota in _quotas(groups, own))]))
@@ -37,32 +36,16 @@ def _quotas(groups: Path, own: Path) -> Iterator[float]:
     """Yield the cores that each control group of the process allows, and each group above."""
     lines = own.read_text().splitlines() if own.exists() else []
     for line in lines:
-        _, controllers, path = line.split(":", 2)
-        if controllers and "cpu" not in controllers.split(","):
+        if not line.startswith("0::"):
             continue
-        mount = groups / "cpu" if controllers else groups
-        place = mount / path.strip("/")
+        place = groups / line.removeprefix("0::").strip("/")
         # In a container the path may be the host's, of which only the mount's root is there.
         for folder in (place, *place.parents):
-            with suppress(OSError, ValueError, ZeroDivisionError):
-                quota, period = _quota(folder, version=1 if controllers else 2)
-                if quota > 0:
-                    yield quota / period
-            if folder == mount:
+            with suppress(OSError, ValueError, ZeroDivisionError):  # "max" allows all
+                quota, period = map(int, (folder / "cpu.max").read_text().split())
+                yield quota / period
+            if folder == groups:
                 break
-
-
-def _quota(folder: Path, version: int) -> tuple[int, int]:
-    """Microseconds of processor time and the period in which they are allowed.
-
-    Raises ValueError for version 2's "max", which allows all. Version 1 says -1.
-    """
-    if version == 2:
-        quota, period = (folder / "cpu.max").read_text().split()
-    else:
-        quota = (folder / "cpu.cfs_quota_us").read_text()
-        period = (folder / "cpu.cfs_period_us").read_text()
-    return int(quota), int(period)
 
 
 CORES = usable_cores()
@@ -83,6 +66,10 @@ libraries hang or abort where one of their threads cannot start.
 _TASKS_OF_A_WORKER = 4
 _TASKS_OF_A_POOL = 16
 """The fork server, the tracker of resources, and threads of libraries."""
+_FILES = 16
+"""Files that a command opens beside those that it inherits. Rerun aborts where it is imported with
+fewer than 5.
+"""
 _STACK_BYTES = 2**16
 _UNMAPPED = ("failed to map segment", "cannot allocate memory", "cannot create shared object")
 """How the system's loader says that there is no room for a library."""
@@ -171,10 +158,29 @@ def _check_tasks(count: int, instead: str = "") -> None:
             thread.join()
 
 
+def check_files() -> None:
+    """Raise LimitReached unless a command can open the files that it needs."""
+    opened = list[int]()
+    try:
+        while len(opened) < _FILES:
+            opened.append(os.open(os.devnull, os.O_RDONLY))
+    except OSError as error:
+        if error.errno not in (errno.EMFILE, errno.ENFILE):
+            raise
+        raise LimitReached(
+            f"{len(opened)} files can be opened, and care-sim needs {_FILES}: raise the limit "
+            "(ulimit -n)"
+        ) from None
+    finally:
+        for file in opened:
+            os.close(file)
+
+
 def check_at_start() -> None:
     """End the process in one line where its limits leave too little for the libraries."""
     try:
         check_memory()
+        check_files()
         # Linear algebra starts its threads when it is imported.
         _check_tasks(_library_threads() + 1)
     except LimitReached as reached:
@@ -200,6 +206,12 @@ def _settle_caches() -> None:
     """Send the caches of this process, and of those that it starts, to a private temporary folder
     where the home folder cannot be written. The command `care-sim` says so in one line.
     """
+    given = os.environ.get("MPLCONFIGDIR")
+    if given and not _can_be_written(given):
+        # Matplotlib would complain with the whole name, and take a new folder at every start.
+        del os.environ["MPLCONFIGDIR"]
+        if is_command():
+            print("care-sim: MPLCONFIGDIR cannot be written, and is ignored", file=sys.stderr)
     home = os.path.expanduser("~")
     has_home = os.path.isabs(home)
     settled = {"XDG_CACHE_HOME", "MPLCONFIGDIR"} <= {*os.environ}
@@ -215,6 +227,16 @@ def _settle_caches() -> None:
     os.environ.setdefault("MPLCONFIGDIR", str(folder / "matplotlib"))
     if is_command():
         print(f"care-sim: no home folder to write to: caches go to {folder}", file=sys.stderr)
+
+
+def _can_be_written(folder: str) -> bool:
+    """Return True if a folder, or the nearest one above it that exists, can be written."""
+    path = Path(folder)
+    try:
+        nearest = next((each for each in (path, *path.parents) if each.exists()), path)
+        return nearest.is_dir() and os.access(nearest, os.W_OK)
+    except OSError:
+        return False
 
 
 def _private_folder() -> Path:

@@ -1,4 +1,19 @@
-"""Seeds: which are for what, and the independent streams of random numbers that each holds."""
+"""Seeds: which are for what, and the independent streams of random numbers that each holds.
+
+The splits of seeds are disjoint by construction; the table is in docs/environments/index.md. No
+training episode can have a seed below 10,000, whatever `--seed` is, and nothing is chosen by a seed
+below 1,000 but `care-sector` and `place-hulls`, which were first tried on the streets 0 to 19. A
+study of several seeds takes them of one split; one episode, of a command or of an environment that
+is reset by hand, takes any. Where episodes differ by the recording and not by the seed
+(`CARE-Replay-v0`), hold out recordings.
+
+Whoever holds this package can draw the episodes of a public seed, and find the seed of an episode
+by what it begins with. A secret enters everything that is drawn: no observation then tells the
+seed, nor a seed the episode, but what a guess among all that the ranges of a scenario allow tells.
+NumPy's generators are not made for cryptography; to tell from the first numbers that a stream gave
+those that follow is years of computing (Bouillaguet, Martinez and Sauvage, ToSC 2020, on PCG64), no
+proof that it cannot be done.
+"""
 
 import hmac
 from collections.abc import Iterable, Sequence

@@ -14,6 +14,7 @@ from care_sim.base.compiled import compiled
 from care_sim.batch.state import BatchState, Bodies, Fired, Reported, Sensors, Solids
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.belief import lay_ranges
+from care_sim.core.cells.boxes import GridSpacing
 from care_sim.core.conditions import Conditions
 from care_sim.core.firing.base import choose_demanded, list_chosen, top_up
 from care_sim.core.firing.floor import (
@@ -25,7 +26,6 @@ from care_sim.core.firing.floor import (
     seed_stream,
     word_streams,
 )
-from care_sim.core.grid import GridSpacing
 from care_sim.core.rig import Rig
 from care_sim.perception.proxy import count_hits
 from care_sim.sensors.engines.ray_kernels import Fan, cast_into

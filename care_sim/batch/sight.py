@@ -17,7 +17,6 @@ from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.cells.boxes import planar_ranges
 from care_sim.core.conditions import Sensing
 from care_sim.core.frames import turned_alike
-from care_sim.core.grid import copy_rows
 from care_sim.core.pinhole import NEAR_M, CameraModels, model_of, window_on
 from care_sim.core.rig import Rig
 from care_sim.core.types import ImageDetections
@@ -132,6 +131,18 @@ class Sight:
 
 
 @compiled(brief=True)
+def _copy_rows(rows: Floats, into: Floats) -> None:
+    """Copy `rows` (n, k) to the first n rows of `into` (m, k).
+
+    An assignment of slices does the same, but Numba compiles the text of its error along, which
+    takes seconds.
+    """
+    for n in range(rows.shape[0]):
+        for k in range(rows.shape[1]):
+            into[n, k] = rows[n, k]
+
+
+@compiled(brief=True)
 def _see_boxes(
     live: Mask, sensors: Sensors, bodies: Bodies, reported: Reported, boxes: Floats
 ) -> None:
@@ -142,7 +153,7 @@ def _see_boxes(
             for n in range(count):
                 for k in range(boxes.shape[2]):
                     boxes[w, n, k] = bodies.boxes[w, reported.bodies[w, n], k]
-            copy_rows(seen_by(sensors, w, boxes[w, :count]), boxes[w])
+            _copy_rows(seen_by(sensors, w, boxes[w, :count]), boxes[w])
 
 
 @compiled()
@@ -189,11 +200,11 @@ def _look(
             for n in range(len(table)):
                 shown[w, table[n, 0]] |= table[n, 5] >= MIN_PIXELS
             rows, _ = reported_boxes(table, classes, camera)
-            copy_rows(rows, seen.rows[w, count:])
+            _copy_rows(rows, seen.rows[w, count:])
             count += len(rows)
         rows = seen.rows[w, :count]
         surest, _ = surest_first(rows, np.empty(count, np.int64), cameras.least[w])
-        copy_rows(surest, seen.rows[w])
+        _copy_rows(surest, seen.rows[w])
         seen.counts[w] = len(surest)
 
 

@@ -16,7 +16,7 @@ from rich.progress import track
 
 import care_sim
 from care_sim.base.errors import InvalidInput, counted, print_lines, shown
-from care_sim.base.extras import import_minari
+from care_sim.base.extras import import_extra
 from care_sim.base.files import JSON, replacing
 from care_sim.base.seeds import training_seeds
 from care_sim.commands.options.results import ExportMinari, ExportNuScenes
@@ -84,7 +84,7 @@ def _scene_results(config: PlayConfig) -> dict[str, list[JsonRow]]:
 
 def export_minari(options: ExportMinari) -> int:
     """Write a policy's episodes as a Minari dataset."""
-    minari = import_minari()
+    minari = import_extra("minari", "A Minari dataset", "minari")
     folder = _folder(options.dataset)
     policies, seeds = [options.policy], training_seeds(options.episodes)
     given = arguments_of(options, policies)

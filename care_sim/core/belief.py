@@ -124,7 +124,7 @@ class Belief:
     `ego` is the car's own motion as its odometry reads it. `budget` is B, the number of cells that
     may fire. `detections` are the camera's, `tracks` the forecasts for this keyframe. `ranges`
     (E, A) are the last scan in metres: 0 not fired, maximum range no return. The loops make it with
-    `care_sim.core.observation.limits`, within what an observation can hold.
+    `care_sim.loops.observation_limits`, within what an observation can hold.
     """
 
     ego: Ego

@@ -84,7 +84,11 @@ _LEAST_M = 0.01
 
 @dataclass(frozen=True, kw_only=True)
 class ReturnSettings:
-    """Which pulses come back, and what they tell. Raises InvalidInput for a value out of its bounds
+    """What becomes of a LiDAR's pulses on their way there and back, one switch for each effect.
+
+    Every switch is off by default: then each fired cell returns what its ray meets within reach.
+    The formulas lie in `care_sim.sensors`, each with its source; `docs/returns.md` shows them
+    together. Raises InvalidInput for a value out of its bounds
     and for a setting that has no meaning without another one.
     """
 

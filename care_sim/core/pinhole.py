@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from care_sim.base.checks import bounded, check_fields, check_number
+from care_sim.base.checks import bounded, check_fields, checked_place
 from care_sim.base.compiled import compiled
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.arrays import Floats, Integers
@@ -283,12 +283,8 @@ class PinholeCamera:
 
     def __post_init__(self) -> None:
         check_fields(self, " of the camera")
-        if not (isinstance(self.position, tuple | list | np.ndarray) and len(self.position) == 3):
-            raise InvalidInput(
-                f"position of the camera must be x, y and z in metres, got {shown(self.position)}"
-            )
-        for metres in self.position:
-            check_number("position of the camera", metres, -FARTHEST_M, FARTHEST_M)
+        place = checked_place("position of the camera", self.position, (-FARTHEST_M, FARTHEST_M))
+        object.__setattr__(self, "position", place)
 
     @cached_property
     def focal(self) -> float:

@@ -7,9 +7,9 @@ import numpy as np
 from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.belief import Belief
+from care_sim.core.beliefs import Beliefs
 from care_sim.core.cells.sets import CellSets, WorldSets, kept_of_each
 from care_sim.core.frames import turned
-from care_sim.core.observation.beliefs import Beliefs
 from care_sim.core.pinhole import CameraModels, box_rays, model_of, pixel
 from care_sim.core.rig import Rig
 from care_sim.core.types import ImageDetections, Tracks
@@ -30,11 +30,6 @@ def camera_layers(belief: Belief, rig: Rig) -> tuple[CellSets, CellSets]:
     return unexplained.sets, known.sets
 
 
-def unexplained_layer(belief: Belief, rig: Rig) -> CellSets:
-    """U of Algorithm 2 alone, the reserve layer of CARE; nothing is laid for what is explained."""
-    return unexplained_layer_of(Beliefs.of(belief, rig)).sets
-
-
 def camera_layers_of(beliefs: Beliefs) -> tuple[WorldSets, WorldSets]:
     """`camera_layers` of several worlds."""
     every, known = wedges_of(beliefs), explained_of(beliefs)
@@ -42,7 +37,7 @@ def camera_layers_of(beliefs: Beliefs) -> tuple[WorldSets, WorldSets]:
 
 
 def unexplained_layer_of(beliefs: Beliefs) -> WorldSets:
-    """`unexplained_layer` of several worlds."""
+    """U of Algorithm 2 alone, the reserve layer of CARE: nothing is laid for what is explained."""
     new = ~explained_of(beliefs)
     counts = kept_of_each(new, beliefs.detected)
     return WorldSets(wedges(beliefs.detections.take(new), beliefs.rig), counts)

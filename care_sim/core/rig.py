@@ -81,7 +81,7 @@ class Rig:
         # A list could change later, unlike what has been computed from it and kept.
         object.__setattr__(self, "cameras", checked_cameras(self.cameras))
 
-    @property
+    @cached_property
     def sensor_position(self) -> tuple[float, float, float]:
         """The LiDAR's x, y and z in the frame of the car, whose origin lies on the road below its
         middle; metres.
@@ -102,8 +102,8 @@ class Rig:
 
     def check_cameras(self, detections: ImageDetections) -> None:
         """Raise InvalidInput for detections of other cameras."""
-        count = len(self.cameras)
-        if not all(0 <= number < count for number in detections.cameras.tolist()):
+        count, numbers = len(self.cameras), detections.cameras
+        if numbers.min(initial=0) < 0 or numbers.max(initial=-1) >= count:
             raise InvalidInput(f"detections of an observation must be of cameras 0 to {count - 1}")
 
     @cached_property

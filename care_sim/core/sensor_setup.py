@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from care_sim.base.checks import check_number
+from care_sim.base.checks import checked_place
 from care_sim.base.digests import combined_digest
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.files import parsed_json
@@ -20,8 +20,8 @@ from care_sim.core.rig import LIDAR_HEIGHT_M, LIDAR_X_M, MOST_SHIFT_M
 LIDAR_POSITION: Place = (LIDAR_X_M, 0.0, LIDAR_HEIGHT_M)
 """Metres in the frame of the car: LIDAR_TOP of nuScenes, the default."""
 _LONGEST_NAME = 60
-_LOWEST_M, _HIGHEST_M = 0.1, 10.0
-"""A LiDAR on a car stands between these above the road."""
+_WITHIN = (-MOST_SHIFT_M, MOST_SHIFT_M), (-MOST_SHIFT_M, MOST_SHIFT_M), (0.1, 10.0)
+"""Metres between which a LiDAR on a car stands along x, y and z, which is above the road."""
 
 
 @dataclass(frozen=True)
@@ -54,10 +54,10 @@ class SensorSetup:
             raise InvalidInput(
                 f"grid{of} must be an AngularGrid or a GridStack, got {shown(self.grid)}"
             )
-        _check_position(f"the position{of}", self.position)
-        object.__setattr__(self, "position", _unsigned(self.position))
+        position = checked_place(f"the position{of}", self.position, *_WITHIN)
+        object.__setattr__(self, "position", position)
         for number, position in enumerate(self.positions[1:], 2):
-            _check_position(f"the position of LiDAR {number}{of}", position)
+            checked_place(f"the position of LiDAR {number}{of}", position, *_WITHIN)
         self._check_cameras(of)
 
     @classmethod
@@ -83,9 +83,9 @@ class SensorSetup:
         (grid, first), *others = lidars
         if not others:
             return cls(name, grid, first, tuple(cameras))
-        for position in (first, *(position for _, position in others)):
-            _check_position(f"a position of the sensor set-up {name}", position)
-        places = [between(first, position) for _, position in lidars]
+        what = f"a position of the sensor set-up {name}"
+        positions = [checked_place(what, position, *_WITHIN) for _, position in lidars]
+        places = [between(positions[0], position) for position in positions]
         stack = GridStack(tuple(grid for grid, _ in lidars), tuple(places))
         return cls(name, stack, first, tuple(cameras))
 
@@ -143,12 +143,7 @@ class SensorSetup:
             (seen,) = self.grid.wedges(picture, 0, 0, np.array([camera.position], float))
             if not len(seen):
                 raise InvalidInput(f"camera {number}{of} sees nothing of the grid")
-        # As plain numbers in a tuple: equal set-ups then have equal hashes.
-        object.__setattr__(self, "cameras", tuple(map(_plain, cameras)))
-
-
-def _plain(camera: PinholeCamera) -> PinholeCamera:
-    return replace(camera, position=_unsigned(camera.position))
+        object.__setattr__(self, "cameras", cameras)
 
 
 def grid_of(plain: dict[str, Any]) -> Grid:
@@ -158,30 +153,14 @@ def grid_of(plain: dict[str, Any]) -> Grid:
     return GridStack(**plain | {"grids": tuple(AngularGrid(**grid) for grid in plain["grids"])})
 
 
-def _check_position(what: str, position: object) -> None:
-    if not (isinstance(position, tuple | list) and len(position) == 3):
-        raise InvalidInput(f"{what} must be x, y and z in metres, got {shown(position)}")
-    x, y, z = position
-    check_number(f"x of {what}", x, -MOST_SHIFT_M, MOST_SHIFT_M)
-    check_number(f"y of {what}", y, -MOST_SHIFT_M, MOST_SHIFT_M)
-    check_number(f"z of {what}", z, _LOWEST_M, _HIGHEST_M)
-
-
 def _sum(one: Place, other: Place) -> Place:
-    x, y, z = (a + b for a, b in zip(one, other, strict=True))
-    return x, y, z
-
-
-def _unsigned(position: Sequence[float]) -> Place:
-    """Plain numbers; zero has no sign, which equality does not tell but a hash would."""
-    x, y, z = (float(metres) + 0.0 for metres in position)
+    x, y, z = (float(a + b) for a, b in zip(one, other, strict=True))
     return x, y, z
 
 
 def on_car(lidar: Place, camera: PinholeCamera) -> Place:
     """Where a camera stands in the frame of the car, whose LiDAR is at `lidar`."""
-    x, y, z = (float(a + b) for a, b in zip(lidar, camera.position, strict=True))
-    return x, y, z
+    return _sum(lidar, camera.position)
 
 
 def between(lidar: Place, other: Place) -> Place:

@@ -78,7 +78,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     | `misses` | keyframes since it was last detected |
     | `hits` | keyframes at which it was detected |
 
-    `care_sim.core.observation.limits` says which rows are kept if there are more, and what becomes
+    `care_sim.loops.observation_limits` says which rows are kept if there are more, and what becomes
     of numbers that no sensor can tell.
 
     ### Reward

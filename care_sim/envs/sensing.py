@@ -23,10 +23,10 @@ from care_sim.core.conditions import MIN_RETURNS, Conditions
 from care_sim.core.firing.floor import RandomFloor
 from care_sim.core.firing.listing import hardware_of
 from care_sim.core.grid import Cells, Place
-from care_sim.core.observation.limits import Limits
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.rig import Rig
 from care_sim.core.types import Action
+from care_sim.loops.observation_limits import Limits
 from care_sim.loops.truth import Loop, Truth
 from care_sim.perception.detectors import CLUSTER, PROXY, check_detector, make_detector
 from care_sim.perception.points_only import Detector
@@ -37,7 +37,7 @@ def observation_space(rig: Rig) -> spaces.Space[Any]:
     """The bounded observation space of a rig.
 
     Keys and columns are as in `care_sim.core.types`, bounds as in
-    `care_sim.core.observation.limits`.
+    `care_sim.loops.observation_limits`.
     """
     grid = rig.grid
     limits = Limits(rig)

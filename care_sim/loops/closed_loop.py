@@ -11,7 +11,6 @@ from care_sim.core.cells.boxes import planar_ranges
 from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.frames import Frame
 from care_sim.core.grid import Cells
-from care_sim.core.observation.limits import Limits
 from care_sim.core.rig import Rig
 from care_sim.core.types import Detections, Scan, Tracks
 from care_sim.driving.corridor import along_route
@@ -20,6 +19,7 @@ from care_sim.driving.localisation import Localisation, Odometry
 from care_sim.loops.cameras import Cameras
 from care_sim.loops.episode import SensorSeeds
 from care_sim.loops.needless import NeedlessBraking, UnfoundedBraking
+from care_sim.loops.observation_limits import Limits
 from care_sim.loops.records import Keyframe, Sight
 from care_sim.loops.truth import Told, TrackObjects, told_by
 from care_sim.perception.matching import found_objects

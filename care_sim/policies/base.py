@@ -14,10 +14,10 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.allocation import allocate
 from care_sim.core.arrays import Integers
 from care_sim.core.belief import Belief, Observation
+from care_sim.core.beliefs import Beliefs
 from care_sim.core.cells.sets import WorldSets
 from care_sim.core.firing.actions import scores_of
 from care_sim.core.grid import Cells
-from care_sim.core.observation.beliefs import Beliefs
 from care_sim.core.rig import Rig
 from care_sim.core.types import Action, Demand
 from care_sim.loops.truth import Truth

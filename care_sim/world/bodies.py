@@ -39,7 +39,10 @@ REFLECTANCES = {
     CONCRETE: 0.24,
     ASPHALT: 0.17,
 }
-"""Reflectance by material, 0 to 1."""
+"""The share of a near-infrared pulse that a surface of each material scatters, 0 to 1, as if it did
+so alike in all directions (Lambert); what shines like a mirror, as paint and glass also do, is left
+out. The LiDARs of cars send at 850 to 905 nm.
+"""
 
 
 Triple = tuple[float, float, float]

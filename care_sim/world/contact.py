@@ -105,7 +105,10 @@ StandIns = tuple[StandIn, StandIn]
 
 class ClearanceJudge:
     """The distances of `BulletWorld.clearance`, to the last bit, between an ego and another body,
-    given by their kinds and poses.
+    given by their kinds and poses, asked of one client of PyBullet for any worlds.
+
+    The parts of a body stand apart there: PyBullet measures every two parts of two bodies, and most
+    of them are too far apart to matter. It is asked about those that could be the nearest.
     """
 
     def __init__(self) -> None:

@@ -1,5 +1,3 @@
-import errno
-import os
 import re
 import sys
 
@@ -7,7 +5,7 @@ import pytest
 
 from care_sim.base import extras
 from care_sim.base.errors import MissingExtra
-from care_sim.base.extras import STANDARD_ERROR, import_open3d, install_command, silenced
+from care_sim.base.extras import import_open3d, install_command
 
 
 def test_a_missing_system_library_names_the_debian_packages(tmp_path, monkeypatch):
@@ -34,28 +32,3 @@ def test_a_missing_extra_is_named(monkeypatch):
 def test_an_installed_wheel_needs_no_clone(tmp_path, monkeypatch):
     monkeypatch.setattr(extras, "_HOME", tmp_path)
     assert install_command("video") == "pip install 'care-sim[video]'"
-
-
-def test_open3d_where_it_is_installed():
-    pytest.importorskip("libusb_package")
-    try:
-        open3d = import_open3d()
-    except MissingExtra as error:
-        pytest.skip(str(error))
-    assert len(open3d.geometry.PointCloud().points) == 0
-
-
-def refused(number):
-    def dup(_descriptor):
-        raise OSError(number, os.strerror(number))
-
-    return dup
-
-
-def test_a_closed_descriptor_needs_no_silence_and_a_shortage_of_them_is_told(monkeypatch):
-    monkeypatch.setattr(os, "dup", refused(errno.EBADF))
-    with silenced(STANDARD_ERROR):
-        pass
-    monkeypatch.setattr(os, "dup", refused(errno.EMFILE))
-    with pytest.raises(OSError, match="Too many open files"), silenced(STANDARD_ERROR):
-        pass

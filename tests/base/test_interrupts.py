@@ -26,6 +26,22 @@ sys.argv = {arguments!r}
 from care_sim.cli import main
 main()
 """
+IN_A_FINALISER = """
+import os, signal, sys, time
+from care_sim.base import interrupts
+
+class Interrupted:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGINT)
+        sum(range(1000))
+
+interrupts.raise_them()
+try:
+    Interrupted()
+    time.sleep(60)
+except KeyboardInterrupt:
+    print("heard")
+"""
 
 
 @pytest.mark.parametrize(
@@ -43,6 +59,11 @@ def test_an_interrupt_within_an_import_of_the_command_is_one_line(module, end):
     with Marked([sys.executable, "-c", program]) as started:
         assert started.process.communicate(timeout=60) == ("", "care-sim: interrupted\n")
         assert started.process.returncode == 130
+
+
+def test_an_interrupt_that_a_finaliser_swallows_comes_again():
+    with Marked([sys.executable, "-c", IN_A_FINALISER]) as started:
+        assert started.process.communicate(timeout=60) == ("heard\n", "")
 
 
 def test_a_library_does_not_touch_the_handlers_of_its_user():

@@ -3,7 +3,7 @@
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.base.plugins import Plugins, package_of
+from care_sim.base.plugins import Plugins
 
 MODULE = """
 import sys
@@ -48,14 +48,6 @@ def test_a_built_in_name_is_taken_and_of_two_the_first_on_the_path_counts(instal
     assert (THINGS.maker("usual")(), THINGS.maker("twin")()) == ("usual", "ours")
 
 
-def test_what_does_not_count_is_told_with_what_does(installed):
-    hidden = [
-        (package_of(entry), entry.name, winner and package_of(winner))
-        for entry, winner in THINGS.hidden_entries()
-    ]
-    assert hidden == [("behind 1.5", "twin", "ahead 1.5"), ("behind 1.5", "usual", None)]
-
-
 @pytest.mark.parametrize(
     ("name", "told"),
     [
@@ -95,23 +87,6 @@ def test_what_cannot_be_made_is_one_line(installed, name, reason):
         THINGS.maker(name)
     assert str(error.value).startswith(reason)
     assert "\n" not in str(error.value)
-
-
-@pytest.mark.parametrize("name", ["nobody", 3, None])
-def test_only_names_are_known(installed, name):
-    THINGS.check("twin")
-    with pytest.raises(InvalidInput, match="unknown thing"):
-        THINGS.check(name)
-
-
-def test_a_module_without_the_name_tells_where_it_was_found(install, tmp_path):
-    install("plain", "reach = 3", THINGS.group, lost="Missing")
-    with pytest.raises(InvalidInput) as caught:
-        THINGS.maker("lost")
-    place = tmp_path / "plain" / "plain.py"
-    assert str(caught.value) == (
-        f"AttributeError: module 'plain' has no attribute 'Missing' (found in {place})"
-    )
 
 
 def test_a_folder_that_hides_the_module_is_named(install, tmp_path, monkeypatch):

@@ -47,12 +47,6 @@ def test_without_the_demand_behind_it_an_action_tells_no_more_than_what_it_chose
     np.testing.assert_array_equal(shares(DEMAND, behind), expected.reshape(3, 4))
 
 
-def test_scored_cells_beyond_the_budget_have_no_share():
-    action = np.linspace(1, 0.1, 12, dtype=np.float32).reshape(3, 4)
-    found = shares_of(fired_cells(action, 6, lambda: FLOOR_ORDER), action, None, RIG)
-    np.testing.assert_array_equal(found.ravel(), [CHOSEN] * 6 + [NOT_FIRED] * 6)
-
-
 cells = (
     st.lists(st.integers(0, 11), max_size=6, unique=True)
     .map(np.array)

@@ -4,11 +4,10 @@ import re
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.allocation import allocate
 from care_sim.core.cells.order import COLUMN_STEP, ROW_STEP, SetMargins, reordered
 from care_sim.core.defaults import AS_DEMANDED, CELL_ORDERS
 from care_sim.core.grid import AngularGrid
@@ -45,11 +44,6 @@ def rectangles(draw):
     return draw(st.integers(0, COLUMNS - 1)), width, draw(st.integers(0, ROWS - height)), height
 
 
-@given(st.lists(st.integers(0, GRID.size - 1), unique=True), st.sampled_from(ORDERS))
-def test_every_order_lists_the_cells_of_the_set(cells, order):
-    assert np.sort(listed(np.array(cells, np.int64), order)).tolist() == sorted(cells)
-
-
 @given(
     st.lists(rectangles(), max_size=4),
     st.integers(0, 50) | st.integers(0, 2 * GRID.size),
@@ -60,18 +54,6 @@ def test_the_first_few_cells_are_those_of_the_whole_order(where, most, order):
     whole = reordered(sets, order, GRID, MARGINS)
     first = reordered(sets, order, GRID, MARGINS, most)
     assert [cells.tolist() for cells in first] == [cells[:most].tolist() for cells in whole]
-
-
-@given(rectangles())
-def test_rows_and_columns(where):
-    first, width, _, _ = where
-    cells = rectangle(*where)
-    assert listed(cells[::-1], "rows-down").tolist() == cells.tolist()
-    rows, columns = places(listed(cells, "rows-up"), 0)
-    assert np.lexsort((columns, -rows)).tolist() == [*range(len(cells))]
-    start = first if width < COLUMNS else 0
-    rows, columns = places(listed(cells, "columns"), start)
-    assert np.lexsort((rows, columns)).tolist() == [*range(len(cells))]
 
 
 @given(
@@ -85,40 +67,6 @@ def test_the_seam_makes_no_difference(where, turned, order):
     there = (first + turned) % COLUMNS
     turned_cells = listed(rectangle(there, width, upper, height), order)
     assert np.array_equal(here, places(turned_cells, there))
-
-
-@given(rectangles(), st.integers(0, 3), st.integers(0, 3))
-def test_the_core_is_the_rectangle_before_it_was_dilated(where, sides, ends):
-    first, width, upper, height = where
-    whole = rectangle(
-        first - sides,
-        min(width + 2 * sides, COLUMNS),
-        max(upper - ends, 0),
-        min(upper + height + ends, ROWS) - max(upper - ends, 0),
-    )
-    found = listed(whole, "core-spread", SetMargins(sides, ends))
-    core = rectangle(*where)
-    # All round, and where the grid cuts the margins, more is core: `by_the_letter` holds that.
-    assume(width + 2 * sides < COLUMNS)
-    assume(upper - ends > 0 and upper + height + ends < ROWS)
-    assert set(found[: len(core)]) == set(core)
-    # Core and rim are each in the order of the whole.
-    spread = listed(whole, "spread")
-    in_core = np.isin(spread, core)
-    assert np.array_equal(found, np.concatenate([spread[in_core], spread[~in_core]]))
-
-
-def test_a_set_that_is_all_margin_keeps_its_middle():
-    cells = rectangle(10, 3, 5, 2)
-    found = listed(cells, "core-spread", SetMargins(2, 1))
-    rows, columns = places(found, 10)
-    assert columns[:2].tolist() == [1, 1]
-    assert sorted(rows[:2]) == [5, 6]
-
-
-def test_rows_cut_by_the_grid_have_no_margin():
-    rows, _ = places(listed(rectangle(100, 5, 0, 4), "core-spread"), 100)
-    assert sorted(rows[:3]) == [0, 1, 2]
 
 
 @pytest.mark.parametrize("order", ["spread", "core-spread"])
@@ -154,15 +102,6 @@ def test_random_is_one_permutation_of_the_grid():
     assert not np.array_equal(everything, np.sort(everything))
 
 
-def test_sets_are_ordered_one_by_one():
-    sets = [rectangle(5, 9, 2, 4), np.empty(0, np.int64), rectangle(500, 30, 20, 12)]
-    for order in ORDERS:
-        together = reordered(sets, order, GRID, MARGINS)
-        assert [a.tolist() for a in together] == [
-            listed(cells, order).tolist() if len(cells) else [] for cells in sets
-        ]
-
-
 @pytest.mark.parametrize("cell", [-1, GRID.size])
 def test_a_cell_beyond_the_grid_is_refused(cell):
     with pytest.raises(InvalidInput, match="cells must lie in"):
@@ -179,10 +118,6 @@ def test_the_rig_lists_all_sets_of_a_demand():
         strict=True,
     ):
         assert np.array_equal(ours, listed(theirs, "spread"))
-
-
-def test_the_allocator_takes_a_set_in_its_order():
-    assert allocate(Demand(layers=[[[7, 3, 5], [5, 1]]]), 4, 0.3).tolist() == [7, 5, 3, 1]
 
 
 @st.composite
@@ -259,18 +194,3 @@ def test_agrees_with_the_orders_by_the_letter(made, order):
 def test_only_an_order_can_be_asked_for(order):
     with pytest.raises(InvalidInput, match=r"unknown order .*; known: columns, core-spread"):
         reordered([np.arange(9)], order, GRID, MARGINS)
-
-
-@pytest.mark.parametrize("demand", [None, Demand(None), Demand((), None), Demand((), [None])])
-def test_a_demand_of_another_form_is_refused_as_the_allocator_does(demand):
-    with pytest.raises(InvalidInput) as ours:
-        Rig(cell_order="spread").in_cell_order(demand)
-    with pytest.raises(InvalidInput) as theirs:
-        allocate(demand, 5, 0.3)
-    assert str(ours.value) == str(theirs.value)
-
-
-def test_an_unknown_order_is_named():
-    with pytest.raises(InvalidInput, match="cell_order 'backwards'; known: as-demanded"):
-        Rig(cell_order="backwards")
-    assert Rig().cell_order == AS_DEMANDED

@@ -35,11 +35,6 @@ def test_guard_distance_of_the_paper(speed, guard):
     assert ForgettingRules().guard_distance(speed) == guard
 
 
-def test_without_scale_there_is_no_guard(tracks_at):
-    assert ForgettingRules(k_safe=0.0).guard_distance(30.0) == 0.0
-    assert settled(tracks_at(("car", 1, 0, 0, 0)), Ego(30.0), k_safe=0.0) == ([0], [True])
-
-
 @pytest.mark.smoke
 def test_static_tracks_are_forgotten_only_outside_the_guard(tracks_at):
     tracks = tracks_at(
@@ -86,12 +81,6 @@ def test_the_margin_decays_by_a_column_a_keyframe_down_to_none(tracks_at):
     assert margins[-1] == 0
 
 
-def test_a_slower_schedule_takes_longer(tracks_at):
-    tracks = tracks_at(("car", 30, 0, 0, 0))
-    assert settled(tracks, keyframes=2, decay_per_keyframe=0.25)[0] == [2]
-    assert settled(tracks, keyframes=20, decay_per_keyframe=0.25)[0] == [0]
-
-
 def test_one_unsafe_keyframe_starts_the_streak_anew(tracks_at):
     memory = forgetting()
     still, moving = tracks_at(("car", 30, 0, 0, 0)), tracks_at(("car", 30, 0, 0, 5))
@@ -121,11 +110,6 @@ def test_localization_noise_keeps_the_margin_of_equation_4(tracks_at, distance, 
     """0.4 m at range r, in columns of 2 pi / 512 rounded up, never more than the full margin."""
     assert min(int(np.ceil(0.4 / distance / WIDTH)), 2) == columns
     assert settled(tracks_at(("car", distance, 0, 0, 0)), position_sigma_m=0.4)[0] == [columns]
-
-
-def test_no_tracks_no_margins(tracks_at):
-    margins, low = advanced(forgetting(), tracks_at(), Ego(5.0))
-    assert (margins.tolist(), low.tolist()) == ([], [])
 
 
 def test_a_track_needs_two_frames_before_it_can_be_forgotten(tracks_at):

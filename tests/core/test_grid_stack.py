@@ -19,9 +19,11 @@ from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.residual import wedges
 from care_sim.core.rig import Rig
 from care_sim.core.types import Ego, ImageDetections, Tracks
+from tests.core.test_grid import boxes, sample
 from tests.helpers.lidars import DEGREE, LEFT, RIGHT, ROOF, STACK
 
-ALONE = GridStack((ROOF,), ((0.0, 0.0, 0.0),))
+ORIGIN = (0.0, 0.0, 0.0)
+ALONE = GridStack((ROOF,), (ORIGIN,))
 SIDES = GridStack((ROOF, LEFT, RIGHT), ((0.0, 0.0, 0.0), (2.3, 0.65, -1.3), (2.3, -3.0, -1.3)))
 """The third so far to the side that its own azimuths of near things differ by much."""
 TALL = AngularGrid(64, 33, 60 * DEGREE, -60 * DEGREE)
@@ -29,15 +31,6 @@ MARGINS = SetMargins(2, 1)
 FRONT = PinholeCamera(horizontal_fov=90 * DEGREE, position=(0.7, 0.0, -0.3))
 """At the first LiDAR, and not at the others."""
 
-boxes = st.tuples(
-    st.floats(-40, 40),
-    st.floats(-40, 40),
-    st.floats(-3, 3),
-    st.floats(0.1, 12),
-    st.floats(0.1, 12),
-    st.floats(0.1, 5),
-    st.floats(-4, 4),
-).map(np.array)
 ahead = st.tuples(
     st.floats(9, 45),
     st.floats(-30, 30),
@@ -47,15 +40,6 @@ ahead = st.tuples(
     st.floats(0.5, 3),
     st.floats(-4, 4),
 ).map(np.array)
-
-
-def points_in(box, seed, count=60):
-    """Points of a box, half of them near its surface."""
-    shares = np.random.default_rng(seed).uniform(-1, 1, (count, 3))
-    shares[: count // 2] = np.sign(shares[: count // 2]) * np.abs(shares[: count // 2]) ** 0.02
-    x, y, z = (shares * (1 - 1e-9) * box[3:6] / 2).T
-    cos, sin = np.cos(box[6]), np.sin(box[6])
-    return box[:3] + np.stack([cos * x - sin * y, sin * x + cos * y, z], axis=1)
 
 
 def detection(image_boxes):
@@ -116,7 +100,7 @@ def assert_same(one, other):
 def test_every_lidar_finds_the_points_of_a_box_in_its_hull(some, seed):
     for box, hull in zip(some, SIDES.hulls(np.array(some), 0, 0), strict=True):
         assert (np.diff(hull) > 0).all()
-        cells = SIDES.cells_at(points_in(box, seed))
+        cells = SIDES.cells_at(sample(box, seed, 60))
         assert {*cells[cells >= 0].tolist()} <= {*hull.tolist()}
 
 
@@ -130,7 +114,7 @@ def test_what_a_camera_shows_is_in_the_wedge_of_every_lidar_that_sees_it(box, se
     # The camera looks straight ahead: its depth is along x.
     assume((box_corners(box[None])[0, :, 0] > FRONT.position[0] + LEAST_DEPTH_M).all())
     (wedge,) = wedges(detection([span]), Rig(SIDES, (FRONT,), azimuth_margin=0, elevation_margin=0))
-    found = SIDES.cells_at(np.vstack([box[:3], points_in(box, seed)]))
+    found = SIDES.cells_at(np.vstack([box[:3], sample(box, seed, 60)]))
     # The first LiDAR is at the camera, so that its wedge is the paper's, without parallax.
     others = found[:, 1:]
     assume((others >= 0).any())
@@ -207,20 +191,6 @@ def test_wedges_keep_the_order_of_their_boxes():
         assert together[n].tolist() == alone.tolist()
 
 
-@given(boxes, st.sampled_from(CELL_ORDERS[1:]), st.integers(0, 200))
-def test_every_order_lists_each_lidar_as_it_is_listed_alone(box, order, most):
-    (hull,) = STACK.hulls(box[None])
-    (listed,) = reordered([hull], order, STACK, MARGINS)
-    assert np.sort(listed).tolist() == hull.tolist()
-    (few,) = reordered([hull], order, STACK, MARGINS, most)
-    assert few.tolist() == listed[:most].tolist()
-    # A permutation of all cells is another one than that of a part of them.
-    for head in STACK.heads if order != "random" else ():
-        own = listed[(listed >= head.first) & (listed < head.cells.stop)] - head.first
-        (alone,) = reordered([np.sort(own)], order, head.grid, MARGINS)
-        assert own.tolist() == alone.tolist()
-
-
 def test_the_cores_of_all_lidars_come_before_all_margins():
     """Each core is a block without its two columns and its row on every side; at the first row of
     its LiDAR the second has no margin, as it has none at the top of a grid.
@@ -278,27 +248,21 @@ def test_forgetting_keeps_what_the_lidar_with_the_narrowest_columns_needs():
     assert margins == [[1], [2]]
 
 
-def test_what_is_no_stack_is_refused_in_one_line():
-    origin = (0.0, 0.0, 0.0)
-    refused = [
-        (((), ()), "grids of a stack must be AngularGrids"),
-        (((ROOF, 3), (origin, origin)), "grids of a stack must be AngularGrids"),
-        (((ROOF, LEFT), (origin,)), "places of a stack must be one for each of its 2 grids"),
-        (((ROOF,), ((0.0, 1.0, 0.0),)), "places of a stack must begin at 0, 0, 0"),
-        (((ROOF,), ((0.0, 1.0),)), "places of a stack must be x, y and z in metres"),
-        (((ROOF, LEFT), (origin, (0.0, 99.0, 0.0))), "places of a stack must"),
-        (
-            ((ROOF, AngularGrid(128, 4)), (origin, origin)),
-            "LiDARs of one set-up must have as many columns each, got 64 and 128: give all",
-        ),
-        (((AngularGrid(64, 600),) * 2, (origin, origin)), "at most 1024 rows in all, got 1200"),
-    ]
-    for arguments, words in refused:
-        with pytest.raises(InvalidInput, match=words) as told:
-            GridStack(*arguments)
-        assert "\n" not in str(told.value)
-    with pytest.raises(InvalidInput, match="grid must be an AngularGrid or a GridStack"):
-        Rig(3)
+@pytest.mark.parametrize(
+    ("grids", "places", "words"),
+    [
+        ((), (), "grids of a stack must be AngularGrids"),
+        ((ROOF, LEFT), (ORIGIN,), "places of a stack must be one for each of its 2 grids"),
+        ((ROOF,), ((0.0, 1.0, 0.0),), "places of a stack must begin at 0, 0, 0"),
+        ((ROOF,), ((0.0, 1.0),), "places of a stack must be x, y and z in metres"),
+        ((ROOF, LEFT), (ORIGIN, (0.0, 99.0, 0.0)), "y of places of a stack must"),
+        ((ROOF, AngularGrid(128, 4)), (ORIGIN, ORIGIN), "as many columns each, got 64 and 128"),
+        ((AngularGrid(64, 600),) * 2, (ORIGIN, ORIGIN), "at most 1024 rows in all, got 1200"),
+    ],
+)
+def test_what_is_no_stack_is_refused(grids, places, words):
+    with pytest.raises(InvalidInput, match=words):
+        GridStack(grids, places)
 
 
 def test_a_copy_leaves_its_tables_behind():

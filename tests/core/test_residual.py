@@ -4,9 +4,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.core.belief import Belief
+from care_sim.core.beliefs import Beliefs
 from care_sim.core.frames import turned
 from care_sim.core.pinhole import PinholeCamera
-from care_sim.core.residual import camera_layers, explained, unexplained_layer, wedges
+from care_sim.core.residual import camera_layers, explained, unexplained_layer_of, wedges
 from care_sim.core.rig import Rig
 from care_sim.core.types import Ego, ImageDetections, Tracks
 from care_sim.sensors.surround import SURROUND_CAMERAS
@@ -22,41 +23,6 @@ def box_around(point, half=5.0, camera=CAMERA):
 
 def belief(detections, tracks):
     return Belief(Ego(), RIG.budget, detections, tracks, np.zeros(RIG.grid.shape, np.float32))
-
-
-@pytest.mark.smoke
-def test_a_same_class_centre_inside_the_box_explains_it(tracks_at, seen):
-    tracks = tracks_at(("pedestrian", 20, 2, 0, 0))
-    inside = seen(("pedestrian", *box_around((20, 2, -1))))
-    assert explained(inside, tracks, RIG).tolist() == [True]
-
-
-def test_another_class_explains_nothing(tracks_at, seen):
-    tracks = tracks_at(("car", 20, 2, 0, 0))
-    assert explained(seen(("pedestrian", *box_around((20, 2, -1)))), tracks, RIG).tolist() == [
-        False
-    ]
-
-
-def test_a_centre_beside_the_box_explains_nothing(tracks_at, seen):
-    tracks = tracks_at(("car", 20, 2, 0, 0))
-    left, top, right, bottom = box_around((20, 2, -1))
-    beside = seen(
-        ("car", left + 12, top, right + 12, bottom), ("car", left, top + 12, right, bottom + 12)
-    )
-    assert explained(beside, tracks, RIG).tolist() == [False, False]
-
-
-def test_one_track_of_several_is_enough_and_each_box_is_judged_alone(tracks_at, seen):
-    tracks = tracks_at(("car", 30, -4, 0, 0), ("truck", 20, 2, 0, 0), ("car", 20, 2, 0, 0))
-    boxes = seen(("car", *box_around((20, 2, -1))), ("car", *box_around((15, -8, -1))))
-    assert explained(boxes, tracks, RIG).tolist() == [True, False]
-
-
-def test_a_track_behind_the_camera_explains_nothing(tracks_at, seen):
-    """Its mirror image through the pinhole would lie in the box."""
-    tracks = tracks_at(("car", -20, -2, 0, 0), z=1.0)
-    assert explained(seen(("car", *box_around((20, 2, -1)))), tracks, RIG).tolist() == [False]
 
 
 def test_forecasts_are_turned_back_to_when_the_picture_was_taken(tracks_at, seen):
@@ -105,19 +71,11 @@ def test_layers_part_what_memory_explains_from_what_it_does_not(tracks_at, seen)
         ("car", *box_around((30, -6, -1))),
     )
     unexplained, known = camera_layers(belief(boxes, tracks), RIG)
-    alone = unexplained_layer(belief(boxes, tracks), RIG)
+    alone = unexplained_layer_of(Beliefs.of(belief(boxes, tracks), RIG)).sets
     assert [cells.tolist() for cells in alone] == [cells.tolist() for cells in unexplained]
     first, second, third = (wedge.tolist() for wedge in wedges(boxes, RIG))
     assert [wedge.tolist() for wedge in unexplained] == [second]
     assert [wedge.tolist() for wedge in known] == [first, third]
-
-
-def test_without_tracks_everything_is_residual_and_without_camera_nothing(tracks_at, seen):
-    boxes = seen(("car", 10, 10, 50, 50), ("bus", 100, 80, 200, 120))
-    unexplained, known = camera_layers(belief(boxes, tracks_at()), RIG)
-    assert (len(unexplained), len(known)) == (2, 0)
-    unexplained, known = camera_layers(belief(seen(), tracks_at(("car", 20, 0, 0, 0))), RIG)
-    assert (len(unexplained), len(known)) == (0, 0)
 
 
 def test_each_detection_is_turned_by_its_own_yaw_change(seen):

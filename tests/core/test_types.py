@@ -88,11 +88,6 @@ def test_padding_is_class_and_id_minus_one_and_float32():
     assert {array.dtype for array in observation.values()} == {np.dtype(np.float32)}
 
 
-def test_nothing_known_is_nothing_read():
-    read = Belief.from_observation(belief().to_observation())
-    assert (len(read.tracks), len(read.detections)) == (0, 0)
-
-
 def test_tables_hold_what_they_can_and_refuse_more_in_one_line():
     tracks = [[n, 0, n, *[0] * 10] for n in range(MAX_TRACKS + 1)]
     detections = [[0, 1, n, *[0] * 6] for n in range(MAX_DETECTIONS + 1)]
@@ -126,12 +121,6 @@ def test_columns_read_off_rows_are_those_that_made_them(kind):
         told.rows()[0] = 0.0
 
 
-def test_take_by_index_and_by_mask():
-    tracks = belief([[n, 0, n, *[0] * 10] for n in range(4)]).tracks
-    assert tracks.take(np.array([2, 0])).ids.tolist() == [2, 0]
-    assert tracks.take(np.array([True, False, False, True])).boxes[:, 0].tolist() == [0, 3]
-
-
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("kind", [ImageDetections, Tracks])
 @pytest.mark.parametrize("number", [np.nan, np.inf, 1e30])
@@ -141,9 +130,3 @@ def test_rows_whose_whole_numbers_are_none_are_refused_in_one_line(kind, number)
     with pytest.raises(InvalidInput, match="must be numbers up to 9"):
         kind.from_rows(rows)
     assert len(kind.from_rows(rows[:1])) == 1
-
-
-def test_an_observation_of_no_cells_is_refused_in_one_line():
-    observation = {**belief().to_observation(), "ranges": np.empty((0, 7), np.float32)}
-    with pytest.raises(InvalidInput, match=r"ranges of an observation must hold a cell at least"):
-        Belief.from_observation(observation)

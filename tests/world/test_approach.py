@@ -39,12 +39,3 @@ def test_the_first_contact_is_told():
     impact = world.advance(0.0, 1.0).impact
     world.close()
     assert (impact.body, impact.speed_mps, impact.at_front) == (standing.body, 8.0, True)
-
-
-def test_who_runs_into_a_standing_ego_is_not_run_into():
-    traffic = Traffic((1,), ego_lane=0, lane_width=3.5, speed_limit=20.0)
-    world = World(traffic, 0.0)
-    runner = world.add("child", "child", lambda time: (-1.0, -3.0 + 2.0 * time, np.pi / 2))
-    impact = world.advance(0.0, 2.0).impact
-    world.close()
-    assert (impact.body, impact.speed_mps, impact.at_front) == (runner.body, 0.0, False)

@@ -1,5 +1,4 @@
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -22,30 +21,6 @@ def test_a_box_stands_on_the_ground_and_turns_with_its_body():
     made.move_all(np.array([1]), np.array([[3.0, 4.0, 0.5]]))
     assert made.boxes[1].tolist() == [3.0, 4.0, 3.47 / 2, 11.19, 2.94, 3.47, 0.5]
     assert np.isnan(made.boxes[0]).all()
-
-
-@pytest.mark.parametrize(("gap", "near"), [(0.49, [2]), (0.51, [])])
-@pytest.mark.parametrize("side", [1, -1])
-def test_near_is_told_by_the_gap_along_the_road(side, gap, near):
-    ahead = side * (EGO.size[0] / 2 + gap + BUS.size[0] / 2)
-    assert (
-        footprints((EGO, (5.0, 1.0, 0.0)), (BUS, (5.0 + ahead, 1.0, 0.0))).near(1, 0.5).tolist()
-        == near
-    )
-
-
-@pytest.mark.parametrize(("gap", "near"), [(0.49, [2]), (0.51, [])])
-def test_a_body_across_the_road_presents_its_width(gap, near):
-    ahead = EGO.size[0] / 2 + gap + BUS.size[1] / 2
-    assert (
-        footprints((EGO, (0.0, 0.0, 0.0)), (BUS, (ahead, 0.0, np.pi / 2))).near(1, 0.5).tolist()
-        == near
-    )
-    beside = EGO.size[1] / 2 + gap + BUS.size[0] / 2
-    assert (
-        footprints((EGO, (0.0, 0.0, 0.0)), (BUS, (0.0, beside, np.pi / 2))).near(1, 0.5).tolist()
-        == near
-    )
 
 
 POSES = st.tuples(st.floats(-9, 9), st.floats(-6, 6), st.floats(-4, 4))

@@ -1,10 +1,10 @@
-"""The flow of a lane, held to highway-env's own drivers."""
+"""Drivers of a lane, and of a street."""
 
 import numpy as np
 import pytest
 
 from care_sim.world.bodies import CATALOGUE
-from care_sim.world.lane_flow import STANDING_GAP_M, LaneFlow
+from care_sim.world.lane_flow import STANDING_GAP_M, FlowingLane, LaneFlow, StreetTraffic
 from care_sim.world.traffic import Traffic
 
 STEP = 0.05
@@ -39,13 +39,31 @@ def test_the_first_driver_stops_before_what_stands():
     assert np.all(flow.speeds < 0.1)
 
 
-def test_who_is_behind_is_nobody_to_follow():
-    flow = LaneFlow([0.0], [8.0])
-    flow.step(1.0, [(-1.0, 0.0)])
-    assert (flow.places[0], flow.speeds[0]) == (8.0, 8.0)
+def along_x(places):
+    return np.column_stack([places, np.zeros(len(places)), np.zeros(len(places))])
 
 
-def test_a_lane_may_be_empty():
-    flow = LaneFlow([], [])
-    flow.step(STEP, [(0.0, 1.0)])
-    assert len(flow.places) == 0
+def lane(places, **ego):
+    return FlowingLane(LaneFlow(places, [8.0] * len(places)), along_x, **ego)
+
+
+def driven(street, seconds, ego_m, ego_speed=0.0):
+    for _ in range(round(seconds / 0.05)):
+        street.step(0.05, ego_m, ego_speed)
+    return street.pose_at(0, 0, 0.0)[0]
+
+
+def test_who_is_behind_a_standing_ego_stops():
+    street = StreetTraffic([lane([-40.0], ego_from_m=-np.inf)])
+    assert driven(street, 20.0, 0.0) == pytest.approx(-10.0, abs=1.0)
+
+
+def test_the_egos_place_in_a_lane_is_shifted():
+    street = StreetTraffic([lane([-40.0], ego_from_m=0.0, ego_ahead_m=-100.0)])
+    assert driven(street, 20.0, 100.0) == pytest.approx(-10.0, abs=1.0)
+
+
+def test_poses_are_those_of_the_lane():
+    street = StreetTraffic([lane([]), lane([3.0, 30.0])])
+    street.step(0.05, 0.0, 0.0)
+    assert street.pose_at(1, 0, 0.0) == (pytest.approx(3.4), 0.0, 0.0)

@@ -1,3 +1,5 @@
+"""Road, ego and drivers of highway-env."""
+
 import numpy as np
 import pytest
 from highway_env.road.lane import StraightLane
@@ -58,16 +60,6 @@ def test_a_lane_change_ends_in_its_lane_and_turns_the_right_way(ego_lane, start,
     assert (side * np.diff(poses[:, 1])).min() > -0.01
 
 
-def test_heading_points_where_a_vehicle_goes():
-    traffic = Traffic((1, 1), 0, 3.5, 14.0)
-    driver = traffic.add_parked_driver(0.0, 0, CAR, 8.0)
-    driver.pull_out(1)
-    poses = drive(traffic, 6.0, driver)[:, 0]
-    moves = np.diff(poses[:, :2], axis=0)
-    fast = np.hypot(*moves.T) / DT > 6.0
-    assert np.arctan2(moves[fast, 1], moves[fast, 0]) == pytest.approx(poses[1:][fast, 2], abs=0.15)
-
-
 def test_a_parked_driver_stands_until_told():
     traffic = Traffic((1, 1), 1, 3.5, 14.0)
     driver = traffic.add_parked_driver(20.0, -1, CAR, 8.0)
@@ -99,46 +91,6 @@ def test_the_ego_stops_and_never_reverses():
     assert ego.speed == pytest.approx(0.0, abs=1e-12)
 
 
-def test_the_ego_holds_its_speed_and_lane():
-    traffic = Traffic((1, -1), 0, 3.5, 14.0)
-    ego = traffic.add_ego(0.0, 8.0, EGO)
-    poses = drive(traffic, 2.0, ego, ego=ego)
-    assert poses[-1, 0] == pytest.approx([16.0, 0.0, 0.0])
-
-
-def test_the_ego_gains_speed_at_the_acceleration_it_is_told():
-    traffic = Traffic((1, -1), 0, 3.5, 14.0)
-    ego = traffic.add_ego(0.0, 2.0, EGO)
-    drive(traffic, 2.0, ego, ego=ego, acceleration=lambda time: 1.5)
-    assert ego.speed == pytest.approx(5.0)
-
-
-def test_two_roads_with_the_same_traffic_agree_to_the_last_bit():
-    def trace():
-        traffic = Traffic((1, 1), 1, 3.5, 14.0)
-        ego, driver = traffic.add_ego(0.0, 8.0, EGO), traffic.add_parked_driver(20.0, -1, CAR, 8.0)
-        driver.pull_out(0)
-        return drive(traffic, 4.0, ego, driver, ego=ego)
-
-    assert np.array_equal(trace(), trace())
-
-
-def mixed():
-    """Ego, a follower, an oncoming driver and two lane changes, one of them oncoming; the ego
-    brakes on the way, and the follower starts in the middle of its lane but not along it.
-    """
-    road = Traffic((1, 1, -1, -1), 0, 3.5, 14.0)
-    ego = road.add_ego(0.0, 8.0, EGO)
-    drivers = [road.add_driver(-22.5, 0, 8.0, CAR), road.add_driver(90.0, 2, 9.0, CAR)]
-    drivers[0]._vehicle.heading = 0.05
-    for x, start, target in ((25.0, 1, 0), (60.0, 3, 2)):
-        drivers.append(road.add_parked_driver(x, start, CAR, 8.0))
-        drivers[-1].pull_out(target)
-    return drive(
-        road, 9.0, ego, *drivers, ego=ego, acceleration=lambda time: -2.0 if 1 < time < 3 else 0.5
-    )
-
-
 def as_highway_env_drives(monkeypatch, run):
     """What `run` gives on the vehicles and lanes of highway-env itself."""
     with monkeypatch.context() as patch:
@@ -147,12 +99,6 @@ def as_highway_env_drives(monkeypatch, run):
         patch.setattr(lane_driver, "LaneAlongX", StraightLane)
         patch.setattr(traffic.RoadVehicle, "forget_lane", lambda vehicle: None)
         return run()
-
-
-def test_all_vehicles_go_as_those_of_highway_env_to_the_last_bit(monkeypatch):
-    poses = mixed()
-    assert poses.tobytes() == as_highway_env_drives(monkeypatch, mixed).tobytes()
-    assert np.ptp(poses[:, 3:, 1], axis=0) == pytest.approx(3.5, abs=0.1)
 
 
 def test_who_is_faster_than_any_vehicle_goes_as_in_highway_env(monkeypatch):
@@ -212,3 +158,24 @@ def test_random_traffic_goes_as_in_highway_env_to_the_last_bit(
         return np.array(motions)
 
     assert run().tobytes() == as_highway_env_drives(monkeypatch, run).tobytes()
+
+
+@pytest.mark.parametrize(("lane", "start", "line"), [(0, -60.0, 0.0), (1, 70.0, 10.0)])
+def test_a_driver_comes_to_rest_before_the_line(lane, start, line):
+    traffic = Traffic((1, -1), 0, 3.5, 8.0)
+    driver = traffic.add_driver(start, lane, 8.0, CATALOGUE["car"])
+    traffic.add_stop_line(line, lane)
+    for _ in range(400):
+        traffic.step(0.1)
+    assert driver.speed < 0.3
+    assert abs(driver.pose[0] - line) < 2.0
+    assert (driver.pose[0] - line) * (line - start) <= 0.1
+
+
+def test_the_line_of_one_lane_does_not_hold_the_other():
+    traffic = Traffic((1, -1), 0, 3.5, 8.0)
+    driver = traffic.add_driver(-30.0, 0, 8.0, CATALOGUE["car"])
+    traffic.add_stop_line(0.0, 1)
+    for _ in range(100):
+        traffic.step(0.1)
+    assert driver.pose[0] == pytest.approx(50.0, abs=1.0)

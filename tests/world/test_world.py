@@ -52,15 +52,6 @@ def test_a_collision_is_told_with_the_speed_of_the_first_contact(world):
     assert passage.impact_speed_mps == pytest.approx(np.sqrt(30), abs=0.25)
 
 
-def test_passing_close_by_is_no_collision(world):
-    bus = world.add("bus", "bus", (10.0, 0.865 + 0.05 + 1.47, 0.0))
-    world.first_sighting = bus
-    passage = world.advance(0.0, 2.0)
-    assert passage.impact_speed_mps is None
-    assert passage.clearance_m == pytest.approx(0.05, abs=5e-3)
-    assert passage.nearest_m == pytest.approx(0.865 + 0.05 + 1.47, abs=0.05)
-
-
 def test_any_body_counts_for_the_collision_but_only_the_first_sighting_for_clearance(world):
     world.add("hoarding", "hoarding", (8.0, 0.0, np.pi / 2))
     world.first_sighting = world.add("person", "pedestrian", (0.0, 20.0, 0.0))
@@ -116,14 +107,6 @@ def test_labels_are_for_reported_bodies_of_the_five_classes(world):
     assert (car.label, silent.label, trailer.label) == (CLASSES.index("car"), None, None)
 
 
-def test_a_driver_of_the_traffic_is_a_body_too(world):
-    driver = world.traffic.add_driver(30.0, 1, 8.0, world.ego_kind)
-    actor = world.add("oncoming", "car", driver)
-    world.advance(0.0, 1.0)
-    x, y, *_ = world.boxes([actor])[0]
-    assert (x, y) == pytest.approx((22.0, 3.5), abs=0.1)
-
-
 def test_what_comes_later_is_at_once_where_it_belongs(world):
     """Its box, and the hulls that collide."""
     world.at(0.1, lambda: world.add("late", "bus", lambda time: (100.0 - 700 * time, 0.0, 0.0)))
@@ -134,11 +117,6 @@ def test_what_comes_later_is_at_once_where_it_belongs(world):
     assert world.bullet.cast(np.array([0.0, 0.0, 1.0]), np.array([[1.0, 0.0, 0.0]]), 50.0)[
         0
     ] == pytest.approx(30.0 - late.kind.size[0] / 2, abs=0.01)
-
-
-def test_an_unknown_kind_of_body_is_named(world):
-    with pytest.raises(InvalidInput, match=r"unknown kind of body 'dragon'; known: .*pedestrian"):
-        world.add("somebody", "dragon", (10.0, 0.0, 0.0))
 
 
 def test_an_episode_goes_on_until_the_ego_arrives_unless_its_scenario_ends_it_otherwise(world):
@@ -181,11 +159,6 @@ def test_an_actor_that_gets_lost_is_named_with_its_place_and_the_time(world, los
     world.advance(0.0, 0.15)
     with pytest.raises(InvalidInput, match=told):
         world.advance(0.0, 0.15)
-
-
-def test_a_body_is_not_added_anywhere(world):
-    with pytest.raises(InvalidInput, match="the pose of wall is nan, 0, 0 at 0 s"):
-        world.add("wall", "terrace", (np.nan, 0.0, 0.0))
 
 
 def test_an_ego_that_gets_lost_is_named(world):

@@ -6,9 +6,9 @@ of rows are told.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
@@ -81,14 +81,6 @@ class GridRays:
         mounted = {"heading": heading, "pitch": pitch, "roll": roll}
         return cls(columns, len(listed), *ends, range_m, field_of_view, listed=listed, **mounted)
 
-    def __getstate__(self) -> dict[str, Any]:
-        # Tables are megabytes for a large grid: a copy, in a worker for example, makes its own.
-        return {one.name: getattr(self, one.name) for one in fields(self)}
-
-    def __deepcopy__(self, _copied: dict[int, Any]) -> Self:
-        # Frozen: within a process a copy may share it, and its tables.
-        return self
-
     def _settle_listed(self) -> None:
         """Check the listed elevations, and make them a tuple of plain numbers."""
         listed = self.listed
@@ -107,42 +99,42 @@ class GridRays:
             )
         object.__setattr__(self, "listed", tuple(map(float, listed)))
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Number of cells N = A * E."""
         return self.columns * self.rows
 
-    @property
+    @cached_property
     def shape(self) -> tuple[int, int]:
         """(rows, columns), the shape of a picture of the grid."""
         return self.rows, self.columns
 
-    @property
+    @cached_property
     def column_width(self) -> float:
         """Azimuth covered by a column, radians."""
         return self.field_of_view / self.columns
 
-    @property
+    @cached_property
     def right(self) -> float:
         """The azimuth at which column 0 begins, radians; the others follow to the left."""
         return self.heading - self.field_of_view / 2
 
-    @property
+    @cached_property
     def turn(self) -> int:
         """How many columns of this width a whole turn has: all are the grid's if it has no gap."""
         return round(2 * np.pi / self.column_width)
 
-    @property
+    @cached_property
     def goes_round(self) -> bool:
         """Whether the last column borders on column 0."""
         return self.columns == self.turn
 
-    @property
+    @cached_property
     def row_height(self) -> float:
         """Elevation between two rows, radians; the mean of it where rows are listed."""
         return (self.top - self.bottom) / (self.rows - 1)
 
-    @property
+    @cached_property
     def is_tilted(self) -> bool:
         """Whether its own up is not that of the sensor frame."""
         return self.pitch != 0 or self.roll != 0

@@ -15,11 +15,11 @@ from care_sim.base.checks import check_whole
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Integers
 from care_sim.core.belief import Belief
+from care_sim.core.beliefs import Beliefs
 from care_sim.core.cells.sets import CellSets, WorldSets
 from care_sim.core.cells.stack import Grid
 from care_sim.core.firing.actions import Allocator
 from care_sim.core.grid import Cells
-from care_sim.core.observation.beliefs import Beliefs
 from care_sim.core.rig import Rig
 from care_sim.core.types import Action, Demand
 

@@ -7,9 +7,9 @@ from typing import ClassVar, NamedTuple
 
 from care_sim.base.checks import check_flag, check_whole
 from care_sim.core.belief import Belief
+from care_sim.core.beliefs import Beliefs
 from care_sim.core.cells.sets import CellSets, WorldSets
 from care_sim.core.conditions import MIN_RETURNS
-from care_sim.core.observation.beliefs import Beliefs
 from care_sim.core.residual import camera_layers, unexplained_layer_of
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand

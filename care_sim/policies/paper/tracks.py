@@ -8,12 +8,12 @@ import numpy as np
 
 from care_sim.core.arrays import Floats, Mask
 from care_sim.core.belief import Belief
+from care_sim.core.beliefs import Beliefs
 from care_sim.core.cells.boxes import planar_ranges
 from care_sim.core.cells.sets import WorldSets
 from care_sim.core.cells.stack import Grid
 from care_sim.core.frames import Frame, turned
 from care_sim.core.grid import Cells
-from care_sim.core.observation.beliefs import Beliefs
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand, Ego
 from care_sim.policies.base import Policy, PrivilegedPolicy, RowPolicy

@@ -11,7 +11,7 @@ import numpy as np
 
 from care_sim.base.checks import check_known
 from care_sim.base.errors import InvalidInput, error_line, shown
-from care_sim.base.extras import import_rosbags
+from care_sim.base.extras import import_extra
 from care_sim.core.arrays import Floats
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.loops.film import Film
@@ -73,7 +73,8 @@ def log_of_bag(path: Path, topics: Sequence[str]) -> Log:
 @contextmanager
 def _opened(path: Path) -> Iterator[Any]:
     """Open a bag. The library's errors become one line."""
-    highlevel, typesys = import_rosbags()
+    highlevel = import_extra("rosbags.highlevel", "A bag", "rosbags")
+    typesys = import_extra("rosbags.typesys", "A bag", "rosbags")
     # Older bags do not hold the definitions of their messages.
     usual = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
     try:

@@ -10,9 +10,11 @@ import numpy as np
 from PIL import Image
 
 from care_sim.base.checks import check_known
-from care_sim.base.extras import import_imageio_ffmpeg
+from care_sim.base.extras import import_extra
 from care_sim.base.files import GIF, MP4, PNG, WEBP, check_output, replacing, why_unwritable
 
+_FFMPEG = "imageio_ffmpeg", "A film as MP4", "video"
+"""FFmpeg, as imageio-ffmpeg brings it, and the extra to install."""
 _GIF_COLOURS = 96
 """Colours of a GIF, the same in all of its pictures: enough for flat surfaces, and the file is half
 as large.
@@ -25,7 +27,7 @@ def check_clip(path: Path) -> None:
     """
     check_known("ending of a clip", path.suffix, ENDINGS)
     if path.suffix == ".mp4":
-        import_imageio_ffmpeg()
+        import_extra(*_FFMPEG)
     check_output(path, _CLIP_KINDS[path.suffix])
 
 
@@ -48,7 +50,7 @@ def _write_mp4(
     # FFmpeg is told the size of the pictures first, so that the first of them is taken out.
     shown = iter(pictures)
     first = next(shown)
-    ffmpeg = import_imageio_ffmpeg()
+    ffmpeg = import_extra(*_FFMPEG)
     settings = {
         "fps": 1 / picture_s,
         "macro_block_size": 2,  # H.264 needs even sizes; larger blocks would scale the picture

@@ -12,7 +12,7 @@ from hypothesis.extra.numpy import arrays
 from care_sim.base.errors import InvalidInput
 from care_sim.core.firing.actions import scores_of
 from care_sim.core.firing.base import shots_by_cell
-from care_sim.core.firing.listing import hardware_of, settled
+from care_sim.core.firing.listing import hardware_of
 from care_sim.core.grid import AngularGrid
 
 GRID = AngularGrid(columns=6, rows=3)
@@ -70,17 +70,6 @@ def test_every_shot_goes_to_the_highest_score_per_shot(action, budget, most):
     assert shots(f"energy:{most}", action, budget) == dealt
 
 
-def test_equal_scores_have_a_first_shot_each_before_any_has_a_second():
-    mask = scores(c2=1, c5=1, c9=1)
-    assert shots("energy:4", mask, 3) == {2: 1, 5: 1, 9: 1}
-    assert shots("energy:4", mask, 5) == {2: 2, 5: 2, 9: 1}
-    assert shots("energy:2", mask, 9) == {2: 2, 5: 2, 9: 2}
-
-
-def test_scores_of_three_to_one_have_three_shots_to_one():
-    assert shots("energy:4", scores(c0=0.25, c7=0.75), 4) == {0: 1, 7: 3}
-
-
 def test_the_floor_comes_after_the_last_shot_of_the_last_demanded_cell():
     floor = np.arange(GRID.size)
     assert shots("energy:3", scores(c1=1, c4=0.1), 8, floor) == {1: 3, 4: 3, 0: 1, 2: 1}
@@ -121,7 +110,3 @@ def test_a_number_of_shots_beyond_reason_is_refused_in_one_line(most):
         InvalidInput, match=rf"shots of firing energy must lie in \[1, 100\], got {most}"
     ):
         hardware_of(f"energy:{most}", GRID)
-
-
-def test_four_shots_are_the_usual():
-    assert settled("energy") == "energy:4"

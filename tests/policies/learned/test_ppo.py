@@ -13,7 +13,6 @@ import pytest
 import care_sim
 from care_sim.base.errors import InvalidInput
 from care_sim.core.grid import AngularGrid
-from care_sim.core.wrapping import Wrapping
 from care_sim.envs.wrappers.grid_observation import GridObservation
 from care_sim.envs.wrappers.sector_actions import SectorReserve, SectorScores
 from care_sim.policies.learned.grid_features import CHANNELS
@@ -21,6 +20,7 @@ from care_sim.policies.learned.ppo import ScoreMap
 from care_sim.policies.learned.weights import (
     Card,
     Weights,
+    Wrapping,
     load_weights,
     save_weights,
     shipped_weights,

@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 
 from care_sim.core.allocation import allocate
 from care_sim.core.belief import Belief
+from care_sim.core.beliefs import Beliefs
 from care_sim.core.firing.actions import scores_of
 from care_sim.core.grid import AngularGrid
-from care_sim.core.observation.beliefs import Beliefs
 from care_sim.core.residual import explained, explained_of
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES, Demand, Ego, ImageDetections, Tracks

@@ -7,7 +7,6 @@ import os
 import pickle
 from dataclasses import replace
 from pathlib import Path
-from zipfile import ZipFile
 
 import gymnasium
 import numpy as np
@@ -19,9 +18,9 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
 from care_sim.core.sensor_setup import SensorSetup
-from care_sim.core.wrapping import Wrapping
 from care_sim.policies.learned.weights import (
     Card,
+    Wrapping,
     load_weights,
     save_weights,
     shipped_weights,
@@ -193,12 +192,6 @@ def large(path: Path) -> None:
     np.savez_compressed(path, card=np.zeros(1, np.uint8), weight=np.zeros(2**24 + 1, np.float32))
 
 
-def twice(path: Path) -> None:
-    save_weights(path, ARRAYS, CARD)
-    with ZipFile(path, "a") as file, pytest.warns(UserWarning, match="Duplicate"):
-        file.writestr("bias.npy", file.read("bias.npy"))
-
-
 def squeezed(path: Path) -> None:
     """Damaged within a compressed entry."""
     np.savez_compressed(path, **ARRAYS, card=np.frombuffer(CARD.to_json().encode(), np.uint8))
@@ -281,7 +274,6 @@ def one_array(path: Path) -> None:
         other('"azimuths": 16', '"sectors": 16'),
         other('"action": "SectorScores"', '"action": "Scores"'),
         large,
-        twice,
         squeezed,
         broken_header,
         locked,

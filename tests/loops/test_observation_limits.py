@@ -6,19 +6,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.core.belief import MAX_DETECTIONS, MAX_TRACKS, Belief
-from care_sim.core.conditions import Sensing
-from care_sim.core.frames import Frame
-from care_sim.core.observation.limits import MAX_AGE_S, MAX_SPEED_MPS, Limits
 from care_sim.core.pinhole import PinholeCamera
-from care_sim.core.residual import camera_layers, explained
+from care_sim.core.residual import explained
 from care_sim.core.rig import Rig
-from care_sim.core.types import CLASSES, Ego, ImageDetections, Tracks
+from care_sim.core.types import Ego, ImageDetections, Tracks
 from care_sim.envs.sensing import observation_space
-from care_sim.loops.episode import SensorSeeds
-from care_sim.loops.film import Film, Shot
-from care_sim.loops.open_loop import OpenLoop
-from care_sim.perception.proxy import ReturnsProxy
-from care_sim.sensors.annotated import Annotations, Cloud, IdentifiedDetections
+from care_sim.loops.observation_limits import MAX_AGE_S, MAX_SPEED_MPS, Limits
 from care_sim.sensors.surround import SURROUND_CAMERAS
 
 RIG = Rig(cameras=SURROUND_CAMERAS, keyframe_s=0.5)
@@ -27,7 +20,6 @@ LIMITS = Limits(RIG)
 SPACE = observation_space(RIG)
 STANDING = Ego()
 NOWHERE = np.zeros(RIG.grid.shape, np.float32)
-PEDESTRIAN = CLASSES.index("pedestrian")
 
 
 def tracks_of(*rows):
@@ -61,60 +53,6 @@ def told(tracks=(), detections=(), ego=STANDING, limits=LIMITS):
 
 def read(belief):
     return Belief.from_observation(belief.to_observation())
-
-
-def crowd_film(count):
-    """Two keyframes of people in rings around the car, each with a box in a camera and three
-    returns.
-    """
-    rng = np.random.default_rng(count)
-    azimuth, far = np.linspace(-np.pi, np.pi, count, endpoint=False), rng.uniform(5, 45, count)
-    boxes = np.tile([0.0, 0.0, -1.0, 0.6, 0.6, 1.8, 0.0], (count, 1))
-    boxes[:, :2] = far[:, None] * np.column_stack([np.cos(azimuth), np.sin(azimuth)])
-    people = Annotations(np.arange(count), np.full(count, PEDESTRIAN), boxes)
-    rows = []
-    for box in boxes:
-        seen = [(n, c.project(box[:3])) for n, c in enumerate(SURROUND_CAMERAS)]
-        number, ((u, v), _) = next(
-            (n, p) for n, p in seen if p[1] > 0 and 2 < p[0][0] < SURROUND_CAMERAS[n].width - 2
-        )
-        box = {"left": u - 2, "right": u + 2, "top": max(v - 4, 0), "bottom": v + 4}
-        rows.append(
-            detection(
-                **box, camera=number, confidence=rng.uniform(0.3, 0.9), **{"class": PEDESTRIAN}
-            )
-        )
-    cells = np.repeat(np.arange(count), 3)
-    cloud = Cloud(cells, np.repeat(boxes[:, :3], 3, axis=0), np.repeat(people.objects, 3))
-    identified = IdentifiedDetections(detections_of(*rows), people.objects)
-    sensor = Frame(0.0, 0.0, 1.84, 0.0)
-    shots = tuple(
-        Shot(0.5 * k, f"{k}", sensor, STANDING, people, identified, cloud) for k in range(2)
-    )
-    return Film("crowd", SURROUND_CAMERAS, 1.84, 0.5, shots)
-
-
-@pytest.mark.parametrize("count", [100, 400])
-def test_of_tracked_people_with_a_box_each_none_is_read_as_new(count):
-    film = crowd_film(count)
-    loop = OpenLoop(
-        film,
-        RIG,
-        Sensing(),
-        SensorSeeds(*(np.random.SeedSequence(n) for n in range(3))),
-        ReturnsProxy(),
-    )
-    assert len(camera_layers(read(loop.belief), RIG)[0]) == min(count, MAX_DETECTIONS), (
-        "before the first scan all are"
-    )
-    loop.keyframe(np.arange(RIG.grid.size))
-    shown = read(loop.belief)
-    new, known = camera_layers(shown, RIG)
-    assert (len(new), len(known)) == (0, min(count, MAX_DETECTIONS))
-    assert len(shown.tracks) == min(count, MAX_TRACKS)
-    assert (np.diff(shown.tracks.ranges) >= 0).all()
-    surest = np.sort(film.shots[1].seen.detections.confidences)[::-1][:MAX_DETECTIONS]
-    assert shown.detections.confidences == pytest.approx(surest)
 
 
 def random_tables(seed):
@@ -174,20 +112,6 @@ def test_of_the_forecasts_that_explain_nothing_the_furthest_are_left_out():
     kept = told([*aside, last], [box]).tracks.ids.tolist()
     assert kept == [*range(MAX_TRACKS - 1), 999]
     assert told([*aside, last]).tracks.ids.tolist() == list(range(MAX_TRACKS))
-
-
-@pytest.mark.parametrize("others", [99, MAX_TRACKS - 1, 400])
-def test_the_farthest_of_many_tracks_still_explains_its_box_for_who_reads_the_observation(others):
-    """The others are of its class, nearer, and behind the camera."""
-    aside = [track(id=n, x=-10.0, y=n / 20, **{"class": PEDESTRIAN}) for n in range(others)]
-    (u, v), _ = SURROUND_CAMERAS[0].project(np.array([48.0, 0.0, 0.0]))
-    last = track(id=999, x=48.0, **{"class": PEDESTRIAN})
-    box = detection(left=u - 1, right=u + 1, top=v - 1, bottom=v + 1, **{"class": PEDESTRIAN})
-
-    def unexplained(*tracks):
-        return len(camera_layers(read(told(tracks, [box])), RIG)[0])
-
-    assert (unexplained(*aside, last), unexplained(*aside)) == (0, 1)
 
 
 LARGE = st.floats(-1e12, 1e12)
@@ -252,11 +176,6 @@ def test_a_box_is_cut_at_the_edges_of_its_own_picture_and_one_outside_is_left_ou
     assert seen.boxes.tolist() == [[0, 0, 320, 180], [0, 0, 400, 200], [10, 20, 30, 40]]
     assert (seen.ages[2], seen.yaw_changes[2]) == pytest.approx((MAX_AGE_S, 0.25))
     assert Limits(TWO_SIZES).kept_detections(detections_of(*boxes)).tolist() == [0, 1, 5]
-
-
-def test_of_too_many_boxes_the_first_are_kept():
-    boxes = detections_of(*(detection() for _ in range(MAX_DETECTIONS + 5)))
-    assert LIMITS.kept_detections(boxes).tolist() == [*range(MAX_DETECTIONS)]
 
 
 def test_a_car_may_go_backwards():

@@ -1,6 +1,5 @@
 """What no argument may be: every number, name and array from outside is refused in one line, where
-it enters.
-"""
+it enters."""
 
 from dataclasses import dataclass, fields
 from decimal import Decimal
@@ -11,7 +10,7 @@ import numpy as np
 import pytest
 
 import care_sim
-from care_sim.base.checks import allowed, bounded, check_fields, check_path, check_whole, one_of
+from care_sim.base.checks import allowed, bounded, check_fields, check_path, one_of
 from care_sim.base.errors import InvalidInput, one_line, shown
 from care_sim.commands.options.shared import seeds_of
 from care_sim.core.allocation import allocate
@@ -25,28 +24,12 @@ from care_sim.core.types import Demand
 from care_sim.envs.open_loop import FilmEnv
 from care_sim.envs.scenarios import DenseEnv
 from care_sim.envs.scenes import ReplayEnv, StreetEnv
-from care_sim.scenarios import SCENARIOS, make_scenario
-from care_sim.scenarios.dartout import Dartout
-from care_sim.study.episode_config import ENVIRONMENT_IDS, EpisodeConfig
-from care_sim.study.executors import cluster
+from care_sim.scenarios import SCENARIOS
+from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.run_config import parameters
-from care_sim.wrappers import ExportScans, GridObservation, SectorReserve, SectorScores
+from care_sim.wrappers import GridObservation, SectorReserve, SectorScores
 
-NO_NUMBERS = (
-    float("nan"),
-    float("inf"),
-    10**400,
-    10**5000,
-    -1e300,
-    1e300,
-    Decimal(1),
-    1j,
-    True,
-    "1",
-    None,
-    [1],
-    {1},
-)
+NO_NUMBERS = (float("nan"), float("inf"), 10**5000, -1e300, 1e300, Decimal(1), True, "1", None, [1])
 
 
 def named(value):
@@ -132,38 +115,6 @@ def test_every_number_of_conditions_and_scenarios_has_bounds():
             assert ("bounds" in field.metadata) == (is_number or is_range), field.name
 
 
-@pytest.mark.parametrize("extreme", ["least", "most"])
-@pytest.mark.parametrize("name", SCENARIOS)
-def test_an_episode_at_the_bounds_of_any_range_stays_in_its_space(name, extreme):
-    ranges = [field for field in fields(SCENARIOS[name]) if isinstance(field.default, tuple)]
-    for field in ranges:
-        end = field.metadata["bounds"][extreme == "most"]
-        env = gymnasium.make(
-            f"care_sim:{ENVIRONMENT_IDS[name]}",
-            disable_env_checker=True,
-            duration_s=0.2,
-            **{field.name: (end, end)},
-        )
-        with env:
-            seen, _ = env.reset(seed=0)
-            for _ in range(2):
-                assert env.observation_space.contains(seen)
-                seen, reward, ended, _, _ = env.step(env.action_space.sample() * 0)
-                assert np.isfinite(reward)
-                if ended:
-                    break
-
-
-@pytest.mark.parametrize("sigma", [10.0, 3])
-def test_the_noisiest_odometry_stays_in_its_space(sigma):
-    with gymnasium.make(
-        "CARE-Dartout-v0", ego_speed_sigma=sigma, duration_s=1.0, disable_env_checker=True
-    ) as env:
-        for seed in range(5):
-            seen, _ = env.reset(seed=seed)
-            assert env.observation_space.contains(seen)
-
-
 @pytest.mark.parametrize(
     "rate", [Fraction(1, 3), np.float32(0.25), np.float64(0.5), 1, np.int64(0)]
 )
@@ -215,19 +166,6 @@ def test_a_dataclass_is_settled_by_kind():
         refused(f"{name} of it", Thing, **{name: value})
 
 
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [
-        ("a\nb", r"'a\nb'"),
-        ("\x1b[31m\ud800", r"'\x1b[31m\ud800'"),
-        (np.ones((2, 1)), "array([[1.], [1.]])"),
-    ],
-    ids=["two lines", "no text", "array"],
-)
-def test_any_value_is_quoted_on_one_line(value, text):
-    assert shown(value) == text
-
-
 def test_a_long_value_is_quoted_by_its_ends():
     assert len(shown("x" * 10**6)) <= 120
     assert shown(10**5000) == "a value of type int"
@@ -248,41 +186,24 @@ def test_a_seed_that_no_column_holds_begins_no_episode(seed, dense):
     refused("seed must be a whole number", dense.unwrapped.reset, seed=seed)
 
 
-def test_a_seed_of_numpy_is_a_seed(dense):
-    _, info = dense.unwrapped.reset(seed=np.int64(7))
-    assert info["seed"] == 7
-    assert type(info["seed"]) is int
-
-
 @pytest.mark.parametrize(
     ("kind", "options", "named"),
     [
-        (DenseEnv, {"render_mode": 5}, "render_mode must be None or 'rgb_array'"),
-        (DenseEnv, {"render_mode": ["rgb_array"]}, "render_mode"),
-        (DenseEnv, {"render_mode": np.zeros(2)}, "render_mode"),
-        (StreetEnv, {"render_mode": 1}, "render_mode"),
+        (DenseEnv, {"render_mode": ["rgb_array"]}, "render_mode must be None or 'rgb_array'"),
         (DenseEnv, {"engine": ["fast"]}, "engine must be a name"),
         (DenseEnv, {"occluder": {}}, "occluder"),
         (DenseEnv, {"keyframe_s": 1e9}, "keyframe_s must lie in [0.05, 1]"),
-        (DenseEnv, {"keyframe_s": 1e-300}, "keyframe_s"),
-        (DenseEnv, {"keyframe_s": "0.1"}, "keyframe_s"),
         (DenseEnv, {"duration_s": 1e300}, "duration_s of dense must lie in [0.05, 60]"),
         (DenseEnv, {"reward_weights": 5}, "reward_weights must map terms to numbers"),
-        (DenseEnv, {"reward_weights": [("gain", 1)]}, "reward_weights"),
-        (DenseEnv, {"reward_weights": {"gain": float("nan")}}, "reward weight gain"),
         (DenseEnv, {"reward_weights": {"gain": 10**400}}, "reward weight gain"),
         (DenseEnv, {"reward_weights": {5: 1}}, "reward term"),
-        (DenseEnv, {"budget": 10**400}, "budget must lie in (0, 1]"),
-        (DenseEnv, {"budget": np.array([0.1, 0.2])}, "budget"),
+        (DenseEnv, {"budget": np.array([0.1, 0.2])}, "budget must lie in (0, 1]"),
         (DenseEnv, {"lidar_dead_rows": [[1]]}, "lidar_dead_rows"),
-        (DenseEnv, {"lidar_dead_rows": np.array(1)}, "lidar_dead_rows"),
         (StreetEnv, {"detector": ["returns"]}, "detector"),
         (StreetEnv, {"detector_parameters": 5}, "detector_parameters"),
         (FilmEnv, {"film": 5}, "film"),
-        (ReplayEnv, {"source": 5}, "source"),
         (ReplayEnv, {"source": "argoverse2:" + "a" * 300}, "source"),
         (ReplayEnv, {"source": "argoverse2:/tmp", "scene": ["a"]}, "scene must be a name"),
-        (ReplayEnv, {"source": "nuscenes:/tmp", "split": [1]}, "split must be a name"),
         (ReplayEnv, {"source": "nuscenes:/tmp", "camera_detections": ""}, "camera_detections"),
     ],
 )  # fmt: skip
@@ -294,24 +215,18 @@ def test_an_argument_of_another_kind_makes_no_environment(kind, options, named):
     "action",
     [
         [[1.0] * 512] * 31 + [[1.0]],
-        np.full((32, 512), 10**30, object),
         np.zeros((32, 512), complex),
-        np.zeros((32, 512), "U3"),
-        np.zeros((32, 512), "datetime64[s]"),
         np.full((32, 512), 1e300),
-        (value for value in [1]),
         None,
     ],
-    ids=["ragged", "object", "complex", "text", "time", "huge", "generator", "none"],
+    ids=["ragged", "complex", "huge", "none"],
 )  # fmt: skip
 def test_an_action_of_other_things_than_numbers_is_refused(action, dense):
     dense.reset(seed=1)
     refused("action must", dense.step, action)
 
 
-@pytest.mark.parametrize(
-    "number", [(n for n in [32]), memoryview(b"1"), [32], 10**30, 2.0, True], ids=named
-)
+@pytest.mark.parametrize("number", [[32], 10**30, 2.0, True], ids=named)
 @pytest.mark.parametrize(
     ("wrapper", "name"),
     [
@@ -325,29 +240,16 @@ def test_a_wrapper_takes_whole_numbers(wrapper, name, number, dense):
     refused(f"{name} must", wrapper, dense, **{name: number})
 
 
-@pytest.mark.parametrize("env", [None, 5, gymnasium.spaces.Discrete(2)])
-@pytest.mark.parametrize(
-    "wrapper", [SectorReserve, GridObservation, lambda env: ExportScans(env, "scans")]
-)
-def test_a_wrapper_takes_environments(wrapper, env):
-    refused("of CARE-Sim", wrapper, env)
-
-
 @pytest.mark.parametrize(
     "demand",
     [
         Demand(layers=1),
         Demand(exploitation=None),
-        Demand("abc"),
         Demand([1, 2]),
         Demand([[0.5]]),
-        Demand([np.zeros((2, 2), int)]),
         Demand([[1, [2, 3]]]),
         Demand(layers=[[1, 2]]),
-        Demand(layers=[5]),
-        Demand(iter([[1]])),
         Demand([[10**30]]),
-        Demand(np.array(3)),
         Demand({1: 2}),
     ],
     ids=named,
@@ -356,20 +258,11 @@ def test_a_demand_of_another_form_is_allocated_nothing(demand):
     refused("must", allocate, demand, 10, 0.3)
 
 
-@pytest.mark.parametrize("budget", [-1, 10**30, 0.5, None, float("nan")])
-def test_the_allocator_is_given_a_number_of_cells(budget):
-    refused("budget must be a whole number", allocate, Demand([[1]]), budget, 0.3)
-
-
 DAMAGES = {
     "a key is missing": lambda seen: seen.pop("budget"),
-    "a column is missing": lambda seen: seen.update(tracks=seen["tracks"][:, :5]),
-    "flat": lambda seen: seen.update(detections=seen["detections"].ravel()),
     "batched": lambda seen: seen.update({key: array[None] for key, array in seen.items()}),
     "of text": lambda seen: seen.update(ego=np.array(["a", "b", "c"])),
     "ragged": lambda seen: seen.update(ego=[1, [2], 3]),
-    "of nothing": lambda seen: seen.update(ranges=None),
-    "another grid": lambda seen: seen.update(ranges=seen["ranges"][:16]),
     "NaN": lambda seen: seen["tracks"].__setitem__((0, 3), np.nan),
     "infinite": lambda seen: seen["ego"].__setitem__(0, np.inf),
     "a budget of NaN": lambda seen: seen.update(budget=np.array([np.nan], np.float32)),
@@ -404,13 +297,9 @@ def test_an_observation_of_other_numbers_is_read_alike(observation):
     ("name", "options"),
     [
         (["care"], {}),
-        (5, {}),
         ("care", {"name": "x"}),
-        ("care", {"env": 1}),
         ("care", {"self": 1}),
-        ("care-sbf", {"k_safe": 10**400}),
         ("care-sbf", {"k_safe": "x"}),
-        ("ppo", {"path": 10**30}),
         ("ppo", {"path": "\0"}),
     ],
 )  # fmt: skip
@@ -418,28 +307,16 @@ def test_a_policy_is_made_of_what_it_takes(name, options, dense):
     refused("", lambda: care_sim.make_policy(name, dense, **options))
 
 
-@pytest.mark.parametrize("env", [None, 5, object()])
-def test_a_policy_is_made_for_an_environment(env):
-    refused("needs an environment", care_sim.make_policy, "care", env)
-
-
 @pytest.mark.parametrize(
     "value",
     [
-        {1},
-        b"x",
         {"a": 1},
-        1j,
-        object(),
         float("nan"),
-        float("inf"),
         2**63,
-        10**4000,
         "\ud800",
         (1, (2, (3, (4,)))),
-        np.longdouble(1),
     ],
-    ids=range(12),
+    ids=range(5),
 )  # fmt: skip
 def test_a_parameter_that_no_file_holds_is_refused(value):
     refused(
@@ -454,35 +331,18 @@ def test_parameters_are_pairs(pairs):
     )
 
 
-def test_a_parameter_has_a_name():
-    refused(
-        "name of a policy parameter", EpisodeConfig, "dense", "care", policy_parameters=((1, 2),)
-    )
-
-
 @pytest.mark.parametrize(
     "field", ["scenario", "policy", "budget", "seed", "floor_seed", "azimuth_margin", "engine"]
 )
-@pytest.mark.parametrize("value", [[1], {}, 10**30, float("nan"), np.zeros(2), None], ids=named)
+@pytest.mark.parametrize("value", [[1], 10**30, None], ids=named)
 def test_an_episode_is_made_of_names_and_numbers(field, value):
     refused("", EpisodeConfig, **{"scenario": "dense", "policy": "care", field: value})
-
-
-def test_a_scenario_without_an_environment_is_named(monkeypatch):
-    @dataclass(frozen=True)
-    class Mine(Dartout):
-        pass
-
-    monkeypatch.setitem(SCENARIOS, "mine", Mine)
-    assert make_scenario("mine") == Mine()
-    refused("scenario mine is registered by hand", EpisodeConfig, "mine", "care")
 
 
 @pytest.mark.parametrize(
     "text",
     [
-        "{[1]}", "-" * 8000 + "1", "[" * 3000, "(1," * 2000, "9" * 5000, "1" + "+1" * 3000, "\0",
-        "1if 1else 2",
+        "{[1]}", "[" * 3000, "9" * 5000, "\0", "1if 1else 2",
     ],
     ids=shown,
 )  # fmt: skip
@@ -491,28 +351,6 @@ def test_what_is_no_literal_is_text(text, recwarn):
     assert not recwarn.list
 
 
-def test_a_parameter_of_the_command_line_has_an_end():
-    refused("at most 8192 characters", parameters, ["a=" + "x" * 10**6])
-
-
 @pytest.mark.parametrize("number", [0, -1, 10**9, 9999999999999999999999])
 def test_a_number_of_seeds_fits_into_memory(number):
     refused("seeds must be one number, a count from 1 to 1,000", seeds_of, [number])
-
-
-def test_one_number_is_told_to_be_a_count_and_how_to_give_one_seed():
-    refused("two or more seeds (7 7 is seed 7 alone), got the count 9000", seeds_of, [9000])
-
-
-@pytest.mark.parametrize(
-    "address",
-    ["ucx://x", "tls://127.0.0.1:1", "garbage://x", "inproc://x", "garbage", "tcp://[::1"],
-)
-def test_an_address_that_dask_cannot_reach_is_named(address):
-    pytest.importorskip("dask.distributed")
-    refused("no dask scheduler answers", cluster, address)
-
-
-@pytest.mark.parametrize("value", [1.0, True, "1", None, np.bool_(True), [1]])
-def test_a_whole_number_is_of_an_integer_type(value):
-    refused("n must be a whole number >= 0", check_whole, "n", value, 0)

@@ -107,10 +107,8 @@ class Limits:
         return np.flatnonzero(shown)[:MAX_DETECTIONS]
 
     def _limited_ego(self, ego: Ego) -> Ego:
-        values = ego.speed, ego.yaw_rate, ego.acceleration
-        if all(abs(value) <= most for value, most in zip(values, _EGO, strict=True)):
-            return ego
-        return Ego(*np.clip(values, *self.ego).tolist())
+        values = np.array([ego.speed, ego.yaw_rate, ego.acceleration])
+        return ego if (np.abs(values) <= _EGO).all() else Ego(*np.clip(values, *self.ego).tolist())
 
     @cached_property
     def _pictured(self) -> tuple[Floats, Floats]:

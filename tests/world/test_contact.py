@@ -1,4 +1,4 @@
-"""One client tells of bodies what the client of their own world tells, to the last bit."""
+"""Contact and clearance."""
 
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
@@ -9,11 +9,11 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from care_sim.core.frames import Frame
-from care_sim.world import contact
 from care_sim.world.bodies import CATALOGUE
+from care_sim.world.body_tables import Footprints
 from care_sim.world.bullet import BulletWorld
 from care_sim.world.bullet_bodies import pybullet
-from care_sim.world.contact import ClearanceJudge, judge_here
+from care_sim.world.contact import PADDING_M, ClearanceJudge, LeastClearance, judge_here, least_gap
 
 KINDS = ("pedestrian", "bicycle", "car", "bus", "trailer", "hoarding")
 BODIES = st.lists(
@@ -74,15 +74,6 @@ def test_pybullet_is_asked_about_the_parts_that_could_be_the_nearest(judge, monk
     assert len(asked) > 2
 
 
-def test_two_of_one_kind_are_not_one(judge):
-    pair = judge.stand_ins(CATALOGUE["ego"], CATALOGUE["ego"])
-    upright = [0.0, 0.0, 0.0, 1.0]
-    poses = [[x, 0.0, 0.0, *upright] for x in (0.0, 10.0)]
-    apart = 10.0 - CATALOGUE["ego"].size[0]
-    assert judge.clearance(pair, poses) == pytest.approx(apart, abs=0.01)
-    assert np.isinf(judge.clearance(pair, poses, within=1.0))
-
-
 def ahead_by_ten(judge, kind):
     pair = judge.stand_ins(CATALOGUE["ego"], kind)
     return judge.clearance(pair, [[x, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0] for x in (0.0, 10.0)])
@@ -104,26 +95,67 @@ def test_a_judge_whose_client_somebody_else_ends_is_replaced(end):
     assert ahead_by_ten(judge_here(), CATALOGUE["car"]) == told
 
 
-def test_a_judge_that_was_closed_before_it_was_asked_is_replaced():
-    def ask():
-        judge_here().close()
-        return ahead_by_ten(judge_here(), CATALOGUE["car"])
-
-    # In a thread where none has been asked.
-    with ThreadPoolExecutor(1) as thread:
-        assert thread.submit(ask).result() == ahead_by_ten(judge_here(), CATALOGUE["car"])
+PAIRED = ("adult", "bicycle", "car", "motorcycle", "pedestrian", "trailer", "truck", "van", "hedge")
+POSES = st.tuples(st.floats(-9.0, 9.0), st.floats(-9.0, 9.0), st.floats(-7.0, 7.0))
 
 
-def test_a_judge_of_many_kinds_is_replaced(monkeypatch):
-    monkeypatch.setattr(contact, "MOST_KINDS", 3)
+class Pair:
+    """The ego and another body, and how often a judge was asked about them."""
 
-    def ask(name):
-        judge = judge_here()
-        ahead_by_ten(judge, CATALOGUE[name])
-        return judge
+    def __init__(self, kind):
+        self.world = BulletWorld()
+        self.footprints = Footprints()
+        self.judge = ClearanceJudge()
+        self.least = LeastClearance(self.judge, CATALOGUE["ego"], CATALOGUE[kind])
+        self.asked = 0
+        start = (0.0, 0.0, 0.0)
+        self.bodies = []
+        for each in (CATALOGUE["ego"], CATALOGUE[kind]):
+            self.bodies.append(self.world.add(each, start))
+            self.footprints.add(self.bodies[-1], each.size, start)
+        exact = self.judge.clearance
 
-    # In a thread where none has been asked: the ego and two others are three.
-    with ThreadPoolExecutor(1) as thread:
-        first, second, *others = thread.map(ask, KINDS)
-    assert first is second
-    assert len({first, *others}) == len(KINDS) // 2
+        def clearance(*pair):
+            self.asked += 1
+            return exact(*pair)
+
+        self.judge.clearance = clearance
+
+    def close(self):
+        self.world.close()
+        self.judge.close()
+
+    def note(self):
+        self.least.note(self.boxes, self.world.primitives.poses[self.bodies])
+
+    def put(self, *poses):
+        table = np.array(poses)
+        self.world.move_all(np.array(self.bodies), table)
+        self.footprints.move_all(np.array(self.bodies), table)
+
+    @property
+    def boxes(self):
+        return self.footprints.boxes[self.bodies]
+
+
+# A simulator an example: to shrink one takes hundreds of them.
+@settings(deadline=None, max_examples=60, phases=set(Phase) - {Phase.shrink})
+@given(st.sampled_from(PAIRED), st.lists(st.tuples(POSES, POSES), min_size=1, max_size=4))
+def test_the_least_of_all_moments_is_that_of_asking_at_each(kind, moments):
+    with closing(Pair(kind)) as pair:
+        each = []
+        for poses in moments:
+            pair.put(*poses)
+            pair.note()
+            each.append(pair.world.clearance(*pair.bodies))
+            assert least_gap(*pair.boxes) - PADDING_M <= each[-1]
+        assert pair.least.metres() == min(each)
+
+
+def test_of_two_that_come_nearer_only_the_last_moment_is_asked_about():
+    with closing(Pair("pedestrian")) as pair:
+        for x in (9.0, 8.6, 8.2):
+            pair.put((0.0, 0.0, 0.0), (x, 1.0, np.pi / 2))
+            pair.note()
+        assert pair.least.metres() == pytest.approx(8.2 - 2.04 - 0.33, abs=0.01)
+        assert pair.asked == 1

@@ -1,1 +1,0 @@
-"""Observations: their bounds, and those of many worlds as one table."""
