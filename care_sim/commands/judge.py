@@ -96,7 +96,9 @@ def _plays(
     made = []
     for name in names:
         own = common | {"detector": name, "detector_parameters": _parameters(options, name)}
-        made.append(play_grid(source, scenes, [options.policy], [options.budget], floors, **own))
+        plays = play_grid(source, scenes, [options.policy], [options.budget], floors, **own)
+        plays[0].try_out()
+        made.append(plays)
     return [list(plays) for plays in zip(*made, strict=True)]
 
 

@@ -31,7 +31,6 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from care_sim.base.checks import check_number
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.sensors.annotated import NO_ANNOTATIONS, Annotations
@@ -73,7 +72,7 @@ class Sightings:
     """What there is to find in a scene, the same for every policy.
 
     `keyframes` are the annotations it was made from and `in_range` (n,) marks which of their
-    objects, one keyframe after the other, are scored, those within `range_m` metres: these are the
+    objects, one keyframe after the other, are scored, those within `RANGE_M`: these are the
     rows of `frames`. `first_ranges` (r,) are the planar metres at which the annotations first show
     the object of each row, within range or beyond. `events` (e,) are the rows of `frames` that are
     first sightings, ascending. `emerging` (m,) are the rows at which an object that was hidden
@@ -83,7 +82,6 @@ class Sightings:
 
     scene: str
     keyframes: tuple[Annotations, ...]
-    range_m: float
     in_range: Mask
     frames: ObjectFrames
     first_ranges: Floats
@@ -95,7 +93,6 @@ class Sightings:
         cls,
         scene: str,
         keyframes: Sequence[Annotations],
-        range_m: float = RANGE_M,
         hidden: Annotations = NO_ANNOTATIONS,
         presence: str = ANNOTATED,
     ) -> "Sightings":
@@ -103,12 +100,10 @@ class Sightings:
         `Film.hidden`.
 
         Raises InvalidInput for a scene without a keyframe, for an object annotated twice at one
-        keyframe or without a finite centre, for a range below 0, and for a presence that is none of
-        `PRESENCES`.
+        keyframe or without a finite centre, and for a presence that is none of `PRESENCES`.
         """
         if not keyframes:
             raise InvalidInput(f"scene {scene}: a scene must have at least one keyframe")
-        check_number("range_m", range_m, 0)
         check_presence(presence)
         rows = _table(keyframes)
         start = _table([_together(keyframes[0], hidden)])
@@ -117,16 +112,15 @@ class Sightings:
 
         # What is beyond the range is in no scene that is scored, so it counts neither as present
         # nor as appearing there.
-        in_range = rows.ranges <= range_m
+        in_range = rows.ranges <= RANGE_M
         frames = rows.take(in_range)
         appearing = _newcomer_rows(frames)
-        present = np.isin(frames.objects[appearing], start.objects[start.ranges <= range_m])
+        present = np.isin(frames.objects[appearing], start.objects[start.ranges <= RANGE_M])
         events = appearing[~present] if presence == ANNOTATED else appearing
         first_ranges = _first_ranges(rows)[in_range]
         return cls(
             scene,
             tuple(keyframes),
-            range_m,
             in_range,
             frames,
             first_ranges,

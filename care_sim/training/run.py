@@ -1,9 +1,8 @@
 """A training run from the first step, or a checkpoint, to the last."""
 
-import sys
 import time
 from collections.abc import Callable
-from contextlib import closing, nullcontext
+from contextlib import closing
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +11,7 @@ from care_sim.base.errors import InvalidInput, counted, print_lines
 from care_sim.base.extras import import_torch, missing_extra
 from care_sim.base.files import check_no_link
 from care_sim.envs.sensing import sensing
-from care_sim.study.progress import ProgressLines, Show, progress_bar
+from care_sim.study.progress import Show, shown_progress
 from care_sim.training import algorithms
 from care_sim.training.config import AgentConfig, OnPolicy
 from care_sim.training.environments import plain, side_by_side, validation_episodes, wrapped
@@ -127,11 +126,7 @@ def _learn(
     """
     clock = Stopwatch(folder.seconds)
     begun = model.num_timesteps
-    with (
-        progress_bar(config.steps, "steps")
-        if sys.stderr.isatty()
-        else nullcontext(ProgressLines(config.steps, "steps")) as show
-    ):
+    with shown_progress(config.steps, "steps") as show:
         shown = _progress(show, config, clock)
         while True:
             # A resumed run may have been interrupted between learning and evaluation.

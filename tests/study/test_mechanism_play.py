@@ -1,11 +1,14 @@
 """The mechanism of a film made by hand, whose answers are known."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.residual import wedges
 from care_sim.core.rig import Rig
+from care_sim.evaluation.rays import RAY_SHARES
 from care_sim.evaluation.sightings import Sightings
 from care_sim.policies.paper.reserves import Care
 from care_sim.sources.named import source_of
@@ -42,7 +45,12 @@ def config(policy, **conditions):
 
 
 def account(policy, **conditions):
-    return account_play(config(policy, **conditions), FILM, SIGHTINGS)
+    row = account_play(config(policy, **conditions), FILM, SIGHTINGS)
+    rays = np.array([row[f"rays_{share}"] for share in RAY_SHARES]).T
+    lists = (list(row[name]) for name in ("misses", "ttfds", "tracked"))
+    return SimpleNamespace(
+        **dict(zip(("reasons", "delays", "tracked"), lists, strict=True)), rays=rays
+    )
 
 
 def wedge_of(number):

@@ -21,7 +21,7 @@ from care_sim.sources.named import source_of
 from care_sim.sources.scenes import Scene, Streets, chosen_scenes
 from care_sim.study import scene_play as plays
 from care_sim.study.play_config import PLAY_FIELDS, listed_plays, play_grid
-from care_sim.study.run_config import in_batches
+from care_sim.study.runner import in_batches
 from tests.helpers.av2_log import at, box, write
 
 MEASURED = {"wall_s", "peak_rss_mb"}

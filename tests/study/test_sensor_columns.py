@@ -119,16 +119,6 @@ def test_an_episode_of_a_page_is_not_played_again_with_another_set_up(file):
             config_of(changed)
 
 
-def test_a_film_is_taken_with_the_sensor_of_its_source(file, monkeypatch):
-    filmed = []
-    monkeypatch.setattr(
-        "care_sim.sources.scenes.record", lambda street, setup, returns: filmed.append(setup)
-    )
-    monkeypatch.setattr("care_sim.sources.scenes.check_film", lambda film: None)
-    source_of("streets", sensor=str(file)).film(SCENE)
-    assert filmed == [sensor_setup(file)]
-
-
 def test_what_has_no_sensor_to_choose_is_refused_in_one_line(tmp_path):
     with pytest.raises(InvalidInput, match="sensor has no meaning for argoverse2 recordings"):
         source_of(f"argoverse2:{tmp_path}", sensor="os1-64")
@@ -137,4 +127,4 @@ def test_what_has_no_sensor_to_choose_is_refused_in_one_line(tmp_path):
     with pytest.raises(InvalidInput, match="unknown sensor 'os2'"):
         episode(sensor="os2")
     with pytest.raises(InvalidInput, match=r"grid is columns 512 .*needed is"):
-        EpisodeConfig("dense", "ppo", sensor="os1-64")
+        EpisodeConfig("dense", "ppo", sensor="os1-64").try_out()

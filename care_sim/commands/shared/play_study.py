@@ -30,6 +30,9 @@ def play_study(
     exit code.
     """
     study = STUDIES[name]
+    # A condition that no environment accepts is told once, before anything is played.
+    for config in configs[:1]:
+        config.try_out()
     make_executor = executors.cluster(options.cluster) if options.cluster else executors.processes
     usual = Path("runs", folder) if options.force else None
     out = options.out or usual or free_folder(folder, configs, study)

@@ -30,9 +30,8 @@ from care_sim.commands.shared.selection import (
 )
 from care_sim.envs import ENVIRONMENT_IDS
 from care_sim.scenarios.ncap.table import TESTS
-from care_sim.study.designs.crowding import crowding_study
 from care_sim.study.designs.faults import fault_study
-from care_sim.study.designs.paper import paper_study
+from care_sim.study.designs.paper import crowding_study, paper_study
 from care_sim.study.designs.standards import ncap_cases, ncap_study, r157_study
 from care_sim.study.designs.validate import levels_of, validation_study
 from care_sim.study.designs.vehicle import vehicle_study

@@ -17,7 +17,7 @@ from care_sim.evaluation.sightings import ANNOTATED
 from care_sim.perception.detectors import CLUSTER, PROXY
 from care_sim.policies import tags_of
 from care_sim.study.episode_config import EpisodeConfig
-from care_sim.study.run_config import CONDITION_NAMES, Row
+from care_sim.study.run_config import Row
 
 ChangedConditions = tuple[tuple[str, Any], ...]
 """Names and values of the conditions that are not the default."""
@@ -99,7 +99,7 @@ class Setting:
         return replace(self, conditions=tuple(felt))
 
 
-_OF_A_SETTING = {*CONDITION_NAMES, "scenario", "sensor", "sensor_hash", "detector", "keyframe_s"}
+_OF_A_SETTING = {*DEFAULTS, "scenario", "sensor", "sensor_hash", "detector", "keyframe_s"}
 _USUAL_EPISODE = {field.name: field.default for field in fields(EpisodeConfig)}
 READ_WITH = {
     "camera_detections": None,
@@ -149,7 +149,7 @@ def _setting_with(names: tuple[str, ...], *values: Any) -> Setting:
     changed = [
         (n, value)
         for n, value in row.items()
-        if (n in CONDITION_NAMES or n.startswith("scenario."))
+        if (n in DEFAULTS or n.startswith("scenario."))
         and value is not None
         and value != _USUAL_EPISODE.get(n)
     ]
