@@ -5,11 +5,11 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from care_sim.base.console import TableConsole
 from care_sim.base.errors import BrokenPolicy, InvalidInput, print_lines, report_problems
-from care_sim.base.exit_codes import DONE, FAILED
 from care_sim.base.files import JSON, check_output
+from care_sim.base.interrupts import DONE, FAILED
 from care_sim.commands.options.results import Benchmark
+from care_sim.commands.shared.console import TableConsole
 from care_sim.commands.shared.selection import check_values, playable, policy_parameters
 from care_sim.policies import tags_of
 from care_sim.policies.isolation import isolated_policies

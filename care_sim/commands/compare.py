@@ -8,10 +8,10 @@ from functools import partial
 from pathlib import Path
 from typing import cast
 
-from care_sim.base.console import TableConsole
 from care_sim.base.errors import report_problems
-from care_sim.base.exit_codes import DONE, FAILED
+from care_sim.base.interrupts import DONE, FAILED
 from care_sim.commands.options.watching import Compare
+from care_sim.commands.shared.console import TableConsole
 from care_sim.commands.shared.one_scene import finish_files, maker_of
 from care_sim.commands.shared.selection import playable
 from care_sim.envs.wrappers.record_rerun import RecordRerun, recording

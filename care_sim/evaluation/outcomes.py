@@ -6,10 +6,9 @@ from enum import StrEnum
 
 import numpy as np
 
-from care_sim.loops.record_columns import Records
-from care_sim.loops.records import DriveOutcome, EncounterOutcome, Keyframe, Outcome, Sight
+from care_sim.loops.records import DriveOutcome, EncounterOutcome, Keyframe, Outcome, Records, Sight
 from care_sim.world.approach import Impact
-from care_sim.world.crosser import Meeting
+from care_sim.world.motions import Meeting
 
 
 def outcome(keyframes: Sequence[Keyframe]) -> Outcome:

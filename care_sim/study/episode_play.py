@@ -17,14 +17,13 @@ from gymnasium.vector.utils import create_empty_array
 from numpy.typing import ArrayLike, NDArray
 
 import care_sim
+from care_sim.base.digests import Content, portable_bytes
 from care_sim.base.errors import InvalidInput, failure_line
-from care_sim.base.portable_hash import Content, portable_bytes
 from care_sim.base.times import LAST_BITS_S
 from care_sim.core.arrays import Floats
-from care_sim.core.driver_settings import DriverSettings
+from care_sim.core.conditions import DriverSettings
 from care_sim.envs.closed_loop import ClosedLoopEnv
-from care_sim.envs.sensing import Observed
-from care_sim.envs.spaces import checked_scores
+from care_sim.envs.sensing import Observed, checked_scores
 from care_sim.envs.vector.arguments import why_separate
 from care_sim.envs.vector.worlds import CompiledWorlds, Stepped
 from care_sim.loops.closed_loop import ClosedLoop
@@ -40,7 +39,7 @@ from care_sim.world.world import World
 
 def world_hash(env: ClosedLoopEnv, seed: int) -> str:
     """Return a hash of what stands in the world of a seed, and how it moves while the ego keeps its
-    speed, and while it brakes; measured numbers rounded (`care_sim.base.portable_hash`). The world
+    speed, and while it brakes; measured numbers rounded (`care_sim.base.digests`). The world
     is built anew.
     """
     content = hashlib.sha256()
@@ -92,7 +91,7 @@ def run_episode(config: EpisodeConfig) -> Row:
     Every parameter of `EpisodeConfig.row`; `version` and `digest` of the configuration; as
     `drawn.NAME` the parameters of the scenario that the seed drew; the fields of
     `care_sim.loops.records.Outcome`; `keyframes`; `wall_s`; `peak_rss_mb` of the process so far;
-    `episode_hash` over cells fired, ranges returned and poses (`care_sim.base.portable_hash`); and
+    `episode_hash` over cells fired, ranges returned and poses (`care_sim.base.digests`); and
     of a scenario that is not built in `world_hash` (`care_sim.study.episode_play`).
     """
     return trace(config)[0]

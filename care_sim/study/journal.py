@@ -13,8 +13,13 @@ from types import TracebackType
 from typing import NamedTuple, Self
 
 from care_sim.base.errors import InvalidInput, counted
-from care_sim.base.files import check_no_link, write_text
-from care_sim.base.json_text import check_file_size, json_content, parsed_json
+from care_sim.base.files import (
+    check_file_size,
+    check_no_link,
+    json_content,
+    parsed_json,
+    write_text,
+)
 from care_sim.study.rows.parquet import with_tuples
 from care_sim.study.run_config import Row
 

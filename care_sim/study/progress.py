@@ -59,7 +59,7 @@ class ProgressReporter(RunListener):
     tasks of the same policy that have ended, or of all tasks.
 
     What was begun before the first task had ended tells nothing of the rest, as the first round of
-    a training does not (`care_sim.training.pace`): it may have compiled what is not compiled yet.
+    a training does not (`care_sim.training.run`): it may have compiled what is not compiled yet.
     """
 
     def __init__(self, waiting: Iterable[RunConfig], show: Show, total: int) -> None:

@@ -21,12 +21,11 @@ import gymnasium
 import numpy as np
 
 import care_sim
-from care_sim.base.digests import file_digest
-from care_sim.base.entry_files import paths_in
+from care_sim.base.digests import file_digest, paths_in
 from care_sim.base.errors import InvalidInput, one_line, shown
+from care_sim.core.cells.stack import Grid
 from care_sim.core.conditions import DEFAULTS, UNUSED_BY_FULL_SCAN
 from care_sim.core.firing.listing import hardware_of
-from care_sim.core.grid_stack import Grid
 from care_sim.perception.detectors import PROXY, check_detector
 from care_sim.policies import POLICIES, check_policy, make_policy, maker
 from care_sim.policies.base import Policy

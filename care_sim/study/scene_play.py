@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 import care_sim
-from care_sim.base.portable_hash import portable_bytes
+from care_sim.base.digests import portable_bytes
 from care_sim.core.belief import Belief
 from care_sim.core.forgetting import released_cells
 from care_sim.core.grid import Cells
@@ -21,8 +21,7 @@ from care_sim.evaluation.differences import AllocationDifference, allocation_dif
 from care_sim.evaluation.recall import SceneScore, Tally
 from care_sim.evaluation.strata import strata
 from care_sim.loops.film import Film
-from care_sim.loops.open_loop import OpenLoop, OpenLoopKeyframe
-from care_sim.loops.scene_records import SceneKeyframe
+from care_sim.loops.open_loop import OpenLoop, OpenLoopKeyframe, SceneKeyframe
 from care_sim.policies.base import Policy
 from care_sim.study.episode_play import GymEnv, peak_rss_mb, result_or_reason
 from care_sim.study.play_config import PlayConfig
@@ -211,7 +210,7 @@ def _released(policy: Policy, belief: Belief) -> int | None:
 
 def film_hash(film: Film) -> str:
     """A hash over what a film shows and who is hidden at its start, measured numbers rounded
-    (`care_sim.base.portable_hash`).
+    (`care_sim.base.digests`).
 
     Of a return it holds the cell and the object, not the range: Bullet finds where a ray meets a
     round body by iteration, which makes a millimetre of a last bit.

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from care_sim import CLASSES, Detections
+from care_sim.core.types import CLASSES, Detections
 from care_sim.envs.scenarios import ScenarioEnv
 from care_sim.policies import make_policy
 from care_sim.scenarios.base import Scenario

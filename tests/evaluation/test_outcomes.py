@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 from care_sim.evaluation.outcomes import collision_outcome, drive_outcome, outcome, score
 from care_sim.loops.records import Keyframe, Outcome, Sight
 from care_sim.world.approach import Impact
-from care_sim.world.crosser import Crosser, Meeting
-from care_sim.world.walker import Walk
+from care_sim.world.motions import Crosser, Meeting, Walk
 
 NO_IMPACT = (False, None, None, None)
 """No brake for nothing, and no contact."""

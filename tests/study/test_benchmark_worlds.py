@@ -7,7 +7,7 @@ from itertools import islice
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.base.seed_ranges import LAST, split_of
+from care_sim.base.seeds import LAST, split_of
 from care_sim.study.benchmark.play import player_in, reachable
 from care_sim.study.benchmark.suite import (
     BENCHMARK_BUDGET,

@@ -7,8 +7,7 @@ import pytest
 from care_sim.base.errors import InvalidInput
 from care_sim.policies import controls
 from care_sim.scenarios.ncap.table import TESTS
-from care_sim.scenarios.r157.grid import kinds_in_turn
-from care_sim.scenarios.r157.preventable import preventable
+from care_sim.scenarios.r157 import kinds_in_turn, preventable
 from care_sim.sources.scenes import Scene, Streets
 from care_sim.study.designs import ablations, paper, standards, validate
 from care_sim.study.designs.defaults import NCAP_POLICIES

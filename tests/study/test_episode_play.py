@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import care_sim  # noqa: F401 (registers the environments)
+from care_sim.base.digests import portable_bytes
 from care_sim.base.errors import InvalidInput
-from care_sim.base.portable_hash import portable_bytes
 from care_sim.scenarios.ncap.table import TESTS
 from care_sim.study.episode_config import EpisodeConfig, grid, of_seeds
 from care_sim.study.episode_play import (

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.actions import CHOSEN, EXPLOITATION, FLOOR, RESERVE, SHARES
+from care_sim.core.firing.actions import CHOSEN, EXPLOITATION, FLOOR, RESERVE, SHARES
 from care_sim.core.grid import AngularGrid
 from care_sim.envs.wrappers.record_rerun import RecordRerun, recording
 from care_sim.loops.watcher import Watcher

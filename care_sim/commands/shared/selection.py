@@ -13,7 +13,7 @@ from care_sim.base.errors import (
     MissingExtra,
     report_problems,
 )
-from care_sim.base.scenario_names import scenario_of
+from care_sim.base.plugins import scenario_of
 from care_sim.commands.options.shared import EpisodeOptions, PlayOptions, SourceOptions
 from care_sim.core.conditions import DEFAULTS
 from care_sim.policies import check_policy, contenders

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.return_settings import RETURN_SETTINGS
+from care_sim.core.conditions import RETURN_SETTINGS
 from care_sim.evaluation.scene_contrasts import Tallies, averaged
 from care_sim.reports.engine.contrasts import Contrast, contrast
 from care_sim.reports.engine.measures import Measure, Recall, Units, tally_of

@@ -11,14 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from care_sim.core.return_settings import FilmedReturns
+from care_sim.core.conditions import FilmedReturns
 from care_sim.core.types import CLASSES
 from care_sim.evaluation.recall import CENSORED_AT
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.film import Film
-from care_sim.loops.open_loop import OpenLoop
+from care_sim.loops.open_loop import OpenLoop, SceneKeyframe
 from care_sim.loops.records import Keyframe, Outcome
-from care_sim.loops.scene_records import SceneKeyframe
 from care_sim.loops.watcher import sought
 from care_sim.reports.page.story import CENTI, fullness, known_before, whole, whole_pose
 from care_sim.sensors.annotated import NO_OBJECT

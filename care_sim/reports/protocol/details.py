@@ -17,8 +17,7 @@ from care_sim.reports.protocol.comparisons import (
     SceneThird,
     means,
 )
-from care_sim.reports.protocol.formatting import claims_of_paper, rounded
-from care_sim.reports.protocol.notes import papers
+from care_sim.reports.protocol.formatting import claims_of_paper, papers, rounded
 from care_sim.reports.protocol.paper import ALLOCATION_SOURCE, PUBLISHED_ALLOCATIONS, claims_about
 from care_sim.reports.protocol.rows import HISTORY, SettingPlays
 from care_sim.reports.table import Table, TableRow

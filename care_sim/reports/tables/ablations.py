@@ -14,9 +14,8 @@ from care_sim.reports.engine.levels import level
 from care_sim.reports.engine.measures import BRAKED, DETECTION, Measure, Recall
 from care_sim.reports.engine.tables import PAPER, under_headings
 from care_sim.reports.formatting import interval, quarters
-from care_sim.reports.protocol.formatting import claims_of_paper, rounded
-from care_sim.reports.protocol.notes import papers
-from care_sim.reports.protocol.paper_ablations import (
+from care_sim.reports.protocol.formatting import claims_of_paper, papers, rounded
+from care_sim.reports.protocol.paper import (
     NEAR_FIELD,
     PUBLISHED_CHANGES,
     PUBLISHED_ON_ALL_LEVELS,

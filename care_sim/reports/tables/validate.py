@@ -13,7 +13,7 @@ from care_sim.evaluation.censoring import FEWEST_PAIRS, quartiles
 from care_sim.reports.engine.contrasts import Contrast, contrast_of_rows
 from care_sim.reports.engine.controls import BEST_CONTROL
 from care_sim.reports.engine.measures import AVOIDED, DETECTION
-from care_sim.reports.engine.policy_rows import PolicyRows
+from care_sim.reports.engine.parts import PolicyRows
 from care_sim.reports.engine.tables import under_headings
 from care_sim.reports.formatting import interval, mean, median, tag_notes
 from care_sim.reports.table import Bold, Table, TableRow

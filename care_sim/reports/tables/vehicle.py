@@ -13,8 +13,7 @@ from care_sim.reports.engine.frames import Frame
 from care_sim.reports.engine.measures import AVOIDED, DETECTION
 from care_sim.reports.engine.tables import under_headings
 from care_sim.reports.formatting import interval, median, spread_of_counts
-from care_sim.reports.protocol.formatting import PAPER
-from care_sim.reports.protocol.notes import papers
+from care_sim.reports.protocol.formatting import PAPER, papers
 from care_sim.reports.table import Table, TableRow
 from care_sim.reports.tables.mechanism import CELLS_AT_APPEARANCE, VEHICLE_CELLS
 from care_sim.study.designs import vehicle as design

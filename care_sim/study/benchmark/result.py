@@ -14,8 +14,7 @@ from typing import Any, NamedTuple, Self
 
 from care_sim.base.checks import LARGEST_INTEGER
 from care_sim.base.errors import InvalidInput, counted, printable, shown
-from care_sim.base.files import JSON, replacing
-from care_sim.base.json_text import json_content
+from care_sim.base.files import JSON, json_content, replacing
 from care_sim.core.defaults import CELL_ORDERS
 from care_sim.evaluation.bootstrap import Interval, mean_of_ratios
 from care_sim.policies import POLICIES, maker, tags_of

@@ -15,10 +15,9 @@ from pathlib import Path
 from typing import Any, NamedTuple, Protocol, TypeVar
 
 from care_sim.base.errors import InvalidInput, shown
-from care_sim.base.files import write_text
-from care_sim.base.json_text import check_file_size, parsed_json
+from care_sim.base.files import check_file_size, parsed_json, write_text
 from care_sim.base.plugins import is_place
-from care_sim.base.random_streams import check_secret, secret_entropy
+from care_sim.base.seeds import check_secret, secret_entropy
 from care_sim.core.conditions import YOLOX_CAMERA
 from care_sim.core.defaults import AS_DEMANDED
 from care_sim.sources.scenes import Scene, Streets

@@ -5,7 +5,7 @@ time and together, in either loop.
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from care_sim.base.seed_ranges import split_of
+from care_sim.base.seeds import split_of
 from care_sim.core.conditions import YOLOX_CAMERA
 from care_sim.core.defaults import CELLS
 from care_sim.core.firing.listing import HARDWARE, settled

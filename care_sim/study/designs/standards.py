@@ -6,11 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from care_sim.core.driver_settings import FIXED
-from care_sim.scenarios.ncap.forms import Across, NcapTest
-from care_sim.scenarios.ncap.table import TESTS
-from care_sim.scenarios.r157.grid import CutInCase, kinds_in_turn
-from care_sim.scenarios.r157.preventable import preventable
+from care_sim.core.conditions import FIXED
+from care_sim.scenarios.ncap.table import TESTS, Across, NcapTest
+from care_sim.scenarios.r157 import CutInCase, kinds_in_turn, preventable
 from care_sim.study.designs.defaults import (
     NCAP_BUDGETS,
     NCAP_POLICIES,

@@ -7,7 +7,7 @@ What is chosen is chosen on training seeds, and what is said is said of test see
 from collections.abc import Sequence
 from typing import Any
 
-from care_sim.base.seed_ranges import (
+from care_sim.base.seeds import (
     TRAINING,
     VALIDATION,
     check_benchmark_seeds,
