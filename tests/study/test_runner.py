@@ -101,35 +101,6 @@ def test_a_finished_study_is_not_written_again(tmp_path, monkeypatch):
     assert (tmp_path / "tables.md").is_file()
 
 
-def test_a_finished_study_is_taken_from_its_results_without_its_journal(
-    tmp_path, monkeypatch, capsys
-):
-    run_study(short(["history"], seeds=range(3)), tmp_path, 1, ThreadPoolExecutor)
-    monkeypatch.setattr("care_sim.commands.shared.run_study.Journal", None)
-    assert run_study(short(["history"], seeds=range(3)), tmp_path, 1, ThreadPoolExecutor) == []
-    assert f"3 of 3 episodes found in {tmp_path}\n" in capsys.readouterr().err
-    # Fewer or more tasks, or a lost file, need the journal again.
-    for lost, seeds in (("", range(4)), ("tables.md", range(3))):
-        if lost:
-            (tmp_path / lost).unlink()
-        with pytest.raises(TypeError, match="NoneType"):
-            run_study(short(["history"], seeds=seeds), tmp_path, 1, ThreadPoolExecutor)
-
-
-def test_what_an_earlier_study_left_is_said_and_its_figures_go(tmp_path, capsys):
-    first, second = short(["history"], budgets=(0.05, 0.1)), short(["history", "random"])
-    run_study(first, tmp_path, workers=1)
-    assert "found" not in capsys.readouterr().err
-    (tmp_path / "dartout-budget.png").touch()
-    (tmp_path / "my-budget.png").touch()
-    run_study(second, tmp_path, workers=1, force=True)
-    line = f"1 of 2 episodes found in {tmp_path}; 1 of other options or code stay in its journal\n"
-    assert line in capsys.readouterr().err
-    assert {path.name for path in tmp_path.iterdir() if path.suffix in (".png", ".svg")} == {
-        "my-budget.png"
-    }
-
-
 class Counting(RunListener):
     def __init__(self):
         self.ended = []
@@ -301,25 +272,6 @@ def test_what_failed_is_told_in_one_line_that_no_terminal_obeys():
 
     assert result_or_reason(fail, InvalidInput("no\n\x1b[2J idea")) == r"no \x1b[2J idea"
     assert result_or_reason(fail, RuntimeError()).startswith("RuntimeError (test_runner.py, line ")
-
-
-def test_a_worker_imports_nothing_of_tables_and_commands():
-    import_as_a_worker = (
-        "import sys, care_sim.study.episode_play, care_sim.envs.closed_loop; print(*sys.modules)"
-    )
-    loaded = subprocess.run(
-        [sys.executable, "-c", import_as_a_worker], capture_output=True, text=True, check=True
-    )
-    needless = {
-        "rich",
-        "tyro",
-        "torch",
-        "dask",
-        "open3d",
-        "care_sim.reports.report",
-        "care_sim.reports.figures.styles",
-    }
-    assert not needless & set(loaded.stdout.split())
 
 
 @pytest.mark.slow
