@@ -147,7 +147,7 @@ def test_a_parameter_that_a_built_in_policy_lacks_is_refused(file):
     """What another policy has is that policy's own word."""
     assert read_result(changed(file, parameters=[["speed", 2]])).entry.parameters
     assert refusal(changed(file, policy="care")).startswith(
-        f"{file}: unknown parameter of policy care 'speed'"
+        f"{file} cannot be played: unknown parameter of policy care 'speed'"
     )
     known = ", ".join(CELL_ORDERS)
     told = refusal(changed(file, policy="mine", cell_order="best"))
