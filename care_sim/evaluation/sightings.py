@@ -106,7 +106,11 @@ class Sightings:
             raise InvalidInput(f"scene {scene}: a scene must have at least one keyframe")
         check_presence(presence)
         rows = _table(keyframes)
-        start = _table([_together(keyframes[0], hidden)])
+        together = (
+            np.concatenate([getattr(part, column.name) for part in (keyframes[0], hidden)])
+            for column in fields(hidden)
+        )
+        start = _table([Annotations(*together)])
         for table in (rows, start):
             _check(scene, table)
 
@@ -114,10 +118,13 @@ class Sightings:
         # nor as appearing there.
         in_range = rows.ranges <= RANGE_M
         frames = rows.take(in_range)
-        appearing = _newcomer_rows(frames)
+        # Rows are in order of keyframe, so the first row of an object is its first keyframe.
+        _, first = np.unique(frames.objects, return_index=True)
+        appearing = np.sort(first[frames.keyframes[first] > 0]).astype(np.int64)
         present = np.isin(frames.objects[appearing], start.objects[start.ranges <= RANGE_M])
         events = appearing[~present] if presence == ANNOTATED else appearing
-        first_ranges = _first_ranges(rows)[in_range]
+        _, first, which = np.unique(rows.objects, return_index=True, return_inverse=True)
+        first_ranges = rows.ranges[first[which]][in_range]
         return cls(
             scene,
             tuple(keyframes),
@@ -148,28 +155,6 @@ def check_presence(presence: object) -> None:
         raise InvalidInput(
             f"presence must be {' or '.join(map(repr, PRESENCES))}, got {shown(presence)}"
         )
-
-
-def _newcomer_rows(frames: ObjectFrames) -> Integers:
-    """(n,) the first row of every object that has none at the first keyframe, ascending."""
-    # Rows are in order of keyframe, so the first row of an object is its first keyframe.
-    _, first = np.unique(frames.objects, return_index=True)
-    return np.sort(first[frames.keyframes[first] > 0]).astype(np.int64)
-
-
-def _first_ranges(rows: ObjectFrames) -> Floats:
-    """(r,) the range of the first row of every row's object."""
-    # Rows are in order of keyframe, and `unique` gives the first of equal ones.
-    _, first, which = np.unique(rows.objects, return_index=True, return_inverse=True)
-    return rows.ranges[first[which]]
-
-
-def _together(seen: Annotations, hidden: Annotations) -> Annotations:
-    columns = (
-        np.concatenate([getattr(part, column.name) for part in (seen, hidden)])
-        for column in fields(seen)
-    )
-    return Annotations(*columns)
 
 
 def _table(keyframes: Sequence[Annotations]) -> ObjectFrames:

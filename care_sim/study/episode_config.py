@@ -4,7 +4,7 @@ from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import asdict, dataclass, field
 from itertools import product
 from math import prod
-from typing import Any, Self, cast
+from typing import Any, cast
 
 import gymnasium
 
@@ -72,13 +72,6 @@ class EpisodeConfig(ClosedLoopConditions, RunConfig):
                 f"scenario {self.scenario} is registered by hand, which other processes do not "
                 "see: name its class as MODULE:OBJECT, or install it"
             )
-
-    def with_seed(self, seed: int) -> Self:
-        """The same with another seed. What is sound for one seed is sound for all, so that only the
-        seed is checked.
-        """
-        check_seed(seed)
-        return self.changed(seed=int(seed))
 
     def make_env(self) -> gymnasium.Env[Any, Any]:
         """The environment of this episode, not yet reset."""
@@ -172,7 +165,11 @@ def of_seeds(configs: Sequence[EpisodeConfig], seeds: Sequence[int]) -> list[Epi
     made.
     """
     check_size(len(configs) * len(seeds))
-    return [config.with_seed(seed) for config in configs for seed in dict.fromkeys(seeds)]
+    # What is sound for one seed is sound for all, so that only the seed is checked.
+    for seed in seeds:
+        check_seed(seed)
+    own = [int(seed) for seed in dict.fromkeys(seeds)]
+    return [config.changed(seed=seed) for config in configs for seed in own]
 
 
 def of_cases(configs: Sequence[EpisodeConfig], cases: Sequence[Parameters]) -> list[EpisodeConfig]:

@@ -206,7 +206,7 @@ class _Run:
     def _collect_finished(self, in_flight: _InFlight) -> None:
         done, _ = wait(in_flight, _QUIET_S, FIRST_COMPLETED)
         # Whole batches first, so that they are in the journal before a death is told.
-        for future in sorted(done, key=_is_cut_off):
+        for future in sorted(done, key=lambda future: future.exception() is not None):
             if not self._kept(in_flight[future], future):
                 raise BrokenExecutor
             del in_flight[future]
@@ -267,7 +267,3 @@ def _part_last(waiting: "deque[list[RunConfig]]", workers: int) -> None:
         if rest := first[share:]:
             waiting.appendleft(rest)
         waiting.appendleft(first[:share])
-
-
-def _is_cut_off(future: Future[list[Row | str]]) -> bool:
-    return future.exception() is not None

@@ -71,14 +71,14 @@ def test_who_asks_for_truth_and_what_no_arrays_hold_is_played_alone():
         (EpisodeConfig("dartout", "care", engine="bullet"), "the engine"),
     ):
         with pytest.raises(InvalidInput, match=reason):
-            play_together([config, config.with_seed(1)])
+            play_together([config, config.changed(seed=1)])
     # What is surely alone does not wait for others in a batch.
     for config in (
         EpisodeConfig("drive", "care"),
         EpisodeConfig("dartout", "care", engine="bullet"),
     ):
-        assert config.batch != config.with_seed(1).batch
-    assert together.batch == together.with_seed(1).batch
+        assert config.batch != config.changed(seed=1).batch
+    assert together.batch == together.changed(seed=1).batch
 
 
 def test_one_that_fails_costs_only_itself(third_party):

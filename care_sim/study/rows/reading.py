@@ -124,11 +124,9 @@ Key = tuple[Setting, str, float]
 
 def setting_of(row: Row) -> Setting:
     """The setting of a row, of an episode or of a play in the open loop."""
-    return _setting_of_play(row) if "source" in row else _setting_of_episode(row)
-
-
-# Thousands of rows share their columns, and their setting.
-def _setting_of_episode(row: Row) -> Setting:
+    if "source" in row:
+        return _setting_of_play(row)
+    # Thousands of rows share their columns, and their setting.
     names = _setting_columns(tuple(row))
     return _setting_with(names, *[row[name] for name in names])
 
