@@ -66,7 +66,7 @@ from care_sim.study.designs.validate import levels_of, validation_study
 from care_sim.study.designs.vehicle import vehicle_study
 from care_sim.study.episode_config import EpisodeConfig, grid, of_seeds
 from care_sim.study.play_config import PlayConfig, mechanism_plays, play_grid
-from care_sim.study.run_config import parameters
+from care_sim.study.rows.parameters import parameters
 
 
 def play_scenes(

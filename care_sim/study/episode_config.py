@@ -19,8 +19,8 @@ from care_sim.perception.detectors import PROXY
 from care_sim.scenarios import SCENARIOS, make_scenario
 from care_sim.sensors.setups import DEFAULT_SETUP, sensor_columns, sensor_setup
 from care_sim.study.provenance import detector_digest, scenario_digest
+from care_sim.study.rows.parameters import Parameters
 from care_sim.study.run_config import (
-    Parameters,
     Row,
     RunConfig,
     check_size,

@@ -18,10 +18,10 @@ from care_sim.policies import check_policy
 from care_sim.sensors.setups import sensor_setup
 from care_sim.sources.scenes import Scene, Source
 from care_sim.study.provenance import detector_digest, source_digests
+from care_sim.study.rows.parameters import Parameters
 from care_sim.study.run_config import (
     FULL,
     REFERENCE,
-    Parameters,
     Row,
     RunConfig,
     check_size,

@@ -29,7 +29,7 @@ from care_sim.scenarios import SCENARIOS, make_scenario
 from care_sim.scenarios.dartout import Dartout
 from care_sim.study.episode_config import ENVIRONMENT_IDS, EpisodeConfig
 from care_sim.study.executors import cluster
-from care_sim.study.run_config import parameters
+from care_sim.study.rows.parameters import parameters
 from care_sim.wrappers import ExportScans, GridObservation, SectorReserve, SectorScores
 
 NO_NUMBERS = (

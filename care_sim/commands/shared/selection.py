@@ -18,7 +18,8 @@ from care_sim.commands.options.shared import EpisodeOptions, PlayOptions, Source
 from care_sim.core.conditions import DEFAULTS
 from care_sim.policies import check_policy, contenders
 from care_sim.scenarios import PLUGINS, SCENARIOS, make_scenario, scenario_names
-from care_sim.study.run_config import Parameters, RunConfig, parameters
+from care_sim.study.rows.parameters import Parameters, parameters
+from care_sim.study.run_config import RunConfig
 
 if TYPE_CHECKING:
     from care_sim.sources.scenes import Source

@@ -24,8 +24,9 @@ from care_sim.sources.scenes import Scene, Streets
 from care_sim.streets.street import street_name
 from care_sim.study.episode_config import grid
 from care_sim.study.play_config import play_grid
+from care_sim.study.rows.parameters import Parameters
 from care_sim.study.rows.reading import is_avoided
-from care_sim.study.run_config import Parameters, Row, RunConfig
+from care_sim.study.run_config import Row, RunConfig
 
 BENCHMARK_VERSION = 1
 """Of worlds, conditions and scorer together. Whatever changes a published row makes another one."""

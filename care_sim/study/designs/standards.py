@@ -17,7 +17,8 @@ from care_sim.study.designs.defaults import (
     R157_POLICIES,
 )
 from care_sim.study.episode_config import EpisodeConfig, grid, of_cases
-from care_sim.study.run_config import Parameters, Row
+from care_sim.study.rows.parameters import Parameters
+from care_sim.study.run_config import Row
 
 TEST_COLUMN = "scenario.test"
 SPEED_COLUMN = "scenario.speed_kph"

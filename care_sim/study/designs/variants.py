@@ -9,8 +9,9 @@ from care_sim.perception.detectors import PROXY
 from care_sim.sources.scenes import Scene, Source
 from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.play_config import PlayConfig, play_grid
+from care_sim.study.rows.parameters import Parameters
 from care_sim.study.rows.reading import Key, key_of
-from care_sim.study.run_config import FULL, Parameters, Row, RunConfig, flat
+from care_sim.study.run_config import FULL, Row, RunConfig, flat
 
 _Thing = TypeVar("_Thing")
 
