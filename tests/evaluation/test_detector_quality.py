@@ -74,13 +74,6 @@ def test_the_least_score_of_a_precision(scene, precision, score):
     assert score_of_precision([scene], precision) == score
 
 
-def test_no_box_has_no_curve(shown, reported):
-    one = scene_boxes(Sightings.of("one", [shown((1, "car", 10.0, 0.0))]), [reported()])
-    assert curve([one]).shape == (0, 3)
-    assert np.isnan(calibration_error([one]))
-    assert score_of_precision([one], 0.5) is None
-
-
 def test_equal_scores_count_together(shown, reported):
     keyframes = [shown((1, "car", 10.0, 0.0))]
     report = scored(reported(("car", 30.0, 0.0), ("car", 10.0, 0.0)), [0.5, 0.5])

@@ -95,14 +95,6 @@ def test_rays_of_the_floor_count():
     assert reason(seen(False), Demand(), 2, floor=OBJECT) == NOT_DEMANDED
 
 
-def test_falsely_explained_is_what_forecasts_of_others_alone_explain():
-    assert seen(True).falsely_explained
-    assert seen(True, True).falsely_explained
-    assert not seen(True, False).falsely_explained
-    assert not seen(True, tracked=True).falsely_explained
-    assert not seen().falsely_explained
-
-
 @st.composite
 def situations(draw):
     some = st.lists(st.integers(0, 19), max_size=6, unique=True).map(

@@ -139,19 +139,6 @@ def test_an_event_counts_in_the_stratum_of_its_first_sighting(follow):
     assert result.tally(~near) == Tally(events=1, sighted=0, delay=1, frames=1, found=0)
 
 
-def test_an_empty_scene_has_nothing_to_find(shown, reported, score_scene):
-    assert (
-        score_scene(
-            Sightings.of("quiet", [shown(), shown()]), [reported(("car", 1, 1)), reported()]
-        ).tally()
-        == Tally()
-    )
-
-
-def test_tallies_add():
-    assert Tally(1, 1, 0, 5, 4) + Tally(2, 0, 9.5, 3, 1) == Tally(3, 1, 9.5, 8, 5)
-
-
 def perfect(keyframes):
     return [Detections(a.classes, a.boxes, np.full(len(a), 3)) for a in keyframes]
 

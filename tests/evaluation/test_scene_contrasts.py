@@ -52,26 +52,6 @@ def test_a_contrast_weighs_events_alike_and_beside_it_scenes():
     assert scene_contrast(OVERALL, ours, theirs).weight == 120
 
 
-def test_less_excludes_zero_as_more_does():
-    more, less = tallies(*[(10, 5), (10, 7)] * 4), tallies(*[(10, 4)] * 8)
-    assert scene_contrast(FIRST_SIGHTING, more, less).excludes_zero
-    assert scene_contrast(FIRST_SIGHTING, less, more).excludes_zero
-
-
-def test_a_policy_against_itself_is_certainly_equal():
-    same = tallies((10, 4), (2, 1), (5, 0), (9, 3), (1, 1))
-    found = scene_contrast(FIRST_SIGHTING, same, same)
-    assert (found.by_event, found.scenes, found.excludes_zero) == ((0.0, 0.0, 0.0), 5, False)
-
-
-def test_pairing_removes_what_scenes_share():
-    """Scenes from easy to hard, and ours one event ahead in each."""
-    ours, theirs = ([(20, sighted + more) for sighted in range(2, 18)] for more in (1, 0))
-    found = scene_contrast(FIRST_SIGHTING, tallies(*ours), tallies(*theirs))
-    assert found.by_event == pytest.approx((5.0, 5.0, 5.0))
-    assert found.excludes_zero
-
-
 @pytest.mark.parametrize(("scenes", "excludes"), [(4, False), (5, True)])
 def test_four_scenes_carry_no_claim(scenes, excludes):
     found = scene_contrast(

@@ -6,7 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.types import CLASSES
 from care_sim.evaluation.sightings import ANNOTATED, VISIBLE, Sightings
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -113,16 +112,6 @@ def test_an_object_cannot_be_hidden_and_seen_at_once_nor_a_presence_made_up(show
     for other in ("seen", None, [ANNOTATED]):
         with pytest.raises(InvalidInput, match="presence must be 'annotated' or 'visible', got"):
             Sightings.of("any", [shown()], presence=other)
-
-
-def test_an_event_says_what_was_seen_and_where(shown):
-    scene = Sightings.of(
-        "left", [shown((1, "car", 10, 0)), shown((1, "car", 9, 0), (2, "bicycle", -3, 4))]
-    )
-    event = scene.frames.take(scene.events)
-    assert (scene.scene, len(event), CLASSES[event.classes[0]]) == ("left", 1, "bicycle")
-    assert (event.keyframes[0], event.objects[0], event.ranges[0]) == (1, 2, 5.0)
-    assert event.azimuths[0] == pytest.approx(np.arctan2(4, -3))
 
 
 def test_range_is_planar_and_the_height_of_a_box_plays_no_part(shown):

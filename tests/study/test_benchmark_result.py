@@ -91,11 +91,6 @@ def test_another_version_is_refused_with_the_command_that_plays_it_again(file):
     assert "care-sim benchmark --policy mine" in told
 
 
-def test_a_score_that_was_written_in_changes_nothing(file):
-    changed(file, score={"measured": {"score": 99.9}})
-    assert read_result(file).score() == made_result().score()
-
-
 @pytest.mark.parametrize(
     "spoil",
     [

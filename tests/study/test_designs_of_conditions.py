@@ -133,15 +133,6 @@ def test_every_configuration_stands_in_a_cell_of_the_tables_of_headlines():
         BY_NAME["drive, 1%"].seeds([999])
 
 
-def test_the_tests_of_euro_ncap_are_each_at_its_highest_speed_up_to_40_kph():
-    cases = [dict(place.parameters) for place in BY_NAME["ncap, 1%"].places]
-    assert len(cases) == len({case["test"] for case in cases}) == 19
-    assert {case["speed_kph"] for case in cases} == {10.0, 20.0, 40.0}
-    assert {case.get("occluder_reported") for case in cases} == {None, True}
-    by_test = {case["test"]: case["speed_kph"] for case in cases}
-    assert (by_test["CPTAns-50"], by_test["CCFtap"], by_test["CPNCO-50"]) == (10.0, 20.0, 40.0)
-
-
 def test_conditions_that_cannot_be_played_are_left_out_with_a_line(drive):
     fits = realism.headline_conditions(BY_NAME["drive, 1%"])
     left = labels(realism.CONDITIONS) - labels(fits.sound)

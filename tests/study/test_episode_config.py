@@ -119,6 +119,20 @@ def test_the_digest_covers_the_code(monkeypatch):
     assert len(provenance.code_digest()) == 16
 
 
+def test_the_digest_covers_the_files_that_parameters_name(tmp_path):
+    file = tmp_path / "model.pt"
+    file.write_text("1")
+    given = (("file", str(file)),)
+    (play,) = play_grid(Streets(), Streets().scenes()[:1], ["care"], [0.1])
+    configs = [config.changed(policy_parameters=given) for config in (GOOD, play)]
+    configs += [
+        config.changed(detector="cluster", detector_parameters=given) for config in (GOOD, play)
+    ]
+    before = [config.digest() for config in configs]
+    file.write_text("2")
+    assert not {*before} & {config.digest() for config in configs}
+
+
 @pytest.fixture
 def package(tmp_path, monkeypatch):
     """An installed package with a policy in one module and a table beside it."""

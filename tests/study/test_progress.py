@@ -158,14 +158,6 @@ def test_the_first_failure_is_told_at_once_and_no_other_before_the_end(capsys):
     ]
 
 
-def test_of_a_single_task_there_are_no_others_that_go_on(capsys):
-    config = EpisodeConfig("dartout", "care")
-    reporter = Shown([config]).reporter
-    reporter.finished(config, None)
-    reporter.failed(Failure(config, "no idea"))
-    assert capsys.readouterr().err == ""
-
-
 @pytest.mark.parametrize(
     ("duration", "text"),
     [(0.4, "0 s"), (89.4, "89 s"), (90, "2 min"), (3600, "60 min"), (12000, "3 h 20 min")],

@@ -12,11 +12,10 @@ from unittest.mock import Mock
 
 import pytest
 
-from care_sim.base.errors import InvalidInput
 from care_sim.commands.shared.run_study import run_study
 from care_sim.loops.records import Outcome
 from care_sim.study.episode_config import EpisodeConfig, grid
-from care_sim.study.episode_play import result_or_reason, run_episode, trace
+from care_sim.study.episode_play import run_episode, trace
 from care_sim.study.journal import JOURNAL, Journal
 from care_sim.study.provenance import code_digest
 from care_sim.study.results_formats import EPISODES
@@ -63,14 +62,6 @@ def test_a_study_writes_its_files_and_equals_the_same_episodes_at_home(tmp_path)
     assert rows[0]["episode_hash"] == run_episode(configs[0])["episode_hash"]
     names = {path.name for path in tmp_path.iterdir()}
     assert names == {"config.json", JOURNAL, EPISODES.file, "tables.md", "tables.tex"}
-
-
-def test_a_study_keeps_its_command_without_what_only_this_machine_knows(tmp_path):
-    command = "care-sim protocol --source kitti:/home/me/drives --out /tmp/x --policies mine:Mine"
-    run_study(short(["history", "full"]), tmp_path, workers=1, command=command)
-    content = json.loads((tmp_path / "config.json").read_text())
-    assert content["command"] == "care-sim protocol --source kitti:FOLDER --policies mine:Mine"
-    assert [each["policies"] for each in content["configurations"]] == [["history"], ["full"]]
 
 
 def test_an_interrupted_study_loses_and_repeats_nothing(tmp_path):
@@ -264,14 +255,6 @@ def test_a_fork_server_that_fails_once_costs_nothing(tmp_path, error):
     configs = short(["history"])
     assert run_study(configs, tmp_path, workers=1, make_executor=server) == []
     assert len(read_rows(tmp_path / EPISODES.file)) == 1
-
-
-def test_what_failed_is_told_in_one_line_that_no_terminal_obeys():
-    def fail(error):
-        raise error
-
-    assert result_or_reason(fail, InvalidInput("no\n\x1b[2J idea")) == r"no \x1b[2J idea"
-    assert result_or_reason(fail, RuntimeError()).startswith("RuntimeError (test_runner.py, line ")
 
 
 @pytest.mark.slow

@@ -196,13 +196,3 @@ def test_a_scene_without_an_event_has_a_row_too(tmp_path):
     (row,) = attempted(small(source_of(f"argoverse2:{tmp_path}"), ["care"], scenes=("empty",)))
     assert Tally(*(row[name] for name in plays.SUMS)) == Tally()
     assert row["ttfds"] == ()
-
-
-def test_what_changed_in_a_recording_is_played_again(source, folder, drive, tmp_path):
-    (config,) = small(source, ["care"])
-    before = config.digest()
-    shutil.copytree(drive, folder / "moved")
-    assert config.digest() == before
-    parked = box("REGULAR_VEHICLE", (15.0, 3.0, 0.42))
-    write(folder / "a", [[parked]] * 10, [at()] * 10)
-    assert config.digest() != before

@@ -92,21 +92,6 @@ def test_an_episode_of_a_page_is_played_again_without_the_file_of_its_set_up(fil
     assert again.story["ego"]["reach"] == 5000
 
 
-def test_an_episode_of_a_page_is_not_played_again_with_another_set_up(file):
-    row = episode(sensor="m1-forward", budget=0.2).row()
-    assert config_of(row).row() == row
-    mine = episode(sensor=str(file)).row()
-    other = mine["sensor_setup"].replace("90", "45")
-    for changed, said in (
-        (row | {"sensor_hash": "0" * 16}, "does not come with this version"),
-        (mine | {"sensor_setup": None}, "does not come with this version"),
-        (mine | {"sensor_setup": other}, "has the hash"),
-        (mine | {"sensor_setup": "[]"}, "no text of a sensor set-up"),
-    ):
-        with pytest.raises(InvalidInput, match=said):
-            config_of(changed)
-
-
 def test_what_has_no_sensor_to_choose_is_refused_in_one_line(tmp_path):
     with pytest.raises(InvalidInput, match="sensor has no meaning for argoverse2 recordings"):
         source_of(f"argoverse2:{tmp_path}", sensor="os1-64")

@@ -115,8 +115,3 @@ def test_folders_of_different_worlds_are_not_merged(tmp_path):
         studied(plays("Drawing", [policy], [0]), tmp_path / policy)
     with pytest.raises(InvalidInput, match=told("Drawing")):
         merged([tmp_path / "history", tmp_path / "care"])
-
-
-def test_rows_of_built_in_scenarios_are_as_they_were():
-    (config,) = grid(["dartout"], ["history"], [0.05], [0])
-    assert "world_hash" not in run_episode(config)
