@@ -71,7 +71,9 @@ def _entries(options: Benchmark) -> tuple[list[Entry], list[str]]:
 
     # One world of every part is enough to see whether a policy can be made.
     tried = [*{world.part: world for world in published_worlds()}.values()]
-    policies, left_out = playable(options.policy, lambda name: _tasks(entry(name), tried))
+    policies, left_out = playable(
+        options.policy, lambda name: [task.config for task in _tasks(entry(name), tried)]
+    )
     entries = [entry(name) for name in policies]
     if options.name and len(entries) > 1:
         raise InvalidInput("--name names one entry, and several policies are given")

@@ -27,7 +27,7 @@ from care_sim.study.judging import JudgedScene, judge_scene
 from care_sim.study.play_config import PlayConfig, play_grid
 from care_sim.study.progress import shown_progress
 from care_sim.study.provenance import machine, versions
-from care_sim.study.run_config import Parameters, parameters
+from care_sim.study.rows.parameters import Parameters, parameters
 from care_sim.study.runner import DIED
 
 _FIGURES = "judge.json"
@@ -96,7 +96,9 @@ def _plays(
     made = []
     for name in names:
         own = common | {"detector": name, "detector_parameters": _parameters(options, name)}
-        made.append(play_grid(source, scenes, [options.policy], [options.budget], floors, **own))
+        plays = play_grid(source, scenes, [options.policy], [options.budget], floors, **own)
+        plays[0].try_out()
+        made.append(plays)
     return [list(plays) for plays in zip(*made, strict=True)]
 
 

@@ -44,7 +44,6 @@ from care_sim.scenarios.ncap.table import TESTS
 from care_sim.sensors.setups import DEFAULT_SETUP
 from care_sim.sources.scenes import chosen_scenes
 from care_sim.study.designs.ablations import ablation_plays, ablation_study, quarter_of
-from care_sim.study.designs.crowding import crowding_study
 from care_sim.study.designs.defaults import FIRING_POLICIES
 from care_sim.study.designs.faults import fault_study
 from care_sim.study.designs.firing import (
@@ -54,7 +53,7 @@ from care_sim.study.designs.firing import (
     order_plays,
     order_study,
 )
-from care_sim.study.designs.paper import paper_study
+from care_sim.study.designs.paper import crowding_study, paper_study
 from care_sim.study.designs.realism import (
     HEADLINES,
     film_conditions,
@@ -67,7 +66,7 @@ from care_sim.study.designs.validate import levels_of, validation_study
 from care_sim.study.designs.vehicle import vehicle_study
 from care_sim.study.episode_config import EpisodeConfig, grid, of_seeds
 from care_sim.study.play_config import PlayConfig, mechanism_plays, play_grid
-from care_sim.study.run_config import parameters
+from care_sim.study.rows.parameters import parameters
 
 
 def play_scenes(

@@ -14,7 +14,7 @@ import numpy as np
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.cells.boxes import planar_ranges
 from care_sim.core.types import Detections
-from care_sim.evaluation.sightings import Sightings
+from care_sim.evaluation.sightings import RANGE_M, Sightings
 from care_sim.perception.matching import UNSERVED, served_by
 
 UNFOUND = -np.inf
@@ -94,7 +94,7 @@ def scene_boxes(sightings: Sightings, reports: Sequence[Detections]) -> SceneBox
         serves = np.zeros(len(report), bool)
         serves[server[server != UNSERVED]] = True
         # One beyond the scored range may be as right as any, but nobody asks for its object.
-        near = planar_ranges(report.boxes) <= sightings.range_m
+        near = planar_ranges(report.boxes) <= RANGE_M
         scores.append(sure[near])
         classes.append(report.classes[near])
         right.append(serves[near])

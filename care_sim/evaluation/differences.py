@@ -1,7 +1,8 @@
 """How two policies differ keyframe by keyframe and event by event."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -9,19 +10,23 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.grid import Cells
 
 
+class Adding:
+    """Sums that add, column by column: those of scenes give those of all of them."""
+
+    def __add__(self, other: Self) -> Self:
+        pairs = zip(vars(self).values(), vars(other).values(), strict=True)
+        return type(self)(*(ours + theirs for ours, theirs in pairs))
+
+
 @dataclass(frozen=True)
-class AllocationDifference:
-    """Sums over keyframes; they add. `differing` of the `keyframes` have allocations that differ,
+class AllocationDifference(Adding):
+    """Sums over keyframes. `differing` of the `keyframes` have allocations that differ,
     by `cells` in all.
     """
 
     keyframes: int = 0
     differing: int = 0
     cells: int = 0
-
-    def __add__(self, other: "AllocationDifference") -> "AllocationDifference":
-        sums = (getattr(self, column.name) + getattr(other, column.name) for column in fields(self))
-        return AllocationDifference(*sums)
 
     @property
     def share(self) -> float:
@@ -62,19 +67,14 @@ def _moved(ours: Cells, theirs: Cells) -> int:
 
 
 @dataclass(frozen=True)
-class DetectionOrder:
-    """Events that the first policy detected earlier, later, or at the same keyframe as the second;
-    they add. Two that never detect it within the censoring time are tied.
+class DetectionOrder(Adding):
+    """Events that the first policy detected earlier, later, or at the same keyframe as the second
+    (paper, Sec. 5.5). Two that never detect it within the censoring time are tied.
     """
 
     earlier: int = 0
     later: int = 0
     tied: int = 0
-
-    def __add__(self, other: "DetectionOrder") -> "DetectionOrder":
-        return DetectionOrder(
-            *(getattr(self, column.name) + getattr(other, column.name) for column in fields(self))
-        )
 
 
 def detection_order(ours: Sequence[int], theirs: Sequence[int]) -> DetectionOrder:

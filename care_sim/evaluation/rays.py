@@ -33,7 +33,7 @@ shown it.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from itertools import chain, pairwise
 
 import numpy as np
@@ -43,6 +43,7 @@ from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
+from care_sim.evaluation.differences import Adding
 
 RAY_SHARES = ("exploitation", "layer_1", "layer_2", "later_layers", "floor")
 """The shares that are told apart. Of CARE layer 1 is U, of care-sbf layers 1 and 2 are U and M; a
@@ -110,8 +111,9 @@ def _hits(returns: Cells, cells: Cells) -> int:
 
 
 @dataclass(frozen=True)
-class ReserveUse:
-    """Sums over keyframes; they add.
+class ReserveUse(Adding):
+    """How the camera's wedges meet the reserve (paper, Sec. 5.2, "The near-tie is mechanical"), as
+    sums over keyframes.
 
     At `filled` of the `keyframes` the unexplained wedges U alone take all that exploitation leaves
     of the budget, so that nothing is left to the explained wedges M or to the floor; at
@@ -125,11 +127,6 @@ class ReserveUse:
     filled_rho: int = 0
     explained_cells: int = 0
     untaken_cells: int = 0
-
-    def __add__(self, other: "ReserveUse") -> "ReserveUse":
-        return ReserveUse(
-            *(getattr(self, column.name) + getattr(other, column.name) for column in fields(self))
-        )
 
 
 def reserve_use(

@@ -12,25 +12,23 @@ was in range, for whoever wants only the events that had them all.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from care_sim.base.checks import check_whole
-from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Integers, Mask
-from care_sim.core.types import CLASSES, Detections
+from care_sim.core.types import CLASSES
+from care_sim.evaluation.differences import Adding
 from care_sim.evaluation.sightings import Sightings
-from care_sim.perception import matching
 
 CENSORED_AT = 6
 """K, in keyframes: three seconds at 2 Hz (paper, Remark 1)."""
 
 
 @dataclass(frozen=True)
-class Tally:
-    """Sums over a scene, or over several: they add.
+class Tally(Adding):
+    """Sums over a scene, or over several.
 
     `events`, of which `sighted` were found at their first keyframe; `delay` is the sum of their
     TTFD in keyframes. `frames` are the object frames in range, of which `found` were found. An
@@ -42,11 +40,6 @@ class Tally:
     delay: float = 0.0
     frames: float = 0.0
     found: float = 0.0
-
-    def __add__(self, other: "Tally") -> "Tally":
-        return Tally(
-            *(getattr(self, column.name) + getattr(other, column.name) for column in fields(self))
-        )
 
 
 @dataclass(frozen=True)
@@ -68,8 +61,8 @@ class SceneScore:
     """What a policy found of a scene.
 
     `found` (r,) by row of `sightings.frames`; of the events (e,) `delays` are the TTFD in
-    keyframes, `censored_at` where not found, and `chances` the keyframes among the first
-    `censored_at` at which the object was in range.
+    keyframes, `CENSORED_AT` where not found, and `chances` the keyframes among the first
+    `CENSORED_AT` at which the object was in range.
     """
 
     sightings: Sightings
@@ -78,27 +71,26 @@ class SceneScore:
     chances: Integers
 
     @classmethod
-    def of(
-        cls, sightings: Sightings, masks: Sequence[Mask], censored_at: int = CENSORED_AT
-    ) -> "SceneScore":
+    def of(cls, sightings: Sightings, masks: Sequence[Mask]) -> "SceneScore":
         """The score of a scene whose keyframes were matched one by one.
 
         `masks` are one per keyframe: (n,) which of its annotations, of all ranges, were found
-        (`matching.found_objects`). Raises InvalidInput for another number of masks or of values in
-        one, and for a `censored_at` that is no whole number of 1 or more.
+        (`matching.found_objects`).
         """
-        check_whole("censored_at", censored_at, 1)
-        _check_keyframes(sightings, len(masks), "masks")
-        for index, (shown, mask) in enumerate(zip(sightings.keyframes, masks, strict=True)):
-            _check_mask(sightings.scene, index, len(shown), mask)
         # Rows of the table are the scored annotations, keyframe after keyframe, as the masks are.
         found = np.concatenate(masks)[sightings.in_range]
 
+        # Keyframes (e, r) from an event to a later row of its object, K for rows of others. An
+        # event is the first row of its object, so no age is below 0.
+        rows = sightings.frames
+        events = rows.take(sightings.events)
+        late = rows.keyframes - events.keyframes[:, None]
+        ages = np.where(rows.objects == events.objects[:, None], late, CENSORED_AT)
+
         # An event is found first at the youngest of its object's rows that was found. Found at none
         # that is younger than K, it keeps K, the initial value.
-        ages = _ages(sightings, censored_at)
-        delays = np.where(found, ages, censored_at).min(axis=1, initial=censored_at)
-        return cls(sightings, found, delays, np.sum(ages < censored_at, axis=1))
+        delays = np.where(found, ages, CENSORED_AT).min(axis=1, initial=CENSORED_AT)
+        return cls(sightings, found, delays, np.sum(ages < CENSORED_AT, axis=1))
 
     def tally(self, within: Mask | None = None) -> Tally:
         """The sums, of all or of the rows (r,) of `sightings.frames` that lie `within` a stratum.
@@ -148,46 +140,3 @@ class SceneScore:
 
 def _share(part: float, whole: float) -> float | None:
     return part / whole if whole else None
-
-
-def score_scene(
-    sightings: Sightings, reports: Sequence[Detections], censored_at: int = CENSORED_AT
-) -> SceneScore:
-    """Score what a policy's detector reported, one entry per keyframe.
-
-    Raises InvalidInput where the reports are not one per keyframe, and as `matching.found_objects`
-    does.
-    """
-    _check_keyframes(sightings, len(reports), "reports")
-    masks = [
-        matching.found_objects(shown, report)
-        for shown, report in zip(sightings.keyframes, reports, strict=True)
-    ]
-    return SceneScore.of(sightings, masks, censored_at)
-
-
-def _ages(sightings: Sightings, censored_at: int) -> Integers:
-    """(e, r) keyframes from an event to a later row of the same object, `censored_at` for rows of
-    other objects.
-    """
-    # An event is the first row of its object, so no age is below 0.
-    rows = sightings.frames
-    events = rows.take(sightings.events)
-    late = rows.keyframes - events.keyframes[:, None]
-    return np.where(rows.objects == events.objects[:, None], late, censored_at)
-
-
-def _check_keyframes(sightings: Sightings, count: int, what: str) -> None:
-    keyframes = len(sightings.keyframes)
-    if count != keyframes:
-        raise InvalidInput(
-            f"scene {sightings.scene}: {keyframes} keyframes need as many {what}, got {count}"
-        )
-
-
-def _check_mask(scene: str, keyframe: int, annotations: int, mask: Mask) -> None:
-    if mask.shape != (annotations,) or mask.dtype != np.bool_:
-        raise InvalidInput(
-            f"scene {scene}, keyframe {keyframe}: {annotations} annotations need a boolean mask "
-            f"({annotations},), got {mask.dtype} {mask.shape}"
-        )

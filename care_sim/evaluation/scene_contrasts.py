@@ -112,9 +112,7 @@ def ratio_level(ratio: Ratio, tallies: Tallies) -> RatioLevel:
     )
 
 
-def scene_contrast(
-    ratio: Ratio, ours: Tallies, theirs: Tallies, *, seed: int = 0
-) -> SceneContrast | None:
+def scene_contrast(ratio: Ratio, ours: Tallies, theirs: Tallies) -> SceneContrast | None:
     """`ours` less `theirs` on the scenes that both have; None where nothing is to be found in them.
 
     Raises InvalidInput where the two do not count the same events or object frames of a scene.
@@ -125,12 +123,12 @@ def scene_contrast(
     a, b, weights = _columns(ratio, pairs)
     # Both policies have the same events, so the sum of differences over the sum of events is the
     # difference of the pooled measures.
-    by_event = ratio_of_sums((a - b, weights), seed=seed)
-    by_scene = paired_difference(a / weights, b / weights, seed=seed)
+    by_event = ratio_of_sums((a - b, weights))
+    by_scene = paired_difference(a / weights, b / weights)
     return SceneContrast(ratio, by_event, by_scene, len(pairs), float(weights.sum()))
 
 
-def scene_share(ratio: Ratio, ours: Tallies, whole: Tallies, *, seed: int = 0) -> SceneShare | None:
+def scene_share(ratio: Ratio, ours: Tallies, whole: Tallies) -> SceneShare | None:
     """`ours` in % of the `whole` on the scenes that both have; None where the whole found nothing.
 
     It is a quotient of two recalls of the same objects. What ours found need not be among what the
@@ -143,7 +141,7 @@ def scene_share(ratio: Ratio, ours: Tallies, whole: Tallies, *, seed: int = 0) -
     if not rich:
         return None
     # A scene is drawn with what both found in it: the two are paired within the resamples too.
-    return SceneShare(ratio_of_sums((100 * a, b), seed=seed), rich)
+    return SceneShare(ratio_of_sums((100 * a, b)), rich)
 
 
 def contrast_gap(
@@ -152,8 +150,6 @@ def contrast_gap(
     theirs: Tallies,
     first: Collection[str],
     second: Collection[str],
-    *,
-    seed: int = 0,
 ) -> Interval | None:
     """How much larger the contrast is in the `first` scenes (the dense third) than in the `second`,
     events alike.
@@ -174,7 +170,7 @@ def contrast_gap(
     # Each group is paired by scene within itself; scenes of the two have nothing in common, so the
     # groups are resampled apart.
     (a, b, weights), (c, d, others) = groups
-    return ratio_of_sums((a - b, weights), less=(c - d, others), seed=seed)
+    return ratio_of_sums((a - b, weights), less=(c - d, others))
 
 
 def _pairs(ratio: Ratio, ours: Tallies, theirs: Tallies) -> list[tuple[Tally, Tally]]:

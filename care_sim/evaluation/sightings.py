@@ -31,7 +31,6 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from care_sim.base.checks import check_number
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.sensors.annotated import NO_ANNOTATIONS, Annotations
@@ -73,7 +72,7 @@ class Sightings:
     """What there is to find in a scene, the same for every policy.
 
     `keyframes` are the annotations it was made from and `in_range` (n,) marks which of their
-    objects, one keyframe after the other, are scored, those within `range_m` metres: these are the
+    objects, one keyframe after the other, are scored, those within `RANGE_M`: these are the
     rows of `frames`. `first_ranges` (r,) are the planar metres at which the annotations first show
     the object of each row, within range or beyond. `events` (e,) are the rows of `frames` that are
     first sightings, ascending. `emerging` (m,) are the rows at which an object that was hidden
@@ -83,7 +82,6 @@ class Sightings:
 
     scene: str
     keyframes: tuple[Annotations, ...]
-    range_m: float
     in_range: Mask
     frames: ObjectFrames
     first_ranges: Floats
@@ -95,7 +93,6 @@ class Sightings:
         cls,
         scene: str,
         keyframes: Sequence[Annotations],
-        range_m: float = RANGE_M,
         hidden: Annotations = NO_ANNOTATIONS,
         presence: str = ANNOTATED,
     ) -> "Sightings":
@@ -103,30 +100,34 @@ class Sightings:
         `Film.hidden`.
 
         Raises InvalidInput for a scene without a keyframe, for an object annotated twice at one
-        keyframe or without a finite centre, for a range below 0, and for a presence that is none of
-        `PRESENCES`.
+        keyframe or without a finite centre, and for a presence that is none of `PRESENCES`.
         """
         if not keyframes:
             raise InvalidInput(f"scene {scene}: a scene must have at least one keyframe")
-        check_number("range_m", range_m, 0)
         check_presence(presence)
         rows = _table(keyframes)
-        start = _table([_together(keyframes[0], hidden)])
+        together = (
+            np.concatenate([getattr(part, column.name) for part in (keyframes[0], hidden)])
+            for column in fields(hidden)
+        )
+        start = _table([Annotations(*together)])
         for table in (rows, start):
             _check(scene, table)
 
         # What is beyond the range is in no scene that is scored, so it counts neither as present
         # nor as appearing there.
-        in_range = rows.ranges <= range_m
+        in_range = rows.ranges <= RANGE_M
         frames = rows.take(in_range)
-        appearing = _newcomer_rows(frames)
-        present = np.isin(frames.objects[appearing], start.objects[start.ranges <= range_m])
+        # Rows are in order of keyframe, so the first row of an object is its first keyframe.
+        _, first = np.unique(frames.objects, return_index=True)
+        appearing = np.sort(first[frames.keyframes[first] > 0]).astype(np.int64)
+        present = np.isin(frames.objects[appearing], start.objects[start.ranges <= RANGE_M])
         events = appearing[~present] if presence == ANNOTATED else appearing
-        first_ranges = _first_ranges(rows)[in_range]
+        _, first, which = np.unique(rows.objects, return_index=True, return_inverse=True)
+        first_ranges = rows.ranges[first[which]][in_range]
         return cls(
             scene,
             tuple(keyframes),
-            range_m,
             in_range,
             frames,
             first_ranges,
@@ -154,28 +155,6 @@ def check_presence(presence: object) -> None:
         raise InvalidInput(
             f"presence must be {' or '.join(map(repr, PRESENCES))}, got {shown(presence)}"
         )
-
-
-def _newcomer_rows(frames: ObjectFrames) -> Integers:
-    """(n,) the first row of every object that has none at the first keyframe, ascending."""
-    # Rows are in order of keyframe, so the first row of an object is its first keyframe.
-    _, first = np.unique(frames.objects, return_index=True)
-    return np.sort(first[frames.keyframes[first] > 0]).astype(np.int64)
-
-
-def _first_ranges(rows: ObjectFrames) -> Floats:
-    """(r,) the range of the first row of every row's object."""
-    # Rows are in order of keyframe, and `unique` gives the first of equal ones.
-    _, first, which = np.unique(rows.objects, return_index=True, return_inverse=True)
-    return rows.ranges[first[which]]
-
-
-def _together(seen: Annotations, hidden: Annotations) -> Annotations:
-    columns = (
-        np.concatenate([getattr(part, column.name) for part in (seen, hidden)])
-        for column in fields(seen)
-    )
-    return Annotations(*columns)
 
 
 def _table(keyframes: Sequence[Annotations]) -> ObjectFrames:

@@ -19,7 +19,7 @@ import numpy as np
 
 from care_sim.core.arrays import Mask
 from care_sim.core.types import CLASSES
-from care_sim.evaluation.sightings import Sightings
+from care_sim.evaluation.sightings import RANGE_M, Sightings
 
 NEAR_M, FAR_M = 20.0, 35.0
 """Bounds of the range strata. 20 m is the paper's near field (Sec. 5.4); 35 m halves what is left
@@ -72,8 +72,8 @@ def _entries(sightings: Sightings) -> dict[str, Mask]:
     first = sightings.first_ranges
     # Who has an event has come in; all others were present at scene start.
     came = np.isin(frames.objects, frames.objects[sightings.events])
-    beyond = first > sightings.range_m
-    near = first < sightings.range_m - RING_WIDTH_M
+    beyond = first > RANGE_M
+    near = first < RANGE_M - RING_WIDTH_M
     masks = (came & near, came & ~near & ~beyond, came & beyond, ~came)
     return dict(zip(ENTRIES, masks, strict=True))
 

@@ -119,7 +119,7 @@ def merged(folders: Sequence[Path]) -> Merged:
         with_regret(rows) if study.results in (EPISODES, VEHICLE) else rows,
         # Events of some plays alone would pass for those of all.
         _events_of_all(events) if len(events) == len(folders) else None,
-        [*dict.fromkeys([*noted, *seen.doubts([*rows[0]], study.schema, {"merged": told})])],
+        [*dict.fromkeys([*noted, *seen.unknown([*rows[0]], study.schema)])],
         told,
         seen.twice,
         _apart(codes, seen.shared),

@@ -122,8 +122,8 @@ def read_results(folder: Path) -> tuple[list[Row], Study, list[str]]:
     checks = RowChecks()
     rows = [row for row in read_rows(path, study.schema) if checks.is_new(row, folder)]
     twice = [f"{counted(checks.twice, 'row')} written twice"] if checks.twice else []
-    doubts = checks.doubts(read_table(path).column_names, study.schema, described(folder))
-    return rows, study, [*dict.fromkeys([*read_notes(path)[1], *twice, *doubts])]
+    unknown = checks.unknown(read_table(path).column_names, study.schema)
+    return rows, study, [*dict.fromkeys([*read_notes(path)[1], *twice, *unknown])]
 
 
 def described(folder: Path) -> dict[str, Any]:

@@ -31,8 +31,8 @@ from care_sim.reports.tables.realism import realism_tables
 from care_sim.reports.tables.sweep import firing_tables, sweep_minus, sweep_tables
 from care_sim.reports.tables.validate import validation_closing, validation_tables
 from care_sim.reports.tables.vehicle import vehicle_tables
-from care_sim.study.designs.crowding import VEHICLES_COLUMN
 from care_sim.study.designs.faults import FAULT_PLACES
+from care_sim.study.designs.paper import VEHICLES_COLUMN
 from care_sim.study.designs.standards import (
     CASE_COLUMNS,
     REPORTED_COLUMN,

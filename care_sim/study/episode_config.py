@@ -1,12 +1,10 @@
-"""The configuration of an episode of the closed loop: everything that decides it, checked when it
-is written down.
-"""
+"""The configuration of an episode of the closed loop: everything that decides it."""
 
 from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import asdict, dataclass, field
 from itertools import product
 from math import prod
-from typing import Any, Self, cast
+from typing import Any, cast
 
 import gymnasium
 
@@ -16,25 +14,23 @@ from care_sim.core.conditions import COLUMNS_WHERE_CHANGED, DEFAULTS, ClosedLoop
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.envs import ENVIRONMENT_IDS, make_scenario_env
 from care_sim.envs.closed_loop import KEYFRAME_S, ClosedLoopEnv
-from care_sim.envs.vector.arguments import why_separate
+from care_sim.envs.vector.arguments import STRAIGHT
 from care_sim.perception.detectors import PROXY
-from care_sim.policies.base import PrivilegedPolicy
 from care_sim.scenarios import SCENARIOS, make_scenario
-from care_sim.sensors.setups import DEFAULT_SETUP, sensor_columns
+from care_sim.sensors.setups import DEFAULT_SETUP, sensor_columns, sensor_setup
 from care_sim.study.provenance import detector_digest, scenario_digest
+from care_sim.study.rows.parameters import Parameters
 from care_sim.study.run_config import (
-    CONDITION_NAMES,
-    Parameters,
     Row,
     RunConfig,
-    SimilarityKey,
     check_size,
     collected,
-    departures,
     effective_conditions,
     files_in,
-    flat,
 )
+
+PLAIN_FIELDS = ["scenario", "policy", "budget", "seed", *DEFAULTS]
+"""Fields that are one value."""
 
 
 @dataclass(frozen=True)
@@ -43,8 +39,8 @@ class EpisodeConfig(ClosedLoopConditions, RunConfig):
 
     The fields are the arguments of the environments (see
     `care_sim.envs.closed_loop.ClosedLoopEnv`); those of detector, scenario and policy are
-    pairs of name and value. Raises InvalidInput for anything that scenario, environment or policy
-    does not accept.
+    pairs of name and value. Raises InvalidInput for a seed, condition, budget, scenario or name
+    that is not allowed, and for a parameter that scenario or policy does not have.
     """
 
     scenario: str
@@ -59,28 +55,23 @@ class EpisodeConfig(ClosedLoopConditions, RunConfig):
     scenario_parameters: Parameters = ()
     policy_parameters: Parameters = ()
 
-    def __post_init__(self) -> None:
-        check_seed(self.seed)
-        self.check_parameters("detector_parameters", "scenario_parameters", "policy_parameters")
-        make_scenario(self.scenario, **dict(self.scenario_parameters))
-        _check_shared(self.scenario)
-        # Making the environment and the policy is the check of all other fields: they alone know
-        # what they accept.
-        with self.make_env() as env:
-            policy = self.make_policy(env)
-            alone = (
-                isinstance(policy, PrivilegedPolicy) or why_separate(closed_loop(env)) is not None
-            )
-        # No field: it follows from them, and is nothing that decides the row.
-        object.__setattr__(self, "_alone", alone)
-        super().__post_init__()
+    columns = tuple(name for name in PLAIN_FIELDS if name not in COLUMNS_WHERE_CHANGED)
+    usual = {"detector": PROXY, "keyframe_s": KEYFRAME_S} | {
+        name: DEFAULTS[name] for name in COLUMNS_WHERE_CHANGED
+    }
 
-    def with_seed(self, seed: int) -> Self:
-        """The same with another seed. What is sound for one seed is sound for all, so that only the
-        seed is checked.
-        """
-        check_seed(seed)
-        return self.changed(seed=int(seed))
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_seed(self.seed)
+        self.check_task(sensor_setup(self.sensor).grid)
+        make_scenario(self.scenario, **dict(self.scenario_parameters))
+        # Workers would not find a scenario that this process alone knows, and nothing would tell
+        # its code.
+        if self.scenario in SCENARIOS and self.scenario not in ENVIRONMENT_IDS:
+            raise InvalidInput(
+                f"scenario {self.scenario} is registered by hand, which other processes do not "
+                "see: name its class as MODULE:OBJECT, or install it"
+            )
 
     def make_env(self) -> gymnasium.Env[Any, Any]:
         """The environment of this episode, not yet reset."""
@@ -91,29 +82,18 @@ class EpisodeConfig(ClosedLoopConditions, RunConfig):
             sensor=self.sensor,
             detector=self.detector,
             detector_parameters=dict(self.detector_parameters),
-            **{name: getattr(self, name) for name in CONDITION_NAMES},
+            **{name: getattr(self, name) for name in DEFAULTS},
             **dict(self.scenario_parameters),
         )
 
-    def row(self) -> Row:
-        """All parameters, flat; those of detector, scenario and policy as `detector.NAME`,
-        `scenario.NAME`, `policy.NAME`. `sensor`, `detector`, `keyframe_s` and
-        `COLUMNS_WHERE_CHANGED` are columns only where they are not the default.
-        """
-        plain = {n: getattr(self, n) for n in PLAIN_FIELDS if n not in COLUMNS_WHERE_CHANGED}
-        # Without the columns the rows, and the digests made of them, stay as they were before there
-        # was a choice.
-        own = {"detector": PROXY, "keyframe_s": KEYFRAME_S}
-        chosen = own | {name: DEFAULTS[name] for name in COLUMNS_WHERE_CHANGED}
-        other = {n: getattr(self, n) for n, usual in chosen.items() if getattr(self, n) != usual}
-        return (
-            plain
-            | sensor_columns(self.sensor)
-            | other
-            | flat("detector", self.detector_parameters)
-            | flat("scenario", self.scenario_parameters)
-            | flat("policy", self.policy_parameters)
-        )
+    def try_out(self) -> None:
+        """Make environment and policy. Raises what they do not accept."""
+        with self.make_env() as env:
+            self.make_policy(env)
+
+    def place(self) -> Row:
+        """Columns of another sensor set-up than the default."""
+        return sensor_columns(self.sensor)
 
     def installed(self) -> list[str | None]:
         """Those of the base; of another detector than the default, and of a scenario that is not
@@ -127,15 +107,9 @@ class EpisodeConfig(ClosedLoopConditions, RunConfig):
         return own
 
     @property
-    def label(self) -> str:
-        """A short name for people: scenario, policy, budget, seed and what departs from the
-        defaults.
-        """
-        main = ("scenario", "policy", "budget", "seed", "sensor_hash", "sensor_setup")
-        changes = departures(self, main)
-        return " ".join(
-            [f"{self.scenario} {self.policy} {self.budget:.4g} seed {self.seed}", *changes]
-        )
+    def name(self) -> str:
+        """Scenario, policy, budget, seed."""
+        return f"{self.scenario} {self.policy} {self.budget:.4g} seed {self.seed}"
 
     @property
     def order(self) -> int:
@@ -143,42 +117,17 @@ class EpisodeConfig(ClosedLoopConditions, RunConfig):
         return self.seed
 
     @property
-    def alone(self) -> bool:
-        """Whether it is played by itself: for a privileged policy, which asks its own world for the
-        truth, and in worlds that are not played as arrays (`care_sim.envs.vector.arguments`).
-        """
-        return bool(vars(self)["_alone"])
-
-    @property
     def batch(self) -> Hashable:
-        """Everything but the seed, of those that can be played together."""
-        return self if self.alone else self.changed(seed=0)
-
-    @property
-    def similarity_keys(self) -> tuple[SimilarityKey, ...]:
-        """Everything but the seed; scenario, policy and budget; the policy; nothing."""
-        all_but_seed = tuple(item for item in self.row().items() if item[0] != "seed")
-        return all_but_seed, (self.scenario, self.policy, self.budget), (self.policy,), ()
+        """Everything but the seed. An episode stands alone where it surely is not played in arrays
+        (`care_sim.study.episode_play`), so that an interrupt need not wait for a batch of them.
+        """
+        in_arrays = SCENARIOS.get(self.scenario) in STRAIGHT and self.detector == PROXY
+        return self.changed(seed=0) if in_arrays and self.engine == "fast" else self
 
 
 def closed_loop(env: gymnasium.Env[Any, Any]) -> ClosedLoopEnv:
     """The environment of an episode without what Gymnasium puts around it."""
     return cast(ClosedLoopEnv, env.unwrapped)
-
-
-def _check_shared(scenario: str) -> None:
-    """Raise InvalidInput for a scenario that this process alone knows: workers would not find it,
-    and nothing would tell its code.
-    """
-    if scenario in SCENARIOS and scenario not in ENVIRONMENT_IDS:
-        raise InvalidInput(
-            f"scenario {scenario} is registered by hand, which other processes do not see: name "
-            "its class as MODULE:OBJECT, or install it"
-        )
-
-
-PLAIN_FIELDS = ["scenario", "policy", "budget", "seed", *CONDITION_NAMES]
-"""Fields that are one value."""
 
 
 def grid(
@@ -201,17 +150,12 @@ def grid(
         false_negative_rates,
         camera_latencies,
     ]
-    # Before the configurations are made: each one makes an environment.
     check_size(prod(map(len, axes)))
-    configs = (
-        _config(
-            scenario,
-            policy,
-            budget,
-            {"false_negative_rate": rate, "camera_latency": latency} | common,
-        )
-        for scenario, policy, budget, rate, latency in product(*axes)
-    )
+    configs = []
+    for scenario, policy, budget, rate, latency in product(*axes):
+        given = {"false_negative_rate": rate, "camera_latency": latency} | common
+        felt = effective_conditions(policy, budget, given)
+        configs.append(EpisodeConfig(scenario, policy, **felt))
     # Without repeats: for the full scan all budgets give the same configuration.
     return of_seeds([*dict.fromkeys(configs)], seeds)
 
@@ -221,7 +165,11 @@ def of_seeds(configs: Sequence[EpisodeConfig], seeds: Sequence[int]) -> list[Epi
     made.
     """
     check_size(len(configs) * len(seeds))
-    return [config.with_seed(seed) for config in configs for seed in dict.fromkeys(seeds)]
+    # What is sound for one seed is sound for all, so that only the seed is checked.
+    for seed in seeds:
+        check_seed(seed)
+    own = [int(seed) for seed in dict.fromkeys(seeds)]
+    return [config.changed(seed=seed) for config in configs for seed in own]
 
 
 def of_cases(configs: Sequence[EpisodeConfig], cases: Sequence[Parameters]) -> list[EpisodeConfig]:
@@ -230,10 +178,6 @@ def of_cases(configs: Sequence[EpisodeConfig], cases: Sequence[Parameters]) -> l
     """
     check_size(len(configs) * len(cases))
     return [config.changed(scenario_parameters=case) for case in cases for config in configs]
-
-
-def _config(scenario: str, policy: str, budget: float, given: dict[str, Any]) -> EpisodeConfig:
-    return EpisodeConfig(scenario, policy, **effective_conditions(policy, budget, given))
 
 
 def listed_episodes(configs: Sequence[EpisodeConfig]) -> dict[str, Any]:

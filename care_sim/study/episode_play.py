@@ -28,6 +28,7 @@ from care_sim.envs.vector.arguments import why_separate
 from care_sim.envs.vector.worlds import CompiledWorlds, Stepped
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.records import Keyframe
+from care_sim.policies import tags_of
 from care_sim.policies.base import Policy
 from care_sim.policies.vector import vector_policy
 from care_sim.scenarios import SCENARIOS
@@ -213,7 +214,7 @@ def play_episodes(batch: Sequence[EpisodeConfig]) -> list[Row | str]:
     """What a worker does: play episodes, and give for each its row, or in one line why there is
     none. Those of an `EpisodeConfig.batch` are played together.
     """
-    if len(batch) > 1 and not batch[0].alone and len({config.batch for config in batch}) == 1:
+    if len(batch) > 1 and len({config.batch for config in batch}) == 1:
         rows = result_or_reason(play_together, batch)
         if not isinstance(rows, str):
             return [*rows]
@@ -234,6 +235,8 @@ def play_together(configs: Sequence[EpisodeConfig]) -> list[Row]:
     outcomes = dict[int, Row]()
     with configs[0].make_env() as env:
         model = closed_loop(env)
+        if "privileged" in tags_of(configs[0].policy):
+            raise InvalidInput("a privileged policy asks its own world for the truth")
         if reason := why_separate(model):
             raise InvalidInput(f"{reason} is not played as arrays")
         observed = cast(Observed, create_empty_array(model.observation_space, count))

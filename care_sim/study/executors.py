@@ -156,7 +156,10 @@ class ClusterExecutor(Executor):
         if error is None:
             ours.set_result(theirs.result())
         else:
-            ours.set_exception(BrokenExecutor(str(error)) if _is_death(error) else error)
+            from dask.distributed import KilledWorker
+
+            died = isinstance(error, KilledWorker)
+            ours.set_exception(BrokenExecutor(str(error)) if died else error)
 
     def _lost(self) -> ClusterLost:
         return ClusterLost(
@@ -199,9 +202,3 @@ async def _try_connection(address: str) -> None:
         address, timeout=_ANSWER_TIMEOUT_S, **Security().get_connection_args("client")
     )
     await comm.close()
-
-
-def _is_death(error: BaseException) -> bool:
-    from dask.distributed import KilledWorker
-
-    return isinstance(error, KilledWorker)

@@ -1,4 +1,5 @@
-"""The journal of a study: one line for every finished task, so that nothing computed is lost.
+"""The journal of a study: one line for every finished task, so that nothing computed is lost; and
+the note that a folder holds while its study has not ended.
 
 A line is a row as JSON, the name of its study, and at the end a checksum of all before it.
 """
@@ -7,13 +8,9 @@ import fcntl
 import hashlib
 import json
 import re
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple, Self
-
-import pyarrow as pa
 
 from care_sim.base.errors import InvalidInput, counted
 from care_sim.base.files import (
@@ -24,11 +21,12 @@ from care_sim.base.files import (
     write_text,
 )
 from care_sim.study.rows.parquet import with_tuples
-from care_sim.study.rows.schema import PARAMETERS, Schema
-from care_sim.study.run_config import Row, RunConfig
+from care_sim.study.run_config import Row
 
 JOURNAL = "journal.jsonl"
 """Name of the file in a folder of results."""
+UNFINISHED = "unfinished.json"
+"""Name of the note, which is there from the begin of a study to its end."""
 _STUDY = "study"
 _CHECK = "check"
 LARGEST_JOURNAL = 2**32
@@ -68,10 +66,8 @@ class Journal:
         self._lock(path.parent)
         self._file.seek(0)
         text = self._file.read()
-        there = _finished(text)
-        self.damaged = there.damaged
-        self.studies = there.studies
-        self._rows = {row["digest"]: row for row in there.rows}
+        rows, self.studies, self.damaged = _finished(text)
+        self._rows = {row["digest"]: row for row in rows}
         # A torn last line is closed, so that the next row does not continue it.
         if text and not text.endswith("\n"):
             self._write("\n")
@@ -101,24 +97,12 @@ class Journal:
     ) -> None:
         self._file.close()
 
-    def drop_unsound(self, configs: Sequence[RunConfig], schema: Schema) -> None:
-        """Drop rows whose parameters are not those of the task under whose key they stand, and rows
-        that lack a column of the schema. Their tasks run again.
-        """
-        found = [config for config in configs if config.key in self]
-        sound = [config for config in found if _is_of(config, self[config.key])]
-        # Row by row only where the table of all rows has a fault.
-        if sound and _has_fault([self[config.key] for config in sound], schema):
-            sound = [config for config in sound if not _has_fault([self[config.key]], schema)]
-        for key in {config.key for config in found} - {config.key for config in sound}:
-            del self._rows[key]
-            self.damaged += 1
-
     def append(self, row: Row) -> None:
         """Keep a finished row. When this returns, the operating system has it, and it outlives this
         process.
         """
-        self._write(_line(row | {_STUDY: self._study}))
+        text = json.dumps(row | {_STUDY: self._study}).removesuffix("}")
+        self._write(f'{text}, "{_CHECK}": "{_checksum(text)}"}}\n')
         self._rows[row["digest"]] = row
 
     def _lock(self, folder: Path) -> None:
@@ -142,23 +126,6 @@ class Journal:
             raise OSError(error.errno, error.strerror, self._file.name) from error
 
 
-def _is_of(config: RunConfig, row: Row) -> bool:
-    """Whether the row has the parameters of the task, and no others."""
-    asked = config.row()
-    return all(name in row and row[name] == value for name, value in asked.items()) and not any(
-        name.startswith(PARAMETERS) and name not in asked for name in row
-    )
-
-
-def _has_fault(rows: Sequence[Row], schema: Schema) -> bool:
-    names = schema.known([*dict.fromkeys(name for row in rows for name in row)])
-    try:
-        table = pa.table({name: [row.get(name) for row in rows] for name in names})
-    except (pa.ArrowException, OverflowError):
-        return True
-    return any(schema.faults(table))
-
-
 def read_journal(path: Path) -> Finished:
     """What a journal holds, none where there is no file; another process may be adding lines."""
     if not path.is_file():
@@ -169,8 +136,6 @@ def read_journal(path: Path) -> Finished:
 
 def is_written(path: Path) -> bool:
     """Whether a process that runs now adds lines to the journal."""
-    if not path.is_file():
-        return False
     try:
         with path.open(encoding="utf-8") as file:
             fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
@@ -197,11 +162,6 @@ def _check_journal(path: Path) -> None:
         raise InvalidInput(f"{path} is no journal: {error}") from error
 
 
-def _line(row: Row) -> str:
-    text = json.dumps(row).removesuffix("}")
-    return f'{text}, "{_CHECK}": "{_checksum(text)}"}}\n'
-
-
 def _read(line: str) -> Row | None:
     """The row of a line with the name of its study, None of a damaged one."""
     whole = _LINE.fullmatch(line)
@@ -219,37 +179,13 @@ def _checksum(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-UNFINISHED = "unfinished.json"
-"""Name of the file, which is there from the begin of a study to its end."""
-
-
-@dataclass(frozen=True)
-class Unfinished:
-    """A study by name, its `tasks`, called by their `unit` (episodes), and the `command` that
-    plays it. The journal held `others` rows before that it does not ask for.
+def note_begin(folder: Path, study: str, tasks: str, others: int, command: str) -> None:
+    """Leave in the folder what is played there, until `forget`: a study, its `tasks` in words, and
+    the `command` that plays them. The journal held `others` rows before that the study does not ask
+    for.
     """
-
-    study: str
-    unit: str
-    tasks: int
-    others: int
-    command: str
-
-    def write(self, folder: Path) -> None:
-        """Leave it in the folder."""
-        write_text(folder / UNFINISHED, json.dumps(asdict(self), indent=1) + "\n")
-
-    @classmethod
-    def read(cls, folder: Path) -> Self | None:
-        """What lies in the folder; None where nothing does that can be read."""
-        try:
-            plain = json_content(folder / UNFINISHED)
-            told = cls(**plain)
-        except (OSError, ValueError, TypeError):
-            return None
-        kinds = dict.fromkeys(("study", "unit", "command"), str) | {"tasks": int, "others": int}
-        whole = all(type(plain[name]) is kind for name, kind in kinds.items())
-        return told if whole else None
+    note = {"study": study, "tasks": tasks, "others": others, "command": command}
+    write_text(folder / UNFINISHED, json.dumps(note, indent=1) + "\n")
 
 
 def how_far(folder: Path) -> str:
@@ -257,20 +193,22 @@ def how_far(folder: Path) -> str:
 
     Raises InvalidInput for a journal that is too large.
     """
-    begun = Unfinished.read(folder)
-    if begun is None and not (folder / JOURNAL).is_file():
+    if not any((folder / name).is_file() for name in (UNFINISHED, JOURNAL)):
         return ""
     kept = len(read_journal(folder / JOURNAL).rows)
-    if begun is None:
-        return (
-            f"{folder} holds an unfinished study, {counted(kept, 'row')}; run again the command "
-            "that began it"
-        )
-    done = f"{kept - begun.others} of {begun.tasks} {begun.unit}"
-    line = f"{folder} holds an unfinished study, {begun.study}: {done} are played"
+    line = f"{folder} holds an unfinished study"
+    again = "run again the command that began it"
+    try:
+        note = json_content(folder / UNFINISHED)
+        played = f"{kept - note['others']} of {note['tasks']} are played"
+        line = f"{line}, {note['study']}: {played}"
+        command = note["command"] or again
+    except (OSError, ValueError, TypeError, KeyError):
+        # The note is lost or damaged.
+        return f"{line}, {counted(kept, 'row')}; {again}"
     if is_written(folder / JOURNAL):
         return f"{line}, and it is being played now"
-    return f"{line}; to go on: {begun.command or 'run again the command that began it'}"
+    return f"{line}; to go on: {command}"
 
 
 def forget(folder: Path) -> None:

@@ -12,7 +12,6 @@ import numpy as np
 
 import care_sim
 from care_sim.base.errors import InvalidInput
-from care_sim.core.arrays import Integers
 from care_sim.core.belief import Belief
 from care_sim.core.grid import Cells
 from care_sim.core.residual import camera_layers, explained, wedges
@@ -89,27 +88,25 @@ def is_covered(hull: Cells, known: Cells) -> bool:
 
 FOUND = ""
 """Stands for a reason where nothing was missed."""
+ACCOUNT_COLUMNS = ("ttfds", "misses", "tracked", *(f"rays_{share}" for share in RAY_SHARES))
+"""What every row says of the events of its own play, in the order of `Sightings.events`: the
+censored times to first detection in keyframes, the reasons why they were missed at their first
+keyframe, the marks 1 or 0 of those that had a track already, and by share the rays that hit them at
+that keyframe.
+"""
+DIFFERING = ("differing_keyframes", "differing_cells")
+"""What a policy that was asked has, and the driver has not."""
+RECEIVED = "received"
+"""Of every new object of the shared belief, the cells that the policy would give it."""
+BELIEF_SUMS = ("filled", "filled_rho", "explained_cells", "untaken_cells")
+"""Sums over keyframes that the row of the driver has: those of `ReserveUse`."""
+BELIEF_MARKS = ("pictured", "falsely_explained", "covered")
+"""What it says of every new object, 1 or 0."""
 
 
-@dataclass(frozen=True)
-class Account:
-    """Event by event, e of them in the order of `Sightings.events`: the censored times to first
-    detection `delays` in keyframes, the `reasons` why they were missed at their first keyframe,
-    `FOUND` where they were not, the marks 1 or 0 of those that had a track already (`tracked`), and
-    `rays` (e, 5) by share of those that hit them at that keyframe.
-    """
-
-    keyframes: int
-    delays: list[int]
-    reasons: list[str]
-    tracked: list[int]
-    rays: Integers
-
-
-def account_play(config: PlayConfig, film: Film, sightings: Sightings) -> Account:
-    """Play a policy through the film of its scene, and account for its rays.
-
-    Raises InvalidInput for a policy that answers without a demand.
+def account_play(config: PlayConfig, film: Film, sightings: Sightings) -> Row:
+    """Play a policy through the film of its scene, and account for its rays: `keyframes` and
+    `ACCOUNT_COLUMNS`. Raises InvalidInput for a policy that answers without a demand.
     """
     reasons: list[str] = []
     tracked: list[int] = []
@@ -129,8 +126,7 @@ def account_play(config: PlayConfig, film: Film, sightings: Sightings) -> Accoun
                     f"policy {config.policy} states no demand, without which its rays cannot be "
                     "accounted for"
                 )
-            fired = env.keyframes[-1].fired
-            served = ServedDemand.of(policy.demanded, fired, rig)
+            served = ServedDemand.of(policy.demanded, env.keyframes[-1].fired, rig)
             for new in entries:
                 seen = new.appearance
                 reasons.append(miss_reason(seen, served, config.min_returns))
@@ -140,7 +136,9 @@ def account_play(config: PlayConfig, film: Film, sightings: Sightings) -> Accoun
         keyframes = len(env.keyframes)
     # A reason was worked out for every event; only those of misses stand.
     told = [reason if delay else FOUND for reason, delay in zip(reasons, delays, strict=True)]
-    return Account(keyframes, delays, told, tracked, np.concatenate(rays))
+    columns = (delays, told, tracked, *np.concatenate(rays).T.tolist())
+    own = zip(ACCOUNT_COLUMNS, map(tuple, columns), strict=True)
+    return {"keyframes": keyframes, **dict(own)}
 
 
 @dataclass
@@ -188,18 +186,6 @@ def share_belief(
     return shared
 
 
-ACCOUNT_COLUMNS = ("ttfds", "misses", "tracked", *(f"rays_{share}" for share in RAY_SHARES))
-"""What every row says of the events of its own play, in order."""
-DIFFERING = ("differing_keyframes", "differing_cells")
-"""What a policy that was asked has, and the driver has not."""
-RECEIVED = "received"
-"""Of every new object of the shared belief, the cells that the policy would give it."""
-BELIEF_SUMS = ("filled", "filled_rho", "explained_cells", "untaken_cells")
-"""Sums over keyframes that the row of the driver has: those of `ReserveUse`."""
-BELIEF_MARKS = ("pictured", "falsely_explained", "covered")
-"""What it says of every new object, 1 or 0."""
-
-
 def play_mechanism(batch: Sequence[MechanismConfig]) -> list[Row | str]:
     """What a worker does: the plays of one scene; of each its row, or in one line why there is
     none.
@@ -243,10 +229,8 @@ class MechanismScene:
             "version": care_sim.__version__,
             "digest": config.digest(),
             "film_hash": self._film_hash,
-            "keyframes": account.keyframes,
-            **_account_columns(account),
-            **self._asked_columns(config),
-            **self._belief_columns(config),
+            **account,
+            **self._shared_columns(config),
             "wall_s": time.perf_counter() - started + self._shared_s / sharers,
             "peak_rss_mb": peak_rss_mb(),
         }
@@ -256,30 +240,25 @@ class MechanismScene:
         others = [config for config in budgeted if config.policy != driver.policy]
         return share_belief(driver, others, self._film, self._sightings)
 
-    def _asked_columns(self, config: MechanismConfig) -> Row:
-        columns: Row = dict.fromkeys((*DIFFERING, RECEIVED))
+    def _shared_columns(self, config: MechanismConfig) -> Row:
+        """What the policy would have done on the shared belief; of that belief itself, the driver's
+        row tells.
+        """
+        columns: Row = dict.fromkeys((*DIFFERING, RECEIVED, *BELIEF_SUMS, *BELIEF_MARKS))
         shared = self._shared
         if shared is None or config.policy == FULL:
             return columns
         columns[RECEIVED] = tuple(shared.received[config.policy])
-        if config.policy == config.driver:
-            return columns
-        moved = allocation_difference(shared.fired[config.policy], shared.fired[config.driver])
-        return columns | dict(zip(DIFFERING, (moved.differing, moved.cells), strict=True))
-
-    def _belief_columns(self, config: MechanismConfig) -> Row:
-        shared = self._shared
-        if shared is None or config.policy != config.driver:
-            return dict.fromkeys((*BELIEF_SUMS, *BELIEF_MARKS))
+        if config.policy != config.driver:
+            moved = allocation_difference(shared.fired[config.policy], shared.fired[config.driver])
+            return columns | dict(zip(DIFFERING, (moved.differing, moved.cells), strict=True))
         seen = [new.appearance for new in shared.entries]
-        return {name: getattr(shared.reserve, name) for name in BELIEF_SUMS} | {
-            "pictured": tuple(int(bool(each.wedges)) for each in seen),
-            "falsely_explained": tuple(int(each.falsely_explained) for each in seen),
-            "covered": tuple(int(new.covered) for new in shared.entries),
-        }
-
-
-def _account_columns(account: Account) -> Row:
-    rays = account.rays.T.tolist()
-    lists = (account.delays, account.reasons, account.tracked, *rays)
-    return dict(zip(ACCOUNT_COLUMNS, map(tuple, lists), strict=True))
+        return (
+            columns
+            | {name: getattr(shared.reserve, name) for name in BELIEF_SUMS}
+            | {
+                "pictured": tuple(int(bool(each.wedges)) for each in seen),
+                "falsely_explained": tuple(int(each.falsely_explained) for each in seen),
+                "covered": tuple(int(new.covered) for new in shared.entries),
+            }
+        )

@@ -38,7 +38,7 @@ from care_sim.study.rows.schema import (
 )
 from care_sim.study.run_config import Row
 from care_sim.study.runner import PlayBatch
-from care_sim.study.scene_play import SUMS, event_columns, play_scene, without_events
+from care_sim.study.scene_play import SUMS, event_columns, play_scene
 from care_sim.study.vehicle_play import (
     VEHICLE_COUNTS,
     VEHICLE_LISTS,
@@ -210,7 +210,10 @@ PLAYS = ResultsFormat(
     play_batch=play_scene,
     most=None,
     # The events have a file of their own, one row per event and play.
-    kept_rows=lambda rows: [without_events(row) for row in with_tags(rows)],
+    kept_rows=lambda rows: [
+        {name: value for name, value in row.items() if name != "sightings"}
+        for row in with_tags(rows)
+    ],
     file="plays.parquet",
     schema=_PLAYS,
     listed=listed_plays,

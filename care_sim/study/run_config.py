@@ -5,184 +5,107 @@ The configurations of the closed loop (`care_sim.study.episode_config`) and of t
 (`care_sim.study.play_config`) have this base.
 """
 
-import ast
 import hashlib
 import json
-import os
-import warnings
 from abc import ABC, abstractmethod
-from collections import Counter
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from copy import copy
 from functools import cached_property
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import gymnasium
-import numpy as np
 
 import care_sim
 from care_sim.base.digests import file_digest, paths_in
-from care_sim.base.errors import InvalidInput, one_line, shown
+from care_sim.base.errors import InvalidInput, shown
+from care_sim.core.cells.stack import Grid
 from care_sim.core.conditions import DEFAULTS, UNUSED_BY_FULL_SCAN
-from care_sim.policies import check_policy, make_policy
+from care_sim.core.firing.listing import hardware_of
+from care_sim.perception.detectors import PROXY, check_detector
+from care_sim.policies import POLICIES, check_policy, make_policy, maker
 from care_sim.policies.base import Policy
+from care_sim.policies.makers import check_parameters
 from care_sim.study.provenance import SESSION, code_digest, policy_digest
-
-Parameters = tuple[tuple[str, Any], ...]
-"""Names and values, of a scenario's physics, a policy or a detector."""
-
-_ALLOWED = "a flag, a number of at most 64 bits, a text, or a list of one kind of these"
-_DEEPEST = 4
-"""Levels that lists may be nested."""
-_WHOLE = 2**63
-"""Whole numbers have 64 bits in a column: from minus this to less than this."""
-_LONGEST = 8192
-"""Characters of a parameter: a path and its name fit."""
-
-
-def checked_parameters(given: Iterable[tuple[str, Any]], whose: str) -> Parameters:
-    """The parameters with values of Python's own types, lists as tuples, paths as texts.
-
-    Raises InvalidInput for a value or a name that a journal and a column of a results file would
-    not give back: sets, maps, bytes, None, which a column reads as not given, NaN, halves of
-    characters, lists of several kinds.
-    """
-    return tuple(
-        (_name(name, whose), _checked(f"{whose} parameter {name}", value)) for name, value in given
-    )
-
-
-def _checked(what: str, value: Any) -> Any:
-    try:
-        plain = _plain(value)
-        _kind(plain)
-    except (ValueError, TypeError, OverflowError) as error:
-        raise InvalidInput(f"{one_line(what)} must be {_ALLOWED}, got {shown(value)}") from error
-    return plain
-
-
-def _name(name: Any, whose: str) -> str:
-    try:
-        return _text(name)
-    except (ValueError, TypeError) as error:
-        raise InvalidInput(
-            f"the name of a {whose} parameter must be a text, got {shown(name)}"
-        ) from error
-
-
-def _plain(value: Any, levels: int = _DEEPEST) -> Any:
-    """The value in Python's own types. Raises ValueError or TypeError where it is not allowed."""
-    if isinstance(value, np.generic | np.ndarray):
-        value = value.tolist()
-    if isinstance(value, list | tuple) and levels:
-        return tuple(_plain(each, levels - 1) for each in value)
-    # Before int, of which bool is a subclass.
-    if isinstance(value, bool):
-        return value
-    if isinstance(value, int) and -_WHOLE <= value < _WHOLE:
-        return int(value)
-    # NaN is no value: no row with it would be equal to itself.
-    if isinstance(value, float) and value == value:
-        return float(value)
-    # Texts pass through fspath unchanged. Anything else that is no path raises TypeError.
-    return _text(os.fspath(value))
-
-
-def _text(value: Any) -> str:
-    if not isinstance(value, str):
-        raise TypeError
-    # Lone surrogates, which no file can hold, raise here.
-    value.encode()
-    # A subclass of str, such as an enum, becomes a plain str.
-    return str.__str__(value)
-
-
-def _kind(value: Any) -> Any:
-    """The kind of values that a column of such values holds. Raises ValueError for a list of
-    several kinds.
-    """
-    if not isinstance(value, tuple):
-        # A column of numbers may mix whole ones with others.
-        return float if type(value) is int else type(value)
-    kinds = {_kind(each) for each in value}
-    if len(kinds) > 1:
-        raise ValueError
-    return (*kinds,)
-
-
-def parameters(texts: Sequence[str]) -> Parameters:
-    """Parameters given as NAME=VALUE. Raises InvalidInput for another form, and for a name that is
-    given twice.
-    """
-    pairs = tuple(_pair(text) for text in texts)
-    for name, count in Counter(name for name, _ in pairs).items():
-        if count > 1:
-            raise InvalidInput(f"a parameter is given once, got {shown(name)} {count} times")
-    return pairs
-
-
-def _pair(text: str) -> tuple[str, Any]:
-    name, equals, value = text.partition("=")
-    if not (name and equals):
-        raise InvalidInput(f"parameters are given as NAME=VALUE, got {shown(text)}")
-    if len(text) > _LONGEST:
-        raise InvalidInput(
-            f"a parameter must be at most {_LONGEST} characters long, got {shown(text)}"
-        )
-    # A Windows path holds backslashes that Python warns of as escapes.
-    with warnings.catch_warnings(action="ignore", category=SyntaxWarning):
-        try:
-            literal = ast.literal_eval(value)
-        except (ValueError, SyntaxError, TypeError, MemoryError, RecursionError):
-            literal = value  # no literal, or one nested deeper than any parameter is
-    return name, tuple(literal) if isinstance(literal, list) else literal
-
+from care_sim.study.rows.parameters import Parameters, checked_parameters
 
 Row = dict[str, Any]
-
-SimilarityKey = tuple[object, ...]
-"""What tasks have in common that take about as long."""
 
 MOST_TASKS = 100_000
 """Tasks of a study, whose rows it holds in memory: 10 to 20 kB each, 1 to 2 GB in all."""
 
-CONDITION_NAMES = [*DEFAULTS]
 REFERENCE = "care"
 """The policy that others are compared with."""
 FULL = "full"
 """The policy that scans everything."""
+_OWNERS = ("detector", "scenario", "policy")
+"""What has parameters of its own."""
+_NAMED = {"scenario", "scene", "policy", "budget", "seed"}
+"""Columns that the name of a task tells."""
 
 
 class RunConfig(ABC):
-    """Everything that decides a row of a study. Subclasses are frozen dataclasses."""
+    """Everything that decides a row of a study. Subclasses are frozen dataclasses.
+
+    A subclass checks what can be known of its fields alone. The environment and the policy refuse
+    the rest when they are made: `try_out` makes them, and so does the first play.
+    """
 
     policy: str
     budget: float
+    detector: str
+    detector_parameters: Parameters
     policy_parameters: Parameters
+    firing: str
+
+    columns: ClassVar[Sequence[str]]
+    """Fields that are a column of every row."""
+    usual: ClassVar[Mapping[str, Any]]
+    """Fields that are a column where they differ from this value. Without the column the rows, and
+    the digests made of them, stay as they were before there was a choice.
+    """
 
     @abstractmethod
-    def row(self) -> Row:
-        """Every parameter flat; those that have parameters of their own as `WHAT.NAME`."""
+    def place(self) -> Row:
+        """Columns that say where the task is played: the sensor set-up, the source of a scene."""
 
     @property
     @abstractmethod
-    def label(self) -> str:
-        """A short name for people."""
+    def name(self) -> str:
+        """What is told of every task to people."""
 
     @property
-    @abstractmethod
     def order(self) -> int:
         """Tasks with lower numbers are played first."""
+        return 0
 
     @property
     @abstractmethod
     def batch(self) -> Hashable:
         """Tasks with equal ones may be handed to one worker together."""
 
-    @property
     @abstractmethod
-    def similarity_keys(self) -> tuple[SimilarityKey, ...]:
-        """What it shares with tasks that take about as long, the closest first."""
+    def try_out(self) -> None:
+        """Make environment and policy. Raises what they do not accept."""
+
+    def row(self) -> Row:
+        """Every parameter flat; those of detector, scenario and policy as `detector.NAME`,
+        `scenario.NAME`, `policy.NAME`.
+        """
+        plain = {name: getattr(self, name) for name in self.columns}
+        chosen = {name: getattr(self, name) for name in self.usual}
+        row = self.place() | plain
+        row |= {name: value for name, value in chosen.items() if value != self.usual[name]}
+        for owner in _OWNERS:
+            row |= flat(owner, getattr(self, f"{owner}_parameters", ()))
+        return row
+
+    @property
+    def label(self) -> str:
+        """A short name for people: the name, and what departs from the defaults."""
+        told = {*self.place(), *_NAMED} - {"sensor"}
+        usual = DEFAULTS | {"detector": PROXY}
+        changes = {n: v for n, v in self.row().items() if n not in told and v != usual.get(n)}
+        return " ".join([self.name, *(f"{name}={value}" for name, value in changes.items())])
 
     def make_policy(self, env: gymnasium.Env[Any, Any]) -> Policy:
         """The policy for the environment."""
@@ -234,31 +157,30 @@ class RunConfig(ABC):
 
     def changed(self, **values: object) -> Self:
         """The same with other values of fields that need no check."""
-        # dataclasses.replace would run every check again, and make an environment for each task of
-        # a large study.
+        # dataclasses.replace would run every check again for each task of a large study.
         other = copy(self)
         for name, value in values.items():
             object.__setattr__(other, name, value)
         return other
 
-    def check_parameters(self, *names: str) -> None:
-        """Bring the parameters in these fields into the form in which files hold them. Raises
-        InvalidInput for values that no file holds.
+    def check_task(self, grid: Grid) -> None:
+        """Check policy, detector and budget for the cells of a grid, and bring all parameters into
+        the form in which files hold them. Raises InvalidInput.
         """
-        for name in names:
-            pairs = getattr(self, name)
+        for owner in _OWNERS:
+            name = f"{owner}_parameters"
+            pairs = getattr(self, name, ())
             if not (isinstance(pairs, tuple | list) and all(map(_is_pair, pairs))):
                 raise InvalidInput(
                     f"{name} must be pairs of a name and a value, got {shown(pairs)}"
                 )
-            object.__setattr__(
-                self, name, checked_parameters(pairs, name.removesuffix("_parameters"))
-            )
-
-
-def departures(task: RunConfig, without: Sequence[str]) -> list[str]:
-    """What of a task's row departs from the default conditions, as NAME=VALUE."""
-    return [f"{n}={v}" for n, v in task.row().items() if n not in without and v != DEFAULTS.get(n)]
+            object.__setattr__(self, name, checked_parameters(pairs, owner))
+        check_policy(self.policy)
+        check_detector(self.detector)
+        hardware_of(self.firing, grid).budget_cells(self.budget)
+        # The code of somebody else is loaded when it plays.
+        if self.policy in POLICIES.built_in:
+            check_parameters(self.policy, maker(self.policy), dict(self.policy_parameters))
 
 
 def effective_conditions(policy: str, budget: float, conditions: dict[str, Any]) -> dict[str, Any]:
@@ -311,22 +233,6 @@ def check_size(tasks: int) -> None:
             f"the tasks of a study must be at most {MOST_TASKS:,}, got {shown(tasks)}, because all "
             "their rows are held in memory: play it in parts, each with its own --out"
         )
-
-
-def in_batches(tasks: Sequence[RunConfig], most: int | None = None) -> list[list[RunConfig]]:
-    """The tasks in the order in which they are played; tasks of one batch stand together, up to
-    `most` of them.
-    """
-    batches: list[list[RunConfig]] = []
-    begun: dict[Hashable, list[RunConfig]] = {}
-    # The sort is stable: a batch is played when its first task is due.
-    for task in sorted(tasks, key=lambda task: task.order):
-        key = task.batch
-        if key not in begun or len(begun[key]) == most:
-            begun[key] = []
-            batches.append(begun[key])
-        begun[key].append(task)
-    return batches
 
 
 def collected(plain: Sequence[dict[str, Any]], axis: str, plural: str) -> dict[str, Any]:

@@ -2,61 +2,16 @@
 
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any
 
-import numpy as np
-from gymnasium.vector.utils import create_empty_array
-
-from care_sim.base.compiled import lacks_code
 from care_sim.base.errors import error_line
-from care_sim.batch import sight
-from care_sim.batch.loop import BatchLoop
-from care_sim.batch.state import place_sensors
-from care_sim.core.arrays import Mask
-from care_sim.envs.sensing import Observed
-from care_sim.study.episode_config import EpisodeConfig, closed_loop
 from care_sim.study.episode_play import MOST_TOGETHER, play_episodes
 from care_sim.study.executors import ClusterLost, ExecutorFactory, parallel_batches, processes
 from care_sim.study.journal import Journal
-from care_sim.study.run_config import Row, RunConfig, in_batches
-
-
-def is_compiling_due() -> bool:
-    """Return True if the simulator can be compiled for later processes, but is not yet."""
-    return lacks_code(sight._look)
-
-
-def compile_from_the_end() -> None:
-    """Play a keyframe that fires first and looks last.
-
-    Episodes look first. Workers that begin together compile the same stages at the same time. One
-    worker that begins with this keyframe compiles the other half, and each reads what the other
-    has compiled.
-    """
-    with EpisodeConfig("dartout", "care").make_env() as env:
-        model = closed_loop(env)
-        observed = cast(Observed, create_empty_array(model.observation_space, 1))
-        duration_s = model.scenario.duration_s
-        loop = _LooksLast([model.rig], [model.conditions], duration_s, observed, exact=False)
-        try:
-            loop.begin({0: model.episode(0)})
-            loop.keyframe(observed["ranges"], np.ones(1, np.bool_))
-        finally:
-            loop.close()
-
-
-class _LooksLast(BatchLoop):
-    """A loop whose first pictures are those after its first keyframe."""
-
-    def _look(self, who: Mask) -> None:
-        if self.state.keyframes.any():
-            super()._look(who)
-        else:
-            place_sensors(self.state, self._rig.sensor_position)
-
+from care_sim.study.run_config import Row, RunConfig
 
 Batch = Sequence[RunConfig]
 PlayBatch = Callable[[Any], list[Row | str]]
@@ -95,6 +50,22 @@ def by_reason(failures: Sequence[Failure], unit: str) -> list[str]:
         str(own[0]) if len(own) == 1 else f"{len(own)} {unit}, the first {own[0]}"
         for own in reasons.values()
     ]
+
+
+def in_batches(tasks: Sequence[RunConfig], most: int | None = None) -> list[list[RunConfig]]:
+    """The tasks in the order in which they are played; tasks of one batch stand together, up to
+    `most` of them.
+    """
+    batches: list[list[RunConfig]] = []
+    begun: dict[Hashable, list[RunConfig]] = {}
+    # The sort is stable: a batch is played when its first task is due.
+    for task in sorted(tasks, key=lambda task: task.order):
+        key = task.batch
+        if key not in begun or len(begun[key]) == most:
+            begun[key] = []
+            batches.append(begun[key])
+        begun[key].append(task)
+    return batches
 
 
 class RunListener:
@@ -160,8 +131,6 @@ class _Run:
         self._deaths: Counter[str] = Counter()
         self._play_batch = play_batch
         self._parts_last = most is not None
-        # On a cluster, workers of many machines would compile.
-        self._compiles = play_batch is play_episodes and make_executor is processes
         self._journal = journal
         self._workers = workers
         self._make_executor = make_executor
@@ -176,10 +145,6 @@ class _Run:
         workers = min(self._workers, len(waiting))
         with self._make_executor(workers) as executor:
             try:
-                if workers > 1 and self._compiles and is_compiling_due():
-                    # Its end is nobody's concern: a task that cannot be played fails by itself.
-                    executor.submit(compile_from_the_end)
-                    self._compiles = False
                 while waiting or in_flight:
                     self._submit_waiting(executor, waiting, in_flight)
                     self._collect_finished(in_flight)
@@ -241,7 +206,7 @@ class _Run:
     def _collect_finished(self, in_flight: _InFlight) -> None:
         done, _ = wait(in_flight, _QUIET_S, FIRST_COMPLETED)
         # Whole batches first, so that they are in the journal before a death is told.
-        for future in sorted(done, key=_is_cut_off):
+        for future in sorted(done, key=lambda future: future.exception() is not None):
             if not self._kept(in_flight[future], future):
                 raise BrokenExecutor
             del in_flight[future]
@@ -302,7 +267,3 @@ def _part_last(waiting: "deque[list[RunConfig]]", workers: int) -> None:
         if rest := first[share:]:
             waiting.appendleft(rest)
         waiting.appendleft(first[:share])
-
-
-def _is_cut_off(future: Future[list[Row | str]]) -> bool:
-    return future.exception() is not None

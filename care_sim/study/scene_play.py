@@ -47,15 +47,7 @@ def event_sightings(score: SceneScore) -> dict[str, list[Any]]:
     # Three decimals are millimetres and milliradians, finer than any sensor here.
     rows = score.event_rows()
     columns = {name: [row[name] for row in rows] for name in _EVENT_COLUMNS}
-    return {
-        name: [round(v, 3) if isinstance(v, float) else v for v in column]
-        for name, column in columns.items()
-    }
-
-
-def without_events(row: Row) -> Row:
-    """The row without what only its events need."""
-    return {name: value for name, value in row.items() if name != "sightings"}
+    return columns | {name: [round(v, 3) for v in columns[name]] for name in ("range_m", "azimuth")}
 
 
 def event_columns(rows: Sequence[Row]) -> dict[str, Any]:

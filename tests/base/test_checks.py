@@ -26,7 +26,7 @@ from care_sim.envs.scenarios import DenseEnv
 from care_sim.envs.scenes import ReplayEnv, StreetEnv
 from care_sim.scenarios import SCENARIOS
 from care_sim.study.episode_config import EpisodeConfig
-from care_sim.study.run_config import parameters
+from care_sim.study.rows.parameters import parameters
 from care_sim.wrappers import GridObservation, SectorReserve, SectorScores
 
 NO_NUMBERS = (float("nan"), float("inf"), 10**5000, -1e300, 1e300, Decimal(1), True, "1", None, [1])

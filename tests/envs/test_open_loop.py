@@ -14,9 +14,10 @@ import care_sim
 from care_sim.base.errors import InvalidInput
 from care_sim.envs import OPEN_LOOP
 from care_sim.envs.open_loop import FilmEnv
-from care_sim.evaluation.recall import score_scene
+from care_sim.evaluation.recall import SceneScore
 from care_sim.evaluation.sightings import Sightings
 from care_sim.loops.film import Film
+from care_sim.perception.matching import found_objects
 from care_sim.sources import street_films
 from care_sim.sources.street_films import street_film
 from tests.helpers.av2_log import at, box, write
@@ -128,7 +129,9 @@ def test_the_score_is_that_of_what_the_detector_reported(make):
     sightings = Sightings.of(
         film.name, [shot.annotations for shot in film.shots], hidden=film.hidden
     )
-    again = score_scene(sightings, [record.detections for record in keyframes])
+    pairs = zip(film.shots, keyframes, strict=True)
+    found = [found_objects(shot.annotations, record.detections) for shot, record in pairs]
+    again = SceneScore.of(sightings, found)
     assert again.tally() == env.unwrapped.score.tally()
     assert again.event_rows() == env.unwrapped.score.event_rows()
 

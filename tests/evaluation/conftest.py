@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from care_sim.core.types import CLASSES, Detections
+from care_sim.evaluation.recall import SceneScore
+from care_sim.perception.matching import found_objects
 from care_sim.sensors.annotated import Annotations
 
 
@@ -50,3 +52,14 @@ def _report(annotations, rng):
     classes = np.concatenate([annotations.classes[kept], [0, 3, 4]])
     classes = np.where(rng.random(len(classes)) < 0.1, (classes + 1) % len(CLASSES), classes)
     return Detections(classes, boxes, np.full(len(classes), 3))
+
+
+@pytest.fixture(scope="session")
+def score_scene():
+    """Score the reports of a scene, one per keyframe."""
+
+    def make(sightings, reports):
+        pairs = zip(sightings.keyframes, reports, strict=True)
+        return SceneScore.of(sightings, [found_objects(shown, report) for shown, report in pairs])
+
+    return make

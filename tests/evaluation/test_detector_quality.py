@@ -14,9 +14,7 @@ from care_sim.evaluation.detector_quality import (
     scene_boxes,
     score_of_precision,
 )
-from care_sim.evaluation.recall import score_scene
 from care_sim.evaluation.sightings import Sightings
-from care_sim.perception.matching import UNSERVED, found_objects, served_by
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -47,6 +45,10 @@ def test_a_scene_by_hand(scene):
     assert scene.right.tolist() == [True, False, True]
     assert scene.found_at.tolist() == [0.9, -np.inf, 0.6]
     assert (scene.events.tolist(), scene.scans) == ([2], 2)
+    points = curve([scene])
+    assert points[-1] == pytest.approx([0.4, 2 / 3, 2 / 3])
+    assert points[0] == pytest.approx([0.9, 1 / 3, 1.0])
+    assert np.isnan(counts([scene], 0.95).precision)
 
 
 @pytest.mark.parametrize(
@@ -60,10 +62,6 @@ def test_a_higher_score_leaves_fewer_boxes(scene, least, precision, recall, firs
     assert found.first_recall == first
 
 
-def test_no_box_has_no_precision(scene):
-    assert np.isnan(counts([scene], 0.95).precision)
-
-
 def test_one_class_alone(scene):
     car = counts([scene.of_class(0)])
     person = counts([scene.of_class(4)])
@@ -74,19 +72,6 @@ def test_one_class_alone(scene):
 @pytest.mark.parametrize(("precision", "score"), [(0.5, 0.4), (0.7, 0.6), (1.0, 0.6)])
 def test_the_least_score_of_a_precision(scene, precision, score):
     assert score_of_precision([scene], precision) == score
-
-
-def test_the_curve_ends_at_all_boxes(scene):
-    points = curve([scene])
-    assert points[-1] == pytest.approx([0.4, 2 / 3, 2 / 3])
-    assert points[0] == pytest.approx([0.9, 1 / 3, 1.0])
-
-
-def test_no_box_has_no_curve(shown, reported):
-    one = scene_boxes(Sightings.of("one", [shown((1, "car", 10.0, 0.0))]), [reported()])
-    assert curve([one]).shape == (0, 3)
-    assert np.isnan(calibration_error([one]))
-    assert score_of_precision([one], 0.5) is None
 
 
 def test_equal_scores_count_together(shown, reported):
@@ -109,7 +94,7 @@ def test_scores_that_are_shares_have_no_error(shown, reported):
 
 @given(SEEDS)
 def test_any_least_score_finds_what_a_detector_that_leaves_the_rest_out_does(
-    street, detector, seed
+    street, detector, score_scene, seed
 ):
     shots = street(seed)
     rng = np.random.default_rng(seed)
@@ -122,15 +107,3 @@ def test_any_least_score_finds_what_a_detector_that_leaves_the_rest_out_does(
         assert found.found.sum() == alone.found
         assert (found.sighted.sum(), found.events.sum()) == (alone.sighted, alone.events)
         assert found.right.sum() <= found.boxes.sum()
-
-
-@given(SEEDS, st.booleans())
-def test_a_detection_serves_one_object(street, detector, seed, surely):
-    for shown, report in zip(street(seed), detector(street(seed), seed), strict=True):
-        rng = np.random.default_rng(seed)
-        one = scored(report, rng.random(len(report))) if surely else report
-        server = served_by(shown, one)
-        used = server[server != UNSERVED]
-        assert len(np.unique(used)) == len(used)
-        assert np.array_equal(server != UNSERVED, found_objects(shown, one))
-        assert np.array_equal(report.classes[used], shown.classes[server != UNSERVED])

@@ -6,10 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.frames import turned
-from care_sim.core.types import CLASSES
-from care_sim.evaluation.sightings import ANNOTATED, VISIBLE, Sightings, check_presence
-from care_sim.sensors.annotated import Annotations
+from care_sim.evaluation.sightings import ANNOTATED, VISIBLE, Sightings
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -117,30 +114,6 @@ def test_an_object_cannot_be_hidden_and_seen_at_once_nor_a_presence_made_up(show
             Sightings.of("any", [shown()], presence=other)
 
 
-def test_which_annotations_of_a_keyframe_are_first_sightings(shown):
-    start, here, far, new = (
-        (1, "car", 10, 0),
-        (2, "car", 20, 0),
-        (3, "car", 60, 0),
-        (4, "car", 5, 5),
-    )
-    scene = Sightings.of(
-        "street", [shown(start), shown(far, here, start, new), shown(here, (3, "car", 40, 0))]
-    )
-    appearing = [scene.appearing(keyframe).tolist() for keyframe in range(3)]
-    assert appearing == [[False], [False, True, False, True], [False, True]]
-
-
-def test_an_event_says_what_was_seen_and_where(shown):
-    scene = Sightings.of(
-        "left", [shown((1, "car", 10, 0)), shown((1, "car", 9, 0), (2, "bicycle", -3, 4))]
-    )
-    event = scene.frames.take(scene.events)
-    assert (scene.scene, len(event), CLASSES[event.classes[0]]) == ("left", 1, "bicycle")
-    assert (event.keyframes[0], event.objects[0], event.ranges[0]) == (1, 2, 5.0)
-    assert event.azimuths[0] == pytest.approx(np.arctan2(4, -3))
-
-
 def test_range_is_planar_and_the_height_of_a_box_plays_no_part(shown):
     below = shown((1, "car", 30, 40))
     below.boxes[0, 2] = -20.0
@@ -153,12 +126,6 @@ def test_object_frames_are_those_in_range(path):
     assert scene.in_range.tolist() == [False, True, True, False, True]
 
 
-def test_the_range_can_be_set(shown):
-    scene = [shown((1, "car", 25, 0)), shown((1, "car", 15, 0))]
-    assert events(Sightings.of("near", scene, range_m=20.0)) == [(1, 1)]
-    assert events(Sightings.of("far", scene)) == []
-
-
 def test_a_scene_may_be_empty_of_objects_but_not_of_keyframes(shown):
     assert len(Sightings.of("quiet", [shown(), shown()]).frames) == 0
     with pytest.raises(
@@ -167,32 +134,10 @@ def test_a_scene_may_be_empty_of_objects_but_not_of_keyframes(shown):
         Sightings.of("nothing", [])
 
 
-def test_an_object_annotated_twice_is_named(shown):
-    with pytest.raises(
-        InvalidInput, match="scene twins, keyframe 1: object 5 is annotated more than once"
-    ):
-        Sightings.of(
-            "twins", [shown(), shown((3, "car", 1, 1), (5, "car", 2, 2), (5, "car", 3, 3))]
-        )
-
-
-def test_one_number_at_two_keyframes_is_one_object_and_numbers_may_have_gaps(shown):
-    scene = Sightings.of(
-        "gaps", [shown((900, "car", 5, 0)), shown((900, "car", 5, 0), (2, "car", 5, 0))]
-    )
-    assert events(scene) == [(1, 2)]
-
-
 @pytest.mark.parametrize("centre", [(np.nan, 0.0), (0.0, np.inf)])
 def test_an_object_that_is_nowhere_is_named(shown, centre):
     with pytest.raises(InvalidInput, match="scene lost, keyframe 1: object 5 has no finite centre"):
         Sightings.of("lost", [shown(), shown((3, "car", 1, 1), (5, "car", *centre))])
-
-
-@pytest.mark.parametrize("range_m", [-1.0, np.nan])
-def test_a_range_that_is_none_is_refused(shown, range_m):
-    with pytest.raises(InvalidInput, match="range_m must be a finite number >= 0"):
-        Sightings.of("any", [shown()], range_m)
 
 
 @given(SEEDS)
@@ -210,52 +155,3 @@ def test_a_first_sighting_is_the_earliest_of_an_object_that_was_not_there_at_sta
         (k, n) for k in range(1, len(near)) for n in sorted(near[k] - set().union(*near[:k]))
     ]
     assert events(Sightings.of("any", keyframes)) == expected
-
-
-@given(SEEDS, st.floats(-np.pi, np.pi))
-def test_neither_the_order_of_objects_nor_a_turn_of_the_sensor_changes_the_events(
-    street, seed, yaw
-):
-    keyframes = street(seed)
-    changed = [
-        Annotations(
-            a.objects[::-1],
-            a.classes[::-1],
-            np.c_[turned(a.boxes[:, :3], yaw), a.boxes[:, 3:]][::-1],
-        )
-        for a in keyframes
-    ]
-    before, after = Sightings.of("a", keyframes), Sightings.of("b", changed)
-    assert sorted(events(before)) == sorted(events(after))
-    assert np.sort(before.frames.ranges) == pytest.approx(np.sort(after.frames.ranges))
-
-
-@given(SEEDS)
-def test_with_nobody_hidden_the_two_presences_agree_and_hiding_takes_events_alone_away(
-    street, seed
-):
-    keyframes = street(seed)
-    plain = events(Sightings.of("any", keyframes))
-    assert events(Sightings.of("any", keyframes, presence=VISIBLE)) == plain
-    later = keyframes[1:]
-    hidden = keyframes[0]
-    by_rule, by_sight = (
-        Sightings.of("any", later, hidden=_without(hidden, later[0]), presence=p)
-        for p in (ANNOTATED, VISIBLE)
-    )
-    assert set(events(by_rule)) <= set(events(by_sight)) == set(events(Sightings.of("any", later)))
-    assert len(by_sight.events) - len(by_rule.events) == len(by_rule.emerging)
-
-
-def _without(annotations, others):
-    kept = ~np.isin(annotations.objects, others.objects)
-    return Annotations(
-        annotations.objects[kept], annotations.classes[kept], annotations.boxes[kept]
-    )
-
-
-def test_a_presence_that_is_none_is_shown_in_a_short_line():
-    with pytest.raises(InvalidInput) as refused:
-        check_presence("x\n\x1b" * 9999)
-    assert len(str(refused.value)) < 200
-    assert str(refused.value).isprintable()

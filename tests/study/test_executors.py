@@ -2,7 +2,6 @@
 one line.
 """
 
-import builtins
 import json
 import os
 import signal
@@ -14,7 +13,7 @@ from contextlib import contextmanager, suppress
 
 import pytest
 
-from care_sim.base.errors import InvalidInput, MissingExtra
+from care_sim.base.errors import InvalidInput
 from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.episode_play import run_episode
 from care_sim.study.executors import cluster
@@ -252,16 +251,3 @@ def test_nobody_at_the_address_is_one_line():
     pytest.importorskip("dask.distributed")
     with pytest.raises(InvalidInput, match="no dask scheduler answers at nonsense"):
         cluster("nonsense")
-
-
-def test_without_dask_the_extra_is_named(monkeypatch):
-    real = builtins.__import__
-
-    def without_dask(name, *rest):
-        if name.startswith("dask"):
-            raise ImportError(name)
-        return real(name, *rest)
-
-    monkeypatch.setattr(builtins, "__import__", without_dask)
-    with pytest.raises(MissingExtra, match=r"\.\[cluster\]"):
-        cluster("tcp://localhost:8786")

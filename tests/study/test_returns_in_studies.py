@@ -6,14 +6,10 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.reports.page.played_rows import config_of
-from care_sim.sources import scenes
 from care_sim.sources.named import source_of
 from care_sim.sources.scenes import Streets
-from care_sim.streets.street import make_street
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.play_config import PlayConfig
-from care_sim.study.scene_play import play_scene
-from tests.helpers.short_streets import part_of
 
 STREETS = Streets()
 FOG = {"lidar_stated_range_m": 40.0, "visibility_m": 50.0}
@@ -31,16 +27,6 @@ def test_settings_are_columns_of_rows_where_they_are_switched_on():
 def test_plays_share_a_film_with_those_of_the_same_returns_alone():
     assert play(lidar_crosstalk=0.1).batch == play(lidar_dropout=0.1).batch == play().batch
     assert play(**FOG).batch != play().batch
-
-
-def test_another_film_asks_for_the_same_first_sightings(monkeypatch):
-    """Who is there does not depend on what returns, who is found does."""
-    monkeypatch.setattr(scenes, "make_street", lambda seed: part_of(make_street(seed), slice(3)))
-    (plain,), (foggy,) = (play_scene([play(**given)]) for given in ({}, FOG))
-    assert plain["film_hash"] != foggy["film_hash"]
-    for name in ("events", "frames"):
-        assert plain[name] == foggy[name]
-    assert plain["found"] > foggy["found"]
 
 
 def test_recordings_refuse_in_one_line(drive):

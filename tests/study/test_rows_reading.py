@@ -3,7 +3,7 @@ from typing import get_args
 from care_sim.loops.records import Outcome
 from care_sim.study.results_formats import EPISODES
 from care_sim.study.rows.parquet import read_rows, write_rows
-from care_sim.study.rows.reading import with_added_columns
+from care_sim.study.rows.reading import is_avoided, with_added_columns
 from tests.helpers.made_rows import rows
 
 
@@ -46,6 +46,13 @@ def test_a_collision_is_read_again_although_its_hulls_overlap(tmp_path):
     write_rows(study, file, "sweep", [], EPISODES.schema)
     (read,) = read_rows(file, EPISODES.schema)
     assert {name: read[name] for name in touched} == touched
+
+
+def test_a_stop_for_nothing_avoids_no_collision():
+    (row,) = rows("care", [14.0])
+    assert is_avoided(row)
+    assert not is_avoided(row | {"braked_before_view": True})
+    assert not is_avoided(row | {"collision": True})
 
 
 def test_every_field_of_an_outcome_is_a_column_and_may_lack_what_it_may_lack():

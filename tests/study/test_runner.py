@@ -12,17 +12,15 @@ from unittest.mock import Mock
 
 import pytest
 
-from care_sim.base.errors import BrokenPolicy, InvalidInput
 from care_sim.commands.shared.run_study import run_study
 from care_sim.loops.records import Outcome
 from care_sim.study.episode_config import EpisodeConfig, grid
-from care_sim.study.episode_play import result_or_reason, run_episode, trace
-from care_sim.study.journal import JOURNAL, Journal, _line, read_journal
+from care_sim.study.episode_play import run_episode, trace
+from care_sim.study.journal import JOURNAL, Journal
 from care_sim.study.provenance import code_digest
 from care_sim.study.results_formats import EPISODES
 from care_sim.study.rows.parquet import read_rows
-from care_sim.study.run_config import in_batches
-from care_sim.study.runner import RunListener, run_all
+from care_sim.study.runner import RunListener, in_batches, run_all
 
 SHORT = (("duration_s", 0.3),)
 MEASURED = {"wall_s", "peak_rss_mb"}
@@ -66,14 +64,6 @@ def test_a_study_writes_its_files_and_equals_the_same_episodes_at_home(tmp_path)
     assert names == {"config.json", JOURNAL, EPISODES.file, "tables.md", "tables.tex"}
 
 
-def test_a_study_keeps_its_command_without_what_only_this_machine_knows(tmp_path):
-    command = "care-sim protocol --source kitti:/home/me/drives --out /tmp/x --policies mine:Mine"
-    run_study(short(["history", "full"]), tmp_path, workers=1, command=command)
-    content = json.loads((tmp_path / "config.json").read_text())
-    assert content["command"] == "care-sim protocol --source kitti:FOLDER --policies mine:Mine"
-    assert [each["policies"] for each in content["configurations"]] == [["history"], ["full"]]
-
-
 def test_an_interrupted_study_loses_and_repeats_nothing(tmp_path):
     configs = short(["history", "care", "random"])
     run_study(configs[:2], tmp_path, workers=1)
@@ -100,56 +90,6 @@ def test_a_finished_study_is_not_written_again(tmp_path, monkeypatch):
     (tmp_path / "tables.md").unlink()
     run_study(configs, tmp_path, 1, ThreadPoolExecutor)
     assert (tmp_path / "tables.md").is_file()
-
-
-def test_what_is_done_after_the_last_task_is_said(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("care_sim.commands.shared.run_study._MANY", 1)
-    run_study(short(["history"]), tmp_path, 1, ThreadPoolExecutor)
-    assert "\nmaking tables and figures of 1 episode\n" in capsys.readouterr().err
-
-
-def test_rows_of_a_journal_that_are_not_of_their_task_are_played_again(tmp_path, capsys):
-    configs = short(["history"], seeds=range(3))
-    run_study(configs, tmp_path, 1, ThreadPoolExecutor)
-    first, second, third = read_journal(tmp_path / JOURNAL).rows
-    del third["collision"]
-    altered = [second | {"digest": first["digest"]}, second, third]
-    lines = [_line(row | {"study": "sweep"}) for row in altered]
-    (tmp_path / JOURNAL).write_text("".join(lines))
-    (tmp_path / EPISODES.file).unlink()
-    assert run_study(configs, tmp_path, 1, ThreadPoolExecutor) == []
-    assert "2 lines of " in capsys.readouterr().err
-    rows = read_rows(tmp_path / EPISODES.file)
-    assert [(row["seed"], row["collision"]) for row in rows] == [(n, False) for n in range(3)]
-
-
-def test_a_finished_study_is_taken_from_its_results_without_its_journal(
-    tmp_path, monkeypatch, capsys
-):
-    run_study(short(["history"], seeds=range(3)), tmp_path, 1, ThreadPoolExecutor)
-    monkeypatch.setattr("care_sim.commands.shared.run_study.Journal", None)
-    assert run_study(short(["history"], seeds=range(3)), tmp_path, 1, ThreadPoolExecutor) == []
-    assert f"3 of 3 episodes found in {tmp_path}\n" in capsys.readouterr().err
-    # Fewer or more tasks, or a lost file, need the journal again.
-    for lost, seeds in (("", range(4)), ("tables.md", range(3))):
-        if lost:
-            (tmp_path / lost).unlink()
-        with pytest.raises(TypeError, match="NoneType"):
-            run_study(short(["history"], seeds=seeds), tmp_path, 1, ThreadPoolExecutor)
-
-
-def test_what_an_earlier_study_left_is_said_and_its_figures_go(tmp_path, capsys):
-    first, second = short(["history"], budgets=(0.05, 0.1)), short(["history", "random"])
-    run_study(first, tmp_path, workers=1)
-    assert "found" not in capsys.readouterr().err
-    (tmp_path / "dartout-budget.png").touch()
-    (tmp_path / "my-budget.png").touch()
-    run_study(second, tmp_path, workers=1, force=True)
-    line = f"1 of 2 episodes found in {tmp_path}; 1 of other options or code stay in its journal\n"
-    assert line in capsys.readouterr().err
-    assert {path.name for path in tmp_path.iterdir() if path.suffix in (".png", ".svg")} == {
-        "my-budget.png"
-    }
 
 
 class Counting(RunListener):
@@ -184,14 +124,6 @@ def test_an_interrupt_finishes_and_keeps_what_is_in_flight(tmp_path):
     assert listener.warned
     assert len(kept) >= 2
     assert len(kept) < len(configs)
-
-
-def test_any_executor_will_do(tmp_path):
-    listener = Counting()
-    with Journal(tmp_path / JOURNAL) as journal:
-        for _ in range(2):
-            assert run_all(short(["history"]), journal, 1, ThreadPoolExecutor, listener) == []
-            assert listener.ended == [(short(["history"])[0], True)]
 
 
 def test_episodes_are_played_seed_by_seed_and_written_in_the_order_asked(tmp_path):
@@ -254,20 +186,14 @@ def test_a_bad_policy_costs_only_its_own_episode(third_party, tmp_path):
 
 
 def test_every_error_of_a_policy_is_one_short_line_with_its_place(third_party, tmp_path):
-    configs = short(["raises-its-own", "raises-without-text", "raises-at-length"])
+    configs = short(["raises-its-own", "raises-at-length"])
     with Journal(tmp_path / JOURNAL) as journal:
         failures = run_all(configs, journal, 2)
     lines = {failure.config.policy: failure.reason for failure in failures}
     assert lines == {
         "raises-its-own": "Own: its own (misbehaving.py, line 86)",
-        "raises-without-text": "Unreadable: its text cannot be read (misbehaving.py, line 94)",
         "raises-at-length": f"RuntimeError: {'x' * 300}... (misbehaving.py, line 98)",
     }
-
-
-def test_a_policy_that_raises_its_own_error_at_start_is_left_out(third_party):
-    with pytest.raises(BrokenPolicy, match="fails-at-start refuses to start: Own: its own"):
-        short(["fails-at-start"])
 
 
 class Following(RunListener):
@@ -331,53 +257,7 @@ def test_a_fork_server_that_fails_once_costs_nothing(tmp_path, error):
     assert len(read_rows(tmp_path / EPISODES.file)) == 1
 
 
-def test_what_failed_is_told_in_one_line_that_no_terminal_obeys():
-    def fail(error):
-        raise error
-
-    assert result_or_reason(fail, InvalidInput("no\n\x1b[2J idea")) == r"no \x1b[2J idea"
-    assert result_or_reason(fail, RuntimeError()).startswith("RuntimeError (test_runner.py, line ")
-
-
-def test_a_study_goes_on_when_some_episodes_fail(third_party, tmp_path):
-    (failure,) = run_study(short(["history", "raises", "care"]), tmp_path, workers=1)
-    assert failure.config.policy == "raises"
-    assert [row["policy"] for row in read_rows(tmp_path / EPISODES.file)] == ["history", "care"]
-    assert run_study(short(["history", "care"]), tmp_path, workers=1) == []
-
-
-def test_a_worker_imports_nothing_of_tables_and_commands():
-    import_as_a_worker = (
-        "import sys, care_sim.study.episode_play, care_sim.envs.closed_loop; print(*sys.modules)"
-    )
-    loaded = subprocess.run(
-        [sys.executable, "-c", import_as_a_worker], capture_output=True, text=True, check=True
-    )
-    needless = {
-        "rich",
-        "tyro",
-        "torch",
-        "dask",
-        "open3d",
-        "care_sim.reports.report",
-        "care_sim.reports.figures.styles",
-    }
-    assert not needless & set(loaded.stdout.split())
-
-
 @pytest.mark.slow
-def test_the_memory_of_a_worker_stays_flat(tmp_path):
-    """Episode after episode in one process: what the twentieth needs, the fifth did already."""
-    configs = grid(["dense"], ["care", "full"], [0.1], range(20), scenario_parameters=SHORT)
-    with Journal(tmp_path / JOURNAL) as journal:
-        assert run_all(configs, journal, 1) == []
-        peaks = [
-            journal[config.digest()]["peak_rss_mb"]
-            for config in sorted(configs, key=lambda c: c.seed)
-        ]
-    assert peaks[-1] < peaks[9] + 5
-
-
 def listen_to_interrupts():
     """What is started in the background inherits deaf ears."""
     signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -11,17 +11,16 @@ import pyarrow.parquet as pq
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.cli import main
 from care_sim.commands.shared.run_study import run_study
 from care_sim.evaluation.recall import Tally
 from care_sim.reports.protocol.rows import plays_by_setting
 from care_sim.reports.report import read_results
 from care_sim.reports.studies import STUDIES
 from care_sim.sources.named import source_of
-from care_sim.sources.scenes import Scene, Streets, chosen_scenes
+from care_sim.sources.scenes import Scene
 from care_sim.study import scene_play as plays
 from care_sim.study.play_config import PLAY_FIELDS, listed_plays, play_grid
-from care_sim.study.run_config import in_batches
+from care_sim.study.runner import in_batches
 from tests.helpers.av2_log import at, box, write
 
 MEASURED = {"wall_s", "peak_rss_mb"}
@@ -191,76 +190,9 @@ def test_the_events_are_kept_one_by_one(source, tmp_path):
     assert "sightings" not in rows[0]
 
 
-def test_the_command_plays_prints_and_resumes(folder, tmp_path, capsys):
-    line = "--policies history care full --budgets 0.05 --floor-seeds 2 --workers 1"
-    options = [*line.split(), "--out", str(tmp_path / "out")]
-    for found in (False, True):
-        with pytest.raises(SystemExit) as end:
-            main(["protocol", "--source", f"argoverse2:{folder}", *options])
-        said = capsys.readouterr()
-        assert end.value.code == 1
-        assert ("10 of 15 plays found" in said.err) == found
-        assert "care-sim: failed: 5 plays, the first torn history 0.05: " in said.err
-    with pytest.raises(SystemExit) as end:
-        main(["report", str(tmp_path / "out")])
-    assert end.value.code == 0
-    assert "Left out: 5 plays" in capsys.readouterr().out
-
-
-def test_scenes_are_chosen_by_number_or_by_name():
-    scenes = Streets().scenes()
-    assert [scene.seed for scene in scenes] == list(range(150))
-    assert chosen_scenes(scenes, ()) == scenes
-    assert [scene.name for scene in chosen_scenes(scenes, ("2",))] == [
-        "street-0000-straight",
-        "street-0001-bend",
-    ]
-    assert chosen_scenes(scenes, (scenes[7].name,)) == [scenes[7]]
-    assert {scene.seed for scene in Streets("calibration").scenes()}.isdisjoint(
-        scene.seed for scene in scenes
-    )
-
-
 def test_a_scene_without_an_event_has_a_row_too(tmp_path):
     far = box("REGULAR_VEHICLE", (70.0, 0.0, 0.42))
     write(tmp_path / "empty", [[far]] * 15, [at()] * 15)
     (row,) = attempted(small(source_of(f"argoverse2:{tmp_path}"), ["care"], scenes=("empty",)))
     assert Tally(*(row[name] for name in plays.SUMS)) == Tally()
     assert row["ttfds"] == ()
-
-
-def test_a_play_is_named_by_the_file_that_its_detector_is_given(source, tmp_path):
-    (plain,) = small(source, ["care"])
-    model = tmp_path / "model.pt"
-    digests = set()
-    for content in (b"one", b"another"):
-        model.write_bytes(content)
-        digests.add(
-            plain.changed(
-                detector="torchscript", detector_parameters=(("file", str(model)),)
-            ).digest()
-        )
-        digests.add(plain.changed(policy_parameters=(("weights", str(tmp_path)),)).digest())
-    assert len(digests | {plain.digest()}) == 5
-
-
-def test_what_changed_in_a_recording_is_played_again(source, folder, drive, tmp_path):
-    (config,) = small(source, ["care"])
-    before = config.digest()
-    shutil.copytree(drive, folder / "moved")
-    assert config.digest() == before
-    parked = box("REGULAR_VEHICLE", (15.0, 3.0, 0.42))
-    write(folder / "a", [[parked]] * 10, [at()] * 10)
-    assert config.digest() != before
-
-
-def test_a_scene_that_cannot_be_read_is_read_once(source, monkeypatch):
-    read = []
-    film = type(source.recordings).film
-    monkeypatch.setattr(
-        type(source.recordings), "film", lambda own, scene: read.append(scene) or film(own, scene)
-    )
-    configs = small(source, floors=(0, 1, 2), scenes=("torn",))
-    (reason,) = set(attempted(configs))
-    assert "annotations.feather" in reason
-    assert read == ["torn"]

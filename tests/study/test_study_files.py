@@ -3,10 +3,8 @@ from dataclasses import asdict
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.cli import main
 from care_sim.loops.records import Outcome
 from care_sim.study.episode_config import EpisodeConfig
-from care_sim.study.journal import Journal
 from care_sim.study.results_formats import EPISODES
 from care_sim.study.rows.parquet import read_rows, write_rows
 
@@ -35,50 +33,7 @@ def test_a_damaged_file_is_named(content, tmp_path):
         read_rows(path)
 
 
-def test_a_truncated_file_is_named(tmp_path):
-    path = tmp_path / "episodes.parquet"
-    write_rows(ROWS, path)
-    path.write_bytes(path.read_bytes()[:-20])
-    with pytest.raises(InvalidInput, match="not a readable Parquet file"):
-        read_rows(path)
-
-
 def test_a_file_of_something_else_is_named(tmp_path):
     write_rows([{"apples": 3}], tmp_path / "episodes.parquet")
     with pytest.raises(InvalidInput, match=r"it lacks .*policy"):
         read_rows(tmp_path / "episodes.parquet", EPISODES.schema)
-
-
-def test_the_journal_passes_over_a_torn_line_and_goes_on_behind_it(tmp_path):
-    path = tmp_path / "deep" / "journal.jsonl"
-    with Journal(path) as journal:
-        journal.append({"digest": "a", "x": 0.1})
-        journal.append({"digest": "b", "x": None})
-    path.write_text(path.read_text()[:-9])
-    with Journal(path) as journal:
-        assert "a" in journal
-        assert "b" not in journal
-        journal.append({"digest": "c", "x": 1 / 3})
-    with Journal(path) as journal:
-        assert journal["a"] == {"digest": "a", "x": 0.1}
-        assert journal["c"]["x"] == 1 / 3
-
-
-def test_a_sweep_over_a_range_is_reported_and_resumed(tmp_path, capsys):
-    sweep = [
-        "sweep",
-        "--scenarios",
-        "dartout",
-        "--policies",
-        "care",
-        "--seeds",
-        "1",
-        "--out",
-        str(tmp_path),
-    ]
-    sweep += ["--scenario-parameters", "duration_s=0.2", "gap_m=(0.9,1.0)", "--workers", "1"]
-    for command in (sweep, sweep, ["report", str(tmp_path)]):
-        with pytest.raises(SystemExit) as end:
-            main(command)
-        assert end.value.code == 0
-        assert "gap m (0.9, 1.0)" in capsys.readouterr().out

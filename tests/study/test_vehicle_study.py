@@ -3,12 +3,10 @@
 from collections import Counter
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.study.designs.vehicle import (
-    BLACKOUTS,
     DENSE,
     EVIDENCE_LEVELS,
     FORGETTING,
@@ -60,29 +58,10 @@ def test_every_level_of_every_question_is_played_once():
     }
 
 
-@pytest.mark.parametrize("policy", ["care-sbf", "full", "all-camera"])
-def test_a_policy_of_some_questions_cannot_join_in(policy):
+def test_a_policy_of_some_questions_cannot_join_in():
     """Its rows of the other questions would stand in no table."""
-    with pytest.raises(InvalidInput, match=f"plays {policy} itself .* any policy but care-sbf"):
-        vehicle_study([0], ["fan", policy])
-
-
-def test_late_levels_have_the_ages_of_the_paper():
-    late = [level for level in EVIDENCE_LEVELS if is_late(level)]
-    assert [level.label for level in EVIDENCE_LEVELS if "late" in level.label] == [
-        level.label for level in late
-    ]
-    assert [level.changes.get("camera_latency_s") for level in late] == [0.12, 0.42, None]
-    place = TURNS.places[0]
-    for level in late:
-        for one in (level, uncompensated(level)):
-            (config,) = one.configurations(place, ["care"], [0])
-            assert key_of(config.row() | {"tags": "causal"}) == one.key(place, "care")
-
-
-def test_ages_in_seconds_are_rounded_up_to_steps_of_the_world():
-    late = vehicle_row(replace(DENSE_CARE, camera_latency_s=0.12))
-    assert set(late["evidence_ages_ms"]) == {150}
+    with pytest.raises(InvalidInput, match=r"plays full itself .* any policy but care-sbf"):
+        vehicle_study([0], ["fan", "full"])
 
 
 def test_the_turning_tests_are_those_in_which_the_ego_turns():
@@ -94,11 +73,10 @@ def test_a_level_finds_the_rows_that_it_plays():
     """With the parameters of the policy and of the place, after a change of each."""
     (place,) = DENSE.places
     level = next(level for level in POSE_LEVELS if level.changes)
-    for one in (level, uncompensated(level), *(forgetting(level, rules) for rules in FORGETTING)):
+    levels = (level, uncompensated(level), *(forgetting(level, rules) for rules in FORGETTING))
+    for one in levels:
         (config,) = one.configurations(place, ["care"], [0])
         row = config.row() | {"tags": "causal"}
-        assert one.key(place, "care")[0].conditions
-
         assert key_of(row) == one.key(place, "care")
     turn = TURNS.places[0]
     (config,) = EVIDENCE_LEVELS[-1].configurations(turn, ["care"], [0])
@@ -132,13 +110,11 @@ def test_late_pictures_still_count_in_a_blackout():
     assert late["apart_after_s"] == pytest.approx(0.3)
 
 
-def test_compensation_keeps_late_wedges_on_their_bodies_in_a_turn(turn):
+def test_compensation_keeps_late_wedges_on_their_bodies_in_a_turn(turn, dark):
     assert set(turn["evidence_ages_ms"]) == {400}
     assert turn["boxes"] >= turn["turned_boxes"] > 0
     assert turn["turned_held"] > 1.3 * turn["unturned_held"]
-
-
-def test_straight_ahead_no_box_is_turned(dark):
+    # Straight ahead no box is turned.
     assert dark["boxes"] > 100
     assert dark["turned_boxes"] == dark["turned_held"] == dark["unturned_held"] == 0
 
@@ -149,13 +125,9 @@ def test_an_exact_pose_forecasts_what_stands_exactly_and_jumps_do_not(dark):
     assert jumps["forecast_error_m"] > 1.0
     assert dark["forecasts_in_eq4"] > 0.95 * dark["forecasts"]
     assert jumps["forecasts_in_eq4"] < 0.6 * jumps["forecasts"]
-    assert jumps["forecasts"] > 0
-
-
-def test_the_margin_of_eq_4_holds_no_more_than_a_full_hull():
-    """As in the policy, which never widens a hull."""
-    drift = vehicle_row(replace(DENSE_CARE, ego_position_sigma_m=0.4, ego_pose_correlation_s=10.0))
-    assert 0 < drift["forecasts_in_eq4"] <= drift["forecasts_in_margin"] < drift["forecasts"]
+    # As in the policy, Eq. 4 never widens a hull, and it keeps cells from being released.
+    assert 0 < jumps["forecasts_in_eq4"] <= jumps["forecasts_in_margin"] < jumps["forecasts"]
+    assert 0 < dark["released_cells_vehicle"] < dark["released_cells"]
 
 
 def test_the_guard_of_a_standing_car_is_four_metres():
@@ -163,16 +135,3 @@ def test_the_guard_of_a_standing_car_is_four_metres():
     row = vehicle_row(replace(DENSE_CARE, policy="full", budget=1.0, brake_side_margin_m=5.0))
     assert row["standing_keyframes"] > 0
     assert row["standing_guard_least_m"] == row["standing_guard_most_m"] == 4.0
-
-
-def test_the_margin_of_eq_4_keeps_cells_that_forgetting_would_release(dark):
-    assert 0 < dark["released_cells_vehicle"] < dark["released_cells"]
-
-
-def test_blackouts_begin_and_end_as_their_labels_say():
-    for levels in BLACKOUTS.values():
-        on, away, throughout = levels
-        assert not on.changes
-        start, length = (away.changes[name] for name in ("blackout_start_s", "blackout_s"))
-        assert away.label == f"away from {start:g} to {start + length:g} s"
-        assert throughout.changes["blackout_s"] == np.float64(3600.0)

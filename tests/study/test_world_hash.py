@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.commands.compare import play_side_by_side
 from care_sim.commands.shared.run_study import run_study
 from care_sim.reports.merging import merged
 from care_sim.scenarios.dartout import Dartout
@@ -46,14 +45,6 @@ class Drawing(Sound):
 
     def pace(self, rng):
         return np.random.default_rng().uniform(1.0, 2.0)
-
-
-@dataclass(frozen=True)
-class Counting(Sound):
-    """Counts the worlds that were built."""
-
-    def pace(self, rng):
-        return 1.0 + next(_BUILT)
 
 
 @dataclass(frozen=True)
@@ -104,17 +95,12 @@ def told(kind):
     )
 
 
-@pytest.mark.parametrize("kind", ["Drawing", "Counting", "Shaping", "Reacting"])
+@pytest.mark.parametrize("kind", ["Drawing", "Shaping", "Reacting"])
 def test_a_study_refuses_it_and_keeps_what_was_played(kind, tmp_path):
     with pytest.raises(InvalidInput, match=told(kind)):
         studied(plays(kind), tmp_path)
     assert not (tmp_path / "tables.md").exists()
     assert len((tmp_path / "journal.jsonl").read_text().splitlines()) == 4
-
-
-def test_a_comparison_of_one_seed_refuses_it():
-    with pytest.raises(InvalidInput, match=told("Drawing")):
-        play_side_by_side(plays("Drawing", seeds=[0]))
 
 
 def test_one_that_draws_from_its_seed_has_one_hash_per_seed():
@@ -129,8 +115,3 @@ def test_folders_of_different_worlds_are_not_merged(tmp_path):
         studied(plays("Drawing", [policy], [0]), tmp_path / policy)
     with pytest.raises(InvalidInput, match=told("Drawing")):
         merged([tmp_path / "history", tmp_path / "care"])
-
-
-def test_rows_of_built_in_scenarios_are_as_they_were():
-    (config,) = grid(["dartout"], ["history"], [0.05], [0])
-    assert "world_hash" not in run_episode(config)

@@ -12,7 +12,7 @@ from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.limits import MOST_WORKERS, WORKERS
 from care_sim.base.seeds import CALIBRATION, split_of
 from care_sim.core.conditions import ClosedLoopConditions, Conditions
-from care_sim.study.run_config import parameters
+from care_sim.study.rows.parameters import parameters
 
 Flag = Annotated[bool, tyro.conf.FlagCreatePairsOff]
 """A switch that has no opposite."""

@@ -28,7 +28,7 @@ from care_sim.reports.studies import STUDIES, SWEEP, study_of
 from care_sim.reports.study import Study
 from care_sim.study import executors
 from care_sim.study.executors import ExecutorFactory, processes
-from care_sim.study.journal import JOURNAL, UNFINISHED, Journal, Unfinished, forget
+from care_sim.study.journal import JOURNAL, UNFINISHED, Journal, forget, note_begin
 from care_sim.study.progress import run_with_progress
 from care_sim.study.provenance import code_digest, machine, versions
 from care_sim.study.rows.checks import check_worlds
@@ -54,6 +54,9 @@ def play_study(
     exit code.
     """
     study = STUDIES[name]
+    # A condition that no environment accepts is told once, before anything is played.
+    for config in configs[:1]:
+        config.try_out()
     make_executor = executors.cluster(options.cluster) if options.cluster else executors.processes
     usual = Path("runs", folder) if options.force else None
     out = options.out or usual or free_folder(folder, configs, study)
@@ -112,11 +115,10 @@ def run_study(
     # case that another process has written meanwhile.
     check_folder(folder, configs, study, force=force)
     with _journal(folder, study) as journal:
-        journal.drop_unsound(configs, study.schema)
         check_folder(folder, configs, study, journal, force)
         print_lines(goes, file=sys.stderr)
         others = _say_what_is_found(configs, journal, folder, kind.unit)
-        Unfinished(study.name, kind.unit, len(configs), others, command).write(folder)
+        note_begin(folder, study.name, counted(len(configs), kind.task), others, command)
 
         # The journal keeps what finishes, even if this process ends before results are written.
         failures = run_with_progress(configs, journal, workers, make_executor, kind)
@@ -164,8 +166,7 @@ def _say_what_is_found(
         lines = counted(journal.damaged, "line")
         print_lines(
             f"{lines} of {folder / JOURNAL} passed over, damaged or of a version "
-            "that wrote no checksums, or not of the task that they name; what they held is played "
-            "again where it is asked for",
+            "that wrote no checksums; what they held is played again where it is asked for",
             file=sys.stderr,
         )
     found = sum(config.key in journal for config in configs)

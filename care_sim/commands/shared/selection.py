@@ -1,6 +1,6 @@
 """What a command plays of what is named: scenarios, policies, sources, values of a condition."""
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +18,8 @@ from care_sim.commands.options.shared import EpisodeOptions, PlayOptions, Source
 from care_sim.core.conditions import DEFAULTS
 from care_sim.policies import check_policy, contenders
 from care_sim.scenarios import PLUGINS, SCENARIOS, make_scenario, scenario_names
-from care_sim.study.run_config import Parameters, parameters
+from care_sim.study.rows.parameters import Parameters, parameters
+from care_sim.study.run_config import RunConfig
 
 if TYPE_CHECKING:
     from care_sim.sources.scenes import Source
@@ -62,14 +63,19 @@ def check_built(scenario: str, given: Parameters) -> None:
 
 
 def playable(
-    names: Sequence[str], make: Callable[[str], object], least: int = 1
+    names: Sequence[str], make: Callable[[str], Iterable[RunConfig]], least: int = 1
 ) -> tuple[list[str], list[str]]:
-    """The policies, each once, whose tasks `make` can make, and a line for each that cannot be
-    made, which is printed too.
+    """The policies, each once, that can begin the tasks that `make` makes, and a line for each of
+    the others, which is printed too.
 
     Raises InvalidInput where something else is wrong, and if fewer than `least` policies are left.
     """
-    return _sound("policies", _policies(names), make, BrokenPolicy, least)
+
+    def try_out(name: str) -> None:
+        for config in make(name):
+            config.try_out()
+
+    return _sound("policies", _policies(names), try_out, BrokenPolicy, least)
 
 
 def _sound(

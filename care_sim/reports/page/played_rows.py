@@ -9,7 +9,8 @@ from care_sim.sources.named import source_of
 from care_sim.sources.scenes import SPLITS, Scene, Source, Streets
 from care_sim.study.episode_config import PLAIN_FIELDS, EpisodeConfig
 from care_sim.study.play_config import PlayConfig
-from care_sim.study.run_config import Parameters, Row
+from care_sim.study.rows.parameters import Parameters
+from care_sim.study.run_config import Row
 
 
 def in_open_loop(row: Row) -> bool:

@@ -11,7 +11,7 @@ from care_sim.reports.engine.levels import level
 from care_sim.reports.engine.measures import DETECTION
 from care_sim.reports.formatting import interval, mean
 from care_sim.reports.table import Table
-from care_sim.study.designs.crowding import CROWDING_POLICIES, VEHICLES_COLUMN
+from care_sim.study.designs.paper import CROWDING_POLICIES, VEHICLES_COLUMN
 from care_sim.study.designs.variants import USUAL_VARIANT, Place
 from care_sim.study.rows.reading import Key
 from care_sim.study.run_config import FULL, Row

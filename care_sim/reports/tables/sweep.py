@@ -139,7 +139,7 @@ def _paper(result: PublishedResult) -> str:
     braked where it tells.
     """
     if result.relation:
-        return result.relation.value
+        return result.relation
     braked = "" if result.braked is None else f", {result.braked}/{PAPER_EPISODES}"
     return f"{result.detection_m:g}{braked}"
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import cache
 from itertools import count
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import Any, NamedTuple
 
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.files import check_file_size, parsed_json, write_text
@@ -24,8 +24,9 @@ from care_sim.sources.scenes import Scene, Streets
 from care_sim.streets.street import street_name
 from care_sim.study.episode_config import grid
 from care_sim.study.play_config import play_grid
+from care_sim.study.rows.parameters import Parameters
 from care_sim.study.rows.reading import is_avoided
-from care_sim.study.run_config import Parameters, Row, RunConfig
+from care_sim.study.run_config import Row, RunConfig
 
 BENCHMARK_VERSION = 1
 """Of worlds, conditions and scorer together. Whatever changes a published row makes another one."""
@@ -42,12 +43,6 @@ QUICK_SHARE = 10
 """One world in so many is played by `--quick`: the first of every part."""
 
 
-class _HasPart(Protocol):
-    @property
-    def part(self) -> str: ...
-
-
-OfPart = TypeVar("OfPart", bound=_HasPart)
 _PUBLISHED = Path(__file__).with_name("worlds.json")
 _SEALED_FROM = 2**32
 """Sealed seeds lie above every split: no policy was trained or chosen on them."""
@@ -124,7 +119,7 @@ def publish_worlds(worlds: Sequence[World]) -> None:
     write_text(_PUBLISHED, "{\n" + ",\n".join(parts) + "\n}\n")
 
 
-def quick_tenth(things: Sequence[OfPart]) -> list[OfPart]:
+def quick_tenth(things: Sequence[Any]) -> list[Any]:
     """The first tenth of every part, of worlds or of what has been reached in them."""
     by_part = [[thing for thing in things if thing.part == part] for part in PARTS]
     return [thing for own in by_part for thing in own[: -(-len(own) // QUICK_SHARE)]]

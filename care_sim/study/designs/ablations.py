@@ -2,10 +2,9 @@
 time.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import Any
 
 from care_sim.core.defaults import AS_DEMANDED, CELL_ORDERS
 from care_sim.core.forgetting import ForgettingRules
@@ -15,18 +14,17 @@ from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.play_config import PlayConfig
 from care_sim.study.run_config import FULL
 
-ABLATION_PLACES = (
-    Place("dartout", 0.03),
-    Place("dartout", 0.10),
-    Place("dense", 0.02),
-    Place("dense", 0.03),
+ABLATION_PLACES = tuple(
+    Place(*place)
+    for place in (("dartout", 0.03), ("dartout", 0.10), ("dense", 0.02), ("dense", 0.03))
 )
 """The dart-out at the paper's tightest budget and at the one it reports, the dense street at the
 tightest and below: with more the reserve holds every wedge whole, and nothing that is varied here
 could show.
 """
 _REFERENCES = ("history", "all-camera")
-_USUAL_ORDERS = (AS_DEMANDED, "rows-down")
+_QUARTER = 4
+"""The paper's ablations take every fourth scene (Sec. 5.4)."""
 
 
 @dataclass(frozen=True)
@@ -39,58 +37,42 @@ class Ablation:
     references: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
-    @property
-    def varies_conditions(self) -> bool:
-        """Whether any policy feels what is varied."""
-        return any(level.changes for level in self.levels)
-
     def beside(self, also: Sequence[str]) -> list[str]:
         """The references, and of further policies those that feel what is varied."""
-        return [*self.references, *(also if self.varies_conditions else ())]
+        varies_conditions = any(level.changes for level in self.levels)
+        return [*self.references, *(also if varies_conditions else ())]
 
 
-def _conditions(name: str, values: Iterable[Any]) -> tuple[Variant, ...]:
-    return tuple(Variant(f"{value:g}", {name: value}) for value in values)
+def _of_conditions(title: str, name: str, *values: float) -> Ablation:
+    levels = tuple(Variant(f"{value:g}", {name: value}) for value in values)
+    return Ablation(title, "care", levels, _REFERENCES)
+
+
+def _of_rules(title: str, name: str, *values: float) -> Ablation:
+    # The default value is the usual policy, whose rows carry no parameter.
+    usual = getattr(ForgettingRules(), name)
+    levels = (
+        Variant(f"{value:g}", parameters={} if value == usual else {name: float(value)})
+        for value in values
+    )
+    return Ablation(title, "care-sbf", tuple(levels), ("care",))
 
 
 def _margins(columns: int, rows: int) -> Variant:
     return Variant(f"{columns}, {rows}", {"azimuth_margin": columns, "elevation_margin": rows})
 
 
-def _rules(name: str, values: Iterable[float]) -> tuple[Variant, ...]:
-    # The default value is the usual policy, whose rows carry no parameter.
-    default = getattr(ForgettingRules(), name)
-    return tuple(
-        Variant(f"{value:g}", parameters={} if value == default else {name: float(value)})
-        for value in values
-    )
-
-
-RESERVE_FRACTION = Ablation(
-    "reserve fraction rho", "care", _conditions("reserve_fraction", (0.15, 0.3, 0.5)), _REFERENCES
-)
+RESERVE_FRACTION = _of_conditions("reserve fraction rho", "reserve_fraction", 0.15, 0.3, 0.5)
 MARGINS = Ablation(
     "angular margin of hulls and wedges, columns and rows",
     "care",
-    tuple(_margins(*margins) for margins in ((1, 1), (2, 1), (4, 2))),
+    (_margins(1, 1), _margins(2, 1), _margins(4, 2)),
     _REFERENCES,
     ("Halved, the margin keeps its one row: there is no half of one.",),
 )
-CONFIDENCE = Ablation(
-    "least confidence of the camera",
-    "care",
-    _conditions("camera_confidence", (0.25, 0.5)),
-    _REFERENCES,
-)
-LATENCY = Ablation(
-    "age of the camera's detections, keyframes",
-    "care",
-    _conditions("camera_latency", (0, 1)),
-    _REFERENCES,
-)
-FLOOR_SEED = Ablation(
-    "seed of the shared floor", "care", _conditions("floor_seed", (0, 1, 2)), _REFERENCES
-)
+CONFIDENCE = _of_conditions("least confidence of the camera", "camera_confidence", 0.25, 0.5)
+LATENCY = _of_conditions("age of the camera's detections, keyframes", "camera_latency", 0, 1)
+FLOOR_SEED = _of_conditions("seed of the shared floor", "floor_seed", 0, 1, 2)
 RESERVE_ORDER = Ablation(
     "order of the reserve",
     "care",
@@ -100,29 +82,11 @@ RESERVE_ORDER = Ablation(
         Variant("care-sbf: so too, with forgetting", policy="care-sbf"),
     ),
 )
-GUARD = Ablation(
-    "scale k_safe of the guard, 0: unguarded",
-    "care-sbf",
-    _rules("k_safe", (0, 0.25, 0.5, 1, 1.5, 2)),
-    ("care",),
-)
-SIGMA = Ablation(
-    "localisation margin sigma_pos, m",
-    "care-sbf",
-    _rules("position_sigma_m", (0, 0.2, 0.4, 0.8)),
-    ("care",),
-)
-DECAY = Ablation(
-    "margin forgotten a keyframe, columns",
-    "care-sbf",
-    _rules("decay_per_keyframe", (0.25, 0.5, 1, 2)),
-    ("care",),
-)
-STATIC = Ablation(
-    "speed tau_static below which a track stands still, m/s",
-    "care-sbf",
-    _rules("static_mps", (0, 0.25, 0.5, 1, 2)),
-    ("care",),
+GUARD = _of_rules("scale k_safe of the guard, 0: unguarded", "k_safe", 0, 0.25, 0.5, 1, 1.5, 2)
+SIGMA = _of_rules("localisation margin sigma_pos, m", "position_sigma_m", 0, 0.2, 0.4, 0.8)
+DECAY = _of_rules("margin forgotten a keyframe, columns", "decay_per_keyframe", 0.25, 0.5, 1, 2)
+STATIC = _of_rules(
+    "speed tau_static below which a track stands still, m/s", "static_mps", 0, 0.25, 0.5, 1, 2
 )
 CELL_ORDER = Ablation(
     "order of the cells inside a set",
@@ -130,7 +94,11 @@ CELL_ORDER = Ablation(
     (
         # The order in which the paper's policies list their sets.
         Variant("rows-down"),
-        *(Variant(name, {"cell_order": name}) for name in CELL_ORDERS if name not in _USUAL_ORDERS),
+        *(
+            Variant(name, {"cell_order": name})
+            for name in CELL_ORDERS
+            if name not in (AS_DEMANDED, "rows-down")
+        ),
     ),
     _REFERENCES,
 )
@@ -153,53 +121,48 @@ IDEAS = Ablation(
         "sets row by row.",
     ),
 )
-ABLATIONS = (
-    RESERVE_FRACTION,
-    MARGINS,
-    CONFIDENCE,
-    LATENCY,
-    FLOOR_SEED,
-    RESERVE_ORDER,
-    GUARD,
-    SIGMA,
-    DECAY,
-)
+_OF_BOTH_LOOPS = (RESERVE_FRACTION, MARGINS, CONFIDENCE, LATENCY)
+_OF_POLICIES = (RESERVE_ORDER, GUARD, SIGMA, DECAY)
+ABLATIONS = (*_OF_BOTH_LOOPS, FLOOR_SEED, *_OF_POLICIES)
 """Those of the closed loop."""
-OPEN_ABLATIONS = (
-    RESERVE_FRACTION,
-    MARGINS,
-    CONFIDENCE,
-    LATENCY,
-    RESERVE_ORDER,
-    GUARD,
-    SIGMA,
-    DECAY,
-    STATIC,
-    CELL_ORDER,
-    IDEAS,
-)
+OPEN_ABLATIONS = (*_OF_BOTH_LOOPS, *_OF_POLICIES, STATIC, CELL_ORDER, IDEAS)
 """Those of the open loop, with one floor as in the paper; the last is ours."""
-_QUARTER = 4
-"""The paper's ablations take every fourth scene (Sec. 5.4)."""
 
 
 def ablation_study(seeds: Sequence[int], also: Sequence[str] = ()) -> list[EpisodeConfig]:
     """Every ablation in every place, and the full scan; `also` are further policies that feel the
     conditions.
     """
-    made = [
-        config
-        for place in ABLATION_PLACES
-        for config in USUAL_VARIANT.configurations(place, ["full"], seeds)
-    ]
-    # The policy itself at every level; the others under the conditions of the level, whose
-    # parameters they do not have.
-    for place, ablation in product(ABLATION_PLACES, ABLATIONS):
-        for level in ablation.levels:
-            made += level.configurations(place, [ablation.policy], seeds)
-            made += level.for_others().configurations(place, ablation.beside(also), seeds)
+    made: list[EpisodeConfig] = []
+    for place in ABLATION_PLACES:
+        made += USUAL_VARIANT.configurations(place, [FULL], seeds)
+    for place, (level, policies) in product(ABLATION_PLACES, _played(ABLATIONS, also)):
+        made += level.configurations(place, policies, seeds)
     # The usual level comes in every ablation and is played once.
     return list(dict.fromkeys(made))
+
+
+def ablation_plays(
+    source: Source, scenes: Sequence[Scene], budgets: Sequence[float], also: Sequence[str] = ()
+) -> list[PlayConfig]:
+    """Every ablation of the open loop at every budget, and the full scan; `also` are further
+    policies that feel the conditions.
+    """
+    made = USUAL_VARIANT.plays(source, scenes, budgets, [FULL])
+    for level, policies in _played(OPEN_ABLATIONS, also):
+        made += level.plays(source, scenes, budgets, policies)
+    return list(dict.fromkeys(made))
+
+
+def _played(ablations: Sequence[Ablation], also: Sequence[str]) -> list[tuple[Variant, list[str]]]:
+    """What is played of each ablation: the policy itself at every level, and the others under the
+    conditions of the level, whose parameters they do not have.
+    """
+    played: list[tuple[Variant, list[str]]] = []
+    for ablation in ablations:
+        for level in ablation.levels:
+            played += [(level, [ablation.policy]), (level.for_others(), ablation.beside(also))]
+    return played
 
 
 def quarter_of(scenes: Sequence[Scene]) -> list[Scene]:
@@ -211,17 +174,3 @@ def quarter_of(scenes: Sequence[Scene]) -> list[Scene]:
         for number, scene in enumerate(scenes)
         if number % _QUARTER == number // _QUARTER % _QUARTER
     ]
-
-
-def ablation_plays(
-    source: Source, scenes: Sequence[Scene], budgets: Sequence[float], also: Sequence[str] = ()
-) -> list[PlayConfig]:
-    """Every ablation of the open loop at every budget, and the full scan; `also` are further
-    policies that feel the conditions.
-    """
-    made = USUAL_VARIANT.plays(source, scenes, budgets, [FULL])
-    for ablation in OPEN_ABLATIONS:
-        for level in ablation.levels:
-            made += level.plays(source, scenes, budgets, [ablation.policy])
-            made += level.for_others().plays(source, scenes, budgets, ablation.beside(also))
-    return list(dict.fromkeys(made))

@@ -18,7 +18,7 @@ reserves apart.
 FAULT_POLICIES = ("history", "all-camera", "care", "full")
 _BLACKOUT_START_S = 2.0
 """Seconds. The person comes into the camera's view 2.4 to 2.9 s after the start."""
-_DEAD_ROWS = ((11,), (10, 11), (10, 11, 12), (9, 10, 11, 12))
+_DEAD: tuple[tuple[int, ...], ...] = ((), (11,), (10, 11), (10, 11, 12), (9, 10, 11, 12))
 """Grown out of the middle of the rows that meet a person at the full scan's 16 m, 1 to 6 degrees
 below the horizon.
 """
@@ -93,10 +93,7 @@ FAULTS = (
     Fault(
         "dead rows",
         "rows",
-        (
-            Variant("0"),
-            *(Variant(f"{len(rows)}", {"lidar_dead_rows": rows}) for rows in _DEAD_ROWS),
-        ),
+        tuple(Variant(f"{len(rows)}", {"lidar_dead_rows": rows} if rows else {}) for rows in _DEAD),
     ),
     Fault("noise of the car's speed", "sigma in m/s", _growing("ego_speed_sigma", 0.25, 0.5, 1.0)),
 )
@@ -119,14 +116,11 @@ def fault_study(
                 f"{name} is a fault that grows: the study takes no other start of it"
             )
     shared = {name: value for name, value in common.items() if name not in _VARIED}
-    made = [
-        config
-        for place, fault in product(FAULT_PLACES, FAULTS)
-        for level in fault.levels
-        for config in Variant(level.label, {**shared, **level.changes}).configurations(
-            place, [*FAULT_POLICIES, *also], seeds
-        )
-    ]
+    made: list[EpisodeConfig] = []
+    for place, fault in product(FAULT_PLACES, FAULTS):
+        for level in fault.levels:
+            grown = Variant(level.label, {**shared, **level.changes})
+            made += grown.configurations(place, [*FAULT_POLICIES, *also], seeds)
     return list(dict.fromkeys(made))
 
 

@@ -3,15 +3,15 @@
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple, TypeVar
 
-from care_sim.base.errors import InvalidInput
 from care_sim.core.defaults import AS_DEMANDED, CELL_ORDERS, CELLS
-from care_sim.core.firing.listing import HARDWARE, hardware_of, settled
+from care_sim.core.firing.listing import HARDWARE, settled
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.policies import is_pattern
 from care_sim.sensors.setups import DEFAULT_SETUP, sensor_setup
 from care_sim.sources.scenes import Scene, Source
 from care_sim.study.designs.defaults import FIRING_POLICIES
 from care_sim.study.designs.paper import paper_study
+from care_sim.study.designs.variants import tried_out
 from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.play_config import PlayConfig, play_grid
 from care_sim.study.rows.reading import policy_of
@@ -39,21 +39,15 @@ def fitting(sensor: str | SensorSetup, policies: Sequence[str] = FIRING_POLICIES
     """What of the study fits a set-up: units that divide its grid and of which the least budget
     buys one, and those of the `policies` that have no weights of another grid.
     """
-    setup = sensor_setup(sensor)
-    found = Fitting([], [], [])
-    for firing in FIRINGS:
-        try:
-            hardware_of(firing, setup.grid).budget_cells(FIRING_BUDGETS[0])
-            found.firings.append(firing)
-        except InvalidInput as error:
-            found.left_out.append(f"left out with {setup.name}: {firing} ({error})")
-    for policy in policies:
-        try:
-            grid(["dense"], [policy], FIRING_BUDGETS[-1:], [0], sensor=sensor)
-            found.policies.append(policy)
-        except InvalidInput as error:
-            found.left_out.append(f"left out with {setup.name}: {policy} ({error})")
-    return found
+
+    def tasks(policy: str, budget: float, firing: str = CELLS) -> list[EpisodeConfig]:
+        return grid(["dense"], [policy], [budget], [0], firing=firing, sensor=sensor)
+
+    where = f"with {sensor_setup(sensor).name}"
+    least, *_, most = FIRING_BUDGETS
+    firings = tried_out(FIRINGS, lambda firing: tasks("random", least, firing), where)
+    played = tried_out(policies, lambda policy: tasks(policy, most), where)
+    return Fitting(firings.sound, played.sound, [*firings.left_out, *played.left_out])
 
 
 def firing_study(

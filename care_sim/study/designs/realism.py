@@ -4,9 +4,7 @@ time and together, in either loop.
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
-from care_sim.base.errors import InvalidInput
 from care_sim.base.seeds import split_of
 from care_sim.core.conditions import YOLOX_CAMERA
 from care_sim.core.defaults import CELLS
@@ -15,10 +13,10 @@ from care_sim.scenarios.ncap.table import TESTS
 from care_sim.sources.scenes import Scene, Source
 from care_sim.study.designs.defaults import NCAP_STEP_KPH
 from care_sim.study.designs.standards import NcapCase, ncap_cases
-from care_sim.study.designs.variants import FilmPlace, Group, Place, Variant
+from care_sim.study.designs.variants import FilmPlace, Group, Place, TriedOut, Variant, tried_out
 from care_sim.study.episode_config import EpisodeConfig, of_cases
 from care_sim.study.play_config import PlayConfig
-from care_sim.study.run_config import FULL
+from care_sim.study.run_config import FULL, RunConfig
 
 IDEAL = Variant("ideal")
 """The conditions of the headline tables, with which every other one is compared."""
@@ -170,46 +168,33 @@ FILM_PAIRS: tuple[Pair, ...] = (
 """The orders of the headline table of the open loop, at each of its budgets."""
 
 
-class Fitting(NamedTuple):
-    """The conditions that can be played, and a line for each other one."""
-
-    levels: tuple[Variant, ...]
-    left_out: tuple[str, ...]
-
-
-def fitting(
-    levels: Sequence[Variant], place: Place | FilmPlace, try_out: Callable[[Variant], object]
-) -> Fitting:
-    """Those of the `levels` that `try_out` can make tasks of: a budget may buy no unit of a
-    hardware, a set-up not be divided by it, a recording not tell what returned.
-
-    Raises InvalidInput where the ideal conditions cannot be played.
-    """
-    try_out(IDEAL)
-    sound, left_out = [], []
-    for level in levels:
-        try:
-            try_out(level)
-            sound.append(level)
-        except InvalidInput as error:
-            left_out.append(f"left out in {place}: {level.label} ({error})")
-    return Fitting(tuple(sound), tuple(left_out))
-
-
-def headline_conditions(headline: Headline) -> Fitting:
+def headline_conditions(headline: Headline) -> TriedOut[Variant]:
     """The conditions that a headline table can be played under."""
     place = headline.places[0]
-    return fitting(CONDITIONS, place, lambda level: level.configurations(place, ["history"], [0]))
+    return _fitting(CONDITIONS, place, lambda level: level.configurations(place, ["history"], [0]))
 
 
-def film_conditions(source: Source, scenes: Sequence[Scene], budget: float) -> Fitting:
+def film_conditions(source: Source, scenes: Sequence[Scene], budget: float) -> TriedOut[Variant]:
     """The conditions that a source can be played under at a budget."""
     place = FilmPlace(source.kind, budget)
-    return fitting(
+    return _fitting(
         FILM_CONDITIONS,
         place,
         lambda level: level.plays(source, scenes[:1], [budget], ["history"]),
     )
+
+
+def _fitting(
+    levels: Sequence[Variant],
+    place: Place | FilmPlace,
+    tasks: Callable[[Variant], Sequence[RunConfig]],
+) -> TriedOut[Variant]:
+    """Those of the `levels` whose `tasks` can begin. Raises InvalidInput where the ideal conditions
+    cannot be played.
+    """
+    for config in tasks(IDEAL):
+        config.try_out()
+    return tried_out(levels, tasks, f"in {place}", lambda level: level.label)
 
 
 def realism_study(
@@ -223,7 +208,7 @@ def realism_study(
     for headline, worlds in [(each, each.seeds(seeds)) for each in headlines]:
         policies = dict.fromkeys([*headline.policies, *also])
         place = headline.places[0]._replace(parameters=())
-        for level in headline_conditions(headline).levels:
+        for level in headline_conditions(headline).sound:
             # One world of a scenario checks the configurations for all.
             configs = level.configurations(place, policies, worlds)
             made += of_cases(configs, [each.parameters for each in headline.places])
@@ -241,7 +226,7 @@ def realism_plays(
     made = [
         config
         for budget in budgets
-        for level in film_conditions(source, scenes, budget).levels
+        for level in film_conditions(source, scenes, budget).sound
         for config in level.plays(source, scenes, [budget], policies, floor_seeds)
     ]
     return [*dict.fromkeys(made)]

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from care_sim.core.conditions import FIXED
-from care_sim.scenarios.ncap.table import TESTS, Across, NcapTest
+from care_sim.scenarios.ncap.table import TESTS, Across
 from care_sim.scenarios.r157 import CutInCase, kinds_in_turn, preventable
 from care_sim.study.designs.defaults import (
     NCAP_BUDGETS,
@@ -17,12 +17,16 @@ from care_sim.study.designs.defaults import (
     R157_POLICIES,
 )
 from care_sim.study.episode_config import EpisodeConfig, grid, of_cases
-from care_sim.study.run_config import Parameters, Row
+from care_sim.study.rows.parameters import Parameters
+from care_sim.study.run_config import Row
 
 TEST_COLUMN = "scenario.test"
 SPEED_COLUMN = "scenario.speed_kph"
 TARGET_COLUMN = "scenario.target_kph"
 REPORTED_COLUMN = "scenario.occluder_reported"
+_CROSSED_BY_CARS = {
+    name for name, test in TESTS.items() if isinstance(test.way, Across) and not test.way.run_up_m
+}
 
 
 @dataclass(frozen=True)
@@ -58,13 +62,9 @@ def ncap_cases(tests: Sequence[str], step_kph: float) -> list[NcapCase]:
         for name in dict.fromkeys(tests)
         for each in TESTS[name].variations
         if each.ego_kph % step_kph == 0
-        and (not _car_crosses(TESTS[name]) or each.target_kph == each.ego_kph)
+        and (name not in _CROSSED_BY_CARS or each.target_kph == each.ego_kph)
         for reported in ((True, False) if TESTS[name].obstruction else (None,))
     ]
-
-
-def _car_crosses(test: NcapTest) -> bool:
-    return isinstance(test.way, Across) and not test.way.run_up_m
 
 
 def ncap_study(
@@ -97,17 +97,13 @@ def r157_study(
     """The preventable cases of the grid, the kinds and sides in turn, or one of `every` of them,
     under every policy and budget. `driver` is that of all.
     """
-    # The cases are the grid's own, which need no check: policies and budgets are checked once.
-    cases = [tuple(asdict(case).items()) for case in _some(preventable(kinds_in_turn()), every)]
-    return of_cases(grid(["r157"], policies, budgets, seeds, driver=driver), cases)
-
-
-def _some(cases: Sequence[CutInCase], every: int) -> list[CutInCase]:
-    """One case of `every`, in their order."""
+    cases = preventable(kinds_in_turn())
     # By lot, the same at every call: kinds and sides come in turn, and every fifth case would be
     # of nearly one kind.
     lot = np.random.default_rng(0).permutation(len(cases))
-    return [cases[number] for number in sorted(lot[::every].tolist())]
+    some = [tuple(asdict(cases[number]).items()) for number in sorted(lot[::every].tolist())]
+    # The cases are the grid's own, which need no check: policies and budgets are checked once.
+    return of_cases(grid(["r157"], policies, budgets, seeds, driver=driver), some)
 
 
 def case_of(row: Row) -> CutInCase:

@@ -15,7 +15,8 @@ from care_sim.base.seeds import (
 )
 from care_sim.policies import controls
 from care_sim.study.episode_config import EpisodeConfig, grid
-from care_sim.study.run_config import FULL, Parameters, Row
+from care_sim.study.rows.parameters import Parameters
+from care_sim.study.run_config import FULL, Row
 
 CAMERA_POLICIES = ("all-camera", "care", "care-sightlines", "care-sector")
 """The causal policies with a camera; the best of them has to beat the best control."""

@@ -1,16 +1,19 @@
-"""What a study varies, one thing at a time: places, levels, and the keys of their rows."""
+"""What a study varies: places, levels, and the keys of their rows. A design is a table of them."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, Generic, NamedTuple, TypeVar
 
-from care_sim.base.errors import percent
+from care_sim.base.errors import InvalidInput, percent
 from care_sim.perception.detectors import PROXY
 from care_sim.sources.scenes import Scene, Source
 from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.play_config import PlayConfig, play_grid
+from care_sim.study.rows.parameters import Parameters
 from care_sim.study.rows.reading import Key, key_of
-from care_sim.study.run_config import Parameters, Row, flat
+from care_sim.study.run_config import FULL, Row, RunConfig, flat
+
+_Thing = TypeVar("_Thing")
 
 
 class Place(NamedTuple):
@@ -48,11 +51,8 @@ class FilmPlace(NamedTuple):
 
     def row(self) -> Row:
         """As columns of a play."""
-        return dict(self.shared) | {
-            "source": self.source,
-            "detector": PROXY,
-            "budget": self.budget,
-        }
+        own = {"source": self.source, "detector": PROXY, "budget": self.budget}
+        return dict(self.shared) | own
 
     def __str__(self) -> str:
         return f"{self.source}, {percent(self.budget)}"
@@ -60,10 +60,8 @@ class FilmPlace(NamedTuple):
 
 @dataclass(frozen=True)
 class Variant:
-    """One value of what is varied: conditions that depart from the usual ones, or parameters of the
-    policy.
-
-    Where the level is another policy, `policy` plays instead of the study's own.
+    """One level of what is varied: conditions that depart from the usual ones, or parameters of the
+    policy. Where the level is another policy, `policy` plays instead of the study's own.
     """
 
     label: str
@@ -76,14 +74,8 @@ class Variant:
     ) -> list[EpisodeConfig]:
         """The episodes of this level; `full` runs once for all that it does not feel."""
         played = [self.policy or policy for policy in policies]
-        return grid(
-            [place.scenario],
-            played,
-            [place.budget],
-            seeds,
-            scenario_parameters=place.parameters,
-            **self._given(),
-        )
+        given = self._given() | {"scenario_parameters": place.parameters}
+        return grid([place.scenario], played, [place.budget], seeds, **given)
 
     def plays(
         self,
@@ -103,18 +95,41 @@ class Variant:
 
     def key(self, place: Place | FilmPlace, policy: str) -> Key:
         """The cell of the rows of a policy at this level."""
-        row = place.row() | {"policy": self.policy or policy}
+        row = place.row() | {"policy": self.policy or policy} | dict(self.changes)
         # The key of a row that has just these values: the same way in which rows get theirs.
-        key = key_of(
-            row
-            | dict(self.changes)
-            | {f"policy.{name}": value for name, value in self.parameters.items()}
-        )
+        setting, played, budget = key_of(row | flat("policy", tuple(self.parameters.items())))
         # The full scan was run once for all levels that it does not feel.
-        return (key[0].for_full(), "full", 1.0) if policy == "full" else key
+        return (setting.for_full(), FULL, 1.0) if policy == FULL else (setting, played, budget)
 
     def _given(self) -> dict[str, Any]:
         return {**self.changes, "policy_parameters": tuple(self.parameters.items())}
 
 
 USUAL_VARIANT = Variant("usual")
+
+
+class TriedOut(NamedTuple, Generic[_Thing]):
+    """What can be played, and a line for each other thing."""
+
+    sound: list[_Thing]
+    left_out: list[str]
+
+
+def tried_out(
+    things: Iterable[_Thing],
+    tasks: Callable[[_Thing], Iterable[RunConfig]],
+    where: str,
+    label: Callable[[_Thing], str] = str,
+) -> TriedOut[_Thing]:
+    """Those of the `things` whose `tasks` can begin: a budget may buy no unit of a hardware, a
+    set-up not be divided by it, a recording not tell what returned.
+    """
+    found = TriedOut[_Thing]([], [])
+    for thing in things:
+        try:
+            for config in tasks(thing):
+                config.try_out()
+            found.sound.append(thing)
+        except InvalidInput as error:
+            found.left_out.append(f"left out {where}: {label(thing)} ({error})")
+    return found

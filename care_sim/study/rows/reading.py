@@ -17,7 +17,7 @@ from care_sim.evaluation.sightings import ANNOTATED
 from care_sim.perception.detectors import CLUSTER, PROXY
 from care_sim.policies import tags_of
 from care_sim.study.episode_config import EpisodeConfig
-from care_sim.study.run_config import CONDITION_NAMES, Row
+from care_sim.study.run_config import Row
 
 ChangedConditions = tuple[tuple[str, Any], ...]
 """Names and values of the conditions that are not the default."""
@@ -99,7 +99,7 @@ class Setting:
         return replace(self, conditions=tuple(felt))
 
 
-_OF_A_SETTING = {*CONDITION_NAMES, "scenario", "sensor", "sensor_hash", "detector", "keyframe_s"}
+_OF_A_SETTING = {*DEFAULTS, "scenario", "sensor", "sensor_hash", "detector", "keyframe_s"}
 _USUAL_EPISODE = {field.name: field.default for field in fields(EpisodeConfig)}
 READ_WITH = {
     "camera_detections": None,
@@ -124,11 +124,9 @@ Key = tuple[Setting, str, float]
 
 def setting_of(row: Row) -> Setting:
     """The setting of a row, of an episode or of a play in the open loop."""
-    return _setting_of_play(row) if "source" in row else _setting_of_episode(row)
-
-
-# Thousands of rows share their columns, and their setting.
-def _setting_of_episode(row: Row) -> Setting:
+    if "source" in row:
+        return _setting_of_play(row)
+    # Thousands of rows share their columns, and their setting.
     names = _setting_columns(tuple(row))
     return _setting_with(names, *[row[name] for name in names])
 
@@ -149,7 +147,7 @@ def _setting_with(names: tuple[str, ...], *values: Any) -> Setting:
     changed = [
         (n, value)
         for n, value in row.items()
-        if (n in CONDITION_NAMES or n.startswith("scenario."))
+        if (n in DEFAULTS or n.startswith("scenario."))
         and value is not None
         and value != _USUAL_EPISODE.get(n)
     ]

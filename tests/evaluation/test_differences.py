@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.evaluation.differences import AllocationDifference, allocation_difference
+from care_sim.evaluation.differences import (
+    AllocationDifference,
+    DetectionOrder,
+    allocation_difference,
+    detection_order,
+)
 
 
 def cells(*numbers):
@@ -33,12 +38,18 @@ def test_equal_allocations_and_none():
     assert allocation_difference([cells()], [cells()]) == AllocationDifference(1, 0, 0)
 
 
-def test_scenes_add():
-    assert AllocationDifference(40, 7, 100) + AllocationDifference(
-        39, 0, 0
-    ) == AllocationDifference(79, 7, 100)
-
-
 def test_other_keyframes_are_refused():
     with pytest.raises(InvalidInput, match="must be of the same keyframes, got 1 and 0"):
         allocation_difference([cells(1)], [])
+
+
+def test_five_events_by_hand():
+    """Two that neither finds are tied."""
+    order = detection_order([0, 2, 6, 3, 6], [1, 1, 6, 3, 0])
+    assert order == DetectionOrder(earlier=1, later=2, tied=2)
+    assert order + DetectionOrder(1, 1, 1) == DetectionOrder(2, 3, 3)
+
+
+def test_events_of_another_scene_are_refused():
+    with pytest.raises(InvalidInput, match="must be of the same events, got 1 and 2"):
+        detection_order([0], [0, 1])

@@ -1,10 +1,26 @@
 """Episodes that are played together leave the rows that each leaves alone. Real episodes."""
 
+import hashlib
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+
+import gymnasium
+import numpy as np
 import pytest
 
+import care_sim  # noqa: F401 (registers the environments)
+from care_sim.base.digests import portable_bytes
 from care_sim.base.errors import InvalidInput
+from care_sim.scenarios.ncap.table import TESTS
 from care_sim.study.episode_config import EpisodeConfig, grid, of_seeds
-from care_sim.study.episode_play import play_episodes, play_together, run_episode
+from care_sim.study.episode_play import (
+    EpisodeHash,
+    peak_rss_mb,
+    play_episodes,
+    play_together,
+    run_episode,
+)
 from care_sim.study.journal import JOURNAL, Journal
 from care_sim.study.runner import run_all
 
@@ -13,20 +29,14 @@ COLLISION = {
     "scenario_parameters": (("encroachment_s", (-0.2, -0.1)), ("ego_speed_mps", (12.0, 13.0)))
 }
 CASES = {
-    "care": ("dense", "care", 0.1, {}),
-    "history": ("dartout", "history", 0.03, {}),
     "full": ("cutin", "full", 1.0, {}),
     "a lane change": ("cutin", "random", 0.05, {}),
-    "draws": ("r157", "care-spread", 0.02, {}),
     "hit": ("dartout", "history", 0.01, COLLISION),
     "its own memory": ("dense", "care-sightlines", 0.03, {}),
     "forgets": ("dense", "care-sbf", 0.1, {"false_negative_rate": 0.3, "camera_jitter": 1}),
     "learned": ("dense", "learned-scorer", 0.05, {"camera_latency": 2}),
     "told": ("dartout", "care-sector", 0.02, {"min_returns": 6, "cell_order": "core-spread"}),
-    "parameters": ("dartout", "fan", 0.02, {"blackout_start_s": 1.0, "blackout_s": 2.0}),
-    "unspent": ("dense", "all-camera", 0.3, {"floor": False}),
-    "mirrored": ("dense", "history", 0.1, {"scenario_parameters": (("mirrored", "drawn"),)}),
-    "coarse": ("dartout", "care", 0.1, {"keyframe_s": 0.2, "budget": 0.1}),
+    "unspent": ("dense", "all-camera", 0.3, {"floor": False, "keyframe_s": 0.2}),
 }
 
 
@@ -53,24 +63,22 @@ def test_episodes_that_end_at_different_keyframes():
     assert [*map(steady, together)] == [steady(run_episode(config)) for config in configs]
 
 
-def test_each_has_an_even_share_of_the_time():
-    rows = play_together(of("fan", scenario_parameters=(("duration_s", 0.3),)))
-    assert len({row["wall_s"] for row in rows}) == 1
-    assert 0 < rows[0]["wall_s"] < 60
-
-
-@pytest.mark.parametrize(
-    "alone",
-    [
-        EpisodeConfig("dartout", "history-oracle"),
-        EpisodeConfig("dartout", "care", lidar_dropout=0.1),
-        EpisodeConfig("drive", "care"),
-    ],
-)
-def test_who_asks_for_truth_and_what_no_arrays_hold_is_played_alone(alone):
-    assert alone.batch != alone.with_seed(1).batch
+def test_who_asks_for_truth_and_what_no_arrays_hold_is_played_alone():
     together = EpisodeConfig("dartout", "care")
-    assert together.batch == together.with_seed(1).batch
+    for config, reason in (
+        (EpisodeConfig("dartout", "history-oracle"), "asks its own world for the truth"),
+        (EpisodeConfig("dartout", "care", lidar_dropout=0.1), "faults of the LiDAR"),
+        (EpisodeConfig("dartout", "care", engine="bullet"), "the engine"),
+    ):
+        with pytest.raises(InvalidInput, match=reason):
+            play_together([config, config.changed(seed=1)])
+    # What is surely alone does not wait for others in a batch.
+    for config in (
+        EpisodeConfig("drive", "care"),
+        EpisodeConfig("dartout", "care", engine="bullet"),
+    ):
+        assert config.batch != config.changed(seed=1).batch
+    assert together.batch == together.changed(seed=1).batch
 
 
 def test_one_that_fails_costs_only_itself(third_party):
@@ -108,10 +116,45 @@ def test_draws_that_a_process_shares_are_those_of_episodes_alone(third_party):
     assert [*map(steady, rows)] == [steady(run_episode(config)) for config in configs]
 
 
-def test_what_was_changed_later_is_not_taken_for_arrays():
-    configs = [config.changed(engine="bullet") for config in of("history", 2)]
-    with pytest.raises(InvalidInput, match="the engine is not played as arrays"):
-        play_together(configs)
+def test_the_hash_holds_cells_ranges_and_the_pose_of_everybody_at_every_keyframe():
+    env = gymnasium.make("CARE-Drive-v0", budget=0.01)
+    env.reset(seed=2)
+    found, content = EpisodeHash(), hashlib.sha256()
+    for _ in range(3):
+        observation, *_, info = env.step(np.zeros((32, 512), np.float32))
+        world = env.unwrapped.loop.world
+        bodies = [world.ego_body, *(actor.body for actor in world.actors)]
+        found.add(info["fired"], observation["ranges"], world.boxes_of(np.array(bodies)))
+        poses = [world.ego.pose, *(actor.pose_at(world.time) for actor in world.actors)]
+        content.update(portable_bytes(info["fired"], observation["ranges"], poses))
+    env.close()
+    assert found.hexdigest() == content.hexdigest()[:16]
+
+
+def test_a_row_tells_what_the_seed_drew_of_a_scenario():
+    short = ("duration_s", 0.1)
+    drawn = (("test", "drawn"), ("speed_kph", 0.0), short)
+    rows = [
+        run_episode(EpisodeConfig("ncap", "fan", 0.01, seed, scenario_parameters=drawn))
+        for seed in range(3)
+    ]
+    for row in rows:
+        pairs = {(each.ego_kph, each.target_kph) for each in TESTS[row["drawn.test"]].variations}
+        assert (row["drawn.speed_kph"], row["drawn.target_kph"]) in pairs
+        assert row["scenario.test"] == "drawn"
+    assert len({row["drawn.test"] for row in rows}) > 1
+
+
+def test_what_the_parent_holds_is_not_counted():
+    held = np.ones(60_000_000)
+    assert peak_rss_mb() > held.nbytes / 1e6
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+        assert pool.submit(peak_rss_mb).result() < peak_rss_mb() - held.nbytes / 2e6
+
+
+def test_a_system_that_does_not_tell_the_peak_is_asked_otherwise(monkeypatch):
+    monkeypatch.setattr(Path, "read_text", lambda _path: "VmRSS:\t1 kB\n")
+    assert 50 < peak_rss_mb() < 100_000
 
 
 # Every death costs the start of a worker.

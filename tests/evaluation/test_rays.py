@@ -1,4 +1,6 @@
-"""Every reason by hand: an object that returns in the cells 10 to 15, of which three are needed."""
+"""Where rays went, by hand. For reasons of misses: an object that returns in the cells 10 to 15, of
+which three are needed.
+"""
 
 import numpy as np
 import pytest
@@ -6,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.core.allocation import allocate
+from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.evaluation.rays import (
@@ -14,11 +17,16 @@ from care_sim.evaluation.rays import (
     MISS_REASONS,
     NOT_DEMANDED,
     NOT_IN_PICTURE,
+    RAY_SHARES,
     STARVED,
     TOO_FEW_RETURNS,
     Appearance,
+    ReserveUse,
     ServedDemand,
     miss_reason,
+    rays_by_share,
+    reserve_use,
+    shares_of_credit,
 )
 
 OBJECT = np.arange(10, 16)
@@ -39,7 +47,7 @@ def reason(appearance, demand, budget, floor=NOTHING):
     return miss_reason(appearance, ServedDemand.of(demand, fired, Rig(budget=budget)), 3)
 
 
-CASES = {
+REASONS = {
     "outside the pictures": (seen(), Demand([HULL]), 6, NOT_IN_PICTURE),
     "its only box is explained": (seen(True), Demand([HULL], [[BESIDE]]), 6, EXPLAINED),
     "one of two boxes is not": (seen(True, False), Demand([HULL]), 6, NOT_DEMANDED),
@@ -62,9 +70,9 @@ CASES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", REASONS)
 def test_each_reason_by_hand(case):
-    appearance, demand, budget, expected = CASES[case]
+    appearance, demand, budget, expected = REASONS[case]
     assert reason(appearance, demand, budget) == expected
 
 
@@ -85,14 +93,6 @@ def test_rays_of_the_floor_count():
     """Two cells of the wedge and one of the floor would have been enough."""
     assert reason(seen(False), Demand(), 3, floor=OBJECT) == TOO_FEW_RETURNS
     assert reason(seen(False), Demand(), 2, floor=OBJECT) == NOT_DEMANDED
-
-
-def test_falsely_explained_is_what_forecasts_of_others_alone_explain():
-    assert seen(True).falsely_explained
-    assert seen(True, True).falsely_explained
-    assert not seen(True, False).falsely_explained
-    assert not seen(True, tracked=True).falsely_explained
-    assert not seen().falsely_explained
 
 
 @st.composite
@@ -120,3 +120,85 @@ def test_a_miss_has_one_reason_and_the_budget_is_blamed_only_where_more_of_it_wo
         assert hits >= 3
     elif told != TOO_FEW_RETURNS:
         assert hits < 3
+
+
+CELLS = st.lists(st.integers(0, 29), max_size=8, unique=True).map(
+    lambda cells: np.array(cells, np.int64)
+)
+SETS = st.lists(CELLS, max_size=3)
+
+
+def cells(*numbers):
+    return np.array(numbers, np.int64)
+
+
+def served(demand, budget, rho=0.3, floor=None):
+    floor = np.arange(30) if floor is None else floor
+    rig = Rig(AngularGrid(columns=10, rows=3), budget=budget, reserve_fraction=rho)
+    return ServedDemand.of(demand, allocate(demand, budget, rho, floor), rig)
+
+
+def test_every_share_of_a_hull_a_wedge_and_a_floor_by_hand():
+    """Of ten cells exploitation may take seven, but asks for two; the wedge takes three, of which
+    the hull had one; the floor begins with the cells 20 and 21. The object returns twice in 5.
+    """
+    demand = Demand([cells(1, 2)], [[cells(2, 5, 6, 7)]])
+    got = served(demand, 7, floor=cells(20, 21, 22, *range(20)))
+    assert [took.tolist() for took in got.took] == [[1, 2], [5, 6, 7]]
+    assert rays_by_share(cells(2, 5, 5, 21, 29), got).tolist() == [1, 2, 0, 0, 1]
+
+
+def test_layers_beyond_the_second_are_one_share():
+    demand = Demand(layers=[[cells(1)], [cells(2)], [cells(3)], [cells(4)]])
+    got = served(demand, 4)
+    assert rays_by_share(cells(1, 2, 3, 4), got).tolist() == [0, 1, 1, 2, 0]
+
+
+@given(SETS, st.lists(SETS, max_size=4), st.integers(0, 30), st.sampled_from([0.0, 0.3, 1.0]))
+def test_the_shares_add_up_to_all_rays_that_hit(exploitation, layers, budget, rho):
+    got = served(Demand(exploitation, layers), budget, rho)
+    returns = np.repeat(np.arange(30), 2)
+    assert rays_by_share(returns, got).sum() == 2 * len(got.fired)
+    assert rays_by_share(returns, got).min() >= 0
+
+
+def test_every_sighting_counts_one_and_one_without_a_ray_nothing():
+    rays = np.array([[1, 3, 0, 0, 0], [0, 0, 0, 0, 0], [0, 0, 0, 0, 9]])
+    assert shares_of_credit(rays) == pytest.approx(
+        np.array([[0.25, 0.75, 0, 0, 0], [0, 0, 0, 0, 0], [0, 0, 0, 0, 1]])
+    )
+    assert shares_of_credit(np.empty((0, len(RAY_SHARES)))).shape == (0, 5)
+
+
+def test_rays_that_fire_along_are_credited_to_the_stage_that_their_unit_fired_for():
+    """Rows of ten cells: the hull in row 0 takes it, the wedge row 2, where its second cell is."""
+    rig = Rig(AngularGrid(columns=10, rows=3), budget=20, reserve_fraction=0.5, firing="rows")
+    demand = Demand([cells(3)], [[cells(4, 25)]])
+    fired = np.concatenate([np.arange(10), np.arange(20, 30)])
+    got = ServedDemand.of(demand, fired, rig)
+    assert rays_by_share(cells(0, 3, 20, 29, 15), got).tolist() == [2, 2, 0, 0, 0]
+
+
+def test_a_reserve_that_is_filled_by_hand():
+    """Of 10 cells exploitation takes 4 of its 7. U asks for 7, one of them a hull cell, and gets
+    the 6 that are left. Of M two cells lie outside U, and one of these the hull has.
+    """
+    unexplained = [cells(3, 10, 11, 12), cells(13, 14, 15)]
+    by_memory = [cells(2, 10), cells(20, 11)]
+    use = reserve_use([np.arange(4)], unexplained, by_memory, 10, 0.3)
+    assert use == ReserveUse(1, filled=1, filled_rho=1, explained_cells=2, untaken_cells=1)
+
+
+def test_the_reserves_own_share_is_less_than_what_exploitation_leaves():
+    """Three cells are rho B, six are left."""
+    use = reserve_use([np.arange(4)], [cells(10, 11, 12)], [], 10, 0.3)
+    assert (use.filled, use.filled_rho) == (0, 1)
+    use = reserve_use([np.arange(4)], [cells(10, 11)], [], 10, 0.3)
+    assert (use.filled, use.filled_rho) == (0, 0)
+
+
+def test_a_hull_cell_that_its_cap_left_out_is_not_taken():
+    use = reserve_use([np.arange(30)], [], [cells(8, 29)], 10, 0.3)
+    assert (use.explained_cells, use.untaken_cells) == (2, 2)
+    use = reserve_use([np.arange(30)], [], [cells(6, 29)], 10, 0.3)
+    assert (use.explained_cells, use.untaken_cells) == (2, 1)
