@@ -10,7 +10,6 @@ from care_sim.core.sensor_setup import LIDAR_POSITION
 from care_sim.core.types import CLASSES
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.episode import SensorSeeds
-from care_sim.perception.tracker import MemoryRules
 from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.route import Route
@@ -108,23 +107,6 @@ def test_the_next_belief_forecasts_a_moving_body_where_the_sensor_then_is(street
     assert twice.boxes[0, :2] == pytest.approx(start + velocity * 0.2 - sensor)
 
 
-def test_a_body_that_is_not_fired_at_any_more_is_forecast_on_and_on_and_then_forgotten(street):
-    world = street()
-    world.add("car", "car", lambda time: (20.0 + 9.0 * time, 6.0, 0.0))
-    loop = loop_in(world)
-    for _ in range(2):
-        loop.keyframe(EVERYTHING)
-    for misses in range(1, 6):
-        loop.keyframe(NOTHING)
-        assert loop.belief.tracks.misses.tolist() == [misses]
-        assert loop.belief.tracks.boxes[0, 0] == pytest.approx(
-            20.0 - LIDAR_POSITION[0] - 1.0 * world.time
-        )
-    for _ in range(round(MemoryRules().coast_s / RIG.keyframe_s) - 4):
-        loop.keyframe(NOTHING)
-    assert len(loop.belief.tracks) == 0
-
-
 @pytest.mark.parametrize(("x", "in_view"), [(12.0, True), (20.0, False)])
 def test_the_first_sighting_is_in_view_before_a_hoarding_and_not_behind_it(street, x, in_view):
     world = street()
@@ -159,20 +141,6 @@ def test_only_the_first_sighting_counts_as_detected(street):
     assert [frame.detected for frame in frames] == [False, False, True]
     for frame, cells in zip(frames, fired, strict=True):
         np.testing.assert_array_equal(frame.fired, cells)
-
-
-def test_late_detections_tell_how_far_the_car_has_turned_since_their_picture(street):
-    world = street()
-    world.add("car", "car", (20.0, 0.0, 0.0))
-    loop = loop_in(world, camera_latency=1)
-    changes = [loop.belief.detections.yaw_changes.tolist()]
-    for heading in (0.1, 0.1, 0.05):
-        world.ego._vehicle.heading = -heading
-        loop.keyframe(NOTHING)
-        changes.append(loop.belief.detections.yaw_changes.tolist())
-        assert loop.belief.detections.ages.tolist() == pytest.approx([0.1])
-    assert changes[0] == []
-    assert np.ravel(changes[1:]) == pytest.approx([0.1, 0.0, -0.05])
 
 
 @pytest.mark.parametrize(("latency_s", "age_s"), [(0.05, 0.05), (0.12, 0.15), (0.3, 0.3)])

@@ -9,20 +9,15 @@ from care_sim import InvalidInput
 from care_sim.core.sensor_setup import LIDAR_POSITION
 from care_sim.perception import detectors
 from care_sim.perception.matching import MATCH_M
+from tests.helpers.episodes import played
 
 
-def play(name="CARE-Dartout-v0", seed=0, policy="full", keyframes=60, **arguments):
+def play(policy="full", keyframes=None, **arguments):
+    """The infos of an episode, and its last observation."""
     budget = 1.0 if policy == "full" else 0.1
-    with gymnasium.make(name, budget=budget, **arguments) as env:
-        chosen = care_sim.make_policy(policy, env)
-        observation, _ = env.reset(seed=seed)
-        infos = []
-        ended = False
-        while not ended and len(infos) < keyframes:
-            observation, _, terminated, truncated, info = env.step(chosen(observation))
-            infos.append(info)
-            ended = terminated or truncated
-        return infos, observation
+    with gymnasium.make("CARE-Dartout-v0", budget=budget, **arguments) as env:
+        _, *steps = played(env, policy, keyframes=keyframes)
+    return [info for *_, info in steps], steps[-1][0]
 
 
 def test_a_clustering_detector_finds_the_person_and_the_car_brakes():
