@@ -16,7 +16,7 @@ from care_sim.batch.state import BatchState, Fired, load, place_sensors, seen_by
 from care_sim.batch.tracking import Braking, Tracking
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.conditions import ClosedLoopConditions
-from care_sim.core.observation_limits import Limits
+from care_sim.core.observation.limits import Limits
 from care_sim.core.rig import Rig
 from care_sim.core.types import Ego, ImageDetections, Tracks
 from care_sim.loops.episode import Episode

@@ -1,6 +1,6 @@
 """What the actions of all worlds fire, their scans, and what the paper's proxy finds in them.
 
-Cells are chosen as `care_sim.core.firing.free_cells` does, each world with its own shared floor.
+Cells are chosen as `care_sim.core.firing.base` does, each world with its own shared floor.
 The rays are those of the engine `fast` (`care_sim.sensors.engines.ray_kernels`), and the proxy is
 that of `care_sim.perception.proxy`.
 """
@@ -13,12 +13,19 @@ from numpy.typing import NDArray
 from care_sim.base.compiled import compiled
 from care_sim.batch.state import BatchState, Bodies, Fired, Reported, Sensors, Solids
 from care_sim.core.arrays import Floats, Integers, Mask
-from care_sim.core.belief_kernels import lay_ranges
+from care_sim.core.belief import lay_ranges
 from care_sim.core.conditions import Conditions
-from care_sim.core.firing.free_cells import choose_demanded, list_chosen, top_up
-from care_sim.core.grid_kernels import GridSpacing
-from care_sim.core.pcg64 import WordStreams, seed_stream, word_streams
-from care_sim.core.random_floor import FloorCells, draw_floor, floor_cells, floor_seed
+from care_sim.core.firing.base import choose_demanded, list_chosen, top_up
+from care_sim.core.firing.floor import (
+    FloorCells,
+    WordStreams,
+    draw_floor,
+    floor_cells,
+    floor_seed,
+    seed_stream,
+    word_streams,
+)
+from care_sim.core.grid import GridSpacing
 from care_sim.core.rig import Rig
 from care_sim.perception.proxy import count_hits
 from care_sim.sensors.engines.ray_kernels import Fan, cast_into

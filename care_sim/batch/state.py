@@ -73,7 +73,7 @@ class Reported(NamedTuple):
 
 
 class TrackTables(NamedTuple):
-    """`rows` (W, T, 13) as in `care_sim.perception.track_kernels`, and the `next_ids` (W,)."""
+    """`rows` (W, T, 13) as in `care_sim.perception.tracker`, and the `next_ids` (W,)."""
 
     counts: Integers
     rows: Floats

@@ -18,18 +18,18 @@ from care_sim.batch.state import (
     seen_by,
 )
 from care_sim.core.arrays import Floats, Integers, Mask
-from care_sim.core.driver_settings import DriverSettings
+from care_sim.core.conditions import DriverSettings
 from care_sim.core.rig import Rig
 from care_sim.core.types import Tracks
-from care_sim.driving.braking import braking_rules
-from care_sim.driving.braking_kernels import BRAKE_OFF, Rules, decided
-from care_sim.perception.track_kernels import (
+from care_sim.driving.braking import BRAKE_OFF, Rules, braking_rules, decided
+from care_sim.perception.tracker import (
+    MemoryRules,
+    assigned,
     forecast_in_place,
     lived_on,
     possible_pairs,
     seen_nearest_first,
 )
-from care_sim.perception.tracker import MemoryRules, assigned
 from care_sim.world.bodies import CATALOGUE
 
 _BOX, _BOX_END = Tracks.BOX.start, Tracks.BOX.stop
@@ -161,7 +161,7 @@ _YAW = Tracks.YAW
 
 class Drivers(NamedTuple):
     """Of each world, (W,): its brake, `since_s` and `free_s`, as in
-    `care_sim.driving.braking_kernels.Brake`; the speed at which it cruises, and whether it brakes
+    `care_sim.driving.braking.Brake`; the speed at which it cruises, and whether it brakes
     for who comes towards it.
     """
 

@@ -1,17 +1,24 @@
 """`care-sim train ppo`, `sac` and `recurrent-ppo`, and `curves` of what they learned."""
 
+import shlex
 from collections.abc import Iterator
 from dataclasses import fields
 
-from care_sim.base.console import TableConsole
 from care_sim.base.errors import InvalidInput, print_lines
 from care_sim.base.files import told_if_replaced
 from care_sim.commands.options.learning import Curves, Learner
 from care_sim.commands.shared.agent_play import AgentPlay
+from care_sim.commands.shared.console import TableConsole
 from care_sim.training.agents import Agent
-from care_sim.training.closing import how_to_play
 from care_sim.training.config import AgentConfig
-from care_sim.training.folder import CHECKPOINT, CURVE, RULES, WEIGHTS, read_curve, read_rules
+from care_sim.training.folder import (
+    CHECKPOINT,
+    CURVE,
+    EPISODES,
+    WEIGHTS,
+    read_table,
+    rule_scores,
+)
 from care_sim.training.hyperparameters import read_hyperparameters
 from care_sim.training.run import train_agent
 
@@ -33,31 +40,30 @@ def end_of_training(config: AgentConfig) -> Iterator[str]:
     """The lines that end the training of a configuration, from what its folder holds."""
     out = config.out
     # The earliest of equals, whose weights are those that were kept.
-    steps, _, best, _ = max(read_curve(out / CURVE), key=lambda row: row[2])
-    returns = {name: score["mean_return"] for name, score in read_rules(out / RULES).items()}
-    beside = ", ".join(f"{name} {value:.2f}" for name, value in returns.items())
+    kept = max(read_table(out / CURVE), key=lambda row: row["return"])
+    best, rules = kept["return"], rule_scores(read_table(out / EPISODES))
+    beside = ", ".join(f"{name} {score.mean_return:.2f}" for name, score in rules.items())
     yield (
-        f"best after {steps} steps: return {best:.2f} on {config.episodes} validation episodes; "
-        f"{beside}"
+        f"best after {kept['steps']} steps: return {best:.2f} on {config.episodes} validation "
+        f"episodes; {beside}"
     )
-    if CHANCE in returns and best <= returns[CHANCE]:
+    if CHANCE in rules and best <= rules[CHANCE].mean_return:
         yield f"not better than {CHANCE}: nothing was learned yet"
     # Only the network of `ppo` has a twin outside of PyTorch.
     if not (out / WEIGHTS).exists():
         yield f"kept: the learner of the last step, {out / CHECKPOINT}; --resume goes on with it"
         return
     yield f"kept: the weights of that step, {out / WEIGHTS}"
-    yield how_to_play("run", out)
+    yield f"play it: {shlex.join(['care-sim', 'run', str(out)])}"
     yield f"beside care: {AgentPlay(Agent.of_run(config, out / WEIGHTS)).study_line()}"
 
 
 def curves(options: Curves) -> int:
     """Draw learning curves, and print their table."""
     # Imported here because training draws nothing.
-    from care_sim.reports.figures.files import check_figure, save
-    from care_sim.training.curves import grouped_runs, read_run
+    from care_sim.reports.figures.styles import check_figure, save
+    from care_sim.training.curves import curves_table, grouped_runs, read_run
     from care_sim.training.curves_figure import curves_figure
-    from care_sim.training.curves_table import curves_table
 
     if not options.folders:
         raise InvalidInput(

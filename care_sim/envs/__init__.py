@@ -7,9 +7,13 @@ import gymnasium
 from gymnasium.envs.registration import EnvSpec
 
 from care_sim.base.checks import check_known
-from care_sim.base.links import refuse_link
-from care_sim.base.plugins import is_place
-from care_sim.base.scenario_names import SCENARIO_GROUP, is_environment_id, scenario_of
+from care_sim.base.plugins import (
+    SCENARIO_GROUP,
+    is_environment_id,
+    is_place,
+    refuse_link,
+    scenario_of,
+)
 
 refuse_link(__name__)
 

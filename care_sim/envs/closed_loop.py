@@ -16,7 +16,7 @@ from care_sim.driving.drivers import check_driver
 from care_sim.envs import reward as rewards
 from care_sim.envs.conditions_page import CONDITIONS
 from care_sim.envs.sensing import Observed, SensingEnv, arguments_of, detector_of, split_conditions
-from care_sim.evaluation.metrics import outcome
+from care_sim.evaluation.outcomes import outcome
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.episode import Episode, EpisodeSeeds
 from care_sim.loops.false_box_pools import pool_of_another_drive
@@ -24,9 +24,9 @@ from care_sim.loops.records import Keyframe, Outcome, Records
 from care_sim.perception.detectors import PROXY
 from care_sim.scenarios import make_scenario, scenario_class
 from care_sim.scenarios.base import Scenario
-from care_sim.sensors.box_pool import EMPTY_POOL, BoxPool
 from care_sim.sensors.camera_profiles import invents_boxes
 from care_sim.sensors.engines import check_engine
+from care_sim.sensors.false_boxes import EMPTY_POOL, BoxPool
 from care_sim.sensors.setups import DEFAULT_SETUP, Sensor, sensor_setup
 from care_sim.world.world import WORLD_STEP_S, World, whole_steps
 
@@ -78,7 +78,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     | `misses` | keyframes since it was last detected |
     | `hits` | keyframes at which it was detected |
 
-    `care_sim.core.observation_limits` says which rows are kept if there are more, and what becomes
+    `care_sim.core.observation.limits` says which rows are kept if there are more, and what becomes
     of numbers that no sensor can tell.
 
     ### Reward
@@ -137,7 +137,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     the cameras, if it has its own.
 
     A `secret` is a text that enters everything that a seed draws
-    (`care_sim.base.random_streams`). An agent that holds this package can then not look its
+    (`care_sim.base.seeds`). An agent that holds this package can then not look its
     episodes up. Take at least 16 random bytes, since a word can be tried like a seed. False, the
     default, means none.
     """

@@ -11,13 +11,12 @@ from numpy.typing import NDArray
 
 from care_sim.base.checks import check_arguments, check_choice
 from care_sim.base.errors import InvalidInput, shown
-from care_sim.base.random_streams import streams
+from care_sim.base.seeds import streams
 from care_sim.core.arrays import Mask
-from care_sim.core.conditions import IDEAL_CAMERA
+from care_sim.core.cells.stack import Grid
+from care_sim.core.conditions import IDEAL_CAMERA, changed_settings
 from care_sim.core.grid import Place
-from care_sim.core.grid_stack import Grid
 from care_sim.core.pinhole import PinholeCamera
-from care_sim.core.return_settings import changed_settings
 from care_sim.core.types import Action
 from care_sim.envs.sensing import Observed, SensingEnv, arguments_of, detector_of, split_conditions
 from care_sim.evaluation.recall import SceneScore

@@ -3,10 +3,10 @@
 from typing import Any
 
 from care_sim.base.errors import BrokenScenario, InvalidInput
-from care_sim.base.scenario_names import is_environment_id, scenario_of
+from care_sim.base.plugins import is_environment_id, scenario_of
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.envs.sensing import arguments_of
-from care_sim.evaluation.drives import drive_outcome
+from care_sim.evaluation.outcomes import drive_outcome
 from care_sim.loops.records import DriveOutcome, Outcome
 from care_sim.scenarios import PLUGINS, scenario_class
 from care_sim.scenarios.base import Scenario

@@ -15,21 +15,21 @@ from numpy.typing import NDArray
 
 from care_sim.base.checks import as_array, check_flag, check_seed
 from care_sim.base.errors import InvalidInput, shown
-from care_sim.base.random_streams import check_secret
+from care_sim.base.seeds import check_secret
 from care_sim.core.arrays import Floats
 from care_sim.core.belief import MAX_DETECTIONS, MAX_TRACKS, OBSERVED
+from care_sim.core.cells.stack import Grid
 from care_sim.core.conditions import MIN_RETURNS, Conditions
+from care_sim.core.firing.floor import RandomFloor
 from care_sim.core.firing.listing import hardware_of
 from care_sim.core.grid import Cells, Place
-from care_sim.core.grid_stack import Grid
-from care_sim.core.observation_limits import Limits
+from care_sim.core.observation.limits import Limits
 from care_sim.core.pinhole import PinholeCamera
-from care_sim.core.random_floor import RandomFloor
 from care_sim.core.rig import Rig
 from care_sim.core.types import Action
 from care_sim.loops.truth import Loop, Truth
-from care_sim.perception.base import Detector
 from care_sim.perception.detectors import CLUSTER, PROXY, check_detector, make_detector
+from care_sim.perception.points_only import Detector
 from care_sim.sensors.lidar_faults import check_dead_rows
 
 
@@ -37,7 +37,7 @@ def observation_space(rig: Rig) -> spaces.Space[Any]:
     """The bounded observation space of a rig.
 
     Keys and columns are as in `care_sim.core.types`, bounds as in
-    `care_sim.core.observation_limits`.
+    `care_sim.core.observation.limits`.
     """
     grid = rig.grid
     limits = Limits(rig)

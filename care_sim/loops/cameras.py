@@ -8,15 +8,10 @@ from care_sim.core.frames import Frame
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.rig import Rig
 from care_sim.sensors.annotated import IdentifiedDetections
-from care_sim.sensors.box_pool import BoxPool
-from care_sim.sensors.camera import (
-    CameraDetector,
-    Picture,
-    class_table,
-    faultless_detections,
-    window_on,
-)
+from care_sim.sensors.camera import CameraDetector
 from care_sim.sensors.engines import Engine
+from care_sim.sensors.false_boxes import BoxPool
+from care_sim.sensors.pictures import Picture, class_table, faultless_detections, window_on
 from care_sim.world.world import WORLD_STEP_S, World
 
 

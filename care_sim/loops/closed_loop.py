@@ -6,33 +6,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.core.arrays import Floats, Integers
-from care_sim.core.belief import Belief
-from care_sim.core.belief_kernels import range_image
-from care_sim.core.boxes import planar_ranges
+from care_sim.core.belief import Belief, range_image
+from care_sim.core.cells.boxes import planar_ranges
 from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.frames import Frame
 from care_sim.core.grid import Cells
-from care_sim.core.observation_limits import Limits
+from care_sim.core.observation.limits import Limits
 from care_sim.core.rig import Rig
 from care_sim.core.types import Detections, Scan, Tracks
 from care_sim.driving.corridor import along_route
-from care_sim.driving.cruising import Cruising, CruisingRules
-from care_sim.driving.drivers import make_driver
-from care_sim.driving.localisation import Localisation
-from care_sim.driving.odometry import Odometry
+from care_sim.driving.drivers import Cruising, CruisingRules, make_driver
+from care_sim.driving.localisation import Localisation, Odometry
 from care_sim.loops.cameras import Cameras
 from care_sim.loops.episode import SensorSeeds
 from care_sim.loops.needless import NeedlessBraking, UnfoundedBraking
 from care_sim.loops.records import Keyframe, Sight
 from care_sim.loops.truth import Told, TrackObjects, told_by
-from care_sim.perception.base import Detector
 from care_sim.perception.matching import found_objects
+from care_sim.perception.points_only import Detector
 from care_sim.perception.proxy import ReturnsRule
 from care_sim.perception.tracker import TrackMemory
 from care_sim.sensors.annotated import NO_OBJECT, Annotations, cloud_of
 from care_sim.sensors.beams import Beams
-from care_sim.sensors.box_pool import EMPTY_POOL, BoxPool
 from care_sim.sensors.engines import make_engine
+from care_sim.sensors.false_boxes import EMPTY_POOL, BoxPool
 from care_sim.sensors.lidar import Lidar
 from care_sim.world.approach import ClosestApproach
 from care_sim.world.world import World

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from numpy.random import SeedSequence
 
-from care_sim.base.random_streams import streams
+from care_sim.base.seeds import streams
 from care_sim.base.times import LAST_BITS_S
 from care_sim.world.world import World
 
@@ -31,7 +31,7 @@ class EpisodeSeeds(NamedTuple):
 
     @classmethod
     def of(cls, entropy: int, secret: str = "") -> "EpisodeSeeds":
-        """Those of a seed; see `care_sim.base.random_streams`."""
+        """Those of a seed; see `care_sim.base.seeds`."""
         # Their order is a part of what a seed means.
         scenario, camera, lidar, floor, odometry, another = streams((entropy,), 6, secret)
         return cls(scenario, SensorSeeds(camera, lidar, odometry), floor, another)

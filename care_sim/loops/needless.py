@@ -14,11 +14,11 @@ import numpy as np
 
 from care_sim.base.times import LAST_BITS_S
 from care_sim.core.arrays import Floats, Integers, Mask
-from care_sim.core.driver_settings import DriverSettings
+from care_sim.core.conditions import DriverSettings
 from care_sim.core.frames import Frame
 from care_sim.core.types import Tracks
 from care_sim.driving.corridor import along_route, enters_strip
-from care_sim.world.gaps import least_gap
+from care_sim.world.contact import least_gap
 from care_sim.world.world import World
 
 

@@ -11,22 +11,21 @@ from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.belief import Belief
 from care_sim.core.conditions import Sensing
 from care_sim.core.grid import Cells
-from care_sim.core.observation_limits import Limits
+from care_sim.core.observation.limits import Limits
 from care_sim.core.rig import Rig
 from care_sim.core.types import Detections, Scan, Tracks
-from care_sim.driving.localisation import Localisation
-from care_sim.driving.odometry import Odometry
+from care_sim.driving.localisation import Localisation, Odometry
 from care_sim.loops.episode import SensorSeeds
 from care_sim.loops.false_box_pools import pool_of_film
 from care_sim.loops.film import Film, Shot
 from care_sim.loops.truth import Told, TrackObjects, told_by
-from care_sim.perception.base import Detector
+from care_sim.perception.points_only import Detector
 from care_sim.perception.tracker import TrackMemory
 from care_sim.sensors.annotated import Cloud, joined
-from care_sim.sensors.box_pool import EMPTY_POOL
 from care_sim.sensors.camera import CameraDetector
 from care_sim.sensors.camera_profiles import invents_boxes
-from care_sim.sensors.recorded_lidar import RecordedLidar
+from care_sim.sensors.false_boxes import EMPTY_POOL
+from care_sim.sensors.lidar import RecordedLidar
 
 
 def with_sweeps(returned: Cloud, lidar: RecordedLidar, held: Cells, shot: Shot) -> Cloud:

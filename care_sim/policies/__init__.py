@@ -11,8 +11,7 @@ import gymnasium
 import gymnasium.vector
 
 from care_sim.base.errors import BrokenPolicy, InvalidInput, shown
-from care_sim.base.links import refuse_link
-from care_sim.base.plugins import Plugins
+from care_sim.base.plugins import Plugins, refuse_link
 from care_sim.base.vectors import attribute_of_each, shared_attribute
 from care_sim.policies.base import Policy
 from care_sim.policies.controls.patterns import Fan, Place, Rows, Stride, Sweep
@@ -29,15 +28,12 @@ from care_sim.policies.makers import (
     policy_faults,
     tags_of_maker,
 )
-from care_sim.policies.own.care_sector import CareSector
-from care_sim.policies.own.care_sightlines import CareSightlines
-from care_sim.policies.own.care_spread import CareSpread
+from care_sim.policies.own.care import CareSector, CareSightlines, CareSpread
 from care_sim.policies.own.care_units import CareUnits
 from care_sim.policies.paper.blind import BeamReduce, FarthestPoints, Full, Random, RandomPoints
 from care_sim.policies.paper.reserves import AllCamera, Care, CarePriority, CareSbf
 from care_sim.policies.paper.tracks import History, HistoryOracle, HistoryUniform, Uncertainty
-from care_sim.policies.vector import VectorPolicy
-from care_sim.policies.vector_rigs import policy_of_rigs
+from care_sim.policies.vector import VectorPolicy, policy_of_rigs
 
 refuse_link(__name__)
 
@@ -93,11 +89,11 @@ BUILT_IN: dict[str, PolicyMaker | EntryPoint] = {
 # themselves, and their traffic (highway-env, which brings pandas and Matplotlib) doubles the time
 # of every import.
 BUILT_IN |= {
-    name: EntryPoint(name, f"care_sim.policies.controls.{place}", "care_sim.policies")
-    for name, place in {
-        "seed-finder": "seed_finder:SeedFinder",
-        "learned-place": "learned_place:LearnedPlace",
-        "history-learned-place": "learned_place:HistoryLearnedPlace",
+    name: EntryPoint(name, f"care_sim.policies.controls.rehearsed:{made}", "care_sim.policies")
+    for name, made in {
+        "seed-finder": "SeedFinder",
+        "learned-place": "LearnedPlace",
+        "history-learned-place": "HistoryLearnedPlace",
     }.items()
 }
 

@@ -47,11 +47,11 @@ def _paragraph(name: str) -> str:
 
 
 def _summary(name: str, make: PolicyMaker) -> str:
-    """For a built-in policy the paragraph that its module begins with. For another one the first
-    line of its own docstring, and its package.
+    """For a built-in policy the paragraph that its docstring begins with. For another one the first
+    line of it, and its package.
     """
     if name in BUILT_IN:
-        return (inspect.getdoc(inspect.getmodule(make)) or "").partition("\n\n")[0]
+        return (inspect.getdoc(make) or "").partition("\n\n")[0]
     said = (make.__doc__ or "").strip().partition("\n")[0]
     return f"{said} [{package_of(POLICIES.entry(name))}]".strip()
 

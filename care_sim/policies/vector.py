@@ -1,7 +1,8 @@
 """One policy for all worlds of a vector environment: what each would ask for alone, in one call.
 
 An idea that goes by rows is asked once for the rows of all worlds, and one that never changes once
-for all keyframes. Of any other there is a policy for every world.
+for all keyframes. Of any other there is a policy for every world. Worlds whose rigs
+differ, as in their budgets, are asked together with those of equal rigs.
 """
 
 from abc import ABC, abstractmethod
@@ -12,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.errors import InvalidInput, shown
-from care_sim.core.allocator import Allocator
-from care_sim.core.arrays import Mask
+from care_sim.core.arrays import Integers, Mask
 from care_sim.core.belief import Observation
-from care_sim.core.beliefs import Beliefs, check_observed
+from care_sim.core.cells.sets import WorldSets
+from care_sim.core.firing.actions import Allocator
+from care_sim.core.observation.beliefs import Beliefs, check_observed
 from care_sim.core.rig import Rig
 from care_sim.core.types import Action
-from care_sim.core.world_sets import WorldSets
 from care_sim.policies.base import FixedPolicy, Policy, RowPolicy
 
 Actions = NDArray[np.float32]
@@ -173,3 +174,38 @@ class _OneEach(VectorPolicy):
 def _world(observation: Observation, world: int) -> Observation:
     """The observation of one world."""
     return {name: tables[world] for name, tables in observation.items()}
+
+
+def policy_of_rigs(makers: Sequence[Callable[[], Policy]], rigs: Sequence[Rig]) -> VectorPolicy:
+    """What plays W worlds, each as the policy that its one of the `makers` (W,) makes for its one
+    of the `rigs` (W,) would play it alone.
+    """
+    groups: list[list[int]] = []
+    for world, rig in enumerate(rigs):
+        group = next((group for group in groups if rigs[group[0]] == rig), None)
+        if group is None:
+            groups.append([world])
+        else:
+            group.append(world)
+    made = [vector_policy(makers[group[0]], len(group)) for group in groups]
+    return made[0] if len(made) == 1 else _ByRig(made, list(map(np.array, groups)))
+
+
+class _ByRig(VectorPolicy):
+    """Of the worlds at each of the `places` one of the `policies`; `rig` is that of the first."""
+
+    def __init__(self, policies: Sequence[VectorPolicy], places: Sequence[Integers]):
+        super().__init__(policies[0].rig, sum(map(len, places)))
+        self._groups = list(zip(policies, places, strict=True))
+        self._table = np.zeros((self.worlds, *self.rig.grid.shape), np.float32)
+
+    def _actions(self, observation: Observation, live: Mask) -> Actions:
+        for policy, places in self._groups:
+            if live[places].any():
+                rows = {name: np.asarray(table)[places] for name, table in observation.items()}
+                self._table[places] = policy(rows, live[places])
+        return self._table.view()
+
+    def _forget(self, mask: Mask) -> None:
+        for policy, places in self._groups:
+            policy.reset(mask[places])

@@ -8,13 +8,18 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from care_sim.base.bounds import bounded, check_fields, one_of
-from care_sim.base.errors import BrokenScenario, InvalidInput, error_line
-from care_sim.base.foreign_code import foreign_place, is_raised_by_foreign
+from care_sim.base.checks import bounded, check_fields, one_of
+from care_sim.base.errors import (
+    BrokenScenario,
+    InvalidInput,
+    error_line,
+    foreign_place,
+    is_raised_by_foreign,
+)
 from care_sim.base.plugins import dataclass_faults
 from care_sim.core.frames import Pose
 from care_sim.core.pinhole import PinholeCamera
-from care_sim.sensors.camera import FRONT_CAMERA
+from care_sim.sensors.pictures import FRONT_CAMERA
 from care_sim.streets.layouts import LANE_WIDTH_M, PARKING_WIDTH_M, SPEED_LIMIT_MPS
 from care_sim.world.bodies import CATALOGUE, BodyKind
 from care_sim.world.traffic import RoadVehicle, Traffic

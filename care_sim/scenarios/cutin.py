@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from care_sim.base.bounds import bounded
+from care_sim.base.checks import bounded
 from care_sim.scenarios.base import (
     EGO_SPEED_BOUNDS_MPS,
     USUAL_EGO_SPEED_MPS,

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from care_sim.base.bounds import bounded, one_of
+from care_sim.base.checks import bounded, one_of
 from care_sim.base.errors import InvalidInput
 from care_sim.scenarios.base import (
     EGO_SPEED_BOUNDS_MPS,
@@ -24,8 +24,8 @@ from care_sim.streets.layouts import (
     draw,
 )
 from care_sim.world.bodies import CATALOGUE
+from care_sim.world.motions import Walk
 from care_sim.world.traffic import Traffic
-from care_sim.world.walker import Walk
 from care_sim.world.world import World
 
 SHADE_M = 0.4

@@ -11,8 +11,7 @@ from typing import Self
 
 import numpy as np
 
-from care_sim.base.bounds import bounded, one_of
-from care_sim.base.checks import check_flag
+from care_sim.base.checks import bounded, check_flag, one_of
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats
 from care_sim.core.frames import Pose
@@ -24,12 +23,10 @@ from care_sim.streets.drivers import DrivenLane
 from care_sim.streets.encounters import AT_KERB, COMERS, Course, Wanted
 from care_sim.streets.layouts import LANE_WIDTH_M, SPEED_LIMIT_MPS
 from care_sim.world.bodies import CATALOGUE
-from care_sim.world.crosser import Crosser, Meeting
-from care_sim.world.lane_flow import LaneFlow
-from care_sim.world.speed_plan import SpeedPlan
-from care_sim.world.street_traffic import FlowingLane, StreetTraffic
+from care_sim.world.lane_flow import FlowingLane, LaneFlow, StreetTraffic
+from care_sim.world.motions import Crosser, Meeting, Walk
+from care_sim.world.route import SpeedPlan
 from care_sim.world.traffic import Traffic
-from care_sim.world.walker import Walk
 from care_sim.world.world import WORLD_STEP_S, Motion, World
 
 CLEAR_M = 0.5

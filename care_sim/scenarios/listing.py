@@ -4,10 +4,9 @@ from collections.abc import Iterator
 from dataclasses import Field, fields
 from typing import Any
 
-from care_sim.base.bounds import allowed, option_text
+from care_sim.base.checks import allowed, option_text
 from care_sim.base.errors import InvalidInput
-from care_sim.base.plugins import package_of
-from care_sim.base.scenario_names import is_environment_id
+from care_sim.base.plugins import is_environment_id, package_of
 from care_sim.scenarios import PLUGINS, SCENARIOS, scenario_class, scenario_names
 from care_sim.scenarios.base import Scenario
 

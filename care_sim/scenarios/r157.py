@@ -6,7 +6,7 @@ regulation (github.com/asam-oss/OSC-ALKS-scenarios). Gaps have half their step, 
 leave out 0.
 
 Preventable cases: both vehicles are boxes along the road. The other moves at even speed, along and
-across; the ego keeps its speed until its driver brakes, as `care_sim.driving.human_model` says, and
+across; the ego keeps its speed until its driver brakes, as `care_sim.driving.drivers` says, and
 then slows down to the other's speed. So the distance between them follows in closed form, and no
 step of time enters.
 """
@@ -17,13 +17,13 @@ from itertools import cycle, product
 
 import numpy as np
 
-from care_sim.base.bounds import bounded, one_of
+from care_sim.base.checks import bounded, one_of
 from care_sim.base.errors import InvalidInput
-from care_sim.driving.human_model import HUMAN_MODEL
+from care_sim.driving.drivers import HUMAN_MODEL
 from care_sim.scenarios.base import LONGEST_EPISODE_S, Scenario
 from care_sim.streets.layouts import Range, draw
 from care_sim.world.bodies import CATALOGUE
-from care_sim.world.lane_change import LaneChange
+from care_sim.world.motions import LaneChange
 from care_sim.world.traffic import Traffic
 from care_sim.world.world import World
 

@@ -35,8 +35,7 @@ from care_sim.streets.layouts import (
 from care_sim.streets.people import populate
 from care_sim.streets.sight import Approach
 from care_sim.world.bodies import CATALOGUE
-from care_sim.world.route import Route, through
-from care_sim.world.speed_plan import SpeedPlan
+from care_sim.world.route import Route, SpeedPlan, through
 
 BESIDE_M = 0.3
 """Kept free on either side of who comes."""

@@ -31,7 +31,7 @@ from care_sim.streets.sight import (
     sight_of,
 )
 from care_sim.world.bodies import CATALOGUE
-from care_sim.world.walker import Walk
+from care_sim.world.motions import Walk
 
 GAP_M: Range = (0.4, 0.8)
 """Between the occluder's end and who passes it: about half a step, as in the dart-out."""

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from care_sim.core.arrays import Floats, Mask
-from care_sim.core.driver_settings import DriverSettings
+from care_sim.core.conditions import DriverSettings
 from care_sim.core.frames import Pose, turned
 from care_sim.core.sensor_setup import LIDAR_POSITION
 from care_sim.perception.tracker import MemoryRules
 from care_sim.world.bodies import CATALOGUE
-from care_sim.world.speed_plan import SpeedPlan
-from care_sim.world.walker import Walk
+from care_sim.world.motions import Walk
+from care_sim.world.route import SpeedPlan
 
 EGO_LENGTH_M, EGO_WIDTH_M, _ = CATALOGUE["ego"].size
 BEFORE_M = 50.0

@@ -1,32 +1,28 @@
 """What is trained, on what, and how long."""
 
 import json
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Literal, get_args
 
-from care_sim.base.bounds import bounded, check_fields
-from care_sim.base.checks import LARGEST_INTEGER, check_known
+from care_sim.base.checks import LARGEST_INTEGER, bounded, check_fields, check_known
 from care_sim.base.errors import InvalidInput, shown
-from care_sim.base.seed_ranges import TRAINING, VALIDATION
+from care_sim.base.seeds import TRAINING, VALIDATION
+from care_sim.core.cells.rays import MOST_COLUMNS, MOST_ROWS
 from care_sim.core.defaults import HEAVIEST
-from care_sim.core.grid_rays import MOST_COLUMNS, MOST_ROWS
 from care_sim.core.wrapping import Wrapping
-from care_sim.study.parameters import parameters
+from care_sim.study.run_config import parameters
 
 Part = Literal["pictures", "place", "tracks", "faults"]
-"""What can be left out (`care_sim.training.ablations`)."""
+"""What can be left out (`care_sim.training.networks`)."""
 HOW_LONG = ("steps", "out", "resume", "tensorboard", "threads", "processes")
 """Fields in which a resumed run may differ from the run before."""
-BEFORE: Mapping[str, Any] = {"drawn": False, "without": []}
-"""Of runs that know neither: nothing was drawn, or left out."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class AgentConfig:
-    """Fields that all learners share. `care_sim.base.seed_ranges` says which seeds are for what."""
+    """Fields that all learners share. `care_sim.base.seeds` says which seeds are for what."""
 
     algorithm: ClassVar[str]
 
@@ -143,7 +139,6 @@ class AgentConfig:
 
         The message names the first difference.
         """
-        before = {**BEFORE, **before}
         for name, value in self.recipe.items():
             if before.get(name) != value:
                 raise InvalidInput(
@@ -169,19 +164,6 @@ class OnPolicy(AgentConfig):
         # Advantages are normalised, and one alone has no deviation.
         if self.rollout * self.environments < 2:
             raise InvalidInput("rollout needs two steps or more, or two environments, got one step")
-
-    def whole_rollouts(self, begun: int) -> str:
-        """How many steps there are in all after those that were `begun` with, where that is not
-        `steps`: between evaluations, a learner learns from whole rollouts. Else empty.
-        """
-        rollout = self.rollout * self.environments
-        done = begun
-        while done < self.steps:
-            done += math.ceil(min(self.evaluate_every, self.steps - done) / rollout) * rollout
-        if done == max(begun, self.steps):
-            return ""
-        what = "a whole rollout" if done - begun == rollout else "whole rollouts"
-        return f"steps {self.steps:,}: {done:,}, {what} of {self.environments} x {self.rollout}"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,59 +1,61 @@
-"""Learning curves of training runs, read from their folders and grouped.
+"""Learning curves of training runs: read from their folders, grouped, and what each group reached.
 
-Runs of a group differ by their seed alone.
+Runs of a group differ by their seed alone. What several seeds reach together, and how sure that is,
+follows Agarwal et al. 2021, "Deep reinforcement learning at the edge of the statistical precipice":
+scores are (runs, tasks).
 """
 
 import json
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
+from scipy import stats
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats
-from care_sim.training.config import BEFORE, HOW_LONG
-from care_sim.training.episodes import LEARNER, EpisodeRow, read_episodes
-from care_sim.training.folder import (
-    CONFIG,
-    CURVE,
-    RULES,
-    Evaluation,
-    read_config,
-    read_curve,
-    read_rules,
-)
+from care_sim.reports.table import Table
+from care_sim.study.progress import rounded_duration
+from care_sim.training.config import HOW_LONG
+from care_sim.training.folder import CONFIG, CURVE, EPISODES, LEARNER, read_config, read_table
+from care_sim.training.validation import Row
 
 NOTHING, EVERYTHING = "random", "full"
 """The rules between which scores are measured where environments differ: 0 and 1."""
+COLUMNS = ("recipe", "seeds", "steps", "reached", "unit", "ahead of", "time")
+RESAMPLES = 2_000
+"""Drawn for one interval."""
+CONFIDENCE = 0.95
+_CUT = 0.25
+"""Share of the scores that is left out at either end."""
 
 
 @dataclass(frozen=True)
 class TrainingRun:
-    """A run: its configuration, what rules score on its validation seeds, its evaluations, and the
-    episodes of all, of which a run of before has none.
-    """
+    """A run: its configuration, its evaluations, and the episodes of these and of the rules."""
 
     config: Mapping[str, Any]
-    rules: Mapping[str, Mapping[str, float]]
-    curve: Sequence[Evaluation]
-    episodes: Sequence[EpisodeRow] = ()
+    curve: Sequence[Row]
+    episodes: Sequence[Row]
 
     @property
     def recipe(self) -> str:
         """What is the same in all runs of a panel: the configuration without seed and length."""
-        told = {**BEFORE, **self.config}
+        left_out = ("seed", *HOW_LONG)
         return json.dumps(
-            {name: told[name] for name in told if name not in ("seed", *HOW_LONG)}, sort_keys=True
+            {name: told for name, told in self.config.items() if name not in left_out},
+            sort_keys=True,
         )
 
     @property
     def closed_loop(self) -> bool:
         """Whether a first detection has a distance; the return alone is measured otherwise."""
-        return all(distance is not None for *_, distance in self.curve)
+        return all(row["distance_m"] is not None for row in self.episodes)
 
     @property
     def unit(self) -> str:
@@ -67,82 +69,81 @@ class TrainingRun:
         """The environments that are scored each by itself; one that `NOTHING` plays as well as
         `EVERYTHING` tells nothing, unless it is the only one.
         """
-        names = [*dict.fromkeys(row.played.env for row in self.episodes)]
-        if len(names) < 2:
-            return names or [" ".join(np.atleast_1d(self.config["env"]))]
-        low, high = (self._means(rule, 0) for rule in (NOTHING, EVERYTHING))
+        names = [*dict.fromkeys(row["env"] for row in self.episodes)]
+        if len(names) == 1:
+            return names
+        low, high = (self._means.get((rule, 0), {}) for rule in (NOTHING, EVERYTHING))
         return [name for name in names if name in low and low[name] < high.get(name, -np.inf)]
 
-    @cached_property
-    def marks(self) -> dict[str, Floats]:
-        """(tasks,) what the rules reach by name, measured as `scores`."""
-        if len(self.tasks) > 1:
-            return {rule: self._normalised(rule, 0) for rule in self.rules}
-        scores = self.rules.items()
-        return {
-            name: np.array([s["mean_return"] if s["distance_m"] is None else s["distance_m"]])
-            for name, s in scores
-        }
+    @property
+    def rules(self) -> list[str]:
+        """The rules that the learner is beside."""
+        return [*dict.fromkeys(row["policy"] for row in self.episodes if row["policy"] != LEARNER)]
 
     @property
     def steps(self) -> list[int]:
         """Environment steps at each evaluation."""
-        return [steps for steps, *_ in self.curve]
+        return [row["steps"] for row in self.curve]
 
-    @cached_property
-    def scores(self) -> Floats:
-        """(evaluations, tasks) of one environment metres of the first detection, or the return; of
-        several the return between those of `NOTHING` and `EVERYTHING`, which has no unit.
+    def scores(self, policy: str = LEARNER, steps: int = 0) -> Floats:
+        """(tasks,) of one environment metres of the first detection, or the return; of several the
+        return between those of `NOTHING` and `EVERYTHING`, which has no unit.
+
+        Raises InvalidInput where episodes are missing.
         """
         if len(self.tasks) > 1:
-            return np.array([self._normalised(LEARNER, steps) for steps in self.steps])
-        return np.array(
-            [[value if distance is None else distance] for _, _, value, distance in self.curve]
-        )
+            low, high, reached = (
+                self._returns(*one) for one in ((NOTHING, 0), (EVERYTHING, 0), (policy, steps))
+            )
+            return np.asarray((reached - low) / (high - low))
+        if len(own := self.each(policy, steps)):
+            return np.array([np.mean(own)])
+        raise self._missing(policy, steps)
 
     def each(self, policy: str, steps: int = 0) -> Floats:
         """(episodes,) what a policy reached in every episode, by ascending seed, in the unit of
-        `scores` of one environment; of several the return. Nothing where the run does not tell.
+        `scores` of one environment; of several the return.
         """
-        metres = len(self.tasks) == 1 and self.closed_loop
+        column = "distance_m" if len(self.tasks) < 2 and self.closed_loop else "return"
         rows = sorted(
-            (row.played.seed, (row.played.distance_m or 0.0) if metres else row.played.total)
+            (row["seed"], row[column])
             for row in self.episodes
-            if (row.policy, row.steps) == (policy, steps)
+            if (row["policy"], row["steps"]) == (policy, steps)
         )
         return np.array([value for _, value in rows])
 
-    def _normalised(self, policy: str, steps: int) -> Floats:
-        low, high, own = (
-            self._means(*one) for one in ((NOTHING, 0), (EVERYTHING, 0), (policy, steps))
-        )
-        try:
-            return np.array([(own[t] - low[t]) / (high[t] - low[t]) for t in self.tasks])
-        except KeyError as error:
-            raise InvalidInput(
-                f"the episodes of a run of seed {self.config['seed']} lack those of {policy} after "
-                f"{steps} steps in {error}"
-            ) from error
+    def _returns(self, policy: str, steps: int) -> Floats:
+        means = self._means.get((policy, steps), {})
+        if not {*self.tasks} <= {*means}:
+            raise self._missing(policy, steps)
+        return np.array([means[task] for task in self.tasks])
 
-    def _means(self, policy: str, steps: int) -> dict[str, float]:
-        """The mean return of a policy by environment."""
-        totals: dict[str, list[float]] = {}
+    def _missing(self, policy: str, steps: int) -> InvalidInput:
+        return InvalidInput(
+            f"the episodes of a run of seed {self.config.get('seed')} lack some of {policy} after "
+            f"{steps} steps"
+        )
+
+    @cached_property
+    def _means(self) -> dict[tuple[str, int], dict[str, float]]:
+        """The mean return of a policy after so many steps, by environment."""
+        totals: dict[tuple[str, int], dict[str, list[float]]] = {}
         for row in self.episodes:
-            if (row.policy, row.steps) == (policy, steps):
-                totals.setdefault(row.played.env, []).append(row.played.total)
-        return {name: float(np.mean(each)) for name, each in totals.items()}
+            played = totals.setdefault((row["policy"], row["steps"]), {})
+            played.setdefault(row["env"], []).append(row["return"])
+        return {
+            which: {env: float(np.mean(each)) for env, each in played.items()}
+            for which, played in totals.items()
+        }
 
 
 def read_run(folder: Path) -> TrainingRun:
     """The run in a folder. Raises InvalidInput for one without an evaluation."""
-    for name in (CONFIG, RULES, CURVE):
+    for name in (CONFIG, CURVE, EPISODES):
         if not (folder / name).is_file():
             raise InvalidInput(f"{folder} holds no evaluated training run: no {name}")
     run = TrainingRun(
-        read_config(folder / CONFIG),
-        read_rules(folder / RULES),
-        read_curve(folder / CURVE),
-        read_episodes(folder),
+        read_config(folder / CONFIG), read_table(folder / CURVE), read_table(folder / EPISODES)
     )
     if not run.curve:
         raise InvalidInput(f"{folder} holds no evaluated training run: {CURVE} has no evaluation")
@@ -171,7 +172,7 @@ def scores_at(runs: Sequence[TrainingRun], steps: int) -> Floats:
             "runs of one recipe were scored in different environments: "
             + "; ".join(", ".join(run.tasks) or "none" for run in runs)
         )
-    return np.array([run.scores[run.steps.index(steps)] for run in runs])
+    return np.array([run.scores(steps=steps) for run in runs])
 
 
 def recipe_name(config: Mapping[str, Any]) -> str:
@@ -181,3 +182,118 @@ def recipe_name(config: Mapping[str, Any]) -> str:
     without = " ".join(config.get("without", ()))
     drawn = ", drawn" if config.get("drawn") else ""
     return f"{config['algorithm']}, {envs}{drawn}" + (f", without {without}" if without else "")
+
+
+class Aggregate(NamedTuple):
+    """A number over all runs, and the ends of its interval, which are None for a single run."""
+
+    value: float
+    low: float | None
+    high: float | None
+
+    def __str__(self) -> str:
+        if self.low is None or self.high is None:
+            return f"{self.value:.2f}"
+        return f"{self.value:.2f} [{self.low:.2f}, {self.high:.2f}]"
+
+
+def interquartile_mean(scores: ArrayLike) -> Aggregate:
+    """The mean of the middle half of all scores (runs, tasks), which are finite.
+
+    The interval is that of the stratified bootstrap: in every task the runs are drawn with
+    replacement, independently of the other tasks, so that no task is left out of a resample.
+    """
+    table: Floats = np.asarray(scores, float)
+    return Aggregate(float(_middle(table.ravel())), *_ends(table, _middle))
+
+
+def performance_profile(scores: ArrayLike, levels: ArrayLike) -> list[Aggregate]:
+    """The share of the scores (runs, episodes) that lie above each of `levels`.
+
+    The interval is that of the bootstrap over whole runs: a run plays all episodes, and what it is
+    better or worse at than another shows in all of them. Drawn episode by episode, runs would
+    cancel, and the interval would vanish as episodes become more.
+    """
+    table: Floats = np.asarray(scores, float)
+    shares = [
+        (table > level).mean(axis=1, keepdims=True)
+        for level in np.atleast_1d(np.asarray(levels, float))
+    ]
+    return [Aggregate(float(each.mean()), *_ends(each, _mean)) for each in shares]
+
+
+def _middle(scores: Floats) -> Floats:
+    result: Floats = np.asarray(stats.trim_mean(scores, _CUT, axis=-1))
+    return result
+
+
+def _mean(scores: Floats) -> Floats:
+    result: Floats = np.asarray(scores.mean(axis=-1))
+    return result
+
+
+def _ends(
+    table: Floats, statistic: Callable[[Floats], Floats]
+) -> tuple[float, float] | tuple[None, None]:
+    """Of the interval of a statistic of all scores, which it takes along the last axis."""
+    if len(table) < 2:
+        return None, None
+    interval = stats.bootstrap(
+        tuple(table.T),
+        lambda *tasks, axis: statistic(
+            np.concatenate([np.moveaxis(task, axis, -1) for task in tasks], axis=-1)
+        ),
+        n_resamples=RESAMPLES,
+        confidence_level=CONFIDENCE,
+        method="percentile",
+        vectorized=True,
+        rng=np.random.default_rng(0),
+    ).confidence_interval
+    return float(interval.low), float(interval.high)
+
+
+def curves_table(groups: Sequence[Sequence[TrainingRun]]) -> Table:
+    """What every recipe reached, how soon, and in how long: a row per recipe."""
+    return Table(
+        "Training runs",
+        COLUMNS,
+        tuple(map(_row, groups)),
+        notes=(
+            "reached: interquartile mean of training seeds and environments at the last evaluation "
+            "that all runs of a recipe have, no chosen one; of two seeds or more with the interval "
+            "of a stratified bootstrap, 95%.",
+            "ahead of: rules, and the steps from which on that mean stays above them.",
+            "time: the median of a run's learning, evaluations left out, on the machine and under "
+            "the load that it had.",
+        ),
+    )
+
+
+def _row(runs: Sequence[TrainingRun]) -> tuple[str, ...]:
+    shared = shared_steps(runs)
+    name, seeds = recipe_name(runs[0].config), str(len(runs))
+    if not shared:
+        return name, seeds, "-", "-", runs[0].unit, "-", "-"
+    reached = [interquartile_mean(scores_at(runs, steps)) for steps in shared]
+    seconds = [row["seconds"] for run in runs for row in run.curve if row["steps"] == shared[-1]]
+    return (
+        name,
+        seeds,
+        f"{shared[-1]:,}",
+        str(reached[-1]),
+        runs[0].unit,
+        _ahead(runs[0], shared, [one.value for one in reached]),
+        rounded_duration(float(np.median(seconds))),
+    )
+
+
+def _ahead(run: TrainingRun, steps: Sequence[int], reached: Sequence[float]) -> str:
+    """The rules that are left behind for good, and from when on."""
+    told = []
+    for rule in run.rules:
+        mark = interquartile_mean(run.scores(rule)[None]).value
+        # The last evaluation that is not above the rule; before the first one there is none.
+        behind = max((n for n, value in enumerate(reached) if value <= mark), default=-1)
+        if behind + 1 < len(steps):
+            told.append(f"{rule} from {steps[behind + 1]:,}")
+    return ", ".join(told) or "none"

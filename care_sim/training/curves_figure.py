@@ -12,12 +12,16 @@ from matplotlib.figure import Figure
 
 from care_sim.base.errors import percent
 from care_sim.core.arrays import Floats
-from care_sim.reports.figures.files import default_style
-from care_sim.reports.figures.names import name_ends
-from care_sim.reports.figures.styles import colours
-from care_sim.training.aggregates import interquartile_mean, performance_profile
-from care_sim.training.curves import TrainingRun, recipe_name, scores_at, shared_steps
-from care_sim.training.episodes import LEARNER
+from care_sim.reports.figures.styles import colours, default_style, name_ends
+from care_sim.training.curves import (
+    TrainingRun,
+    interquartile_mean,
+    performance_profile,
+    recipe_name,
+    scores_at,
+    shared_steps,
+)
+from care_sim.training.folder import LEARNER
 
 _LEVELS = 60
 """Points of a profile."""
@@ -30,23 +34,21 @@ def curves_figure(groups: Sequence[Sequence[TrainingRun]]) -> Figure:
     """A panel per recipe.
 
     It has a line per training seed, their interquartile mean with its interval where there are
-    several, and rules as lines across. Below it, where runs tell of their episodes, is the
-    performance profile of the last evaluation that all have.
+    several, and rules as lines across. Below it is the performance profile of the last evaluation
+    that all have.
     """
-    rows = 1 + any(run.episodes for runs in groups for run in runs)
-    figure = Figure(figsize=(1.2 + 4.6 * len(groups), 3.9 * rows), layout="constrained")
-    panels = figure.subplots(rows, len(groups), squeeze=False)
+    figure = Figure(figsize=(1.2 + 4.6 * len(groups), 7.8), layout="constrained")
+    panels = figure.subplots(2, len(groups), squeeze=False)
     # Panels of one unit have one scale, so that heights compare.
     scales: dict[str, Axes] = {}
-    for axes, runs in zip(panels[0], groups, strict=True):
+    for axes, below, runs in zip(*panels, groups, strict=True):
         unit = runs[0].unit
         if unit in scales:
             axes.sharey(scales[unit])
         scales.setdefault(unit, axes)
         _draw(axes, runs)
         axes.set_ylabel(unit)
-    for axes, runs in zip(panels[1:].ravel(), groups, strict=rows > 1):
-        _draw_profiles(axes, runs)
+        _draw_profiles(below, runs)
     name_ends(figure, {axes: _ends(runs) for axes, runs in zip(panels[0], groups, strict=True)})
     return figure
 
@@ -54,13 +56,13 @@ def curves_figure(groups: Sequence[Sequence[TrainingRun]]) -> Figure:
 def _draw(axes: Axes, runs: Sequence[TrainingRun]) -> None:
     config = runs[0].config
     learner = config["algorithm"]
-    hues = colours((*runs[0].marks, learner))
+    hues = colours((*runs[0].rules, learner))
     for name, height in _heights(runs).items():
         axes.axhline(height, color=hues[name], linestyle="--", linewidth=1.1, zorder=1)
     for run in runs:
         axes.plot(
             run.steps,
-            [_middle(scores) for scores in run.scores],
+            [_middle(run.scores(steps=steps)) for steps in run.steps],
             color=hues[learner],
             linewidth=0.9,
             alpha=0.5 if len(runs) > 1 else 1.0,
@@ -108,10 +110,6 @@ def _draw_profiles(axes: Axes, runs: Sequence[TrainingRun]) -> None:
     own = [run.each(LEARNER, shared[-1]) for run in runs] if shared else []
     same = len({len(one) for one in own}) == 1
     played |= {learner: np.array(own)} if same else {}
-    played = {name: scores for name, scores in played.items() if scores.size}
-    if not played:
-        axes.set_axis_off()
-        return
     hues = colours((*runs[0].rules, learner))
     every = np.concatenate([scores.ravel() for scores in played.values()])
     levels = np.linspace(every.min(), every.max(), _LEVELS)
@@ -137,11 +135,11 @@ def _middle(scores: Floats) -> float:
 
 def _heights(runs: Sequence[TrainingRun]) -> dict[str, float]:
     """Where the lines of the rules lie."""
-    return {name: _middle(scores) for name, scores in runs[0].marks.items()}
+    return {rule: _middle(runs[0].scores(rule)) for rule in runs[0].rules}
 
 
 def _ends(runs: Sequence[TrainingRun]) -> dict[str, tuple[float, str]]:
     """The right ends of the learner's curve and of the lines, with their colours."""
-    last = float(np.mean([_middle(run.scores[-1]) for run in runs]))
+    last = float(np.mean([_middle(run.scores(steps=run.steps[-1])) for run in runs]))
     heights = _heights(runs) | {runs[0].config["algorithm"]: last}
     return {name: (heights[name], colour) for name, colour in colours(heights).items()}

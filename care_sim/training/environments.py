@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import gymnasium
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
-from care_sim.base.cores import CORES
+from care_sim.base.limits import CORES
 from care_sim.base.processes import following, starting
 from care_sim.envs import CLOSED_LOOP, OPEN_LOOP, installed_ids, make_env
 from care_sim.envs.wrappers.grid_observation import GridObservation, VectorGridObservation
@@ -19,10 +19,8 @@ from care_sim.envs.wrappers.sector_actions import (
     VectorSectorReserve,
     VectorSectorScores,
 )
-from care_sim.training.chances import MissedChances
 from care_sim.training.config import AgentConfig
-from care_sim.training.drawn_env import DrawnEnv, DrawnStreet, Mirrored
-from care_sim.training.draws import Draw, drawn
+from care_sim.training.drawn import Draw, DrawnEnv, DrawnStreet, Mirrored, MissedChances, drawn
 from care_sim.training.seeds import TrainingSeeds, VectorTrainingSeeds, validation_seeds
 
 if TYPE_CHECKING:

@@ -3,9 +3,8 @@
 | file | content |
 |---|---|
 | `config.json` | the effective configuration, and the hash of the code of a scenario of one's own |
-| `rules.json` | what rules score on the same validation seeds |
 | `curve.csv` | steps, seconds, return and detection distance of every evaluation |
-| `episodes.csv` | the same of every episode of it, and of the rules' |
+| `episodes.csv` | the same of every episode of it, and of the rules that the learner is beside |
 | `checkpoint.zip` | the learner, by Stable-Baselines3; loading it executes code: load your own |
 | `weights.npz` | `ppo` only: the weights with the best return on the validation seeds |
 
@@ -22,43 +21,30 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from care_sim.base.checks import LARGEST_INTEGER, check_known, is_number
+from care_sim.base.checks import LARGEST_INTEGER, is_number
 from care_sim.base.errors import InvalidInput
-from care_sim.base.files import replacing, write_text
-from care_sim.base.json_text import json_content
-from care_sim.base.plugins import is_place
-from care_sim.base.scenario_names import scenario_of
-from care_sim.base.seed_ranges import TRAINING
+from care_sim.base.files import check_file_size, json_content, replacing, write_text
+from care_sim.base.plugins import is_place, scenario_of
+from care_sim.base.seeds import TRAINING
 from care_sim.core.rig import Rig
 from care_sim.policies.learned.weights import Card, save_weights
 from care_sim.scenarios import PLUGINS
 from care_sim.study.provenance import machine_line, package_versions, scenario_digest
 from care_sim.training.config import ALGORITHMS, AgentConfig
-from care_sim.training.csv_tables import read_table
-from care_sim.training.episodes import (
-    LEARNER,
-    EpisodeRow,
-    Played,
-    read_episodes,
-    write_episodes,
-)
 from care_sim.training.seeds import validation_seeds
-from care_sim.training.validation import ValidationScore
+from care_sim.training.validation import Row, ValidationScore
 
 if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm
 
-CONFIG, RULES, CURVE = "config.json", "rules.json", "curve.csv"
+CONFIG, CURVE, EPISODES = "config.json", "curve.csv", "episodes.csv"
 CHECKPOINT, WEIGHTS = "checkpoint.zip", "weights.npz"
-CURVE_COLUMNS = ("steps", "seconds", "return", "distance_m")
+LEARNER = "learner"
+"""Among the policies of the episodes, where others are rules."""
 _CODE = "scenario_code"
 """Of the configuration of a run on a scenario of one's own: the hash of its code."""
 _LARGEST_DRAWN = 1e30
 """The largest return or distance that a figure can draw."""
-Evaluation = tuple[int, float, float, float | None]
-"""Of `CURVE_COLUMNS`: environment steps, seconds of learning, mean return, metres (none in the open
-loop).
-"""
 
 
 class Folder:
@@ -78,12 +64,8 @@ class Folder:
             raise InvalidInput(
                 f"{self.path} holds a run already; add --resume, or give another --out"
             )
-        self._curve = read_curve(self.path / CURVE) if config.resume else []
-        self._episodes = read_episodes(self.path) if config.resume else []
-        # A trial begins with the rules that were scored before.
-        if not config.resume and (self.path / RULES).exists():
-            rows = read_episodes(self.path)
-            self._episodes = [row for row in rows if row.policy != LEARNER]
+        self._curve = read_table(self.path / CURVE) if config.resume else []
+        self._episodes = read_table(self.path / EPISODES) if config.resume else []
 
     def begin(self, model: "BaseAlgorithm") -> None:
         """Write the configuration down, and the learner as it is.
@@ -96,53 +78,56 @@ class Folder:
         content = json.loads(self.config.to_json()) | _own_code(self.config.env)
         write_text(self.path / CONFIG, json.dumps(content, indent=1) + "\n")
 
-    def rules(self, play: Callable[[], dict[str, list[Played]]]) -> dict[str, ValidationScore]:
+    def rules(self, play: Callable[[], dict[str, list[Row]]]) -> dict[str, ValidationScore]:
         """What rules score: measured at the beginning of a run, read when it is resumed."""
-        path = self.path / RULES
-        if not path.exists():
-            played = play()
-            self._episodes = [
-                EpisodeRow(name, 0, one) for name, each in played.items() for one in each
-            ]
-            # The table first: where the scores are, its rows are, too.
-            write_episodes(self.path, self._episodes)
-            scores = {name: asdict(ValidationScore.of(each)) for name, each in played.items()}
-            write_text(path, json.dumps(scores, indent=1) + "\n")
-        return {name: ValidationScore(**plain) for name, plain in read_rules(path).items()}
+        if not self._episodes:
+            for name, played in play().items():
+                self._add(name, 0, played)
+            _write_table(self.path / EPISODES, self._episodes)
+        return rule_scores(self._episodes)
 
     @property
     def seconds(self) -> float:
         """How long the run has learned by the last evaluation."""
-        return self._curve[-1][1] if self._curve else 0.0
+        return float(self._curve[-1]["seconds"]) if self._curve else 0.0
 
     def evaluated(self, model: "BaseAlgorithm") -> bool:
         """Whether the learner has been evaluated as it is."""
-        return bool(self._curve) and self._curve[-1][0] >= model.num_timesteps
+        return bool(self._curve) and self._curve[-1]["steps"] >= model.num_timesteps
 
     def keep(
-        self, model: "BaseAlgorithm", played: Sequence[Played], seconds: float, rig: Rig
+        self, model: "BaseAlgorithm", played: Sequence[Row], seconds: float, rig: Rig
     ) -> ValidationScore:
         """Write an evaluation and, when it is the best yet, the weights. Returns its score."""
         score = ValidationScore.of(played)
         # The weights first: when the curve knows an evaluation, its weights are there.
-        if score.mean_return > max((row[2] for row in self._curve), default=float("-inf")):
+        if score.mean_return > max((row["return"] for row in self._curve), default=float("-inf")):
             self._export(model, score, seconds, rig)
         steps = model.num_timesteps
         # An interruption before the curve was written left rows of this evaluation.
-        before = [row for row in self._episodes if (row.policy, row.steps) != (LEARNER, steps)]
-        self._episodes = [*before, *(EpisodeRow(LEARNER, steps, one) for one in played)]
-        write_episodes(self.path, self._episodes)
+        self._episodes = [
+            row for row in self._episodes if (row["policy"], row["steps"]) != (LEARNER, steps)
+        ]
+        self._add(LEARNER, steps, played)
+        _write_table(self.path / EPISODES, self._episodes)
         self._curve.append(
-            (model.num_timesteps, round(seconds, 1), score.mean_return, score.distance_m)
+            {
+                "steps": steps,
+                "seconds": round(seconds, 1),
+                "return": score.mean_return,
+                "distance_m": score.distance_m,
+            }
         )
-        with replacing(self.path / CURVE) as unfinished, unfinished.open("w", newline="") as file:
-            csv.writer(file).writerows([CURVE_COLUMNS, *self._curve])
+        _write_table(self.path / CURVE, self._curve)
         return score
 
     def save(self, model: "BaseAlgorithm") -> None:
         """Write a checkpoint."""
         with replacing(self.checkpoint) as unfinished:
             model.save(unfinished)
+
+    def _add(self, policy: str, steps: int, played: Sequence[Row]) -> None:
+        self._episodes += [{"policy": policy, "steps": steps, **row} for row in played]
 
     def _export(
         self, model: "BaseAlgorithm", score: ValidationScore, seconds: float, rig: Rig
@@ -151,17 +136,11 @@ class Folder:
         from care_sim.training.networks import SectorPolicy
 
         # Only this network has a twin in NumPy; the others act from their checkpoint.
-        if isinstance(model.policy, SectorPolicy):
-            save_weights(
-                self.weights, model.policy.arrays(), self._card(model, score, seconds, rig)
-            )
-
-    def _card(
-        self, model: "BaseAlgorithm", score: ValidationScore, seconds: float, rig: Rig
-    ) -> Card:
+        if not isinstance(model.policy, SectorPolicy):
+            return
         config = self.config
         held_out = validation_seeds(score.episodes)
-        return Card(
+        card = Card(
             kind="ppo",
             grid=rig.grid,
             setup=rig.setup,
@@ -182,6 +161,7 @@ class Folder:
             versions=package_versions("care-sim", "numpy", "stable-baselines3", "torch"),
             result={"validation": asdict(score), "config": config.recipe},
         )
+        save_weights(self.weights, model.policy.arrays(), card)
 
     def _check_resumable(self) -> None:
         for file in (self.path / CONFIG, self.checkpoint):
@@ -189,12 +169,20 @@ class Folder:
                 raise InvalidInput(f"{self.path} holds no run to be resumed: no {file.name}")
         before = read_config(self.path / CONFIG)
         self.config.check_same(before)
-        # A folder of before tells nothing of the code.
-        if (_CODE in before) and before[_CODE] != _own_code(self.config.env).get(_CODE):
+        if before.get(_CODE) != _own_code(self.config.env).get(_CODE):
             raise InvalidInput(
                 f"{self.path}: the code of {' '.join(self.config.env)} is another than when it was "
                 "trained; give another --out"
             )
+
+
+def rule_scores(episodes: Sequence[Row]) -> dict[str, ValidationScore]:
+    """What every rule scores, by name."""
+    played: dict[str, list[Row]] = {}
+    for row in episodes:
+        if row["policy"] != LEARNER:
+            played.setdefault(row["policy"], []).append(row)
+    return {name: ValidationScore.of(rows) for name, rows in played.items()}
 
 
 def _own_code(envs: Sequence[str]) -> dict[str, Any]:
@@ -217,70 +205,83 @@ def read_config(path: Path) -> dict[str, Any]:
 
     Raises InvalidInput for a damaged file, or one of something else.
     """
-    config = _read_map(path)
-    kinds: dict[str, Callable[[Any], bool]] = {
-        "algorithm": _is_text,
-        "env": lambda env: (
-            _is_text(env) or (isinstance(env, list) and bool(env) and all(map(_is_text, env)))
-        ),
-        "budget": lambda budgets: (
-            isinstance(budgets, list) and bool(budgets) and all(map(_is_finite, budgets))
-        ),
-        "episodes": _is_finite,
+    try:
+        config = json_content(path)
+    except ValueError as error:
+        raise InvalidInput(f"{path} is damaged: {error}") from error
+    if not isinstance(config, dict):
+        raise InvalidInput(f"{path} is no configuration of a training run: it holds no map")
+    listed = config.get("env") if isinstance(config.get("env"), list) else [config.get("env")]
+    right = {
+        "algorithm": config.get("algorithm") in ALGORITHMS,
+        "env": bool(listed) and all(isinstance(name, str) for name in listed),
+        "budget": bool(config.get("budget"))
+        and isinstance(config["budget"], list)
+        and all(map(_is_finite, config["budget"])),
+        "episodes": _is_finite(config.get("episodes")),
     }
-    for name, is_kind in kinds.items():
-        if not is_kind(config.get(name)):
+    for name, is_right in right.items():
+        if not is_right:
             raise InvalidInput(
                 f"{path} is no configuration of a training run: {name} is {config.get(name)!r:.80}"
             )
-    check_known(f"algorithm in {path}", config["algorithm"], ALGORITHMS)
     return config
 
 
-def read_rules(path: Path) -> dict[str, dict[str, Any]]:
-    """What rules score. Raises InvalidInput for a damaged file, or one of something else."""
-    rules = _read_map(path)
-    for name, score in rules.items():
-        if not isinstance(score, dict) or {*score} != {*ValidationScore.__dataclass_fields__}:
-            raise InvalidInput(
-                f"{path} holds no scores of rules: {name!r:.80} has not "
-                f"{', '.join(ValidationScore.__dataclass_fields__)}"
-            )
-        for column, value in score.items():
-            if not (_is_finite(value) or (column == "distance_m" and value is None)):
-                raise InvalidInput(
-                    f"{path} holds no scores of rules: {column} of {name!r:.80} is {value!r:.80}"
-                )
-    return rules
+def read_table(path: Path) -> list[Row]:
+    """The rows of `CURVE` or `EPISODES`, none of a file that is not there.
 
-
-def _read_map(path: Path) -> dict[str, Any]:
+    Raises InvalidInput for a damaged file.
+    """
+    columns = COLUMNS[path.name]
+    if not path.exists():
+        return []
     try:
-        content = json_content(path)
-    except ValueError as error:
+        check_file_size(path)
+        with path.open(newline="", encoding="utf-8") as file:
+            head, *rows = csv.reader(file)
+        if head != [*columns]:
+            raise ValueError(f"its columns are not {', '.join(columns)}")
+        return [
+            {name: read(text) for (name, read), text in zip(columns.items(), row, strict=True)}
+            for row in rows
+        ]
+    except (ValueError, csv.Error) as error:
         raise InvalidInput(f"{path} is damaged: {error}") from error
-    if not isinstance(content, dict):
-        raise InvalidInput(f"{path} is no file of a training run: it holds no map")
-    return content
 
 
-def read_curve(path: Path) -> list[Evaluation]:
-    """The evaluations of a run, none yet included. Raises InvalidInput for a damaged file."""
-    return read_table(path, CURVE_COLUMNS, _evaluation)
+def _write_table(path: Path, rows: Sequence[Row]) -> None:
+    with replacing(path) as unfinished, unfinished.open("w", newline="") as file:
+        writer = csv.DictWriter(file, COLUMNS[path.name])
+        writer.writeheader()
+        writer.writerows(rows)
 
 
-def _evaluation(row: list[str]) -> Evaluation:
-    """A row of the curve. Raises ValueError for what is no number that can be drawn."""
-    steps, seconds, value, distance = row
-    numbers = (float(seconds), float(value), *([float(distance)] if distance else []))
-    if not (0 <= int(steps) <= LARGEST_INTEGER and all(map(_is_finite, numbers))):
-        raise ValueError(f"{', '.join(row)} are no numbers of an evaluation")
-    return int(steps), float(seconds), float(value), float(distance) if distance else None
+def _count(text: str) -> int:
+    number = int(text)
+    if not 0 <= number <= LARGEST_INTEGER:
+        raise ValueError(f"{text} is no count")
+    return number
 
 
-def _is_text(value: object) -> bool:
-    return isinstance(value, str)
+def _number(text: str) -> float:
+    number = float(text)
+    if not _is_finite(number):
+        raise ValueError(f"{text} is no number that can be drawn")
+    return number
+
+
+def _metres(text: str) -> float | None:
+    return _number(text) if text else None
 
 
 def _is_finite(value: object) -> bool:
     return is_number(value) and abs(value) <= _LARGEST_DRAWN  # type: ignore[arg-type]
+
+
+_SCORES: dict[str, Callable[[str], Any]] = {"return": _number, "distance_m": _metres}
+COLUMNS: dict[str, dict[str, Callable[[str], Any]]] = {
+    CURVE: {"steps": _count, "seconds": _number, **_SCORES},
+    EPISODES: {"policy": str, "steps": _count, "seed": _count, "env": str, **_SCORES},
+}
+"""The columns of both tables, and how each is read."""

@@ -1,6 +1,20 @@
 """The score map in PyTorch, as a policy of Stable-Baselines3.
 
-`care_sim.policies.learned.score_map` computes the same network in NumPy.
+`care_sim.policies.learned.ppo` computes the same network in NumPy.
+
+It can be trained without a part, to see what that part was worth:
+
+| without | what is taken away |
+|---|---|
+| `pictures` | all six pictures: what is left is the car's motion, the budget and the place |
+| `place` | the number of its own that each sector has: what is seen alone decides its score |
+| `tracks` | all that forecasts tell in the pictures; the allocator goes on to fire at their hulls |
+| `faults` | faults of the camera in the training episodes; those of the validation keep them |
+
+Pictures are taken away by a matrix before the first layer. It is multiplied into the weights that
+are kept, which therefore act in NumPy like any others. Tracks are in four pictures: `forecast` and
+`undetected` vanish, and `residual` and `explained`, which forecasts tell apart, become one. `fired`
+and `nearness` stay: they show the last scan, hulls at which the allocator fired among the rest.
 """
 
 from collections.abc import Collection
@@ -9,23 +23,37 @@ from typing import Any
 import numpy as np
 import torch
 from gymnasium import spaces
+from numpy.typing import NDArray
 from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from torch import Tensor, nn
 
 from care_sim.base.array_files import Arrays
-from care_sim.policies.learned.grid_features import EGO_INPUTS
-from care_sim.policies.learned.score_map import BLOCK_MARGIN
-from care_sim.training.ablations import mixing
+from care_sim.policies.learned.grid_features import CHANNELS, EGO_INPUTS
+from care_sim.policies.learned.ppo import BLOCK_MARGIN
+
+
+def mixing(without: Collection[str]) -> NDArray[np.float32]:
+    """(channels, channels) of what is seen, from what the pictures show; the unit matrix where none
+    is taken away.
+    """
+    matrix = np.eye(len(CHANNELS), dtype=np.float32)
+    if "tracks" in without:
+        forecast, residual, explained, undetected = (
+            CHANNELS.index(name) for name in ("forecast", "residual", "explained", "undetected")
+        )
+        matrix[[forecast, undetected, explained]] = 0
+        matrix[residual, explained] = 1
+    return matrix * ("pictures" not in without)
 
 
 class Window(nn.Module):
     """(n, hidden, sectors) from what each sector sees: its blocks, one more on each side, and the
-    car's motion. `care_sim.policies.learned.score_map` computes the same in NumPy.
+    car's motion. `care_sim.policies.learned.ppo` computes the same in NumPy.
 
     `shape` is (channels, rows, columns) of the blocks, `sectors` (elevations, azimuths);
     `goes_round` says whether the grid does; `without` what is left out of the pictures
-    (`care_sim.training.ablations`).
+    (`care_sim.training.networks`).
     """
 
     mixing: Tensor
@@ -214,7 +242,7 @@ class SectorPolicy(ActorCriticPolicy):
         return elevations, azimuths
 
     def arrays(self) -> Arrays:
-        """The actor's weights by the names of `care_sim.policies.learned.score_map`."""
+        """The actor's weights by the names of `care_sim.policies.learned.ppo`."""
         named = {**self.mlp_extractor.actor.state_dict(), **self.action_net.state_dict()}
         arrays: Arrays = {name: tensor.cpu().numpy().copy() for name, tensor in named.items()}
         # The head calls its parameter `weight` alone.

@@ -1,9 +1,13 @@
-"""A training run from the first step, or a checkpoint, to the last."""
+"""A training run from the first step, or a checkpoint, to the last.
 
-import sys
+Learners are those of Stable-Baselines3 and sb3-contrib. Both libraries are imported when a learner
+is trained, since their extra 'rl' is optional.
+"""
+
+import math
 import time
 from collections.abc import Callable
-from contextlib import closing, nullcontext
+from contextlib import closing
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -12,18 +16,18 @@ from care_sim.base.errors import InvalidInput, counted, print_lines
 from care_sim.base.extras import import_torch, missing_extra
 from care_sim.base.files import check_no_link
 from care_sim.envs.sensing import sensing
-from care_sim.study.progress import ProgressLines, Show, progress_bar
-from care_sim.training import algorithms
-from care_sim.training.config import AgentConfig, OnPolicy
+from care_sim.policies.learned.grid_features import CHANNELS
+from care_sim.study.progress import Show, rounded_duration, shown_progress
+from care_sim.training.config import AgentConfig, OnPolicy, PpoConfig, RecurrentPpoConfig, SacConfig
 from care_sim.training.environments import plain, side_by_side, validation_episodes, wrapped
-from care_sim.training.episodes import Played
 from care_sim.training.folder import Folder
-from care_sim.training.pace import Pace
-from care_sim.training.validation import acting, play, rule
+from care_sim.training.validation import Row, acting, play, rule
 
 if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm
 
+TENSORBOARD = "tensorboard"
+"""Folder of the logs for TensorBoard, in that of the run."""
 RULES = {
     "random": None,
     "history": None,
@@ -42,45 +46,104 @@ can be reached.
 
 def train_agent(
     config: AgentConfig, evaluated: Callable[[float], None] = lambda _return: None
-) -> int:
+) -> None:
     """Train, and keep everything in `config.out`; see `care_sim.training.folder`. `evaluated` is
     told the mean return of every evaluation, once it is kept.
 
     Raises InvalidInput for what does not fit, MissingExtra for a library that is not installed.
     """
     # What is missing is told before the folder is made.
-    algorithms.algorithm(config.algorithm)
+    algorithm(config.algorithm)
     _check_tensorboard(config)
     import_torch().set_num_threads(config.threads)
     folder = Folder(config)
-    env = wrapped(config)
-    envs = side_by_side(config)
-    try:
+    with closing(wrapped(config)) as env, closing(side_by_side(config)) as envs:
         model = (
             _resumed(config, folder, envs)
             if config.resume
-            else algorithms.make_learner(config, envs, sensing(env).rig.grid.goes_round)
+            else make_learner(config, envs, sensing(env).rig.grid.goes_round)
         )
         folder.begin(model)
-        # Whatever SAC does beyond its steps is fewer than it has environments.
-        whole = config.whole_rollouts(model.num_timesteps) if isinstance(config, OnPolicy) else ""
-        if whole:
-            _say(whole)
         for name, score in folder.rules(partial(played_rules, config)).items():
-            _say(f"{name}: {score}")
+            print_lines(f"{name}: {score}")
         _learn(config, folder, model, env, evaluated)
-    finally:
-        envs.close()
-        env.close()
-    return 0
+
+
+def algorithm(name: str) -> Any:
+    """The class of a learner, a `BaseAlgorithm`.
+
+    Raises MissingExtra for one that is not installed.
+    """
+    try:
+        if name == "recurrent-ppo":
+            from sb3_contrib import RecurrentPPO
+
+            return RecurrentPPO
+        from stable_baselines3 import PPO, SAC
+    except ImportError as error:
+        raise missing_extra(name, "rl", error) from error
+    return {"ppo": PPO, "sac": SAC}[name]
+
+
+def make_learner(config: AgentConfig, envs: Any, goes_round: bool = True) -> "BaseAlgorithm":
+    """A learner that has learned nothing yet; `goes_round` says whether the grid does."""
+    policy, options = _settings(config, goes_round)
+    log = str(config.out / TENSORBOARD) if config.tensorboard else None
+    learner: BaseAlgorithm = algorithm(config.algorithm)(
+        policy=policy,
+        env=envs,
+        learning_rate=config.learning_rate,
+        gamma=config.discount,
+        seed=config.seed,
+        device="cpu",
+        tensorboard_log=log,
+        **options,
+    )
+    return learner
+
+
+def _settings(config: AgentConfig, goes_round: bool) -> tuple[Any, dict[str, Any]]:
+    """The policy, and the options that are the learner's own."""
+    # The module subclasses PyTorch's and Stable-Baselines3's classes: optional extra 'rl'.
+    from care_sim.training.networks import Sectored, SectorPolicy
+
+    shape = len(CHANNELS), config.rows, config.columns
+    seen = {"shape": shape, "goes_round": goes_round, "without": config.without}
+    # PPO scores sectors with the network that `ppo` later runs in NumPy. The others keep their own
+    # networks behind features of the sectors, since their critics or memories need a vector.
+    own = {
+        "features_extractor_class": Sectored,
+        "features_extractor_kwargs": seen | {"sectors": (config.elevations, config.azimuths)},
+    }
+    if isinstance(config, PpoConfig):
+        kwargs = seen | {"hidden": config.hidden, "log_std_init": math.log(config.noise)}
+        return SectorPolicy, _on_policy(config) | {"policy_kwargs": kwargs}
+    if isinstance(config, RecurrentPpoConfig):
+        kwargs = own | {"log_std_init": math.log(config.noise)}
+        return "MultiInputLstmPolicy", _on_policy(config) | {"policy_kwargs": kwargs}
+    assert isinstance(config, SacConfig)
+    return "MultiInputPolicy", {
+        "buffer_size": config.memory,
+        "batch_size": config.batch,
+        "policy_kwargs": own,
+    }
+
+
+def _on_policy(config: OnPolicy) -> dict[str, Any]:
+    return {
+        "n_steps": config.rollout,
+        "batch_size": config.batch,
+        "n_epochs": config.epochs,
+        "gae_lambda": 0.9,
+    }
 
 
 def _resumed(config: AgentConfig, folder: Folder, envs: Any) -> "BaseAlgorithm":
-    _say(
+    print_lines(
         f"resuming from {folder.checkpoint}: loading a checkpoint runs code from it, so resume "
         "your own runs only"
     )
-    model: BaseAlgorithm = algorithms.algorithm(config.algorithm).load(
+    model: BaseAlgorithm = algorithm(config.algorithm).load(
         folder.checkpoint, env=envs, device="cpu"
     )
     if model.num_timesteps >= config.steps and folder.evaluated(model):
@@ -96,18 +159,18 @@ def _resumed(config: AgentConfig, folder: Folder, envs: Any) -> "BaseAlgorithm":
     return model
 
 
-def played_rules(config: AgentConfig) -> dict[str, list[Played]]:
+def played_rules(config: AgentConfig) -> dict[str, list[Row]]:
     """How the rules play the validation seeds. One that does not fit the learner's environment, as
     a map of another grid, is left out, and said so.
     """
-    _say(f"playing the rules on {counted(config.episodes, 'validation episode')}")
+    print_lines(f"playing the rules on {counted(config.episodes, 'validation episode')}")
     played = {}
     for name, budget in RULES.items():
         with closing(plain(config, budget)) as env:
             try:
                 care_sim.make_policy(name, env.unwrapped)
             except InvalidInput as error:
-                _say(f"{name} does not fit and is not beside it: {error}")
+                print_lines(f"{name} does not fit and is not beside it: {error}")
             else:
                 played[name] = play(env, rule(name, env), validation_episodes(config))
     return played
@@ -125,29 +188,24 @@ def _learn(
     Stable-Baselines3's EvalCallback and CheckpointCallback cannot do it: the one evaluates episodes
     of seeds that it draws itself, the other does not replace its files whole.
     """
-    clock = Stopwatch(folder.seconds)
-    begun = model.num_timesteps
-    with (
-        progress_bar(config.steps, "steps")
-        if sys.stderr.isatty()
-        else nullcontext(ProgressLines(config.steps, "steps")) as show
-    ):
-        shown = _progress(show, config, clock)
+    before, begun, learning_s = folder.seconds, model.num_timesteps, 0.0
+    with shown_progress(config.steps, "steps") as show:
         while True:
             # A resumed run may have been interrupted between learning and evaluation.
             if not folder.evaluated(model):
                 played = play(env, acting(model), validation_episodes(config))
-                score = folder.keep(model, played, clock.seconds, env.unwrapped.rig)
-                _say(f"{model.num_timesteps} steps: {score}")
+                score = folder.keep(model, played, before + learning_s, env.unwrapped.rig)
+                print_lines(f"{model.num_timesteps} steps: {score}")
                 evaluated(score.mean_return)
             if (left := config.steps - model.num_timesteps) <= 0:
                 break
-            with clock:
-                _learn_steps(model, min(config.evaluate_every, left), shown, folder)
+            started = time.monotonic()
+            _learn_steps(model, min(config.evaluate_every, left), _paced(show, config), folder)
+            learning_s += time.monotonic() - started
     if learned := model.num_timesteps - begun:
-        rate = learned / clock.own_seconds
-        _say(
-            f"{rate:.0f} environment steps per second inside {config.algorithm}, learning included"
+        print_lines(
+            f"{learned / learning_s:.0f} environment steps per second inside {config.algorithm}, "
+            "learning included"
         )
 
 
@@ -170,53 +228,29 @@ def _learn_steps(
         folder.save(model)
 
 
-def _progress(
-    show: Show, config: AgentConfig, clock: "Stopwatch"
-) -> Callable[["BaseAlgorithm"], None]:
-    pace = Pace(config.steps)
+def _paced(show: Show, config: AgentConfig) -> Callable[["BaseAlgorithm"], None]:
+    """Shows the steps per second since the first ones that it is told of, and what is left."""
+    first: tuple[int, float] | None = None
 
     def shown(model: "BaseAlgorithm") -> None:
-        steps, updates = model.num_timesteps, model._n_updates
-        show(min(steps, config.steps), pace.told(steps, updates, clock.own_seconds))
+        nonlocal first
+        steps, now = model.num_timesteps, time.monotonic()
+        first = first or (steps, now)
+        told = ""
+        if steps > first[0]:
+            rate = (steps - first[0]) / (now - first[1])
+            left = rounded_duration(max(config.steps - steps, 0) / rate)
+            told = f"{rate:.0f} steps/s, {left} left"
+        show(min(steps, config.steps), told)
 
     return shown
 
 
-class Stopwatch:
-    """Seconds spent in learning, evaluations left out; `before` are those of a resumed run."""
-
-    def __init__(self, before: float):
-        self._before = before
-        self._done = 0.0
-        self._since: float | None = None
-
-    def __enter__(self) -> None:
-        self._since = time.monotonic()
-
-    def __exit__(self, *_: object) -> None:
-        self._done = self.own_seconds
-        self._since = None
-
-    @property
-    def own_seconds(self) -> float:
-        """Of this program."""
-        return self._done + (time.monotonic() - self._since if self._since is not None else 0.0)
-
-    @property
-    def seconds(self) -> float:
-        """With those before it was resumed."""
-        return self._before + self.own_seconds
-
-
 def _check_tensorboard(config: AgentConfig) -> None:
     # A resumed learner writes its log without the option, too.
-    check_no_link(config.out / algorithms.TENSORBOARD)
+    check_no_link(config.out / TENSORBOARD)
     if config.tensorboard:
         try:
             import tensorboard  # noqa: F401
         except ImportError as error:
             raise missing_extra("--tensorboard", "rl", error) from error
-
-
-def _say(line: str) -> None:
-    print_lines(line)

@@ -9,8 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 import care_sim
-from care_sim.training.episodes import Played
 
+Row = dict[str, Any]
+"""How an episode was played: `seed`, `env`, `return`, and `distance_m`, the metres at which the
+first-sighting actor was detected, 0 where it never was; None in the open loop.
+"""
 Choose = Callable[[Any, bool], NDArray[np.float32]]
 """The action for an observation. The flag tells that the episode begins with it."""
 
@@ -27,10 +30,8 @@ class Learner(Protocol):
 
 @dataclass(frozen=True)
 class ValidationScore:
-    """Means over episodes: the return, and the first-detection distance.
-
-    That is the distance at which the first-sighting actor was detected, metres; 0 where it never
-    was, None unless every episode has one: in the open loop there is none.
+    """Means over episodes: the return, and the first-detection distance, None unless every episode
+    has one.
     """
 
     episodes: int
@@ -38,11 +39,11 @@ class ValidationScore:
     distance_m: float | None
 
     @classmethod
-    def of(cls, played: Sequence[Played]) -> "ValidationScore":
+    def of(cls, played: Sequence[Row]) -> "ValidationScore":
         """The means of one episode or more."""
-        metres = [one.distance_m for one in played if one.distance_m is not None]
-        mean_m = float(np.mean(metres)) if len(metres) == len(played) else None
-        return cls(len(played), float(np.mean([one.total for one in played])), mean_m)
+        metres = [row["distance_m"] for row in played]
+        mean_m = None if None in metres else float(np.mean(metres))
+        return cls(len(played), float(np.mean([row["return"] for row in played])), mean_m)
 
     def __str__(self) -> str:
         seen = (
@@ -53,7 +54,7 @@ class ValidationScore:
         return f"return {self.mean_return:.2f}{seen}"
 
 
-def play(env: gymnasium.Env[Any, Any], choose: Choose, episodes: Mapping[int, str]) -> list[Played]:
+def play(env: gymnasium.Env[Any, Any], choose: Choose, episodes: Mapping[int, str]) -> list[Row]:
     """Play the episodes of the seeds, whose environments are named."""
     return [_episode(env, choose, seed, name) for seed, name in episodes.items()]
 
@@ -89,7 +90,7 @@ def rule(name: str, env: gymnasium.Env[Any, Any]) -> Choose:
     return choose
 
 
-def _episode(env: gymnasium.Env[Any, Any], choose: Choose, seed: int, name: str) -> Played:
+def _episode(env: gymnasium.Env[Any, Any], choose: Choose, seed: int, name: str) -> Row:
     observation, _ = env.reset(seed=seed)
     total = 0.0
     begins = True
@@ -103,4 +104,4 @@ def _episode(env: gymnasium.Env[Any, Any], choose: Choose, seed: int, name: str)
     # An actor who is never detected counts as 0 m, the worst there is. The open loop has no such
     # distance.
     distance = outcome["detection_distance_m"] or 0.0 if "detection_distance_m" in outcome else None
-    return Played(seed, name, total, distance)
+    return {"seed": seed, "env": name, "return": total, "distance_m": distance}

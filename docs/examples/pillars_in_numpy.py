@@ -13,9 +13,8 @@ import numba
 import numpy as np
 import torch
 
-from care_sim.perception.pillars.detector import PillarsDetector
+from care_sim.perception.pillars.detector import PillarsDetector, load_detector
 from care_sim.perception.pillars.network import LAYERS, POINT_LAYERS
-from care_sim.perception.pillars.weights import load_detector
 from care_sim.sources.street_films import street_film
 
 STREET = 2500

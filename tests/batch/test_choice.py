@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from care_sim.batch.scanning import Choice
 from care_sim.core.conditions import ClosedLoopConditions
+from care_sim.core.firing.floor import RandomFloor
 from care_sim.core.grid import AngularGrid
-from care_sim.core.random_floor import RandomFloor
 from care_sim.core.rig import Rig
 
 WORLDS = 3

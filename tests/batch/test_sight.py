@@ -8,8 +8,7 @@ from care_sim.batch.camera_faults import BatchDelay, BatchMisses, Detected, Draw
 from care_sim.core.conditions import CameraFaults
 from care_sim.core.types import ImageDetections
 from care_sim.sensors.annotated import IdentifiedDetections
-from care_sim.sensors.camera_faults import Delay, Misses
-from care_sim.sensors.picture_timing import PictureTiming
+from care_sim.sensors.camera import Delay, Misses, PictureTiming
 
 
 @given(st.integers(0, 2**32), st.integers(0, 12), st.integers(0, 9))

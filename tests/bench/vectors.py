@@ -14,10 +14,10 @@ from care_sim.base.errors import MissingExtra
 from care_sim.base.extras import import_torch
 from care_sim.policies import make_policy
 from care_sim.study.executors import processes
-from care_sim.training.algorithms import algorithm, make_learner
 from care_sim.training.config import PpoConfig
 from care_sim.training.environments import side_by_side
-from tests.bench.settings import EPISODE, MAIN, by_name
+from care_sim.training.run import algorithm, make_learner
+from tests.bench.environments import EPISODE, MAIN, by_name
 
 WORLDS = 64
 THREADS = {1: "one thread", 2: "two threads"}

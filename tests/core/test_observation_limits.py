@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from care_sim.core.belief import MAX_DETECTIONS, MAX_TRACKS, Belief
 from care_sim.core.conditions import Sensing
 from care_sim.core.frames import Frame
-from care_sim.core.observation_limits import MAX_AGE_S, MAX_SPEED_MPS, Limits
+from care_sim.core.observation.limits import MAX_AGE_S, MAX_SPEED_MPS, Limits
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.residual import camera_layers, explained
 from care_sim.core.rig import Rig

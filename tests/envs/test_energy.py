@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.actions import scores_of
+from care_sim.core.firing.actions import scores_of
 from care_sim.envs.scenes import FilmEnv
 
 LOOPS = ("CARE-Dense-v0", "CARE-Street-v0")

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from care_sim.perception.pillars.weights import CALIBRATION, array_shapes, save_detector
+from care_sim.perception.pillars.detector import CALIBRATION, array_shapes, save_detector
 
 
 def drawn_arrays(seed=0):

@@ -5,7 +5,7 @@ import numpy as np
 from care_sim.core.grid import AngularGrid
 from care_sim.core.wrapping import Wrapping
 from care_sim.policies.learned.grid_features import CHANNELS, EGO_INPUTS
-from care_sim.policies.learned.score_map import BLOCK_MARGIN
+from care_sim.policies.learned.ppo import BLOCK_MARGIN
 from care_sim.policies.learned.weights import Card, save_weights
 
 USUAL = Wrapping()

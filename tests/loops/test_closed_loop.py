@@ -10,10 +10,9 @@ from care_sim.core.sensor_setup import LIDAR_POSITION
 from care_sim.core.types import CLASSES
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.episode import SensorSeeds
-from care_sim.sensors.camera import FRONT_CAMERA
+from care_sim.sensors.pictures import FRONT_CAMERA
 from care_sim.world.bodies import CATALOGUE
-from care_sim.world.route import Route
-from care_sim.world.speed_plan import SpeedPlan
+from care_sim.world.route import Route, SpeedPlan
 from care_sim.world.traffic import Traffic
 from care_sim.world.world import World
 

@@ -8,7 +8,7 @@ from care_sim.core.rig import Rig
 from care_sim.loops.episode import SensorSeeds
 from care_sim.loops.false_box_pools import pool_of_another_drive
 from care_sim.scenarios import SCENARIOS
-from care_sim.sensors.camera import FRONT_CAMERA
+from care_sim.sensors.pictures import FRONT_CAMERA
 
 RIG = Rig(cameras=(FRONT_CAMERA,))
 

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 import care_sim
-from care_sim.core.actions import EXPLOITATION, FLOOR, RESERVE
+from care_sim.core.firing.actions import EXPLOITATION, FLOOR, RESERVE
 from care_sim.core.sensor_setup import LIDAR_POSITION
 from care_sim.envs.wrappers.record_rerun import Watching
 from care_sim.loops.watcher import WAY_M, Watcher
-from care_sim.sensors.confidence import MIN_PIXELS
+from care_sim.sensors.pictures import MIN_PIXELS
 from care_sim.sources.named import source_of
 from care_sim.study.play_config import play_grid
 

@@ -20,8 +20,8 @@ from tests.helpers.descendants import until
 POLICIES = [
     "care_sim.policies.paper.reserves:Care",
     "care_sim.policies.paper.blind:Random",
-    "care_sim.policies.own.care_spread:CareSpread",
-    "care_sim.policies.controls.learned_place:HistoryLearnedPlace",
+    "care_sim.policies.own.care:CareSpread",
+    "care_sim.policies.controls.rehearsed:HistoryLearnedPlace",
 ]
 """With a memory, with a generator, told a setting, told a scenario."""
 SPY = """

@@ -5,14 +5,14 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.belief import Belief
+from care_sim.core.cells.stack import GridStack
 from care_sim.core.grid import AngularGrid
-from care_sim.core.grid_stack import GridStack
 from care_sim.core.rig import Rig
 from care_sim.core.types import Ego, ImageDetections, Tracks
 from care_sim.policies.controls.patterns import Fan, cells_by_row, entry_cells, entry_elevation_deg
 from care_sim.policies.learned.cell_inputs import CellInputs
 from care_sim.policies.learned.grid_features import CHANNELS, GridFeatures
-from care_sim.policies.learned.tiling import Tiling
+from care_sim.policies.learned.sectors import Tiling
 from care_sim.policies.own.sight_lines import AHEAD_RAD, SightLines, columns_ahead
 from care_sim.policies.paper.blind import horizon_rows
 from tests.helpers.lidars import DEGREE, ROOF, STACK

@@ -10,16 +10,15 @@ import numpy as np
 import pytest
 
 from care_sim import cli
-from care_sim.base.seed_ranges import TRAINING
+from care_sim.base.seeds import TRAINING
 from care_sim.loops.episode import EpisodeSeeds
 from care_sim.policies import BUILT_IN
 from care_sim.scenarios import make_scenario
-from care_sim.study.benchmark.made_by import processor_of
-from care_sim.study.benchmark.result_file import read_result
-from care_sim.study.benchmark.worlds import TESTS, published_worlds
+from care_sim.study.benchmark.result import processor_of, read_result
+from care_sim.study.benchmark.suite import TESTS, published_worlds
 from care_sim.study.results_formats import EPISODES
 from care_sim.study.rows.parquet import read_rows
-from care_sim.training.sets import ROUNDS
+from care_sim.training.supervised.sets import ROUNDS
 from tests.helpers.examples import loaded
 from tests.helpers.pages import RESULTS, links
 from tests.helpers.places import ROOT
@@ -85,7 +84,7 @@ def test_how_many_tests_of_the_suite_are_of_a_kind_that_training_met():
         drawn = scenario.drawn(np.random.default_rng(EpisodeSeeds.of(seed).scenario))
         return drawn.test, drawn.speed_kph, drawn.target_kph
 
-    # The tests of both rounds of `care_sim.training.sets`.
+    # The tests of both rounds of `care_sim.training.supervised.sets`.
     count = sum(worlds["ncap"] for worlds in ROUNDS)
     met = {kind(TRAINING + number) for number in range(count)}
     kinds = {w.number: kind(w.seed) for w in published_worlds() if w.part == TESTS}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from care_sim.core.rig import Rig
-from care_sim.policies.controls.learned_place import rehearsal
+from care_sim.policies.controls.rehearsed import rehearsal
 from care_sim.scenarios import SCENARIOS, make_scenario
 from care_sim.scenarios.base import MirrorableScenario, MirroredWorld
 

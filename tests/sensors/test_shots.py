@@ -4,18 +4,16 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from care_sim.core.conditions import Sensing
+from care_sim.core.conditions import ReturnSettings, Sensing
 from care_sim.core.frames import Frame
-from care_sim.core.return_settings import ReturnSettings
 from care_sim.loops.truth import told_by
 from care_sim.sensors.annotated import Cloud
 from care_sim.sensors.beams import Beams
 from care_sim.sensors.engines import ENGINES
-from care_sim.sensors.lidar import Lidar
-from care_sim.sensors.recorded_lidar import RecordedLidar
+from care_sim.sensors.lidar import Lidar, RecordedLidar
 from care_sim.sensors.signal import Signal
 from care_sim.world.bodies import BodyKind, Part
-from care_sim.world.linear_motion import LinearMotion
+from care_sim.world.motions import LinearMotion
 
 WALL = BodyKind("wall", None, (0.2, 30.0, 6.0), (
     Part("box", (0.2, 30.0, 6.0), (0.0, 0.0, 3.0), (0.5,) * 3),

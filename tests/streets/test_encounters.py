@@ -21,8 +21,7 @@ from care_sim.streets.encounters import (
 from care_sim.streets.layouts import LAYOUTS
 from care_sim.streets.sight import EGO_WIDTH_M, Approach
 from care_sim.world.bodies import CATALOGUE
-from care_sim.world.route import Route
-from care_sim.world.speed_plan import SpeedPlan
+from care_sim.world.route import Route, SpeedPlan
 
 PLACE_M = 250.0
 APPROACH = Approach.along(SpeedPlan(Route(legs=((400.0, 0.0),)), 8.0, 2.0, 1.5), PLACE_M, PLACE_M)

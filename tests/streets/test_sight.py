@@ -15,9 +15,8 @@ from care_sim.streets.sight import (
     sight_of,
 )
 from care_sim.world.bodies import CATALOGUE
-from care_sim.world.route import Route
-from care_sim.world.speed_plan import SpeedPlan
-from care_sim.world.walker import Walk
+from care_sim.world.motions import Walk
+from care_sim.world.route import Route, SpeedPlan
 
 HALF_M = 0.3
 RADIUS_M = 10.0

@@ -5,10 +5,10 @@ import pytest
 
 from care_sim.core.grid import AngularGrid
 from care_sim.policies.learned.grid_features import CHANNELS
-from care_sim.policies.learned.score_map import ScoreMap
+from care_sim.policies.learned.ppo import ScoreMap
 from care_sim.policies.learned.weights import Card, load_weights, save_weights
-from care_sim.training.ablations import mixing
 from care_sim.training.config import PpoConfig
+from care_sim.training.networks import mixing
 
 
 def test_without_tracks_no_picture_tells_of_a_forecast():
@@ -28,8 +28,8 @@ def test_without_tracks_no_picture_tells_of_a_forecast():
 def learned(tmp_path):
     """A learner that learned a little without something, and the weights that it keeps."""
     pytest.importorskip("stable_baselines3")
-    from care_sim.training.algorithms import make_learner
     from care_sim.training.environments import side_by_side
+    from care_sim.training.run import make_learner
 
     def learn(*without):
         config = PpoConfig(environments=2, rollout=32, batch=32, hidden=8, without=without)

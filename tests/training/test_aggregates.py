@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from care_sim.base.errors import InvalidInput
-from care_sim.training.aggregates import interquartile_mean, performance_profile
+from care_sim.training.curves import interquartile_mean, performance_profile
 
 TABLES = arrays(float, st.tuples(st.integers(2, 5), st.integers(1, 3)),
                 elements=st.floats(-100, 100).map(lambda value: round(value, 3)))  # fmt: skip

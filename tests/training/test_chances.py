@@ -7,7 +7,7 @@ import pytest
 
 from care_sim.envs import make_env
 from care_sim.envs.open_loop import FilmEnv
-from care_sim.training.chances import MissedChances
+from care_sim.training.drawn import MissedChances
 from tests.helpers.handmade_film import BEHIND, BESIDE, ENTRY, WALKER, handmade_film, returns_of
 
 

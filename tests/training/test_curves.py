@@ -7,11 +7,11 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.cli import main
+from care_sim.study.episode_play import Played
 from care_sim.training.config import PpoConfig, SacConfig
-from care_sim.training.curves import grouped_runs, read_run
+from care_sim.training.curves import curves_table, grouped_runs, read_run
 from care_sim.training.curves_figure import curves_figure
-from care_sim.training.curves_table import curves_table
-from care_sim.training.episodes import EpisodeRow, Played, write_episodes
+from care_sim.training.validation import EpisodeRow, write_episodes
 
 DISTANCES = (4.0, 10.0, 16.0)
 

@@ -8,18 +8,15 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.cli import main
-from care_sim.perception.pillars.detector import PillarsDetector
-from care_sim.perception.pillars.network import Fixed, answers, place_planes
-from care_sim.perception.pillars.plan import REACH_M, on_plan
-from care_sim.perception.pillars.weights import load_detector, save_detector
-from care_sim.training import detector
-from care_sim.training.detector_data import Example
-from care_sim.training.detector_score import PLAIN, Judged, Peaks, calibration_of, right
-from care_sim.training.detector_targets import targets_of
+from care_sim.perception.pillars.detector import PillarsDetector, load_detector, save_detector
+from care_sim.perception.pillars.network import REACH_M, Fixed, answers, on_plan, place_planes
+from care_sim.training.supervised import detector
+from care_sim.training.supervised.detector import PLAIN, Judged, Peaks, calibration_of, right
+from care_sim.training.supervised.detector_data import Example, targets_of
 from tests.helpers.made_points import HEIGHT, road, shell
 
 torch = pytest.importorskip("torch")
-from care_sim.training.detector_network import Learning  # noqa: E402 (it needs PyTorch)
+from care_sim.training.supervised.detector_network import Learning  # noqa: E402 (it needs PyTorch)
 
 
 def street(seed):

@@ -7,12 +7,12 @@ import pytest
 
 from care_sim.core.types import CLASSES
 from care_sim.envs.open_loop import FilmEnv
-from care_sim.perception.pillars.box_kernels import points_within
-from care_sim.perception.pillars.plan import REACH_M
+from care_sim.perception.pillars.decoding import points_within
+from care_sim.perception.pillars.network import REACH_M
 from care_sim.policies import maker, tags_of
 from care_sim.sensors.setups import setup_names
 from care_sim.sources.street_films import street_film
-from care_sim.training.detector_data import OTHER_SETUPS, POLICIES, play, scanned
+from care_sim.training.supervised.detector_data import OTHER_SETUPS, POLICIES, play, scanned
 
 DRIVE = 10_003
 

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from care_sim.training.detector_data import Example
-from care_sim.training.detector_targets import Targets, loss, targets_of
+from care_sim.training.supervised.detector_data import Example, Targets, loss, targets_of
 
 torch = pytest.importorskip("torch")
 NOTHING = np.empty((0, 3), np.float32)

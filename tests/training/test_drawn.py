@@ -7,15 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_sim import SensorSetup
 from care_sim.base.errors import InvalidInput
-from care_sim.base.seed_ranges import TRAINING, VALIDATION, split_of
+from care_sim.base.seeds import TRAINING, VALIDATION, split_of
 from care_sim.core.grid import AngularGrid
+from care_sim.core.sensor_setup import SensorSetup
 from care_sim.envs import make_env
 from care_sim.envs.sensing import sensing
 from care_sim.training.config import PpoConfig, RecurrentPpoConfig, SacConfig
-from care_sim.training.drawn_env import Mirrored
-from care_sim.training.draws import STREETS, drawn
+from care_sim.training.drawn import STREETS, Mirrored, drawn
 from care_sim.training.environments import plain, training, validation_episodes, wrapped
 from care_sim.wrappers import GridObservation, SectorReserve
 

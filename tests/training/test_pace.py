@@ -2,7 +2,7 @@
 
 import pytest
 
-from care_sim.training.pace import Pace
+from care_sim.training.run import Pace
 
 COMPILING_S = 60.0
 ACTING_S, LEARNING_S = 1.0, 3.0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from care_sim.core.grid import AngularGrid
-from care_sim.training.place_map import first_returns, sighting_map
+from care_sim.training.supervised.place import first_returns, sighting_map
 from tests.helpers.handmade_film import BEHIND, BESIDE, BUS, WALKER, handmade_film, returns_of
 
 GRID = AngularGrid()

@@ -5,14 +5,14 @@ from contextlib import closing
 import numpy as np
 import pytest
 
-from care_sim.base.seed_ranges import TRAINING, VALIDATION
+from care_sim.base.seeds import TRAINING, VALIDATION
 from care_sim.cli import main
 from care_sim.envs.scenarios import DriveEnv
 from care_sim.policies import make_policy
 from care_sim.policies.learned.cell_inputs import RIG_INPUTS, SCAN_INPUTS
 from care_sim.policies.learned.weights import load_weights
-from care_sim.training import scorer
-from care_sim.training.scorer_data import Examples, drawn_examples
+from care_sim.training.supervised import scorer
+from care_sim.training.supervised.scorer import Examples, drawn_examples
 
 torch = pytest.importorskip("torch")
 INPUTS = SCAN_INPUTS + len(RIG_INPUTS)

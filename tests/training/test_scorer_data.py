@@ -11,10 +11,9 @@ from care_sim.envs.scenarios import DriveEnv
 from care_sim.policies.learned.cell_inputs import RIG_INPUTS, SCAN_INPUTS, CellInputs
 from care_sim.sources.street_films import street_film
 from care_sim.streets.street import CALIBRATION_SEEDS, EVALUATION_SEEDS
-from care_sim.training import drawn_worlds
-from care_sim.training.drawn_worlds import front_alone
-from care_sim.training.scorer import HELD_OUT
-from care_sim.training.scorer_data import (
+from care_sim.training.supervised import worlds
+from care_sim.training.supervised.scorer import (
+    HELD_OUT,
     OTHER_CELLS,
     SCORER_BUDGETS,
     Examples,
@@ -23,6 +22,7 @@ from care_sim.training.scorer_data import (
     examples,
     untracked_cells,
 )
+from care_sim.training.supervised.worlds import front_alone
 
 
 @pytest.fixture(scope="module")
@@ -131,8 +131,8 @@ def test_a_drawn_play_gives_the_same_examples_again_at_its_own_budget(monkeypatc
         told.append(conditions(rng, faulty))
         return told[-1]
 
-    conditions = drawn_worlds._conditions
-    monkeypatch.setattr(drawn_worlds, "_conditions", watched)
+    conditions = worlds._conditions
+    monkeypatch.setattr(worlds, "_conditions", watched)
     once, again, other = ([*drawn_examples("ncap", seed)] for seed in (10_002, 10_002, 10_003))
     assert once
     for one, same in zip(once, again, strict=True):

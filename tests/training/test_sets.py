@@ -8,14 +8,14 @@ import pytest
 
 import care_sim
 from care_sim.cli import main
-from care_sim.core.boxes import planar_ranges
+from care_sim.core.cells.boxes import planar_ranges
 from care_sim.core.grid import AngularGrid
 from care_sim.envs.scenarios import DriveEnv
+from care_sim.policies.learned.learned_sets import LEARNED_RETURNS, STEPS, SetNetwork
 from care_sim.policies.learned.set_items import ITEM_INPUTS, STRIP_INPUTS, ItemReader, Items
-from care_sim.policies.learned.set_network import LEARNED_RETURNS, STEPS, SetNetwork
 from care_sim.policies.learned.weights import Card, load_weights, save_weights
-from care_sim.training import drawn_worlds, sets, sets_data, sets_network
-from care_sim.training.sets_data import Example
+from care_sim.training.supervised import sets, sets_data, worlds
+from care_sim.training.supervised.sets_data import Example
 
 torch = pytest.importorskip("torch")
 PLACES = 13 * 32
@@ -37,12 +37,12 @@ def drawn(seed, count=200):
 
 @pytest.fixture(scope="module")
 def learned():
-    return sets_network.learn([*drawn(0)], PLACES, 0, 300)
+    return sets.learn([*drawn(0)], PLACES, 0, 300)
 
 
 def test_it_learns_what_there_is_to_learn(learned):
-    untaught = sets_network.learn([*drawn(0)], PLACES, 0, 1)
-    before, after = (sets_network.losses_of(one, [*drawn(1)]) for one in (untaught, learned))
+    untaught = sets.learn([*drawn(0)], PLACES, 0, 1)
+    before, after = (sets.losses_of(one, [*drawn(1)]) for one in (untaught, learned))
     assert after["items"] < 0.1 < before["items"]
     assert after["strips"] < 0.5 * before["strips"]
 
@@ -57,7 +57,7 @@ def test_what_acts_is_what_has_learned(learned, tmp_path):
     told = -np.log(shares[np.arange(5), one.answers]).mean()
     chances = network.strip_chances(items, one.places)
     strips = -np.log(np.where(one.found > 0, chances, 1 - chances)).mean()
-    losses = sets_network.losses_of(learned, [one])
+    losses = sets.losses_of(learned, [one])
     assert losses["items"] == pytest.approx(told, rel=1e-2)
     assert losses["strips"] == pytest.approx(strips, rel=1e-3)
 
@@ -65,7 +65,7 @@ def test_what_acts_is_what_has_learned(learned, tmp_path):
 @pytest.mark.parametrize("without", [["attention"], ["inputs"], ["attention", "inputs", "place"]])
 def test_what_is_left_out_decides_nothing(without, tmp_path):
     """And what is not left out does: weights of the same form, which act in NumPy."""
-    arrays = sets_network.learn([*drawn(0)], PLACES, 0, 60, without)
+    arrays = sets.learn([*drawn(0)], PLACES, 0, 60, without)
     save_weights(tmp_path / "w.npz", arrays, Card("learned-sets", AngularGrid()))
     network = SetNetwork(load_weights(tmp_path / "w.npz"), PLACES)
     rng = np.random.default_rng(4)
@@ -91,7 +91,7 @@ def test_constants_are_the_shares_of_each_kind(tmp_path):
         replace(one, weights=np.where(one.found > 0, 1, 25).astype(np.float32)) for one in drawn(0)
     ]
     parts = ["attention", "inputs", "place"]
-    constants = sets_network.learn(examples, PLACES, 0, 1500, parts)
+    constants = sets.learn(examples, PLACES, 0, 1500, parts)
     save_weights(tmp_path / "w.npz", constants, Card("learned-sets", AngularGrid()))
     network = SetNetwork(load_weights(tmp_path / "w.npz"), PLACES)
     for kind in (0, 1):
@@ -104,16 +104,16 @@ def test_constants_are_the_shares_of_each_kind(tmp_path):
         np.concatenate([getattr(one, name) for one in examples]) for name in ("found", "weights")
     )
     share = np.average(found, weights=weights)
-    assert 3 * sets_network.RARE < share < 5 * sets_network.RARE
+    assert 3 * sets.RARE < share < 5 * sets.RARE
     chances = network.strip_chances(Items(None, 0, inputs, strips), np.arange(PLACES))
     assert chances == pytest.approx(np.full(PLACES, share), rel=0.3)
     assert np.ptp(chances) == 0
 
 
 def test_without_faults_the_camera_has_none(monkeypatch):
-    told = [drawn_worlds._conditions(np.random.default_rng(seed), False) for seed in range(50)]
+    told = [worlds._conditions(np.random.default_rng(seed), False) for seed in range(50)]
     assert {name for one in told for name in one} == {"budget"}
-    faulty = [drawn_worlds._conditions(np.random.default_rng(seed), True) for seed in range(50)]
+    faulty = [worlds._conditions(np.random.default_rng(seed), True) for seed in range(50)]
     assert [one["budget"] for one in told] == [one["budget"] for one in faulty]
     asked = []
     monkeypatch.setattr(sets, "play", lambda *which: asked.append(which[-1]) or [])
@@ -215,9 +215,9 @@ def test_worlds_of_a_round_are_of_training_seeds_and_none_comes_twice(monkeypatc
     asked = []
     monkeypatch.setattr(sets, "play", lambda *which: asked.append(which) or [])
     first = 10_000
-    for worlds in sets.ROUNDS:
-        sets.gathered(worlds, first, None)
-        first += max(worlds.values())
+    for counts in sets.ROUNDS:
+        sets.gathered(counts, first, None)
+        first += max(counts.values())
     played = [(kind, seed) for kind, seed, *_ in asked]
     assert len({*played}) == len(played)
     assert min(seed for _, seed in played) == 10_000

@@ -13,21 +13,19 @@ import pytest
 
 import care_sim
 from care_sim.base.errors import InvalidInput, MissingExtra
-from care_sim.base.seed_ranges import TRAINING, VALIDATION
+from care_sim.base.seeds import TRAINING, VALIDATION
 from care_sim.cli import main, parsed_command
 from care_sim.commands.train import end_of_training
 from care_sim.core.wrapping import Wrapping
 from care_sim.policies.learned.weights import load_weights
 from care_sim.scenarios import PLUGINS
 from care_sim.study import provenance
-from care_sim.training.algorithms import algorithm
 from care_sim.training.config import PpoConfig, SacConfig
 from care_sim.training.environments import plain, training
-from care_sim.training.episodes import read_episodes
 from care_sim.training.folder import Folder
-from care_sim.training.run import RULES, played_rules
+from care_sim.training.run import RULES, algorithm, played_rules
 from care_sim.training.seeds import validation_seeds
-from care_sim.training.validation import ValidationScore, play, rule
+from care_sim.training.validation import ValidationScore, play, read_episodes, rule
 
 SHORT = ["--environments", "2", "--episodes", "2", "--env-parameters", "duration_s=1.0"]
 TOLD = ("scoring_info=True",)

@@ -14,8 +14,8 @@ from gymnasium.vector.utils import batch_space, create_empty_array
 from numpy.typing import NDArray
 
 from care_sim.base.checks import as_array, check_flag, check_whole
-from care_sim.base.cores import CORES
 from care_sim.base.errors import InvalidInput, shown
+from care_sim.base.limits import CORES
 from care_sim.base.vectors import shared_attribute
 from care_sim.core.arrays import Floats, Mask
 from care_sim.core.conditions import ClosedLoopConditions

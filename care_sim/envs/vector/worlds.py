@@ -16,7 +16,7 @@ from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.envs.reward import BEGINNING, BOUND, REWARD_WEIGHTS, terms, weighted
 from care_sim.envs.sensing import Observed
 from care_sim.envs.vector.arguments import Maker
-from care_sim.evaluation.metrics import outcome_of
+from care_sim.evaluation.outcomes import outcome_of
 from care_sim.loops.episode import most_keyframes
 from care_sim.loops.records import Outcome, Records, kind_of
 

@@ -14,7 +14,7 @@ from care_sim.base.checks import check_flag
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.arrays import Floats, Mask
 from care_sim.core.belief import OBSERVED, Observation
-from care_sim.core.beliefs import Beliefs
+from care_sim.core.observation.beliefs import Beliefs
 from care_sim.envs.sensing import sensing, shows_belief
 from care_sim.envs.wrappers.reading import (
     AnyVector,

@@ -13,7 +13,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv, VectorWrapper
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.vectors import attribute_of_each
 from care_sim.core.belief import OBSERVED, Observation
-from care_sim.core.beliefs import Beliefs
+from care_sim.core.observation.beliefs import Beliefs
 from care_sim.core.rig import Rig
 
 AnyVector = VectorEnv[Any, Any, Any]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from care_sim.base.vectors import attribute_of_each
 from care_sim.core.arrays import Floats, Mask
-from care_sim.core.beliefs import Beliefs
+from care_sim.core.observation.beliefs import Beliefs
 from care_sim.core.types import Action
 from care_sim.envs.sensing import checked_scores, sensing, shows_belief
 from care_sim.envs.wrappers.reading import (
@@ -24,8 +24,7 @@ from care_sim.envs.wrappers.reading import (
     rig_of,
     shows_beliefs,
 )
-from care_sim.policies.learned.sector_choice import SectorActions
-from care_sim.policies.learned.tiling import Tiling
+from care_sim.policies.learned.sectors import SectorActions, Tiling
 
 
 class _Sectors(gymnasium.ActionWrapper[Any, NDArray[np.float32], Action], RecordConstructorArgs):

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from care_sim.base.checks import check_number, check_whole
 from care_sim.core.belief import Belief
+from care_sim.core.cells.stack import Grid
 from care_sim.core.grid import Cells, Head
-from care_sim.core.grid_stack import Grid
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.policies.base import FixedPolicy, Policy
@@ -23,9 +23,11 @@ follow the rig's `sensor_height_m`."""
 
 
 class Fan(FixedPolicy):
-    """Fires what lies ahead, between the horizon and `LOWEST_DEG`, the columns nearest to straight
-    ahead first: at 3% of the paper's grid 20 degrees to either side. When the fan has gone all
-    round, the other rows follow in the same way. Several LiDARs make one fan.
+    """Fires what lies ahead, up to the horizon, the columns nearest to straight ahead first.
+
+    The fan lies between the horizon and `LOWEST_DEG`: at 3% of the paper's grid 20 degrees to
+    either side. When the fan has gone all round, the other rows follow in the same way. Several
+    LiDARs make one fan.
 
     With `shots` it asks for as many times fewer cells, each of which hardware that fires cells
     several times then fires as often. Raises InvalidInput for less than one.
@@ -71,10 +73,11 @@ ENTRY_DISTANCE_M = 50.0
 
 
 class Rows(FixedPolicy):
-    """Fires the rows nearest to the elevation at which things enter the range, nearest first; the
-    last row is thinned evenly. That elevation follows from the rig (`entry_elevation_deg`), unless
-    one is given. `shots` are as of `Fan`. Raises InvalidInput for an elevation that is none, and
-    for less than one shot.
+    """Fires the rows nearest to the elevation at which things enter the range, nearest first.
+
+    The last row is thinned evenly. That elevation follows from the rig (`entry_elevation_deg`),
+    unless one is given. `shots` are as of `Fan`. Raises InvalidInput for an elevation that is none,
+    and for less than one shot.
     """
 
     name = "rows"
@@ -184,8 +187,9 @@ class Sweep(Policy):
 
 
 class Place(FixedPolicy):
-    """Fires the cells in which most first sightings were detected in the calibration's streets. It
-    knows a place and sees nothing: what a policy with a camera must beat.
+    """Fires the cells in which most first sightings were detected in the calibration's streets.
+
+    It knows a place and sees nothing: what a policy with a camera must beat.
 
     `path` is a map that `care-sim train place` wrote; the shipped one, unless given. Raises
     InvalidInput for a file of something else or made for another grid.

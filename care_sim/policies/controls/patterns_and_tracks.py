@@ -10,7 +10,7 @@ from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
 from care_sim.policies.controls.patterns import Place, Rows, likeliest_cells
-from care_sim.policies.own.care_spread import CORE_FIRST, Round
+from care_sim.policies.own.care import CORE_FIRST, Round
 
 
 class HistoryPattern(Policy):
@@ -58,8 +58,10 @@ MAP_SHARE = 0.35
 
 
 class PlaceHulls(Policy):
-    """`MAP_SHARE` of the budget for the likeliest cells of the map `place`, then two rounds of a
-    few cells for every hull, the undilated core first as in `care-spread`; what is left goes on
+    """The likeliest cells of the map `place`, then a few cells of every hull.
+
+    `MAP_SHARE` of the budget goes to the likeliest cells of the map `place`, then two rounds of a
+    few cells to every hull, the undilated core first as in `care-spread`; what is left goes on
     down the map. What a camera must beat in a policy that serves its tracks as sparingly.
 
     `path` is a map as for `place`.

@@ -16,15 +16,19 @@ from care_sim.policies.learned.cell_inputs import (
     SCAN_INPUTS,
     CellFeatures,
     CellInputs,
+    MarkWeights,
+    RigTerms,
+    network_scores,
 )
-from care_sim.policies.learned.cell_kernels import MarkWeights, RigTerms, network_scores
 from care_sim.policies.learned.weights import Weights, load_weights, shipped_weights
 
 
 class LearnedScorer(Policy):
-    """The learned scorer of the paper (Sec. 5.1). A small network scores every cell by what a
-    policy can see of it (`care_sim.policies.learned.cell_inputs`), and the reserve asks for the rho
-    B highest. What exploitation has of them already goes to the floor, as with `history-uniform`.
+    """The learned scorer of the paper (Sec. 5.1): history with a learned reserve.
+
+    A small network scores every cell by what a policy can see of it
+    (`care_sim.policies.learned.cell_inputs`), and the reserve asks for the rho B highest. What
+    exploitation has of them already goes to the floor, as with `history-uniform`.
 
     `path` is a file of weights that `care-sim train learned-scorer` wrote; without it the shipped
     ones act. They serve any budget and any cameras. Raises InvalidInput for a file of something

@@ -8,7 +8,7 @@ import numpy as np
 
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.belief import Belief
-from care_sim.core.cell_sets import CellSets
+from care_sim.core.cells.sets import CellSets
 from care_sim.core.residual import explaining_tracks, wedge_rays, wedges
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES
@@ -19,7 +19,7 @@ from care_sim.policies.learned.set_kernels import (
     look_at_strips,
     look_back,
 )
-from care_sim.policies.own.care_spread import CORE_FIRST
+from care_sim.policies.own.care import CORE_FIRST
 from care_sim.policies.paper.tracks import GROUND_CLEARANCE_M
 
 LOOKED_AT = 24

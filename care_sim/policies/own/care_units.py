@@ -5,12 +5,12 @@ import numpy as np
 from care_sim.core.allocation import allocate
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.belief import Belief
-from care_sim.core.boxes import planar_ranges
+from care_sim.core.cells.boxes import planar_ranges
 from care_sim.core.grid import Cells
 from care_sim.core.residual import ray_starts, wedge_rays, wedges
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES, Demand, ImageDetections, Tracks
-from care_sim.policies.own.care_sightlines import CareSightlines
+from care_sim.policies.own.care import CareSightlines
 from care_sim.sensors.signal import Signal
 from care_sim.world.bodies import CATALOGUE
 
@@ -84,7 +84,7 @@ class TargetShots:
 
 
 class CareUnits(CareSightlines):
-    """`care-sightlines`, whose cells vote for the units of the hardware (`care_sim.core.firing`).
+    """`care-sightlines`, whose cells vote for the units of the hardware.
 
     Projected in its own order, a demand spends a unit on every first cell, however few others share
     it. Here a unit is worth the cells that it holds of those that the allocator takes. The first of

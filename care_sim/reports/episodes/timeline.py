@@ -16,7 +16,7 @@ from care_sim.loops.records import DriveOutcome, Keyframe
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.play_config import PlayConfig
 from care_sim.study.run_config import Row
-from care_sim.study.scene_trace import PlayedScene
+from care_sim.study.scene_play import PlayedScene
 
 _COLUMNS = (
     "time\ns",

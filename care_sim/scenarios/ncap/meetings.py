@@ -30,9 +30,8 @@ from care_sim.scenarios.ncap.table import (
 )
 from care_sim.streets.layouts import LANE_WIDTH_M
 from care_sim.world.bodies import CATALOGUE, BodyKind, Triple, sized
+from care_sim.world.motions import StraightWay, Walk
 from care_sim.world.route import Leg, Route
-from care_sim.world.straight_way import StraightWay
-from care_sim.world.walker import Walk
 from care_sim.world.world import Motion, World
 
 CLEAR_M = 0.2

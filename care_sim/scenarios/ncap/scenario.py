@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from care_sim.base.bounds import bounded, one_of
+from care_sim.base.checks import bounded, one_of
 from care_sim.base.errors import InvalidInput
 from care_sim.scenarios.base import (
     LONGEST_EPISODE_S,

@@ -13,9 +13,9 @@ from care_sim.base.digests import Stamp, file_digest, file_stamp
 from care_sim.base.errors import InvalidInput
 from care_sim.loops.film import Film
 from care_sim.sources.film_checks import report_once
+from care_sim.sources.nuscenes.cameras import CAMERA_TIMES, OWN
 from care_sim.sources.nuscenes.detections import DetectionFile
 from care_sim.sources.nuscenes.films import nuscenes_film, sweep_files
-from care_sim.sources.nuscenes.pictures import CAMERA_TIMES, OWN
 from care_sim.sources.nuscenes.table_files import FIELDS, JsonRow, read_json
 from care_sim.sources.nuscenes.tables import Database
 from care_sim.sources.recordings import Recordings

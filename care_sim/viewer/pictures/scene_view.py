@@ -9,7 +9,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from care_sim.core.arrays import Floats
-from care_sim.core.boxes import box_corners, planar_ranges
+from care_sim.core.cells.boxes import box_corners, planar_ranges
 from care_sim.core.residual import wedge_rays
 from care_sim.core.rig import Rig
 from care_sim.evaluation.sightings import RANGE_M

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from care_sim import SensorSetup
 from care_sim.core.pinhole import PinholeCamera
+from care_sim.core.sensor_setup import SensorSetup
 from care_sim.envs import CLOSED_LOOP
 from care_sim.envs.scenarios import DartoutEnv
 from care_sim.envs.vector.arguments import why_separate

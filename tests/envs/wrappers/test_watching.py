@@ -13,7 +13,7 @@ import pytest
 from gymnasium.vector import SyncVectorEnv
 
 import care_sim
-from care_sim.core.actions import CHOSEN
+from care_sim.core.firing.actions import CHOSEN
 from care_sim.envs.wrappers.record_rerun import Watching, numbered
 from care_sim.wrappers import ExportScans, RecordRerun, SectorReserve
 

@@ -7,12 +7,10 @@ from hypothesis import strategies as st
 from scipy.special import logit
 
 from care_sim.core.types import CLASSES
-from care_sim.perception.pillars.box_kernels import one_a_place, points_within
-from care_sim.perception.pillars.decoding import peaks_of, score
-from care_sim.perception.pillars.plan import CELLS, REACH_M
+from care_sim.perception.pillars.decoding import one_a_place, peaks_of, points_within, score
+from care_sim.perception.pillars.network import CELLS, REACH_M
 from care_sim.perception.points_only import inside
-from care_sim.training.detector_data import Example
-from care_sim.training.detector_targets import targets_of
+from care_sim.training.supervised.detector_data import Example, targets_of
 
 HEIGHT = 1.84
 PLAIN = np.tile([1.0, 0.0], (len(CLASSES), 1))

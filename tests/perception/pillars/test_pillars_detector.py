@@ -8,13 +8,19 @@ import pytest
 
 from care_sim.base.array_files import write_arrays
 from care_sim.base.errors import InvalidInput, MissingExtra
-from care_sim.core.boxes import planar_ranges
+from care_sim.core.cells.boxes import planar_ranges
 from care_sim.perception.detectors import make_detector
 from care_sim.perception.matching import found_objects
-from care_sim.perception.pillars import weights
+from care_sim.perception.pillars import detector as pillars
 from care_sim.perception.pillars.detector import PillarsDetector
-from care_sim.perception.pillars.network import LAYERS, Fixed, answers, place_planes
-from care_sim.perception.pillars.plan import PILLARS, on_plan
+from care_sim.perception.pillars.network import (
+    LAYERS,
+    PILLARS,
+    Fixed,
+    answers,
+    on_plan,
+    place_planes,
+)
 from care_sim.perception.points_only import PointsOnly, checked
 from care_sim.sources.street_films import street_film
 from tests.helpers.detector_weights import drawn_arrays, drawn_weights
@@ -57,7 +63,7 @@ def test_of_a_pillar_its_mean_point_counts_and_how_many_they_are(tmp_path):
     answers_to = {}
     for told in (True, False):
         arrays["near0.weight"][:, LAYERS["point1"].outputs] *= told
-        weights.save_detector(tmp_path / "told.npz", arrays, {})
+        pillars.save_detector(tmp_path / "told.npz", arrays, {})
         detector = PillarsDetector(tmp_path / "told.npz")
         answers_to[told] = [detector.answer(points, HEIGHT) for points in (POINTS, twice)]
     assert np.allclose(*answers_to[False], atol=1e-4)
@@ -132,7 +138,7 @@ def test_the_shipped_detector_finds_most_of_a_street():
 
 def test_the_shipped_card_says_what_the_readme_does():
     made = PillarsDetector()
-    told = (weights.SHIPPED.parent / "README.md").read_text()
+    told = (pillars.SHIPPED.parent / "README.md").read_text()
     result = made.card["result"]
     for name in ("recall, all scans", "recall, full scans", "precision, all scans"):
         assert f"{100 * result[name]:.1f}" in told
@@ -143,8 +149,8 @@ def test_the_shipped_card_says_what_the_readme_does():
 def test_weights_whose_answer_is_no_number_are_told_of(tmp_path):
     """Each number is allowed, but 25 layers of them leave what float32 holds."""
     arrays = {name: array * np.float32(1e4) for name, array in drawn_arrays().items()}
-    arrays[weights.CALIBRATION][:] = 1, 0
-    weights.save_detector(tmp_path / "wild.npz", arrays, {})
+    arrays[pillars.CALIBRATION][:] = 1, 0
+    pillars.save_detector(tmp_path / "wild.npz", arrays, {})
     with pytest.raises(
         InvalidInput, match=r"^weights \S*wild\.npz: the network answers"
     ) as refused:
@@ -169,17 +175,17 @@ def pickled(path):
 
 
 def objects(path):
-    np.savez(path, card=np.array([{"format": weights.FORMAT}], object))
+    np.savez(path, card=np.array([{"format": pillars.FORMAT}], object))
 
 
 def lacking(path):
     arrays = drawn_arrays()
     del arrays["body0.bias"]
-    weights.save_detector(path, arrays, {})
+    pillars.save_detector(path, arrays, {})
 
 
 def of_another_shape(path):
-    weights.save_detector(path, drawn_arrays() | {"body0.bias": np.zeros(3)}, {})
+    pillars.save_detector(path, drawn_arrays() | {"body0.bias": np.zeros(3)}, {})
 
 
 def not_finite(path):
@@ -189,7 +195,7 @@ def not_finite(path):
 
 
 def turned_round(path):
-    weights.save_detector(path, drawn_arrays() | {weights.CALIBRATION: -np.ones((5, 2))}, {})
+    pillars.save_detector(path, drawn_arrays() | {pillars.CALIBRATION: -np.ones((5, 2))}, {})
 
 
 def of_another_format(path):
@@ -223,6 +229,6 @@ def test_a_wrong_file_is_refused_in_one_line_that_names_it(tmp_path, spoil):
 
 
 def test_a_file_holds_the_numbers_of_every_layer():
-    shapes = weights.array_shapes()
+    shapes = pillars.array_shapes()
     assert len(shapes) == 2 * len(LAYERS) + 1
     assert 5e5 < sum(np.prod(shape) for shape in shapes.values()) < 1.5e6

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_sim.perception.pillars.plan import (
+from care_sim.perception.pillars.network import (
     CELL_M,
     OWN_ROOF_M,
     PILLAR_M,

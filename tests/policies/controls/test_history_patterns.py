@@ -5,9 +5,9 @@ import pytest
 
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
-from care_sim.policies.controls.learned_place import HistoryLearnedPlace, learned_cells
 from care_sim.policies.controls.patterns import cells_by_row
 from care_sim.policies.controls.patterns_and_tracks import HistoryPlace, HistoryRows
+from care_sim.policies.controls.rehearsed import HistoryLearnedPlace, learned_cells
 from care_sim.policies.learned.weights import Card, save_weights
 
 GRID = AngularGrid()

@@ -9,7 +9,7 @@ import pytest
 import care_sim
 from care_sim.base.errors import InvalidInput
 from care_sim.core.rig import Rig
-from care_sim.policies.controls.learned_place import LearnedPlace, learned_cells
+from care_sim.policies.controls.rehearsed import LearnedPlace, learned_cells
 from care_sim.scenarios import make_scenario
 
 GRID = Rig().grid

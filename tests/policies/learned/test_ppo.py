@@ -17,7 +17,7 @@ from care_sim.core.wrapping import Wrapping
 from care_sim.envs.wrappers.grid_observation import GridObservation
 from care_sim.envs.wrappers.sector_actions import SectorReserve, SectorScores
 from care_sim.policies.learned.grid_features import CHANNELS
-from care_sim.policies.learned.score_map import ScoreMap
+from care_sim.policies.learned.ppo import ScoreMap
 from care_sim.policies.learned.weights import (
     Card,
     Weights,
@@ -115,9 +115,9 @@ def test_it_fires_what_its_learner_would_behind_the_wrappers(tmp_path, env, acti
 @pytest.mark.parametrize("goes_round", [True, False])
 def test_numpy_predicts_what_stable_baselines3_does(tmp_path, env, goes_round):
     pytest.importorskip("stable_baselines3")
-    from care_sim.training.algorithms import make_learner
     from care_sim.training.config import PpoConfig
     from care_sim.training.environments import side_by_side
+    from care_sim.training.run import make_learner
 
     config = PpoConfig(environments=2, rollout=32, batch=32, hidden=8)
     envs = side_by_side(config)

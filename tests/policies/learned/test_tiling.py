@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.grid import AngularGrid
-from care_sim.policies.learned.tiling import Tiling
+from care_sim.policies.learned.sectors import Tiling
 
 GRID = AngularGrid(columns=4, rows=4)
 QUARTERS = Tiling(GRID, 2, 2)

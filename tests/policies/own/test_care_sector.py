@@ -8,8 +8,7 @@ from care_sim.core.grid import AngularGrid
 from care_sim.core.residual import camera_layers
 from care_sim.core.rig import Rig
 from care_sim.policies.controls.patterns import cells_by_row
-from care_sim.policies.own.care_sector import CareSector
-from care_sim.policies.own.care_spread import CORE_FIRST
+from care_sim.policies.own.care import CORE_FIRST, CareSector
 from care_sim.policies.own.sight_lines import columns_ahead
 
 

@@ -10,7 +10,7 @@ from care_sim.core.belief import MAX_DETECTIONS
 from care_sim.core.residual import camera_layers
 from care_sim.core.types import ImageDetections
 from care_sim.policies.controls.patterns import cells_by_row
-from care_sim.policies.own.care_spread import CORE_FIRST
+from care_sim.policies.own.care import CORE_FIRST
 
 
 def blind(observation):

@@ -6,7 +6,7 @@ import care_sim
 from care_sim.core.belief import Belief
 from care_sim.core.residual import camera_layers
 from care_sim.core.rig import Rig
-from care_sim.policies.own.care_spread import CORE_FIRST, CareSpread
+from care_sim.policies.own.care import CORE_FIRST, CareSpread
 
 
 def assert_same(sets, expected):

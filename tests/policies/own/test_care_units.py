@@ -9,7 +9,7 @@ from care_sim.core.allocation import allocate
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
-from care_sim.policies.own.care_sightlines import CareSightlines
+from care_sim.policies.own.care import CareSightlines
 from care_sim.policies.own.care_units import CareUnits
 
 GRID = AngularGrid(columns=12, rows=6)

@@ -1,0 +1,250 @@
+"""Controls that have played this very scenario before: in training seeds to learn where it hides
+its actor, or in the seed that is played.
+"""
+
+from collections.abc import Mapping
+from contextlib import closing
+from dataclasses import replace
+from functools import lru_cache
+from typing import ClassVar
+
+import numpy as np
+
+from care_sim.base.checks import check_flag, check_known, check_whole
+from care_sim.base.seeds import training_seeds
+from care_sim.core.arrays import Floats
+from care_sim.core.belief import Belief
+from care_sim.core.cells.boxes import planar_ranges
+from care_sim.core.conditions import ClosedLoopConditions
+from care_sim.core.frames import Frame
+from care_sim.core.grid import Cells
+from care_sim.core.rig import Rig
+from care_sim.core.types import Demand
+from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.loops.episode import EpisodeSeeds
+from care_sim.policies.base import FixedPolicy, Policy
+from care_sim.policies.controls.patterns import likeliest_first
+from care_sim.policies.controls.patterns_and_tracks import HistoryPattern
+from care_sim.scenarios import SCENARIOS, make_scenario
+from care_sim.scenarios.base import Scenario
+from care_sim.world.world import World
+
+FALLBACK_SCENARIO = "dense"
+"""What is rehearsed where no scenario is told, as in the open loop."""
+
+
+def known_scenario(told: Scenario | str | None) -> Scenario:
+    """The scenario of the environment, or one by name with its default arguments.
+
+    Raises InvalidInput for an unknown name.
+    """
+    if isinstance(told, Scenario):
+        return told
+    name = FALLBACK_SCENARIO if told is None else told
+    check_known("scenario", name, SCENARIOS)
+    return make_scenario(name)
+
+
+def rehearsal(scenario: Scenario, seed: int, rig: Rig) -> ClosedLoop:
+    """The episode of a seed before its first keyframe, as an environment without faults builds it.
+
+    The caller closes its world.
+    """
+    seeds = EpisodeSeeds.of(seed)
+    world = scenario.make_world(np.random.default_rng(seeds.scenario))
+    # A rig that was made alone may have no camera; the scenario's environment has these.
+    equipped = rig if rig.cameras else replace(rig, cameras=scenario.cameras)
+    return ClosedLoop(world, equipped, ClosedLoopConditions(), seeds.sensors)
+
+
+class LearnedPlace(FixedPolicy):
+    """Fires the cells in which this very scenario hid its actor in other seeds.
+
+    They are those in which a full scan first detected the first-sighting actor in the first `seeds`
+    training seeds of the scenario.
+
+    `make_policy` tells it the `scenario` of the environment, with its parameters. Raises
+    InvalidInput for an unknown scenario.
+    """
+
+    name = "learned-place"
+    tags = ("causal", "learned", "control")
+    source = "own: a map of the scenario's training seeds that never changes"
+    told: ClassVar[Mapping[str, str]] = {"scenario": "scenario"}
+    is_pattern = True
+
+    def __init__(self, rig: Rig, scenario: Scenario | str | None = None, seeds: int = 10):
+        super().__init__(rig)
+        self._pattern = learned_cells(rig, scenario, seeds)
+
+    def fixed(self, budget: int) -> Demand:
+        """The same cells at every keyframe."""
+        return Demand(layers=[[self._pattern[:budget]]])
+
+
+def learned_cells(rig: Rig, scenario: Scenario | str | None, seeds: int) -> Cells:
+    """(N,) all cells, those first in which most of the actors were found.
+
+    Raises InvalidInput for an unknown scenario, or `seeds` beyond 1 to 1,000.
+    """
+    check_whole("seeds", seeds, 1, 1000)
+    # All budgets share a map: it is learned with a full scan.
+    return _learned(replace(rig, budget=rig.grid.size), known_scenario(scenario), seeds)
+
+
+@lru_cache(maxsize=8)
+def _learned(rig: Rig, scenario: Scenario, seeds: int) -> Cells:
+    sightings = np.zeros(rig.grid.size)
+    for seed in training_seeds(seeds):
+        # A hull is dilated by the paper's margins, its guess of how far off a box can be.
+        sightings[_first_hull(rig, scenario, seed)] += 1
+    return likeliest_first(rig, sightings)
+
+
+def _first_hull(rig: Rig, scenario: Scenario, seed: int) -> Cells:
+    """The hull of the first-sighting actor at the first keyframe at which a full scan detects it;
+    no cell if it never does.
+    """
+    everything = np.arange(rig.grid.size)
+    loop = rehearsal(scenario, seed, rig)
+    with closing(loop.world) as world:
+        over = False
+        while (target := world.first_sighting) and not over:
+            # Where the actor is at the scan: the keyframe moves the world on.
+            boxes = loop.sensor.boxes_to_local(world.boxes([target]))
+            record = loop.keyframe(everything)
+            if record.detected:
+                (hull,) = rig.hulls(boxes)
+                return hull
+            hit = record.impact_speed_mps is not None
+            over = hit or world.is_over() or world.time >= scenario.duration_s
+    return np.zeros(0, np.int64)
+
+
+class HistoryLearnedPlace(HistoryPattern):
+    """The hulls of the history policy; the reserve goes to the map of `learned-place`, of which it
+    has the parameters.
+    """
+
+    name = "history-learned-place"
+    tags = ("causal", "learned", "control")
+    source = "own: history, and a map of the scenario's training seeds that never changes"
+    told: ClassVar[Mapping[str, str]] = {"scenario": "scenario"}
+
+    def __init__(self, rig: Rig, scenario: Scenario | str | None = None, seeds: int = 10):
+        super().__init__(LearnedPlace(rig, scenario, seeds))
+
+
+class SeedFinder(Policy):
+    """A warning: it finds the seed by the first observation and knows the episode from then on.
+
+    Of the first `seeds` seeds of a public
+    `scenario` it takes the one whose ego begins at the speed that it reads, and of several such the
+    one whose first picture it sees. It lets a twin of that episode's world go on beside it, its ego
+    driven as the own car drives, and reserves the hulls of where all who come out of hiding are by
+    then. It needs no return. It plays as history does if no seed that it knows begins at that
+    speed: with a seed beyond `seeds`, a `secret` of the environment, or noise of the speed.
+
+    `make_policy` tells it the `scenario` of the environment, with its parameters. Made of a rig
+    alone it takes `dense`. In another scenario than it is given by name the first speed can be the
+    same. It then finds the seed, and fires where they would be in the scenario that it knows.
+
+    With `hidden_first` it asks for these hulls before anything else and gives its tracks what is
+    left. It knows nothing of the traffic, so that in drives others may hit less.
+
+    It is a control, no contender: what it reaches without a camera is what the seeds give away.
+    """
+
+    name = "seed-finder"
+    tags = ("generator", "control")
+    source = "own: what public seeds give away"
+    told: ClassVar[Mapping[str, str]] = {"scenario": "scenario"}
+    """A rig does not say through which scenario it drives, and scenarios share first speeds."""
+
+    def __init__(
+        self,
+        rig: Rig,
+        scenario: Scenario | str | None = None,
+        seeds: int = 30,
+        hidden_first: bool = False,
+    ):
+        check_whole("seeds", seeds, 1, 10**6)
+        check_flag("hidden_first", hidden_first)
+        super().__init__(rig)
+        self._hidden_first = hidden_first
+        self._scenario = known_scenario(scenario)
+        self._seeds = seeds
+        self._twin: World | None = None
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the episode."""
+        self.found: int | None = None
+        """The seed that fits the first observation; None if there is none."""
+        if self._twin is not None:
+            self._twin.close()
+        self._twin = None
+        self._speed: float | None = None
+
+    def remember(self, belief: Belief) -> None:
+        """Find the seed by what is seen first, then let its twin follow the car."""
+        speed = belief.ego.speed
+        if self._speed is None:
+            self.found = self._seed_of(belief)
+            if self.found is not None:
+                self._twin = rehearsal(self._scenario, self.found, self.rig).world
+        elif self._twin is not None:
+            # Between keyframes the car holds one acceleration, which both speeds tell.
+            held = (speed - self._speed) / self.rig.keyframe_s
+            self._twin.advance(held, self.rig.keyframe_s)
+        self._speed = speed
+
+    def demand(self, belief: Belief) -> Demand:
+        """Hulls of tracked objects, then of hidden ones."""
+        tracked = self.rig.hulls(belief.tracks.boxes)
+        hidden = self.rig.hulls(self._expected())
+        if self._hidden_first:
+            return Demand(layers=[hidden, tracked])
+        return Demand(tracked, [hidden])
+
+    def _seed_of(self, belief: Belief) -> int | None:
+        # All budgets share what is seen first.
+        rig = replace(self.rig, budget=self.rig.grid.size)
+        seen = _picture(belief)
+        alike: int | None = None
+        for seed in range(self._seeds):
+            speed, picture = _first_look(self._scenario, seed, rig)
+            if speed == belief.ego.speed:
+                if picture == seen:
+                    return seed
+                # A camera with faults shows another picture: then the speed alone has to do.
+                alike = seed if alike is None else alike
+        return alike
+
+    def _expected(self) -> Floats:
+        """(n, 7) boxes in the sensor frame of all who come out of hiding, ahead and within the
+        sensor's reach; none if not known.
+        """
+        if self._twin is None:
+            return np.empty((0, 7))
+        hidden = {one.body for one in self._twin.meetings}
+        if self._twin.first_sighting is not None:
+            hidden.add(self._twin.first_sighting.body)
+        sensor = Frame.mounted(self._twin.ego.pose, self.rig.sensor_position)
+        boxes = sensor.boxes_to_local(self._twin.boxes_of(np.array(sorted(hidden), np.int64)))
+        # Who was passed, or is too far to be detected, would take the cells of who matters.
+        near = planar_ranges(boxes) <= self.rig.grid.range_m
+        return np.asarray(boxes[near & (boxes[:, 0] > 0)])
+
+
+@lru_cache(maxsize=10_000)
+def _first_look(scenario: Scenario, seed: int, rig: Rig) -> tuple[float, bytes]:
+    """Speed and picture with which the episode of a seed begins, as an observation holds them."""
+    loop = rehearsal(scenario, seed, rig)
+    with closing(loop.world):
+        return float(np.float32(loop.belief.ego.speed)), _picture(loop.belief)
+
+
+def _picture(belief: Belief) -> bytes:
+    """The camera's boxes, as an observation holds them: in float32."""
+    return belief.detections.rows().astype(np.float32).tobytes()

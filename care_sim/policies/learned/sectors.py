@@ -1,0 +1,184 @@
+"""Equal tiles of the angular grid: the sectors that an agent scores and the coarse blocks in which
+it sees. And what scores of sectors ask of the shared allocator, and what it then fires, in any
+number of worlds.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import accumulate, pairwise
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_sim.base.checks import check_whole
+from care_sim.base.errors import InvalidInput
+from care_sim.core.arrays import Integers
+from care_sim.core.belief import Belief
+from care_sim.core.cells.sets import CellSets, WorldSets
+from care_sim.core.cells.stack import Grid
+from care_sim.core.firing.actions import Allocator
+from care_sim.core.grid import Cells
+from care_sim.core.observation.beliefs import Beliefs
+from care_sim.core.rig import Rig
+from care_sim.core.types import Action, Demand
+
+_Cells = TypeVar("_Cells", int, Integers)
+
+
+@dataclass(frozen=True)
+class Tiling:
+    """`azimuths` x `elevations` tiles. Raises InvalidInput unless they divide the grid's columns
+    and rows.
+
+    A tile's index is `elevation * azimuths + azimuth`; as with cells, elevation 0 is the highest
+    and azimuth 0 begins straight behind, at -pi. `shape` is that of a picture of the tiles.
+    """
+
+    grid: Grid
+    azimuths: int = 32
+    elevations: int = 4
+
+    def __post_init__(self) -> None:
+        sides = (
+            ("azimuths", self.azimuths, self.grid.columns),
+            ("elevations", self.elevations, self.grid.rows),
+        )
+        for name, count, cells in sides:
+            check_whole(name, count, 1, cells)
+            if cells % count:
+                raise InvalidInput(f"{name} must divide the {cells} of the grid, got {count}")
+        # A tile of two LiDARs would be no place.
+        tall, _ = self.tile_shape
+        if any(head.grid.rows % tall for head in self.grid.heads):
+            rows = ", ".join(str(head.grid.rows) for head in self.grid.heads)
+            raise InvalidInput(
+                f"elevations must make tiles that lie in one LiDAR each: {self.elevations} of them "
+                f"are {tall} rows tall, and the LiDARs have {rows} rows"
+            )
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(elevations, azimuths)."""
+        return self.elevations, self.azimuths
+
+    @property
+    def tile_shape(self) -> tuple[int, int]:
+        """Rows and columns of cells in a tile."""
+        return self.grid.rows // self.elevations, self.grid.columns // self.azimuths
+
+    @cached_property
+    def cells(self) -> Cells:
+        """(tiles, n) the cells of every tile, ascending."""
+        rows, columns = self.tile_shape
+        # Axes: tile row, row in the tile, tile column, column in the tile. The middle two change
+        # places, so that the cells of a tile come together.
+        pictured = np.arange(self.grid.size).reshape(self.elevations, rows, self.azimuths, columns)
+        return pictured.swapaxes(1, 2).reshape(self.elevations * self.azimuths, rows * columns)
+
+    def ranked(self, scores: NDArray[np.floating], enough: int) -> tuple[Integers, Integers]:
+        """Of the tiles of W pictures of `scores` (W, ...) the best (W, m), ties by ascending index,
+        and how many (W,) of these have a strictly positive score; no more tiles than hold `enough`
+        cells.
+        """
+        flat = scores.reshape(len(scores), -1)
+        most = min(-(-enough // self.cells.shape[1]), len(self.cells))
+        # A stable sort of the negated scores: among equals the lower index comes first.
+        best = np.argsort(-flat, axis=1, kind="stable")[:, :most]
+        return best, np.minimum(np.count_nonzero(flat > 0, axis=1), most)
+
+
+def reserve_demand(
+    belief: Belief, rig: Rig, sectors: Tiling, scores: NDArray[np.floating]
+) -> Demand:
+    """The forecasts' hulls, then the sectors with a positive score as layers of the reserve, best
+    first: what `care_sim.policies.learned.sectors.SectorChoice` asks for, in one world and
+    not yet in the rig's `cell_order`, for a policy of your own.
+    """
+    enough = enough_beside_hulls(rig.budget)
+    (ranked,), (count,) = sectors.ranked(np.reshape(scores, (1, -1)), enough)
+    return Demand(
+        rig.hulls(belief.tracks.boxes), [[cells] for cells in sectors.cells[ranked[:count]]]
+    )
+
+
+def enough_beside_hulls(budget: _Cells) -> _Cells:
+    """Cells of sectors that fill a budget, or each of some, whatever the hulls take."""
+    # At most one budget of the cells of sectors is taken by hulls.
+    return 2 * budget
+
+
+class SectorChoice:
+    """The stages of Algorithm 1 for scores (W, ...) of the `sectors` of W worlds. All sets are
+    listed in the rig's `cell_order` already.
+    """
+
+    def __init__(self, rig: Rig, sectors: Tiling):
+        self._rig = rig
+        self._sectors = sectors
+
+    def reserve(self, beliefs: Beliefs, scores: NDArray[np.floating]) -> list[WorldSets]:
+        """The forecasts' hulls, then the sectors with a positive score as layers of the reserve,
+        best first.
+        """
+        return [self.hulls(beliefs), *self._layers(scores, enough_beside_hulls(self._rig.budget))]
+
+    def alone(self, scores: NDArray[np.floating]) -> list[WorldSets]:
+        """The sectors with a positive score alone, best first."""
+        return [WorldSets.nothing(len(scores)), *self._layers(scores, self._rig.budget)]
+
+    def hulls(self, beliefs: Beliefs) -> WorldSets:
+        """The hulls of the forecasts."""
+        hulls = beliefs.hulls
+        return WorldSets(self._rig.listed(hulls.sets), hulls.counts)
+
+    def best(self, scores: NDArray[np.floating], enough: Integers) -> WorldSets:
+        """Of each world one set, the cells of the sectors with a positive score, best first, up to
+        the one that makes them `enough` (W,). One set gives in turn what a layer for each sector
+        would.
+        """
+        tile = self._sectors.cells.shape[1]
+        ranked, counts = self._sectors.ranked(scores, int(enough.max()))
+        counts = np.minimum(counts, -(-enough // tile))
+        cells = self._listed[ranked[np.arange(ranked.shape[1]) < counts[:, None]]]
+        return WorldSets(CellSets(cells.ravel(), counts * tile), np.ones(len(counts), np.int64))
+
+    def _layers(self, scores: NDArray[np.floating], enough: int) -> list[WorldSets]:
+        """The best sector of every world that has one, then the next of each, and so on."""
+        ranked, counts = self._sectors.ranked(scores, enough)
+        has = np.arange(counts.max(initial=0))[:, None] < counts
+        cells = self._listed[ranked.T[: len(has)][has]]
+        sizes = np.full(*cells.shape)
+        ends = accumulate(np.count_nonzero(has, axis=1).tolist(), initial=0)
+        return [
+            WorldSets(CellSets(cells[first:last].ravel(), sizes[first:last]), told)
+            for (first, last), told in zip(pairwise(ends), has.astype(np.int64), strict=True)
+        ]
+
+    @cached_property
+    def _listed(self) -> Cells:
+        """(sectors, n) the cells of every sector in the order in which they are taken."""
+        cells = self._sectors.cells
+        return self._rig.listed(list(cells)).cells.reshape(cells.shape)
+
+
+class SectorActions:
+    """The actions (W, E, A) for scores (W, ...) of the `sectors` of W worlds, each with its own of
+    the `budgets` (W,). They are read-only, and the next call overwrites them.
+    """
+
+    def __init__(self, rig: Rig, sectors: Tiling, budgets: Integers):
+        self._choice = SectorChoice(rig, sectors)
+        self._allocator = Allocator(rig, len(budgets))
+        self._budgets = budgets
+
+    def reserve(self, beliefs: Beliefs, scores: NDArray[np.floating]) -> Action:
+        """See `SectorChoice.reserve`; each world with the budget that it is told."""
+        budgets = beliefs.budgets
+        best = self._choice.best(scores, enough_beside_hulls(budgets))
+        return self._allocator.scores([self._choice.hulls(beliefs), best], budgets)
+
+    def alone(self, scores: NDArray[np.floating]) -> Action:
+        """See `SectorChoice.alone`."""
+        best = self._choice.best(scores, self._budgets)
+        return self._allocator.scores([WorldSets.nothing(len(scores)), best], self._budgets)

@@ -1,0 +1,216 @@
+"""Policies that spend the reserve of CARE in rounds: as many cells of every set as a detection
+needs, before another set has more.
+"""
+
+from collections.abc import Mapping
+from typing import ClassVar, NamedTuple
+
+from care_sim.base.checks import check_flag, check_whole
+from care_sim.core.belief import Belief
+from care_sim.core.cells.sets import CellSets, WorldSets
+from care_sim.core.conditions import MIN_RETURNS
+from care_sim.core.observation.beliefs import Beliefs
+from care_sim.core.residual import camera_layers, unexplained_layer_of
+from care_sim.core.rig import Rig
+from care_sim.core.types import Demand
+from care_sim.policies.base import Policy, RowPolicy
+from care_sim.policies.controls.patterns import cells_by_row, entry_cells
+from care_sim.policies.own.sight_lines import SightLines, columns_ahead
+
+CORE_FIRST = "core-spread"
+"""The order of the cells in hulls and wedges (`care_sim.core.cells.order`), unless the rig has one:
+the rim is there for errors of the forecast, without which the object lies in the core alone."""
+HULL_CELLS_PER_RETURN = 2
+"""Cells that a hull gets in a round for every return that a detection needs."""
+WEDGE_CELLS_PER_RETURN = 3
+"""Cells that a wedge gets in a round for every return that a detection needs. Both numbers were
+chosen on the calibration's streets 1000 to 1007 and on streets 2000 to 2007, none of which is
+scored."""
+
+
+class Round(NamedTuple):
+    """The cells that each hull and each wedge gets in a round."""
+
+    hull: int
+    wedge: int
+
+    @classmethod
+    def of(cls, min_returns: int) -> "Round":
+        """That of a detector which needs so many returns. Raises InvalidInput unless they are a
+        whole number of at least 1.
+        """
+        check_whole("min_returns", min_returns, 1)
+        return cls(HULL_CELLS_PER_RETURN * min_returns, WEDGE_CELLS_PER_RETURN * min_returns)
+
+
+class CareSpread(RowPolicy):
+    """The reserve of CARE, spent otherwise. It asks no more of a set than a detection needs, before
+    another set has had as much.
+
+    First every unexplained wedge gets a few cells, then every hull; then both get as many again.
+    What is left goes to the floor. Sets are listed with their undilated core first, spread evenly
+    (`core-spread`), unless the rig has an order. All of it is in the reserve layers, in order of
+    priority: the share rho plays no part. `min_returns` is what the proxy needs to detect an
+    object; with another detector it is the default.
+    """
+
+    name = "care-spread"
+    source = "own: the reserve of CARE, core first, in rounds"
+    told: ClassVar[Mapping[str, str]] = {"min_returns": "min_returns"}
+    keeps_order = True
+
+    def __init__(self, rig: Rig, min_returns: int = MIN_RETURNS):
+        super().__init__(rig)
+        self._round = Round.of(min_returns)
+
+    def stages(self, beliefs: Beliefs) -> list[WorldSets]:
+        """Layers: a round of wedges, a round of hulls, and both again."""
+        unexplained = unexplained_layer_of(beliefs)
+        few, more = self._round
+        wedges = self._listed(unexplained, 2 * more)
+        hulls = self._listed(beliefs.hulls, 2 * few)
+        return [
+            WorldSets.nothing(len(beliefs)),
+            wedges.part(0, more),
+            hulls.part(0, few),
+            wedges.part(more, 2 * more),
+            hulls.part(few, 2 * few),
+        ]
+
+    def _listed(self, given: WorldSets, most: int) -> WorldSets:
+        """The first `most` cells of every set, the core first."""
+        return WorldSets(self.rig.listed(given.sets, CORE_FIRST, most), given.counts)
+
+
+class CareSector(Policy):
+    """`care-sightlines` without its memory of lines of sight: the simplest policy that was found as
+    good on generated streets.
+
+    In order of priority: a round of unexplained wedges; the sector ahead, in the row at which
+    things enter the range; a round of hulls; a round of explained wedges; the rest of the
+    unexplained ones; the rest of that row; more of the hulls; and the pattern `rows` in the place
+    of the random floor.
+    """
+
+    name = "care-sector"
+    source = "own: the reserve of CARE in rounds, a fixed sector ahead, rows"
+    told: ClassVar[Mapping[str, str]] = {"min_returns": "min_returns"}
+    keeps_order = True
+
+    def __init__(self, rig: Rig, min_returns: int = MIN_RETURNS):
+        super().__init__(rig)
+        self._round = Round.of(min_returns)
+        self._rows = cells_by_row(rig)
+        entries = entry_cells(rig)
+        self._entries = len(entries)
+        self._sector = entries[columns_ahead(rig.grid)]
+
+    def demand(self, belief: Belief) -> Demand:
+        """Layers in order of priority; see the class."""
+        unexplained, known = camera_layers(belief, self.rig)
+        few, more = self._round
+        wedges = self.rig.listed(unexplained, CORE_FIRST, WEDGE_ROUNDS * more)
+        hulls = self.rig.listed(self.rig.hulls(belief.tracks.boxes), CORE_FIRST, few + more)
+        return Demand(
+            layers=[
+                wedges.part(0, more),
+                [self._sector],
+                hulls.part(0, few),
+                self.rig.listed(known, CORE_FIRST, few),
+                wedges.part(more, WEDGE_ROUNDS * more),
+                [self._rows[: self._entries]],
+                hulls.part(few, few + more),
+                [self._rows[: belief.budget]],
+            ]
+        )
+
+
+WEDGE_ROUNDS = 4
+"""Rounds that an unexplained wedge gets at most. Chosen on the calibration's streets 1000 to 1007
+and on streets 2000 to 2007, none of which is scored."""
+
+
+class CareSightlines(Policy):
+    """`care-spread` with a watch for what no camera box asks for.
+
+    In order of priority: a round of unexplained wedges; the lines of sight ahead along which
+    something can drive into the range (`care_sim.policies.own.sight_lines`); a round of hulls; a
+    round of explained wedges, since a new object can stand in front of a known one; all lines of
+    sight; the rest of the wedges, up to `wedge_rounds` rounds in all, unless the picture is late
+    and says where things were; the rest of the row at which things enter the range; more of the
+    hulls; and the pattern `rows` in the place of the random floor.
+
+    Each idea can be switched off, to see what it does: `camera` (all wedges), `ahead`, `explained`,
+    `sight_lines`, `rows`.
+    """
+
+    name = "care-sightlines"
+    source = "own: the reserve of CARE in rounds, open lines of sight, rows"
+    told: ClassVar[Mapping[str, str]] = {"min_returns": "min_returns"}
+    keeps_order = True
+
+    def __init__(
+        self,
+        rig: Rig,
+        min_returns: int = MIN_RETURNS,
+        wedge_rounds: int = WEDGE_ROUNDS,
+        camera: bool = True,
+        ahead: bool = True,
+        explained: bool = True,
+        sight_lines: bool = True,
+        rows: bool = True,
+    ):
+        super().__init__(rig)
+        self._round = Round.of(min_returns)
+        check_whole("wedge_rounds", wedge_rounds, 1)
+        switches = {
+            "camera": camera,
+            "ahead": ahead,
+            "explained": explained,
+            "sight_lines": sight_lines,
+            "rows": rows,
+        }
+        for name, value in switches.items():
+            check_flag(name, value)
+        self._wedge_most = wedge_rounds * self._round.wedge
+        self._uses_camera = camera
+        self._looks_ahead = ahead
+        self._rechecks = explained
+        self._watches = sight_lines
+        self._entries = entry_cells(rig)
+        self._rows = CellSets.of([cells_by_row(rig)] if rows else [])
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget what was seen."""
+        self._lines = SightLines(self.rig, self._entries)
+
+    def remember(self, belief: Belief) -> None:
+        """Take in the last scan."""
+        self._lines.update(belief)
+
+    def demand(self, belief: Belief) -> Demand:
+        """Layers in order of priority; see the class."""
+        unexplained, known = camera_layers(belief, self.rig) if self._uses_camera else ([], [])
+        few, more = self._round
+        wedges = self.rig.listed(unexplained, CORE_FIRST, self._wedge_most)
+        rechecked = self.rig.listed(known if self._rechecks else [], CORE_FIRST, few)
+        hulls = self.rig.listed(self.rig.hulls(belief.tracks.boxes), CORE_FIRST, few + more)
+        return Demand(
+            layers=[
+                wedges.part(0, more),
+                [self._lines.ahead()] if self._looks_ahead else [],
+                hulls.part(0, few),
+                rechecked,
+                [self._lines.cells()] if self._watches else [],
+                [] if self._is_late(belief) else wedges.part(more, self._wedge_most),
+                self._rows.part(0, len(self._entries)),
+                hulls.part(few, few + more),
+                self._rows.part(0, belief.budget),
+            ]
+        )
+
+    def _is_late(self, belief: Belief) -> bool:
+        """Whether the newest picture is at least half a keyframe old."""
+        ages = belief.detections.ages
+        return len(ages) > 0 and bool(ages.min() >= self.rig.keyframe_s / 2)

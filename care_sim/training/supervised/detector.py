@@ -1,0 +1,310 @@
+"""Train the learned detector: `care-sim train detector` makes the shipped weights from nothing.
+
+One process plays and another learns from what it plays, so nothing is kept on disk. Plays come in
+the order of their numbers, PyTorch computes in one thread, and seeds are fixed: the same machine
+makes the same bytes.
+"""
+
+import sys
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from itertools import islice
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from care_sim.base.checks import bounded
+from care_sim.base.errors import print_lines
+from care_sim.base.extras import import_torch
+from care_sim.base.files import ZIP, check_output
+from care_sim.base.limits import one_thread
+from care_sim.base.seeds import TRAINING, VALIDATION
+from care_sim.core.arrays import Floats, Mask
+from care_sim.core.types import CLASSES, Detections
+from care_sim.perception.matching import UNSERVED, served_by
+from care_sim.perception.pillars.decoding import Peaks, peaks_of
+from care_sim.perception.pillars.detector import CALIBRATION, LEAST_SCORE, save_detector
+from care_sim.sensors.annotated import Annotations
+from care_sim.study.executors import Processes, processes
+from care_sim.study.provenance import machine_line, package_versions
+from care_sim.training.supervised.detector_data import (
+    Example,
+    Targets,
+    loss,
+    play,
+    targets_of,
+    turned_example,
+)
+from care_sim.training.supervised.fit import FitConfig, fit, print_end
+
+if TYPE_CHECKING:
+    from care_sim.training.supervised.detector_network import Learning
+
+PLAIN: Floats = np.tile([1.0, 0.0], (len(CLASSES), 1))
+"""The calibration that leaves every logit as it is."""
+LEAST_LOGIT = -6.0
+"""Peaks below are not looked at: an object in four hundred, or fewer."""
+FEWEST_HITS = 20
+"""Of a class, to fit its scores to."""
+NEWTON_STEPS = 30
+RIDGE = 1e-3
+"""Keeps the fit finite where all peaks above some logit are right."""
+
+BATCH = 4
+"""Scans per gradient."""
+LEARNING_RATE = 2e-3
+"""Of AdamW, at its highest."""
+WEIGHT_DECAY = 0.01
+STEEPEST = 10.0
+"""The longest gradient; longer ones are shortened to it."""
+SHUFFLED = 512
+"""Examples from which a batch is drawn: those of some twenty plays, so that a batch holds several
+streets."""
+AHEAD = 4
+"""Plays that are under way before they are needed."""
+RISING = 0.05
+"""Share of the steps in which the rate of learning rises."""
+CURVE_STEPS = 250
+"""Steps between two points of the curve that the card tells, after which the weights are written,
+too."""
+CALIBRATING = range(VALIDATION, VALIDATION + 24)
+HELD_OUT = range(VALIDATION + 24, VALIDATION + 48)
+"""Seeds of plays that nothing is learned from: those that scores are fitted to, and those by which
+the card tells what was reached."""
+
+
+@dataclass(frozen=True)
+class DetectorConfig(FitConfig):
+    """Train the detector `pillars` on generated streets and drives.
+
+    It writes a file of weights; needs the extra `rl`.
+    """
+
+    steps: int = bounded(10_000, 1, 1_000_000)
+    """Batches of four scans that are learned from."""
+
+
+def train_pillars(config: DetectorConfig) -> int:
+    """Train the detector and write its weights; returns the exit code of the command."""
+    torch = import_torch()
+    from care_sim.training.supervised.detector_network import Learning
+
+    check_output(config.out, ZIP)
+    started = time.perf_counter()
+    torch.manual_seed(config.seed)
+    network = Learning()
+
+    def save(
+        losses: list[float], calibration: Floats = PLAIN, result: dict[str, float] | None = None
+    ) -> None:
+        arrays = network.arrays() | {CALIBRATION: calibration.astype(np.float32)}
+        save_detector(config.out, arrays, _card(config, network, losses, result))
+
+    def keep(losses: list[float]) -> None:
+        # Whatever ends the learning, or the check of it, what was learned until then is kept.
+        if len(losses) % CURVE_STEPS == 0 or len(losses) == config.steps:
+            save(losses)
+
+    with one_thread(torch), _player() as executor:
+        print_lines(f"playing {SHUFFLED} scans before the first step", file=sys.stderr)
+        batches = _batches(played(executor, TRAINING), np.random.default_rng(config.seed))
+        losses = train_detector(network, batches, config.steps, keep)
+        network.eval()
+        count = len(CALIBRATING) + len(HELD_OUT)
+        print_lines(f"checking {config.out} on {count} further plays", file=sys.stderr)
+        fitted, apart = (
+            [example for examples in executor.map(play, seeds) for example in examples]
+            for seeds in (CALIBRATING, HELD_OUT)
+        )
+        calibration = calibration_of(scores_by_scan(network, fitted))
+        result = judged(scores_by_scan(network, apart, calibration))
+    save(losses, calibration, result)
+    play_with = ("street", "--detector", "pillars", "--detector-parameters", f"file={config.out}")
+    print_end(config.out, started, result, *play_with)
+    return 0
+
+
+def train_detector(
+    network: "Learning",
+    batches: Iterator[list[Example]],
+    steps: int,
+    after: Callable[[list[float]], None] = lambda _losses: None,
+) -> list[float]:
+    """Let the network learn from so many batches; see `care_sim.training.supervised.fit.fit`."""
+    torch = import_torch()
+    network.train()
+    optimizer = torch.optim.AdamW(network.parameters(), lr=LEARNING_RATE, weight_decay=WEIGHT_DECAY)
+
+    def shorten(*_: object) -> None:
+        torch.nn.utils.clip_grad_norm_(network.parameters(), STEEPEST)
+
+    optimizer.register_step_pre_hook(shorten)
+    # Of so few steps that the rate would rise in one at most it rises in none: PyTorch divides by
+    # the steps after the first in which it does.
+    rising = RISING if RISING * steps > 1 else 0.0
+    schedule = torch.optim.lr_scheduler.OneCycleLR(
+        optimizer, LEARNING_RATE, total_steps=steps, pct_start=rising, cycle_momentum=False
+    )
+
+    def off(batch: list[Example]) -> Any:
+        return loss(torch, network(batch), Targets(*map(torch.from_numpy, targets_of(batch))))
+
+    return fit(off, batches, steps, (optimizer, schedule), after)
+
+
+def played(executor: Executor, first: int) -> Iterator[Example]:
+    """The examples of the plays of seeds from `first` on, in order, without end."""
+    under_way = deque(executor.submit(play, first + number) for number in range(AHEAD))
+    while True:
+        first += 1
+        examples = under_way.popleft().result()
+        under_way.append(executor.submit(play, first + AHEAD - 1))
+        yield from examples
+
+
+@contextmanager
+def _player() -> Iterator[Executor]:
+    """One process that plays. What it is still at when all is learned, or when the learning is
+    broken off, nobody waits for.
+    """
+    executor = processes(1)
+    try:
+        yield executor
+    finally:
+        if isinstance(executor, Processes):
+            executor.end_at_once()
+        executor.shutdown(cancel_futures=True)
+
+
+def _batches(examples: Iterator[Example], rng: np.random.Generator) -> Iterator[list[Example]]:
+    """Batches of examples, turned, each drawn from SHUFFLED that wait, whose places others take."""
+    waiting = [*islice(examples, SHUFFLED)]
+    while True:
+        batch = []
+        for place in rng.choice(len(waiting), BATCH, replace=False).tolist():
+            batch.append(turned_example(waiting[place], rng))
+            waiting[place] = next(examples)
+        yield batch
+
+
+def _card(
+    made: DetectorConfig,
+    network: "Learning",
+    losses: list[float],
+    result: dict[str, float] | None,
+) -> dict[str, Any]:
+    """What the file says of itself; without a `result` nobody has checked the weights."""
+    numbers = sum(array.size for array in network.arrays().values())
+    parts = [losses[n : n + CURVE_STEPS] for n in range(0, len(losses), CURVE_STEPS)]
+    return {
+        "kind": "pillars",
+        "network": f"{numbers} numbers",
+        "data": f"{len(losses) * BATCH} scans of generated streets and drives, of every budget, by "
+        "the policies that know any grid; see care_sim.training.supervised.detector_data",
+        "seeds": {
+            "training from": TRAINING,
+            "calibration of scores": [CALIBRATING[0], CALIBRATING[-1]],
+            "held out": [HELD_OUT[0], HELD_OUT[-1]],
+            "training": made.seed,
+        },
+        "steps": len(losses),
+        "steps asked for": made.steps,
+        "batch": BATCH,
+        "curve": [round(float(np.mean(part)), 3) for part in parts],
+        "result": "not checked, scores not calibrated"
+        if result is None
+        else {name: round(value, 4) for name, value in result.items()},
+        "machine": machine_line(),
+        "versions": package_versions("care-sim", "numpy", "torch"),
+    }
+
+
+class Judged(NamedTuple):
+    """The peaks of a scan, `right` (n,) those that serve an object, and how many `objects` with
+    a return stood on the plan; `full` says that every cell fired.
+    """
+
+    peaks: Peaks
+    right: Mask
+    objects: int
+    full: bool
+
+
+def scores_by_scan(
+    network: "Learning", examples: list[Example], calibration: Floats = PLAIN
+) -> list[Judged]:
+    """What the network makes of every example."""
+    torch = import_torch()
+    made = []
+    for one in examples:
+        with torch.no_grad():
+            answer = network([one])[0].numpy()
+        peaks = peaks_of(answer, one.sensor_height_m, calibration, 0.0)
+        peaks = peaks.take(peaks.logits >= LEAST_LOGIT)
+        made.append(Judged(peaks, right(peaks, one), len(one.classes), one.full))
+    return made
+
+
+def right(peaks: Peaks, example: Example) -> Mask:
+    """(n,) which peaks lie within 2 m of an object of their class that no surer one serves."""
+    there = Annotations(np.arange(len(example.classes)), example.classes, example.boxes)
+    many = np.ones(len(peaks.classes), np.int64)
+    server = served_by(there, Detections(peaks.classes, peaks.boxes, many, peaks.scores))
+    served = np.zeros(len(peaks.classes), bool)
+    served[server[server != UNSERVED]] = True
+    return served
+
+
+def calibration_of(scans: list[Judged]) -> Floats:
+    """(classes, 2) slope and offset, by class, that make the score of a peak its chance to be
+    right: the logistic regression of Platt (1999). A class with too few keeps its logits.
+    """
+    classes, logits = (
+        np.concatenate([column[n] for column in (scan.peaks for scan in scans)]) for n in (0, 1)
+    )
+    hits = np.concatenate([scan.right for scan in scans])
+    made = PLAIN.copy()
+    for label in range(len(CLASSES)):
+        own = classes == label
+        if hits[own].sum() >= FEWEST_HITS and not hits[own].all():
+            fitted = _fitted(logits[own], hits[own])
+            made[label] = fitted if fitted[0] > 0 else made[label]
+    return made
+
+
+def judged(scans: list[Judged]) -> dict[str, float]:
+    """Recall and precision of all and of full scans at the score that is reported by default, and
+    the mean distance of scores from the share that is right, over tenths.
+    """
+    told: dict[str, float] = {}
+    for name, some in (("all scans", scans), ("full scans", [one for one in scans if one.full])):
+        sure = [one.peaks.scores >= LEAST_SCORE for one in some]
+        hits = sum(int(one.right[rows].sum()) for one, rows in zip(some, sure, strict=True))
+        objects, reported = sum(one.objects for one in some), sum(int(rows.sum()) for rows in sure)
+        told[f"recall, {name}"] = hits / max(objects, 1)
+        told[f"precision, {name}"] = hits / max(reported, 1)
+    scores = np.concatenate([one.peaks.scores for one in scans])
+    hits_of = np.concatenate([one.right for one in scans])
+    tenths = np.minimum((scores * 10).astype(int), 9)
+    off = [abs((scores - hits_of)[tenths == n].sum()) for n in range(10)]
+    return told | {"calibration error": float(sum(off) / max(len(scores), 1))}
+
+
+def _fitted(logits: Floats, hits: Mask) -> Floats:
+    """Slope and offset by Newton's method."""
+    design = np.column_stack([logits, np.ones(len(logits))])
+    line = np.array([1.0, 0.0])
+    for _ in range(NEWTON_STEPS):
+        chances = 1 / (1 + np.exp(-np.clip(design @ line, -30, 30)))
+        slope = design.T @ (chances - hits) + RIDGE * (line - [1.0, 0.0])
+        bend = (design * (chances * (1 - chances))[:, None]).T @ design + RIDGE * np.eye(2)
+        line = line - np.linalg.solve(bend, slope)
+    return line
+
+
+if TYPE_CHECKING:
+    from care_sim.training.supervised.detector_network import Learning

@@ -1,0 +1,85 @@
+"""The network of the learned detector while it learns: its layers normalise over a batch."""
+
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from care_sim.base.array_files import Arrays
+from care_sim.core.types import CLASSES
+from care_sim.perception.pillars.network import (
+    LAYERS,
+    PILLARS,
+    POINT_LAYERS,
+    Layer,
+    answers,
+    on_plan,
+    place_planes,
+)
+from care_sim.training.supervised.detector_data import Example
+
+RARE = -4.0
+"""The logit that a centre lies in a cell, before anything is learned: one cell in fifty. From even
+odds the first steps would all go into unlearning them."""
+
+
+class Learning(nn.Module):
+    """Learns the arrays of `care_sim.perception.pillars.network.shapes`."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.layers = nn.ModuleDict({name: _module(layer) for name, layer in LAYERS.items()})
+        self._places = place_planes(torch)
+
+    def forward(self, examples: list[Example]) -> Tensor:
+        """(s, OUTPUTS, CELLS, CELLS) the answers to the scans of some examples."""
+        seen = [on_plan(one.points.astype(np.float64), one.sensor_height_m) for one in examples]
+        pillars = [one.pillars + number * PILLARS**2 for number, one in enumerate(seen)]
+        inputs = torch.from_numpy(np.concatenate([one.inputs for one in seen]))
+        told: Tensor = answers(
+            torch,
+            lambda name, given: self.layers[name](given),
+            inputs,
+            torch.from_numpy(np.concatenate(pillars)),
+            self._places,
+            len(examples),
+        )
+        return told
+
+    def arrays(self) -> Arrays:
+        """The numbers as they act once nothing is learned any more."""
+        made: Arrays = {}
+        with torch.no_grad():
+            for name, layer in LAYERS.items():
+                weight, bias = _fixed(self.layers[name])
+                shape = (layer.outputs, layer.inputs, layer.size, layer.size)
+                made[f"{name}.weight"] = weight.reshape(shape).contiguous().numpy().copy()
+                made[f"{name}.bias"] = bias.numpy().copy()
+        return made
+
+
+def _module(layer: Layer) -> nn.Sequential:
+    if layer in POINT_LAYERS:
+        return nn.Sequential(nn.Linear(layer.inputs, layer.outputs), nn.ReLU())
+    planes = layer.inputs, layer.outputs, layer.size, layer.stride, layer.size // 2
+    if not layer.rectified:
+        answer = nn.Conv2d(*planes)
+        bias = torch.zeros(layer.outputs)
+        bias[: len(CLASSES)] = RARE
+        answer.bias = nn.Parameter(bias)
+        return nn.Sequential(answer)
+    return nn.Sequential(
+        nn.Conv2d(*planes, bias=False), nn.BatchNorm2d(layer.outputs), nn.ReLU(inplace=True)
+    )
+
+
+def _fixed(module: Any) -> tuple[Tensor, Tensor]:
+    """The weight and the bias that do what a module does in evaluation."""
+    first = module[0]
+    if first.bias is not None:
+        return first.weight, first.bias
+    # A normalisation whose mean and variance are fixed is one more multiplication and sum.
+    normal = module[1]
+    scale = normal.weight / torch.sqrt(normal.running_var + normal.eps)
+    return first.weight * scale.view(-1, 1, 1, 1), normal.bias - normal.running_mean * scale

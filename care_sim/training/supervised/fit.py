@@ -1,0 +1,115 @@
+"""What every training on truth shares: its options, the loop over batches, the card and the last
+lines.
+"""
+
+import shlex
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from care_sim.base.checks import LARGEST_INTEGER, bounded, check_fields
+from care_sim.base.errors import InvalidInput, print_lines
+from care_sim.base.extras import import_torch
+from care_sim.core.grid import AngularGrid
+from care_sim.policies.learned.weights import Card
+from care_sim.sensors.setups import DEFAULT_SETUP, sensor_setup
+from care_sim.study.progress import rounded_duration, shown_progress
+from care_sim.study.provenance import machine_line, package_versions
+
+_Batch = TypeVar("_Batch")
+_Thing = TypeVar("_Thing")
+
+LEARNING_RATE = 3e-3
+"""Of Adam, at the first step."""
+LATELY = 250
+"""Steps whose mean loss is shown."""
+
+
+@dataclass(frozen=True)
+class FitConfig:
+    """Options of every training on truth."""
+
+    out: Path
+    """File to write."""
+    seed: int = bounded(0, 0, LARGEST_INTEGER)
+    """Seed of the first weights and the order of the examples."""
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+
+def adam(parameters: Iterable[Any], steps: int) -> tuple[Any, Any]:
+    """Adam, whose rate falls to 0 along a half cosine over so many steps."""
+    optim = import_torch().optim
+    optimizer = optim.Adam(parameters, lr=LEARNING_RATE)
+    return optimizer, optim.lr_scheduler.CosineAnnealingLR(optimizer, steps)
+
+
+def fit(
+    loss: Callable[[_Batch], Any],
+    batches: Iterable[_Batch],
+    steps: int,
+    descent: tuple[Any, Any],
+    after: Callable[[list[float]], None] = lambda _losses: None,
+) -> list[float]:
+    """Let the optimizer of a `descent`, with its schedule, make so many steps, one per batch.
+
+    Returns the loss of every step; `after` is handed those so far after each. Call it in
+    `one_thread`: the same machine then makes the same bytes. Raises InvalidInput where the loss is
+    no number any more.
+    """
+    torch = import_torch()
+    optimizer, schedule = descent
+    losses: list[float] = []
+    started = time.monotonic()
+    with shown_progress(steps, "steps") as show:
+        for step, batch in zip(range(1, steps + 1), batches, strict=False):
+            optimizer.zero_grad()
+            off = loss(batch)
+            # Every later step would be no number, either.
+            if not torch.isfinite(off):
+                raise InvalidInput(
+                    f"the training diverged: the loss of step {step} is {off.item()}; another "
+                    "--seed may do better"
+                )
+            off.backward()
+            optimizer.step()
+            schedule.step()
+            losses.append(off.item())
+            left = rounded_duration((time.monotonic() - started) / step * (steps - step))
+            show(step, f"loss {np.mean(losses[-LATELY:]):.3f}, {left} left")
+            after(losses)
+    return losses
+
+
+def one_by_one(things: Sequence[_Thing], what: str) -> Iterator[_Thing]:
+    """All of the things; how far it has come is told on stderr."""
+    for number, thing in enumerate(things, 1):
+        print(f"{what} {number} of {len(things)}", end="   \r", file=sys.stderr, flush=True)
+        yield thing
+
+
+def card_of(kind: str, library: str = "torch", **told: Any) -> Card:
+    """The card of a file for the paper's grid and sensor set-up, made here and now."""
+    return Card(
+        kind,
+        AngularGrid(),
+        setup=sensor_setup(DEFAULT_SETUP).label,
+        machine=machine_line(),
+        versions=package_versions("care-sim", "numpy", library),
+        **told,
+    )
+
+
+def print_end(out: Path, started: float, result: Mapping[str, float], *play: str) -> None:
+    """Print what was reached since `started`, and the words of the command that plays it."""
+    told = ", ".join(f"{name} {value:.4g}" for name, value in result.items())
+    print_lines(
+        f"{out}: {told}; {time.perf_counter() - started:.0f} s",
+        f"play it: {shlex.join(['care-sim', 'run', *play])}",
+    )

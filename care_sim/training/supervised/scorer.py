@@ -1,0 +1,316 @@
+"""Train the learned scorer: `care-sim train learned-scorer` makes the shipped weights from nothing,
+`--drawn` others, from worlds that differ.
+
+The paper names no network and no loss. Both are the plainest that do: one hidden layer of rectified
+units for every cell by itself, and the weighted logistic loss, whose best score orders the cells by
+the odds that they find an object. Adam runs a fixed number of steps over shuffled batches, its rate
+falling to 0 along a half cosine. One thread and fixed seeds: the same machine makes the same bytes.
+
+Truth is used here, at training, and nowhere else. The paper says that 20 scenes apart from the
+evaluation's train it, and no more. The rest was decided before a result was seen:
+
+- An example is a cell at a keyframe. It is positive if its return of the full scan lies on an
+  object that has no track and that can be detected at all, in MIN_RETURNS cells or more.
+- The scenes are played by `history`, the policy whose reserve is learned, at budgets from the
+  scarcest to the most generous that are studied, so that one file serves them all.
+- They are played with all cameras and with the front one alone: the closed loop has no other.
+- Worlds that differ are those of `care_sim.training.supervised.worlds`, and `history` plays them,
+  too. Nothing is mirrored: the inputs of a cell do not tell left from right.
+- First sightings count objects, not cells, so the cells of an object weigh 1 together, however many
+  they are.
+- All positive cells are kept. Of the others, of which there are sixty times as many, about as many
+  are kept at random. They weigh together what the positive ones do, so that neither drowns the
+  other.
+"""
+
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, fields, replace
+from functools import partial
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_sim.base.array_files import Arrays
+from care_sim.base.checks import LARGEST_INTEGER, bounded
+from care_sim.base.extras import import_torch
+from care_sim.base.files import ZIP, check_output
+from care_sim.base.limits import one_thread
+from care_sim.base.seeds import TRAINING, VALIDATION
+from care_sim.core.arrays import Mask
+from care_sim.core.belief import Belief
+from care_sim.core.cells.boxes import planar_ranges
+from care_sim.core.conditions import MIN_RETURNS
+from care_sim.core.grid import Cells
+from care_sim.envs.open_loop import FilmEnv
+from care_sim.evaluation.sightings import RANGE_M
+from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.loops.open_loop import OpenLoop
+from care_sim.policies.learned.cell_inputs import CellInputs, Float32s
+from care_sim.policies.learned.weights import save_weights
+from care_sim.policies.paper.tracks import History
+from care_sim.sources.street_films import street_film
+from care_sim.streets.street import CALIBRATION_SEEDS
+from care_sim.training.supervised.fit import FitConfig, adam, card_of, fit, one_by_one, print_end
+from care_sim.training.supervised.worlds import (
+    LEAST_BUDGET,
+    MOST_BUDGET,
+    SCENARIOS,
+    AnyEnv,
+    front_alone,
+    kept,
+    keyframes,
+    plays,
+    present,
+    seeds_of_worlds,
+)
+
+SCORER_BUDGETS = (0.03, 0.10, 0.35)
+"""The paper's scarcest closed loop, the budget that both loops share, and its most generous open
+loop.
+"""
+OTHER_CELLS = 200
+"""Cells drawn per keyframe; those that are not positive are kept as examples."""
+
+
+@dataclass(frozen=True)
+class ScorerConfig(FitConfig):
+    """Train `learned-scorer` on the 20 calibration streets, or in worlds that differ.
+
+    It writes a file of weights; needs the extra `rl`.
+    """
+
+    steps: int = bounded(4000, 1, LARGEST_INTEGER)
+    """Batches that are learned from."""
+    drawn: bool = False
+    """Learn from drives, tests of Euro NCAP and streets of training seeds, with budgets and faults
+    of the camera drawn for every play, instead of from the calibration streets."""
+
+
+@dataclass(frozen=True)
+class Examples:
+    """Cells to learn from."""
+
+    inputs: Float32s
+    """(n, SCAN_INPUTS + len(RIG_INPUTS))"""
+    positive: Mask
+    """(n,) whether an untracked object returns from them."""
+    weights: Float32s
+    """(n,)"""
+
+    def __len__(self) -> int:
+        return len(self.positive)
+
+
+def examples(seed: int) -> Iterator[Examples]:
+    """The examples of the street of a seed, one play at a time."""
+    film = street_film(seed)
+    for number, (shown, budget) in enumerate(product((film, front_alone(film)), SCORER_BUDGETS)):
+        rng = np.random.default_rng([seed, number])
+        yield _joined([*_play(FilmEnv(shown, budget=budget), seed, rng)])
+
+
+def drawn_examples(kind: str, seed: int) -> Iterator[Examples]:
+    """The examples of the street, the drive or the test of a seed, one keyframe at a time."""
+    rng = np.random.default_rng([seed, len(kind)])
+    for env in plays(kind, seed, rng):
+        yield from _play(env, seed, rng, thinned=True)
+
+
+def balanced(parts: Iterable[Examples]) -> Examples:
+    """All parts as one, positive and other examples of equal weight, 1 on average."""
+    together = _joined([*parts])
+    # In float64: millions of weights are summed. Each group then weighs half of the total.
+    weights = together.weights.astype(np.float64)
+    for group in (together.positive, ~together.positive):
+        weights[group] *= len(weights) / 2 / max(weights[group].sum(), 1e-12)
+    return replace(together, weights=weights.astype(np.float32))
+
+
+def untracked_cells(loop: OpenLoop | ClosedLoop) -> tuple[Cells, Float32s]:
+    """Cells (n,) of the coming keyframe that should fire, and what each weighs (n,). Truth.
+
+    In the full scan they have a return from an object in range that has no track and can be
+    detected.
+    """
+    objects, boxes, returning, behind = present(loop)
+    in_range = planar_ranges(boxes) <= RANGE_M
+    tracked = np.isin(objects, loop.true_objects(loop.belief.tracks))
+    wanted = np.isin(behind, objects[in_range & ~tracked])
+    # Each cell once, for the object of its first return: those of a recorded sweep may share one.
+    cells, first = np.unique(returning[wanted], return_index=True)
+    # `sizes` (objects,): how many of the cells an object has; `group` (cells,): a cell's place in
+    # it. Fewer than MIN_RETURNS would not detect the object.
+    _, group, sizes = np.unique(behind[wanted][first], return_inverse=True, return_counts=True)
+    enough = sizes[group] >= MIN_RETURNS
+    return cells[enough], (1 / sizes[group[enough]]).astype(np.float32)
+
+
+def _play(
+    env: AnyEnv, seed: int, rng: np.random.Generator, thinned: bool = False
+) -> Iterator[Examples]:
+    inputs = CellInputs(env.rig)
+    for belief in keyframes(env, History(env.rig), seed):
+        if not thinned or kept(env, rng):
+            yield _keyframe(env.loop, belief, inputs, rng)
+
+
+def _keyframe(
+    loop: OpenLoop | ClosedLoop, belief: Belief, inputs: CellInputs, rng: np.random.Generator
+) -> Examples:
+    positive, shares = untracked_cells(loop)
+    # Drawn from all cells and not from the others alone: a few of so many are positive.
+    others = np.setdiff1d(rng.choice(inputs.rig.grid.size, OTHER_CELLS, replace=False), positive)
+    cells = np.concatenate([positive, others])
+    seen = inputs.of(belief, inputs.rig.hulls(belief.tracks.boxes))
+    weights = np.concatenate([shares, np.ones(len(others), np.float32)])
+    return Examples(
+        np.hstack([seen.rows(cells), inputs.rig_inputs[cells]]),
+        np.arange(len(cells)) < len(positive),
+        weights,
+    )
+
+
+def _joined(parts: list[Examples]) -> Examples:
+    return Examples(
+        *(
+            np.concatenate([getattr(part, field.name) for part in parts])
+            for field in fields(Examples)
+        )
+    )
+
+
+HIDDEN_UNITS = 16
+"""As many as score a keyframe within half a millisecond on one core."""
+BATCH = 4096
+"""Cells per gradient."""
+STREETS: Mapping[str, tuple[int, ...]] = {
+    "calibration": CALIBRATION_SEEDS,
+    "held out": tuple(range(2000, 2004)),
+}
+"""Seeds of streets to learn from, and of those that belong neither to the calibration nor to the
+evaluation. The card tells the loss on both.
+"""
+DRAWN: Mapping[str, tuple[int, Mapping[str, int]]] = {
+    "learned": (TRAINING, {"drive": 48, "ncap": 144, "street": 8}),
+    "held out": (VALIDATION, {"drive": 6, "ncap": 18, "street": 1}),
+}
+"""With `--drawn`, the first seed and how many worlds of each kind: about 6,500 keyframes to learn
+from, 2,560 of them of streets.
+"""
+
+
+def train_learned_scorer(config: ScorerConfig) -> int:
+    """Train the policy and write its weights; returns the exit code of the command."""
+    import_torch()
+    check_output(config.out, ZIP)
+    started = time.perf_counter()
+    data, told = _drawn_lessons() if config.drawn else _street_lessons()
+    arrays, losses = train_scorer(data, config.seed, config.steps)
+    learned = next(iter(data.values()))
+    cells = f"{len(learned)} cells, {int(learned.positive.sum())} of them positive, of "
+    card = card_of(
+        "learned-scorer",
+        scenario=told["scenario"],
+        data=f"{cells}{told['data']}; {OTHER_CELLS} others per keyframe",
+        seeds=told["seeds"] | {"training": config.seed},
+        steps=config.steps,
+        result={f"loss {name}": round(loss, 5) for name, loss in losses.items()},
+    )
+    save_weights(config.out, arrays, card)
+    print_end(config.out, started, card.result, str(config.out))
+    return 0
+
+
+def train_scorer(
+    data: Mapping[str, Examples], seed: int, steps: int
+) -> tuple[Arrays, dict[str, float]]:
+    """The weights that the first set of examples teaches, and the loss on every set (log 2 = 0.69
+    without any knowledge).
+    """
+    torch = import_torch()
+    learned = next(iter(data.values()))
+    with one_thread(torch):
+        torch.manual_seed(seed)
+        network = torch.nn.Sequential(
+            torch.nn.Linear(learned.inputs.shape[1], HIDDEN_UNITS),
+            torch.nn.ReLU(),
+            torch.nn.Linear(HIDDEN_UNITS, 1, bias=False),
+        )
+        batches = _batches(np.random.default_rng(seed), len(learned))
+        fit(partial(_loss, network, learned), batches, steps, adam(network.parameters(), steps))
+        with torch.no_grad():
+            losses = {
+                name: float(_loss(network, cells, np.arange(len(cells))))
+                for name, cells in data.items()
+            }
+    # PyTorch holds (units, inputs); the policy multiplies inputs (n, inputs) from the left.
+    layer, bias, out = (parameter.detach().numpy() for parameter in network.parameters())
+    return {"layer": layer.T, "bias": bias, "out": out[0]}, losses
+
+
+def _batches(rng: np.random.Generator, count: int) -> Iterator[NDArray[np.int64]]:
+    """Rows (n,) of batches without end.
+
+    Each pass over the examples is in random order; what does not fill a batch at its end is left
+    out.
+    """
+    size = min(BATCH, count)
+    order = np.empty(0, np.int64)
+    while True:
+        if len(order) < size:
+            order = rng.permutation(count)
+        batch, order = np.split(order, [size])
+        yield batch
+
+
+def _loss(network: Any, data: Examples, rows: NDArray[np.int64]) -> Any:
+    """The weighted logistic loss over some examples."""
+    torch = import_torch()
+    inputs, positive, weights = (
+        torch.from_numpy(column[rows]) for column in (data.inputs, data.positive, data.weights)
+    )
+    scores = network(inputs)[:, 0]
+    # With logits: the logarithm of a sigmoid that underflows would be minus infinity.
+    return torch.nn.functional.binary_cross_entropy_with_logits(scores, positive.float(), weights)
+
+
+def _street_lessons() -> tuple[dict[str, Examples], dict[str, Any]]:
+    """The examples of streets by name, and what the card says of them."""
+    data = {
+        name: balanced(
+            part for seed in one_by_one(seeds, f"{name} street") for part in examples(seed)
+        )
+        for name, seeds in STREETS.items()
+    }
+    budgets = ", ".join(f"{budget:g}" for budget in SCORER_BUDGETS)
+    return data, {
+        "scenario": "CARE-Street-v0",
+        "data": f"generated streets under history at {budgets} of the cells, with six cameras and "
+        "with the front one",
+        "seeds": {name: list(seeds) for name, seeds in STREETS.items()},
+    }
+
+
+def _drawn_lessons() -> tuple[dict[str, Examples], dict[str, Any]]:
+    """The same of worlds that differ."""
+    data = {
+        name: balanced(
+            part
+            for kind, seed in seeds_of_worlds(worlds, first)
+            for part in drawn_examples(kind, seed)
+        )
+        for name, (first, worlds) in DRAWN.items()
+    }
+    learned = ", ".join(f"{count} of {kind}" for kind, count in DRAWN["learned"][1].items())
+    return data, {
+        "scenario": SCENARIOS,
+        "data": f"worlds {learned} under history at {LEAST_BUDGET:g} to {MOST_BUDGET:g} of the "
+        "cells, with faults of the camera, streets with six cameras and with the front one",
+        "seeds": {
+            name: [first, first + max(worlds.values()) - 1]
+            for name, (first, worlds) in DRAWN.items()
+        },
+    }

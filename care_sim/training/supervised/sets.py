@@ -1,0 +1,268 @@
+"""Train the policy `learned-sets`: `care-sim train learned-sets` makes the shipped weights from
+nothing.
+
+Two rounds: in the first somebody else's policies play, in the second mostly this one with what the
+first has taught it, and it learns anew from the keyframes of both. One thread and fixed seeds: the
+same machine makes the same bytes.
+
+What it says of an item is a share for each number of cells after which it is found, and one for
+never: cross-entropy. What it says of a strip is a chance: logistic loss, against the share of a
+detection. Both are proper, so that chances are chances, which the choice of cells relies on.
+
+It can be trained without a part, to see what that part was worth:
+
+| without | what is taken away |
+|---|---|
+| `attention` | what an item is told of the others |
+| `inputs` | what is told of an item, but its kind, and of a strip, but its place |
+| `place` | the map of the strips: one chance for all places |
+| `faults` | faults of the camera in the worlds that are learned from |
+
+A kind is a camera box that a track explains, one that no track explains, or a track. So without
+`attention`, `inputs` and `place` what is learned are constants: for each kind the shares of items
+that are found after so many cells, and one chance for all strips. It is the control of what
+learning is worth beside the choice of cells, which stays.
+
+Weights that are taken away are 0 and stay it; those of the map learn as one. So the file has the
+form of any other, and acts as such.
+"""
+
+import sys
+import time
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from care_sim.base.array_files import Arrays
+from care_sim.base.checks import LARGEST_INTEGER, bounded, check_known
+from care_sim.base.errors import print_lines
+from care_sim.base.extras import import_torch
+from care_sim.base.files import ZIP, check_output
+from care_sim.base.limits import one_thread
+from care_sim.base.seeds import TRAINING, VALIDATION
+from care_sim.core.rig import Rig
+from care_sim.policies.learned.learned_sets import STEPS, LearnedSets
+from care_sim.policies.learned.set_items import ITEM_INPUTS, MIRRORED, STRIP_INPUTS, ItemReader
+from care_sim.policies.learned.weights import Card, save_weights
+from care_sim.training.supervised.fit import FitConfig, adam, card_of, fit, print_end
+from care_sim.training.supervised.sets_data import Example, play
+from care_sim.training.supervised.worlds import SCENARIOS, seeds_of_worlds
+
+Part = Literal["attention", "inputs", "place", "faults"]
+KIND = ("is a camera box", "explained")
+"""The inputs that tell an item's kind."""
+UNITS, WIDTH, STRIP_UNITS = 48, 16, 16
+KEYFRAMES = 64
+"""Per gradient."""
+RARE = 0.001
+"""About the chance of a strip, from which the map begins."""
+ROUNDS: tuple[Mapping[str, int], ...] = (
+    {"drive": 24, "ncap": 48, "street": 10},
+    {"drive": 48, "ncap": 96, "street": 20},
+)
+"""How many worlds of each kind are played in each round."""
+HELD_OUT: Mapping[str, int] = {"drive": 4, "ncap": 8, "street": 2}
+"""Worlds of validation seeds, played as in the second round; the card tells the loss on them."""
+
+
+@dataclass(frozen=True)
+class SetsConfig(FitConfig):
+    """Train `learned-sets` on drives, Euro NCAP tests and streets of training seeds.
+
+    It writes a file of weights, also at the end of the first round; needs the extra `rl`.
+    """
+
+    steps: int = bounded(3000, 1, LARGEST_INTEGER)
+    """Batches that are learned from in each round."""
+    without: tuple[Part, ...] = ()
+    """What to leave out, to see what it is worth: what an item is told of the others; all that is
+    told of it but its kind; the map of places; faults of the camera."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for part in self.without:
+            check_known("part to be without", part, get_args(Part))
+
+
+def train_sets(config: SetsConfig) -> int:
+    """Train the policy and write its weights; returns the exit code of the command."""
+    import_torch()
+    check_output(config.out, ZIP)
+    started = time.perf_counter()
+    places = int(ItemReader(Rig(), 1).places.max()) + 1
+    examples: list[Example] = []
+    first = TRAINING
+    for number, worlds in enumerate(ROUNDS, 1):
+        own = config.out if number > 1 else None
+        examples += gathered(worlds, first, own, "faults" not in config.without)
+        first += max(worlds.values())
+        arrays = learn(examples, places, config.seed, config.steps, config.without)
+        save_weights(config.out, arrays, _card(config, examples, ROUNDS[:number]))
+        told = f"{config.out} holds what {number} of {len(ROUNDS)} rounds have taught"
+        print_lines(told, file=sys.stderr)
+    held_out = gathered(HELD_OUT, VALIDATION, config.out)
+    losses = {
+        f"loss per {what}, {name}": round(loss, 5)
+        for name, data in (("learned", examples), ("held out", held_out))
+        for what, loss in losses_of(arrays, data).items()
+    }
+    save_weights(config.out, arrays, _card(config, examples, ROUNDS, losses))
+    print_end(config.out, started, losses, str(config.out))
+    return 0
+
+
+def gathered(
+    worlds: Mapping[str, int], first: int, own: Path | None, faulty: bool = True
+) -> list[Example]:
+    """The keyframes of so many worlds of each kind, with seeds from the first on."""
+    return [
+        example
+        for kind, seed in seeds_of_worlds(worlds, first)
+        for example in play(kind, seed, own, faulty)
+    ]
+
+
+def learn(
+    examples: Sequence[Example],
+    places: int,
+    seed: int,
+    steps: int,
+    without: Collection[str] = (),
+) -> Arrays:
+    """The weights, after so many steps over shuffled batches, `without` what is left out."""
+    torch = import_torch()
+    with one_thread(torch):
+        torch.manual_seed(seed)
+        arrays = _first_weights(torch, places)
+        _leave_out(torch, arrays, without)
+        batches = _batches(examples, np.random.default_rng(seed))
+        fit(
+            lambda batch: sum(_losses(torch, arrays, *batch)),
+            batches,
+            steps,
+            adam(arrays.values(), steps),
+        )
+        return {name: array.detach().numpy() for name, array in arrays.items()}
+
+
+def losses_of(arrays: Arrays, examples: Sequence[Example]) -> dict[str, float]:
+    """The loss per item and per strip."""
+    torch = import_torch()
+    with one_thread(torch), torch.no_grad():
+        held = {name: torch.from_numpy(np.asarray(array)) for name, array in arrays.items()}
+        both = [
+            [float(loss) for loss in _losses(torch, held, examples[first : first + KEYFRAMES])]
+            for first in range(0, len(examples), KEYFRAMES)
+        ]
+    items, strips = np.mean(both, axis=0)
+    return {"items": float(items), "strips": float(strips)}
+
+
+def _batches(
+    examples: Sequence[Example], rng: np.random.Generator
+) -> Iterator[tuple[list[Example], Any]]:
+    """Examples drawn, and 1 or -1 for each: left and right are exchanged in half of them."""
+    while True:
+        rows = rng.integers(0, len(examples), KEYFRAMES)
+        yield [examples[row] for row in rows], np.where(rng.random(KEYFRAMES) < 0.5, 1.0, -1.0)
+
+
+def _first_weights(torch: Any, places: int) -> dict[str, Any]:
+    def layer(inputs: int, outputs: int) -> Any:
+        return torch.randn(inputs, outputs) * (1.0 / inputs) ** 0.5
+
+    items, strips, answers = len(ITEM_INPUTS), len(STRIP_INPUTS), len(STEPS) + 1
+    arrays = {
+        "first": layer(items, UNITS),
+        "first_bias": torch.zeros(UNITS),
+        "query": layer(UNITS, WIDTH),
+        "key": layer(UNITS, WIDTH),
+        "value": layer(UNITS, UNITS),
+        "second": layer(2 * UNITS, UNITS),
+        "second_bias": torch.zeros(UNITS),
+        "out": layer(UNITS, answers),
+        "out_bias": torch.zeros(answers),
+        "map": torch.full((places,), float(np.log(RARE))),
+        "strip": layer(strips, STRIP_UNITS),
+        "strip_bias": torch.zeros(STRIP_UNITS),
+        "strip_out": torch.zeros(STRIP_UNITS),
+    }
+    return {name: array.requires_grad_() for name, array in arrays.items()}
+
+
+def _leave_out(torch: Any, arrays: dict[str, Any], without: Collection[str]) -> None:
+    """What is not kept becomes 0 and gets no gradient; a map without places is one number."""
+    kept: Arrays = {}
+    if "attention" in without:
+        kept["value"] = np.zeros(1, np.float32)
+    if "inputs" in without:
+        kept["first"] = np.isin(ITEM_INPUTS, KIND).astype(np.float32)[:, None]
+        kept["strip"] = np.zeros((len(STRIP_INPUTS), 1), np.float32)
+    for name, told in kept.items():
+        mask = torch.from_numpy(told)
+        arrays[name].data *= mask
+        arrays[name].register_hook(mask.mul)
+    if "place" in without:
+        # All places begin alike and get the same gradient, so that they stay alike.
+        arrays["map"].register_hook(lambda gradient: gradient.sum().expand_as(gradient))
+
+
+def _losses(
+    torch: Any, arrays: dict[str, Any], batch: Sequence[Example], signs: Any = None
+) -> tuple[Any, Any]:
+    """The mean loss of the items of a batch, and that of its strips."""
+    nets = torch.nn.functional
+    most = max(max(len(one.answers) for one in batch), 1)
+    inputs = np.zeros((len(batch), most, len(ITEM_INPUTS)), np.float32)
+    answers = np.full((len(batch), most), -1, np.int64)
+    for row, one in enumerate(batch):
+        inputs[row, : len(one.answers)] = one.inputs
+        answers[row, : len(one.answers)] = one.answers
+    if signs is not None:
+        inputs[..., MIRRORED] *= signs[:, None, None]
+    there = torch.from_numpy(answers >= 0)
+    units = nets.relu(torch.from_numpy(inputs) @ arrays["first"] + arrays["first_bias"])
+    scores = (units @ arrays["query"]) @ (units @ arrays["key"]).transpose(1, 2) / WIDTH**0.5
+    # Padding is attended by nobody; a large finite number, since a keyframe may be all padding.
+    told = nets.softmax(scores.masked_fill(~there[:, None], -1e9), -1) @ (units @ arrays["value"])
+    both = torch.cat([units, told], -1)
+    units = nets.relu(both @ arrays["second"] + arrays["second_bias"])
+    logits = units @ arrays["out"] + arrays["out_bias"]
+    known = torch.from_numpy(answers)[there]
+    items = nets.cross_entropy(logits[there], known) if len(known) else logits.sum() * 0
+
+    columns = (
+        np.concatenate([getattr(one, name) for one in batch])
+        for name in ("places", "strips", "found", "weights")
+    )
+    places, strips, found, weights = map(torch.from_numpy, columns)
+    units = nets.relu(strips @ arrays["strip"] + arrays["strip_bias"])
+    logits = units @ arrays["strip_out"] + arrays["map"][places.long()]
+    loss = nets.binary_cross_entropy_with_logits(logits, found, weights, reduction="sum")
+    return items, loss / weights.sum()
+
+
+def _card(
+    made: SetsConfig,
+    examples: Sequence[Example],
+    rounds: Sequence[Mapping[str, int]],
+    losses: Mapping[str, float] | None = None,
+) -> Card:
+    played = ", then ".join(
+        ", ".join(f"{count} of {kind}" for kind, count in worlds.items()) for worlds in rounds
+    )
+    items = sum(len(one.answers) for one in examples)
+    last = TRAINING + sum(max(worlds.values()) for worlds in rounds) - 1
+    return card_of(
+        LearnedSets.name,
+        scenario=SCENARIOS,
+        data=f"{items} boxes and tracks of {len(examples)} keyframes; worlds {played}"
+        + (", the second time mostly by itself" if len(rounds) > 1 else "")
+        + (f"; without {' and '.join(made.without)}" if made.without else ""),
+        seeds={"worlds": [TRAINING, last], "training": made.seed},
+        steps=made.steps,
+        result=losses or {},
+    )
