@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from care_sim.driving.drivers import HUMAN_MODEL as HUMAN
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
+from care_sim.driving.drivers import HUMAN_MODEL as HUMAN
 from care_sim.scenarios import make_scenario
 from care_sim.scenarios.r157 import (
     GAP_STEP_M,
