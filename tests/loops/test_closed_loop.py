@@ -86,6 +86,18 @@ def test_a_keyframe_tells_time_speed_and_distance_at_its_scan(street):
     )
 
 
+def test_the_distance_is_from_the_sensor_of_a_car_that_has_turned_off(street):
+    world = street(Route(legs=((2.0, 0.0), (15.0, 0.1), (300.0, 0.0))))
+    world.first_sighting = world.add("person", "pedestrian", (30.0, 4.0, 0.0))
+    loop = loop_in(world)
+    for _ in range(12):
+        sensor = Frame.mounted(world.ego.pose, LIDAR_POSITION)
+        assert loop.keyframe(NOTHING).distance_m == pytest.approx(
+            np.hypot(30.0 - sensor.x, 4.0 - sensor.y)
+        )
+    assert sensor.y > 1.0
+
+
 def test_the_next_belief_forecasts_a_moving_body_where_the_sensor_then_is(street):
     world = street()
     start, velocity = np.array([20.0, 6.0]), np.array([-3.0, 4.0])

@@ -102,7 +102,12 @@ def test_bad_arguments_are_named(arguments, message):
         gymnasium.make("CARE-Dartout-v0", **arguments)
 
 
-def test_a_box_is_of_whom_it_has_returns_though_somebody_hidden_is_nearer(monkeypatch):
+@pytest.mark.parametrize(("label", "detected"), [(4, True), (0, False)], ids=["person", "car"])
+def test_a_box_is_of_whom_it_has_returns_though_somebody_hidden_is_nearer(
+    monkeypatch, label, detected
+):
+    """And of somebody of its class alone."""
+
     class Between:
         """One box of a person between one who is seen and one who is hidden."""
 
@@ -111,7 +116,7 @@ def test_a_box_is_of_whom_it_has_returns_though_somebody_hidden_is_nearer(monkey
             box = seen.copy()
             box[:2] += 0.6 * (hidden[:2] - seen[:2])
             box[3:5] = 3.0
-            return care_sim.Detections(np.array([4]), box[None], np.array([1]), None)
+            return care_sim.Detections(np.array([label]), box[None], np.array([1]), None)
 
     monkeypatch.setitem(detectors.DETECTORS.built_in, "between", Between)
     env = gymnasium.make("CARE-Dartout-v0", budget=1.0, detector="between")
@@ -131,5 +136,5 @@ def test_a_box_is_of_whom_it_has_returns_though_somebody_hidden_is_nearer(monkey
         return loop.sensor.boxes_to_local(loop.world.boxes([seen, hidden]))
 
     env.reset(seed=0)
-    assert env.step(np.ones(env.action_space.shape, np.float32))[4]["detected"]
+    assert env.step(np.ones(env.action_space.shape, np.float32))[4]["detected"] is detected
     env.close()

@@ -142,3 +142,15 @@ def test_who_is_seen_from_the_middle_of_a_turn_is_in_sight_for_as_long_as_the_re
     # A wall four metres further to the left hides nobody.
     aside = 40.0 - length / 2, 13.0 - width / 2, 0.0
     assert sight_of(approach, arrival, walk, 0.73, "wall", aside, hit_s, hit_s) is None
+
+
+@pytest.mark.parametrize(("speed", "hides_long"), [(4.0, True), (8.0, False)])
+def test_who_was_in_sight_just_before_does_not_count_as_hidden(speed, hides_long):
+    """A bicycle between hides the line of sight over 7.5 m of the way: 1.9 s or 0.9 s."""
+    plan = SpeedPlan(Route(legs=((200.0, 0.0),)), speed, 2.0, 1.5)
+    approach = Approach.along(plan, 80.0, 80.0)
+    arrival = approach.arrival(Line((80.0, 0.0, 0.0), 1), 0.33)
+    walk = Walk((80.0, 6.0), -np.pi / 2, 2.8, 5.6, 20.0)
+    hit_s = walk.duration_to(6.0)
+    found = sight_of(approach, arrival, walk, 0.73, "bicycle", (70.0, 3.0, 0.0), hit_s, hit_s)
+    assert (found is not None) is hides_long

@@ -98,6 +98,16 @@ def test_the_reserve_goes_to_the_best_sector_and_exploitation_stays():
     env.close()
 
 
+@pytest.mark.parametrize("wrapper", [SectorReserve, SectorScores])
+def test_the_scores_of_an_action_are_the_callers_own(wrapper):
+    with wrapper(gymnasium.make("CARE-Dense-v0", disable_env_checker=True, budget=0.03)) as env:
+        env.reset(seed=0)
+        first = env.action(np.ones((4, 32), np.float32))
+        kept = first.copy()
+        env.action(np.eye(4, 32, 5, np.float32))
+        np.testing.assert_array_equal(first, kept)
+
+
 def test_scores_of_sectors_fire_the_best_sectors():
     env = SectorScores(gymnasium.make("CARE-Dense-v0", disable_env_checker=True, budget=0.03))
     scores = np.full((4, 32), -1, np.float32)
