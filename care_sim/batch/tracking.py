@@ -50,9 +50,9 @@ class Tracking:
         # As many rows as there will be if nothing that was found is known.
         needed = int((state.tracks.counts + found.counts).max(initial=0))
         if needed > state.tracks.rows.shape[1]:
-            rows = np.zeros((state.worlds, 2 * needed, state.tracks.rows.shape[2]))
-            rows[:, : state.tracks.rows.shape[1]] = state.tracks.rows
-            state.tracks = state.tracks._replace(rows=rows)
+            longer = np.zeros((state.worlds, 2 * needed, state.tracks.rows.shape[2]))
+            longer[:, : state.tracks.rows.shape[1]] = state.tracks.rows
+            state.tracks = state.tracks._replace(rows=longer)
         crowded = np.zeros(state.worlds, np.bool_)
         tables = state.bodies, state.reported, state.sensors, state.tracks
         _update(state.live, found, *tables, self._life, crowded)

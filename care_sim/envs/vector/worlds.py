@@ -48,7 +48,7 @@ class Rewards:
         self._weights = weights
         self._measured = bool(weights["gain"])
         # Columns (W,) of `care_sim.envs.reward.Course`.
-        self._courses = tuple(np.full(worlds, value) for value in BEGINNING)
+        self._courses: Any = tuple(np.full(worlds, value) for value in BEGINNING)
 
     def begin(self, world: int) -> None:
         """Begin an episode in a world."""
