@@ -143,21 +143,16 @@ class Impacts:
         bodies, egos = state.bodies, state.egos
         counts, near = _near(looked, bodies.counts, bodies.boxes, egos.bodies, CONTACT_REACH_M)
         for world in np.flatnonzero(counts).tolist():
+            own, ego, kinds = self._egos[world], int(egos.bodies[world]), self._kinds[world]
+            assert own is not None
             for body in near[world, : counts[world]].tolist():
-                if self._touches(state, world, body):
+                if self._judge.touch((own, kinds[body]), bodies.poses[world, [ego, body]]):
                     # The velocity is that of `World.velocities_of`.
                     boxes, before = bodies.boxes[world], bodies.before[world]
                     velocity = (boxes[body, :2] - before[body, :2]) / WORLD_STEP_S
-                    kind, ego = self._kinds[world][body].name, int(egos.bodies[world])
                     speed_mps = float(egos.speeds[world])
-                    yield world, Impact.on(body, kind, boxes, ego, speed_mps, velocity)
+                    yield world, Impact.on(body, kinds[body].name, boxes, ego, speed_mps, velocity)
                     break
-
-    def _touches(self, state: BatchState, world: int, body: int) -> bool:
-        ego = self._egos[world]
-        assert ego is not None
-        poses = state.bodies.poses[world, [int(state.egos.bodies[world]), body]]
-        return self._judge.touch((ego, self._kinds[world][body]), poses)
 
 
 @compiled(brief=True)

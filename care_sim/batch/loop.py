@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from care_sim.base.compiled import compiled
 from care_sim.batch.motion import Motion, steps_of
-from care_sim.batch.scanning import Choice, Found, Scanning
+from care_sim.batch.scanning import Choice, Scanning
 from care_sim.batch.sight import Sight
 from care_sim.batch.state import BatchState, Fired, load, place_sensors, seen_by_each
 from care_sim.batch.tracking import Braking, Tracking
@@ -123,8 +123,8 @@ class BatchLoop:
     seconds. Observations are written into `observed`, arrays with a row per world. The `rigs` (W,)
     differ at most in their budgets, the `conditions` (W,) in those of their cameras.
 
-    Unless `exact`, records tell the clearance as `Motion.advance` does, and `least_clearance_m`
-    has to be asked for that of an episode.
+    Unless `exact`, records tell the clearance as `Motion.advance` does, and `motion.settle`
+    tells the least of an episode.
     """
 
     fired: Fired
@@ -153,7 +153,7 @@ class BatchLoop:
         self._tracking = Tracking(rig.keyframe_s)
         self._braking = Braking(rig, common, worlds)
         self._exact = exact
-        self._motion = Motion(worlds, steps_of(duration_s, rig.keyframe_s))
+        self.motion = Motion(worlds, steps_of(duration_s, rig.keyframe_s))
         self._sight = Sight(rig, conditions)
         self._observing = Observing(rig, budgets)
         self._min_returns = common.min_returns
@@ -167,7 +167,7 @@ class BatchLoop:
             load(self.state, world, built)
             self._choice.begin(world, episode.floor)
             self._braking.begin(world, built.ego_motion.speed, built.has_oncoming)
-            self._motion.begin(world, built)
+            self.motion.begin(world, built)
             self._sight.begin(world, built, episode.seeds.camera)
             self._observed["ranges"][world] = 0.0
             who[world] = True
@@ -191,10 +191,13 @@ class BatchLoop:
         found = self._scanning.found(state, returns)
         self._tracking.update(state, found)
         accelerations, braking = self._braking.command(who, *self._tracking.seen(state), speed)
-        detected = self._is_found(found)
+        in_use = np.arange(found.rows.shape[1]) < found.counts[:, None]
+        bodies = np.take_along_axis(state.reported.bodies, np.where(in_use, found.rows, 0), axis=1)
+        targeted = ((bodies == state.egos.targets[:, None]) & in_use).any(axis=1)
+        detected = targeted & self._has_target
 
         # The command holds until the next keyframe; then the cameras look and forecasts are due.
-        passages = self._motion.advance(state, accelerations, self._rig.keyframe_s, self._exact)
+        passages = self.motion.advance(state, accelerations, self._rig.keyframe_s, self._exact)
         self.impacts = passages.impacts
         state.keyframes[who] += 1
         self._tracking.predict(state)
@@ -242,13 +245,9 @@ class BatchLoop:
         result: Mask = state.live & (hits >= self._min_returns)
         return result
 
-    def least_clearance_m(self, world: int, since_s: float) -> float:
-        """The least clearance of a world's episode from a time on; see `Motion.settle`."""
-        return self._motion.settle(world, since_s)
-
     def close(self) -> None:
         """Free what the stages hold."""
-        self._motion.close()
+        self.motion.close()
 
     def _look(self, who: Mask) -> None:
         """Take the cameras' pictures and write what the policies of the worlds `who` are told."""
@@ -272,12 +271,3 @@ class BatchLoop:
         centres = state.bodies.boxes[np.arange(state.worlds), state.egos.targets, :2]
         away = centres - state.sensors.poses[:, :2]
         return np.where(self._has_target, np.hypot(away[:, 0], away[:, 1]), np.inf)
-
-    def _is_found(self, found: Found) -> Mask:
-        """(W,) whether the first-sighting actor is among the bodies that are detected."""
-        state = self.state
-        in_use = np.arange(found.rows.shape[1]) < found.counts[:, None]
-        rows = np.where(in_use, found.rows, 0)
-        bodies = np.take_along_axis(state.reported.bodies, rows, axis=1)
-        targeted: Mask = ((bodies == state.egos.targets[:, None]) & in_use).any(axis=1)
-        return targeted & self._has_target

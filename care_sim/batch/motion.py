@@ -96,11 +96,12 @@ class Motion:
         self._impacts.begin(world, built)
         self._by_itself.pop(world, None)
         self._goes_along[world] = True
-        drivers = [actor for actor in built.actors if _is_driver(actor)]
-        others = [actor for actor in built.actors if not _is_driver(actor)]
+        drivers = [actor for actor in built.actors if _is_vehicle(_source(actor))]
+        others = [actor for actor in built.actors if not _is_vehicle(_source(actor))]
         keepers = self._keepers(built, drivers)
         timed = [actor for actor in others if not isinstance(actor.moved_by, tuple)]
-        if keepers is None or not all(map(_goes_by_time, timed)):
+        by_time = all(isinstance(_timetable(actor), _BY_TIME_ALONE) for actor in timed)
+        if keepers is None or not by_time:
             self._by_itself[world] = built
             self._goes_along[world] = False
             return
@@ -134,7 +135,10 @@ class Motion:
         for _ in range(count):
             self._step(state, accelerations)
             self._clearances.note(state, self._steps, passages.nearest_m)
-            self._note_impacts(state, passages)
+            for world, impact in self._impacts.now(state, state.live & ~passages.hit):
+                passages.hit[world] = True
+                passages.impact_speed_mps[world] = impact.speed_mps
+                passages.impacts[world] = impact
         below = np.inf if exact else KNOWN_BELOW_M
         passages.clearance_m[:] = self._clearances.least_since(self._steps, count, targeted, below)
         return passages
@@ -163,7 +167,11 @@ class Motion:
         """
         ways = np.empty((len(actors), len(self._times), 5))
         for way, actor in zip(ways, actors, strict=True):
-            way[:, :3] = _poses(actor, self._times)
+            timetable = _timetable(actor)
+            assert isinstance(timetable, _BY_TIME_ALONE)
+            way[:, :3] = timetable.poses(self._times)
+            if isinstance(actor.moved_by, Reflection):
+                way[:, :3] *= _REFLECTED
             half = way[:, 2] / 2
             way[:, 3], way[:, 4] = np.sin(half), np.cos(half)
         return ways
@@ -182,22 +190,11 @@ class Motion:
                 built.step(float(accelerations[world]))
                 _copy(built, world, state)
 
-    def _note_impacts(self, state: BatchState, passages: Passages) -> None:
-        """Write the first impact of each world into `passages`."""
-        for world, impact in self._impacts.now(state, state.live & ~passages.hit):
-            passages.hit[world] = True
-            passages.impact_speed_mps[world] = impact.speed_mps
-            passages.impacts[world] = impact
-
 
 def _source(actor: Actor) -> object:
     """What moves an actor, on either side of the street."""
     moved_by = actor.moved_by
     return moved_by.of if isinstance(moved_by, Reflection) else moved_by
-
-
-def _is_driver(actor: Actor) -> bool:
-    return _is_vehicle(_source(actor))
 
 
 def _is_vehicle(source: object) -> TypeGuard[RoadVehicle]:
@@ -207,18 +204,6 @@ def _is_vehicle(source: object) -> TypeGuard[RoadVehicle]:
 def _timetable(actor: Actor) -> object:
     """What tells where an actor is at a time, if the time alone tells it."""
     return getattr(_source(actor), "__self__", None)
-
-
-def _goes_by_time(actor: Actor) -> bool:
-    return isinstance(_timetable(actor), _BY_TIME_ALONE)
-
-
-def _poses(actor: Actor, times: Floats) -> Floats:
-    """(n, 3) where an actor that goes by time alone is at `times` (n,)."""
-    timetable = _timetable(actor)
-    assert isinstance(timetable, _BY_TIME_ALONE)
-    poses = timetable.poses(times)
-    return poses * _REFLECTED if isinstance(actor.moved_by, Reflection) else poses
 
 
 def _copy(built: World, world: int, state: BatchState) -> None:

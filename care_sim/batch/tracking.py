@@ -35,13 +35,6 @@ from care_sim.world.bodies import CATALOGUE
 _BOX, _BOX_END = Tracks.BOX.start, Tracks.BOX.stop
 
 
-class Seen(NamedTuple):
-    """Tracks in the frame of each sensor, the nearest first: `counts` (W,), `rows` (W, T, 13)."""
-
-    counts: Integers
-    rows: Floats
-
-
 class Tracking:
     """The track memories of all worlds. What `seen` returns it fills anew at the next call."""
 
@@ -54,42 +47,35 @@ class Tracking:
         """Assign what was found in this keyframe to the forecasts, start new tracks, drop old
         ones.
         """
-        _make_room(state, found.counts)
+        # As many rows as there will be if nothing that was found is known.
+        needed = int((state.tracks.counts + found.counts).max(initial=0))
+        if needed > state.tracks.rows.shape[1]:
+            longer = np.zeros((state.worlds, 2 * needed, state.tracks.rows.shape[2]))
+            longer[:, : state.tracks.rows.shape[1]] = state.tracks.rows
+            state.tracks = state.tracks._replace(rows=longer)
         crowded = np.zeros(state.worlds, np.bool_)
         tables = state.bodies, state.reported, state.sensors, state.tracks
         _update(state.live, found, *tables, self._life, crowded)
+        # Where a track could be two or two one, Python assigns, as in a single world.
         for world in np.flatnonzero(crowded).tolist():
-            self._update_crowded(state, found, world)
+            rows = found.rows[world, : found.counts[world]]
+            classes, boxes = _detected(rows, state.bodies, state.reported, state.sensors, world)
+            table = state.tracks.rows[world, : state.tracks.counts[world]]
+            pairs = assigned(table, classes, boxes, self._life)
+            _keep(state.tracks, world, classes, boxes, pairs, self._life)
 
     def predict(self, state: BatchState) -> None:
         """Move every track one keyframe ahead at constant velocity."""
         _predict(state.live, state.tracks, self._keyframe_s)
 
-    def seen(self, state: BatchState, sensors: Sensors | None = None) -> Seen:
-        """The tracks from where the `sensors` are, those of the state unless others are given."""
+    def seen(self, state: BatchState) -> tuple[Integers, Floats]:
+        """Tracks in the frame of each sensor, the nearest first: how many (W,), and the rows
+        (W, T, 13).
+        """
         if self._seen.shape != state.tracks.rows.shape:
             self._seen = np.empty(state.tracks.rows.shape)
-        _see(state.live, state.tracks, state.sensors if sensors is None else sensors, self._seen)
-        return Seen(state.tracks.counts, self._seen)
-
-    def _update_crowded(self, state: BatchState, found: Found, world: int) -> None:
-        """Update the tracks of a world in which one could be two, or two one."""
-        rows = found.rows[world, : found.counts[world]]
-        classes, boxes = _detected(rows, state.bodies, state.reported, state.sensors, world)
-        tracks = state.tracks
-        table = tracks.rows[world, : tracks.counts[world]]
-        pairs = assigned(table, classes, boxes, self._life)
-        _keep(tracks, world, classes, boxes, pairs, self._life)
-
-
-def _make_room(state: BatchState, new: Integers) -> None:
-    """Give the tables as many rows as there will be if nothing that was found is known."""
-    tracks = state.tracks
-    needed = int((tracks.counts + new).max(initial=0))
-    if needed > tracks.rows.shape[1]:
-        rows = np.zeros((state.worlds, 2 * needed, tracks.rows.shape[2]))
-        rows[:, : tracks.rows.shape[1]] = tracks.rows
-        state.tracks = tracks._replace(rows=rows)
+        _see(state.live, state.tracks, state.sensors, self._seen)
+        return state.tracks.counts, self._seen
 
 
 @compiled(brief=True)

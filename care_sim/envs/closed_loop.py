@@ -207,8 +207,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         `info` holds the seed that repeats the episode and the parameters that it drew, unless
         `scoring_info` is off. There are no `options`.
         """
-        self._reseed(seed, options)
-        entropy = self._draw_entropy(seed)
+        entropy = self._entropy(seed, options)
         self.close()
         pool = self._pool(entropy)
         world, seeds, floor = self.episode(entropy)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from care_sim.base.checks import check_arguments, check_choice
 from care_sim.base.errors import InvalidInput, shown
+from care_sim.base.seeds import streams
 from care_sim.core.arrays import Mask
 from care_sim.core.cells.stack import Grid
 from care_sim.core.conditions import IDEAL_CAMERA, changed_settings
@@ -141,7 +142,7 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
                 "camera_profile must be ideal where the camera's detections come from a file: "
                 "a detector made them, with its own errors"
             )
-        camera, lidar, floor, odometry = self._streams(seed, crc32(film.name.encode()), count=4)
+        camera, lidar, floor, odometry = streams((seed, crc32(film.name.encode())), 4, self._secret)
         self._sightings = _sightings(film, self.presence)
         self.keyframes = []
         self._masks = []
@@ -172,7 +173,7 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
             info["outcome"] = asdict(self.score.outcome())
         # A keyframe without annotated objects misses none of them.
         reward = float(scored.mean()) - 1.0 if len(scored) else 0.0
-        return self.observed(), reward, False, self._over, info
+        return loop.belief.to_observation(), reward, False, self._over, info
 
     def render(self) -> NDArray[np.uint8] | None:
         """A picture (H, W, 3) of the last keyframe from above.
@@ -220,8 +221,7 @@ class FilmEnv(OpenLoopEnv):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observed, dict[str, Any]]:
         """Begin the scene anew. `info` holds what repeats the episode; there are no `options`."""
-        self._reseed(seed, options)
-        return self._start(self.film, self._draw_entropy(seed))
+        return self._start(self.film, self._entropy(seed, options))
 
 
 def check_film_arguments(kind: type[OpenLoopEnv], parameters: Collection[str]) -> None:

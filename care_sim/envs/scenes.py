@@ -40,8 +40,7 @@ class StreetEnv(OpenLoopEnv):
 
         `info` holds what repeats it; there are no `options`.
         """
-        self._reseed(seed, options)
-        entropy = self._draw_entropy(seed)
+        entropy = self._entropy(seed, options)
         film = street_film(entropy, self._secret, self._setup, self.conditions.filmed)
         return self._start(film, entropy)
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from care_sim.base.checks import as_array, check_flag, check_seed
 from care_sim.base.errors import InvalidInput, shown
-from care_sim.base.seeds import check_secret, streams
+from care_sim.base.seeds import check_secret
 from care_sim.core.arrays import Floats
 from care_sim.core.belief import MAX_DETECTIONS, MAX_TRACKS, OBSERVED
 from care_sim.core.cells.stack import Grid
@@ -192,31 +192,23 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         """What privileged policies may ask for; `make_policy` hands it to them alone."""
         return Truth(self)
 
-    def _reseed(self, seed: int | None, options: dict[str, Any] | None) -> None:
-        """Begin the environment's own generator anew if a seed is given.
+    def _entropy(self, seed: int | None, options: dict[str, Any] | None) -> int:
+        """The seed of an episode: the given one, with which the environment's own generator begins
+        anew, or else a draw of that generator.
 
-        Raises InvalidInput unless it is a whole number from 0 to 2^63 - 1, and for any `options` of
-        `reset`: there are none.
+        Raises InvalidInput unless a seed is a whole number from 0 to 2^63 - 1, and for any
+        `options` of `reset`: there are none.
         """
         if options:
             raise InvalidInput(
                 f"reset takes no options, got {shown(options)}; what an episode is made of are "
                 "arguments of the environment"
             )
-        if seed is not None:
-            check_seed(seed)
-            super().reset(seed=int(seed))
-
-    def _draw_entropy(self, seed: int | None) -> int:
-        """The seed of an episode: the given one, or else a draw of the own generator."""
-        return int(seed) if seed is not None else int(self.np_random.integers(2**32))
-
-    def _streams(self, *entropy: int, count: int) -> list[np.random.SeedSequence]:
-        """`count` independent streams of an episode; see `care_sim.base.seeds`.
-
-        No policy enters the seed, so all meet the same world, faults and floor.
-        """
-        return streams(entropy, count, self._secret)
+        if seed is None:
+            return int(self.np_random.integers(2**32))
+        check_seed(seed)
+        super().reset(seed=int(seed))
+        return int(seed)
 
     def _begin(self, loop: AnyLoop, floor: np.random.SeedSequence) -> Observed:
         """Start an episode over a loop and a floor; its first observation."""
@@ -225,11 +217,7 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         self._floors = RandomFloor(floor, self.conditions.floor_seed, self.rig.grid.size)
         self._keyframe = 0
         self._last_fired = np.empty(0, np.int64)
-        return self.observed()
-
-    def observed(self) -> Observed:
-        """The observation of the coming keyframe; the arrays are the caller's own."""
-        return self.loop.belief.to_observation()
+        return loop.belief.to_observation()
 
     def _choose_cells(self, action: Action) -> Cells:
         """Take an action: the cells that it fires at the coming keyframe.

@@ -4,6 +4,7 @@ It is gathered only while somebody watches.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,8 +62,10 @@ def returned(ranges: NDArray[np.floating], grid: Grid) -> tuple[Cells, Floats]:
 
 
 @dataclass(frozen=True)
-class Surroundings:
-    """What is there when the cells of a keyframe are chosen. Boxes are in the world frame."""
+class TrueSituation:
+    """What is there when the cells of a keyframe are chosen, and what of it the policy was shown.
+    Boxes are in the world frame. Truth: for people and scoring, never for a policy.
+    """
 
     time_s: float
     """Seconds from the start."""
@@ -82,15 +85,6 @@ class Surroundings:
     """(n, 7) their boxes."""
     target: int | None
     """The row of the first-sighting actor, None without one."""
-
-
-@dataclass(frozen=True)
-class TrueSituation(Surroundings):
-    """The surroundings, and what of them the policy was shown.
-
-    Truth: for people and scoring, never for a policy.
-    """
-
     belief: Belief
     """All that the policy was shown."""
     known: Mask
@@ -143,7 +137,7 @@ class Watcher:
         sure = clear.detections.confidences >= self._confidence
         missed = clear.detections.rows()[sure & ~np.isin(clear.objects, given)]
         return TrueSituation(
-            **vars(there),
+            **there,
             belief=loop.belief,
             known=explained(loop.belief.detections, loop.belief.tracks, loop.rig),
             false=given == NO_OBJECT,
@@ -165,34 +159,36 @@ class Watcher:
         return Watched(situation, shares, ranges, record, fired)
 
 
-def _of_world(loop: ClosedLoop) -> Surroundings:
+def _of_world(loop: ClosedLoop) -> dict[str, Any]:
+    """What is there around a world's ego."""
     world = loop.world
     pieces = 1 if world.route is None else _PIECES
     middles = (np.arange(pieces) + 0.5) * WAY_M / pieces
-    return Surroundings(
-        time_s=world.time,
-        sensor=loop.sensor,
-        ego=world.boxes_of(np.array([world.ego_body]))[0],
-        way=np.array([way_ahead(world, loop.rig.sensor_x_m, m) for m in middles.tolist()]),
-        names=tuple(actor.name for actor in world.actors),
-        labels=tuple(actor.label for actor in world.actors),
-        bodies=world.boxes(world.actors).copy(),
-        target=world.actors.index(world.first_sighting) if world.first_sighting else None,
-    )
+    return {
+        "time_s": world.time,
+        "sensor": loop.sensor,
+        "ego": world.boxes_of(np.array([world.ego_body]))[0],
+        "way": np.array([way_ahead(world, loop.rig.sensor_x_m, m) for m in middles.tolist()]),
+        "names": tuple(actor.name for actor in world.actors),
+        "labels": tuple(actor.label for actor in world.actors),
+        "bodies": world.boxes(world.actors).copy(),
+        "target": world.actors.index(world.first_sighting) if world.first_sighting else None,
+    }
 
 
-def _of_film(loop: OpenLoop) -> Surroundings:
+def _of_film(loop: OpenLoop) -> dict[str, Any]:
+    """What is there in a film's keyframe."""
     shot, (x, y, height), size = loop.shot, loop.film.position, CATALOGUE["ego"].size
     car = np.array([[-x, -y, size[2] / 2 - height, *size, 0.0]])
     annotations = shot.annotations
     named = zip(annotations.classes.tolist(), annotations.objects.tolist(), strict=True)
-    return Surroundings(
-        time_s=shot.time_s,
-        sensor=shot.sensor,
-        ego=shot.sensor.boxes_to_world(car)[0],
-        way=np.empty((0, 3)),
-        names=tuple(f"{CLASSES[label]} {number}" for label, number in named),
-        labels=tuple(annotations.classes.tolist()),
-        bodies=shot.sensor.boxes_to_world(annotations.boxes),
-        target=None,
-    )
+    return {
+        "time_s": shot.time_s,
+        "sensor": shot.sensor,
+        "ego": shot.sensor.boxes_to_world(car)[0],
+        "way": np.empty((0, 3)),
+        "names": tuple(f"{CLASSES[label]} {number}" for label, number in named),
+        "labels": tuple(annotations.classes.tolist()),
+        "bodies": shot.sensor.boxes_to_world(annotations.boxes),
+        "target": None,
+    }

@@ -14,7 +14,7 @@ from care_sim.scenarios.base import Scenario, scenario_faults
 from care_sim.scenarios.cutin import CutIn
 from care_sim.scenarios.dartout import Dartout, Dense
 from care_sim.scenarios.drive import DriveScenario
-from care_sim.scenarios.ncap import Ncap
+from care_sim.scenarios.ncap.scenario import Ncap
 from care_sim.scenarios.r157 import R157
 
 refuse_link(__name__)

@@ -124,17 +124,14 @@ class MirrorableScenario(Scenario):
 
     def empty_world(self, traffic: Traffic, ego_speed: float, rng: np.random.Generator) -> World:
         """The world to be filled, at time zero; `ego_speed` in m/s."""
-        reflects = self._reflects(rng)
+        # A stream of its own: the draws that follow are those of the world that is not reflected.
+        reflects = self.mirrored == "always" or (
+            self.mirrored == "drawn" and rng.spawn(1)[0].random() < 0.5
+        )
         world = (MirroredWorld if reflects else World)(traffic, ego_speed)
         if self.mirrored == "drawn":
             world.drawn = {"mirrored": "always" if reflects else "never"}
         return world
-
-    def _reflects(self, rng: np.random.Generator) -> bool:
-        # A stream of its own: the draws that follow are those of the world that is not reflected.
-        return self.mirrored == "always" or (
-            self.mirrored == "drawn" and rng.spawn(1)[0].random() < 0.5
-        )
 
 
 class MirroredWorld(World):
@@ -153,7 +150,7 @@ class MirroredWorld(World):
         backdrop: bool = False,
     ) -> Actor:
         """Add a body where `World.add` would put its reflection."""
-        reflected = _reflected(pose)
+        reflected = _on_the_other_side(pose) if isinstance(pose, tuple) else Reflection(pose)
         return super().add(name, kind, reflected, reported=reported, backdrop=backdrop)
 
 
@@ -167,10 +164,6 @@ class Reflection:
         """The pose at `time`."""
         pose = self.of.pose if isinstance(self.of, RoadVehicle) else self.of(time)
         return _on_the_other_side(pose)
-
-
-def _reflected(pose: Pose | Motion | RoadVehicle) -> Pose | Motion:
-    return _on_the_other_side(pose) if isinstance(pose, tuple) else Reflection(pose)
 
 
 def _on_the_other_side(pose: Pose) -> Pose:

@@ -186,9 +186,8 @@ class DrawnStreet(StreetEnv):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observed, dict[str, Any]]:
         """Begin an episode in the street."""
-        self._reseed(seed, options)
         film = _film(self._street, self._secret, self._setup, self.conditions.filmed)
-        return self._start(film, self._draw_entropy(seed))
+        return self._start(film, self._entropy(seed, options))
 
 
 _YAW_RATE = EGO_INPUTS.index("yaw_rate")

@@ -8,7 +8,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.seeds import LAST, TRAINING, VALIDATION
-from care_sim.envs.vector.steps import last_rows, same_step
+from care_sim.envs.vector.arguments import last_rows, same_step
 from care_sim.envs.wrappers.reading import WorldsWrapper
 
 

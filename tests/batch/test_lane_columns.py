@@ -53,48 +53,27 @@ def test_columns_go_as_highway_env_moves_vehicles(roads):
             assert all(vehicle.pose[2] == 0.0 for vehicle in vehicles)
 
 
+def out_of_order(traffic):
+    return [traffic.add_driver(x, 0, 8.0, CAR) for x in (10.0, 10.0)][::-1]
+
+
 def askew(traffic):
     driver = traffic.add_driver(10.0, 0, 8.0, CAR)
     driver._vehicle.heading = 1e-9
     return [driver]
 
 
-def oncoming(traffic):
-    return [traffic.add_driver(40.0, 1, 8.0, CAR)]
-
-
-def pulling_out(traffic):
-    driver = traffic.add_parked_driver(20.0, 0, CAR, 8.0)
-    driver.pull_out(1)
-    return [driver]
-
-
-def parked(traffic):
-    return [traffic.add_parked_driver(20.0, 0, CAR, 8.0)]
-
-
-def at_the_end(traffic):
-    return [traffic.add_driver(700.0, 0, 8.0, CAR)]
-
-
-def unknown(traffic):
-    traffic.add_driver(20.0, 0, 8.0, CAR)
-    return []
-
-
-def stop_line(traffic):
-    traffic.add_stop_line(50.0, 0)
-    return []
-
-
-def out_of_order(traffic):
-    drivers = [traffic.add_driver(x, 0, 8.0, CAR) for x in (10.0, 10.0)]
-    return drivers[::-1]
-
-
 @pytest.mark.parametrize(
     "others",
-    [askew, oncoming, pulling_out, parked, at_the_end, unknown, stop_line, out_of_order],
+    [
+        askew,
+        out_of_order,
+        lambda traffic: [traffic.add_driver(40.0, 1, 8.0, CAR)],  # oncoming
+        lambda traffic: [traffic.add_parked_driver(20.0, 0, CAR, 8.0)],
+        lambda traffic: [traffic.add_driver(700.0, 0, 8.0, CAR)],  # at the end
+        lambda traffic: traffic.add_driver(20.0, 0, 8.0, CAR) and [],  # unknown
+        lambda traffic: traffic.add_stop_line(50.0, 0) or [],
+    ],
 )
 def test_what_is_not_sure_to_keep_its_lane_is_left_to_highway_env(others):
     traffic = Traffic((1, -1), 0, 3.5, 14.0)

@@ -1,7 +1,6 @@
 """What many policies are told is what each of them would be told alone, to the last bit."""
 
 import numpy as np
-import pytest
 from gymnasium.vector.utils import create_empty_array
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -87,19 +86,3 @@ def test_each_world_is_told_what_fits(worlds, seed):
                 assert observed[name][world].tobytes() == rows.tobytes(), name
             elif name != "ranges":
                 assert (observed[name][world] == 1).all()
-
-
-@pytest.mark.parametrize("others", [99, MAX_TRACKS - 1, MAX_TRACKS, 400])
-def test_the_farthest_of_many_tracks_is_told_where_it_explains_a_box(others):
-    """The others are nearer, and behind the camera."""
-    known = np.zeros((others + 1, len(Tracks.COLUMNS)))
-    known[:, Tracks.ID] = np.arange(others + 1)
-    known[:, 2] = -10.0
-    known[:, 3] = np.arange(others + 1) / 20
-    known[-1, 2:4] = 48.0, 0.0
-    (u, v), _ = FRONT_CAMERA.project(np.array([48.0, 0.0, 0.0]))
-    box = np.array([[0, 0.5, u - 1, v - 1, u + 1, v + 1, 0, 0, 0]])
-    observed, _ = told(np.zeros((1, 3)), [box], [known], True)
-    kept = observed["tracks"][0][:, Tracks.ID]
-    assert others in kept
-    assert np.count_nonzero(kept >= 0) == min(others + 1, MAX_TRACKS)

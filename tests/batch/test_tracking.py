@@ -49,11 +49,11 @@ def test_crowds_are_tracked_as_in_a_single_world(people, spread):
                 detections = Detections(classes[world, seen], local, np.full(len(seen), 3))
                 memories[world].update(detections, sensor)
         tracking.update(state, found)
-        from_sensors = tracking.seen(state)
+        counts, rows = tracking.seen(state)
         for world in np.flatnonzero(state.live):
             pose = state.sensors.poses[world]
             expected = memories[world].tracks(Frame(*pose[:4])).rows()
-            same(from_sensors.rows[world, : from_sensors.counts[world]], expected)
+            same(rows[world, : counts[world]], expected)
             memories[world].predict()
         tracking.predict(state)
         for world in np.flatnonzero(state.live):

@@ -68,15 +68,3 @@ def test_only_fired_cells_are_cast(monkeypatch, name, made, engine):
         env.step(env.action_space.sample())
     assert counts == [819, 819, 819]
     env.close()
-
-
-@pytest.mark.parametrize("name", [name for name in CLOSED_LOOP if name != "CARE-Dartout-v0"])
-def test_the_observation_holds_no_body_id(name):
-    """Tracks are numbered from 0. In the dart-out nobody is there at first."""
-    env = gymnasium.make(name, disable_env_checker=True, budget=1.0).unwrapped
-    env.reset(seed=0)
-    env.step(np.ones((32, 512), bool))
-    tracks = env.loop.belief.tracks
-    assert len(tracks) > 0
-    np.testing.assert_array_equal(np.sort(tracks.ids), np.arange(len(tracks)))
-    env.close()

@@ -48,15 +48,6 @@ def test_every_policy_fires_whole_units_of_the_budget(loop, firing):
                 assert np.array_equal(np.flatnonzero(observation["ranges"].ravel()), cells)
 
 
-@pytest.mark.parametrize("firing", FIRINGS)
-def test_an_episode_repeats_itself_after_reset(loop, firing):
-    """A window begins anew where it began."""
-    with gymnasium.make(loop, budget=0.05, firing=firing) as env:
-        policy = care_sim.make_policy("care", env)
-        first, again = ([fired.tolist() for _, fired in played(env, policy)] for _ in range(2))
-    assert first == again
-
-
 def test_without_a_floor_units_stay_unspent_and_windows_do_not(loop):
     with gymnasium.make(loop, budget=0.05, firing="tiles", floor=False) as env:
         policy = care_sim.make_policy("random", env)

@@ -8,11 +8,11 @@ import pytest
 
 from care_sim.core.types import CLASSES, Detections
 from care_sim.envs.scenarios import ScenarioEnv
-from care_sim.policies import make_policy
 from care_sim.scenarios.base import Scenario
 from care_sim.study.benchmark.suite import reached
 from care_sim.world.traffic import Traffic
 from care_sim.world.world import World
+from tests.helpers.episodes import outcome
 
 SPEED_MPS = 10.0
 MADE_UP = f"{__name__}:MakesUpACar"
@@ -70,16 +70,9 @@ def _street():
     return World(Traffic((1,), 0, 3.5, 20.0), SPEED_MPS)
 
 
-def played(scenario, policy="full", **given):
+def played(scenario, **given):
     with closing(ScenarioEnv(scenario=scenario, budget=1.0, **given)) as env:
-        choose = make_policy(policy, env)
-        observation, _ = env.reset(seed=0)
-        choose.reset()
-        over = False
-        while not over:
-            observation, _, terminated, truncated, info = env.step(choose(observation))
-            over = terminated or truncated
-        return info["outcome"]
+        return outcome(env, "full")
 
 
 def test_whoever_runs_into_a_braking_car_is_named():
@@ -104,13 +97,13 @@ def test_a_stop_for_a_car_that_a_detector_made_up_avoids_nothing():
 
 @pytest.mark.parametrize("given", [{}, {"detector": SILENT}])
 def test_a_stop_for_what_is_there_is_no_stop_for_nothing(given):
-    outcome = played(Hidden, **given)
-    assert outcome["braked"] == (not given)
-    assert not outcome["braked_before_view"]
-    assert reached("drives", outcome) == (not outcome["collision"])
+    came_of = played(Hidden, **given)
+    assert came_of["braked"] == (not given)
+    assert not came_of["braked_before_view"]
+    assert reached("drives", came_of) == (not came_of["collision"])
 
 
 def test_a_brake_behind_a_car_is_founded():
-    outcome = played(Hidden, detector=MADE_UP, car_ahead=True)
-    assert outcome["braked"]
-    assert not outcome["braked_before_view"]
+    came_of = played(Hidden, detector=MADE_UP, car_ahead=True)
+    assert came_of["braked"]
+    assert not came_of["braked_before_view"]

@@ -9,20 +9,15 @@ from care_sim import InvalidInput
 from care_sim.core.sensor_setup import LIDAR_POSITION
 from care_sim.perception import detectors
 from care_sim.perception.matching import MATCH_M
+from tests.helpers.episodes import played
 
 
-def play(name="CARE-Dartout-v0", seed=0, policy="full", keyframes=60, **arguments):
+def play(policy="full", keyframes=None, **arguments):
+    """The infos of an episode, and its last observation."""
     budget = 1.0 if policy == "full" else 0.1
-    with gymnasium.make(name, budget=budget, **arguments) as env:
-        chosen = care_sim.make_policy(policy, env)
-        observation, _ = env.reset(seed=seed)
-        infos = []
-        ended = False
-        while not ended and len(infos) < keyframes:
-            observation, _, terminated, truncated, info = env.step(chosen(observation))
-            infos.append(info)
-            ended = terminated or truncated
-        return infos, observation
+    with gymnasium.make("CARE-Dartout-v0", budget=budget, **arguments) as env:
+        _, *steps = played(env, policy, keyframes=keyframes)
+    return [info for *_, info in steps], steps[-1][0]
 
 
 def test_a_clustering_detector_finds_the_person_and_the_car_brakes():
@@ -107,7 +102,12 @@ def test_bad_arguments_are_named(arguments, message):
         gymnasium.make("CARE-Dartout-v0", **arguments)
 
 
-def test_a_box_is_of_whom_it_has_returns_though_somebody_hidden_is_nearer(monkeypatch):
+@pytest.mark.parametrize(("label", "detected"), [(4, True), (0, False)], ids=["person", "car"])
+def test_a_box_is_of_whom_it_has_returns_though_somebody_hidden_is_nearer(
+    monkeypatch, label, detected
+):
+    """And of somebody of its class alone."""
+
     class Between:
         """One box of a person between one who is seen and one who is hidden."""
 
@@ -116,7 +116,7 @@ def test_a_box_is_of_whom_it_has_returns_though_somebody_hidden_is_nearer(monkey
             box = seen.copy()
             box[:2] += 0.6 * (hidden[:2] - seen[:2])
             box[3:5] = 3.0
-            return care_sim.Detections(np.array([4]), box[None], np.array([1]), None)
+            return care_sim.Detections(np.array([label]), box[None], np.array([1]), None)
 
     monkeypatch.setitem(detectors.DETECTORS.built_in, "between", Between)
     env = gymnasium.make("CARE-Dartout-v0", budget=1.0, detector="between")
@@ -136,5 +136,5 @@ def test_a_box_is_of_whom_it_has_returns_though_somebody_hidden_is_nearer(monkey
         return loop.sensor.boxes_to_local(loop.world.boxes([seen, hidden]))
 
     env.reset(seed=0)
-    assert env.step(np.ones(env.action_space.shape, np.float32))[4]["detected"]
+    assert env.step(np.ones(env.action_space.shape, np.float32))[4]["detected"] is detected
     env.close()

@@ -17,7 +17,6 @@ from care_sim.perception.points_only import PointsOnly
 from care_sim.perception.proxy import ReturnsProxy
 from care_sim.sensors.annotated import NO_OBJECT, Annotations, Cloud, IdentifiedDetections
 from care_sim.sensors.surround import SURROUND_CAMERAS
-from care_sim.sources.named import source_of
 
 RIG = Rig(cameras=SURROUND_CAMERAS, keyframe_s=0.5)
 HEIGHT, OTHER = 1.84, 40
@@ -203,27 +202,6 @@ def test_an_appearance_is_missed_no_more_often_than_what_was_there_before():
         for loop in loops:
             loop.keyframe(NOWHERE)
     assert sum(len(loop.belief.detections) for loop in loops) >= 36
-
-
-def test_the_objects_behind_boxes_come_with_them(drive):
-    """Of the hand-built drive: the centre of each lies in its box, and false boxes have none."""
-    source = source_of(f"argoverse2:{drive}")
-    driven = source.film(source.scenes()[0])
-    loop = loop_of(driven, false_positive_rate=3.0)
-    behind = []
-    while not loop.over:
-        objects, seen, shown = loop.true_detected_objects(), loop.belief.detections, loop.shot
-        behind += objects.tolist()
-        assert len(objects) == len(seen)
-        for number, camera, (left, top, right, bottom) in zip(
-            objects, seen.cameras, seen.boxes, strict=True
-        ):
-            for centre in shown.annotations.boxes[shown.annotations.objects == number, :3]:
-                (u, v), _ = driven.cameras[camera].project(centre)
-                assert left - 2 <= np.clip(u, 0, driven.cameras[camera].width) <= right + 2
-                assert top - 2 <= np.clip(v, 0, driven.cameras[camera].height) <= bottom + 2
-        loop.keyframe(NOWHERE)
-    assert {NO_OBJECT} < {*behind}
 
 
 def test_a_late_box_is_still_of_the_object_that_is_gone():

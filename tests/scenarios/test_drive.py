@@ -9,7 +9,6 @@ import pytest
 from care_sim.base.errors import InvalidInput
 from care_sim.base.seeds import streams
 from care_sim.scenarios.drive import DriveScenario
-from care_sim.sensors.surround import SURROUND_CAMERAS
 
 SEEDS = (2, 3, 16, 46, 95, 137)
 """Of those that hold encounters of every course, turns to both sides and bends."""
@@ -82,10 +81,6 @@ def test_the_episode_is_about_the_first_conflict():
         assert (sought and sought.body) == (first and first.body)
         world.close()
     assert [len(world.meetings) for world in worlds] == [3, 1, 2, 0]
-
-
-def test_the_car_has_six_cameras():
-    assert DriveScenario.cameras == SURROUND_CAMERAS
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from care_sim.base.errors import InvalidInput
 from care_sim.core.rig import Rig
 from care_sim.policies.controls.rehearsed import rehearsal
 from care_sim.scenarios import SCENARIOS, make_scenario
@@ -46,16 +45,6 @@ def test_a_full_scan_of_the_reflection_is_the_reflection_of_the_scan():
 
 
 @every_scenario
-def test_a_drawn_side_is_one_of_both_and_each_comes(name):
-    sides = []
-    for seed in range(8):
-        drawn, here, there = (boxes(name, m, seed, 0.1) for m in ("drawn", "never", "always"))
-        assert np.array_equal(drawn, here) != np.array_equal(drawn, there)
-        sides.append(np.array_equal(drawn, there))
-    assert {*sides} == {True, False}
-
-
-@every_scenario
 def test_the_side_that_was_drawn_is_told(name):
     for seed in range(6):
         world = make_scenario(name, mirrored="drawn").build(np.random.default_rng(seed))
@@ -65,11 +54,3 @@ def test_the_side_that_was_drawn_is_told(name):
     world = make_scenario(name, mirrored="always").build(np.random.default_rng(0))
     assert world.drawn == {}
     world.close()
-
-
-@every_scenario
-def test_another_word_is_refused(name):
-    with pytest.raises(
-        InvalidInput, match=f"mirrored of {name} 'half'; known: always, drawn, never"
-    ):
-        make_scenario(name, mirrored="half")

@@ -39,20 +39,6 @@ def test_the_same_seed_gives_the_same_world_and_another_another(name):
 
 
 @every_scenario
-def test_worlds_in_one_process_do_not_disturb_each_other(name):
-    alone = traced(name, 1)
-    one, other = built(name, 1), built("dense", 2)
-    poses = []
-    for _ in range(30):
-        poses.append([one.ego.pose, *[actor.pose_at(one.time) for actor in one.actors]])
-        other.advance(0.0, 0.1)
-        one.advance(-1.0, 0.1)
-    other.close()
-    one.close()
-    assert np.array_equal(np.array(poses), alone)
-
-
-@every_scenario
 def test_there_is_one_first_sighting_and_it_is_reported(name):
     world = built(name, 0)
     assert world.first_sighting in world.actors
@@ -75,20 +61,7 @@ def test_nothing_stands_in_anything_else_at_the_start(name):
         assert touching == []
 
 
-@pytest.mark.parametrize("seed", range(10))
-def test_dartout_and_dense_share_the_crossing(seed):
-    alone, crowded = built("dartout", seed), built("dense", seed)
-    assert alone.ego.speed == crowded.ego.speed
-    for name in ("occluder", "person"):
-        one, other = actor_named(alone, name), actor_named(crowded, name)
-        assert [one.pose_at(t) for t in np.arange(0, 6, 0.25)] == [
-            other.pose_at(t) for t in np.arange(0, 6, 0.25)
-        ]
-    alone.close()
-    crowded.close()
-
-
-@pytest.mark.parametrize("vehicles", [0, 1, 5, 12])
+@pytest.mark.parametrize("vehicles", [0, 12])
 def test_vehicles_of_the_dense_street_are_counted_without_the_follower(vehicles):
     alone, street = built("dartout", 0), built("dense", 0, vehicles=vehicles)
     assert len(street.actors) - len(alone.actors) == vehicles + 1
@@ -96,41 +69,21 @@ def test_vehicles_of_the_dense_street_are_counted_without_the_follower(vehicles)
     street.close()
 
 
-def test_more_vehicles_leave_the_earlier_ones_in_place():
-    few, many = built("dense", 3, vehicles=5), built("dense", 3, vehicles=12)
-    places = [
-        {a.name: a.pose_at(0.0) for a in world.actors if a.name[-1].isdigit()}
-        for world in (few, many)
-    ]
-    shared = list(places[0])
-    assert len(shared) == 5
-    assert all(places[0][name] == places[1][name] for name in shared)
-    few.close()
-    many.close()
-
-
-@pytest.mark.parametrize("reported", [True, False])
-@pytest.mark.parametrize("name", ["dartout", "dense"])
-@pytest.mark.parametrize("occluder", ["truck", "van"])
-def test_a_vehicle_that_hides_the_person_can_be_reported_or_not(name, occluder, reported):
-    world = built(name, 0, occluder=occluder, occluder_reported=reported)
-    assert (actor_named(world, "occluder").label is not None) is reported
-    assert actor_named(world, "occluder").kind.name == occluder
-    world.close()
-
-
 @pytest.mark.parametrize(
-    ("name", "reported"), [("dartout", False), ("dense", False), ("cutin", True)]
+    ("name", "given", "reported"),
+    [
+        ("dartout", {}, False),
+        ("dense", {"occluder": "van"}, False),
+        ("dense", {"occluder": "van", "occluder_reported": True}, True),
+        ("cutin", {}, True),
+        ("cutin", {"occluder_reported": False}, False),
+    ],
 )
-def test_what_perception_reports_by_default(name, reported):
-    world = built(name, 0)
-    assert (actor_named(world, "occluder").label is not None) is reported
-    world.close()
-
-
-def test_the_bus_of_the_cut_in_can_go_unreported():
-    world = built("cutin", 0, occluder_reported=False)
-    assert actor_named(world, "occluder").label is None
+def test_perception_reports_what_hides_somebody_or_not(name, given, reported):
+    world = built(name, 0, **given)
+    occluder = actor_named(world, "occluder")
+    assert (occluder.label is not None) is reported
+    assert occluder.kind.name == given.get("occluder", occluder.kind.name)
     world.close()
 
 
@@ -138,13 +91,6 @@ def test_the_bus_of_the_cut_in_can_go_unreported():
 def test_what_has_no_class_cannot_be_reported(occluder):
     with pytest.raises(InvalidInput, match=rf"occluder_reported.*{occluder}"):
         make_scenario("dartout", occluder=occluder, occluder_reported=True)
-
-
-def test_reporting_the_occluder_moves_nothing():
-    silent, reported = (
-        traced("dense", 2, occluder="truck", occluder_reported=switch) for switch in (False, True)
-    )
-    assert np.array_equal(silent, reported)
 
 
 def test_the_person_runs_straight_across_at_the_stated_speed():
@@ -170,10 +116,9 @@ def test_the_car_of_the_cut_in_comes_into_the_egos_lane():
 
 
 @every_scenario
-@pytest.mark.parametrize("parameter", ["colour", "rng", "vehicle"])
-def test_an_unknown_parameter_is_refused_with_the_known_ones(name, parameter):
-    with pytest.raises(InvalidInput, match=rf"parameter of {name} '{parameter}'.*duration_s"):
-        make_scenario(name, **{parameter: 1})
+def test_an_unknown_parameter_is_refused_with_the_known_ones(name):
+    with pytest.raises(InvalidInput, match=rf"parameter of {name} 'colour'.*duration_s"):
+        make_scenario(name, colour=1)
 
 
 @pytest.mark.parametrize(
@@ -184,17 +129,9 @@ def test_an_unknown_parameter_is_refused_with_the_known_ones(name, parameter):
             {"occluder": "bush"},
             r"occluder of dartout 'bush'; known: hoarding, trailer, truck, van",
         ),
-        (
-            "dense",
-            {"vehicles": -1},
-            r"vehicles of dense must be a whole number >= 0 and <= 12, got -1",
-        ),
-        (
-            "dense",
-            {"vehicles": 13},
-            r"vehicles of dense must be a whole number >= 0 and <= 12, got 13",
-        ),
         ("dense", {"vehicles": "five"}, "dense"),
+        ("dartout", {"run_mps": (3.0, 2.0)}, "run_mps of dartout"),
+        ("dartout", {"run_up_mps2": 0.0}, "run_up_mps2 of dartout"),
         ("roundabout", {}, r"scenario 'roundabout'; known: cutin, dartout, dense, drive, ncap"),
     ],
 )
@@ -202,16 +139,3 @@ def test_an_impossible_value_is_refused_in_one_line(name, parameters, named):
     with pytest.raises(InvalidInput, match=named) as refusal:
         make_scenario(name, **parameters)
     assert "\n" not in str(refusal.value)
-
-
-@pytest.mark.parametrize(
-    "parameters",
-    [{"run_mps": 5.0}, {"run_mps": (3.0, 2.0)}, {"duration_s": -1.0}, {"run_up_mps2": 0.0}],
-)
-def test_an_impossible_range_is_refused_before_an_episode(parameters):
-    with pytest.raises(InvalidInput):
-        make_scenario("dartout", **parameters)
-
-
-def test_a_collision_course_can_be_asked_for():
-    assert make_scenario("dartout", encroachment_s=(-0.5, -0.2)).encroachment_s == (-0.5, -0.2)

@@ -8,16 +8,14 @@ import gymnasium
 import numpy as np
 import pytest
 
-import care_sim
 from care_sim.base.errors import BrokenScenario, InvalidInput
 from care_sim.cli import main
-from care_sim.envs import CLOSED_LOOP, make_env, register_all
+from care_sim.envs import register_all
 from care_sim.envs.scenarios import ScenarioEnv
 from care_sim.reports.report import read_results
 from care_sim.scenarios import PLUGINS, SCENARIOS, make_scenario, scenario_names
 from care_sim.scenarios.dartout import Dartout
 from care_sim.scenarios.drive import DriveScenario
-from care_sim.study.episode_config import EpisodeConfig
 from care_sim.training.config import PpoConfig
 from care_sim.training.environments import plain
 from tests.helpers.places import ROOT, example, fenced
@@ -42,12 +40,6 @@ def run(*arguments):
     with pytest.raises(SystemExit) as end:
         main([*map(str, arguments)])
     return end.value.code
-
-
-def test_the_example_has_thirty_lines_or_so():
-    body = LEFT_BIKE[LEFT_BIKE.index("@dataclass") : LEFT_BIKE.index("if __name__")]
-    assert len([line for line in body.splitlines() if line.strip()]) <= 35
-    assert ENTRY == ("Mine-LeftBike-v0", "leftbike:LeftBike")
 
 
 def test_its_name_and_its_environment_are_known(installed):
@@ -92,39 +84,6 @@ def test_by_its_place_it_is_the_same(tmp_path, monkeypatch, capsys):
     with plain(PpoConfig(env="placed_bike:LeftBike", env_parameters=("ride_mps=4,4",))) as env:
         assert env.unwrapped.scenario.ride_mps == (4.0, 4.0)
     assert "placed_bike:LeftBike" not in scenario_names()
-
-
-def test_learners_know_it_by_its_id_and_by_its_name(installed):
-    for name in ("Mine-LeftBike-v0", "leftbike"):
-        with plain(PpoConfig(env=name)) as env:
-            env.reset(seed=3)
-            assert type(env.unwrapped.scenario).__name__ == "LeftBike"
-    with pytest.raises(InvalidInput, match=r"unknown environment 'Mine-Left-v0'.*Mine-LeftBike-v0"):
-        make_env("Mine-Left-v0")
-
-
-def test_its_parameters_are_checked_like_ours(installed):
-    with pytest.raises(InvalidInput, match="unknown parameter of leftbike 'vehicles'"):
-        EpisodeConfig("leftbike", "care", scenario_parameters=(("vehicles", 3),))
-    with pytest.raises(
-        InvalidInput, match=r"ride_mps of leftbike must be two numbers.*\[0.5, 10\]"
-    ):
-        EpisodeConfig("leftbike", "care", scenario_parameters=(("ride_mps", (4.0, 40.0)),))
-
-
-def test_an_edit_of_its_code_makes_its_episodes_others(tmp_path, monkeypatch):
-    monkeypatch.setattr(sys, "path", [*sys.path])
-    own, ours = [], []
-    for number in (1, 2):
-        folder = tmp_path / str(number)
-        folder.mkdir()
-        (folder / "edited_bike.py").write_text(f"{LEFT_BIKE}\nNUMBER = {number}\n")
-        monkeypatch.syspath_prepend(folder)
-        sys.modules.pop("edited_bike", None)
-        own.append(EpisodeConfig("edited_bike:LeftBike", "care").digest())
-        ours.append(EpisodeConfig("dense", "care").digest())
-    assert own[0] != own[1]
-    assert ours[0] == ours[1]
 
 
 BROKEN = """
@@ -229,23 +188,6 @@ def test_a_sweep_leaves_broken_ones_out_and_plays_the_others(broken, installed, 
     assert "none of the scenarios can be played" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    ("command", "told"),
-    [
-        (["run", "nothing"], "broken_worlds:Nothing: build must return a World"),
-        (["compare", "torn"], "scenario torn cannot be loaded: AttributeError"),
-        (["validate", "exploding"], "broken_worlds:Exploding cannot be built: KeyError: 'street'"),
-        (["run", "moon"], "unknown scenario 'moon'; known: "),
-        (["run", "absent_module:X"], "scenario absent_module:X cannot be loaded: ModuleNotFound"),
-    ],
-)
-def test_commands_say_it_in_one_line(broken, command, told, capsys):
-    assert run(*command) in (1, 2)
-    error = capsys.readouterr().err
-    assert told in error
-    assert "Traceback" not in error
-
-
 def test_a_built_in_name_cannot_be_taken(install, capsys):
     before = {*gymnasium.registry}
     install("usurper_world", LEFT_BIKE, PLUGINS.group, **{"Mine-Dartout-v0": "LeftBike"})
@@ -262,12 +204,6 @@ def test_a_built_in_name_cannot_be_taken(install, capsys):
     assert refusal in capsys.readouterr().err
 
 
-def test_ids_of_ours_stay_ours(install):
-    install("other_world", LEFT_BIKE, PLUGINS.group, **{"CARE-Dense-v0": "LeftBike"})
-    register_all()
-    assert gymnasium.spec("CARE-Dense-v0").entry_point == CLOSED_LOOP["CARE-Dense-v0"]
-
-
 def test_the_list_tells_it_and_what_is_broken(installed, broken, capsys):
     assert run("scenarios") == 0
     # Lines are broken where the terminal ends.
@@ -277,21 +213,6 @@ def test_the_list_tells_it_and_what_is_broken(installed, broken, capsys):
     assert "    ride_mps=3.5,4.5 (0.5 to 10)\n" in told
     assert "torn         (broken) scenario torn cannot be loaded: AttributeError" in told
     assert "[leaving_worlds 1.5]" in told
-
-
-def test_one_registered_by_hand_runs_here_and_is_refused_by_studies(monkeypatch, capsys):
-    monkeypatch.setitem(SCENARIOS, "gateway", type("Gateway", (Dartout,), {}))
-    with ScenarioEnv(scenario="gateway") as env:
-        env.reset(seed=0)
-    assert run("sweep", "--scenarios", "gateway") == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith("care-sim: scenario gateway is registered by hand, which other")
-
-
-def test_an_unknown_scenario_of_a_class_is_one_line():
-    kind = type("Lost", (care_sim.envs.closed_loop.ClosedLoopEnv,), {"scenario_name": "nowhere"})
-    with pytest.raises(InvalidInput, match="unknown scenario 'nowhere'"):
-        kind()
 
 
 def test_a_drive_of_ones_own_is_scored_as_a_drive():

@@ -66,12 +66,6 @@ def test_nobody_walks_through_a_parked_car_or_into_a_driving_one(draft):
     assert draft.move("pedestrian", later, 0.1)
 
 
-def test_the_obstructed_way_keeps_walkers_off_and_adds_no_body(draft):
-    draft.obstruct(straight_way(0.0, 8.0), (4.0, 1.7), 1.0)
-    assert not draft.move("pedestrian", straight_way(2.0, 8.0), 0.1)
-    assert draft.kinds == []
-
-
 POSE = st.tuples(st.floats(-12, 12), st.floats(-12, 12), st.floats(-4, 4))
 SIZE = st.tuples(st.floats(0.3, 8), st.floats(0.3, 3))
 BERTH = st.floats(0, 1)
@@ -100,10 +94,3 @@ def test_bodies_meet_exactly_where_the_exact_test_says_at_some_time(
         return footprints_meet(poses, sizes, others, other_sizes, np.full(times, berth)).any()
 
     assert bodies.meets(way, size) == any(at_some_time(*each) for each in placed)
-
-
-def test_a_berth_counts_from_end_to_end():
-    bodies = PlacedBodies()
-    bodies.add(np.zeros((1, 3)), (4.0, 0.3), 1.0)
-    assert bodies.meets(np.array([[4.9, 0.0, 0.0]]), (4.0, 0.3))
-    assert not bodies.meets(np.array([[5.1, 0.0, 0.0]]), (4.0, 0.3))

@@ -90,22 +90,3 @@ def test_who_waits_is_behind_the_occluder_and_all_its_way_is_beyond_its_end(seed
     assert front > -width / 2
     if abs(one.from_d) < side.kerb_m:
         assert abs(one.from_d) > side.lane_edge_m
-
-
-@pytest.mark.parametrize("reported", [True, False])
-def test_an_occluder_is_reported_if_its_kind_has_a_class(reported):
-    kinds = {
-        one.occluder
-        for _, one in map(drawn, range(400))
-        if one and one.occluder_reported is reported
-    }
-    assert kinds == (
-        {"car", "van", "truck", "bus"}
-        if reported
-        else {"skip", "trailer", "hoarding", "wall", "hedge", "building"}
-    )
-
-
-def test_all_who_can_come_do_from_both_sides():
-    met = {(one.who, one.side) for _, one in map(drawn, range(400)) if one}
-    assert met == {(who, side) for who in COMERS for side in (-1, 1)}

@@ -1,15 +1,19 @@
-"""The arguments of a vector environment; every world may have its own of some of them. And which
-environments can be played as arrays.
+"""What goes into a vector environment and what comes out of it beside arrays: arguments, of which
+every world may have some of its own, seeds and infos. And which environments can be played as
+arrays.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
 from gymnasium.vector import AutoresetMode
+from numpy.typing import NDArray
 
+from care_sim.base.checks import as_array, check_seed
 from care_sim.base.errors import InvalidInput, shown
+from care_sim.core.arrays import Mask
 from care_sim.core.conditions import CAMERA_FAULTS, DEFAULTS, IDEAL_CAMERA
 from care_sim.core.grid import AngularGrid
 from care_sim.envs.closed_loop import ClosedLoopEnv
@@ -79,6 +83,43 @@ def _is_list(value: object) -> bool:
     return isinstance(value, list | tuple) or (isinstance(value, np.ndarray) and value.ndim == 1)
 
 
+def seeds_of(seed: int | Sequence[int | None] | None, worlds: int) -> list[int | None]:
+    """The seeds of so many worlds, of which the i-th is `seed + i` for a whole number. Raises
+    InvalidInput for a list of another length, and for what is no seed.
+    """
+    if seed is None:
+        return [None] * worlds
+    if isinstance(seed, Iterable):
+        # An array without an axis calls itself Iterable, too.
+        if not getattr(seed, "ndim", 1):
+            check_seed(seed)
+        seeds = [*seed]
+    else:
+        check_seed(seed)
+        seeds = [int(seed) + world for world in range(worlds)]
+    if len(seeds) != worlds:
+        raise InvalidInput(f"seed must be one for each of {worlds}, got {len(seeds)}")
+    for one in seeds:
+        if one is not None:
+            check_seed(one)
+    return seeds
+
+
+def worlds_to_reset(options: dict[str, Any] | None, worlds: int) -> Mask:
+    """(worlds,) those of the `reset_mask`, all without one. Raises InvalidInput for other options,
+    and for a mask that is none or empty.
+    """
+    everybody = np.ones(worlds, np.bool_)
+    if not options:
+        return everybody
+    if [*options] != ["reset_mask"]:
+        raise InvalidInput(f"reset takes no options but reset_mask, got {shown(options)}")
+    mask = as_array("reset_mask", options["reset_mask"])
+    if mask.dtype != np.bool_ or mask.shape != everybody.shape or not mask.any():
+        raise InvalidInput(f"reset_mask must be {worlds} flags, at least one of them True")
+    return mask
+
+
 STRAIGHT = (Dartout, Dense, CutIn, R157)
 """Scenarios on a straight road, without a route, a plan of speeds or an end before their time."""
 PLAIN = (DartoutEnv, DenseEnv, CutInEnv, R157Env, ScenarioEnv)
@@ -121,3 +162,94 @@ def why_separate(env: ClosedLoopEnv) -> str | None:
         ),
     }
     return next((name for name, holds in reasons.items() if holds), None)
+
+
+Infos = dict[str, Any]
+
+
+def last_rows(observation: Any, over: Mask) -> NDArray[np.object_]:
+    """(W,) copies of the observations of the worlds that are `over`, None of the others."""
+    rows = np.full(len(over), None, object)
+    for world in np.flatnonzero(over).tolist():
+        rows[world] = (
+            {name: values[world].copy() for name, values in observation.items()}
+            if isinstance(observation, Mapping)
+            else observation[world].copy()
+        )
+    return rows
+
+
+def same_step(infos: Infos, begun: Infos, last: NDArray[np.object_], over: Mask) -> Infos:
+    """What a step tells whose `infos` are of all worlds, if in those that are `over`, with the
+    `last` observations (W,), episodes begin that tell `begun`.
+    """
+    finals = {
+        "final_obs": last,
+        "_final_obs": over.copy(),
+        "final_info": _part(infos, over),
+        "_final_info": over.copy(),
+    }
+    return _joined(_part(infos, ~over), begun) | finals
+
+
+def _part(infos: Infos, who: Mask) -> Infos:
+    """What infos tell of the worlds `who` (W,), in the form of Gymnasium."""
+    part = Infos()
+    for name, column in _columns(infos):
+        told = infos[f"_{name}"] & who
+        if told.any():
+            part[name] = _part(column, who) if isinstance(column, dict) else column.copy()
+            part[f"_{name}"] = told
+            if not isinstance(column, dict):
+                part[name][~told] = None if column.dtype == object else 0
+    return part
+
+
+def _joined(infos: Infos, others: Infos) -> Infos:
+    """What both tell, the `others` of other worlds."""
+    joined = infos | {name: value for name, value in others.items() if name not in infos}
+    for name, column in _columns(others):
+        if name not in infos:
+            continue
+        told = others[f"_{name}"]
+        if isinstance(column, dict):
+            joined[name] = _joined(infos[name], column)
+        else:
+            joined[name] = infos[name].copy()
+            joined[name][told] = column[told]
+        joined[f"_{name}"] = infos[f"_{name}"] | told
+    return joined
+
+
+def _columns(infos: Infos) -> list[tuple[str, Any]]:
+    return [(name, column) for name, column in infos.items() if f"_{name}" in infos]
+
+
+def joined(parts: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """The columns of the shares of worlds, one after the other, in arrays of their own."""
+    return {
+        name: joined([part[name] for part in parts])
+        if isinstance(column, dict)
+        else np.concatenate([part[name] for part in parts])
+        for name, column in parts[0].items()
+    }
+
+
+def kept(columns: dict[str, Any], who: Mask) -> dict[str, Any]:
+    """Infos in the form of Gymnasium: of `columns` (W, ...), or dictionaries of them, the rows of
+    the worlds `who` (W,), 0 or None of the others; and beside every name, with a line before it, of
+    whom it tells.
+    """
+    infos = dict[str, Any]()
+    for name, column in columns.items():
+        infos[name] = kept(column, who) if isinstance(column, dict) else _rows(column, who)
+        infos[f"_{name}"] = who.copy()
+    return infos
+
+
+def _rows(column: np.ndarray, who: Mask) -> np.ndarray:
+    if who.all():
+        return column
+    rows = column.copy()
+    rows[~who] = None if rows.dtype == object else 0
+    return rows

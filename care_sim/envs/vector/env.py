@@ -24,8 +24,19 @@ from care_sim.core.types import Action
 from care_sim.envs import scenarios
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.envs.sensing import Observed, checked_scores
-from care_sim.envs.vector.arguments import Maker, autoreset_of, makers_of, models_of, why_separate
-from care_sim.envs.vector.steps import joined, kept, last_rows, same_step, seeds_of, worlds_to_reset
+from care_sim.envs.vector.arguments import (
+    Maker,
+    autoreset_of,
+    joined,
+    kept,
+    last_rows,
+    makers_of,
+    models_of,
+    same_step,
+    seeds_of,
+    why_separate,
+    worlds_to_reset,
+)
 from care_sim.envs.vector.worlds import CompiledWorlds, SeparateWorlds, Stepped, Worlds
 from care_sim.scenarios.base import Scenario
 
@@ -173,13 +184,6 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
             raise InvalidInput(f"call reads attributes of many worlds; for a method {_SINGLE}")
         return values
 
-    def set_attr(self, name: str, values: Any) -> None:
-        """Raise InvalidInput: what is fixed about the worlds stays so."""
-        raise InvalidInput(
-            f"many worlds keep their {shown(name)}: make the vector anew with the value, or "
-            f"{_SINGLE}"
-        )
-
     def reset(
         self,
         *,
@@ -229,10 +233,6 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
             infos = self._begin(begins, anybody, infos)
             self._over = over
         return self._handed_out(), stepped.rewards, stepped.terminated, stepped.truncated, infos
-
-    def render(self) -> None:
-        """Raise InvalidInput: many worlds draw no pictures."""
-        raise InvalidInput(f"many worlds draw no pictures: {_SINGLE}, with a render_mode")
 
     def close_extras(self, **_: Any) -> None:
         """Free the worlds and end the threads."""
@@ -331,43 +331,18 @@ def _places(who: Mask) -> list[int]:
     return places
 
 
-class DartoutVectorEnv(ClosedLoopVectorEnv):
-    """`CARE-Dartout-v0` many times."""
-
-    single = scenarios.DartoutEnv
-
-
-class DenseVectorEnv(ClosedLoopVectorEnv):
-    """`CARE-Dense-v0` many times."""
-
-    single = scenarios.DenseEnv
+def _many(single: type[ClosedLoopEnv]) -> type[ClosedLoopVectorEnv]:
+    """The vector environment of a single one."""
+    name = f"{single.__name__.removesuffix('Env')}VectorEnv"
+    own = {"single": single, "__module__": __name__, "__doc__": ClosedLoopVectorEnv.__doc__}
+    return type(name, (ClosedLoopVectorEnv,), own)
 
 
-class CutInVectorEnv(ClosedLoopVectorEnv):
-    """`CARE-CutIn-v0` many times."""
-
-    single = scenarios.CutInEnv
-
-
-class R157VectorEnv(ClosedLoopVectorEnv):
-    """`CARE-R157-v0` many times."""
-
-    single = scenarios.R157Env
-
-
-class NcapVectorEnv(ClosedLoopVectorEnv):
-    """`CARE-NCAP-v0` many times."""
-
-    single = scenarios.NcapEnv
-
-
-class DriveVectorEnv(ClosedLoopVectorEnv):
-    """`CARE-Drive-v0` many times."""
-
-    single = scenarios.DriveEnv
-
-
-class ScenarioVectorEnv(ClosedLoopVectorEnv):
-    """Any scenario of the closed loop many times."""
-
-    single = scenarios.ScenarioEnv
+DartoutVectorEnv = _many(scenarios.DartoutEnv)
+DenseVectorEnv = _many(scenarios.DenseEnv)
+CutInVectorEnv = _many(scenarios.CutInEnv)
+R157VectorEnv = _many(scenarios.R157Env)
+NcapVectorEnv = _many(scenarios.NcapEnv)
+DriveVectorEnv = _many(scenarios.DriveEnv)
+ScenarioVectorEnv = _many(scenarios.ScenarioEnv)
+"""Any scenario of the closed loop many times."""

@@ -2,19 +2,20 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, replace
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium.utils import seeding
 from numpy.typing import NDArray
 
+from care_sim.base.compiled import compiled
 from care_sim.base.times import LAST_BITS_S
 from care_sim.batch.loop import BatchLoop
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.envs.closed_loop import ClosedLoopEnv
+from care_sim.envs.reward import BEGINNING, BOUND, REWARD_WEIGHTS, terms, weighted
 from care_sim.envs.sensing import Observed
 from care_sim.envs.vector.arguments import Maker
-from care_sim.envs.vector.steps import Rewards
 from care_sim.evaluation.outcomes import outcome_of
 from care_sim.loops.episode import most_keyframes
 from care_sim.loops.records import Outcome, Records, kind_of
@@ -40,6 +41,68 @@ class History:
         return Records(*(table[:keyframes, world] for table in columns))
 
 
+class Rewards:
+    """The rewards of `worlds` worlds. `weights` holds one of every term."""
+
+    def __init__(self, weights: Mapping[str, float], worlds: int):
+        self._weights = weights
+        self._measured = bool(weights["gain"])
+        # Columns (W,) of `care_sim.envs.reward.Course`.
+        self._courses: Any = tuple(np.full(worlds, value) for value in BEGINNING)
+
+    def begin(self, world: int) -> None:
+        """Begin an episode in a world."""
+        for column, value in zip(self._courses, BEGINNING, strict=True):
+            column[world] = value
+
+    @property
+    def need_bound(self) -> Mask:
+        """(W,) where the full-scan bound counts and is not known yet."""
+        wanted: Mask = np.isnan(self._courses[BOUND]) & self._measured
+        return wanted
+
+    def of(
+        self, records: Records, detectable: Mask, over: Mask, who: Mask
+    ) -> tuple[Floats, dict[str, Floats]]:
+        """The rewards (W,) of the next keyframe in the worlds `who`, 0 in the others, and their
+        terms; see `care_sim.envs.reward.EpisodeReward.of`.
+        """
+        table = np.zeros((len(REWARD_WEIGHTS), len(who)))
+        _earn(who, self._courses, records, detectable, over, self._measured, table)
+        earned = dict(zip(REWARD_WEIGHTS, table, strict=True))
+        return weighted(self._weights, earned), earned
+
+
+@compiled(brief=True)
+def _earn(
+    who: Mask,
+    courses: tuple[Mask, Mask, Floats, Floats],
+    records: Records,
+    detectable: Mask,
+    over: Mask,
+    measured: bool,
+    table: Floats,
+) -> None:
+    """Fill the `table` (5, W) with the terms of the worlds `who`, and lead their courses on."""
+    for w in range(len(who)):
+        if who[w]:
+            before = courses[0][w], courses[1][w], courses[2][w], courses[3][w]
+            told = (
+                records.in_view[w],
+                records.detected[w],
+                records.braking[w],
+                records.distance_m[w],
+                records.clearance_m[w],
+                records.impact_speed_mps[w],
+                detectable[w],
+                over[w],
+            )
+            after, values = terms(before, told, measured)
+            courses[0][w], courses[1][w], courses[2][w], courses[3][w] = after
+            for n in range(len(values)):
+                table[n, w] = values[n]
+
+
 class Stepped(NamedTuple):
     """What n worlds give at a step: rewards, terminations and truncations (n,), 0 and False of
     those that did not play; what `info` says of all in `columns` (n, ...), by name, which the next
@@ -52,38 +115,11 @@ class Stepped(NamedTuple):
     columns: dict[str, Any]
     single: dict[int, dict[str, Any]]
 
-    @classmethod
-    def nothing(cls, worlds: int) -> "Stepped":
-        """Of worlds of which none has played."""
-        flags = np.zeros((2, worlds), np.bool_)
-        return cls(np.zeros(worlds), flags[0], flags[1], {}, {})
-
-
-class Worlds(Protocol):
-    """Some of the worlds of a vector environment. Each writes the observation of its coming
-    keyframe into its row of `observed`.
-    """
-
-    observed: Observed
-
-    def begin(self, seeds: Mapping[int, int | None]) -> dict[int, dict[str, Any]]:
-        """Begin an episode in those that have a seed or None here, as `reset` of the single
-        environment does with it; their infos.
-        """
-        ...
-
-    def step(self, actions: NDArray[np.float32], who: Mask) -> Stepped:
-        """Let those play that are True in `who` (n,), with their rows of `actions` (n, E, A)."""
-        ...
-
-    def close(self) -> None:
-        """Free what they hold."""
-        ...
-
 
 class CompiledWorlds:
-    """A batch of worlds, one for every row of `observed`. World i is one of the environment
-    `models[i]`; these differ at most in budget and camera (`BatchLoop`).
+    """A batch of worlds, one for every row of `observed`, into which each writes the observation of
+    its coming keyframe. World i is one of the environment `models[i]`; these differ at most in
+    budget and camera (`BatchLoop`).
 
     Unless `exact`, clearances that no reward needs are bounds (`BatchLoop`); outcomes are exact.
     `one_budget` says whether all worlds of the vector environment, those of other threads too, fire
@@ -113,7 +149,9 @@ class CompiledWorlds:
         self._generators: list[np.random.Generator | None] = [None] * worlds
 
     def begin(self, seeds: Mapping[int, int | None]) -> dict[int, dict[str, Any]]:
-        """See `care_sim.envs.vector.worlds.Worlds`."""
+        """Begin an episode in those that have a seed or None here, as `reset` of the single
+        environment does with it; their infos.
+        """
         infos = dict[int, dict[str, Any]]()
         episodes = {}
         for world, seed in seeds.items():
@@ -125,7 +163,7 @@ class CompiledWorlds:
         return infos
 
     def step(self, actions: NDArray[np.float32], who: Mask) -> Stepped:
-        """See `care_sim.envs.vector.worlds.Worlds`."""
+        """Let those play that are True in `who` (n,), with their rows of `actions` (n, E, A)."""
         # Asked before the keyframe, which moves the worlds on, and only while it is needed: it
         # costs rays.
         state = self._loop.state
@@ -138,15 +176,22 @@ class CompiledWorlds:
         terminated = who & ~np.isnan(records.impact_speed_mps)
         truncated = who & (state.times >= self._model.scenario.duration_s - LAST_BITS_S)
         over = terminated | truncated
-        rewards, terms = self._rewards.of(records, detectable, over, who)
+        rewards, earned = self._rewards.of(records, detectable, over, who)
         single: dict[int, dict[str, Any]] = {
             world: {"outcome": asdict(self._outcome(world, keyframes[world] + 1))}
             for world in np.flatnonzero(over).tolist()
         }
-        if not self._model.conditions.floor:
-            self._list_fired(single, who)
+        scan = {}
+        if self._model.conditions.floor:
+            scan["fired"] = self._all_fired()
+        else:
+            # Cells of different numbers, as lists: they are no column.
+            counts, cells = self._loop.fired
+            for world in np.flatnonzero(who).tolist():
+                fired = cells[world, : counts[world]].tolist()
+                single[world] = {"fired": fired, **single.get(world, {})}
         # There are columns even where nobody plays: they are joined with those of other threads.
-        columns = self._columns(records, terms)
+        columns = self._model.keyframe_info(scan, records, earned)
         return Stepped(rewards, terminated, truncated, columns, single)
 
     def boxes(self, world: int) -> Floats:
@@ -168,14 +213,7 @@ class CompiledWorlds:
         if self._exact or result.clearance_m is None:
             return result
         appeared = float(episode.time_s[episode.in_view.argmax()])
-        return replace(result, clearance_m=self._loop.least_clearance_m(world, appeared))
-
-    def _columns(self, records: Records, terms: dict[str, Any]) -> dict[str, Any]:
-        """What `info` says of all worlds, in the order of the single environment."""
-        scan = {}
-        if self._model.conditions.floor:
-            scan["fired"] = self._all_fired()
-        return self._model.keyframe_info(scan, records, terms)
+        return replace(result, clearance_m=self._loop.motion.settle(world, appeared))
 
     def _all_fired(self) -> NDArray[Any]:
         """(W, B) the cells of all worlds, or (W,) arrays of each world's own."""
@@ -185,13 +223,6 @@ class CompiledWorlds:
         fired = np.empty(len(budgets), object)
         fired[:] = [row[:budget].copy() for row, budget in zip(cells, budgets, strict=True)]
         return fired
-
-    def _list_fired(self, single: dict[int, dict[str, Any]], who: Mask) -> None:
-        """Cells of different numbers, as lists: they are no column."""
-        counts, cells = self._loop.fired
-        for world in np.flatnonzero(who).tolist():
-            fired = cells[world, : counts[world]].tolist()
-            single[world] = {"fired": fired, **single.get(world, {})}
 
     def _entropy(self, world: int, seed: int | None) -> int:
         if seed is not None:
@@ -212,7 +243,7 @@ class SeparateWorlds:
         self._envs = [make() for make in makers]
 
     def begin(self, seeds: Mapping[int, int | None]) -> dict[int, dict[str, Any]]:
-        """See `care_sim.envs.vector.worlds.Worlds`."""
+        """As of `CompiledWorlds`."""
         infos = {}
         for world, seed in seeds.items():
             observation, infos[world] = self._envs[world].reset(seed=seed)
@@ -220,8 +251,9 @@ class SeparateWorlds:
         return infos
 
     def step(self, actions: NDArray[np.float32], who: Mask) -> Stepped:
-        """See `care_sim.envs.vector.worlds.Worlds`."""
-        stepped = Stepped.nothing(len(who))
+        """As of `CompiledWorlds`."""
+        flags = np.zeros((2, len(who)), np.bool_)
+        stepped = Stepped(np.zeros(len(who)), flags[0], flags[1], {}, {})
         for world in np.flatnonzero(who).tolist():
             observation, reward, terminated, truncated, info = self._envs[world].step(
                 actions[world]
@@ -240,3 +272,7 @@ class SeparateWorlds:
     def _show(self, world: int, observation: Observed) -> None:
         for name, values in observation.items():
             self.observed[name][world] = values
+
+
+Worlds = CompiledWorlds | SeparateWorlds
+"""What plays some of the worlds of a vector environment."""

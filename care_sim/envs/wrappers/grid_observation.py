@@ -140,16 +140,9 @@ class VectorGridObservation(WorldsWrapper, ReadsBeliefs):
     It takes every mode of `autoreset_mode`; in "SameStep" the last observations of episodes, in
     `infos["final_obs"]`, are pictures, too.
 
-    ### Action
-    That of the wrapped vector environment.
-
-    ### Observation
-    The `Dict` of `GridObservation`, a row for every world: `grid` (W, 6 * rows * columns), or with
-    `pictures` (W, 6, rows, columns), and `ego` (W, 4). The arrays are the caller's own, also where
-    those of the wrapped environment are written over by its next step (`copy=False`).
-
-    ### Arguments
-    As of `GridObservation`.
+    Observation and arguments are those of `GridObservation`, a row for every world. The arrays are
+    the caller's own, also where those of the wrapped environment are written over by its next step
+    (`copy=False`).
 
     ### Example
     ```python

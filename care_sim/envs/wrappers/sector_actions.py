@@ -178,16 +178,7 @@ class VectorSectorReserve(_VectorSectors, ReadsBeliefs):
     """`SectorReserve` over a vector environment: a world is the single environment behind
     `SectorReserve`, to the last bit.
 
-    ### Action
-    That of `SectorReserve`, a row for every world: `Box(-1, 1, (W, elevations, azimuths),
-    float32)`.
-
-    ### Observation
-    That of the wrapped vector environment, unchanged. The forecasts are read from it, or, outside
-    `VectorGridObservation`, they are those that its pictures were drawn of.
-
-    ### Arguments
-    As of `SectorReserve`.
+    Action, observation and arguments are those of `SectorReserve`, a row for every world.
 
     ### Example
     ```python
@@ -228,14 +219,7 @@ class VectorSectorScores(_VectorSectors):
     """`SectorScores` over a vector environment: a world is the single environment behind
     `SectorScores`, to the last bit.
 
-    ### Action
-    That of `SectorScores`, a row for every world: `Box(-1, 1, (W, elevations, azimuths), float32)`.
-
-    ### Observation
-    That of the wrapped vector environment.
-
-    ### Arguments
-    As of `SectorReserve`.
+    Action, observation and arguments are those of `SectorScores`, a row for every world.
 
     ### Example
     ```python

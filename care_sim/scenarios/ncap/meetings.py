@@ -248,78 +248,50 @@ def _front(route: Route, along: float, ego: Ego) -> tuple[float, float]:
     return x + reach * float(np.cos(heading)), y + reach * float(np.sin(heading))
 
 
-@dataclass(frozen=True)
-class Sizes:
-    """Length, width and height of the small and of the large car."""
-
-    small: Triple
-    large: Triple
-
-
-@dataclass(frozen=True)
-class Standing:
-    """A car and where it stands."""
-
-    kind: BodyKind
-    pose: Pose
+Car = tuple[BodyKind, Pose]
+"""A car and where it stands."""
 
 
 def standing_cars(
     obstruction: Obstruction | None,
-    sizes: Sizes,
+    small: Triple,
+    large: Triple,
     line_x: float,
     target_width: float,
     ego_width: float,
-) -> list[Standing]:
-    """The cars of an obstruction. The middle line of the target's way is at x = `line_x`; the ego's
-    is y = 0.
+) -> list[Car]:
+    """The cars of an obstruction, for a target from the right. The middle line of the target's way
+    is at x = `line_x`; the ego's is y = 0. `small` and `large` are length, width and height.
     """
-    if obstruction is None:
-        return []
+    side_x = line_x - target_width / 2
     match obstruction:
         case ParkedAlong():
-            return _parked(obstruction, sizes, line_x - target_width / 2, ego_width / 2)
+            # Both have the middle line of the large one.
+            y = -(ego_width / 2 + obstruction.beside_m + large[1] / 2)
+            row = _ends(side_x - obstruction.gap_m, (small, large), obstruction.gap_m)
+            return [_car(size, end - size[0] / 2, y, 0.0) for size, end in row]
         case StandingAcross():
-            return _standing(obstruction, sizes, line_x - target_width / 2)
+            # Their sides towards the target are in line.
+            side = side_x - obstruction.before_m
+            row = _ends(-obstruction.end_m, (large, small), obstruction.gap_m)
+            return [
+                _car(size, side - size[1] / 2, end - size[0] / 2, -np.pi / 2) for size, end in row
+            ]
         case WaitingBeside():
-            return _waiting(obstruction, sizes, line_x)
+            row = _ends(line_x - obstruction.before_m, (large, small, small), obstruction.gap_m)
+            aside = obstruction.beside_m
+            return [_car(size, end - size[0] / 2, -aside - size[1] / 2, 0.0) for size, end in row]
+        case None:
+            return []
 
 
-def _parked(way: ParkedAlong, sizes: Sizes, side_x: float, ego_side: float) -> list[Standing]:
-    # Both have the middle line of the large one.
-    y = -(ego_side + way.beside_m + sizes.large[1] / 2)
-    order = (sizes.small, sizes.large)
-    fronts = _fronts(side_x - way.gap_m, order, way.gap_m)
-    return [
-        _car(size, front - size[0] / 2, y, 0.0) for size, front in zip(order, fronts, strict=True)
-    ]
-
-
-def _standing(way: StandingAcross, sizes: Sizes, side_x: float) -> list[Standing]:
-    order = (sizes.large, sizes.small)
-    fronts = _fronts(-way.end_m, order, way.gap_m)
-    # Their sides towards the target are in line.
-    side = side_x - way.before_m
-    return [
-        _car(size, side - size[1] / 2, front - size[0] / 2, -np.pi / 2)
-        for size, front in zip(order, fronts, strict=True)
-    ]
-
-
-def _waiting(way: WaitingBeside, sizes: Sizes, line_x: float) -> list[Standing]:
-    order = (sizes.large, sizes.small, sizes.small)
-    fronts = _fronts(line_x - way.before_m, order, way.gap_m)
-    return [
-        _car(size, front - size[0] / 2, -way.beside_m - size[1] / 2, 0.0)
-        for size, front in zip(order, fronts, strict=True)
-    ]
-
-
-def _fronts(first: float, order: Sequence[Triple], gap: float) -> list[float]:
-    """Where the nearer ends of cars lie that stand one behind the other, from `first` downwards."""
+def _ends(first: float, order: Sequence[Triple], gap: float) -> list[tuple[Triple, float]]:
+    """Cars that stand one behind the other, and where the nearer end of each lies, from `first`
+    downwards.
+    """
     behind = np.cumsum([0.0, *(size[0] + gap for size in order[:-1])])
-    return [first - float(each) for each in behind]
+    return [(size, first - float(each)) for size, each in zip(order, behind, strict=True)]
 
 
-def _car(size: Triple, x: float, y: float, heading: float) -> Standing:
-    return Standing(sized("obstructing car", "car", size), (x, y, heading))
+def _car(size: Triple, x: float, y: float, heading: float) -> Car:
+    return sized("obstructing car", "car", size), (x, y, heading)

@@ -2,18 +2,21 @@
 
 from copy import deepcopy
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
 from care_sim.base.checks import bounded, one_of
 from care_sim.base.errors import InvalidInput
-from care_sim.core.frames import Pose
-from care_sim.scenarios.base import LONGEST_EPISODE_S, MIRRORED, NO_LIMIT_MPS, Scenario
+from care_sim.scenarios.base import (
+    LONGEST_EPISODE_S,
+    MIRRORED,
+    NO_LIMIT_MPS,
+    MirroredWorld,
+    Scenario,
+)
 from care_sim.scenarios.ncap.meetings import (
     Ego,
     Meeting,
-    Sizes,
     across,
     across_exit,
     ahead,
@@ -41,7 +44,7 @@ from care_sim.streets.layouts import LANE_WIDTH_M, Range, draw
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.route import Route
 from care_sim.world.traffic import Traffic
-from care_sim.world.world import Motion, World
+from care_sim.world.world import World
 
 DRAWN = "drawn"
 """In the place of a test's name: the seed draws one."""
@@ -147,36 +150,30 @@ class Ncap(Scenario):
         side = 1.0 if rng.random() < 0.5 else -1.0
         if self.mirrored != DRAWN:
             side = -1.0 if self.mirrored == "always" else 1.0
-        sizes = Sizes(
-            (draw(rng, self.small_length_m), draw(rng, self.small_width_m), SMALL_HEIGHT_M),
-            (draw(rng, self.large_length_m), draw(rng, self.large_width_m), LARGE_HEIGHT_M),
-        )
+        small = draw(rng, self.small_length_m), draw(rng, self.small_width_m), SMALL_HEIGHT_M
+        large = draw(rng, self.large_length_m), draw(rng, self.large_width_m), LARGE_HEIGHT_M
 
         length, width, _ = CATALOGUE["ego"].size
         meeting = _meeting(test, self._variation(), Ego(speed, length, width, start_s))
         traffic = Traffic((1,), ego_lane=0, lane_width=LANE_WIDTH_M, speed_limit=NO_LIMIT_MPS)
-        world = World(traffic, speed, _mirrored_route(meeting.route, side))
+        route = meeting.route
+        if side < 0 and route is not None:
+            x, y, heading = route.start
+            route = Route((x, -y, -heading), tuple((way, -bend) for way, bend in route.legs))
+        world = (MirroredWorld if side < 0 else World)(traffic, speed, route)
         world.has_oncoming = True
         if self.mirrored == DRAWN:
             world.drawn = {"mirrored": "always" if side < 0 else "never"}
-        self._add_cars(world, meeting, sizes, side)
-        world.first_sighting = world.add(
-            test.target.body, test.target.body, partial(_mirrored_at, meeting.motion, side)
-        )
+        target = CATALOGUE[test.target.body]
+        cars = standing_cars(test.obstruction, small, large, meeting.line_x, target.size[1], width)
+        # They stand on the side that the target comes from.
+        far = isinstance(test.way, Across) and test.way.far
+        for number, (kind, (x, y, heading)) in enumerate(cars):
+            pose = (x, -y, -heading) if far else (x, y, heading)
+            world.add(f"obstruction {number}", kind, pose, reported=self.occluder_reported)
+        world.first_sighting = world.add(test.target.body, test.target.body, meeting.motion)
         world.ended = meeting.end.is_over
         return world
-
-    def _add_cars(self, world: World, meeting: Meeting, sizes: Sizes, side: float) -> None:
-        """Add the cars that hide the target, if there are any."""
-        test = TESTS[self.test]
-        target_width = CATALOGUE[test.target.body].size[1]
-        ego_width = world.ego_kind.size[1]
-        # They are reckoned for a target from the right, and stand on the side that it comes from.
-        far = isinstance(test.way, Across) and test.way.far
-        cars = standing_cars(test.obstruction, sizes, meeting.line_x, target_width, ego_width)
-        for number, car in enumerate(cars):
-            pose = _mirrored(car.pose, -side if far else side)
-            world.add(f"obstruction {number}", car.kind, pose, reported=self.occluder_reported)
 
     def _variation(self) -> Variation:
         """The speeds of this episode, and the line of a turn."""
@@ -199,19 +196,3 @@ def _meeting(test: NcapTest, speeds: Variation, ego: Ego) -> Meeting:
             return across_exit(way, target, speed, way.bends[speeds.ego_kph], ego)
         case Oncoming():
             return oncoming(target, speed, way.bends[speeds.ego_kph], ego)
-
-
-def _mirrored(pose: Pose, side: float) -> Pose:
-    """A pose as it is, or with `side` -1 on the other side of the ego's way."""
-    x, y, heading = pose
-    return x, side * y, side * heading
-
-
-def _mirrored_at(motion: Motion, side: float, time: float) -> Pose:
-    return _mirrored(motion(time), side)
-
-
-def _mirrored_route(route: Route | None, side: float) -> Route | None:
-    return route and Route(
-        _mirrored(route.start, side), tuple((length, side * bend) for length, bend in route.legs)
-    )

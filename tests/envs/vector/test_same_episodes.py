@@ -1,10 +1,14 @@
 """World i of a vector environment is the single environment, to the last bit."""
 
+import numpy as np
 import pytest
 
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.envs import CLOSED_LOOP
+from care_sim.envs.scenarios import DartoutEnv
+from care_sim.envs.vector.arguments import why_separate
+from care_sim.envs.vector.env import ClosedLoopVectorEnv
 from tests.helpers.vectors import MODES, native, played_alike
 
 LATE = {"camera_latency": 2, "camera_jitter": 1}
@@ -23,6 +27,7 @@ CONDITIONS = {
     "on a collision course": {"encroachment_s": (-0.2, -0.1), "ego_speed_mps": (12.0, 13.0)},
     "with all that a learner gains": {"reward_weights": {"gain": 2.0}},
     "without scoring": {"scoring_info": False, "secret": "a text that nobody knows"},
+    "several cameras": {"sensor": "paper-vehicle", "duration_s": 3.0} | LATE,
     # These are played one after the other.
     "noisy": {"lidar_range_sigma": 0.05, "lidar_dropout": 0.2},
     "by tiles": {"firing": "tiles:4x8"},
@@ -52,9 +57,11 @@ OWN = {
 }
 
 
-@pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("name", CLOSED_LOOP)
-def test_every_world_in_every_mode(name, mode):
+@pytest.mark.parametrize(
+    ("name", "mode"),
+    [(name, MODES[number % len(MODES)]) for number, name in enumerate(CLOSED_LOOP)],
+)
+def test_every_world_and_every_mode(name, mode):
     steps = 8 if name == "CARE-Drive-v0" else 64
     assert played_alike(name, worlds=3, steps=steps, mode=mode, threads=2) is None
 
@@ -95,3 +102,24 @@ def test_more_detections_than_an_observation_holds():
     assert (env.reset(seed=3)[0]["detections"][..., 0] >= 0).all()
     env.close()
     assert played_alike("CARE-Dense-v0", worlds=2, steps=12, **LATE, **arguments) is None
+
+
+class Miser(DartoutEnv):
+    """Pays nothing."""
+
+    def step(self, action):
+        observation, _, *rest = super().step(action)
+        return observation, 7.0, *rest
+
+
+class Misers(ClosedLoopVectorEnv):
+    single = Miser
+
+
+def test_a_class_that_derives_from_an_environment_plays_as_it_does():
+    assert why_separate(DartoutEnv()) is None
+    assert why_separate(Miser()) == "the class Miser"
+    env = Misers(2, threads=1)
+    env.reset(seed=0)
+    assert env.step(np.zeros(env.action_space.shape, np.float32))[1].tolist() == [7.0, 7.0]
+    env.close()

@@ -9,9 +9,7 @@ import pytest
 import care_sim
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
-from care_sim.core.sensor_setup import grid_of
 from care_sim.wrappers import ExportScans
-from tests.helpers.lidars import CORNERS
 
 
 @pytest.fixture(scope="module")
@@ -87,19 +85,6 @@ def test_poses_and_boxes_place_the_points_on_the_person(played, open3d):
     assert np.hypot(box[0] - x, box[1] - y) == pytest.approx(outcome["detection_distance_m"])
 
 
-def test_tracks_are_forecasts_of_what_was_detected_before(played):
-    folder, keyframes, _ = played
-    first = next(frame.index for frame in keyframes if frame.detected)
-    assert beside(folder, f"{first:03d}")["tracks"] == []
-    text = beside(folder, f"{first + 3:03d}")
-    (track,) = text["tracks"]
-    (person,) = (body for body in text["bodies"] if body["name"] == "person")
-    x, y, *_ = text["sensor_in_world"]
-    assert track["class"] == "pedestrian"
-    np.testing.assert_allclose(track["box"][:2], np.array(person["box"][:2]) - (x, y), atol=0.3)
-    assert track["velocity"][1] == pytest.approx(2.7, abs=1.0)
-
-
 def test_a_folder_that_holds_scans_is_refused_before_play(open3d, tmp_path):
     (tmp_path / "000.pcd").touch()
     with ExportScans(gymnasium.make("CARE-Dartout-v0", disable_env_checker=True), tmp_path) as env:
@@ -108,36 +93,6 @@ def test_a_folder_that_holds_scans_is_refused_before_play(open3d, tmp_path):
             env.step(np.zeros(env.action_space.shape, np.float32))
         assert env.unwrapped.loop.index == 0
     assert [path.name for path in tmp_path.iterdir()] == ["000.pcd"]
-
-
-def test_scans_of_several_lidars_are_one_cloud_in_the_frame_of_the_first(open3d, tmp_path):
-    env = gymnasium.make("CARE-Dense-v0", sensor=CORNERS, budget=1.0, disable_env_checker=True)
-    with ExportScans(env, tmp_path / "scans", care_sim.make_policy("full", env)) as env:
-        env.reset(seed=0)
-        env.step(np.ones(env.action_space.shape, np.float32))
-        ranges = env.unwrapped.loop.belief.ranges.ravel()
-    grid = grid_of(beside(tmp_path / "scans", "episode")["grid"])
-    assert grid == CORNERS.grid
-    cloud = open3d.t.io.read_point_cloud(str(tmp_path / "scans" / "000.pcd")).point
-    cells = cloud["cell"].numpy().ravel()
-    points = cloud["positions"].numpy()
-    assert {*np.searchsorted([512, 768], cells, side="right").tolist()} == {0, 1, 2}
-    np.testing.assert_allclose(points, grid.points(cells, ranges[cells]), rtol=1e-5, atol=1e-4)
-    # Every LiDAR meets cars where they stand in the world.
-    text = beside(tmp_path / "scans", "000")
-    x, y, z, yaw, pitch, roll = text["sensor_in_world"]
-    sensor = Frame(x, y, z, yaw, roll, pitch)
-    world = sensor.origin + sensor.vectors_to_world(points.astype(float))
-    on_body = np.zeros(len(points), bool)
-    for body in text["bodies"]:
-        box = np.array(body["box"])
-        here = Frame(*box[:3], box[6]).vectors_to_local(world - box[:3])
-        on_body |= (np.abs(here) < box[3:6] / 2 + 0.01).all(axis=1)
-    high = world[:, 2] > 0.05
-    assert {*grid.lidars_of(cells[high]).tolist()} == {0, 1, 2}
-    assert on_body[high].all()
-    # The corners stand lower than the roof, and all meet the same road.
-    assert points[:, 2].min() == pytest.approx(-1.8, abs=0.01)
 
 
 def test_scans_of_the_open_loop_hold_who_was_found(open3d, drive, tmp_path):

@@ -95,15 +95,6 @@ def test_shares_are_those_of_the_action_that_the_environment_got(order):
     assert np.count_nonzero(moment.shares == CHOSEN) == 100
 
 
-def test_an_episode_cut_short_has_no_outcome():
-    with Kept(make(max_episode_steps=2)) as env:
-        env.reset(seed=0)
-        for _ in range(2):
-            *_, truncated, _ = env.step(np.zeros(env.action_space.shape, np.float32))
-        assert truncated
-        assert env.ended == [None]
-
-
 def test_a_refused_first_action_does_not_begin_the_episode_twice(watcher, tmp_path):
     with watcher(make(), tmp_path / "out.rrd") as env:
         env.reset(seed=0)
@@ -112,23 +103,6 @@ def test_a_refused_first_action_does_not_begin_the_episode_twice(watcher, tmp_pa
             env.step(nothing + np.nan)
         env.step(nothing)
     assert [path.name for path in tmp_path.iterdir()] == ["out.rrd"]
-
-
-def test_an_episode_without_a_keyframe_is_closed(watcher, tmp_path):
-    with watcher(make(), tmp_path / "out.rrd") as env:
-        env.reset(seed=0)
-        with pytest.raises(care_sim.InvalidInput, match="NaN"):
-            env.step(np.full(env.action_space.shape, np.nan, np.float32))
-    assert (tmp_path / "out.rrd").exists()
-
-
-def test_the_environment_may_be_closed_before_its_watcher():
-    env = Kept(make())
-    env.reset(seed=0)
-    env.step(np.zeros(env.action_space.shape, np.float32))
-    env.unwrapped.close()
-    env.close()
-    assert env.ended == [None]
 
 
 def test_the_environment_is_closed_where_the_end_cannot_be_kept():
@@ -197,20 +171,3 @@ def test_a_watched_episode_is_the_same_to_the_last_bit(watcher, tmp_path):
         np.testing.assert_array_equal(plain[4]["fired"], seen[4]["fired"])
     bare.close()
     watched.close()
-
-
-def test_after_its_end_an_episode_is_over_for_the_watcher_too(watcher, tmp_path):
-    with watcher(make(duration_s=0.1), tmp_path / "out.rrd") as env:
-        nothing = np.zeros(env.action_space.shape, np.float32)
-        env.reset(seed=0)
-        env.step(nothing)
-        with pytest.raises(gymnasium.error.ResetNeeded):
-            env.step(nothing)
-
-
-def test_a_place_that_cannot_be_written_is_named(watcher, tmp_path):
-    (tmp_path / "file").touch()
-    with watcher(make(), tmp_path / "file" / "out.rrd") as env:
-        env.reset(seed=0)
-        with pytest.raises(OSError, match="file"):
-            env.step(np.zeros(env.action_space.shape, np.float32))
