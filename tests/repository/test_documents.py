@@ -29,7 +29,7 @@ from care_sim.study.benchmark.tasks import tasks_of
 from care_sim.study.benchmark.worlds import PARTS, published_worlds
 from care_sim.study.results_formats import RESULTS_FORMATS
 from care_sim.training.config import PpoConfig
-from care_sim.training.folder import read_curve
+from care_sim.training.folder import read_table
 from care_sim.training.hyperparameters import read_hyperparameters
 from tests.helpers.examples import EXAMPLES, loaded
 from tests.helpers.forked import LEARNING, LIBRARIES, Forked
@@ -147,7 +147,7 @@ def test_hyperparameters_are_chosen_in_one_file_that_can_be_run_again(tmp_path):
     best = read_hyperparameters(PpoConfig, [example.ENV], tmp_path / "best.toml")
     assert best.values.keys() == {*example.TRIED}
     returns = [
-        max(row[2] for row in read_curve(tmp_path / n / "curve.csv")) for n in ("000", "001")
+        max(row["return"] for row in read_table(tmp_path / n / "curve.csv")) for n in ("000", "001")
     ]
     tried = [json.loads((tmp_path / n / "config.json").read_text()) for n in ("000", "001")]
     assert tried[0]["learning_rate"] == PpoConfig.learning_rate

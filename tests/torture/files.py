@@ -126,7 +126,7 @@ def training(case):
     path, own = case.rng.choice(
         (
             ("config.json", spoil.json_node),
-            ("rules.json", spoil.json_node),
+            ("episodes.csv", spoil.csv),
             ("curve.csv", spoil.csv),
         )
     )

@@ -185,15 +185,14 @@ def _make_recording(path):
 
 def _make_trained(path):
     """What `train curves` reads, as `train ppo` leaves it."""
-    import json
-
-    path.mkdir()
-    scores = {"episodes": 2, "mean_return": -3.0, "distance_m": 12.0}
     from care_sim.training.config import PpoConfig
 
+    path.mkdir()
     (path / "config.json").write_text(PpoConfig().to_json())
-    (path / "rules.json").write_text(
-        json.dumps(dict.fromkeys(("random", "history", "care", "full"), scores))
+    played = (("random", 0), ("care", 0), ("full", 0), ("learner", 0), ("learner", 64))
+    (path / "episodes.csv").write_text(
+        "policy,steps,seed,env,return,distance_m\n"
+        + "".join(f"{name},{steps},2000,CARE-Dense-v0,-3.0,12.0\n" for name, steps in played)
     )
     (path / "curve.csv").write_text(
         "steps,seconds,return,distance_m\n0,0.1,-5.0,8.0\n64,1.5,-4.0,9.5\n"

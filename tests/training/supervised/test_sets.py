@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import care_sim
+from care_sim.base.seed_ranges import TRAINING
 from care_sim.cli import main
 from care_sim.core.boxes import planar_ranges
 from care_sim.core.grid import AngularGrid
@@ -110,6 +111,28 @@ def test_constants_are_the_shares_of_each_kind(tmp_path):
     assert np.ptp(chances) == 0
 
 
+def test_an_interrupt_keeps_what_the_first_round_has_taught(tmp_path, monkeypatch, capsys):
+    asked = []
+
+    def interrupted(worlds, first, own, *_):
+        asked.append((first, max(worlds.values())))
+        if own is not None:
+            raise KeyboardInterrupt
+        return [*drawn(first, 20)]
+
+    monkeypatch.setattr(sets, "gathered", interrupted)
+    with pytest.raises(SystemExit):
+        main(["train", "learned-sets", "--out", str(tmp_path / "w.npz"), "--steps", "5"])
+    # No world comes twice.
+    assert asked[0][0] == TRAINING
+    assert asked[1][0] == sum(asked[0])
+    assert "w.npz holds what 1 of 2 rounds have taught" in capsys.readouterr().err
+    card = load_weights(tmp_path / "w.npz").card
+    assert "10 of street" in card.data
+    assert "then" not in card.data
+    assert not card.result
+
+
 def test_without_faults_the_camera_has_none(monkeypatch):
     told = [worlds._conditions(np.random.default_rng(seed), False) for seed in range(50)]
     assert {name for one in told for name in one} == {"budget"}
@@ -190,50 +213,4 @@ def test_the_command_writes_the_same_file_again_with_its_card(tmp_path, monkeypa
     card = load_weights(one).card
     assert (card.kind, card.steps, card.seeds["training"]) == ("learned-sets", 5, 3)
     assert len(card.result) == 4
-    said = capsys.readouterr().out.splitlines()
-    assert said[0].startswith(f"{one}: loss per items, learned")
-    assert said[1] == f"play it: care-sim run {one}"
-
-
-def test_an_interrupt_keeps_what_the_first_round_has_taught(tmp_path, monkeypatch, capsys):
-    def interrupted(worlds, first, own, *_):
-        if own is not None:
-            raise KeyboardInterrupt
-        return [*drawn(first, 20)]
-
-    monkeypatch.setattr(sets, "gathered", interrupted)
-    with pytest.raises(SystemExit):
-        main(["train", "learned-sets", "--out", str(tmp_path / "w.npz"), "--steps", "5"])
-    assert "w.npz holds what 1 of 2 rounds have taught" in capsys.readouterr().err
-    card = load_weights(tmp_path / "w.npz").card
-    assert "10 of street" in card.data
-    assert "then" not in card.data
-    assert not card.result
-
-
-def test_worlds_of_a_round_are_of_training_seeds_and_none_comes_twice(monkeypatch):
-    asked = []
-    monkeypatch.setattr(sets, "play", lambda *which: asked.append(which) or [])
-    first = 10_000
-    for counts in sets.ROUNDS:
-        sets.gathered(counts, first, None)
-        first += max(counts.values())
-    played = [(kind, seed) for kind, seed, *_ in asked]
-    assert len({*played}) == len(played)
-    assert min(seed for _, seed in played) == 10_000
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (("--steps", "0"), "steps must be a whole number >= 1, got 0"),
-        (("--sead", "0"), "--sead"),
-        (("--without", "boxes"), "boxes"),
-    ],
-)
-def test_bad_options_are_refused_in_one_line(tmp_path, monkeypatch, capsys, options, message):
-    assert trained(tmp_path / "w.npz", monkeypatch, *options) == 2
-    error = capsys.readouterr().err
-    assert message in error
-    assert error.startswith("care-sim: ")
-    assert error.count("\n") == 1
+    assert f"{one}: loss per items, learned" in capsys.readouterr().out
