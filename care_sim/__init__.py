@@ -6,12 +6,9 @@ Importing the package registers the environments of the closed loop, `CARE-Darto
 """
 
 # First of all: an interrupt may come while the rest is imported, and limits may be too low for it.
+# The limits settle the caches of Numba and Matplotlib, too.
 import care_sim.base.interrupts
-import care_sim.base.limits
-
-# isort: split
-# Before Numba and Matplotlib look for their caches.
-import care_sim.base.home  # noqa: F401
+import care_sim.base.limits  # noqa: F401
 
 # isort: split
 from importlib import import_module

@@ -12,12 +12,12 @@ from typing import Any, NoReturn
 
 import care_sim
 from care_sim.base import interrupts
-from care_sim.base.causes import causes
 from care_sim.base.errors import (
     LONGEST,
     InvalidInput,
     MissingExtra,
     error_line,
+    foreign_place,
     is_own_fault,
     one_line,
     report_problems,
@@ -25,8 +25,7 @@ from care_sim.base.errors import (
     shown,
     unknown,
 )
-from care_sim.base.exit_codes import BAD_INPUT, FAILED, INTERRUPTED, UNEXPECTED, UNREAD
-from care_sim.base.foreign_code import foreign_place
+from care_sim.base.interrupts import BAD_INPUT, FAILED, INTERRUPTED, UNEXPECTED, UNREAD
 from care_sim.base.limits import limit_in
 from care_sim.commands.table import COMMANDS, FAMILIES, GROUPS, MOVED, RENAMED, Command
 
@@ -81,7 +80,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         raise
     # Foreign code may raise anything.
     except BaseException as error:
-        if not _is_interrupt(error):
+        if not interrupts.was_interrupted(error):
             _end_with(error, trace=_DEBUG in given or bool(os.environ.get("CARE_SIM_DEBUG")))
         if alone:
             interrupts.end_in_silence()
@@ -91,14 +90,6 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     finally:
         if alone:
             interrupts.end_in_silence()
-
-
-def _is_interrupt(error: BaseException) -> bool:
-    """Whether an error is an interrupt, or what an import has made of one."""
-    # A compiled module that is interrupted while it is imported raises ImportError or SystemError,
-    # and keeps the interrupt as the cause.
-    links = causes(error) if isinstance(error, ImportError | SystemError) else [error]
-    return any(isinstance(link, KeyboardInterrupt) for link in links)
 
 
 def _end_with(error: BaseException, trace: bool) -> NoReturn:

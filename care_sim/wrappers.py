@@ -5,11 +5,14 @@ environments, whose names begin with `Vector`. The others watch an episode and l
 """
 
 from care_sim.envs.wrappers.export_scans import ExportScans
-from care_sim.envs.wrappers.grid_observation import GridObservation
+from care_sim.envs.wrappers.grid_observation import GridObservation, VectorGridObservation
 from care_sim.envs.wrappers.record_rerun import RecordRerun
-from care_sim.envs.wrappers.sector_actions import SectorReserve, SectorScores
-from care_sim.envs.wrappers.vector_grid_observation import VectorGridObservation
-from care_sim.envs.wrappers.vector_sector_actions import VectorSectorReserve, VectorSectorScores
+from care_sim.envs.wrappers.sector_actions import (
+    SectorReserve,
+    SectorScores,
+    VectorSectorReserve,
+    VectorSectorScores,
+)
 
 __all__ = [
     "ExportScans",

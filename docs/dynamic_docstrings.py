@@ -8,7 +8,7 @@ from typing import Any
 
 import griffe
 
-from care_sim.base.bounds import allowed, bounded, one_of
+from care_sim.base.checks import allowed, bounded, one_of
 
 _STATING = tuple(f"{each.__name__}(" for each in (bounded, one_of))
 """How the value of a field begins that states what it may be."""

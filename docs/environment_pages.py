@@ -23,7 +23,7 @@ from typing import Any
 
 import docstring_parser
 
-from care_sim.base.bounds import allowed
+from care_sim.base.checks import allowed
 
 PAGES = Path(__file__).parent / "environments"
 _REGION = re.compile(r"<!-- site\n(?P<directive>::: (?P<path>\S+)\n.*?)-->\n.*?<!-- end -->", re.S)

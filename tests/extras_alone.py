@@ -31,7 +31,7 @@ BAG = """
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 from care_sim.base.errors import InvalidInput
-from care_sim.sources.kinds import recordings
+from care_sim.sources.installed import recordings
 
 store = get_typestore(Stores.ROS2_HUMBLE)
 with Writer("drive", version=9, storage_plugin=StoragePlugin.MCAP) as bag:

@@ -1,12 +1,21 @@
-"""Hashes of files and folders, and which files lie below a folder."""
+"""Hashes of files and folders, of what happened, and of what an entry point names."""
 
 import hashlib
+import math
 import os
+import sys
 from collections.abc import Iterable, Iterator
 from functools import lru_cache
+from importlib.metadata import EntryPoint
+from importlib.util import find_spec
 from itertools import islice
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from care_sim.base.checks import LONGEST_PATH
+from care_sim.base.compiled import compiled
 from care_sim.base.errors import InvalidInput
 
 MOST_FILES = 10_000
@@ -115,3 +124,154 @@ def real_path(path: Path) -> Path:
     and `Path.resolve` would raise.
     """
     return Path(os.path.realpath(path))
+
+
+_SITES = {"site-packages", "dist-packages"}
+CODE = (".py", ".so", ".pyd")
+"""Endings of files that a process loads once."""
+
+
+def entry_files(entry: EntryPoint) -> dict[str, Path] | None:
+    """The files by name. A package: all files in its folder. A single module: its file, and code
+    beside it unless it was installed. Both: the files in `files`. None where its code is in no
+    file, or in too many.
+
+    Raises InvalidInput for `files` that are no names, or that are missing.
+    """
+    roots = _roots(entry.module.partition(".")[0])
+    files = {
+        f"{root.name}/{file.relative_to(root if root.is_dir() else root.parent)}": file
+        for root in roots
+        for file in islice(_of_root(root), MOST_FILES + 1)
+    }
+    if not 0 < len(files) <= MOST_FILES:
+        return None
+    return files | {f"declared {number}": path for number, path in enumerate(_declared(entry))}
+
+
+def paths_in(value: object) -> Iterator[Path]:
+    """The files and folders that a parameter names, from here; of a list those of its items."""
+    if isinstance(value, list | tuple):
+        for item in value:
+            yield from paths_in(item)
+    elif isinstance(value, str | os.PathLike):
+        name = os.path.expanduser(os.path.expandvars(str(value)))
+        there = 0 < len(name) <= LONGEST_PATH and (os.path.isfile(name) or os.path.isdir(name))
+        if there and not is_of_the_system(Path(name)):
+            yield Path(name)
+
+
+def _roots(top: str) -> list[Path]:
+    """Where a package or module lies; nowhere, if any of it is in no file."""
+    try:
+        spec = find_spec(top)
+    except (ImportError, ValueError):
+        return []
+    # A namespace package has several places, a module one. In a zip archive none of them is a file.
+    places = (spec.submodule_search_locations or [spec.origin or ""]) if spec else []
+    roots = [Path(place) for place in places]
+    return roots if all(root.name and root.exists() for root in roots) else []
+
+
+def _of_root(root: Path) -> Iterator[Path]:
+    if root.is_dir():
+        yield from (file for file in files_below(root) if not is_compiled(file))
+    elif _SITES.isdisjoint(root.parts):
+        yield from (
+            file for file in sorted(root.parent.iterdir()) if file.suffix in CODE and file.is_file()
+        )
+    else:
+        yield root
+
+
+def _declared(entry: EntryPoint) -> list[Path]:
+    """The files that an entry declares; relative names count from its module. Nothing of code that
+    cannot be loaded.
+    """
+    try:
+        declared = getattr(entry.load(), "files", ())
+    except KeyboardInterrupt:
+        raise
+    except BaseException:
+        return []
+    # A source has a method of this name, which says what a scene is read from.
+    if callable(declared):
+        return []
+    if not (
+        isinstance(declared, tuple | list)
+        and all(isinstance(name, str | os.PathLike) for name in declared)
+    ):
+        raise InvalidInput(f"{entry.value}: files must be a tuple of names, got {declared!r}")
+    home = Path(sys.modules[entry.module].__file__ or "").parent
+    paths = [home / Path(name).expanduser() for name in declared]
+    for path in paths:
+        if not path.exists():
+            raise InvalidInput(f"{entry.value}: files names {path}, which does not exist")
+    return paths
+
+
+STEP = 1e-4
+"""Metres, radians, metres per second: what measured numbers are rounded to. A whole episode
+computed with other features of the processor moves poses by less than 1e-13, and the float32 ranges
+of an observation by their last bit, 4e-6; what an outcome rests on (sizes, margins, the spacing of
+rays) is centimetres."""
+SHIFT = (5**0.5 - 1) / 2
+"""Shares of a step by which the borders between steps lie beside the round numbers that scenes are
+made of (0, 0.05, 1.5, a half of anything): a number on a border would be rounded by its last bit.
+"""
+
+_INFINITE = 2**62
+_NONE = 2**62 + 1
+_LARGEST = 2.0**61
+
+Content = str | ArrayLike
+
+
+def portable_bytes(*parts: Content | tuple[Content, ...]) -> bytes:
+    """The bytes of texts, arrays and numbers, and of tuples of them, with their shapes.
+
+    Whole numbers and flags are taken exactly, the others to `STEP`; -0.0 is 0, float32 and float64
+    are one, infinities and NaN are numbers of their own.
+    """
+    return b"".join(map(_bytes_of, parts))
+
+
+def _bytes_of(part: object) -> bytes:
+    # Each part begins with its kind and size, so that no two different sequences of parts are the
+    # same bytes: ("ab", "c") is not ("a", "bc").
+    if isinstance(part, str):
+        text = part.encode(errors="surrogatepass")
+        return b"text %d " % len(text) + text
+    if isinstance(part, tuple):
+        return b"tuple %d " % len(part) + portable_bytes(*part)
+    numbers = np.asarray(part)
+    whole = numbers if numbers.dtype.kind in "biu" else _rounded(numbers)
+    return b"array %r " % (numbers.shape,) + np.ascontiguousarray(whole, "<i8").tobytes()
+
+
+def _rounded(numbers: NDArray[np.floating]) -> NDArray[np.int64]:
+    """The step that each number lies in."""
+    # Compiled for the two kinds of floats that arrays come in; any other is taken as the wider one.
+    is_single = numbers.dtype == np.float32
+    table: NDArray[np.floating] = np.ascontiguousarray(
+        numbers, np.float32 if is_single else np.float64
+    )
+    return np.asarray(_steps(table.reshape(-1)).reshape(numbers.shape))
+
+
+@compiled()
+def _steps(numbers: NDArray[np.floating]) -> NDArray[np.int64]:
+    """(n,) the steps of numbers (n,)."""
+    steps = np.empty(len(numbers), np.int64)
+    for n in range(len(numbers)):
+        number = np.float64(numbers[n])
+        # Floor, not round: a border lies SHIFT beside each multiple of the step. Held in bounds,
+        # so that every step is a 64-bit integer, and those beyond are left for infinity and NaN.
+        if math.isfinite(number):
+            step = math.floor(min(max(number / STEP + SHIFT, -_LARGEST), _LARGEST))
+        elif math.isnan(number):
+            step = _NONE
+        else:
+            step = _INFINITE if number > 0 else -_INFINITE
+        steps[n] = step
+    return steps

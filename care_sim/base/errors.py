@@ -2,12 +2,87 @@
 allowed, and text made fit to be shown.
 """
 
+import inspect
+import site
 import sys
+import sysconfig
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
+from importlib.metadata import entry_points
+from pathlib import Path
+from traceback import walk_tb
+from types import FrameType
 from typing import TextIO
 
-from care_sim.base.foreign_code import foreign_place, is_raised_by_foreign, raised_place
+_OURS = Path(__file__).parent.parent
+_FOLDERS = (
+    *(sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib")),
+    # A system's own packages and those of `pip install --user` lie elsewhere.
+    *site.getsitepackages(),
+    site.getusersitepackages(),
+)
+_LIBRARIES = [Path(folder) for folder in dict.fromkeys(_FOLDERS)]
+
+
+def foreign_place(error: BaseException) -> str:
+    """File and line, in brackets after a space, where an error left the code of a user or of a
+    package that adds something to the benchmark; empty where no such code was running.
+    """
+    # The innermost one: what it calls is ours or a library's, and was called wrongly.
+    return next((_place(*at) for at in _frames(error) if _is_foreign(at[0])), "")
+
+
+def is_raised_by_foreign(error: BaseException) -> bool:
+    """Whether foreign code raised an error itself, not what it called."""
+    return any(_is_foreign(frame) for frame, _ in _frames(error)[:1])
+
+
+def _frames(error: BaseException) -> list[tuple[FrameType, int]]:
+    """The frames and lines that an error came through, the innermost first."""
+    return [*walk_tb(error.__traceback__)][::-1]
+
+
+def _place(frame: FrameType, line: int) -> str:
+    return f" ({Path(frame.f_code.co_filename).name}, line {line})"
+
+
+def class_place(kind: type) -> str:
+    """A class with its file and line, in brackets after a space; empty where it has no file."""
+    try:
+        _, line = inspect.getsourcelines(kind)
+        return f" (class {kind.__name__}, {Path(inspect.getfile(kind)).name}, line {line})"
+    except (OSError, TypeError):
+        return ""
+
+
+def _is_foreign(frame: FrameType) -> bool:
+    """Whether the code of a frame is neither ours nor that of a library which adds nothing."""
+    file = Path(frame.f_code.co_filename)
+    # What Python itself makes, such as the methods of dataclasses, has a name in brackets.
+    if not file.is_absolute() or file.is_relative_to(_OURS):
+        return False
+    if not any(map(file.is_relative_to, _LIBRARIES)):
+        return True
+    return _top(frame.f_globals.get("__name__", "")) in _plugged_in()
+
+
+def _plugged_in() -> set[str]:
+    """The top-level modules of packages that add something."""
+    try:
+        installed = entry_points()
+    except (OSError, MemoryError):  # the error at hand may be of a limit that holds here, too
+        return set()
+    return {
+        _top(entry.module)
+        for group in installed.groups
+        if group.startswith("care_sim.")
+        for entry in installed.select(group=group)
+    }
+
+
+def _top(module: str) -> str:
+    return module.partition(".")[0]
+
 
 _QUOTED = 120
 """Characters of a value that a message quotes."""
@@ -97,16 +172,15 @@ def failure_line(error: BaseException) -> str:
     """
     if isinstance(error, InvalidInput):
         return shortened(one_line(_text(error, LONGEST)), LONGEST)
-    return error_line(error) + ("" if foreign_place(error) else raised_place(error))
+    raised = [] if foreign_place(error) else _frames(error)[:1]
+    return error_line(error) + "".join(_place(*at) for at in raised)
 
 
 def _text(error: BaseException, most: int = _SAID) -> str:
     """The first `most` characters of what an error says."""
     try:
         text = str(error)
-    except KeyboardInterrupt:
-        raise
-    except BaseException:  # An error of foreign code may fail in its own `__str__`.
+    except Exception:  # An error of foreign code may fail in its own `__str__`.
         return "its text cannot be read"
     return text if len(text) <= most else f"{text[:most]}..."
 
@@ -135,7 +209,7 @@ def shown(value: object) -> str:
     try:
         text = one_line(repr(value))
     except Exception:  # whatever a foreign object does; an int of 4,300 digits refuses, too
-        text = f"{'an' if isinstance(value, int) else 'a value of type'} {type(value).__name__}"
+        text = f"a value of type {type(value).__name__}"
     return shortened(text, _QUOTED)
 
 

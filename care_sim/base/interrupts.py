@@ -1,5 +1,5 @@
 """What ends a command from outside: an interrupt or a quit typed, a terminal that closes, a request
-to end.
+to end; and the exit codes of commands.
 
 It imports nothing that takes time: the command `care-sim` is interrupted in one line from the first
 of its imports on.
@@ -8,13 +8,18 @@ of its imports on.
 import os
 import signal
 import sys
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from types import FrameType
+from collections.abc import Callable
 from typing import Any
 
-from care_sim.base.exit_codes import INTERRUPTED
+DONE = 0
+FAILED = 1
+"""Something failed, such as code of the user's own or a limit of the machine, or was left out."""
+BAD_INPUT = 2
+UNEXPECTED = 70
+"""A fault in the software: `EX_SOFTWARE` of BSD."""
+INTERRUPTED = 130
+UNREAD = 141
+"""Nobody reads the output: what a shell gives for SIGPIPE, 128 + 13."""
 
 SIGNALS = tuple(
     getattr(signal, name)
@@ -22,9 +27,7 @@ SIGNALS = tuple(
     if hasattr(signal, name)
 )
 """All end a command in the same way."""
-_HEARD = (*SIGNALS, signal.SIGALRM)
-SOON_S = 0.02
-"""Seconds after which an interrupt that came at a bad moment is raised again."""
+_heard: list[int] = []
 
 
 def end_at_once() -> None:
@@ -33,56 +36,22 @@ def end_at_once() -> None:
 
 
 def raise_them() -> None:
-    """From now on an interrupt is a KeyboardInterrupt, raised where it is not lost: one that falls
-    into an import, which may turn it into another error, comes after it, or with the next one; one
-    that falls into code whose errors nobody can catch (finalisers, callbacks) comes again.
-    """
+    """From now on an interrupt is a KeyboardInterrupt."""
     _listen(_raise)
-    signal.signal(signal.SIGALRM, _raise)
-    sys.unraisablehook = _come_again
 
 
 def end_in_silence() -> None:
     """From now on an interrupt is the system's to handle: all is said, and the interpreter is
     ending.
     """
-    signal.setitimer(signal.ITIMER_REAL, 0)
     _listen(signal.SIG_DFL)
 
 
-@contextmanager
-def held_back() -> Iterator[None]:
-    """Interrupts wait for the end of the block, for what must not be left half done."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    # Only handlers of Python can wait in a list. What is ignored, or the system's, stays so.
-    waiting: list[int] = []
-    with _deaf():
-        handlers = {number: signal.getsignal(number) for number in _HEARD}
-        before = {number: handler for number, handler in handlers.items() if callable(handler)}
-        for number in before:
-            signal.signal(number, lambda number, _: waiting.append(number))
-    try:
-        yield
-    finally:
-        with _deaf():
-            for number, handler in before.items():
-                signal.signal(number, handler)
-        # One is enough: all end a command in the same way. It is raised when the handlers are back.
-        for number in waiting[:1]:
-            signal.raise_signal(number)
-
-
-@contextmanager
-def _deaf() -> Iterator[None]:
-    """What comes meanwhile is handled at the end, so that handlers change all at once."""
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, ())
-    try:
-        signal.pthread_sigmask(signal.SIG_BLOCK, _HEARD)
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+def was_interrupted(error: BaseException) -> bool:
+    """Whether an error is an interrupt, or came after one: code that is interrupted in the middle,
+    such as an import, may raise an error of its own.
+    """
+    return bool(_heard) or isinstance(error, KeyboardInterrupt)
 
 
 def _listen(handler: Callable[[int, Any], Any] | signal.Handlers) -> None:
@@ -98,34 +67,9 @@ def _end(*_: object) -> None:
     os._exit(INTERRUPTED)
 
 
-def _raise(number: int, frame: FrameType | None) -> None:
-    # An import may catch what is raised within it and raise an error of its own. So an interrupt
-    # that falls into an import is put off: an alarm calls this handler again, until the import has
-    # ended. If a second interrupt comes while the alarm is set, it is raised at once.
-    is_alarm = number == signal.SIGALRM
-    one_waits = signal.getitimer(signal.ITIMER_REAL)[0] > 0
-    is_second = one_waits and not is_alarm
-    if _imports(frame) and not is_second:
-        signal.setitimer(signal.ITIMER_REAL, SOON_S)
-    else:
-        raise KeyboardInterrupt
-
-
-def _imports(frame: FrameType | None) -> bool:
-    """Whether an import is going on: its machinery is among the callers."""
-    while frame is not None:
-        if frame.f_code.co_filename == "<frozen importlib._bootstrap>":
-            return True
-        frame = frame.f_back
-    return False
-
-
-def _come_again(lost: "sys.UnraisableHookArgs") -> None:
-    """Have an interrupt that nobody could catch raised once more, a moment later."""
-    if issubclass(lost.exc_type, KeyboardInterrupt):
-        signal.setitimer(signal.ITIMER_REAL, SOON_S)
-    else:
-        sys.__unraisablehook__(lost)
+def _raise(number: int, _: object) -> None:
+    _heard.append(number)
+    raise KeyboardInterrupt
 
 
 def is_command() -> bool:

@@ -1,20 +1,77 @@
-"""Limits of memory, processes and open files that a shell, a batch system or a container sets.
+"""What the machine allows this process: cores, memory, processes, a folder for caches.
 
-The command `care-sim` checks them before it imports its libraries, which end a process in their own
-words where they find too little. So this module imports nothing that takes time.
+The command `care-sim` checks the limits that a shell, a batch system or a container sets before it
+imports its libraries, which end a process in their own words where they find too little. So this
+module imports nothing that takes time.
 """
 
 import errno
 import os
 import resource
+import stat
+import sys
+import tempfile
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from math import ceil
+from pathlib import Path
+from typing import Any
 
-from care_sim.base.causes import causes
-from care_sim.base.cores import CORES
-from care_sim.base.interrupts import is_command
+from care_sim.base.interrupts import FAILED, is_command
 
-FAILED = 1
-"""Exit code of a command that a limit has ended."""
+
+def usable_cores(
+    groups: Path = Path("/sys/fs/cgroup"), own: Path = Path("/proc/self/cgroup")
+) -> int:
+    """Count the cores that the affinity and the control groups of Linux leave to this process.
+
+    `groups` is where control groups of version 1 or 2 are mounted. `own` lists those of the
+    process.
+    """
+    affinity = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return max(1, min([affinity or 1, *(ceil(quota) for quota in _quotas(groups, own))]))
+
+
+def _quotas(groups: Path, own: Path) -> Iterator[float]:
+    """Yield the cores that each control group of the process allows, and each group above."""
+    lines = own.read_text().splitlines() if own.exists() else []
+    for line in lines:
+        _, controllers, path = line.split(":", 2)
+        if controllers and "cpu" not in controllers.split(","):
+            continue
+        mount = groups / "cpu" if controllers else groups
+        place = mount / path.strip("/")
+        # In a container the path may be the host's, of which only the mount's root is there.
+        for folder in (place, *place.parents):
+            with suppress(OSError, ValueError, ZeroDivisionError):
+                quota, period = _quota(folder, version=1 if controllers else 2)
+                if quota > 0:
+                    yield quota / period
+            if folder == mount:
+                break
+
+
+def _quota(folder: Path, version: int) -> tuple[int, int]:
+    """Microseconds of processor time and the period in which they are allowed.
+
+    Raises ValueError for version 2's "max", which allows all. Version 1 says -1.
+    """
+    if version == 2:
+        quota, period = (folder / "cpu.max").read_text().split()
+    else:
+        quota = (folder / "cpu.cfs_quota_us").read_text()
+        period = (folder / "cpu.cfs_period_us").read_text()
+    return int(quota), int(period)
+
+
+CORES = usable_cores()
+"""Cores that this process may use, as counted when the package was imported."""
+MOST_WORKERS = 1024
+"""Most worker processes; each takes about 100 MB."""
+WORKERS = min(CORES, MOST_WORKERS)
+"""Workers unless another number is asked for."""
+
 _BYTES_PER_THREAD = 100_000_000
 _MEMORY = {
     "address space": (resource.RLIMIT_AS, 3_000_000_000, "ulimit -v"),
@@ -26,10 +83,6 @@ libraries hang or abort where one of their threads cannot start.
 _TASKS_OF_A_WORKER = 4
 _TASKS_OF_A_POOL = 16
 """The fork server, the tracker of resources, and threads of libraries."""
-_FILES = 16
-"""Files that a command opens beside those that it inherits. Rerun aborts where it is imported with
-fewer than 5.
-"""
 _STACK_BYTES = 2**16
 _UNMAPPED = ("failed to map segment", "cannot allocate memory", "cannot create shared object")
 """How the system's loader says that there is no room for a library."""
@@ -62,6 +115,20 @@ def _library_threads() -> int:
 def check_workers(workers: int) -> None:
     """Raise LimitReached unless so many worker processes can be started now."""
     _check_tasks(_TASKS_OF_A_WORKER * workers + _TASKS_OF_A_POOL, ", or lower --workers")
+
+
+def causes(error: BaseException | None) -> Iterator[BaseException]:
+    """Yield an error, the error that led to it, and so on, as Python's trace shows them.
+
+    An error raised `from None` has no cause. Each error comes once: code that raises an error again
+    while it handles another one may close a circle.
+    """
+    known: set[int] = set()
+    while error is not None and id(error) not in known:
+        known.add(id(error))
+        yield error
+        is_hidden = error.__cause__ is not None or error.__suppress_context__
+        error = error.__cause__ if is_hidden else error.__context__
 
 
 def limit_in(error: BaseException) -> str:
@@ -104,29 +171,10 @@ def _check_tasks(count: int, instead: str = "") -> None:
             thread.join()
 
 
-def check_files() -> None:
-    """Raise LimitReached unless a command can open the files that it needs."""
-    opened = list[int]()
-    try:
-        while len(opened) < _FILES:
-            opened.append(os.open(os.devnull, os.O_RDONLY))
-    except OSError as error:
-        if error.errno not in (errno.EMFILE, errno.ENFILE):
-            raise
-        raise LimitReached(
-            f"{len(opened)} files can be opened, and care-sim needs {_FILES}: raise the limit "
-            "(ulimit -n)"
-        ) from None
-    finally:
-        for file in opened:
-            os.close(file)
-
-
 def check_at_start() -> None:
     """End the process in one line where its limits leave too little for the libraries."""
     try:
         check_memory()
-        check_files()
         # Linear algebra starts its threads when it is imported.
         _check_tasks(_library_threads() + 1)
     except LimitReached as reached:
@@ -137,5 +185,49 @@ def check_at_start() -> None:
     os.environ["ARROW_DEFAULT_MEMORY_POOL"] = "system"
 
 
+@contextmanager
+def one_thread(torch: Any) -> Iterator[None]:
+    """Let PyTorch compute in one thread while this lasts."""
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(threads)
+
+
+def _settle_caches() -> None:
+    """Send the caches of this process, and of those that it starts, to a private temporary folder
+    where the home folder cannot be written. The command `care-sim` says so in one line.
+    """
+    home = os.path.expanduser("~")
+    has_home = os.path.isabs(home)
+    settled = {"XDG_CACHE_HOME", "MPLCONFIGDIR"} <= {*os.environ}
+    if has_home and (settled or os.access(home, os.W_OK)):
+        return
+    try:
+        folder = _private_folder()
+    except OSError:  # a container whose whole disk is read-only
+        folder = Path(os.devnull)
+    if not has_home:
+        os.environ["HOME"] = str(folder)
+    os.environ.setdefault("XDG_CACHE_HOME", str(folder))
+    os.environ.setdefault("MPLCONFIGDIR", str(folder / "matplotlib"))
+    if is_command():
+        print(f"care-sim: no home folder to write to: caches go to {folder}", file=sys.stderr)
+
+
+def _private_folder() -> Path:
+    """The folder of this user among the temporary files; a new one where somebody else could write
+    to it, since caches of Numba hold code. Raises OSError where there is no place for it.
+    """
+    folder = Path(tempfile.gettempdir()) / f"care-sim-{os.getuid()}"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    found = folder.lstat()
+    is_private = (found.st_uid, stat.S_IMODE(found.st_mode)) == (os.getuid(), 0o700)
+    return folder if is_private and stat.S_ISDIR(found.st_mode) else Path(tempfile.mkdtemp())
+
+
 if is_command():
     check_at_start()
+_settle_caches()

@@ -21,6 +21,30 @@ from typing import Any, Generic, TypeVar
 
 from care_sim.base.errors import InvalidInput, error_line, unknown
 
+SCENARIO_GROUP = "care_sim.scenarios"
+"""Entry points of scenarios, called as the scenario is or by the id of its environment."""
+_ID = re.compile(r"\w+-(\w+)-v\d+")
+
+
+def is_environment_id(name: str) -> bool:
+    """Whether a name has the form of an environment's id, `Mine-LeftBike-v0`."""
+    return _ID.fullmatch(name) is not None
+
+
+def scenario_of(name: str) -> str:
+    """The scenario of an environment's id; any other name is the scenario's own."""
+    told = _ID.fullmatch(name)
+    return told[1].lower() if told else name
+
+
+def refuse_link(package: str) -> None:
+    """Raise ImportError for a package that is imported by its link: its registries would be others
+    than those of `care_sim`.
+    """
+    if not package.startswith("care_sim."):
+        raise ImportError(f"{package} is a link and no package: import care_sim.{package} instead")
+
+
 Made = TypeVar("Made")
 _PLACE = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*(\.[^\W\d]\w*)*")
 

@@ -1,5 +1,5 @@
 """What goes wrong between the pictures of all worlds and the detections that arrive, in each world
-by its own faults; see `care_sim.sensors.camera_faults`. Their random numbers are drawn for many
+by its own faults; see `care_sim.sensors.camera`. Their random numbers are drawn for many
 keyframes at once.
 """
 
@@ -13,7 +13,7 @@ from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.conditions import CameraFaults
 from care_sim.core.types import ImageDetections
-from care_sim.sensors.camera_faults import first_bursts, later_bursts, miss_rates
+from care_sim.sensors.camera import first_bursts, later_bursts, miss_rates
 
 # Numbers of a module are what compiled code can hold.
 _AGE, _YAW_CHANGE = ImageDetections.AGE, ImageDetections.YAW_CHANGE
@@ -30,7 +30,7 @@ class Detected(NamedTuple):
 
 class BatchMisses:
     """Which of the reported bodies the cameras miss; the numbers are those of
-    `care_sim.sensors.camera_faults.Misses`.
+    `care_sim.sensors.camera.Misses`.
     """
 
     def __init__(self, faults: Sequence[CameraFaults]):
@@ -93,7 +93,7 @@ class _Sent(NamedTuple):
 
 
 class BatchDelay:
-    """Hands out the newest picture that has arrived, as `care_sim.sensors.camera_faults.Delay`:
+    """Hands out the newest picture that has arrived, as `care_sim.sensors.camera.Delay`:
     each is late by its world's one of the `latencies` (W,), keyframes, and by 0 to that of the
     `jitters` (W,) more that are drawn for it.
     """

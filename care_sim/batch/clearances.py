@@ -18,8 +18,7 @@ from care_sim.world.approach import Impact
 from care_sim.world.bodies import BodyKind
 from care_sim.world.body_tables import bodies_near
 from care_sim.world.bullet import NO_BODY
-from care_sim.world.clearance_judge import CONTACT_REACH_M, ClearanceJudge, StandIns
-from care_sim.world.gaps import PADDING_M, least_gap
+from care_sim.world.contact import CONTACT_REACH_M, PADDING_M, ClearanceJudge, StandIns, least_gap
 from care_sim.world.world import WORLD_STEP_S, World
 
 

@@ -8,23 +8,114 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.batch.braking import Braking
-from care_sim.batch.choice import Choice
-from care_sim.batch.loading import load
+from care_sim.base.compiled import compiled
 from care_sim.batch.motion import Motion, steps_of
-from care_sim.batch.observing import Observations, Observing
-from care_sim.batch.scanning import Found, Scanning
-from care_sim.batch.sensor_frames import place_sensors, seen_by_each
+from care_sim.batch.scanning import Choice, Found, Scanning
 from care_sim.batch.sight import Sight
-from care_sim.batch.state import BatchState, Fired
-from care_sim.batch.tracking import Tracking
-from care_sim.core.arrays import Floats, Mask
+from care_sim.batch.state import BatchState, Fired, load, place_sensors, seen_by_each
+from care_sim.batch.tracking import Braking, Tracking
+from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.conditions import ClosedLoopConditions
+from care_sim.core.observation.limits import Limits
 from care_sim.core.rig import Rig
+from care_sim.core.types import Ego, ImageDetections, Tracks
 from care_sim.loops.episode import Episode
-from care_sim.loops.record_columns import Records
+from care_sim.loops.records import Records
 from care_sim.world.approach import Impact
 from care_sim.world.bullet import NO_BODY
+
+# Which column of a table tells the camera, by which bounds differ.
+_CAMERA, _NO_CAMERA = ImageDetections.CAMERA, -1
+
+Observations = dict[str, NDArray[np.float32]]
+
+
+class Observing:
+    """Writes what the policies are told, within the limits of observations. Of a budget of the
+    `budgets` (W,) each is told its share of the cells.
+    """
+
+    def __init__(self, rig: Rig, budgets: Integers):
+        self._rig = rig
+        self._limits = Limits(rig)
+        self._shares = (budgets[:, None] / rig.grid.size).astype(np.float32)
+        cameras = self._limits.most_by_camera
+        self._detection_bounds = self._limits.detections[0], cameras
+        self._track_bounds = self._limits.tracks[0], self._limits.tracks[1][None]
+
+    def write(
+        self,
+        state: BatchState,
+        detections: tuple[Integers, Floats],
+        tracks: tuple[Integers, Floats],
+        observed: Observations,
+    ) -> None:
+        """Write all but `ranges` of the worlds that play into `observed`. `detections` and
+        `tracks` are numbers of rows (W,) and rows (W, n, 9) and (W, n, 13).
+        """
+        who = state.live
+        egos = state.egos
+        numbers = np.stack([egos.speeds, egos.yaw_rates, egos.accelerations], axis=1)
+        observed["ego"][who] = np.clip(numbers, *self._limits.ego)[who]
+        observed["budget"][who] = self._shares[who]
+        fits = _put(*detections, *self._detection_bounds, _CAMERA, observed["detections"], who)
+        fits &= _put(*tracks, *self._track_bounds, _NO_CAMERA, observed["tracks"], who)
+        for world in np.flatnonzero(who & ~fits).tolist():
+            self._mend(world, detections, tracks, observed)
+
+    def _mend(
+        self,
+        world: int,
+        detections: tuple[Integers, Floats],
+        tracks: tuple[Integers, Floats],
+        observed: Observations,
+    ) -> None:
+        """Write the tables of a world with numbers beyond the limits, or too many rows."""
+        rows = (table[world, : counts[world]].copy() for counts, table in (detections, tracks))
+        belief = self._limits.belief(
+            Ego(),
+            ImageDetections.from_checked_rows(next(rows)),
+            Tracks.from_checked_rows(next(rows)),
+            observed["ranges"][world],
+        )
+        told = belief.to_observation()
+        for name in ("detections", "tracks"):
+            observed[name][world] = told[name]
+
+
+@compiled(brief=True)
+def _put(
+    counts: Integers,
+    rows: Floats,
+    least: Floats,
+    most: Floats,
+    camera: int,
+    table: NDArray[np.float32],
+    who: Mask,
+) -> Mask:
+    """Write `rows` (W, n, k) into the `table` (W, m, k) of the worlds `who`, and -1 before what is
+    left over; (W,) whether all were between `least` (k,) and `most` (c, k), and no more than m.
+
+    Row by row `most` is that of the number in the column `camera`, or the only one.
+    """
+    fits = np.ones(len(counts), np.bool_)
+    for w in range(len(counts)):
+        if not who[w]:
+            continue
+        count = min(counts[w], table.shape[1])
+        fits[w] = count == counts[w]
+        for n in range(count):
+            bound = int(rows[w, n, camera]) if camera >= 0 else 0
+            for k in range(table.shape[2]):
+                number = rows[w, n, k]
+                table[w, n, k] = number
+                if not least[k] <= number <= most[bound, k]:
+                    fits[w] = False
+        for n in range(count, table.shape[1]):
+            for k in range(table.shape[2]):
+                table[w, n, k] = 0.0
+            table[w, n, 0] = -1.0
+    return fits
 
 
 class BatchLoop:

@@ -15,13 +15,12 @@ from care_sim.batch.lane_columns import SPEED, LaneColumns
 from care_sim.batch.state import BatchState, Bodies, Egos, Passages, filled
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.loops.episode import most_keyframes
-from care_sim.scenarios.mirroring import Reflection
+from care_sim.scenarios.base import Reflection
 from care_sim.world.bullet import NO_BODY
-from care_sim.world.clearance_judge import ClearanceJudge
-from care_sim.world.lane_change import LaneChange
-from care_sim.world.route_car import RouteCar
+from care_sim.world.contact import ClearanceJudge
+from care_sim.world.motions import LaneChange, Walk
+from care_sim.world.route import RouteCar
 from care_sim.world.traffic import LaneKeeper, RoadVehicle
-from care_sim.world.walker import Walk
 from care_sim.world.world import WORLD_STEP_S, Actor, World, whole_steps
 
 KNOWN_BELOW_M = 2.0

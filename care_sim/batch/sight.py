@@ -12,19 +12,16 @@ import numpy as np
 
 from care_sim.base.compiled import compiled
 from care_sim.batch.camera_faults import BatchDelay, BatchMisses, Detected
-from care_sim.batch.sensor_frames import seen_by
-from care_sim.batch.state import BatchState, Bodies, Outlines, Reported, Sensors
+from care_sim.batch.state import BatchState, Bodies, Outlines, Reported, Sensors, seen_by
 from care_sim.core.arrays import Floats, Integers, Mask
-from care_sim.core.boxes import planar_ranges
+from care_sim.core.cells.boxes import planar_ranges
 from care_sim.core.conditions import Sensing
 from care_sim.core.frames import turned_alike
-from care_sim.core.grid_kernels import copy_rows
-from care_sim.core.pinhole import NEAR_M
-from care_sim.core.pinhole_kernels import CameraModels, model_of, window_on
+from care_sim.core.grid import copy_rows
+from care_sim.core.pinhole import NEAR_M, CameraModels, model_of, window_on
 from care_sim.core.rig import Rig
 from care_sim.core.types import ImageDetections
-from care_sim.sensors.camera_kernels import reported_boxes, surest_first
-from care_sim.sensors.confidence import MIN_PIXELS
+from care_sim.sensors.camera import picture_timing
 from care_sim.sensors.engines.picture_kernels import Line, draw_silhouettes, empty_line
 from care_sim.sensors.engines.silhouette_kernels import (
     Silhouettes,
@@ -32,7 +29,7 @@ from care_sim.sensors.engines.silhouette_kernels import (
     room_for,
 )
 from care_sim.sensors.engines.view_kernels import Lens, Meshes, PlacedCamera
-from care_sim.sensors.picture_timing import picture_timing
+from care_sim.sensors.pictures import MIN_PIXELS, reported_boxes, surest_first
 from care_sim.world.bullet import FAR_M
 from care_sim.world.world import WORLD_STEP_S, World
 
@@ -83,7 +80,7 @@ class Sight:
         self._is_ever_dark = any(each.blackout_s for each in conditions)
 
     def begin(self, world: int, built: World, seed: np.random.SeedSequence) -> None:
-        """Begin an episode; `seed` is that of the camera (`care_sim.loops.seeds.SensorSeeds`)."""
+        """Begin an episode; `seed` is that of the camera (`care_sim.loops.episode.SensorSeeds`)."""
         self._misses.begin(world, seed, len(built.labels()))
         if self._is_late:
             # The streams are those of `care_sim.sensors.camera.CameraDetector`.

@@ -5,14 +5,19 @@ needs, and `counts` (W,) says how many rows of a world's table are in use. What 
 means nothing. World frame, metres and radians, unless it says otherwise.
 """
 
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
 
+from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.belief import MAX_TRACKS
+from care_sim.core.frames import mounted_at, placed_at, seen_from
 from care_sim.core.types import Tracks
 from care_sim.world.approach import Impact
+from care_sim.world.bullet import NO_BODY
+from care_sim.world.world import World
 
 _BODIES, _PARTS, _CORNERS = 32, 128, 1024
 """Rows with which tables begin; they grow with what comes."""
@@ -68,7 +73,7 @@ class Reported(NamedTuple):
 
 
 class TrackTables(NamedTuple):
-    """`rows` (W, T, 13) as in `care_sim.perception.track_kernels`, and the `next_ids` (W,)."""
+    """`rows` (W, T, 13) as in `care_sim.perception.tracker`, and the `next_ids` (W,)."""
 
     counts: Integers
     rows: Floats
@@ -178,3 +183,91 @@ def filled(table: np.ndarray, world: int, rows: np.ndarray) -> np.ndarray:
 
 def _counts(worlds: int) -> Integers:
     return np.zeros(worlds, np.int64)
+
+
+def place_sensors(state: BatchState, at: tuple[float, float, float]) -> None:
+    """Write where the sensors are, which are mounted `at` (x, y, z) on the egos."""
+    x, y, yaw = state.bodies.boxes[np.arange(state.worlds), state.egos.bodies][:, [0, 1, 6]].T
+    sensors = state.sensors
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    sensors.turns[:, 0], sensors.turns[:, 1] = cos, sin
+    sensors.turns_back[:, 0], sensors.turns_back[:, 1] = np.cos(-yaw), np.sin(-yaw)
+    sensors.poses[:, 0], sensors.poses[:, 1] = mounted_at((x, y), (cos, sin), at)
+    sensors.poses[:, 2], sensors.poses[:, 3] = at[2], yaw
+
+
+@compiled()
+def seen_by(sensors: Sensors, world: int, boxes: Floats) -> Floats:
+    """Boxes (n, 7) of a world in the frame of its sensor."""
+    x, y, z, yaw, _, _ = sensors.poses[world]
+    cos, sin = sensors.turns_back[world]
+    return seen_from(boxes, (cos, sin), (x, y, z, yaw))
+
+
+@compiled()
+def placed_by(sensors: Sensors, world: int, boxes: Floats) -> Floats:
+    """Boxes (n, 7) in the frame of a world's sensor, in the world."""
+    x, y, z, yaw, _, _ = sensors.poses[world]
+    cos, sin = sensors.turns[world]
+    return placed_at(boxes, (cos, sin), (x, y, z, yaw))
+
+
+@compiled()
+def seen_by_each(sensors: Sensors, worlds: Integers, boxes: Floats) -> Floats:
+    """Boxes (n, 7), one of each of some `worlds` (n,), each in the frame of the sensor there."""
+    seen = np.empty_like(boxes)
+    for n in range(len(worlds)):
+        seen[n] = seen_by(sensors, worlds[n], boxes[n : n + 1])[0]
+    return seen
+
+
+def load(state: BatchState, world: int, built: World) -> None:
+    """Write the tables of a `world` of the batch anew: bodies, parts, classes, the ego; no tracks,
+    and keyframe 0.
+    """
+    state.keyframes[world], state.times[world] = 0, built.time
+    target = built.first_sighting
+    motion = built.ego_motion
+    state.egos.bodies[world] = built.ego_body
+    state.egos.targets[world] = NO_BODY if target is None else target.body
+    state.egos.speeds[world] = motion.speed
+    state.egos.yaw_rates[world] = motion.yaw_rate
+    state.egos.accelerations[world] = motion.acceleration
+    state.tracks.counts[world] = state.tracks.next_ids[world] = 0
+
+    primitives = built.bullet.primitives
+    count = len(primitives.poses)
+    boxes = built.boxes_of(np.arange(count))
+    state.bodies.counts[world] = count
+    bodies = state.bodies
+    state.bodies = bodies._replace(
+        boxes=filled(bodies.boxes, world, boxes),
+        before=filled(bodies.before, world, boxes),
+        poses=filled(bodies.poses, world, primitives.poses),
+    )
+    parts = primitives.tables
+    state.solids.counts[world] = len(parts[-1])
+    state.solids = Solids(state.solids.counts, *_all_filled(state.solids[1:], world, parts))
+    meshes = built.bullet.polyhedra.tables
+    state.outlines.counts[world] = len(meshes[-1])
+    outlines = _all_filled(state.outlines[1:], world, meshes)
+    state.outlines = Outlines(state.outlines.counts, *outlines)
+
+    # Ids count up in the order in which bodies were added, and so do those that are reported.
+    labels = built.labels()
+    by_body = np.full(count, -1)
+    by_body[[*labels]] = [*labels.values()]
+    reported = state.reported
+    reported.counts[world] = len(labels)
+    state.reported = reported._replace(
+        bodies=filled(reported.bodies, world, np.array([*labels], np.int64)),
+        classes=filled(reported.classes, world, np.array([*labels.values()], np.int64)),
+        by_body=filled(reported.by_body, world, by_body),
+    )
+
+
+def _all_filled(
+    tables: Iterable[np.ndarray], world: int, columns: Iterable[np.ndarray]
+) -> Iterator[np.ndarray]:
+    for table, rows in zip(tables, columns, strict=True):
+        yield filled(table, world, rows)

@@ -11,10 +11,10 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from care_sim.base.portable_hash import portable_bytes
+from care_sim.base.digests import portable_bytes
 from care_sim.certify.design import Drawn
 from care_sim.envs.closed_loop import ClosedLoopEnv
-from care_sim.evaluation.metrics import outcome
+from care_sim.evaluation.outcomes import outcome
 from care_sim.loops.closed_loop import ClosedLoop
 
 CONFIGURATION = "configuration"

@@ -5,24 +5,24 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from care_sim.base.console import TableConsole
 from care_sim.base.errors import BrokenPolicy, InvalidInput, print_lines, report_problems
-from care_sim.base.exit_codes import DONE, FAILED
 from care_sim.base.files import JSON, check_output
+from care_sim.base.interrupts import DONE, FAILED
 from care_sim.commands.options.results import Benchmark
+from care_sim.commands.shared.console import TableConsole
 from care_sim.commands.shared.selection import check_values, playable, policy_parameters
 from care_sim.policies import tags_of
 from care_sim.policies.isolation import isolated_policies
 from care_sim.reports.leaderboard import leaderboard_table
-from care_sim.study.benchmark.play import played
-from care_sim.study.benchmark.player import player_in
-from care_sim.study.benchmark.screening import screened_worlds
-from care_sim.study.benchmark.tasks import Entry, Task, tasks_of
-from care_sim.study.benchmark.worlds import (
+from care_sim.study.benchmark.play import played, player_in, screened_worlds
+from care_sim.study.benchmark.suite import (
+    Entry,
     Salt,
+    Task,
     World,
     published_worlds,
     quick_tenth,
+    tasks_of,
 )
 from care_sim.study.executors import processes
 from care_sim.study.run_config import parameters_for

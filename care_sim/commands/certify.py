@@ -1,7 +1,7 @@
 """`care-sim certify`: whether episodes go on this machine as published."""
 
 from care_sim.base.errors import InvalidInput, MissingExtra, report_problems
-from care_sim.base.exit_codes import DONE, FAILED
+from care_sim.base.interrupts import DONE, FAILED
 from care_sim.certify import ALL_EPISODES, CERTIFIED_EPISODES, playing, published
 from care_sim.certify.design import drawn
 from care_sim.certify.verdict import verdict_of

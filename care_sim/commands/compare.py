@@ -8,10 +8,10 @@ from functools import partial
 from pathlib import Path
 from typing import cast
 
-from care_sim.base.console import TableConsole
 from care_sim.base.errors import report_problems
-from care_sim.base.exit_codes import DONE, FAILED
+from care_sim.base.interrupts import DONE, FAILED
 from care_sim.commands.options.watching import Compare
+from care_sim.commands.shared.console import TableConsole
 from care_sim.commands.shared.one_scene import finish_files, maker_of
 from care_sim.commands.shared.selection import playable
 from care_sim.envs.wrappers.record_rerun import RecordRerun, recording
@@ -22,10 +22,10 @@ from care_sim.reports.table import Table
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.episode_play import GymEnv, result_or_reason, trace
 from care_sim.study.play_config import PlayConfig
+from care_sim.study.rows.checks import check_worlds
 from care_sim.study.rows.reading import stops_for_nothing
 from care_sim.study.run_config import Row
-from care_sim.study.scene_trace import trace_scene
-from care_sim.study.world_hash import check_worlds
+from care_sim.study.scene_play import trace_scene
 
 AnyConfig = EpisodeConfig | PlayConfig
 _COLUMNS = {

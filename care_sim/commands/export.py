@@ -18,11 +18,11 @@ import care_sim
 from care_sim.base.errors import InvalidInput, counted, print_lines, shown
 from care_sim.base.extras import import_minari
 from care_sim.base.files import JSON, replacing
-from care_sim.base.seed_ranges import training_seeds
+from care_sim.base.seeds import training_seeds
 from care_sim.commands.options.results import ExportMinari, ExportNuScenes
 from care_sim.commands.shared.selection import arguments_of, common_of, source_named
+from care_sim.sources.nuscenes.detections import MODALITIES, result_boxes
 from care_sim.sources.nuscenes.recordings import NuScenes
-from care_sim.sources.nuscenes.results_form import MODALITIES, result_boxes
 from care_sim.sources.nuscenes.table_files import JsonRow
 from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.play_config import PlayConfig, play_grid

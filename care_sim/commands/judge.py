@@ -8,26 +8,26 @@ from typing import Any
 
 import numpy as np
 
-from care_sim.base.console import TableConsole
 from care_sim.base.errors import InvalidInput, print_lines, report_problems
-from care_sim.base.exit_codes import DONE, FAILED
 from care_sim.base.files import JSON, check_no_link, check_output, write_text
+from care_sim.base.interrupts import DONE, FAILED
 from care_sim.commands.options.results import Judge
+from care_sim.commands.shared.console import TableConsole
 from care_sim.commands.shared.selection import check_values, common_of, source_named
 from care_sim.evaluation.detector_quality import SceneBoxes, counts, curve, reliability
 from care_sim.perception.detectors import PROXY, check_detector
 from care_sim.policies.isolation import isolated_policies
 from care_sim.reports.detectors import Judged, detector_tables
 from care_sim.reports.figures.detectors import DETECTORS_FIGURE, detectors_figure
-from care_sim.reports.figures.files import check_figure, save
+from care_sim.reports.figures.styles import check_figure, save
 from care_sim.sources.scenes import Scene, Source, chosen_scenes
 from care_sim.study.episode_play import result_or_reason
 from care_sim.study.executors import processes
 from care_sim.study.judging import JudgedScene, judge_scene
-from care_sim.study.parameters import Parameters, parameters
 from care_sim.study.play_config import PlayConfig, play_grid
 from care_sim.study.progress import shown_progress
 from care_sim.study.provenance import machine, versions
+from care_sim.study.run_config import Parameters, parameters
 from care_sim.study.runner import DIED
 
 _FIGURES = "judge.json"

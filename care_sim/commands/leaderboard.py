@@ -8,7 +8,6 @@ from random import SystemRandom
 from tempfile import TemporaryDirectory
 
 from care_sim.base.checks import check_known
-from care_sim.base.console import TableConsole
 from care_sim.base.errors import (
     InvalidInput,
     MissingExtra,
@@ -17,25 +16,27 @@ from care_sim.base.errors import (
     report_problems,
     unknown,
 )
-from care_sim.base.exit_codes import DONE, FAILED
-from care_sim.base.files import check_output, told_if_replaced, write_text
-from care_sim.base.json_text import json_content
+from care_sim.base.files import check_output, json_content, told_if_replaced, write_text
+from care_sim.base.interrupts import DONE, FAILED
 from care_sim.commands.options.results import Leaderboard
+from care_sim.commands.shared.console import TableConsole
 from care_sim.policies.isolation import isolated_policies
-from care_sim.reports.figures.files import FORMATS, check_figure, save
 from care_sim.reports.figures.leaderboard import (
     LEADERBOARD_FIGURE,
     leaderboard_figure,
     score_chart,
 )
+from care_sim.reports.figures.styles import FORMATS, check_figure, save
 from care_sim.reports.leaderboard import CONTROL, leaderboard_table, leads_table, names_in
-from care_sim.study.benchmark.made_by import elsewhere, own_code_of
-from care_sim.study.benchmark.player import Player, player_in
-from care_sim.study.benchmark.replay import replayed
-from care_sim.study.benchmark.result import BenchmarkResult
-from care_sim.study.benchmark.result_file import is_result, read_result
-from care_sim.study.benchmark.screening import screened_worlds
-from care_sim.study.benchmark.worlds import Salt, World
+from care_sim.study.benchmark.play import Player, player_in, replayed, screened_worlds
+from care_sim.study.benchmark.result import (
+    BenchmarkResult,
+    elsewhere,
+    is_result,
+    own_code_of,
+    read_result,
+)
+from care_sim.study.benchmark.suite import Salt, World
 
 _HEAD = (
     "# Leaderboard\n\nWhat is played and why, and how to enter: the page *Report a result* of the "

@@ -3,10 +3,10 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-from care_sim.base.console import TableConsole
 from care_sim.base.errors import InvalidInput, counted, print_lines, report_problems
-from care_sim.base.exit_codes import DONE, FAILED
+from care_sim.base.interrupts import DONE, FAILED
 from care_sim.commands.options.results import Report
+from care_sim.commands.shared.console import TableConsole
 from care_sim.commands.shared.selection import source_named
 from care_sim.reports.merging import Merged, merged
 from care_sim.reports.report import (

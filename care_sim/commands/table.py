@@ -36,7 +36,7 @@ def _own(options: str, run: str, about: str) -> Command:
 
 
 def _study(options: str, run: str, about: str) -> Command:
-    return _own(f"studies:{options}", f"studies.{run}", about)
+    return _own(f"studies:{options}", f"studies:{run}", about)
 
 
 def _weights(options: str, run: str, about: str) -> Command:
@@ -51,72 +51,70 @@ GROUPS: dict[str, dict[str, Command]] = {
         "compare": _own(
             "watching:Compare", "compare:compare", "Play one seed under several policies."
         ),
-        "view": _own("watching:View", "view:view", "Open a recording in the Rerun viewer."),
+        "view": _own("watching:View", "run:view", "Open a recording in the Rerun viewer."),
     },
     "Studies": {
         "reproduce": _study(
             "Reproduce",
-            "closed_loop:reproduce",
+            "reproduce",
             "Play the paper's study beside the paper's figures.",
         ),
         "sweep": _study(
             "Sweep",
-            "closed_loop:sweep",
+            "sweep",
             "Play every combination of scenarios, policies, budgets, faults.",
         ),
         "protocol": _study(
             "Protocol",
-            "open_loop:protocol",
+            "protocol",
             "Play the first-sighting protocol, on streets or recordings.",
         ),
         "study ablate": _study(
-            "Ablate", "either_loop:ablate", "Vary one thing at a time, as the paper's ablations do."
+            "Ablate", "ablate", "Vary one thing at a time, as the paper's ablations do."
         ),
         "study order": _study(
             "Order",
-            "either_loop:order",
+            "order",
             "Play the paper's study under every order of cells in a set.",
         ),
         "study faults": _study(
             "Faults",
-            "closed_loop:faults",
+            "faults",
             "Let every fault grow until the order of the policies changes.",
         ),
         "study crowding": _study(
             "Crowding",
-            "closed_loop:crowding",
+            "crowding",
             "Fill the dense street until the all-camera reserve collapses.",
         ),
         "study ncap": _study(
             "Ncap",
-            "closed_loop:ncap",
+            "ncap",
             "Play the Euro NCAP tests: avoided, mitigated or hit; a score.",
         ),
-        "study r157": _study(
-            "R157", "closed_loop:r157", "Play the preventable cut-ins of UN Regulation 157."
-        ),
+        "study r157": _study("R157", "r157", "Play the preventable cut-ins of UN Regulation 157."),
         "study validate": _study(
             "Validate",
-            "closed_loop:validate",
+            "validate",
             "Say whether a world tells good policies from lucky ones.",
         ),
         "study mechanism": _study(
             "Mechanism",
-            "open_loop:mechanism",
+            "mechanism",
             "Find why one policy finds what another misses, ray by ray.",
         ),
         "study firing": _study(
             "Firing",
-            "either_loop:firing",
+            "firing",
             "Show what a LiDAR that fires tiles, rows or a window decides.",
         ),
         "study realism": _study(
             "Realism",
-            "either_loop:realism",
+            "realism",
             "Show which orders of policies a real car's sensing keeps.",
         ),
         "study vehicle": _study(
-            "Vehicle", "closed_loop:vehicle", "Play late evidence, a failing camera, a wrong pose."
+            "Vehicle", "vehicle", "Play late evidence, a failing camera, a wrong pose."
         ),
     },
     "Results": {

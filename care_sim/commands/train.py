@@ -4,11 +4,11 @@ import shlex
 from collections.abc import Iterator
 from dataclasses import fields
 
-from care_sim.base.console import TableConsole
 from care_sim.base.errors import InvalidInput, print_lines
 from care_sim.base.files import told_if_replaced
 from care_sim.commands.options.learning import Curves, Learner
 from care_sim.commands.shared.agent_play import AgentPlay
+from care_sim.commands.shared.console import TableConsole
 from care_sim.training.agents import Agent
 from care_sim.training.config import AgentConfig
 from care_sim.training.folder import (
@@ -61,7 +61,7 @@ def end_of_training(config: AgentConfig) -> Iterator[str]:
 def curves(options: Curves) -> int:
     """Draw learning curves, and print their table."""
     # Imported here because training draws nothing.
-    from care_sim.reports.figures.files import check_figure, save
+    from care_sim.reports.figures.styles import check_figure, save
     from care_sim.training.curves import curves_table, grouped_runs, read_run
     from care_sim.training.curves_figure import curves_figure
 

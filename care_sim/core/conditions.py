@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from care_sim.base.bounds import bounded, check_fields, one_of
-from care_sim.base.checks import LARGEST_INTEGER, check_whole
+from care_sim.base.checks import LARGEST_INTEGER, bounded, check_fields, check_whole, one_of
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.times import LAST_BITS_S
+from care_sim.core.cells.rays import MOST_COLUMNS, MOST_ROWS
 from care_sim.core.defaults import (
     AS_DEMANDED,
     AZIMUTH_MARGIN,
@@ -23,9 +23,149 @@ from care_sim.core.defaults import (
     ELEVATION_MARGIN,
     RESERVE_FRACTION,
 )
-from care_sim.core.driver_settings import DRIVER_SETTINGS, DriverSettings
-from care_sim.core.grid_rays import MOST_COLUMNS, MOST_ROWS
-from care_sim.core.return_settings import RETURN_SETTINGS, FilmedReturns, ReturnSettings
+
+FIXED, CAREFUL_HUMAN = DRIVERS = "fixed", "careful-human"
+
+
+@dataclass(frozen=True, kw_only=True)
+class DriverSettings:
+    """The driver by name, and the rules of the fixed one with their sources.
+
+    `careful-human` has the numbers of its regulation; of these it takes `comfort_mps2` alone.
+    """
+
+    driver: str = one_of(FIXED, DRIVERS)
+    """Who brakes: `fixed`, the controller of `care_sim.driving.braking`, or `careful-human`, the
+    driver model of UN Regulation 157 (`care_sim.driving.drivers`).
+    """
+    brake_mps2: float = bounded(5.0, 0.1, 20)
+    """Deceleration b, m/s^2; 5 is the least that UN Regulation 152 asks of emergency braking."""
+    brake_reaction_s: float = bounded(0.3, 0, 10)
+    """From decision to full braking, seconds: build-up of brake pressure."""
+    brake_standstill_m: float = bounded(2.0, 0, 50)
+    """s_0, jam distance of the intelligent driver model (Treiber et al. 2000), metres, as in the
+    guard of SBF.
+    """
+    brake_horizon_s: float = bounded(2.0, 0, 10)
+    """How far ahead an entry is predicted, seconds: the two-second rule (Vogel 2003), as in the
+    guard of SBF.
+    """
+    brake_side_margin_m: float = bounded(0.3, 0, 5)
+    """Room kept on either side of the ego, metres."""
+    brake_release_s: float = bounded(0.5, 0, 60)
+    """The way must have been free this long before the brake is released, seconds."""
+    brake_for_oncoming: bool = False
+    """Whether a track that comes towards the ego counts where it will be, not where it is
+    (`care_sim.driving.braking`). In the Euro NCAP tests it always does.
+    """
+    comfort_mps2: float = bounded(1.5, 0.01, 10)
+    """Acceleration back to cruising speed, m/s^2."""
+
+
+DRIVER_SETTINGS = tuple(field.name for field in fields(DriverSettings))
+BRAKING_RULES = tuple(name for name in DRIVER_SETTINGS if name.startswith("brake_"))
+"""Settings that the fixed controller alone knows."""
+
+
+STRONGEST, LAST, BOTH = "strongest", "last", "both"
+RETURNS_KEPT = (STRONGEST, LAST, BOTH)
+"""Which echoes of a beam a sensor reports."""
+_NEEDS = {
+    "lidar_stated_reflectance": "lidar_stated_range_m",
+    "visibility_m": "lidar_stated_range_m",
+    "rain_mm_h": "lidar_stated_range_m",
+    "lidar_returns": "lidar_divergence_mrad",
+    "lidar_compensated": "lidar_sweep_s",
+}
+"""Settings that say nothing unless another one is switched on."""
+_LEAST_M = 0.01
+"""Metres. The formulas divide by a range and by a visibility: nearer to 0 they would overflow."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReturnSettings:
+    """Which pulses come back, and what they tell. Raises InvalidInput for a value out of its bounds
+    and for a setting that has no meaning without another one.
+    """
+
+    lidar_stated_range_m: float = bounded(0.0, 0, 10_000)
+    """From here a target of `lidar_stated_reflectance` that faces the LiDAR returns just enough, in
+    clear air, metres, 0.01 at least: a line of every data sheet. A return is then as strong as its
+    surface and its distance make it (`care_sim.sensors.signal`), and weaker ones are lost. At 0
+    none is.
+    """
+    lidar_stated_reflectance: float = bounded(0.1, 0.001, 1)
+    """Reflectance of the target at `lidar_stated_range_m`, 0 to 1; most data sheets take 0.1."""
+    visibility_m: float = bounded(0.0, 0, 1_000_000)
+    """Meteorological visibility in fog, metres, 0.01 at least (`care_sim.sensors.signal`); 0 is
+    clear air. The cameras see on as before.
+    """
+    rain_mm_h: float = bounded(0.0, 0, 1000)
+    """Rain, millimetres per hour (`care_sim.sensors.signal`). The cameras see on as before."""
+    lidar_divergence_mrad: float = bounded(0.0, 0, 100)
+    """Angle between opposite edges of a beam, milliradians (`care_sim.sensors.beams`). A beam may
+    then meet several bodies. At 0 it is one ray.
+    """
+    lidar_returns: str = one_of(STRONGEST, RETURNS_KEPT)
+    """Which echo a beam returns that has several: `strongest`, `last` or `both`
+    (`care_sim.sensors.signal`).
+    """
+    lidar_sweep_s: float = bounded(0.0, 0, 1)
+    """How long a sweep takes, seconds: columns fire one after another, the last at the keyframe
+    (`care_sim.sensors.beams`). At 0 all fire at once.
+    """
+    lidar_compensated: bool = False
+    """Whether points of a sweep are moved by how the ego moved since. Ranges stay as measured."""
+    lidar_crosstalk: float = bounded(0.0, 0, 1)
+    """Share of the cells that take the pulse of another LiDAR for their return, 0 to 1
+    (`care_sim.sensors.lidar_faults`).
+    """
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        self.check_returns()
+
+    @property
+    def shapes_beams(self) -> bool:
+        """Whether a ray alone does not tell what a cell returns."""
+        return bool(self.lidar_stated_range_m or self.lidar_divergence_mrad or self.lidar_sweep_s)
+
+    def check_returns(self) -> None:
+        """Raise InvalidInput for a setting that has no meaning without another one, and for a
+        distance too near to 0.
+        """
+        changed = [n for n, usual in RETURN_SETTINGS.items() if getattr(self, n) != usual]
+        for name in ("lidar_stated_range_m", "visibility_m"):
+            if 0 < getattr(self, name) < _LEAST_M:
+                raise InvalidInput(
+                    f"{name} must be 0 or at least {_LEAST_M:g}, got {getattr(self, name):g}"
+                )
+        for name in changed:
+            if (needed := _NEEDS.get(name, name)) not in changed:
+                raise InvalidInput(f"{name} has no meaning without {needed}")
+
+
+RETURN_SETTINGS: dict[str, Any] = {field.name: field.default for field in fields(ReturnSettings)}
+"""Their names and defaults."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FilmedReturns(ReturnSettings):
+    """How pulses return in a film, without crosstalk, which is drawn when it is played. It holds
+    what returns to a cell that is fired up to `most_shots` times.
+    """
+
+    most_shots: int = 1
+
+
+RAYS = FilmedReturns()
+"""All switches off."""
+
+
+def changed_settings(settings: ReturnSettings, usual: ReturnSettings) -> list[str]:
+    """The names of those in which two differ."""
+    return [name for name in RETURN_SETTINGS if getattr(settings, name) != getattr(usual, name)]
+
 
 MIN_RETURNS = 3
 """Fired rays that must hit an object. The fewest that span a surface."""
@@ -70,7 +210,7 @@ class CameraFaults:
     camera_latency_s: float = bounded(0.0, 0, LONGEST_LATENCY_S)
     """Age of the camera's detections in seconds; not together with `camera_latency`. The picture is
     of that instant, or of the newest before it at which there is one: in the closed loop the world
-    steps every 0.05 s, a film has its keyframes (`care_sim.sensors.picture_timing`).
+    steps every 0.05 s, a film has its keyframes (`care_sim.sensors.camera`).
     """
     camera_jitter: int = bounded(0, 0, MOST_KEYFRAMES)
     """Most keyframes by which a picture may come later still; drawn evenly from 0 to this."""
@@ -151,7 +291,7 @@ class Sensing(CameraFaults, LidarFaults, ReturnSettings):
     """Fired rays that must hit an object for it to be detected."""
     camera_confidence: float = bounded(CAMERA_CONFIDENCE, 0, 1)
     """Least confidence of a camera detection, 0 to 1; visible pixels decide, and the least box has
-    0.25 (`care_sim.sensors.confidence`).
+    0.25 (`care_sim.sensors.pictures`).
     """
 
     def __post_init__(self) -> None:

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from care_sim.base.bounds import bounded, check_fields
+from care_sim.base.checks import bounded, check_fields
 from care_sim.core.arrays import Floats, Integers, Mask
-from care_sim.core.boxes import planar_ranges
-from care_sim.core.cell_sets import CellSets
+from care_sim.core.cells.boxes import planar_ranges
+from care_sim.core.cells.sets import CellSets
 from care_sim.core.grid import Cells, Head
 from care_sim.core.rig import Rig
 from care_sim.core.types import Ego, Tracks

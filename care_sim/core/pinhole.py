@@ -4,20 +4,254 @@ Image frame: u right, v down, in pixels; (0, 0) is the outer corner of the top-l
 directions are expressed in the sensor frame (x forward, y left, z up) of the LiDAR.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from care_sim.base.bounds import bounded, check_fields
-from care_sim.base.checks import check_number
+from care_sim.base.checks import bounded, check_fields, check_number
+from care_sim.base.compiled import compiled
 from care_sim.base.errors import InvalidInput, shown
-from care_sim.core import pinhole_kernels as kernels
-from care_sim.core.arrays import Floats
+from care_sim.core.arrays import Floats, Integers
 from care_sim.core.frames import Frame
-from care_sim.core.pinhole_kernels import CameraModel, CameraModels
+
+
+class CameraModel(NamedTuple):
+    """One camera: `position` (3,) of its optical centre; `axes` (3, 3), whose rows are its forward,
+    left and up; its `focal` length and principal point `centre` (2,) in pixels.
+    """
+
+    position: Floats
+    axes: Floats
+    focal: float
+    centre: Floats
+
+
+class CameraModels(NamedTuple):
+    """k cameras: `positions` (k, 3), `axes` (k, 3, 3), `focals` (k,) and `centres` (k, 2)."""
+
+    positions: Floats
+    axes: Floats
+    focals: Floats
+    centres: Floats
+
+
+Numbers4 = tuple[float, float, float, float]
+
+_BOX_POINTS = ((2, 2), (0, 0), (0, 1), (1, 0), (1, 1), (3, 0), (3, 1), (0, 3), (1, 3))
+"""Points of an image box: which of low, high, middle and nearest to the principal point across, and
+which down."""
+
+
+@compiled()
+def _project(points: Floats, camera: CameraModel) -> tuple[Floats, Floats]:
+    """Pixels (n, 2) and depths (n,) of points (n, 3)."""
+    pixels = np.empty((len(points), 2))
+    depths = np.empty(len(points))
+    for n, (x, y, z) in enumerate(points):
+        pixels[n, 0], pixels[n, 1], depths[n] = pixel(x, y, z, camera)
+    return pixels, depths
+
+
+@compiled()
+def _rays(pixels: Floats, camera: CameraModel) -> Floats:
+    """Directions (n, 3), not normalised, through pixels (n, 2)."""
+    directions = np.empty((len(pixels), 3))
+    for n, (u, v) in enumerate(pixels):
+        directions[n] = _ray(u, v, camera)
+    return directions
+
+
+@compiled()
+def box_rays(boxes: Floats, numbers: Integers, cameras: CameraModels) -> Floats:
+    """(n, 9, 3) rays through image boxes (n, 4: left, top, right, bottom) of the cameras `numbers`
+    (n,); see `care_sim.core.pinhole.PinholeCamera.box_rays`.
+    """
+    # One ray per entry of `_BOX_POINTS`: each picks one of four places across and one of four down.
+    bundles = np.empty((len(boxes), len(_BOX_POINTS), 3))
+    for n, (left, top, right, bottom) in enumerate(boxes):
+        camera = model_of(cameras, numbers[n])
+        centre = camera.centre
+        # Azimuth and elevation of a box's points are extreme at its corners, or on an edge where it
+        # passes nearest to the principal point.
+        across = left, right, (left + right) / 2, min(max(centre[0], left), right)
+        down = top, bottom, (top + bottom) / 2, min(max(centre[1], top), bottom)
+        for k, (i, j) in enumerate(_BOX_POINTS):
+            bundles[n, k] = _ray(across[i], down[j], camera)
+    return bundles
+
+
+@compiled()
+def box_spans(boxes: Floats, camera: CameraModel, nearest: float) -> Floats:
+    """(n, 4: left, top, right, bottom) what 3D boxes (n, 7) span in the picture, NaN for a box
+    wholly behind the plane at the depth `nearest`; see
+    `care_sim.core.pinhole.PinholeCamera.project_boxes`.
+    """
+    spans = np.full((len(boxes), 4), math.nan)
+    corners = np.empty((8, 3))
+    for n, box in enumerate(boxes):
+        if _is_behind(box, camera, nearest):
+            continue
+        # Beyond the near plane, the picture of a box is the convex hull of those of its corners,
+        # so these bound it.
+        _lay_corners(box, camera, corners)
+        span = math.inf, math.inf, -math.inf, -math.inf
+        for one in range(8):
+            if corners[one, 0] >= nearest:
+                span = _widened(span, corners[one], camera)
+
+            # An edge joins two corners that differ in one bit. Where it crosses the near plane, the
+            # box is cut, and the cut is a point of its outline.
+            for axis in range(3):
+                other = one ^ 1 << axis
+                if corners[one, 0] < nearest <= corners[other, 0]:
+                    share = (nearest - corners[one, 0]) / (corners[other, 0] - corners[one, 0])
+                    cut = corners[one] + (corners[other] - corners[one]) * share
+                    span = _widened(span, cut, camera)
+        if span[0] <= span[2]:
+            spans[n, 0], spans[n, 1], spans[n, 2], spans[n, 3] = span
+    return spans
+
+
+@compiled()
+def window_on(
+    boxes: Floats, camera: CameraModel, nearest: float, width: int, height: int
+) -> tuple[int, int, int, int]:
+    """`window_around` what 3D boxes (n, 7) span; see `box_spans`."""
+    kept = np.empty(boxes.shape)
+    count = 0
+    for n in range(len(boxes)):
+        if not _is_beside(boxes[n], camera):
+            kept[count] = boxes[n]
+            count += 1
+    return window_around(box_spans(kept[:count], camera, nearest), width, height)
+
+
+@compiled()
+def window_around(spans: Floats, width: int, height: int) -> tuple[int, int, int, int]:
+    """Left, top, right, bottom: the whole pixels of a picture that hold `spans` (n, 4), and one
+    more on each side. Spans of NaN are left out, and all 0 is a window that holds nothing.
+    """
+    # An empty window, the wrong way round: whatever is shown widens it.
+    left, top = width, height
+    right, bottom = 0, 0
+    for span in spans:
+        # A span of NaN fails this comparison.
+        if span[0] <= span[2]:
+            low = max(math.floor(span[0]) - 1, 0), max(math.floor(span[1]) - 1, 0)
+            high = min(math.ceil(span[2]) + 1, width), min(math.ceil(span[3]) + 1, height)
+            if low[0] < high[0] and low[1] < high[1]:
+                left, top = min(left, low[0]), min(top, low[1])
+                right, bottom = max(right, high[0]), max(bottom, high[1])
+    return (left, top, right, bottom) if left < right else (0, 0, 0, 0)
+
+
+@compiled(boundscheck=True)
+def model_of(cameras: CameraModels, number: int) -> CameraModel:
+    """One of several cameras. Raises IndexError for a number that there is not."""
+    return CameraModel(
+        cameras.positions[number],
+        cameras.axes[number],
+        cameras.focals[number],
+        cameras.centres[number],
+    )
+
+
+@compiled()
+def pixel(x: float, y: float, z: float, camera: CameraModel) -> tuple[float, float, float]:
+    """Pixel u, v and depth of a point. At or behind the image plane there is no pixel: NaN."""
+    position = camera.position
+    axes = camera.axes
+    centre = camera.centre
+    x, y, z = x - position[0], y - position[1], z - position[2]
+
+    # Depth is the part along the optical axis. A point appears as far from the principal point as
+    # it lies off that axis, times the focal length over its depth. Pixels count to the right and
+    # down, the axes of the camera to the left and up.
+    depth = _along(axes[0], x, y, z)
+    left, up = _along(axes[1], x, y, z), _along(axes[2], x, y, z)
+    scale = camera.focal / depth if depth > 0 else math.nan
+    return centre[0] - left * scale, centre[1] - up * scale, depth
+
+
+@compiled()
+def _ray(u: float, v: float, camera: CameraModel) -> tuple[float, float, float]:
+    """The direction of a pixel, not normalised: its part along the optical axis is 1."""
+    axes = camera.axes
+    centre = camera.centre
+    # At depth 1 the pixel lies this far to the left of the optical axis, and this far above it.
+    left, up = (centre[0] - u) / camera.focal, (centre[1] - v) / camera.focal
+    return (
+        axes[0, 0] + left * axes[1, 0] + up * axes[2, 0],
+        axes[0, 1] + left * axes[1, 1] + up * axes[2, 1],
+        axes[0, 2] + left * axes[1, 2] + up * axes[2, 2],
+    )
+
+
+@compiled()
+def _is_behind(box: Floats, camera: CameraModel, depth: float) -> bool:
+    """Whether the ball that holds a box (7,) lies wholly before a depth: most boxes around a car
+    are behind any one of its cameras.
+    """
+    place = camera.position
+    x, y, z = box[0] - place[0], box[1] - place[1], box[2] - place[2]
+    radius = math.sqrt(box[3] ** 2 + box[4] ** 2 + box[5] ** 2) / 2
+    # A millimetre is room for rounding.
+    return _along(camera.axes[0], x, y, z) + radius + 0.001 < depth
+
+
+@compiled()
+def _is_beside(box: Floats, camera: CameraModel) -> bool:
+    """Whether the ball that holds a box (7,) lies wholly to one side of all that the picture and
+    two columns more on either side show.
+    """
+    place = camera.position
+    x, y, z = box[0] - place[0], box[1] - place[1], box[2] - place[2]
+    ahead, left = _along(camera.axes[0], x, y, z), _along(camera.axes[1], x, y, z)
+    # The plane through the camera and a column `off` from the principal point is
+    # left * focal = off * ahead. A millimetre is room for rounding.
+    off = camera.centre[0] + 2.0
+    radius = math.sqrt(box[3] ** 2 + box[4] ** 2 + box[5] ** 2) / 2 + 0.001
+    beyond = abs(left) * camera.focal - off * ahead
+    return bool(beyond > radius * math.hypot(camera.focal, off))
+
+
+@compiled()
+def _lay_corners(box: Floats, camera: CameraModel, corners: Floats) -> None:
+    """Fill `corners` (8, 3: depth, left, up in the camera) of a box (7,). Bit i of a corner's
+    number says on which side of the box's axis i it lies.
+    """
+    position = camera.position
+    axes = camera.axes
+    cos, sin = math.cos(box[6]), math.sin(box[6])
+    for n in range(8):
+        # A bit less one half is the side: -0.5 or 0.5 of the length, the width and the height.
+        along, across = box[3] * ((n & 1) - 0.5), box[4] * ((n >> 1 & 1) - 0.5)
+        upward = box[5] * ((n >> 2) - 0.5)
+        x = box[0] + cos * along - sin * across - position[0]
+        y = box[1] + sin * along + cos * across - position[1]
+        for i in range(3):
+            corners[n, i] = _along(axes[i], x, y, box[2] + upward - position[2])
+
+
+@compiled()
+def _widened(span: Numbers4, point: Floats, camera: CameraModel) -> Numbers4:
+    """A span (left, top, right, bottom), widened to hold the pixel of a point (depth, left, up)."""
+    u = camera.centre[0] - camera.focal * point[1] / point[0]
+    v = camera.centre[1] - camera.focal * point[2] / point[0]
+    return min(span[0], u), min(span[1], v), max(span[2], u), max(span[3], v)
+
+
+@compiled()
+def _along(axis: NDArray[np.float64], x: float, y: float, z: float) -> float:
+    """The part of (x, y, z) along an axis (3,)."""
+    part: float = axis[0] * x + axis[1] * y + axis[2] * z
+    return part
+
 
 NEAR_M = 0.1
 """Nothing nearer to the image plane than this is seen."""
@@ -93,13 +327,13 @@ class PinholeCamera:
         """
         # Kernels are compiled for one layout, contiguous float64; anything else is copied to it.
         points = np.ascontiguousarray(points, dtype=float)
-        pixels, depths = kernels.project(points.reshape(-1, 3), self._model)
+        pixels, depths = _project(points.reshape(-1, 3), self._model)
         return pixels.reshape(*points.shape[:-1], 2), depths.reshape(points.shape[:-1])
 
     def rays(self, pixels: ArrayLike) -> Floats:
         """Directions (..., 3), not normalised, through pixels (..., 2), in the sensor frame."""
         pixels = np.ascontiguousarray(pixels, dtype=float)
-        return kernels.rays(pixels.reshape(-1, 2), self._model).reshape(*pixels.shape[:-1], 3)
+        return _rays(pixels.reshape(-1, 2), self._model).reshape(*pixels.shape[:-1], 3)
 
     def box_rays(self, boxes: ArrayLike) -> Floats:
         """(n, 9, 3) rays through image boxes (n, 4: left, top, right, bottom).
@@ -109,21 +343,21 @@ class PinholeCamera:
         extreme.
         """
         boxes = np.ascontiguousarray(boxes, dtype=float).reshape(-1, 4)
-        return kernels.box_rays(boxes, np.zeros(len(boxes), np.int64), camera_models([self]))
+        return box_rays(boxes, np.zeros(len(boxes), np.int64), camera_models([self]))
 
     def project_boxes(self, boxes: Floats) -> Floats:
         """(n, 4) left, top, right, bottom of 3D boxes (n, 7) in pixels, beyond the picture where
         they reach beyond it. NaN for a box wholly behind NEAR_M; a box that crosses that plane is
         cut there.
         """
-        return kernels.box_spans(np.ascontiguousarray(boxes, dtype=float), self._model, NEAR_M)
+        return box_spans(np.ascontiguousarray(boxes, dtype=float), self._model, NEAR_M)
 
     def window_on(self, boxes: Floats) -> tuple[int, int, int, int]:
         """Left, top, right and bottom in whole pixels: the rectangle of the picture that holds 3D
         boxes (n, 7), with a pixel more on each side; all 0 when none is in view.
         """
         boxes = np.ascontiguousarray(boxes, dtype=float)
-        window: tuple[int, int, int, int] = kernels.window_on(
+        window: tuple[int, int, int, int] = window_on(
             boxes, self._model, NEAR_M, self.width, self.height
         )
         return window

@@ -7,13 +7,12 @@ import numpy as np
 from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.belief import Belief
-from care_sim.core.beliefs import Beliefs
-from care_sim.core.cell_sets import CellSets
+from care_sim.core.cells.sets import CellSets, WorldSets, kept_of_each
 from care_sim.core.frames import turned
-from care_sim.core.pinhole_kernels import CameraModels, box_rays, model_of, pixel
+from care_sim.core.observation.beliefs import Beliefs
+from care_sim.core.pinhole import CameraModels, box_rays, model_of, pixel
 from care_sim.core.rig import Rig
 from care_sim.core.types import ImageDetections, Tracks
-from care_sim.core.world_sets import WorldSets, kept_of_each
 
 # Numbers of a module are what compiled code can hold.
 _CLASS, _CAMERA = ImageDetections.CLASS, ImageDetections.CAMERA

@@ -6,15 +6,16 @@ from functools import cached_property
 
 import numpy as np
 
-from care_sim.base.bounds import bounded, check_fields, one_of
-from care_sim.base.checks import check_whole
+from care_sim.base.checks import bounded, check_fields, check_whole, one_of
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.allocation import budget_cells, stages_of
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.belief import Belief, Observation
-from care_sim.core.cell_order import reordered
-from care_sim.core.cell_order_kernels import SetMargins
-from care_sim.core.cell_sets import CellSets
+from care_sim.core.cells.order import SetMargins, reordered
+from care_sim.core.cells.rays import MOST_COLUMNS, MOST_ROWS
+from care_sim.core.cells.sets import CellSets
+from care_sim.core.cells.stack import Grid, GridStack
+from care_sim.core.conditions import RAYS, FilmedReturns
 from care_sim.core.defaults import (
     AS_DEMANDED,
     AZIMUTH_MARGIN,
@@ -26,11 +27,7 @@ from care_sim.core.defaults import (
 from care_sim.core.firing.base import Hardware
 from care_sim.core.firing.listing import hardware_of, settled
 from care_sim.core.grid import AT_LIDAR_M, AngularGrid, Cells
-from care_sim.core.grid_rays import MOST_COLUMNS, MOST_ROWS
-from care_sim.core.grid_stack import Grid, GridStack
-from care_sim.core.pinhole import PinholeCamera, camera_models, checked_cameras
-from care_sim.core.pinhole_kernels import CameraModels
-from care_sim.core.return_settings import RAYS, FilmedReturns
+from care_sim.core.pinhole import CameraModels, PinholeCamera, camera_models, checked_cameras
 from care_sim.core.types import Demand, ImageDetections
 
 LIDAR_X_M = -0.445
@@ -50,7 +47,7 @@ class Rig:
     between two decisions. Hulls and wedges are dilated by `azimuth_margin` columns and
     `elevation_margin` rows. The LiDAR, of several the first, stands `sensor_height_m` above the
     road, `sensor_x_m` before and `sensor_y_m` left of the car's middle. The sets that a policy
-    demands are listed in a `cell_order` (`care_sim.core.cell_order.CELL_ORDERS`) before cells are
+    demands are listed in a `cell_order` (`care_sim.core.cells.order.CELL_ORDERS`) before cells are
     chosen. `firing` names the hardware that fires them (`care_sim.core.firing`), and `returns` how
     their pulses return, without crosstalk. `setup` tells the set-up by name and hash
     (`care_sim.core.sensor_setup`); nothing of recordings, and of rigs that were made without one.

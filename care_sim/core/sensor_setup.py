@@ -11,9 +11,9 @@ import numpy as np
 from care_sim.base.checks import check_number
 from care_sim.base.digests import combined_digest
 from care_sim.base.errors import InvalidInput, shown
-from care_sim.base.json_text import parsed_json
+from care_sim.base.files import parsed_json
+from care_sim.core.cells.stack import Grid, GridStack
 from care_sim.core.grid import AngularGrid, Place
-from care_sim.core.grid_stack import Grid, GridStack
 from care_sim.core.pinhole import PinholeCamera, checked_cameras
 from care_sim.core.rig import LIDAR_HEIGHT_M, LIDAR_X_M, MOST_SHIFT_M
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats, Integers, Mask
-from care_sim.core.boxes import planar_ranges
+from care_sim.core.cells.boxes import planar_ranges
 from care_sim.core.grid import Cells
 
 CLASSES = ("car", "truck", "bus", "bicycle", "pedestrian")
@@ -24,7 +24,7 @@ _EXACT = 2.0**53
 """Up to this a float holds every whole number."""
 
 Action = NDArray[np.float32]
-"""A score per cell, (E, A); see `care_sim.core.actions`."""
+"""A score per cell, (E, A); see `care_sim.core.firing.actions`."""
 
 
 @dataclass(frozen=True)
@@ -234,7 +234,7 @@ class Demand:
     """What a policy asks of the allocator (Algorithm 1).
 
     A set is a list of cells, taken in its order. The paper takes them "in ascending index", and so
-    its policies list them (`care_sim.core.cell_order`).
+    its policies list them (`care_sim.core.cells.order`).
     """
 
     exploitation: Sequence[Cells] = ()
@@ -261,7 +261,7 @@ class Scan:
     whose pulses have no strength.
     """
     times: Floats | None = None
-    """(n,) seconds from the keyframe, below 0, and 0 without a return (`care_sim.sensors.sweep`);
+    """(n,) seconds from the keyframe, below 0, and 0 without a return (`care_sim.sensors.beams`);
     None where all cells fire at once.
     """
     points: Floats | None = None

@@ -10,7 +10,7 @@ v * t_reaction + v^2 / (2 b) + s_0, less what a track that drives ahead needs to
 v_x^2 / (2 b) (Shalev-Shwartz et al. 2017, RSS). It acts with b at the first keyframe that is at
 least `brake_reaction_s` later. It stays on while any counting track is not faster than the ego, and
 for `brake_release_s` after the last one. Then the ego gains speed at `comfort_mps2` up to its
-cruising speed. Numbers and sources are those of `care_sim.core.driver_settings`.
+cruising speed. Numbers and sources are those of `care_sim.core.conditions`.
 
 With `brake_for_oncoming` the gap to a track with v_x < 0 is the least that it will have before it
 leaves the strip, at most `brake_horizon_s` after it has entered: x - |v_x| * t for x. So an ego
@@ -19,11 +19,114 @@ opposite directions has the other brake, too; a car that crosses the ego's way n
 the strip instead.
 """
 
+import math
+from typing import NamedTuple
+
 import numpy as np
 
-from care_sim.core.driver_settings import DriverSettings
+from care_sim.base.compiled import compiled
+from care_sim.base.times import LAST_BITS_S
+from care_sim.core.arrays import Floats
+from care_sim.core.conditions import DriverSettings
 from care_sim.core.types import Command, Ego, Tracks
-from care_sim.driving.braking_kernels import BRAKE_OFF, Rules, decided
+from care_sim.driving.corridor import Turns, enters, footprint, leaves_s
+
+_X, _Y = Tracks.CENTRE.start, Tracks.CENTRE.start + 1
+_LENGTH, _WIDTH = Tracks.BOX.start + 3, Tracks.BOX.start + 4
+_VX, _VY = Tracks.VELOCITY.start, Tracks.VELOCITY.start + 1
+
+Brake = tuple[float, float]
+"""Seconds for which the brake has been on, NaN while it is off, and for which the way has been free
+since."""
+BRAKE_OFF = (math.nan, 0.0)
+Rules = tuple[float, float, float, float, float, float, float, float, float]
+"""The fields of `BrakingRules`."""
+
+
+class BrakingRules(NamedTuple):
+    """What of `care_sim.core.conditions.DriverSettings` the decision follows, in its units;
+    where the strip that is guarded begins, `front_m`, and its reach to either side, `reach_m`; and
+    the time between keyframes.
+    """
+
+    front_m: float
+    reach_m: float
+    keyframe_s: float
+    brake_mps2: float
+    reaction_s: float
+    standstill_m: float
+    horizon_s: float
+    release_s: float
+    comfort_mps2: float
+
+
+@compiled(error_model="numpy")
+def decided(
+    brake: Brake,
+    tracks: Floats,
+    turns: Turns,
+    speed: tuple[float, float],
+    cruise_mps: float,
+    for_oncoming: bool,
+    given: Rules,
+) -> tuple[Brake, float, bool]:
+    """The brake a keyframe later, the acceleration, and whether the brake is on.
+
+    `tracks` (n, 13) are rows of `Tracks` as they lie before a car that drives straight ahead, and
+    `turns` the cosines and sines (n,) of their headings. `speed` is the car's and its square. It
+    cruises at `cruise_mps`; `for_oncoming` is the setting, and `given` holds the fields of
+    `BrakingRules`.
+    """
+    rules = BrakingRules(*given)
+    since_s, free_s = brake
+    is_due, is_blocked = _weighed(tracks, turns, speed, for_oncoming, rules)
+    if math.isnan(since_s):
+        if is_due:
+            since_s, free_s = 0.0, 0.0
+    else:
+        since_s += rules.keyframe_s
+        free_s = 0.0 if is_blocked else free_s + rules.keyframe_s
+        if free_s > rules.release_s - LAST_BITS_S:
+            since_s = math.nan
+    brake = since_s, free_s
+    if math.isnan(since_s):
+        wanted = (cruise_mps - speed[0]) / rules.keyframe_s
+        return brake, min(max(wanted, -rules.comfort_mps2), rules.comfort_mps2), False
+    is_acting = since_s >= rules.reaction_s - LAST_BITS_S
+    return brake, -rules.brake_mps2 if is_acting else 0.0, True
+
+
+@compiled(error_model="numpy")
+def _weighed(
+    tracks: Floats,
+    turns: Turns,
+    speed: tuple[float, float],
+    for_oncoming: bool,
+    rules: BrakingRules,
+) -> tuple[bool, bool]:
+    """Whether the gap to a track that counts is at most what the car needs to stop, and whether a
+    track that counts is not faster than the car.
+    """
+    own_mps, squared = speed
+    braking_m = squared / (2 * rules.brake_mps2)
+    own_m = own_mps * rules.reaction_s + braking_m + rules.standstill_m
+    strip = rules.front_m, rules.reach_m, rules.horizon_s
+    is_due, is_blocked = False, False
+    for n in range(len(tracks)):
+        track = tracks[n]
+        size = track[_LENGTH], track[_WIDTH]
+        box = footprint((track[_X], track[_Y]), size, (turns[0][n], turns[1][n]))
+        if not enters(box, track[_VY], strip):
+            continue
+        gap = track[_X] - box[2] - rules.front_m
+        if for_oncoming:
+            # How near it comes by itself before it has left the strip.
+            gap += min(track[_VX], 0.0) * leaves_s(box, track[_VY], strip)
+        ahead = max(track[_VX], 0.0)
+        theirs_m = ahead * ahead / (2 * rules.brake_mps2)
+        is_due |= gap <= own_m - theirs_m
+        is_blocked |= track[_VX] <= own_mps
+    return is_due, is_blocked
 
 
 class BrakingController:
@@ -68,7 +171,7 @@ def guarded_m(half_width_m: float, rules: DriverSettings) -> float:
 def braking_rules(
     front_m: float, half_width_m: float, keyframe_s: float, rules: DriverSettings
 ) -> Rules:
-    """The fields of `care_sim.driving.braking_kernels.BrakingRules`, as compiled code takes them at
+    """The fields of `care_sim.driving.braking.BrakingRules`, as compiled code takes them at
     once; what is given is as in `BrakingController`.
     """
     return (

@@ -7,9 +7,13 @@ import gymnasium
 from gymnasium.envs.registration import EnvSpec
 
 from care_sim.base.checks import check_known
-from care_sim.base.links import refuse_link
-from care_sim.base.plugins import is_place
-from care_sim.base.scenario_names import SCENARIO_GROUP, is_environment_id, scenario_of
+from care_sim.base.plugins import (
+    SCENARIO_GROUP,
+    is_environment_id,
+    is_place,
+    refuse_link,
+    scenario_of,
+)
 
 refuse_link(__name__)
 
@@ -88,4 +92,4 @@ def _vector_of(entry_point: str) -> str | None:
     place, _, kind = entry_point.partition(":")
     if place != "care_sim.envs.scenarios":
         return None
-    return f"care_sim.envs.vector.scenarios:{kind.removesuffix('Env')}VectorEnv"
+    return f"care_sim.envs.vector.env:{kind.removesuffix('Env')}VectorEnv"

@@ -15,21 +15,18 @@ from care_sim.core.types import Action
 from care_sim.driving.drivers import check_driver
 from care_sim.envs import reward as rewards
 from care_sim.envs.conditions_page import CONDITIONS
-from care_sim.envs.detection import detector_of
-from care_sim.envs.sensing import Observed, SensingEnv, arguments_of, split_conditions
-from care_sim.evaluation.metrics import outcome
+from care_sim.envs.sensing import Observed, SensingEnv, arguments_of, detector_of, split_conditions
+from care_sim.evaluation.outcomes import outcome
 from care_sim.loops.closed_loop import ClosedLoop
-from care_sim.loops.episode import Episode
+from care_sim.loops.episode import Episode, EpisodeSeeds
 from care_sim.loops.false_box_pools import pool_of_another_drive
-from care_sim.loops.record_columns import Records
-from care_sim.loops.records import Keyframe, Outcome
-from care_sim.loops.seeds import EpisodeSeeds
+from care_sim.loops.records import Keyframe, Outcome, Records
 from care_sim.perception.detectors import PROXY
 from care_sim.scenarios import make_scenario, scenario_class
 from care_sim.scenarios.base import Scenario
-from care_sim.sensors.box_pool import EMPTY_POOL, BoxPool
 from care_sim.sensors.camera_profiles import invents_boxes
 from care_sim.sensors.engines import check_engine
+from care_sim.sensors.false_boxes import EMPTY_POOL, BoxPool
 from care_sim.sensors.setups import DEFAULT_SETUP, Sensor, sensor_setup
 from care_sim.world.world import WORLD_STEP_S, World, whole_steps
 
@@ -81,7 +78,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     | `misses` | keyframes since it was last detected |
     | `hits` | keyframes at which it was detected |
 
-    `care_sim.core.observation_limits` says which rows are kept if there are more, and what becomes
+    `care_sim.core.observation.limits` says which rows are kept if there are more, and what becomes
     of numbers that no sensor can tell.
 
     ### Reward
@@ -140,7 +137,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     the cameras, if it has its own.
 
     A `secret` is a text that enters everything that a seed draws
-    (`care_sim.base.random_streams`). An agent that holds this package can then not look its
+    (`care_sim.base.seeds`). An agent that holds this package can then not look its
     episodes up. Take at least 16 random bytes, since a word can be tried like a seed. False, the
     default, means none.
     """
@@ -229,7 +226,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     def first_info(self, entropy: int, world: World) -> dict[str, Any]:
         """The info of `reset`."""
         drawn = {"drawn": dict(world.drawn)} if world.drawn else {}
-        return self._info_of({}, {"seed": entropy, **drawn})
+        return {"seed": entropy, **drawn} if self.scoring_info else {}
 
     def keyframe_info(
         self, scan: dict[str, Any], record: Keyframe | Records, terms: Mapping[str, Any]
@@ -238,14 +235,16 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         told, and the terms of the reward.
         """
         own = {**scan, "braking": record.braking, "time_s": record.time_s}
-        scoring = {
+        if not self.scoring_info:
+            return own
+        return {
+            **own,
             "detected": record.detected,
             "in_view": record.in_view,
             "clearance_m": record.clearance_m,
             "speed_mps": record.speed_mps,
             "reward_terms": terms,
         }
-        return self._info_of(own, scoring)
 
     def step(self, action: Action) -> tuple[Observed, float, bool, bool, dict[str, Any]]:
         """Fire the cells that `action` scores highest and go on to the next keyframe.
@@ -267,7 +266,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         info = self.keyframe_info(self._scan_info(fired), record, terms)
         if self._over:
             info["outcome"] = asdict(self._outcome())
-        return self.observed(), reward, terminated, truncated, info
+        return loop.belief.to_observation(), reward, terminated, truncated, info
 
     def render(self) -> NDArray[np.uint8] | None:
         """A picture (H, W, 3) of the last keyframe: chase view, camera, fired cells."""

@@ -4,7 +4,7 @@ off the fields.
 
 from dataclasses import fields
 
-from care_sim.base.bounds import allowed
+from care_sim.base.checks import allowed
 from care_sim.core.conditions import ClosedLoopConditions
 
 _ROWS = (
@@ -82,6 +82,6 @@ more of each. Faults are off by default and drawn by the seed.
 
 (3) `care_sim.core.firing`; B is then the cells of the units that the budget buys. (4)
 `care_sim.driving.braking` and `care_sim.driving.drivers`. Only `fixed` has the settings
-that begin with `brake_`. (5) `care_sim.core.return_settings`; at 0 all that is in reach
+that begin with `brake_`. (5) `care_sim.core.conditions`; at 0 all that is in reach
 returns.
 """

@@ -12,20 +12,17 @@ from numpy.typing import NDArray
 from care_sim.base.checks import check_arguments, check_choice
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.arrays import Mask
-from care_sim.core.conditions import IDEAL_CAMERA
+from care_sim.core.cells.stack import Grid
+from care_sim.core.conditions import IDEAL_CAMERA, changed_settings
 from care_sim.core.grid import Place
-from care_sim.core.grid_stack import Grid
 from care_sim.core.pinhole import PinholeCamera
-from care_sim.core.return_settings import changed_settings
 from care_sim.core.types import Action
-from care_sim.envs.detection import detector_of
-from care_sim.envs.sensing import Observed, SensingEnv, arguments_of, split_conditions
+from care_sim.envs.sensing import Observed, SensingEnv, arguments_of, detector_of, split_conditions
 from care_sim.evaluation.recall import SceneScore
 from care_sim.evaluation.sightings import ANNOTATED, Sightings, check_presence
+from care_sim.loops.episode import SensorSeeds
 from care_sim.loops.film import Film
-from care_sim.loops.open_loop import OpenLoop, OpenLoopKeyframe
-from care_sim.loops.scene_records import SceneKeyframe
-from care_sim.loops.seeds import SensorSeeds
+from care_sim.loops.open_loop import OpenLoop, OpenLoopKeyframe, SceneKeyframe
 from care_sim.perception import matching
 from care_sim.perception.detectors import PROXY
 
@@ -150,7 +147,8 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         self._masks = []
         seeds = SensorSeeds(camera, lidar, odometry)
         loop = OpenLoop(film, self.rig, self.conditions, seeds, self._detector)
-        return self._begin(loop, floor), self._info_of({}, {"seed": seed, "scene": film.name})
+        info = {"seed": seed, "scene": film.name} if self.scoring_info else {}
+        return self._begin(loop, floor), info
 
     def step(self, action: Action) -> tuple[Observed, float, bool, bool, dict[str, Any]]:
         """Fire the cells that `action` scores highest and go on to the next keyframe.
@@ -167,8 +165,9 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         self._masks.append(found)
         scored = found[self._sightings.scored(record.index)]
         self._over = loop.over
-        own = {**self._scan_info(fired), "time_s": shot.time_s}
-        info = self._info_of(own, {"objects": len(scored), "found": int(scored.sum())})
+        info = {**self._scan_info(fired), "time_s": shot.time_s}
+        if self.scoring_info:
+            info |= {"objects": len(scored), "found": int(scored.sum())}
         if self._over:
             info["outcome"] = asdict(self.score.outcome())
         # A keyframe without annotated objects misses none of them.

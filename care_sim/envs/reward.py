@@ -59,7 +59,7 @@ class Course(NamedTuple):
 
 
 class Told(NamedTuple):
-    """What the reward is told of a keyframe: columns of `care_sim.loops.record_columns.Records`;
+    """What the reward is told of a keyframe: columns of `care_sim.loops.records.Records`;
     whether a scan of every cell would detect the actor, `detectable`; and whether the episode ends
     with this keyframe, `over`.
     """

@@ -3,10 +3,10 @@
 from typing import Any
 
 from care_sim.base.errors import BrokenScenario, InvalidInput
-from care_sim.base.scenario_names import is_environment_id, scenario_of
+from care_sim.base.plugins import is_environment_id, scenario_of
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.envs.sensing import arguments_of
-from care_sim.evaluation.drives import drive_outcome
+from care_sim.evaluation.outcomes import drive_outcome
 from care_sim.loops.records import DriveOutcome, Outcome
 from care_sim.scenarios import PLUGINS, scenario_class
 from care_sim.scenarios.base import Scenario
@@ -17,7 +17,7 @@ class DartoutEnv(ClosedLoopEnv):
     """`CARE-Dartout-v0`: a person runs out from behind a parked trailer into an empty street.
 
     The paper's first closed-loop scene, at 30 km/h. The seed draws the speeds, the place and the
-    timing; see `care_sim.scenarios.crossing.CrossingScenario` for the physics and their sources,
+    timing; see `care_sim.scenarios.dartout.CrossingScenario` for the physics and their sources,
     all of which can be passed as arguments. `occluder="truck", occluder_reported=True` parks a
     vehicle that perception reports instead.
     """
@@ -30,7 +30,7 @@ class DenseEnv(ClosedLoopEnv):
     """`CARE-Dense-v0`: the dart-out in a street lined with tracked vehicles.
 
     There are `vehicles` (7) of them, five in the camera's view. At 3% of the cells a reserve for
-    every camera box starves the person; `care_sim.scenarios.dense` reckons why, cell by cell.
+    every camera box starves the person; `care_sim.scenarios.dartout` reckons why, cell by cell.
     """
 
     __doc__ = f"{__doc__}\n    {ClosedLoopEnv.__doc__}"

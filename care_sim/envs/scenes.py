@@ -19,7 +19,7 @@ class StreetEnv(OpenLoopEnv):
     """`CARE-Street-v0`: a generated urban street, 40 keyframes at 2 Hz, six cameras around the car.
 
     The seed of `reset` draws the street (`care_sim.streets`) and everything else that is
-    random. `care_sim.base.seed_ranges` says which seeds are for what. With a `secret` all streets
+    random. `care_sim.base.seeds` says which seeds are for what. With a `secret` all streets
     are others, and none of them is in the published tables. `sensor` says LiDAR and cameras, as in
     the closed loop.
     """

@@ -13,21 +13,98 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from care_sim.base.checks import check_flag, check_seed
+from care_sim.base.checks import as_array, check_flag, check_seed
 from care_sim.base.errors import InvalidInput, shown
-from care_sim.base.random_streams import check_secret, streams
-from care_sim.core.belief import OBSERVED
-from care_sim.core.conditions import Conditions
+from care_sim.base.seeds import check_secret, streams
+from care_sim.core.arrays import Floats
+from care_sim.core.belief import MAX_DETECTIONS, MAX_TRACKS, OBSERVED
+from care_sim.core.cells.stack import Grid
+from care_sim.core.conditions import MIN_RETURNS, Conditions
+from care_sim.core.firing.floor import RandomFloor
 from care_sim.core.firing.listing import hardware_of
 from care_sim.core.grid import Cells, Place
-from care_sim.core.grid_stack import Grid
+from care_sim.core.observation.limits import Limits
 from care_sim.core.pinhole import PinholeCamera
-from care_sim.core.random_floor import RandomFloor
 from care_sim.core.rig import Rig
 from care_sim.core.types import Action
-from care_sim.envs.spaces import checked_scores, observation_space
-from care_sim.loops.truth import EpisodeTruth, Loop, Truth
+from care_sim.loops.truth import Loop, Truth
+from care_sim.perception.detectors import CLUSTER, PROXY, check_detector, make_detector
+from care_sim.perception.points_only import Detector
 from care_sim.sensors.lidar_faults import check_dead_rows
+
+
+def observation_space(rig: Rig) -> spaces.Space[Any]:
+    """The bounded observation space of a rig.
+
+    Keys and columns are as in `care_sim.core.types`, bounds as in
+    `care_sim.core.observation.limits`.
+    """
+    grid = rig.grid
+    limits = Limits(rig)
+    return spaces.Dict(
+        {
+            "ego": _box(limits.ego),
+            "budget": spaces.Box(0.0, 1.0, (1,), np.float32),
+            "detections": _table(limits.detections, MAX_DETECTIONS),
+            "tracks": _table(limits.tracks, MAX_TRACKS),
+            "ranges": spaces.Box(0.0, grid.range_m, grid.shape, np.float32),
+        }
+    )
+
+
+def checked_scores(action: NDArray[np.floating], shape: tuple[int, ...]) -> NDArray[np.float32]:
+    """The action as float32 scores; a boolean mask is one too. Raises InvalidInput otherwise."""
+    scores = as_array("action", action)
+    if scores.shape != shape:
+        raise InvalidInput(f"action must have shape {shape} (rows, columns), got {scores.shape}")
+    if scores.dtype.kind not in "biuf":
+        raise InvalidInput(f"action must hold numbers, got {scores.dtype}")
+    if scores.dtype != np.float32:
+        # What overflows float32 becomes infinite, and is refused below.
+        with np.errstate(over="ignore"):
+            scores = scores.astype(np.float32)
+    if not np.isfinite(scores).all():
+        raise InvalidInput(
+            "action must not hold NaN or infinity (of float32); score a cell 0 to leave it out"
+        )
+    return scores
+
+
+def _box(bounds: Floats) -> spaces.Box:
+    low, high = (np.asarray(bound, np.float32) for bound in bounds)
+    return spaces.Box(low, high, dtype=np.float32)
+
+
+def _table(bounds: Floats, rows: int) -> spaces.Box:
+    low, high = (np.tile(np.asarray(bound, np.float32), (rows, 1)) for bound in bounds)
+    return spaces.Box(low, high, dtype=np.float32)
+
+
+def detector_of(
+    name: str,
+    parameters: Mapping[str, object] | None,
+    conditions: Conditions,
+    rig: Rig,
+) -> Detector:
+    """The detector `name` with its own `parameters`.
+
+    The proxy's threshold is the condition `min_returns`. Raises InvalidInput for a name or
+    parameter that is unknown, and for a `min_returns` beside another detector.
+    """
+    check_detector(name)
+    if name != PROXY and conditions.min_returns != MIN_RETURNS:
+        raise InvalidInput(f"min_returns is of the detector {PROXY}, {name} does not know it")
+    if not isinstance(parameters, Mapping | None):
+        raise InvalidInput(f"detector_parameters must map names to values, got {shown(parameters)}")
+    if name == PROXY and "min_returns" in (parameters or {}):
+        raise InvalidInput("min_returns is a condition, give it without detector_parameters")
+    own: dict[str, object] = {}
+    if name == PROXY:
+        own = {"min_returns": conditions.min_returns}
+    elif name == CLUSTER:
+        own = {"grid": rig.grid}
+    return make_detector(name, rig.sensor_height_m, **own | dict(parameters or {}))
+
 
 Observed = dict[str, NDArray[np.float32]]
 AnyLoop = TypeVar("AnyLoop", bound=Loop)
@@ -113,7 +190,7 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
     @property
     def truth(self) -> Truth:
         """What privileged policies may ask for; `make_policy` hands it to them alone."""
-        return EpisodeTruth(self)
+        return Truth(self)
 
     def _reseed(self, seed: int | None, options: dict[str, Any] | None) -> None:
         """Begin the environment's own generator anew if a seed is given.
@@ -135,18 +212,11 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         return int(seed) if seed is not None else int(self.np_random.integers(2**32))
 
     def _streams(self, *entropy: int, count: int) -> list[np.random.SeedSequence]:
-        """`count` independent streams of an episode; see `care_sim.base.random_streams`.
+        """`count` independent streams of an episode; see `care_sim.base.seeds`.
 
         No policy enters the seed, so all meet the same world, faults and floor.
         """
         return streams(entropy, count, self._secret)
-
-    def _info_of(self, own: dict[str, Any], scoring: dict[str, Any]) -> dict[str, Any]:
-        """`info`: what the car itself knows, and what only the scoring may know.
-
-        The latter is left out where `scoring_info` is off.
-        """
-        return own | scoring if self.scoring_info else own
 
     def _begin(self, loop: AnyLoop, floor: np.random.SeedSequence) -> Observed:
         """Start an episode over a loop and a floor; its first observation."""
@@ -194,9 +264,8 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         length.
         """
         scan = {"fired": fired, **self.loop.told}
-        if self.conditions.floor:
-            return {name: values.copy() for name, values in scan.items()}
-        return {name: values.tolist() for name, values in scan.items()}
+        floor = self.conditions.floor
+        return {name: values.copy() if floor else values.tolist() for name, values in scan.items()}
 
 
 def split_conditions(

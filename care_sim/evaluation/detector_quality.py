@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from care_sim.core.arrays import Floats, Integers, Mask
-from care_sim.core.boxes import planar_ranges
+from care_sim.core.cells.boxes import planar_ranges
 from care_sim.core.types import Detections
 from care_sim.evaluation.sightings import Sightings
 from care_sim.perception.matching import UNSERVED, served_by

@@ -8,15 +8,10 @@ from care_sim.core.frames import Frame
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.rig import Rig
 from care_sim.sensors.annotated import IdentifiedDetections
-from care_sim.sensors.box_pool import BoxPool
-from care_sim.sensors.camera import (
-    CameraDetector,
-    Picture,
-    class_table,
-    faultless_detections,
-    window_on,
-)
+from care_sim.sensors.camera import CameraDetector
 from care_sim.sensors.engines import Engine
+from care_sim.sensors.false_boxes import BoxPool
+from care_sim.sensors.pictures import Picture, class_table, faultless_detections, window_on
 from care_sim.world.world import WORLD_STEP_S, World
 
 
@@ -33,6 +28,9 @@ class Cameras:
     """What the cameras as they are mounted show, before misses, false boxes and delay. Truth: for
     scoring and people.
     """
+
+    after_s: float
+    """Seconds from a keyframe to the pictures that the detector is given, 0 at the keyframe."""
 
     def __init__(
         self,
@@ -52,17 +50,13 @@ class Cameras:
         self._detector = CameraDetector(
             list(labels), sensing, rig.keyframe_s, seed, rig.cameras, pool, step_s=WORLD_STEP_S
         )
-
-    @property
-    def after_s(self) -> float:
-        """Seconds from a keyframe to the pictures that the detector is given, 0 at the keyframe."""
-        return self._detector.timing.after_s
+        self.after_s = self._detector.timing.after_s
 
     def look(self, sensor: Frame, heading: float) -> IdentifiedDetections:
         """Take the pictures of a keyframe, the LiDAR at `sensor` and the car taken to have the
         `heading`: the newest detections that are due.
         """
-        boxes = self._boxes(sensor)
+        boxes = sensor.boxes_to_local(self._world.boxes_of(self._bodies))
         self.pictures = taken = self._photographed(self._designed, sensor, boxes)
         if self._detector.mounted != self._designed:
             taken = self._photographed(self._detector.mounted, sensor, boxes)
@@ -73,7 +67,7 @@ class Cameras:
 
     def look_between(self, sensor: Frame, heading: float) -> None:
         """Take the pictures that the detector is given, `after_s` after a keyframe; see `look`."""
-        boxes = self._boxes(sensor)
+        boxes = sensor.boxes_to_local(self._world.boxes_of(self._bodies))
         taken = self._photographed(self._detector.mounted, sensor, boxes)
         seen = faultless_detections(taken, self._classes)
         self._detector.take(seen, heading, boxes, self._world.time)
@@ -88,13 +82,13 @@ class Cameras:
         """
         return faultless_detections(self.pictures, self._classes)
 
-    def _boxes(self, sensor: Frame) -> Floats:
-        """(n, 7) of all that the detector may ever report, in the sensor frame."""
-        return sensor.boxes_to_local(self._world.boxes_of(self._bodies))
-
     def _photographed(
         self, cameras: tuple[PinholeCamera, ...], sensor: Frame, boxes: Floats
     ) -> tuple[Picture, ...]:
-        windows = [(camera, window_on(camera, boxes)) for camera in cameras]
-        tables = (self._engine.visible_boxes(camera, sensor, at) for camera, at in windows)
-        return tuple(map(Picture.listed, tables))
+        """The pictures around boxes (n, 7) of all that the detector may ever report, in the sensor
+        frame.
+        """
+        return tuple(
+            Picture.listed(self._engine.visible_boxes(camera, sensor, window_on(camera, boxes)))
+            for camera in cameras
+        )

@@ -6,32 +6,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.core.arrays import Floats, Integers
-from care_sim.core.belief import Belief
-from care_sim.core.belief_kernels import range_image
-from care_sim.core.boxes import planar_ranges
+from care_sim.core.belief import Belief, range_image
+from care_sim.core.cells.boxes import planar_ranges
 from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.frames import Frame
 from care_sim.core.grid import Cells
-from care_sim.core.observation_limits import Limits
+from care_sim.core.observation.limits import Limits
 from care_sim.core.rig import Rig
-from care_sim.core.types import Command, Scan, Tracks
+from care_sim.core.types import Detections, Scan, Tracks
 from care_sim.driving.corridor import along_route
-from care_sim.driving.cruising import Cruising, CruisingRules
-from care_sim.driving.drivers import make_driver
-from care_sim.driving.localisation import Localisation
-from care_sim.driving.odometry import Odometry
+from care_sim.driving.drivers import Cruising, CruisingRules, make_driver
+from care_sim.driving.localisation import Localisation, Odometry
 from care_sim.loops.cameras import Cameras
+from care_sim.loops.episode import SensorSeeds
 from care_sim.loops.needless import NeedlessBraking, UnfoundedBraking
 from care_sim.loops.records import Keyframe, Sight
-from care_sim.loops.scan_detection import ScanDetection
-from care_sim.loops.seeds import SensorSeeds
-from care_sim.loops.told import Told, told_by
-from care_sim.loops.truth import TrackObjects
-from care_sim.perception.base import Detector
+from care_sim.loops.truth import Told, TrackObjects, told_by
+from care_sim.perception.matching import found_objects
+from care_sim.perception.points_only import Detector
+from care_sim.perception.proxy import ReturnsRule
 from care_sim.perception.tracker import TrackMemory
+from care_sim.sensors.annotated import NO_OBJECT, Annotations, cloud_of
 from care_sim.sensors.beams import Beams
-from care_sim.sensors.box_pool import EMPTY_POOL, BoxPool
 from care_sim.sensors.engines import make_engine
+from care_sim.sensors.false_boxes import EMPTY_POOL, BoxPool
 from care_sim.sensors.lidar import Lidar
 from care_sim.world.approach import ClosestApproach
 from care_sim.world.world import World
@@ -82,7 +80,11 @@ class ClosedLoop:
         self.cameras = Cameras(world, rig, engine, conditions, seeds.camera, pool)
         self._odometry = Odometry(conditions.ego_speed_sigma, seeds.odometry)
         self._localisation = Localisation(conditions, rig.keyframe_s, seeds.odometry)
-        self._detection = ScanDetection(rig.grid, world.labels(), conditions.min_returns, detector)
+        labels = world.labels()
+        self._reported = np.array([*labels], np.int64)
+        self._classes = np.array([*labels.values()], np.int64)
+        self._returns_rule = ReturnsRule(labels, conditions.min_returns)
+        self._detector = detector
         self._min_returns = conditions.min_returns
         self._limits = Limits(rig)
         self._memory = TrackMemory(rig.keyframe_s)
@@ -115,37 +117,50 @@ class ClosedLoop:
 
     def keyframe(self, fired: Cells) -> Keyframe:
         """Fire `fired`, act on what came back, and move on to the next keyframe."""
-        # The record is of the time of the scan: it is taken before the world moves on.
-        world = self.world
-        sensor = self.sensor
-        in_view = self._in_view()
-        distance = self._distance_to_first_sighting(sensor)
-        index = self.index
-        time = world.time
-        speed = world.ego_motion.speed
+        # What is recorded of the scan is taken before the world moves on.
+        world, sensor, target = self.world, self.sensor, self.world.first_sighting
+        index, time, speed = self.index, world.time, world.ego_motion.speed
+        in_view, distance = False, float("inf")
+        if target is not None:
+            in_view = self.shows(target.body)
+            x, y = world.centre_of(target.body)
+            distance = float(np.hypot(x - sensor.x, y - sensor.y))
 
         # The scan, the detector and the tracker see the world as it was when the cells were chosen.
         scan, bodies = self._lidar.fire(fired, sensor)
-        self.told = told_by(fired, scan.cells, intensities=scan.intensities, times_s=scan.times)
-        detections, behind, found = self._detection.detect(scan, bodies, self._local_boxes)
-        tracks = self._memory.update(detections, self._localisation.taken_for(sensor))
-        self._track_objects.note(tracks, behind)
-        middle = self._middle()
-        command = self._command(self._localisation.taken_for(middle))
+        self.told = told_by(fired, scan.cells, scan.intensities, scan.times)
+        detections, behind, found = self._detect(scan, bodies)
+        tracked = self._memory.update(detections, self._localisation.taken_for(sensor))
+        self._track_objects.note(tracked, behind)
+
+        # The driver reckons from the middle line of the car, along the way that it is to go.
+        middle = sensor
+        if self.rig.sensor_y_m:
+            x, _, z = self.rig.sensor_position
+            middle = Frame.mounted(world.ego.pose, (x, 0.0, z))
+        taken_for, ego = self._localisation.taken_for(middle), self.belief.ego
+        tracks = self._memory.tracks(taken_for)
+        ahead = tracks if world.route is None else along_route(tracks, world.route, taken_for)
+        command = self._driver.command(ahead, ego)
+        if self._cruising is not None:
+            command = self._cruising.eased(command, ahead, ego.speed, world.along_m)
         needless = self._needless is not None and self._needless.judge(
             world, middle, command.braking
         )
-        unfounded = self._is_unfounded(middle, command, in_view, behind)
-        sights = self._sights(found)
+        unfounded = self._unfounded is not None and self._unfounded.judge_tracks(
+            world, middle, tracks, ahead, command.braking, in_view, behind
+        )
+        sights = self._sights(found) if world.meetings else ()
 
         # The command holds until the next keyframe; then the camera looks and forecasts are due.
         passage = self._advance(command.acceleration)
         self.index += 1
         self._memory.predict()
-        self._look(self._range_image(scan))
+        grid = self.rig.grid
+        image = range_image(grid.size, scan.cells, scan.ranges, float(grid.range_m))
+        self._look(image.reshape(grid.shape))
 
         # What was near, or was hit, is of the time since the scan; the rest is of the scan itself.
-        target = world.first_sighting
         return Keyframe(
             index=index,
             time_s=time,
@@ -215,45 +230,26 @@ class ClosedLoop:
         """Whether a camera shows enough of a body for a box. Truth: for scoring and people."""
         return self.cameras.shows(body)
 
-    def _middle(self) -> Frame:
-        """Where the driver reckons from: the LiDAR's frame, moved to the middle line of the car."""
-        if not self.rig.sensor_y_m:
-            return self.sensor
-        x, _, z = self.rig.sensor_position
-        return Frame.mounted(self.world.ego.pose, (x, 0.0, z))
+    def _detect(self, scan: Scan, bodies: Integers) -> tuple[Detections, Integers, Integers]:
+        """The detections, the body behind each or NO_OBJECT, and all bodies that were found; of the
+        returns of `bodies`.
 
-    def _command(self, middle: Frame) -> Command:
-        """What the car's software asks for, from the tracks of this keyframe."""
-        ahead = self._along_way(self._memory.tracks(middle), middle)
-        ego = self.belief.ego
-        command = self._driver.command(ahead, ego)
-        if self._cruising is None:
-            return command
-        return self._cruising.eased(command, ahead, ego.speed, self.world.along_m)
-
-    def _is_unfounded(
-        self, middle: Frame, command: Command, in_view: bool, behind: Integers
-    ) -> bool:
-        """Whether the brake is on for what the detector made up; `behind` are the bodies behind its
-        detections.
+        The proxy alone may ask whose return each is. What another detector finds is scored by the
+        class-consistent 2 m match (paper, Remark 1), and only what a box has returns of: else a box
+        on the end of a lorry would find who is hidden behind it.
         """
-        if self._unfounded is None:
-            return False
-        target = self.world.first_sighting
-        if in_view or (target is not None and target.body in behind):
-            self._unfounded.has_met = True
-        if not command.braking:
-            return False
-        unseen = None if self._unfounded.has_met or target is None else target.body
-        taken_for = self._localisation.taken_for(middle)
-        tracks = self._memory.tracks(taken_for)
-        ahead = self._along_way(tracks, taken_for)
-        return self._unfounded.judge_tracks(self.world, middle, tracks, ahead, unseen)
-
-    def _along_way(self, tracks: Tracks, middle: Frame) -> Tracks:
-        """Return tracks as the controller takes them: along the way that the car is to go."""
-        route = self.world.route
-        return tracks if route is None else along_route(tracks, route, middle)
+        if self._detector is None:
+            detections, detected = self._returns_rule.detections(bodies, self._local_boxes)
+            return detections, detected, detected
+        objects = np.where(np.isin(bodies, self._reported), bodies, NO_OBJECT)
+        cloud = cloud_of(scan, objects, self.rig.grid)
+        boxes = self._local_boxes(self._reported)
+        present = Annotations(self._reported, self._classes, boxes)
+        detections, behind = self._detector.detect(cloud, present)
+        hit = np.isin(present.objects, behind)
+        candidates = Annotations(present.objects[hit], present.classes[hit], present.boxes[hit])
+        found = found_objects(candidates, detections)
+        return detections, behind, candidates.objects[found]
 
     def _advance(self, acceleration: float) -> ClosestApproach:
         """Let the world move on to the next keyframe, and the cameras take their pictures on the
@@ -263,7 +259,7 @@ class ClosedLoop:
         if not after_s:
             return self.world.advance(acceleration, self.rig.keyframe_s)
         before = self.world.advance(acceleration, after_s)
-        sensor = self._mounted()
+        sensor = Frame.mounted(self.world.ego.pose, self.rig.sensor_position)
         self.cameras.look_between(sensor, self._localisation.taken_for(sensor).yaw)
         rest = self.world.advance(acceleration, self.rig.keyframe_s - after_s)
         return ClosestApproach.over([before, rest])
@@ -271,7 +267,7 @@ class ClosedLoop:
     def _look(self, ranges: NDArray[np.float32]) -> None:
         """Let the cameras look, and form the belief on which the next cells are chosen."""
         self._localisation.advance()
-        self.sensor = self._mounted()
+        self.sensor = Frame.mounted(self.world.ego.pose, self.rig.sensor_position)
 
         # The boxes that arrive, late and with errors, and the forecasts: all that is known when the
         # next cells are chosen.
@@ -283,37 +279,14 @@ class ClosedLoop:
         # A rendered box lies in the picture, so the limits leave out none but the last, too many.
         self.detected_bodies = arrived.objects[: len(self.belief.detections)]
 
-    def _mounted(self) -> Frame:
-        """Where the LiDAR is on the car now."""
-        return Frame.mounted(self.world.ego.pose, self.rig.sensor_position)
-
-    def _range_image(self, scan: Scan) -> NDArray[np.float32]:
-        grid = self.rig.grid
-        return range_image(grid.size, scan.cells, scan.ranges, float(grid.range_m)).reshape(
-            grid.shape
-        )
-
     def _local_boxes(self, bodies: Integers) -> Floats:
         return self.sensor.boxes_to_local(self.world.boxes_of(bodies))
 
     def _sights(self, detected: Integers) -> tuple[Sight, ...]:
         """Whom the scenario lets the ego meet, at this scan."""
         bodies = [one.body for one in self.world.meetings]
-        if not bodies:
-            return ()
         ranges = planar_ranges(self._local_boxes(np.array(bodies, np.int64)))
         return tuple(
             Sight(distance, self.shows(body), body in detected)
             for body, distance in zip(bodies, ranges.tolist(), strict=True)
         )
-
-    def _in_view(self) -> bool:
-        target = self.world.first_sighting
-        return target is not None and self.shows(target.body)
-
-    def _distance_to_first_sighting(self, sensor: Frame) -> float:
-        target = self.world.first_sighting
-        if target is None:
-            return float("inf")
-        x, y = self.world.centre_of(target.body)
-        return float(np.hypot(x - sensor.x, y - sensor.y))

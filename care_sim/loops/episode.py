@@ -1,13 +1,40 @@
-"""An episode of the closed loop: what it begins with, and how long it lasts."""
+"""An episode of the closed loop: its random streams, what it begins with, and how long it lasts."""
 
 import math
 from typing import NamedTuple
 
 from numpy.random import SeedSequence
 
+from care_sim.base.seeds import streams
 from care_sim.base.times import LAST_BITS_S
-from care_sim.loops.seeds import SensorSeeds
 from care_sim.world.world import World
+
+
+class SensorSeeds(NamedTuple):
+    """A stream for each sensor: a fault of one leaves the draws of the others as they are."""
+
+    camera: SeedSequence
+    lidar: SeedSequence
+    odometry: SeedSequence
+
+
+class EpisodeSeeds(NamedTuple):
+    """The streams that the seed of an episode holds: of the scenario, the sensors, the floor, and
+    of another drive through the scenario, from which false boxes are drawn. Nothing in that one
+    tells of the episode.
+    """
+
+    scenario: SeedSequence
+    sensors: SensorSeeds
+    floor: SeedSequence
+    another: SeedSequence
+
+    @classmethod
+    def of(cls, entropy: int, secret: str = "") -> "EpisodeSeeds":
+        """Those of a seed; see `care_sim.base.seeds`."""
+        # Their order is a part of what a seed means.
+        scenario, camera, lidar, floor, odometry, another = streams((entropy,), 6, secret)
+        return cls(scenario, SensorSeeds(camera, lidar, odometry), floor, another)
 
 
 class Episode(NamedTuple):

@@ -7,14 +7,13 @@ from functools import lru_cache
 import numpy as np
 
 from care_sim.base.times import LAST_BITS_S
-from care_sim.core.conditions import IDEAL_CAMERA, ClosedLoopConditions
-from care_sim.core.return_settings import RETURN_SETTINGS
+from care_sim.core.conditions import IDEAL_CAMERA, RETURN_SETTINGS, ClosedLoopConditions
 from care_sim.core.rig import Rig
 from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.loops.episode import SensorSeeds
 from care_sim.loops.film import Film
-from care_sim.loops.seeds import SensorSeeds
-from care_sim.perception.base import Detector
-from care_sim.sensors.box_pool import BoxPool
+from care_sim.perception.points_only import Detector
+from care_sim.sensors.false_boxes import BoxPool
 from care_sim.world.world import World
 
 NEAR_S = 2.0

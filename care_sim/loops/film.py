@@ -7,11 +7,11 @@ recorded clouds. Nothing in it depends on a policy. It holds truth; policies see
 
 from dataclasses import dataclass, field
 
+from care_sim.core.cells.stack import Grid
+from care_sim.core.conditions import RAYS, FilmedReturns
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid, Place
-from care_sim.core.grid_stack import Grid
 from care_sim.core.pinhole import PinholeCamera
-from care_sim.core.return_settings import RAYS, FilmedReturns
 from care_sim.core.sensor_setup import LIDAR_POSITION
 from care_sim.core.types import Ego
 from care_sim.sensors.annotated import NO_ANNOTATIONS, Annotations, Cloud, IdentifiedDetections

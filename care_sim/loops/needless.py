@@ -14,11 +14,11 @@ import numpy as np
 
 from care_sim.base.times import LAST_BITS_S
 from care_sim.core.arrays import Floats, Integers, Mask
-from care_sim.core.driver_settings import DriverSettings
+from care_sim.core.conditions import DriverSettings
 from care_sim.core.frames import Frame
 from care_sim.core.types import Tracks
 from care_sim.driving.corridor import along_route, enters_strip
-from care_sim.world.gaps import least_gap
+from care_sim.world.contact import least_gap
 from care_sim.world.world import World
 
 
@@ -67,7 +67,7 @@ class NeedlessBraking:
 class UnfoundedBraking(NeedlessBraking):
     """Judges whether the brake of one episode is on for what the detector made up."""
 
-    has_met: bool = False
+    _has_met = False
     """Whether the camera has shown the first-sighting actor, or a detection held its returns."""
 
     def judge_tracks(
@@ -76,12 +76,19 @@ class UnfoundedBraking(NeedlessBraking):
         sensor: Frame,
         tracks: Tracks,
         ahead: Tracks,
-        unseen: int | None,
+        braking: bool,
+        in_view: bool,
+        behind: Integers,
     ) -> bool:
-        """Whether it is; to be asked at every keyframe with the brake on. `tracks` are in the frame
-        of the sensor, and the same lie `ahead` as the driver takes them; the body `unseen` gives no
-        reason.
+        """Whether it is; to be asked at every keyframe. `tracks` are in the frame of the sensor,
+        and the same lie `ahead` as the driver takes them; `behind` (n,) are the bodies behind the
+        detections, and `in_view` says whether a camera shows the first-sighting actor.
         """
+        target = world.first_sighting
+        self._has_met |= in_view or (target is not None and target.body in behind)
+        if not braking:
+            return False
+        unseen = None if self._has_met or target is None else target.body
         needed = self._is_needed(world, sensor, unseen) or _touch(
             sensor.boxes_to_world(tracks.boxes[self._enters(ahead)]),
             world.boxes_of(_bodies(world, unseen)),

@@ -2,33 +2,50 @@
 react.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.core.arrays import Floats, Integers
+from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.belief import Belief
 from care_sim.core.conditions import Sensing
 from care_sim.core.grid import Cells
-from care_sim.core.observation_limits import Limits
+from care_sim.core.observation.limits import Limits
 from care_sim.core.rig import Rig
 from care_sim.core.types import Detections, Scan, Tracks
-from care_sim.driving.localisation import Localisation
-from care_sim.driving.odometry import Odometry
+from care_sim.driving.localisation import Localisation, Odometry
+from care_sim.loops.episode import SensorSeeds
 from care_sim.loops.false_box_pools import pool_of_film
 from care_sim.loops.film import Film, Shot
-from care_sim.loops.held_mask import with_sweeps
-from care_sim.loops.seeds import SensorSeeds
-from care_sim.loops.told import Told, told_by
-from care_sim.loops.truth import TrackObjects
-from care_sim.perception.base import Detector
+from care_sim.loops.truth import Told, TrackObjects, told_by
+from care_sim.perception.points_only import Detector
 from care_sim.perception.tracker import TrackMemory
-from care_sim.sensors.annotated import Cloud
-from care_sim.sensors.box_pool import EMPTY_POOL
+from care_sim.sensors.annotated import Cloud, joined
 from care_sim.sensors.camera import CameraDetector
 from care_sim.sensors.camera_profiles import invents_boxes
-from care_sim.sensors.recorded_lidar import RecordedLidar
+from care_sim.sensors.false_boxes import EMPTY_POOL
+from care_sim.sensors.lidar import RecordedLidar
+
+
+def with_sweeps(returned: Cloud, lidar: RecordedLidar, held: Cells, shot: Shot) -> Cloud:
+    """The returns of a keyframe, and those of the sweeps before it, which fired the cells `held` by
+    the mask of the keyframe before.
+
+    All are in the sensor frame of the keyframe: the motion of the car is compensated, that of
+    others is not. Each has its time, seconds from the keyframe, 0 or less. Without sweeps the
+    returns of the keyframe are as they were.
+    """
+    if not shot.sweeps:
+        return returned
+    clouds = [replace(returned, times=np.zeros(len(returned)))]
+    for sweep in shot.sweeps:
+        # Cells are those of the sensor as it stood then; faults are drawn for every sweep.
+        own = lidar.fire(held, sweep.cloud)
+        points = shot.sensor.points_of(sweep.sensor, own.points)
+        times = np.full(len(own), sweep.time_s - shot.time_s)
+        clouds.append(replace(own, points=points, times=times))
+    return joined(clouds)
 
 
 @dataclass(frozen=True)
@@ -111,7 +128,7 @@ class OpenLoop:
 
         # In the order of the closed loop, but for the car: a film moves on by itself.
         cloud = self._lidar.fire(fired, shot.cloud)
-        self.told = told_by(fired, cloud.cells, intensities=cloud.intensities, times_s=cloud.times)
+        self.told = told_by(fired, cloud.cells, cloud.intensities, cloud.times)
         gathered = with_sweeps(cloud, self._lidar, self._held, shot)
         self._held = fired
         detections, objects = self._detector.detect(gathered, shot.annotations)
@@ -187,3 +204,49 @@ class OpenLoop:
         ranges = np.zeros(self.rig.grid.size, np.float32)
         ranges[fired] = np.minimum(self._lidar.ranges(cloud)[fired], self.rig.grid.range_m)
         return ranges.reshape(self.rig.grid.shape)
+
+
+@dataclass(frozen=True)
+class SceneKeyframe:
+    """What a keyframe found of the annotated objects (n,) of its shot: which were `found`, which
+    are `scored`, within range, and which are `appearing`, their first sighting. `time_s` is from
+    the start; `record` is None before the first scan.
+
+    Truth: never for a policy.
+    """
+
+    time_s: float
+    record: OpenLoopKeyframe | None
+    found: Mask
+    scored: Mask
+    appearing: Mask
+
+    @property
+    def index(self) -> int:
+        """The number of the keyframe, from 0."""
+        return self.record.index if self.record else 0
+
+    @property
+    def fired(self) -> Cells | None:
+        """The cells that fired, each as often as it was fired."""
+        return self.record.fired if self.record else None
+
+    @property
+    def objects(self) -> int:
+        """How many objects are scored."""
+        return int(self.scored.sum())
+
+    @property
+    def objects_found(self) -> int:
+        """How many of them were found."""
+        return int((self.found & self.scored).sum())
+
+    @property
+    def entries(self) -> int:
+        """How many appear for the first time."""
+        return int(self.appearing.sum())
+
+    @property
+    def entries_found(self) -> int:
+        """How many of these were found at once."""
+        return int((self.found & self.appearing).sum())

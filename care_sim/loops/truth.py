@@ -1,44 +1,46 @@
 """What is true about the coming keyframe: for privileged policies, scoring and training alone.
 
-Truth is asked of the running loop and never enters a `Belief`.
+Truth is asked of the running loop and never enters a `Belief`. And what returns tell besides their
+ranges, for `info`.
 """
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.belief import Belief
+from care_sim.core.grid import Cells
 from care_sim.core.types import Scan, Tracks
-from care_sim.loops.told import Told
 from care_sim.sensors.annotated import NO_OBJECT
 
+_NO_CELL = -1
+Told = dict[str, Floats]
+"""By name, (n,) numbers of the fired cells, 0 of a cell without a return."""
 
-class Truth(Protocol):
-    """The truth about the coming keyframe, as a privileged policy may ask for it.
 
-    `make_policy` hands it to subclasses of `PrivilegedPolicy` and to nobody else. `Policy.told`
-    leads to public settings alone.
+def told_by(
+    fired: Cells, cells: Cells, intensities: Floats | None = None, times_s: Floats | None = None
+) -> Told:
+    """The columns (k,) of returns of ascending `cells` (k,) as numbers of the `fired` ones,
+    ascending too: of several returns of a cell the first, of a cell fired several times the same
+    for each. A column that is None tells nothing.
     """
-
-    def boxes(self, tracks: Tracks) -> Floats:
-        """(n, 7) true boxes, in the sensor frame, of the objects behind the tracks.
-
-        A track without an object keeps its forecast.
-        """
-        ...
-
-    def full_scan(self) -> Scan:
-        """What a scan of every cell would return, before noise and dropout.
-
-        `cells` are all cells, ascending.
-        """
-        ...
+    if intensities is None and times_s is None:
+        return {}
+    # The place of the first return of every fired cell; behind the last one there is none.
+    first = np.searchsorted(cells, fired)
+    returned = np.append(cells, _NO_CELL)[first] == fired
+    return {
+        name: np.where(returned, np.append(values, 0.0)[first], 0.0)
+        for name, values in (("intensities", intensities), ("times_s", times_s))
+        if values is not None
+    }
 
 
 class Loop(Protocol):
-    """What the environments ask of a loop, besides its keyframes."""
+    """What environments and privileged policies ask of a loop, besides its keyframes."""
 
     belief: Belief
     told: Told
@@ -52,28 +54,31 @@ class Loop(Protocol):
         ...
 
 
-class Looped(Protocol):
-    """An environment with a running episode."""
+class Truth:
+    """The truth about the coming keyframe of an environment's running `loop`, from episode to
+    episode.
 
-    @property
-    def loop(self) -> Loop:
-        """The loop of the running episode."""
-        ...
+    `make_policy` hands it to subclasses of `PrivilegedPolicy` and to nobody else. `Policy.told`
+    leads to public settings alone.
+    """
 
-
-class EpisodeTruth:
-    """A `Truth` that follows an environment from episode to episode."""
-
-    def __init__(self, env: Looped):
+    def __init__(self, env: Any):
         self._env = env
 
     def boxes(self, tracks: Tracks) -> Floats:
-        """(n, 7) true boxes; see `Truth.boxes`."""
-        return self._env.loop.true_boxes(tracks)
+        """(n, 7) true boxes, in the sensor frame, of the objects behind the tracks.
+
+        A track without an object keeps its forecast.
+        """
+        boxes: Floats = self._env.loop.true_boxes(tracks)
+        return boxes
 
     def full_scan(self) -> Scan:
-        """What a scan of every cell would return; see `Truth.full_scan`."""
-        return self._env.loop.full_scan()
+        """What a scan of every cell would return, before noise and dropout; `cells` are all cells,
+        ascending.
+        """
+        scan: Scan = self._env.loop.full_scan()
+        return scan
 
 
 class TrackObjects:
@@ -99,13 +104,9 @@ class TrackObjects:
         nowhere.
         """
         # All objects are asked for at once: the closed loop reads their boxes off one table.
+        behind = self.behind(tracks).tolist()
+        present = boxes_of([number for number in behind if number != NO_OBJECT])
         boxes = tracks.boxes.copy()
-        known = [
-            (row, self._objects[track])
-            for row, track in enumerate(tracks.ids.tolist())
-            if self._objects.get(track, NO_OBJECT) != NO_OBJECT
-        ]
-        present = boxes_of([number for _, number in known])
-        for row, number in known:
+        for row, number in enumerate(behind):
             boxes[row] = present.get(number, boxes[row])
         return boxes

@@ -8,18 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.core.actions import shares_of
 from care_sim.core.arrays import Floats, Mask
 from care_sim.core.belief import Belief
+from care_sim.core.cells.stack import Grid
+from care_sim.core.firing.actions import shares_of
 from care_sim.core.frames import Frame, Pose
 from care_sim.core.grid import Cells
-from care_sim.core.grid_stack import Grid
 from care_sim.core.residual import explained
 from care_sim.core.types import CLASSES, Action, Demand, ImageDetections
 from care_sim.loops.closed_loop import ClosedLoop
-from care_sim.loops.open_loop import OpenLoop
+from care_sim.loops.open_loop import OpenLoop, SceneKeyframe
 from care_sim.loops.records import Keyframe
-from care_sim.loops.scene_records import SceneKeyframe
 from care_sim.sensors.annotated import NO_OBJECT
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.world import Actor, World
@@ -109,7 +108,7 @@ class Watched:
     situation: TrueSituation
     """How things stood before it."""
     shares: NDArray[np.uint8]
-    """(E, A) the share of the budget of each cell, a place in `care_sim.core.actions.SHARES`."""
+    """(E, A) each cell's share of the budget, a place in `care_sim.core.firing.actions.SHARES`."""
     ranges: NDArray[np.float32]
     """(E, A) the scan in metres: 0 not fired, maximum range without a return."""
     record: Keyframe | SceneKeyframe

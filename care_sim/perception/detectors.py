@@ -12,13 +12,16 @@ from typing import Any
 from care_sim.base.checks import check_known
 from care_sim.base.errors import InvalidInput, MissingExtra, error_line, printable, shown
 from care_sim.base.plugins import Plugins
-from care_sim.perception.base import Detector
 from care_sim.perception.cluster.detector import ClusterDetector
-from care_sim.perception.graded import GradedProxy
 from care_sim.perception.pillars.detector import PillarsDetector
-from care_sim.perception.points_only import BrokenDetector, PointDetector, PointsOnly
-from care_sim.perception.proxy import ReturnsProxy
-from care_sim.perception.torchscript import TorchScriptDetector
+from care_sim.perception.points_only import (
+    BrokenDetector,
+    Detector,
+    PointDetector,
+    PointsOnly,
+    TorchScriptDetector,
+)
+from care_sim.perception.proxy import GradedProxy, ReturnsProxy
 
 PROXY = "returns"
 """The paper's proxy."""
@@ -136,7 +139,5 @@ def _summary(name: str) -> str:
         make = _maker(name)
     except BrokenDetector as error:
         return f"(broken) {error}"
-    # The module of a built-in detector begins with what it does; another tells it by itself.
-    described = inspect.getmodule(make) if name in DETECTORS.built_in else make
-    about, _, _ = (inspect.getdoc(described) or "").partition("\n\n")
+    about, _, _ = (inspect.getdoc(make) or "").partition("\n\n")
     return " ".join(about.split())

@@ -1,18 +1,33 @@
-"""Real detectors are handed points, and no truth.
+"""What a detector is. Real detectors are handed points, and no truth.
 
 `PointsOnly` is the one place where a film meets a real detector. Whatever is installed or loaded
 goes through it.
 """
 
+from os import PathLike, fspath
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 
+from care_sim.base.checks import check_flag
 from care_sim.base.errors import InvalidInput, MissingExtra, error_line
+from care_sim.base.extras import import_torch
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.frames import turned
 from care_sim.core.types import CLASSES, Detections
 from care_sim.sensors.annotated import NO_OBJECT, Annotations, Cloud
+
+
+class Detector(Protocol):
+    """What a loop calls at every keyframe."""
+
+    def detect(self, cloud: Cloud, annotations: Annotations) -> tuple[Detections, Integers]:
+        """Detections in the sensor frame from the returns of the fired cells, and (n,) the
+        annotated object behind each, or NO_OBJECT, for privileged policies and the scoring.
+        """
+        ...
+
 
 MOST_DETECTIONS = 500
 """Boxes per keyframe: as many as the official nuScenes evaluation takes."""
@@ -42,7 +57,7 @@ class PointDetector(Protocol):
 
 
 class PointsOnly:
-    """Makes a `PointDetector` a `care_sim.perception.base.Detector`.
+    """Makes a `PointDetector` a `care_sim.perception.points_only.Detector`.
 
     The detector gets a copy of the points: neither objects nor boxes nor unfired cells can be
     reached from it. What it returns is copied and checked; only then the objects are named.
@@ -54,7 +69,7 @@ class PointsOnly:
         self._sensor_height_m = sensor_height_m
 
     def detect(self, cloud: Cloud, annotations: Annotations) -> tuple[Detections, Integers]:
-        """See `care_sim.perception.base.Detector`.
+        """See `care_sim.perception.points_only.Detector`.
 
         Raises BrokenDetector where it fails or returns what is no detections.
         """
@@ -161,3 +176,56 @@ def _faults(
 
 def _is_count(numbers: Floats) -> Mask:
     return np.asarray((numbers >= 0) & (numbers % 1 == 0))
+
+
+class TorchScriptDetector:
+    """A learned detector from a TorchScript file, and the example to follow for one's own.
+
+    Runs the module in `file`: `forward(points, sensor_height_m) -> (classes, boxes, scores)`.
+
+    `points` is a float32 tensor (P, 3) in the sensor frame, `sensor_height_m` a float; `classes`
+    (n,) index `care_sim.core.types.CLASSES`, `boxes` (n, 7) are x, y, z, length, width, height, yaw
+    in the sensor frame, `scores` (n,) lie in [0, 1]. With `times` the points are (P, 4), last the
+    seconds from the keyframe, 0 or less. Runs on the CPU. Needs torch. Raises MissingExtra without
+    it, InvalidInput for a file that is no TorchScript module.
+
+    One around an ONNX file, in a package of its own:
+
+        class OnnxDetector:
+            def __init__(self, file: str):
+                self._session = onnxruntime.InferenceSession(file)
+
+            def detect(self, points, sensor_height_m):
+                inputs = {"points": points.astype("float32")}
+                classes, boxes, scores = self._session.run(None, inputs)
+                return Detections(classes, boxes, inside(points, boxes).sum(axis=1), scores)
+
+    is found under the name `mine` by this entry in the package's pyproject.toml:
+
+        [project.entry-points."care_sim.detectors"]
+        mine = "my_package:OnnxDetector"
+    """
+
+    def __init__(self, file: str | PathLike[str], times: bool = False):
+        check_flag("times", times)
+        self.wants_times = times
+        self._torch = import_torch()
+        self._file = fspath(file)
+        if not Path(file).is_file():
+            raise InvalidInput(
+                f"{self._file}: no such file; allowed is a TorchScript module (torch.jit.save)"
+            )
+        try:
+            self._module = self._torch.jit.load(self._file, map_location="cpu").eval()
+        except RuntimeError as error:
+            raise InvalidInput(f"{self._file}: no TorchScript module (torch.jit.save)") from error
+
+    def detect(self, points: Floats, sensor_height_m: float) -> Detections:
+        """See `care_sim.perception.points_only.PointDetector`."""
+        # Nothing is learned here, so no gradients are kept.
+        with self._torch.inference_mode():
+            outputs = self._module(
+                self._torch.from_numpy(points.astype(np.float32)), float(sensor_height_m)
+            )
+        classes, boxes, scores = (output.numpy() for output in outputs)
+        return Detections(classes, boxes, inside(points[:, :3], boxes).sum(axis=1), scores)

@@ -1,13 +1,189 @@
-"""Track memory: assignment by position, velocity from two keyframes, coasting, forecasts."""
+"""Track memory: assignment by position, velocity from two keyframes, coasting, forecasts.
 
+Tracks are a table (m, 13) in the order of `Tracks.COLUMNS`, by ascending id, in the world frame.
+Detections are their `classes` (n,) and their boxes `seen` (n, 7), in the world frame, too.
+"""
+
+import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from care_sim.core.arrays import Floats, Integers
+from care_sim.base.compiled import compiled
+from care_sim.base.times import LAST_BITS_S
+from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.frames import Frame, turned
 from care_sim.core.types import Detections, Tracks
-from care_sim.perception import track_kernels as kernels
+
+# Numbers of a module are what compiled code can hold.
+_ID, _CLASS, _X, _Y = Tracks.ID, Tracks.CLASS, Tracks.CENTRE.start, Tracks.CENTRE.start + 1
+_VX, _VY = Tracks.VELOCITY.start, Tracks.VELOCITY.start + 1
+_BOX, _BOX_WIDTH = Tracks.BOX.start, Tracks.BOX.stop - Tracks.BOX.start
+_MISSES, _HITS = Tracks.MISSES, Tracks.HITS
+
+
+Rules = tuple[float, float, float, float]
+"""The fields of `Life`."""
+Pairs = tuple[Integers, Integers]
+"""The rows (k,) of tracks, and of the detections that belong to them."""
+
+
+class Life(NamedTuple):
+    """What association and life of a track follow (`care_sim.perception.tracker.MemoryRules`)."""
+
+    keyframe_s: float
+    gate_m: float
+    first_speed_mps: float
+    coast_s: float
+
+
+@compiled()
+def forecast(tracks: Floats, seconds: float) -> Floats:
+    """The tracks `seconds` later, at constant velocity."""
+    moved = tracks.copy()
+    forecast_in_place(moved, seconds)
+    return moved
+
+
+@compiled()
+def forecast_in_place(tracks: Floats, seconds: float) -> None:
+    """Let the tracks be `forecast`."""
+    for m in range(len(tracks)):
+        tracks[m, _X] += tracks[m, _VX] * seconds
+        tracks[m, _Y] += tracks[m, _VY] * seconds
+
+
+@compiled()
+def seen_nearest_first(tracks: Floats, boxes: Floats, turn: tuple[float, float]) -> Floats:
+    """The tracks at other `boxes` (m, 7), those of a sensor's frame, the nearest first. `turn` is
+    the cosine and the sine of the angle by which velocities turn into its axes.
+    """
+    cos, sin = turn
+    ranges = np.empty(len(tracks))
+    seen = np.empty(tracks.shape)
+    for m in range(len(tracks)):
+        # Each is put behind all that are not farther: tracks of one distance stay in the order in
+        # which they were begun.
+        away = math.hypot(boxes[m, 0], boxes[m, 1])
+        place = m
+        while place > 0 and ranges[place - 1] > away:
+            ranges[place] = ranges[place - 1]
+            _copy_row(seen, place - 1, seen, place)
+            place -= 1
+        ranges[place] = away
+        _copy_row(tracks, m, seen, place)
+        _put_box(seen[place], boxes[m])
+        seen[place, _VX] = cos * tracks[m, _VX] - sin * tracks[m, _VY]
+        seen[place, _VY] = sin * tracks[m, _VX] + cos * tracks[m, _VY]
+    return seen
+
+
+@compiled()
+def possible_pairs(
+    tracks: Floats, classes: Integers, seen: Floats, rules: Rules
+) -> tuple[Floats, Mask, Pairs, bool]:
+    """(m, n) metres between forecasts and detections, (m, n) which of them can be one object; the
+    rows of both in such pairs where none is in two, and whether that is so.
+    """
+    life = Life(*rules)
+    distances = np.empty((len(tracks), len(seen)))
+    possible = np.zeros(distances.shape, np.bool_)
+    rows = np.empty(len(seen), np.int64)
+    columns = np.empty(len(seen), np.int64)
+    is_taken = np.zeros(len(seen), np.bool_)
+    count = 0
+    alone = True
+    for m in range(len(tracks)):
+        # A track with a velocity is forecast where it should be, and its gate is that of the match.
+        # One seen once is forecast where it was, and may have gone any way since.
+        gate = life.gate_m
+        if tracks[m, _HITS] <= 1:
+            gate += life.first_speed_mps * ((tracks[m, _MISSES] + 1) * life.keyframe_s)
+        before = count
+        for n in range(len(seen)):
+            distances[m, n] = math.hypot(tracks[m, _X] - seen[n, 0], tracks[m, _Y] - seen[n, 1])
+            if distances[m, n] <= gate and tracks[m, _CLASS] == classes[n]:
+                possible[m, n] = True
+                alone = alone and count == before and not is_taken[n]
+                if alone:
+                    is_taken[n] = True
+                    rows[count], columns[count] = m, n
+                    count += 1
+    return distances, possible, (rows[:count], columns[:count]), alone
+
+
+@compiled()
+def lived_on(
+    tracks: Floats, classes: Integers, seen: Floats, pairs: Pairs, rules: Rules, next_id: int
+) -> tuple[Floats, Integers]:
+    """The tracks a keyframe later, and (n,) the id of the track of every detection.
+
+    `pairs` belong together. A detection without a track begins one, from `next_id` on.
+    """
+    life = Life(*rules)
+    rows, columns = pairs
+    detected = np.full(len(tracks), -1)
+    for k in range(len(rows)):
+        detected[rows[k]] = columns[k]
+
+    # Who has not been detected for too long is dropped, new ones come last. Ids count up and are
+    # never given again, so each means one object.
+    result = np.empty((len(tracks) + len(seen), tracks.shape[1]))
+    ids = np.full(len(seen), -1)
+    count = 0
+    for m in range(len(tracks)):
+        n = detected[m]
+        elapsed = (tracks[m, _MISSES] + 1) * life.keyframe_s
+        if n < 0 and elapsed > life.coast_s + LAST_BITS_S:
+            continue
+        _copy_row(tracks, m, result, count)
+        result[count, _MISSES] += 1
+        if n >= 0:
+            _follow(result[count], seen[n], elapsed)
+            ids[n] = int(tracks[m, _ID])
+        count += 1
+    for n in range(len(seen)):
+        if ids[n] < 0:
+            ids[n] = next_id
+            _begin(result[count], next_id, classes[n], seen[n])
+            next_id += 1
+            count += 1
+    return result[:count], ids
+
+
+@compiled()
+def _follow(track: Floats, box: Floats, elapsed: float) -> None:
+    """Set a track to the `box` (7,) on which it is detected, `elapsed` seconds after the last."""
+    # A forecast moved at constant velocity; moved back, it is where the object was last seen. The
+    # velocity is the way from there over the time since, however many keyframes that is.
+    track[_VX] = (box[0] - (track[_X] - track[_VX] * elapsed)) / elapsed
+    track[_VY] = (box[1] - (track[_Y] - track[_VY] * elapsed)) / elapsed
+    track[_MISSES] = 0.0
+    track[_HITS] += 1
+    _put_box(track, box)
+
+
+@compiled()
+def _begin(track: Floats, number: int, label: int, box: Floats) -> None:
+    """Make a row the track of what is seen for the first time."""
+    for k in range(len(track)):
+        track[k] = 0.0
+    track[_ID], track[_CLASS], track[_HITS] = number, label, 1.0
+    _put_box(track, box)
+
+
+@compiled()
+def _put_box(track: Floats, box: Floats) -> None:
+    for k in range(_BOX_WIDTH):
+        track[_BOX + k] = box[k]
+
+
+@compiled()
+def _copy_row(source: Floats, row: int, target: Floats, place: int) -> None:
+    for k in range(source.shape[1]):
+        target[place, k] = source[row, k]
+
 
 _IMPOSSIBLE_M = 1e6
 """The cost of a pair that cannot be one object, in metres of distance: more than all others."""
@@ -26,7 +202,7 @@ class MemoryRules:
     for 3 of the open one (CenterPoint's tracker: 3 frames at 2 Hz).
     """
 
-    def life(self, keyframe_s: float) -> kernels.Rules:
+    def life(self, keyframe_s: float) -> Rules:
         """These rules where keyframes are `keyframe_s` seconds apart, as compiled code takes
         them.
         """
@@ -59,13 +235,11 @@ class TrackMemory:
         estimates.
         """
         boxes = sensor.boxes_to_local(self._table[:, Tracks.BOX])
-        return Tracks.from_checked_rows(
-            kernels.seen_nearest_first(self._table, boxes, sensor.turn_back)
-        )
+        return Tracks.from_checked_rows(seen_nearest_first(self._table, boxes, sensor.turn_back))
 
     def predict(self) -> None:
         """Move every track one keyframe ahead at constant velocity."""
-        self._table = kernels.forecast(self._table, self._keyframe_s)
+        self._table = forecast(self._table, self._keyframe_s)
 
     def update(self, detections: Detections, sensor: Frame) -> Integers:
         """Assign the detections of this keyframe to the forecasts, start new tracks, drop old ones.
@@ -75,9 +249,7 @@ class TrackMemory:
         classes = np.ascontiguousarray(detections.classes, np.int64)
         seen = sensor.boxes_to_world(detections.boxes)
         pairs = assigned(self._table, classes, seen, self._life)
-        self._table, ids = kernels.lived_on(
-            self._table, classes, seen, pairs, self._life, self._next_id
-        )
+        self._table, ids = lived_on(self._table, classes, seen, pairs, self._life, self._next_id)
         self._next_id = max(self._next_id, ids.max(initial=-1) + 1)
         return ids
 
@@ -90,15 +262,11 @@ class TrackMemory:
         return turned(self._table[rows, Tracks.VELOCITY], -sensor.yaw)
 
 
-def assigned(tracks: Floats, classes: Integers, seen: Floats, life: kernels.Rules) -> kernels.Pairs:
-    """The rows (k,) of forecasts and of detections that belong together, pair by pair.
-
-    The forecasts are a table of `care_sim.perception.track_kernels`. Detections have `classes` (n,)
-    and stand at `seen` (n, 7) in the world.
-    """
+def assigned(tracks: Floats, classes: Integers, seen: Floats, life: Rules) -> Pairs:
+    """The rows (k,) of forecasts and of detections that belong together, pair by pair."""
     from scipy.optimize import linear_sum_assignment
 
-    distances, possible, pairs, alone = kernels.possible_pairs(tracks, classes, seen, life)
+    distances, possible, pairs, alone = possible_pairs(tracks, classes, seen, life)
     # Nearly always each can be one alone, and all pairs belong together.
     if alone:
         return pairs

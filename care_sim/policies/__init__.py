@@ -11,8 +11,7 @@ import gymnasium
 import gymnasium.vector
 
 from care_sim.base.errors import BrokenPolicy, InvalidInput, shown
-from care_sim.base.links import refuse_link
-from care_sim.base.plugins import Plugins
+from care_sim.base.plugins import Plugins, refuse_link
 from care_sim.base.vectors import attribute_of_each, shared_attribute
 from care_sim.policies.base import Policy
 from care_sim.policies.controls.patterns import Fan, Place, Rows, Stride, Sweep

@@ -11,15 +11,15 @@ import numpy as np
 
 from care_sim.base.checks import as_array
 from care_sim.base.errors import InvalidInput
-from care_sim.core.actions import scores_of
 from care_sim.core.allocation import allocate
 from care_sim.core.arrays import Integers
 from care_sim.core.belief import Belief, Observation
-from care_sim.core.beliefs import Beliefs
+from care_sim.core.cells.sets import WorldSets
+from care_sim.core.firing.actions import scores_of
 from care_sim.core.grid import Cells
+from care_sim.core.observation.beliefs import Beliefs
 from care_sim.core.rig import Rig
 from care_sim.core.types import Action, Demand
-from care_sim.core.world_sets import WorldSets
 from care_sim.loops.truth import Truth
 
 TAGS = ("causal", "privileged", "non-causal", "learned", "generator", "control")

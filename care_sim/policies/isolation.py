@@ -34,7 +34,7 @@ from care_sim.base.errors import (
 )
 from care_sim.base.processes import LOOK_S, end_with_parent, flush_output, lead_group, starting
 from care_sim.core.belief import Belief, Observation
-from care_sim.core.cell_sets import CellSets
+from care_sim.core.cells.sets import CellSets
 from care_sim.core.rig import Rig
 from care_sim.core.types import Action, Demand
 from care_sim.policies.base import Policy

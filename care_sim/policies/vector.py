@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.errors import InvalidInput, shown
-from care_sim.core.allocator import Allocator
 from care_sim.core.arrays import Integers, Mask
 from care_sim.core.belief import Observation
-from care_sim.core.beliefs import Beliefs, check_observed
+from care_sim.core.cells.sets import WorldSets
+from care_sim.core.firing.actions import Allocator
+from care_sim.core.observation.beliefs import Beliefs, check_observed
 from care_sim.core.rig import Rig
 from care_sim.core.types import Action
-from care_sim.core.world_sets import WorldSets
 from care_sim.policies.base import FixedPolicy, Policy, RowPolicy
 
 Actions = NDArray[np.float32]

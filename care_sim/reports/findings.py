@@ -23,7 +23,7 @@ from care_sim.reports.engine.measures import (
 )
 from care_sim.reports.engine.parts import Part
 from care_sim.reports.formatting import MARKS, emphasised, ends, signed
-from care_sim.reports.protocol.notes import papers
+from care_sim.reports.protocol.formatting import papers
 from care_sim.reports.protocol.paper import PAPER_BUDGETS
 from care_sim.reports.protocol.quotes import GATE
 from care_sim.reports.protocol.rows import HISTORY, plays_by_setting, settings

@@ -7,10 +7,8 @@ from care_sim.base.errors import counted
 from care_sim.evaluation.bootstrap import Interval
 from care_sim.reports.formatting import MARKS, bounds, marked, tag_notes
 from care_sim.reports.table import Bold, Table, TableRow
-from care_sim.study.benchmark.made_by import code_of, processor_of
-from care_sim.study.benchmark.result import BenchmarkResult
-from care_sim.study.benchmark.tasks import CAMERAS, IDEAL, Entry
-from care_sim.study.benchmark.worlds import BENCHMARK_VERSION
+from care_sim.study.benchmark.result import BenchmarkResult, code_of, processor_of
+from care_sim.study.benchmark.suite import BENCHMARK_VERSION, CAMERAS, IDEAL, Entry
 from care_sim.study.run_config import FULL
 
 CONTROL = Entry("place")

@@ -19,7 +19,7 @@ from care_sim.base.files import write_text
 from care_sim.reports.report import CONFIG, StudyReport, described, read_results
 from care_sim.reports.study import Study
 from care_sim.study.results_formats import EPISODES, PLAYS, VEHICLE
-from care_sim.study.row_checks import RowChecks
+from care_sim.study.rows.checks import RowChecks, check_worlds
 from care_sim.study.rows.parquet import (
     read_notes,
     read_rows,
@@ -29,7 +29,6 @@ from care_sim.study.rows.parquet import (
 )
 from care_sim.study.rows.reading import key_of, with_regret
 from care_sim.study.run_config import Row
-from care_sim.study.world_hash import check_worlds
 
 _EVENTS = "events.parquet"
 

@@ -1,5 +1,6 @@
 """A study from configurations to a folder of results, and a report of what lies in one."""
 
+import re
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -9,18 +10,85 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 
 from care_sim.base.errors import InvalidInput, counted, printable, unknown
-from care_sim.base.files import write_text
-from care_sim.base.json_text import json_content
-from care_sim.reports.latex import PREAMBLE, latex, paragraph
+from care_sim.base.files import json_content, write_text
 from care_sim.reports.studies import STUDIES, SWEEP, study_of
 from care_sim.reports.study import Study
-from care_sim.reports.table import Table, unmarked
+from care_sim.reports.table import Bold, Table, TableRow, unmarked
+from care_sim.study.journal import UNFINISHED, how_far
 from care_sim.study.results_formats import results_format_in
-from care_sim.study.row_checks import RowChecks
+from care_sim.study.rows.checks import RowChecks
 from care_sim.study.rows.parquet import read_notes, read_rows, read_table
 from care_sim.study.rows.reading import policy_of
 from care_sim.study.run_config import FULL, Row
-from care_sim.study.unfinished import UNFINISHED, how_far
+
+PREAMBLE = "% \\usepackage{booktabs,adjustbox}\n"
+_FIT = "max width=\\textwidth,max totalheight=0.85\\textheight"
+"""A table that is too wide or too long for a page is scaled down."""
+
+_SPECIAL = {
+    **{sign: f"\\{sign}" for sign in "&%$#_{}"},
+    "\\": r"\textbackslash{}",
+    "~": r"$\sim$",
+    "^": r"\textasciicircum{}",
+    "≤": r"$\le$",
+    "≥": r"$\ge$",
+    "†": r"\textdagger{}",
+    "‡": r"\textdaggerdbl{}",
+    "§": r"\S{}",
+    "°": r"\textdegree{}",
+    "±": r"$\pm$",
+    "<": r"\textless{}",
+    ">": r"\textgreater{}",
+}
+_ESCAPES = str.maketrans(_SPECIAL)
+_MINUS = re.compile(r"(?<!\w)-(?=\d)")
+
+
+def escaped(text: str) -> str:
+    """Text as LaTeX prints it; a hyphen before a number is a minus, but not one within a word."""
+    # Quotation marks after the escapes, which know none of the signs that they become.
+    quoted = re.sub(r'"([^"]*)"', r"``\1''", text.translate(_ESCAPES))
+    return _MINUS.sub("$-$", quoted)
+
+
+def paragraph(text: str) -> str:
+    """A paragraph in small print."""
+    return f"{{\\footnotesize {escaped(text)}\\par}}\n"
+
+
+def latex(table: Table) -> str:
+    """The table as a float with a caption; its notes and quotes stand in the caption."""
+    caption = " ".join([f"{table.title}.", *table.lines, *table.quotes])
+    columns = len(table.columns)
+    lines = [
+        "\\begin{table}[tbp]",
+        "\\centering\\footnotesize",
+        f"\\caption{{{escaped(caption)}}}",
+        f"\\begin{{adjustbox}}{{{_FIT}}}",
+        f"\\begin{{tabular}}{{{'l' * columns}}}",
+        "\\toprule",
+        _line(table.columns),
+        "\\midrule",
+        *(_heading(row[0], columns) if len(row) == 1 else _line(row) for row in table.rows),
+        "\\bottomrule",
+        "\\end{tabular}",
+        "\\end{adjustbox}",
+        "\\end{table}",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _line(row: TableRow) -> str:
+    return " & ".join(map(_entry, row)) + r" \\"
+
+
+def _entry(text: str) -> str:
+    return f"\\textbf{{{escaped(text)}}}" if isinstance(text, Bold) else escaped(text)
+
+
+def _heading(text: str, columns: int) -> str:
+    return f"\\multicolumn{{{columns}}}{{l}}{{\\emph{{{escaped(text)}}}}} \\\\"
+
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -80,7 +148,7 @@ class StudyReport:
     ) -> "StudyReport":
         """The report of a study that lacks what is `left_out`."""
         # Imported here and below because it loads Matplotlib, before anything is printed.
-        from care_sim.reports.figures.files import default_style
+        from care_sim.reports.figures.styles import default_style
 
         tables = study.tables(rows)
         with default_style():
@@ -95,7 +163,7 @@ class StudyReport:
 
     def write(self, folder: Path) -> None:
         """Write tables and figures into a folder; then figures of an earlier study are removed."""
-        from care_sim.reports.figures.files import remove_others, save
+        from care_sim.reports.figures.styles import remove_others, save
 
         # New files first, then what is no longer of this study: whoever stops it in between keeps
         # both.

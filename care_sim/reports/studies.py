@@ -16,31 +16,30 @@ from care_sim.reports.findings import (
     ties,
 )
 from care_sim.reports.protocol.contrasts import protocol_minus
-from care_sim.reports.protocol.notes import protocol_closing
+from care_sim.reports.protocol.formatting import protocol_closing
 from care_sim.reports.protocol.tables import protocol_tables
 from care_sim.reports.study import Study
 from care_sim.reports.tables.ablations import ablation_tables, ceiling
 from care_sim.reports.tables.crowding import crowding_tables
 from care_sim.reports.tables.faults import fault_tables
-from care_sim.reports.tables.firing import firing_tables
 from care_sim.reports.tables.mechanism import mechanism_closing, mechanism_tables
 from care_sim.reports.tables.ncap import ncap_headline, ncap_tables
 from care_sim.reports.tables.order import order_closing, order_tables
 from care_sim.reports.tables.paper_statements import in_short, statement_tables
 from care_sim.reports.tables.r157 import r157_tables
 from care_sim.reports.tables.realism import realism_tables
-from care_sim.reports.tables.sweep import sweep_minus, sweep_tables
+from care_sim.reports.tables.sweep import firing_tables, sweep_minus, sweep_tables
 from care_sim.reports.tables.validate import validation_closing, validation_tables
 from care_sim.reports.tables.vehicle import vehicle_tables
 from care_sim.study.designs.crowding import VEHICLES_COLUMN
 from care_sim.study.designs.faults import FAULT_PLACES
-from care_sim.study.designs.ncap import (
+from care_sim.study.designs.standards import (
+    CASE_COLUMNS,
     REPORTED_COLUMN,
     SPEED_COLUMN,
     TARGET_COLUMN,
     TEST_COLUMN,
 )
-from care_sim.study.designs.r157 import CASE_COLUMNS
 from care_sim.study.results_formats import MECHANISM, PLAYS, VEHICLE
 from care_sim.study.rows.parquet import read_notes
 from care_sim.study.rows.schema import COUNT, FLAG, SUM, TEXT, as_optional

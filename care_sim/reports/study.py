@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 from care_sim.reports.table import Table
 from care_sim.scenarios import SCENARIOS
 from care_sim.study.results_formats import EPISODES, ResultsFormat
-from care_sim.study.rows.reading import setting_of
+from care_sim.study.rows.reading import SOURCES, Setting, setting_of
 from care_sim.study.rows.schema import Column, Schema
-from care_sim.study.rows.settings import SOURCES, Setting
 from care_sim.study.run_config import Row
 
 if TYPE_CHECKING:

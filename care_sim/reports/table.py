@@ -1,4 +1,4 @@
-"""A table of text, for a file in Markdown and for a terminal; `care_sim.reports.latex` sets it in
+"""A table of text, for a file in Markdown and for a terminal; `care_sim.reports.report` sets it in
 LaTeX.
 """
 

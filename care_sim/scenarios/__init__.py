@@ -2,24 +2,20 @@
 its place. A scenario is a frozen dataclass of its physics with a `build(rng)`.
 
 An entry of the group `care_sim.scenarios` names the class. It is called as the scenario is, or by
-the id of its environment, which is then registered (`care_sim.base.scenario_names`).
+the id of its environment, which is then registered (`care_sim.base.plugins`).
 """
 
 from dataclasses import fields
 
 from care_sim.base.checks import check_known
 from care_sim.base.errors import BrokenScenario, InvalidInput, error_line, shown
-from care_sim.base.links import refuse_link
-from care_sim.base.plugins import Plugins
-from care_sim.base.scenario_names import SCENARIO_GROUP, scenario_of
-from care_sim.scenarios.base import Scenario
+from care_sim.base.plugins import SCENARIO_GROUP, Plugins, refuse_link, scenario_of
+from care_sim.scenarios.base import Scenario, scenario_faults
 from care_sim.scenarios.cutin import CutIn
-from care_sim.scenarios.dartout import Dartout
-from care_sim.scenarios.dense import Dense
+from care_sim.scenarios.dartout import Dartout, Dense
 from care_sim.scenarios.drive import DriveScenario
 from care_sim.scenarios.ncap import Ncap
-from care_sim.scenarios.r157.scenario import R157
-from care_sim.scenarios.soundness import scenario_faults
+from care_sim.scenarios.r157 import R157
 
 refuse_link(__name__)
 

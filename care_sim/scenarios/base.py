@@ -1,19 +1,41 @@
-"""What the scenarios share: what a scenario is, and the street of the first three."""
+"""What the scenarios share: what a scenario is, the street of the first three, its reflection."""
 
+import inspect
 from abc import ABC, abstractmethod
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
-from care_sim.base.bounds import bounded, check_fields
-from care_sim.base.errors import BrokenScenario, InvalidInput, error_line
-from care_sim.base.foreign_code import foreign_place, is_raised_by_foreign
+from care_sim.base.checks import bounded, check_fields, one_of
+from care_sim.base.errors import (
+    BrokenScenario,
+    InvalidInput,
+    error_line,
+    foreign_place,
+    is_raised_by_foreign,
+)
+from care_sim.base.plugins import dataclass_faults
+from care_sim.core.frames import Pose
 from care_sim.core.pinhole import PinholeCamera
-from care_sim.sensors.camera import FRONT_CAMERA
-from care_sim.streets.dimensions import LANE_WIDTH_M, PARKING_WIDTH_M, SPEED_LIMIT_MPS
-from care_sim.world.bodies import CATALOGUE
-from care_sim.world.world import World
+from care_sim.sensors.pictures import FRONT_CAMERA
+from care_sim.streets.layouts import LANE_WIDTH_M, PARKING_WIDTH_M, SPEED_LIMIT_MPS
+from care_sim.world.bodies import CATALOGUE, BodyKind
+from care_sim.world.traffic import RoadVehicle, Traffic
+from care_sim.world.world import Actor, Motion, World
+
+
+def scenario_faults(made: Any) -> Iterator[str]:
+    """Why a loaded object is no scenario, one text per reason. `care_sim.base.plugins` asks it."""
+    if not (inspect.isclass(made) and issubclass(made, Scenario)):
+        yield "is no Scenario"
+        return
+    yield from dataclass_faults(made)
+    cameras = made.cameras
+    if not (isinstance(cameras, tuple) and all(isinstance(one, PinholeCamera) for one in cameras)):
+        yield f"has the cameras {cameras!r:.80}; allowed is a tuple of PinholeCamera"
+
 
 LONGEST_EPISODE_S = 60.0
 """The longest episode: a car at 60 km/h then comes to the end of the road, and a delayed picture is
@@ -84,3 +106,73 @@ def line_with_terraces(world: World, right_y: float, left_y: float) -> None:
     middle = length / 2 + FIRST_HOUSE_X
     world.add("terrace right", "terrace", (middle, right_y - depth / 2, 0.0), backdrop=True)
     world.add("terrace left", "terrace", (middle, left_y + depth / 2, 0.0), backdrop=True)
+
+
+MIRRORED = ("never", "drawn", "always")
+
+
+@dataclass(frozen=True)
+class MirrorableScenario(Scenario):
+    """A scenario whose world may be reflected at the middle of the ego's lane, as in left-hand
+    traffic: what stood on the right stands on the left.
+
+    `mirrored="drawn"` reflects the worlds of half of the seeds. A world and its reflection share
+    every other draw of the seed.
+    """
+
+    mirrored: str = one_of("never", MIRRORED)
+
+    def empty_world(self, traffic: Traffic, ego_speed: float, rng: np.random.Generator) -> World:
+        """The world to be filled, at time zero; `ego_speed` in m/s."""
+        reflects = self._reflects(rng)
+        world = (MirroredWorld if reflects else World)(traffic, ego_speed)
+        if self.mirrored == "drawn":
+            world.drawn = {"mirrored": "always" if reflects else "never"}
+        return world
+
+    def _reflects(self, rng: np.random.Generator) -> bool:
+        # A stream of its own: the draws that follow are those of the world that is not reflected.
+        return self.mirrored == "always" or (
+            self.mirrored == "drawn" and rng.spawn(1)[0].random() < 0.5
+        )
+
+
+class MirroredWorld(World):
+    """A world whose bodies stand and move reflected at the x axis, on which the ego drives.
+
+    Bodies keep their shapes: a person still has the right leg in front.
+    """
+
+    def add(
+        self,
+        name: str,
+        kind: str | BodyKind,
+        pose: Pose | Motion | RoadVehicle,
+        *,
+        reported: bool = True,
+        backdrop: bool = False,
+    ) -> Actor:
+        """Add a body where `World.add` would put its reflection."""
+        reflected = _reflected(pose)
+        return super().add(name, kind, reflected, reported=reported, backdrop=backdrop)
+
+
+@dataclass(frozen=True)
+class Reflection:
+    """The motion on the other side of the x axis of a function of time, or of a vehicle."""
+
+    of: Motion | RoadVehicle
+
+    def __call__(self, time: float) -> Pose:
+        """The pose at `time`."""
+        pose = self.of.pose if isinstance(self.of, RoadVehicle) else self.of(time)
+        return _on_the_other_side(pose)
+
+
+def _reflected(pose: Pose | Motion | RoadVehicle) -> Pose | Motion:
+    return _on_the_other_side(pose) if isinstance(pose, tuple) else Reflection(pose)
+
+
+def _on_the_other_side(pose: Pose) -> Pose:
+    x, y, heading = pose
+    return x, -y, -heading

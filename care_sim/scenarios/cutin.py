@@ -5,14 +5,14 @@ from functools import partial
 
 import numpy as np
 
-from care_sim.base.bounds import bounded
+from care_sim.base.checks import bounded
 from care_sim.scenarios.base import (
     EGO_SPEED_BOUNDS_MPS,
     USUAL_EGO_SPEED_MPS,
+    MirrorableScenario,
     line_with_terraces,
 )
-from care_sim.scenarios.mirroring import MirrorableScenario
-from care_sim.streets.dimensions import (
+from care_sim.streets.layouts import (
     LANE_WIDTH_M,
     SPEED_LIMIT_MPS,
     Range,
@@ -31,7 +31,9 @@ of 4.25 m on the right, where the stop is, and of 4.75 m on the left.
 
 @dataclass(frozen=True)
 class CutIn(MirrorableScenario):
-    """Two lanes in the ego's direction, the ego in the left one. A bus stands at its stop in the
+    """A car pulls out into the ego's lane from in front of a standing bus.
+
+    Two lanes in the ego's direction, the ego in the left one. A bus stands at its stop in the
     right lane. A car stands hidden before the bus and pulls out ahead of the ego (highway-env lane
     change, IDM).
 

@@ -11,26 +11,22 @@ from typing import Self
 
 import numpy as np
 
-from care_sim.base.bounds import bounded, one_of
-from care_sim.base.checks import check_flag
+from care_sim.base.checks import bounded, check_flag, one_of
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats
 from care_sim.core.frames import Pose
 from care_sim.scenarios.base import LONGEST_EPISODE_S, Scenario
 from care_sim.sensors.surround import SURROUND_CAMERAS
-from care_sim.streets.dimensions import LANE_WIDTH_M, SPEED_LIMIT_MPS
+from care_sim.streets.draft import footprints_meet
 from care_sim.streets.drive import SAMPLE_S, TURN_CHANCE, Drive, draw_drive
-from care_sim.streets.drive_traffic import DrivenLane
-from care_sim.streets.encounters import COMERS, Course, Wanted
-from care_sim.streets.footprints import footprints_meet
-from care_sim.streets.hiding import AT_KERB
+from care_sim.streets.drivers import DrivenLane
+from care_sim.streets.encounters import AT_KERB, COMERS, Course, Wanted
+from care_sim.streets.layouts import LANE_WIDTH_M, SPEED_LIMIT_MPS
 from care_sim.world.bodies import CATALOGUE
-from care_sim.world.crosser import Crosser, Meeting
-from care_sim.world.lane_flow import LaneFlow
-from care_sim.world.speed_plan import SpeedPlan
-from care_sim.world.street_traffic import FlowingLane, StreetTraffic
+from care_sim.world.lane_flow import FlowingLane, LaneFlow, StreetTraffic
+from care_sim.world.motions import Crosser, Meeting, Walk
+from care_sim.world.route import SpeedPlan
 from care_sim.world.traffic import Traffic
-from care_sim.world.walker import Walk
 from care_sim.world.world import WORLD_STEP_S, Motion, World
 
 CLEAR_M = 0.5
@@ -47,8 +43,10 @@ SIDES = {"left": 1, "right": -1}
 
 @dataclass(frozen=True)
 class DriveScenario(Scenario):
-    """A drive of 160 to 260 m through a residential street, straight, round a bend or off into a
-    side street. The ego follows its route, slows for bends and follows who drives ahead.
+    """A drive through a generated street, with traffic that reacts and people who come out.
+
+    The way is 160 to 260 m long, straight, round a bend or off into a side street. The ego follows
+    its route, slows for bends and follows who drives ahead.
 
     Up to three times somebody comes out of hiding: an adult, a child, a cyclist or a car, from
     either side. See `care_sim.streets.encounters` for who, whence and how it would end. What is

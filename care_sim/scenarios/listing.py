@@ -1,14 +1,12 @@
 """The scenarios as people read them: name, what it is, parameters with their bounds."""
 
-import inspect
 from collections.abc import Iterator
 from dataclasses import Field, fields
 from typing import Any
 
-from care_sim.base.bounds import allowed, option_text
+from care_sim.base.checks import allowed, option_text
 from care_sim.base.errors import InvalidInput
-from care_sim.base.plugins import package_of
-from care_sim.base.scenario_names import is_environment_id
+from care_sim.base.plugins import is_environment_id, package_of
 from care_sim.scenarios import PLUGINS, SCENARIOS, scenario_class, scenario_names
 from care_sim.scenarios.base import Scenario
 
@@ -58,12 +56,12 @@ def _choices(scenario: type[Scenario], field: Field[Any]) -> str:
 
 
 def _summary(name: str, scenario: type[Scenario]) -> str:
-    """The first line of the docstring of a built-in scenario's module; of another class its own,
-    its package and the id of its environment.
+    """The first line of a class's docstring; of one that is not built in its package, too, and the
+    id of its environment.
     """
-    if name in SCENARIOS:
-        return (inspect.getdoc(inspect.getmodule(scenario)) or "").partition("\n")[0]
-    entry = PLUGINS.entry(name)
     own = (scenario.__doc__ or "").strip().partition("\n")[0]
+    if name in SCENARIOS:
+        return own
+    entry = PLUGINS.entry(name)
     known = f"{entry.name}, " if is_environment_id(entry.name) else ""
     return f"{own} [{known}{package_of(entry)}]".strip()

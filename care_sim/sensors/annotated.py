@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.cells.stack import Grid
 from care_sim.core.grid import Cells
-from care_sim.core.grid_stack import Grid
 from care_sim.core.types import ImageDetections, Scan
 
 NO_OBJECT = -1
@@ -45,7 +45,7 @@ class Cloud:
     """Returns: `cells` (P,) ascending (several returns of a recorded sweep may share one), `points`
     (P, 3) in the sensor frame, `objects` (P,) the annotated object that each lies on or NO_OBJECT,
     `intensities` (P,), 0 to 1, where pulses have strength (`care_sim.sensors.signal`), and `times`
-    (P,), seconds from the keyframe, where they have their own (`care_sim.sensors.sweep`). `shots`
+    (P,), seconds from the keyframe, where they have their own (`care_sim.sensors.beams`). `shots`
     (P,) is how often a cell must be fired for each to return; None where once is enough for all.
     """
 

@@ -1,97 +1,188 @@
 """A ground-truth camera: boxes read off the visible pixels."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from care_sim.core.arrays import Floats, Integers
-from care_sim.core.boxes import planar_ranges
-from care_sim.core.conditions import Sensing
+from care_sim.base.times import LAST_BITS_S
+from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.cells.boxes import planar_ranges
+from care_sim.core.conditions import CameraFaults, Sensing
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import ImageDetections
 from care_sim.sensors.annotated import NO_OBJECT, IdentifiedDetections
-from care_sim.sensors.box_pool import EMPTY_POOL, BoxPool
-from care_sim.sensors.camera_faults import Delay, Misses, mounted
-from care_sim.sensors.camera_kernels import reported_boxes, surest_first
+from care_sim.sensors.camera_errors import ProfiledDetector
 from care_sim.sensors.camera_profiles import PROFILES
-from care_sim.sensors.confidence import MIN_PIXELS
-from care_sim.sensors.engines.box_kernels import boxes_of_window, visible_boxes
-from care_sim.sensors.false_boxes import FalseBoxes
-from care_sim.sensors.picture_timing import picture_timing
-from care_sim.sensors.profiled_detector import ProfiledDetector
-from care_sim.world.bullet import PixelWindow
-
-CAMERA_FROM_LIDAR = (0.76, 0.0, -0.33)
-"""Metres in the sensor frame: CAM_FRONT of nuScenes is this far before and below LIDAR_TOP."""
-CAMERA_HEIGHT = 180
-CAMERA_WIDTH = 320
-FRONT_CAMERA = PinholeCamera(CAMERA_WIDTH, CAMERA_HEIGHT, np.deg2rad(90.0), CAMERA_FROM_LIDAR)
-"""90 degrees wide, the default of CARLA's RGB camera, in which the paper ran."""
-
-_NO_ROWS = np.empty((0, len(ImageDetections.COLUMNS)))
-_NO_BODIES = np.empty(0, np.int64)
+from care_sim.sensors.false_boxes import EMPTY_POOL, BoxPool, FalseBoxes
+from care_sim.sensors.pictures import surest_first
 
 
-def window_on(camera: PinholeCamera, boxes: Floats) -> PixelWindow:
-    """The rectangle of the picture that holds every sensor-frame box (n, 7); empty when none is in
-    view.
-    """
-    return camera.window_on(boxes)
-
-
-@dataclass(frozen=True)
-class Picture:
-    """What a camera shows: `bodies` (n,) ids, image `boxes` (n, 4) and `pixels` (n,)
-    visible.
+class PictureTiming(NamedTuple):
+    """One picture per keyframe: it is taken `after_s` seconds after it, and its detections arrive
+    `keyframes` keyframes after it.
     """
 
-    bodies: Integers
-    boxes: Floats
-    pixels: Integers
+    keyframes: int
+    after_s: float
 
-    @classmethod
-    def of(cls, ids: Integers, window: PixelWindow | None = None) -> "Picture":
-        """Read the box of every body off a picture of ids (height, width), all of it or that of a
-        window.
+
+def picture_timing(faults: CameraFaults, keyframe_s: float, step_s: float) -> PictureTiming:
+    """The timing that `faults` ask for, of pictures that can be taken every `step_s` seconds, of
+    which a keyframe of `keyframe_s` is a whole number.
+
+    A latency in seconds is met by the newest picture that is at least so old.
+    """
+    if not faults.camera_latency_s:
+        return PictureTiming(faults.camera_latency, 0.0)
+    # Rounded up to steps; they are counted back from the keyframe at which the detections arrive.
+    steps = math.ceil((faults.camera_latency_s - LAST_BITS_S) / step_s)
+    per_keyframe = round(keyframe_s / step_s)
+    keyframes = -(-steps // per_keyframe)
+    return PictureTiming(keyframes, (keyframes * per_keyframe - steps) * step_s)
+
+
+NOTHING_SEEN = IdentifiedDetections(
+    ImageDetections.from_rows(np.empty((0, len(ImageDetections.COLUMNS)))), np.empty(0, np.int64)
+)
+
+
+class Misses:
+    """Which objects the camera misses: in the long run the stated share, in bursts of keyframes.
+
+    One number is drawn for every object at every keyframe, seen or not, so that every policy meets
+    the same misses.
+    """
+
+    def __init__(self, objects: int, faults: CameraFaults, rng: np.random.Generator):
+        self._faults = faults
+        self._rng = rng
+        self._lasting = np.zeros(objects, np.int64)
+        """(n,) keyframes for which each object's burst still lasts."""
+        self._started = False
+
+    def draw(self, ranges: Floats) -> Mask:
+        """(n,) who is missed at this keyframe; `ranges` (n,) are distances in metres."""
+        faults = self._faults
+        if not (faults.false_negative_rate or faults.false_negative_per_m):
+            return np.zeros(len(ranges), bool)
+        rates = miss_rates(faults.false_negative_rate, faults.false_negative_per_m, ranges)
+        # One draw per object decides all: whether it is missed, and at the start for how long.
+        draws = self._rng.random(len(rates))
+        burst = faults.false_negative_burst
+        if self._started:
+            self._lasting = later_bursts(self._lasting, rates, draws, burst)
+        else:
+            self._lasting = first_bursts(rates, draws, burst)
+        self._started = True
+        missed = self._lasting > 0
+        self._lasting -= missed
+        return missed
+
+
+def miss_rates(rate: float | Floats, per_m: float | Floats, ranges: Floats) -> Floats:
+    """The share of keyframes at which objects so many metres away are missed, in any shape, by
+    `false_negative_rate` and `false_negative_per_m`.
+    """
+    return np.minimum(rate + per_m * ranges, 1.0)
+
+
+def first_bursts(rates: Floats, draws: Floats, burst: int | Integers) -> Integers:
+    """For how many keyframes, from the first on, objects are missed that have these rates and
+    draws. Arrays of one shape.
+
+    The first keyframe shows the long run: an object is missed at its rate, and whoever is missed is
+    at any keyframe of its burst with equal chance.
+    """
+    hit = draws < rates
+    # A draw below the rate, divided by it, is again evenly distributed from 0 to 1.
+    share = np.divide(draws, rates, out=np.zeros_like(draws), where=hit)
+    served = np.floor(burst * share).astype(np.int64)
+    return np.where(hit, burst - served, 0)
+
+
+def later_bursts(
+    lasting: Integers, rates: Floats, draws: Floats, burst: int | Integers
+) -> Integers:
+    """The same at a later keyframe, before which they were missed for `lasting` more: bursts begin
+    among the objects that are in none.
+    """
+    # With the chance p that a burst of L keyframes begins, (1 - p) / p keyframes without one lie
+    # between two bursts on the mean. The share of missed keyframes is L / (L + (1 - p) / p); it is
+    # the rate r for p = r / (L - (L - 1) r).
+    begins = (lasting == 0) & (draws < rates / (burst - (burst - 1) * rates))
+    return np.where(begins, burst, lasting)
+
+
+class _SentPicture(NamedTuple):
+    """The detections of a picture on their way: that of `keyframe`, taken with the car's `heading`,
+    they arrive at the keyframe `due`.
+    """
+
+    seen: IdentifiedDetections
+    heading: float
+    keyframe: int
+    due: int
+
+
+@dataclass
+class Delay:
+    """Hands out the newest picture that has arrived.
+
+    One is taken per keyframe, as `timing` says. Each is late by its keyframes, and by 0 to `jitter`
+    more that are drawn for it.
+    """
+
+    timing: PictureTiming
+    jitter: int
+    keyframe_s: float
+    rng: np.random.Generator
+
+    def __post_init__(self) -> None:
+        self._sent: list[_SentPicture] = []
+        self._taken = 0
+        self._keyframe = -1
+
+    def take(self, seen: IdentifiedDetections, heading: float) -> None:
+        """Take in the detections of a keyframe's picture, and the car's heading when it was taken,
+        radians.
         """
-        return cls.listed(visible_boxes(ids) if window is None else boxes_of_window(ids, window))
+        # Lateness is drawn for every picture in turn, whatever it shows.
+        late = self.timing.keyframes
+        late += int(self.rng.integers(self.jitter + 1)) if self.jitter else 0
+        self._sent.append(_SentPicture(seen, heading, self._taken, self._taken + late))
+        self._taken += 1
 
-    @classmethod
-    def listed(cls, table: Integers) -> "Picture":
-        """What a table of an engine's `visible_boxes` tells."""
-        return cls(table[:, 0], table[:, 1:5].astype(np.float64), table[:, 5])
+    def newest(self, heading: float) -> IdentifiedDetections:
+        """Begin a keyframe with the car's `heading`, radians; return the newest detections that are
+        due, with age and yaw change.
+        """
+        self._keyframe += 1
+        arrived = [n for n, picture in enumerate(self._sent) if picture.due <= self._keyframe]
+        if not arrived:
+            return NOTHING_SEEN
+        # Jitter lets a picture overtake the ones before it, which are then never handed out.
+        self._sent = self._sent[arrived[-1] :]
+        return self._aged(self._sent[0], heading)
 
-    def shows(self, body: int) -> bool:
-        """Whether enough of a body is visible for a box."""
-        return body in self._shown
-
-    @cached_property
-    def _shown(self) -> frozenset[int]:
-        return frozenset(self.bodies[self.pixels >= MIN_PIXELS].tolist())
-
-
-def class_table(labels: Mapping[int, int]) -> Integers:
-    """The class of every body by its id, -1 of those that `labels` does not map to one."""
-    table = np.full(max(labels, default=-1) + 1, -1)
-    table[list(labels)] = list(labels.values())
-    return table
+    def _aged(self, picture: _SentPicture, heading: float) -> IdentifiedDetections:
+        age_s = (self._keyframe - picture.keyframe) * self.keyframe_s - self.timing.after_s
+        detections = picture.seen.detections.aged(age_s, heading - picture.heading)
+        return IdentifiedDetections(detections, picture.seen.objects)
 
 
-def faultless_detections(pictures: Sequence[Picture], classes: Integers) -> IdentifiedDetections:
-    """What the camera detector reports without faults: a box for every body that has a class in the
-    `class_table` and shows enough pixels.
-
-    `pictures` are one per camera of the rig, in its order.
-    """
-    parts = [
-        reported_boxes(picture.bodies, picture.boxes, picture.pixels, classes, camera)
-        for camera, picture in enumerate(pictures)
-    ]
-    rows = np.concatenate([_NO_ROWS, *(rows for rows, _ in parts)])
-    bodies = np.concatenate([_NO_BODIES, *(bodies for _, bodies in parts)])
-    return IdentifiedDetections(ImageDetections.from_checked_rows(rows), bodies)
+def mounted(camera: PinholeCamera, faults: CameraFaults, rng: np.random.Generator) -> PinholeCamera:
+    """The camera as it really stands: turned and moved by errors that the rig does not know."""
+    # Drawn even where both spreads are 0, so that to switch one error on does not change what is
+    # drawn for the other.
+    yaw, pitch = np.deg2rad(faults.camera_rotation_sigma_deg) * rng.standard_normal(2)
+    shift = faults.camera_position_sigma_m * rng.standard_normal(3)
+    x, y, z = (float(value) for value in camera.position + shift)
+    return replace(
+        camera, position=(x, y, z), yaw=camera.yaw + float(yaw), pitch=camera.pitch + float(pitch)
+    )
 
 
 class CameraDetector:

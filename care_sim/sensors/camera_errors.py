@@ -20,8 +20,8 @@ from care_sim.core.arrays import Floats, Integers
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import CLASSES, ImageDetections
 from care_sim.sensors.annotated import IdentifiedDetections
-from care_sim.sensors.box_pool import NO_ROWS, BoxPool, box_areas
-from care_sim.sensors.false_boxes import without_duplicates
+from care_sim.sensors.camera_profiles import CameraProfile
+from care_sim.sensors.false_boxes import NO_ROWS, BoxPool, box_areas, without_duplicates
 
 
 class PersistentDraws:
@@ -61,32 +61,6 @@ medians of the catalogue's bodies, seen from all sides at 10 to 30 m. The corner
 stay empty, of slender bodies most.
 """
 _UNHIDDEN = np.array([UNHIDDEN[name] for name in CLASSES])
-
-
-@dataclass(frozen=True)
-class RecallTable:
-    """Measured recall at some heights and visible shares, linear between them.
-
-    `heights` (h,) in pixels and `shares` (s,) ascend; `recalls` (s, h). Recall falls to 0 from the
-    first height to height 0 and from the first share to share 0; beyond the last ones it stays.
-    """
-
-    heights: tuple[float, ...]
-    shares: tuple[float, ...]
-    recalls: tuple[tuple[float, ...], ...]
-
-    def at(self, heights: Floats, shares: Floats) -> Floats:
-        """(n,) the recall at `heights` (n,) in pixels and visible `shares` (n,)."""
-        known = (0.0, *self.heights)
-        by_height = [np.interp(heights, known, (0.0, *row)) for row in self.recalls]
-        levels = np.stack([np.zeros(len(heights)), *by_height])
-        # Where each share lies between two of the table: the lower one, and how far beyond it.
-        places = np.interp(shares, (0.0, *self.shares), np.arange(len(levels)))
-        lower = np.minimum(places.astype(np.int64), len(levels) - 2)
-        objects = np.arange(len(heights))
-        low, high = levels[lower, objects], levels[lower + 1, objects]
-        recalls: Floats = low + (places - lower) * (high - low)
-        return recalls
 
 
 def seen_as(
@@ -244,3 +218,89 @@ class Ghosts:
         is_own = (pool.objects == ghost.object) & (pool.cameras == ghost.camera)
         rows = np.flatnonzero(is_now & is_own)
         return int(rows[0]) if len(rows) else None
+
+
+_JITTERED = 4
+"""A box's middle across and down, its width and its height."""
+
+
+class ProfiledDetector:
+    """Makes of faultless detections what a detector of a profile reports.
+
+    `objects` (n,) are all that it may ever find, `cameras` those that take the pictures. Ghosts are
+    made from `pool`. Every kind of error has a random stream of its own.
+    """
+
+    def __init__(
+        self,
+        profile: CameraProfile,
+        objects: Integers,
+        cameras: Sequence[PinholeCamera],
+        keyframe_s: float,
+        pool: BoxPool,
+        seeds: Sequence[np.random.SeedSequence],
+    ):
+        misses, jitter, confusion, ghosts = (np.random.default_rng(seed) for seed in seeds)
+        self._profile = profile
+        self._objects = objects
+        self._order = np.argsort(objects)
+        self._cameras = cameras
+        self._matrix = profile.confusion_matrix()
+        self._spreads = np.array([group.jitter for group in profile.groups])
+        # A number for every group: no class need be known of an object before it is seen.
+        times_s = [group.miss_time_s for group in profile.groups]
+        self._misses = PersistentDraws(len(objects), times_s, keyframe_s, misses)
+        jitter_times_s = [profile.jitter_time_s] * _JITTERED
+        self._jitter = PersistentDraws(len(objects), jitter_times_s, keyframe_s, jitter)
+        self._confusion = PersistentDraws(
+            len(objects), [profile.confusion_time_s], keyframe_s, confusion
+        )
+        self._ghosts = Ghosts(
+            pool,
+            profile.ghosts_per_picture,
+            profile.ghost_time_s,
+            keyframe_s,
+            len(cameras),
+            ghosts,
+        )
+
+    def report(self, seen: IdentifiedDetections, boxes: Floats) -> tuple[Floats, Integers]:
+        """What is reported of the faultless detections `seen` (m,): rows (k, 9) as
+        `ImageDetections.rows`, and (k,) the object behind each.
+
+        `boxes` (n, 7) are the 3D boxes of all objects in the sensor frame.
+        """
+        # Where the detections' objects stand among all.
+        places = self._order[np.searchsorted(self._objects, seen.objects, sorter=self._order)]
+        # All numbers are drawn at every keyframe, whatever is there.
+        misses, jitter, confusion = (
+            draws.next()[places] for draws in (self._misses, self._jitter, self._confusion)
+        )
+        classes = seen.detections.classes
+        groups = self._profile.groups_of(classes)
+        own_misses = misses[np.arange(len(seen)), groups]
+        (found,) = np.nonzero(own_misses < self._recalls(seen, groups, boxes[places]))
+
+        rows = seen.detections.rows()[found]
+        rows[:, ImageDetections.CLASS] = confused(classes[found], confusion[found, 0], self._matrix)
+        rows[:, ImageDetections.BOX] = jittered(
+            rows[:, ImageDetections.BOX],
+            jitter[found],
+            self._spreads[groups[found]],
+            seen.detections.cameras[found],
+            self._cameras,
+        )
+        return rows, seen.objects[found]
+
+    def ghosts(self, shown: Floats, time_s: float) -> Floats:
+        """(k, 9) the ghosts of this keyframe's pictures, beside the boxes `shown` (n, 9)."""
+        return self._ghosts.draw(shown, time_s)
+
+    def _recalls(self, seen: IdentifiedDetections, groups: Integers, boxes: Floats) -> Floats:
+        """(m,) the chances to find the objects `seen` (m,) of `groups` (m,) with `boxes` (m, 7)."""
+        heights, shares = seen_as(seen, boxes, self._cameras, self._profile.focal_px)
+        recalls = np.empty(len(seen))
+        for number, group in enumerate(self._profile.groups):
+            own = groups == number
+            recalls[own] = group.recall.at(heights[own], shares[own])
+        return recalls

@@ -15,7 +15,32 @@ import numpy as np
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.conditions import IDEAL_CAMERA, YOLOX_CAMERA, CameraFaults
 from care_sim.core.types import CLASSES
-from care_sim.sensors.camera_errors import RecallTable
+
+
+@dataclass(frozen=True)
+class RecallTable:
+    """Measured recall at some heights and visible shares, linear between them.
+
+    `heights` (h,) in pixels and `shares` (s,) ascend; `recalls` (s, h). Recall falls to 0 from the
+    first height to height 0 and from the first share to share 0; beyond the last ones it stays.
+    """
+
+    heights: tuple[float, ...]
+    shares: tuple[float, ...]
+    recalls: tuple[tuple[float, ...], ...]
+
+    def at(self, heights: Floats, shares: Floats) -> Floats:
+        """(n,) the recall at `heights` (n,) in pixels and visible `shares` (n,)."""
+        known = (0.0, *self.heights)
+        by_height = [np.interp(heights, known, (0.0, *row)) for row in self.recalls]
+        levels = np.stack([np.zeros(len(heights)), *by_height])
+        # Where each share lies between two of the table: the lower one, and how far beyond it.
+        places = np.interp(shares, (0.0, *self.shares), np.arange(len(levels)))
+        lower = np.minimum(places.astype(np.int64), len(levels) - 2)
+        objects = np.arange(len(heights))
+        low, high = levels[lower, objects], levels[lower + 1, objects]
+        recalls: Floats = low + (places - lower) * (high - low)
+        return recalls
 
 
 @dataclass(frozen=True)

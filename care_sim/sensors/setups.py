@@ -18,8 +18,8 @@ import numpy as np
 from care_sim.base.checks import check_arguments, check_number, check_path
 from care_sim.base.digests import content_digest
 from care_sim.base.errors import InvalidInput, shown
+from care_sim.core.cells.rays import LEAST_VIEW, MOST_TILT
 from care_sim.core.grid import AngularGrid, Place
-from care_sim.core.grid_rays import LEAST_VIEW, MOST_TILT
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.sensor_setup import LIDAR_POSITION, SensorSetup, between
 

@@ -15,11 +15,17 @@ clear air the reach grows with the square root of n. `docs/firing.md` has the so
 """
 
 import math
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from care_sim.core.arrays import Floats, Integers, Mask
-from care_sim.core.return_settings import ReturnSettings
+from care_sim.core.conditions import LAST, STRONGEST, ReturnSettings
+from care_sim.sensors.engines.solid_kernels import met_surfaces
+from care_sim.world.bodies import ASPHALT, REFLECTANCES
+from care_sim.world.body_tables import Primitives
+from care_sim.world.bullet import NO_BODY
 
 
 class Signal:
@@ -81,3 +87,115 @@ def rain_extinction(rain_mm_h: float) -> float:
     """Extinction of rain per metre, 0 without rain."""
     decibels_per_km: float = RAIN_DB_PER_KM * rain_mm_h**RAIN_POWER
     return decibels_per_km / DB_PER_FACTOR_E / 1000
+
+
+def brightness(
+    parts: Primitives, origins: Floats, rays: Floats, ranges: Floats, bodies: Integers
+) -> Floats:
+    """(n,) reflectance times cosine of the angle of incidence (Lambert) where unit `rays` (n, 3)
+    from `origins` (n, 3) or (3,) met `bodies` (n,) at `ranges` (n,), all in the world as it stands
+    now; 0 where they met nothing.
+    """
+    # What was met and has no parts is the road: level, so that the slope of a ray is its angle.
+    solid = np.isin(bodies, parts.tables[-1])
+    met = np.flatnonzero(solid)
+    road = np.flatnonzero(~solid & (bodies != NO_BODY))
+    bright = np.zeros(len(bodies))
+    bright[road] = REFLECTANCES[ASPHALT] * np.maximum(-rays[road, 2], 0.0)
+
+    places = np.broadcast_to(origins, rays.shape)[met] + rays[met] * ranges[met, None]
+    hit = bodies[met]
+    found, cosines = met_surfaces(places, rays[met], hit, parts.poses[hit], parts.tables)
+    reflectances = np.array([REFLECTANCES[name] for name in parts.materials])
+    bright[met] = reflectances[found] * cosines
+    return bright
+
+
+SEPARATION_M = 1.0
+"""Surfaces are told apart from this distance on (Velodyne, VLP-16 manual, dual returns)."""
+_EDGE_ON = 1e-12
+"""The intensity of a surface that is met edge-on, so that its place still counts."""
+
+
+class Echoes(NamedTuple):
+    """A row for each echo, by beam and then by range: `beams` (m,) the place of its beam, `ranges`
+    (m,) in metres, `intensities` (m,) as in `care_sim.sensors.signal`, `bodies` (m,) ids.
+    """
+
+    beams: Integers
+    ranges: Floats
+    intensities: Floats
+    bodies: Integers
+
+    @classmethod
+    def none(cls) -> "Echoes":
+        """No echo."""
+        return cls(np.empty(0, np.int64), np.empty(0), np.empty(0), np.empty(0, np.int64))
+
+    @classmethod
+    def joined(cls, parts: Sequence["Echoes"]) -> "Echoes":
+        """All echoes of some parts, one after the other."""
+        return cls(
+            np.concatenate([part.beams for part in parts]),
+            np.concatenate([part.ranges for part in parts]),
+            np.concatenate([part.intensities for part in parts]),
+            np.concatenate([part.bodies for part in parts]),
+        )
+
+    def take(self, rows: Integers) -> "Echoes":
+        """Some of the echoes, by index."""
+        return Echoes(
+            self.beams[rows], self.ranges[rows], self.intensities[rows], self.bodies[rows]
+        )
+
+
+def echoes_of(ranges: Floats, intensities: Floats, bodies: Integers) -> Echoes:
+    """The echoes of n beams of k rays of equal weight. The rays met `bodies` (k, n) at `ranges`
+    (k, n), inf where they met none; `intensities` (k, n) are those that a whole beam would have.
+    """
+    count, beams = ranges.shape
+    order = np.argsort(ranges, axis=0, kind="stable")
+    ranges = np.take_along_axis(ranges, order, axis=0)
+    intensities = np.take_along_axis(intensities, order, axis=0)
+    bodies = np.take_along_axis(bodies, order, axis=0)
+    # From the near end of a beam on, a gap begins the next echo. What met nothing comes last.
+    met = np.isfinite(ranges)
+    gaps = np.diff(np.where(met, ranges, 0.0), axis=0) > SEPARATION_M
+    number = np.vstack([np.zeros((1, beams), np.int64), np.cumsum(gaps, axis=0)])
+    key = (np.arange(beams) * count + number)[met]
+
+    # A ray's power falls with the square of its range; an echo lies where its power does.
+    powers = np.maximum(intensities[met], _EDGE_ON) / ranges[met] ** 2 / count
+    power = np.bincount(key, powers, beams * count)
+    middle = np.bincount(key, powers * ranges[met], beams * count)
+    (found,) = np.nonzero(power)
+    where = middle[found] / power[found]
+    # The body behind its strongest ray; keys ascend as the echoes do.
+    body = bodies[met][_last_rows(key, powers)]
+    return Echoes(found // count, where, power[found] * where**2, body)
+
+
+def reported(echoes: Echoes, kept: str) -> Echoes:
+    """What a sensor reports of the echoes that keeps `strongest`, `last` or `both`.
+
+    Where the strongest is also the last, `both` has the second strongest beside it (Velodyne,
+    VLP-16 manual, page 57).
+    """
+    power = echoes.intensities / echoes.ranges**2
+    if kept == STRONGEST:
+        return echoes.take(_last_rows(echoes.beams, power))
+    last = _last_rows(echoes.beams, echoes.ranges)
+    if kept == LAST:
+        return echoes.take(last)
+    # The strongest but for the last one: the strongest of all, unless that is the last.
+    others = np.setdiff1d(np.arange(len(power)), last)
+    strongest = others[_last_rows(echoes.beams[others], power[others])]
+    return echoes.take(np.union1d(strongest, last))
+
+
+def _last_rows(groups: Integers, values: Floats) -> Integers:
+    """The row of the largest value of each group, groups ascending."""
+    order = np.lexsort((values, groups))
+    _, sizes = np.unique(groups, return_counts=True)
+    rows: Integers = order[np.cumsum(sizes) - 1]
+    return rows

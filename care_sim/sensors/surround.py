@@ -11,12 +11,12 @@ from typing import NamedTuple
 import numpy as np
 
 from care_sim.core.arrays import Floats, Integers
+from care_sim.core.cells.stack import Grid
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid, Cells, Head
-from care_sim.core.grid_stack import Grid
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.sensors.annotated import NO_OBJECT, Cloud, IdentifiedDetections
-from care_sim.sensors.camera import (
+from care_sim.sensors.pictures import (
     CAMERA_FROM_LIDAR,
     CAMERA_HEIGHT,
     CAMERA_WIDTH,

@@ -1,6 +1,10 @@
-"""A film of annotated boxes that somebody holds as plain numbers."""
+"""Films of annotated boxes, and what every recording of boxes needs: the boxes as bodies of a
+world, what its sensors make of them, and the car's own motion.
+"""
 
 from collections.abc import Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -8,17 +12,157 @@ import numpy as np
 from care_sim.base.checks import as_array, check_known
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.arrays import Floats, Mask
+from care_sim.core.cells.stack import Grid
 from care_sim.core.frames import Frame
+from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.sensor_setup import SensorSetup
-from care_sim.core.types import CLASSES
+from care_sim.core.types import CLASSES, Ego
 from care_sim.loops.film import Film, Shot
 from care_sim.sensors.annotated import Annotations, Cloud, IdentifiedDetections
 from care_sim.sensors.setups import DEFAULT_SETUP, sensor_setup
-from care_sim.sensors.surround import SURROUND_CAMERAS
-from care_sim.sources.boxes_as_bodies import AnnotatedBody, sense
-from care_sim.sources.car_motion import motions
-from care_sim.sources.film_checks import FULL_TURN, LEAST_KEYFRAMES, check_film, tell_other_frame
-from care_sim.sources.plausible import AWAY_M, MAP_M, SIZES_M, ValueRange, check_span
+from care_sim.sensors.surround import (
+    SURROUND_CAMERAS,
+    View,
+    full_sweep,
+    numbers_of,
+    surround_detections,
+)
+from care_sim.sources.film_checks import (
+    AWAY_M,
+    FULL_TURN,
+    LEAST_KEYFRAMES,
+    MAP_M,
+    SIZES_M,
+    ValueRange,
+    check_film,
+    check_span,
+    tell_other_frame,
+)
+from care_sim.world.bodies import sized
+from care_sim.world.bullet import BulletWorld
+
+SPAN_S = 0.5
+"""How far back the poses count: a keyframe. At 10 Hz these are six poses, which average out the
+centimetres by which recorded poses err. Longer spans lag behind a driver who begins to brake."""
+LEAST_POSES = 3
+"""The fewest poses that tell a steady acceleration without lag. At 2 Hz they reach back a second.
+"""
+
+
+def motions(times_s: Floats, poses: Sequence[Frame]) -> list[Ego]:
+    """Return the car's motion at every pose: speed along its heading, yaw rate, acceleration.
+
+    Each motion is fitted to its pose and to earlier ones, never to later ones. Parabolas are fitted
+    to places and headings of the last SPAN_S. `times_s` (n,) ascend strictly. The second pose has a
+    speed and a yaw rate, but no acceleration. The first pose has no past, so its motion is zero.
+    """
+    # Headings that jump by a whole turn would be read as a spin.
+    yaws = np.unwrap([pose.yaw for pose in poses])
+    places = np.array([[pose.x, pose.y, yaw] for pose, yaw in zip(poses, yaws, strict=True)])
+    return [_motion(times_s, places, pose) for pose in range(len(poses))]
+
+
+def _motion(times_s: Floats, places: Floats, now: int) -> Ego:
+    """Return the motion at row `now` of `places` (n, 3: x, y, heading)."""
+    if now == 0:
+        return Ego()
+    # The span, 1% longer so that a pose at its very end counts whatever the clock's rounding; at
+    # least LEAST_POSES, where there are so many.
+    first = min(
+        int(np.searchsorted(times_s, times_s[now] - 1.01 * SPAN_S)), max(now + 1 - LEAST_POSES, 0)
+    )
+    window = slice(first, now + 1)
+    # Relative to now: the coefficients of the parabola are then place, rate and half the change of
+    # the rate at this very moment.
+    times = times_s[window] - times_s[now]
+    degree = min(len(times), LEAST_POSES) - 1
+    rates = np.polynomial.polynomial.polyfit(times, places[window] - places[now], degree)
+    heading = np.array([np.cos(places[now, 2]), np.sin(places[now, 2])])
+    acceleration = 2 * rates[2, :2] @ heading if degree == 2 else 0.0
+    return Ego(float(rates[1, :2] @ heading), float(rates[1, 2]), float(acceleration))
+
+
+@dataclass(frozen=True)
+class AnnotatedBody:
+    """An annotated box: its `number` in the film, its class name (None outside the five classes),
+    length, width and height, and the frame in its centre, seen from the sensor.
+    """
+
+    number: int
+    label: str | None
+    size: tuple[float, float, float]
+    frame: Frame
+
+    @property
+    def box(self) -> tuple[float, ...]:
+        """Centre, size and heading in the sensor frame."""
+        return (*self.frame.origin.tolist(), *self.size, self.frame.yaw)
+
+    @property
+    def bounds(self) -> tuple[float, ...]:
+        """The box along the sensor's axes that holds it, however it is turned."""
+        # Each of its own axes reaches along a sensor's axis by the absolute value of their cosine.
+        extents = np.abs(self.frame.rotation.as_matrix()) @ self.size
+        return (*self.frame.origin.tolist(), *extents.tolist(), 0.0)
+
+    @property
+    def foot(self) -> Frame:
+        """The frame in the middle of its bottom face."""
+        return self.frame.holding(np.array([0.0, 0.0, -self.size[2] / 2]))
+
+
+def sense(
+    annotated: Sequence[AnnotatedBody],
+    sensor: Frame,
+    height_m: float,
+    grid: Grid,
+    cameras: tuple[PinholeCamera, ...] = SURROUND_CAMERAS,
+    views: Sequence[View] | None = None,
+    up: Floats | None = None,
+) -> tuple[Annotations, IdentifiedDetections, Cloud]:
+    """Return what LiDARs in the frame `sensor` and its `cameras` see of `annotated`, every cell
+    fired. `views` are the pictures of cameras that took them at other moments, in their place.
+
+    The road is a plane `height_m` below the sensor, parallel to the car: at a right angle to `up`
+    (3,) in the sensor frame, or to the sensor's z axis. It hides nothing, because real roads
+    undulate: a plane in the world would bury what stands where they fall.
+    """
+    reported = [one for one in annotated if one.label is not None]
+    annotations = annotations_of(reported)
+    with closing(BulletWorld(ground=False)) as world:
+        # All of them occlude. Those of the five classes have a number in the film.
+        bodies = {id(one): _add(world, one, sensor) for one in annotated}
+        numbers = {bodies[id(one)]: one.number for one in reported}
+        labels = {bodies[id(one)]: CLASSES.index(str(one.label)) for one in reported}
+        # A recorded sensor leans, and an upright box does not hold the body that leans back in it.
+        shown = annotations.boxes if views is None else _table([one.bounds for one in reported])
+        views = [View(camera, sensor) for camera in cameras] if views is None else views
+        seen = surround_detections(world, views, sensor, labels, shown)
+        bounds = _table([one.bounds for one in annotated])
+        swept = full_sweep(world, grid, sensor, bounds, height_m, up)
+    identified = IdentifiedDetections(seen.detections, numbers_of(seen.objects, numbers))
+    return (
+        annotations,
+        identified,
+        Cloud(swept.cells, swept.points, numbers_of(swept.objects, numbers)),
+    )
+
+
+def annotations_of(annotated: Sequence[AnnotatedBody]) -> Annotations:
+    """The annotations of `annotated`, all of the five classes."""
+    boxes = _table([one.box for one in annotated])
+    classes = [CLASSES.index(str(one.label)) for one in annotated]
+    numbers = [one.number for one in annotated]
+    return Annotations(np.array(numbers, dtype=np.int64), np.array(classes, dtype=np.int64), boxes)
+
+
+def _table(boxes: list[tuple[float, ...]]) -> Floats:
+    return np.array(boxes, dtype=float).reshape(-1, 7)
+
+
+def _add(world: BulletWorld, one: AnnotatedBody, sensor: Frame) -> int:
+    foot = one.foot
+    return world.add(sized("prop", one.label, one.size), sensor.holding(foot.origin, foot.rotation))
 
 
 def film_of_boxes(

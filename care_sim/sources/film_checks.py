@@ -1,20 +1,74 @@
-"""Checks of a film, whoever made it: what is wrong is named with the scene, the time and the
-object.
+"""What a recording can hold, alike for every source, and what is told of a film.
+
+The ranges are wide. What lies beyond them is damage. Further on it would become infinities and NaN,
+or a body that ends Bullet (a round one without a radius does).
 """
 
 from collections.abc import Sequence
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from care_sim.base.errors import InvalidInput, report_problems, shown
-from care_sim.core.arrays import Floats, Integers
+from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.cells.boxes import planar_ranges
 from care_sim.core.frames import Frame
 from care_sim.core.types import CLASSES
 from care_sim.loops.film import Film, Shot
 from care_sim.sensors.annotated import Annotations, Cloud
-from care_sim.sources.plausible import SIZES_M
+
+ValueRange = tuple[float, float]
+
+SIZES_M: ValueRange = (0.01, 200.0)
+"""Length, width and height of an annotated box: a tenth of the smallest, and twice the longest
+train in a street.
+"""
+AWAY_M: ValueRange = (-1e4, 1e4)
+"""x, y and z of an annotated box from the car: forty times as far as boxes are annotated."""
+MAP_M: ValueRange = (-1e8, 1e8)
+"""x, y and z in a map: more than twice round the Earth, and yet a float tells a micrometre."""
+MOUNT_M: ValueRange = (-100.0, 100.0)
+"""x, y and z of a sensor in its car, which may be a road train."""
+REACH_M: ValueRange = (-500.0, 500.0)
+"""x, y and z of a point from its sensor: farther than any LiDAR reaches."""
+STAMPS_NS: ValueRange = (0, 2**62)
+"""Nanoseconds since 1970, until 2116: differences stay within 64 bits."""
+LONGEST_S = 86_400
+"""A drive lasts a day."""
+MOST_PITCH = np.radians(80)
+"""Radians that a car or a box may be pitched: what points straight up has no heading."""
+UNIT = (0.9, 1.1)
+"""The length of a quaternion that was rounded."""
+
+
+def check_span(path: Path | str, seconds: float) -> None:
+    """Raise InvalidInput for a drive longer than `LONGEST_S`."""
+    if seconds > LONGEST_S:
+        raise InvalidInput(
+            f"{path}: its times span {seconds:g} s, and a drive may last {LONGEST_S} s"
+        )
+
+
+def quaternion_fault(turns: Floats, has_heading: bool = True) -> tuple[int, str] | None:
+    """The first of quaternions (n, 4: x, y, z, w) that turns nothing, or leaves no heading where
+    there must be one: its row, and what is wrong with it.
+    """
+    # Clipped, since squares of large numbers overflow.
+    lengths = np.linalg.norm(np.clip(turns, -2, 2), axis=1)
+    unit = (lengths >= UNIT[0]) & (lengths <= UNIT[1])
+    x, y, z, w = np.where(unit[:, None], turns, 0.0).T
+    # The sine of the pitch is 2 (w y - x z) over the square of the quaternion's length.
+    steep = np.abs(w * y - x * z) * 2 > np.sin(MOST_PITCH) * np.where(unit, lengths, 1.0) ** 2
+    for wrong, reason in (
+        (~unit, "a quaternion that is not of length 1"),
+        (steep & has_heading, f"a pitch beyond {np.degrees(MOST_PITCH):.0f} degrees"),
+    ):
+        if wrong.any():
+            return int(wrong.argmax()), reason
+    return None
+
 
 LEAST_KEYFRAMES = 3
 """Fewer tell neither an acceleration nor a first sighting that a track follows."""
@@ -159,3 +213,28 @@ def _other_frame(seen: Sequence[tuple[Frame, Annotations]]) -> str:
         return ""
     others = zip(_FRAMES, (told, twice), strict=True)
     return next((name for name, boxes in others if standing(boxes) > MOST_ASTRAY), "")
+
+
+def tell_empty_boxes(
+    name: str, every: Sequence[Annotations], filled: Sequence[Mask], range_m: float
+) -> None:
+    """Print once how many boxes of a scene hold no recorded point, and how many newcomers there are
+    without and with them.
+
+    `every` are all annotations per keyframe, and `filled` (n,) which of them hold a point. Those
+    within `range_m` metres count.
+    """
+    near = [planar_ranges(annotations.boxes) <= range_m for annotations in every]
+    objects = [part.objects[own] for part, own in zip(every, near, strict=True)]
+    holds = np.concatenate([part[own] for part, own in zip(filled, near, strict=True)])
+    if holds.all():
+        return
+    together = np.concatenate(objects)
+    # Objects of the first keyframe were present, with a point or without.
+    without, with_them = (
+        len(np.setdiff1d(some, objects[0])) for some in (together[holds], together)
+    )
+    report_once(
+        f"{name}: {np.sum(~holds)} of {len(holds)} boxes within {range_m:g} m hold no recorded "
+        f"point: {without} newcomers without these boxes, {with_them} with them"
+    )

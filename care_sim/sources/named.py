@@ -5,22 +5,32 @@ NAME:FOLDER, or one of `Generated`, asked for as NAME. Either is asked for by it
 MODULE:CLASS:FOLDER or MODULE:CLASS.
 """
 
+import inspect
+from collections.abc import Iterator
+from dataclasses import fields
 from importlib.util import find_spec
+from typing import Any
 
-from care_sim.base.checks import check_known
+from care_sim.base.checks import check_known, option_text
 from care_sim.base.errors import InvalidInput
-from care_sim.base.plugins import is_place
+from care_sim.base.plugins import is_place, package_of
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.sensors.setups import DEFAULT_SETUP
-from care_sim.sources.installed import SOURCES, Installed
-from care_sim.sources.kinds import RECORDING_KINDS, RECORDING_TEXTS, recordings
+from care_sim.sources.installed import (
+    RECORDING_KINDS,
+    RECORDING_TEXTS,
+    SOURCES,
+    Installed,
+    recordings,
+)
+from care_sim.sources.recordings import Recordings
 from care_sim.sources.scenes import SPLITS, Recorded, Source, Streets
 
 
 def source_of(text: str, **options: object) -> Source:
-    """The source that a text names: `streets`, one of
-    `care_sim.sources.kinds.RECORDING_TEXTS`, or one of another package, with `options` of its kind
-    (`split`, and the fields of its class); those that are None are not given.
+    """The source that a text names: `streets`, one of `care_sim.sources.installed.RECORDING_TEXTS`,
+    or one of another package, with `options` of its kind (`split`, and the fields of its class);
+    those that are None are not given.
 
     Raises InvalidInput for another text, a folder that is none, an option that the kind does not
     have, a source that cannot be loaded.
@@ -85,3 +95,34 @@ def _unknown(text: str) -> InvalidInput:
         f"unknown source {text!r:.200}; known: {', '.join(known)}; `care-sim list sources` tells "
         "what each is"
     )
+
+
+def source_lines() -> Iterator[str]:
+    """A line per source and one per option, an empty line between sources; at the end why entries
+    of packages are refused.
+    """
+    for name in SOURCES.names():
+        yield from _source_lines(name)
+        yield ""
+    yield from (reason for _, reason in SOURCES.refusals())
+
+
+def _source_lines(name: str) -> list[str]:
+    """A source as it is asked for and its parameters, or why it cannot be loaded."""
+    package = "" if name in SOURCES.built_in else f" [{package_of(SOURCES.entry(name))}]"
+    try:
+        source: Any = SOURCES.maker(name)
+    except InvalidInput as error:
+        return [f"{name:17} (broken) {error}{package}"]
+    has_folder = issubclass(source, Recordings) and not source.shipped
+    asked = f"{name}:FOLDER" if has_folder else name
+    about, _, _ = (inspect.getdoc(source) or "").partition("\n\n")
+    return [
+        f"{asked:17} {' '.join(about.split())}{package}",
+        *(
+            f"    {field.name}={option_text(field.default)}"
+            for field in fields(source)
+            # The folder is told behind the name.
+            if field.name != "folder"
+        ),
+    ]

@@ -11,7 +11,7 @@ from typing import Any, ClassVar, NamedTuple, Protocol
 from care_sim.base.checks import check_known
 from care_sim.base.digests import Stamp, data_digest, file_stamp, files_below
 from care_sim.base.errors import InvalidInput, shortened
-from care_sim.core.return_settings import RAYS, FilmedReturns, changed_settings
+from care_sim.core.conditions import RAYS, FilmedReturns, changed_settings
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.loops.film import Film
 from care_sim.sensors.setups import DEFAULT_SETUP, sensor_columns, sensor_setup

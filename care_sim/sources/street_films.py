@@ -10,11 +10,11 @@ from functools import lru_cache, partial
 import numpy as np
 
 from care_sim.base.errors import InvalidInput
-from care_sim.base.random_streams import secret_entropy
+from care_sim.base.seeds import secret_entropy
 from care_sim.core.arrays import Floats, Integers
+from care_sim.core.conditions import RAYS, STRONGEST, FilmedReturns
 from care_sim.core.frames import Frame
 from care_sim.core.pinhole import PinholeCamera
-from care_sim.core.return_settings import RAYS, STRONGEST, FilmedReturns
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.core.types import CLASSES
 from care_sim.loops.film import Film, Shot
@@ -33,7 +33,7 @@ from care_sim.streets.draft import STREET_KEYFRAME_S
 from care_sim.streets.street import Street, make_street
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.bullet import BulletWorld
-from care_sim.world.linear_motion import LinearMotion, rates_between
+from care_sim.world.motions import LinearMotion, rates_between
 
 SIGHT_M = 60.0
 """Bodies whose hull is further than this from the sensor are left out, unless its LiDAR reaches

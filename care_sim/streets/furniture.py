@@ -5,9 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from care_sim.streets.dimensions import Range, draw
 from care_sim.streets.draft import Draft
-from care_sim.streets.layouts import Joining, Plan, Road, Side
+from care_sim.streets.layouts import Joining, Plan, Range, Road, Side, draw
 from care_sim.world.bodies import CATALOGUE
 
 OCCUPANCY: Range = (0.1, 0.85)

@@ -2,7 +2,7 @@
 everything else is placed on them.
 
 A road's reference line (d = 0) is the middle of the lane that leads along it; traffic keeps right.
-Widths follow the German RASt 06 (directives for urban streets), see `care_sim.streets.dimensions`.
+Widths follow the German RASt 06 (directives for urban streets).
 """
 
 from collections.abc import Callable
@@ -10,15 +10,71 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from care_sim.core.frames import Pose
-from care_sim.streets.curve import Curve
-from care_sim.streets.dimensions import (
-    LANE_WIDTH_M,
-    PARKING_WIDTH_M,
-    PAVEMENT_WIDTH_M,
-    Range,
-    draw,
-)
+from care_sim.core.arrays import Floats
+from care_sim.core.frames import Pose, turned
+
+Range = tuple[float, float]
+"""Low and high. The seed draws uniformly between them."""
+
+SPEED_LIMIT_MPS = 30 / 3.6
+"""All scenarios take place in a 30 km/h zone, the residential default of many European cities."""
+LANE_WIDTH_M = 3.5
+"""Of a traffic lane (German RASt 06)."""
+PARKING_WIDTH_M = 2.5
+"""Of a parking lane that lorries may use (RASt 06)."""
+PAVEMENT_WIDTH_M = 2.5
+"""Between parking lane and houses (RASt 06)."""
+
+
+def draw(rng: np.random.Generator, values: Range) -> float:
+    """A uniform draw from a range (low, high)."""
+    return float(rng.uniform(*values))
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A straight, one bend, and a straight again. Metres and radians.
+
+    Road coordinates: `s` along the line, `d` to its left, headings relative to its own. The line
+    begins at the world pose `start` with s = 0; it bends from `bend_at` on for `bend_length` with
+    `curvature` (1/m, positive to the left). Before 0 and after the bend it goes on straight.
+    """
+
+    start: Pose = (0.0, 0.0, 0.0)
+    bend_at: float = 0.0
+    bend_length: float = 0.0
+    curvature: float = 0.0
+
+    def heading(self, s: Floats | float) -> Floats:
+        """World heading of the line at `s`."""
+        along = np.clip(np.asarray(s) - self.bend_at, 0.0, self.bend_length)
+        return np.asarray(self.start[2] + self.curvature * along)
+
+    def curvature_at(self, s: float) -> float:
+        """Curvature of the line at `s`, 1/m."""
+        return self.curvature if self.bend_at <= s < self.bend_at + self.bend_length else 0.0
+
+    def to_world(self, places: Floats) -> Floats:
+        """World poses (..., 3: x, y, heading) of places (..., 3: s, d, heading) on the road."""
+        places = np.asarray(places, dtype=float)
+        s, d, heading = places[..., 0], places[..., 1], places[..., 2]
+        along = np.minimum(np.maximum(s - self.bend_at, 0.0), self.bend_length)
+        turn = self.curvature * along
+        # The chord of a circle's arc, 2 R sin(turn / 2) with the radius R = along / turn. NumPy's
+        # sinc(x) is sin(pi x) / (pi x) and 1 at 0, where the road is straight and R infinite.
+        chord = along * np.sinc(turn / (2 * np.pi)) if self.curvature else along
+        before = np.minimum(s, self.bend_at)
+        after = np.maximum(s - self.bend_at - self.bend_length, 0.0)
+        # Three parts, one after the other: the straight before lies along x, the chord at half the
+        # turn, the straight after at the whole turn. d goes to the left of where the line points.
+        cos, sin = np.cos(turn), np.sin(turn)
+        world = np.empty(places.shape)
+        world[..., 0] = before + chord * np.cos(turn / 2) + after * cos - d * sin
+        world[..., 1] = chord * np.sin(turn / 2) + after * sin + d * cos
+        world[..., 2] = self.start[2] + turn + heading
+        world[..., :2] = turned(world[..., :2], self.start[2]) + self.start[:2]
+        return world
+
 
 PAVEMENT_M: Range = (PAVEMENT_WIDTH_M, 4.0)
 """From the least of RASt 06 to that of a shopping street."""

@@ -3,15 +3,14 @@ yard or a garden.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
 from care_sim.core.arrays import Floats
-from care_sim.streets.curve import Walked
-from care_sim.streets.dimensions import Range, draw
 from care_sim.streets.draft import Draft
 from care_sim.streets.furniture import Span
-from care_sim.streets.layouts import EVEN_CHANCE, Road, Side
+from care_sim.streets.layouts import EVEN_CHANCE, Curve, Range, Road, Side, draw
 
 WALKING_MPS = 1.34
 WALKING_SPREAD_MPS = 0.26
@@ -47,6 +46,47 @@ Manual).
 TRIES = 40
 """Ways that are drawn for one person until one is free. Without a free one the person is left out.
 """
+
+
+@dataclass(frozen=True)
+class Walked:
+    """A way covered at constant `speed` (m/s): a person's or a cyclist's.
+
+    `corners` (k, 2) are s and d of the way's corners on `curve`. The walker is at the beginning at
+    `starts_s`, and stands at either end before and after. Distances are measured in the world, so
+    that the speed holds in a bend.
+    """
+
+    curve: Curve
+    corners: tuple[tuple[float, float], ...]
+    speed: float
+    starts_s: float = 0.0
+
+    STRIDE_M = 1.0
+
+    def poses(self, times: Floats) -> Floats:
+        """World poses (t, 3) at `times` (t,)."""
+        points = self._points()
+        legs = np.diff(points, axis=0)
+        # Metres done at every point of the way, and by the walker at every time.
+        covered = np.concatenate([[0.0], np.cumsum(np.hypot(*legs.T))])
+        way = np.clip(self.speed * (times - self.starts_s), 0.0, covered[-1])
+        # Who stands at the end still faces along the last leg.
+        leg = np.clip(np.searchsorted(covered, way, side="right") - 1, 0, len(legs) - 1)
+        x, y = (np.interp(way, covered, points[:, axis]) for axis in (0, 1))
+        return np.column_stack([x, y, np.arctan2(legs[leg, 1], legs[leg, 0])])
+
+    def _points(self) -> Floats:
+        """(n, 2) world points of the way, about a stride apart at most, to follow bends."""
+        places = [np.array([self.corners[0]])]
+        for start, end in zip(self.corners, self.corners[1:], strict=False):
+            pieces = max(
+                int(np.ceil(np.hypot(end[0] - start[0], end[1] - start[1]) / self.STRIDE_M)), 1
+            )
+            shares = np.arange(1, pieces + 1) / pieces
+            places.append(np.array(start) + shares[:, None] * (np.array(end) - start))
+        road = np.concatenate(places)
+        return self.curve.to_world(np.column_stack([road, np.zeros(len(road))]))[:, :2]
 
 
 def populate(draft: Draft, road: Road, span: Span) -> None:

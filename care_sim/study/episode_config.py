@@ -21,10 +21,10 @@ from care_sim.perception.detectors import PROXY
 from care_sim.policies.base import PrivilegedPolicy
 from care_sim.scenarios import SCENARIOS, make_scenario
 from care_sim.sensors.setups import DEFAULT_SETUP, sensor_columns
-from care_sim.study.parameters import Parameters
 from care_sim.study.provenance import detector_digest, scenario_digest
 from care_sim.study.run_config import (
     CONDITION_NAMES,
+    Parameters,
     Row,
     RunConfig,
     SimilarityKey,

@@ -1,29 +1,69 @@
-"""One episode: a configuration in, one tidy row out."""
+"""Episodes of the closed loop: a configuration in, one tidy row out."""
 
 import hashlib
+import random
 import resource
 import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar, cast
 
 import gymnasium
 import numpy as np
+from gymnasium.vector.utils import create_empty_array
 from numpy.typing import ArrayLike, NDArray
 
 import care_sim
-from care_sim.base.errors import failure_line
-from care_sim.base.portable_hash import portable_bytes
+from care_sim.base.digests import Content, portable_bytes
+from care_sim.base.errors import InvalidInput, failure_line
+from care_sim.base.times import LAST_BITS_S
 from care_sim.core.arrays import Floats
+from care_sim.core.conditions import DriverSettings
 from care_sim.envs.closed_loop import ClosedLoopEnv
+from care_sim.envs.sensing import Observed, checked_scores
+from care_sim.envs.vector.arguments import why_separate
+from care_sim.envs.vector.worlds import CompiledWorlds, Stepped
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.records import Keyframe
 from care_sim.policies.base import Policy
+from care_sim.policies.vector import vector_policy
 from care_sim.scenarios import SCENARIOS
-from care_sim.study.episode_config import EpisodeConfig
+from care_sim.study.episode_config import EpisodeConfig, closed_loop
 from care_sim.study.run_config import Row, flat
-from care_sim.study.world_hash import world_hash
+from care_sim.world.world import World
+
+
+def world_hash(env: ClosedLoopEnv, seed: int) -> str:
+    """Return a hash of what stands in the world of a seed, and how it moves while the ego keeps its
+    speed, and while it brakes; measured numbers rounded (`care_sim.base.digests`). The world
+    is built anew.
+    """
+    content = hashlib.sha256()
+    # Somebody may react to a brake alone.
+    for acceleration in (0.0, -DriverSettings().brake_mps2):
+        with closing(env.episode(seed).world) as world:
+            content.update(portable_bytes(*_told(world)))
+            bodies = np.array([world.ego_body, *(actor.body for actor in world.actors)])
+            while world.time < env.scenario.duration_s - LAST_BITS_S and not world.is_over():
+                content.update(portable_bytes(world.boxes_of(bodies)[:, [0, 1, 6]]))
+                world.step(acceleration)
+    return content.hexdigest()[:16]
+
+
+def _told(world: World) -> Iterator[tuple[Content, ...]]:
+    """What is in a world before anything moves: the bodies with their parts, whom it is about, and
+    what its scenario says that it has drawn.
+    """
+    for actor in world.actors:
+        kind = actor.kind
+        yield actor.name, str(kind.label), actor.reported, kind.size
+        yield from ((part.shape, part.material, part.size, part.centre) for part in kind.parts)
+    yield (world.first_sighting.name if world.first_sighting else "",)
+    yield from sorted(world.drawn.items())
+
 
 _Result = TypeVar("_Result")
 Watcher = Callable[[ClosedLoop, Keyframe], None]
@@ -50,8 +90,8 @@ def run_episode(config: EpisodeConfig) -> Row:
     Every parameter of `EpisodeConfig.row`; `version` and `digest` of the configuration; as
     `drawn.NAME` the parameters of the scenario that the seed drew; the fields of
     `care_sim.loops.records.Outcome`; `keyframes`; `wall_s`; `peak_rss_mb` of the process so far;
-    `episode_hash` over cells fired, ranges returned and poses (`care_sim.base.portable_hash`); and
-    of a scenario that is not built in `world_hash` (`care_sim.study.world_hash`).
+    `episode_hash` over cells fired, ranges returned and poses (`care_sim.base.digests`); and
+    of a scenario that is not built in `world_hash` (`care_sim.study.episode_play`).
     """
     return trace(config)[0]
 
@@ -161,3 +201,93 @@ def peak_rss_mb() -> float:
     # In bytes on macOS, in KiB elsewhere.
     held = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return held / (1e6 if sys.platform == "darwin" else 1e3)
+
+
+MOST_TOGETHER = 16
+"""Episodes that are played together: more save no time worth telling, and an interrupted study
+would leave fewer whole pairs of policies.
+"""
+
+
+def play_episodes(batch: Sequence[EpisodeConfig]) -> list[Row | str]:
+    """What a worker does: play episodes, and give for each its row, or in one line why there is
+    none. Those of an `EpisodeConfig.batch` are played together.
+    """
+    if len(batch) > 1 and not batch[0].alone and len({config.batch for config in batch}) == 1:
+        rows = result_or_reason(play_together, batch)
+        if not isinstance(rows, str):
+            return [*rows]
+    # What is raised among many is not told: whose it is shows where each is played alone.
+    return [result_or_reason(run_episode, config) for config in batch]
+
+
+def play_together(configs: Sequence[EpisodeConfig]) -> list[Row]:
+    """The rows of episodes of one `EpisodeConfig.batch`, of whose time each has an even share.
+    Raises what any of them raises, and InvalidInput where they would not be what each is alone.
+    """
+    started = time.perf_counter()
+    # The file of a set-up may be written anew while the episodes run.
+    told = [config.row() for config in configs]
+    count = len(configs)
+    hashes = [EpisodeHash() for _ in configs]
+    keyframes = np.zeros(count, np.int64)
+    outcomes = dict[int, Row]()
+    with configs[0].make_env() as env:
+        model = closed_loop(env)
+        if reason := why_separate(model):
+            raise InvalidInput(f"{reason} is not played as arrays")
+        observed = cast(Observed, create_empty_array(model.observation_space, count))
+        policy = vector_policy(partial(configs[0].make_policy, env), count)
+        with closing(CompiledWorlds([model] * count, observed, exact=False)) as worlds:
+            infos = worlds.begin({world: config.seed for world, config in enumerate(configs)})
+            policy.reset()
+            drawn = _common_draws()
+            live = np.ones(count, np.bool_)
+            # Worlds that are over rest until the last one is.
+            while live.any():
+                # In copies, since a policy may keep what it is shown, and write into it.
+                shown = {name: tables.copy() for name, tables in observed.items()}
+                actions = checked_scores(policy(shown, live), observed["ranges"].shape)
+                stepped = worlds.step(actions, live)
+                for world in np.flatnonzero(live).tolist():
+                    fired = _fired(stepped, world)
+                    hashes[world].add(fired, observed["ranges"][world], worlds.boxes(world))
+                over = stepped.terminated | stepped.truncated
+                outcomes |= {w: stepped.single[w]["outcome"] for w in np.flatnonzero(over).tolist()}
+                keyframes += live
+                live &= ~over
+    # Who seeds a generator of the whole process in `reset`, and draws from it at keyframes, gets
+    # other numbers where others draw from it, too.
+    if _common_draws() != drawn:
+        raise InvalidInput(f"policy {configs[0].policy} draws from a generator of the process")
+    wall_s = (time.perf_counter() - started) / count
+    return [
+        Played(
+            told[world],
+            infos[world].get("drawn", {}),
+            outcomes[world],
+            int(keyframes[world]),
+            wall_s,
+            hashes[world].hexdigest(),
+        ).row(config)
+        for world, config in enumerate(configs)
+    ]
+
+
+def _common_draws() -> list[Any]:
+    """Where the generators are that everything in a process shares."""
+    _, words, *rest = cast(tuple[Any, ...], np.random.get_state())  # noqa: NPY002 (whose it may be)
+    states: list[Any] = [random.getstate(), words.tobytes(), *rest]
+    # Whoever draws from it has imported it; nobody else waits for it.
+    if torch := sys.modules.get("torch"):
+        states.append(torch.get_rng_state().numpy().tobytes())
+    return states
+
+
+def _fired(stepped: Stepped, world: int) -> NDArray[np.int64] | list[int]:
+    """The cells that a world fired: a list of its own where numbers differ."""
+    column: NDArray[np.int64] | None = stepped.columns.get("fired")
+    cells: NDArray[np.int64] | list[int] = (
+        column[world] if column is not None else stepped.single[world]["fired"]
+    )
+    return cells

@@ -50,7 +50,7 @@ def processes(workers: int) -> Executor:
     context = get_context("forkserver")
     context.set_forkserver_preload(
         [
-            "care_sim.study.episodes_together",
+            "care_sim.study.episode_play",
             "care_sim.envs.closed_loop",
             "care_sim.world.lane_driver",
             "care_sim.study.scene_play",

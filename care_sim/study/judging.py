@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from care_sim.core.arrays import Floats
-from care_sim.core.boxes import planar_ranges
+from care_sim.core.cells.boxes import planar_ranges
 from care_sim.core.types import Detections
-from care_sim.envs.detection import detector_of
+from care_sim.envs.sensing import detector_of
 from care_sim.evaluation.detector_quality import SceneBoxes, scene_boxes
 from care_sim.evaluation.sightings import RANGE_M
 from care_sim.loops.film import Film
 from care_sim.sensors.annotated import Annotations
-from care_sim.sources.nuscenes.results_form import result_boxes
+from care_sim.sources.nuscenes.detections import result_boxes
 from care_sim.sources.nuscenes.table_files import JsonRow
 from care_sim.study.play_config import PlayConfig
 from care_sim.study.scene_play import play_through_film
@@ -24,7 +24,7 @@ TIMED_SCANS = 8
 
 
 Samples = dict[str, list[JsonRow]]
-"""Boxes by keyframe in the official form (`care_sim.sources.nuscenes.results_form`)."""
+"""Boxes by keyframe in the official form (`care_sim.sources.nuscenes.detections`)."""
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,15 @@ from pathlib import Path
 from uuid import uuid4
 
 import care_sim
-from care_sim.base.cores import CORES
-from care_sim.base.digests import combined_digest, content_digest, file_digest
-from care_sim.base.entry_files import CODE, entry_files, paths_in
+from care_sim.base.digests import (
+    CODE,
+    combined_digest,
+    content_digest,
+    entry_files,
+    file_digest,
+    paths_in,
+)
+from care_sim.base.limits import CORES
 from care_sim.perception.detectors import DETECTORS
 from care_sim.policies import POLICIES
 from care_sim.policies.isolation import are_isolated, policy_process
@@ -50,7 +56,7 @@ def code_digest() -> str:
 
 def policy_digest(policy: str) -> str | None:
     """Hash of the version and the files that decide what an installed policy does
-    (`care_sim.base.entry_files`). Empty for a built-in policy, None where there are no files to
+    (`care_sim.base.digests`). Empty for a built-in policy, None where there are no files to
     read.
     """
     if policy in POLICIES.built_in:

@@ -10,7 +10,7 @@ from typing import Any
 from care_sim.core.conditions import COLUMNS_WHERE_CHANGED, OF_BOTH_LOOPS
 from care_sim.loops.records import DriveOutcome
 from care_sim.study.episode_config import PLAIN_FIELDS, listed_episodes
-from care_sim.study.episodes_together import MOST_TOGETHER, play_episodes
+from care_sim.study.episode_play import MOST_TOGETHER, play_episodes
 from care_sim.study.mechanism_play import (
     ACCOUNT_COLUMNS,
     BELIEF_MARKS,
@@ -20,7 +20,6 @@ from care_sim.study.mechanism_play import (
     play_mechanism,
 )
 from care_sim.study.play_config import PLAY_FIELDS, listed_plays
-from care_sim.study.play_events import event_columns, without_events
 from care_sim.study.rows.reading import READ_WITH, with_added_columns, with_tags
 from care_sim.study.rows.schema import (
     CONDITION_COLUMNS,
@@ -39,8 +38,8 @@ from care_sim.study.rows.schema import (
 )
 from care_sim.study.run_config import Row
 from care_sim.study.runner import PlayBatch
-from care_sim.study.scene_play import SUMS, play_scene
-from care_sim.study.vehicle.play import (
+from care_sim.study.scene_play import SUMS, event_columns, play_scene, without_events
+from care_sim.study.vehicle_play import (
     VEHICLE_COUNTS,
     VEHICLE_LISTS,
     VEHICLE_MEASURES,

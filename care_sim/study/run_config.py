@@ -1,28 +1,142 @@
-"""What a study hands to its workers: a policy, and the world that it meets, named by a digest.
+"""What a study hands to its workers: a policy with its parameters, and the world that it meets,
+named by a digest.
 
 The configurations of the closed loop (`care_sim.study.episode_config`) and of the open loop
 (`care_sim.study.play_config`) have this base.
 """
 
+import ast
 import hashlib
 import json
+import os
+import warnings
 from abc import ABC, abstractmethod
-from collections.abc import Hashable, Sequence
+from collections import Counter
+from collections.abc import Hashable, Iterable, Sequence
 from copy import copy
 from functools import cached_property
 from typing import Any, Self
 
 import gymnasium
+import numpy as np
 
 import care_sim
-from care_sim.base.digests import file_digest
-from care_sim.base.entry_files import paths_in
-from care_sim.base.errors import InvalidInput, shown
+from care_sim.base.digests import file_digest, paths_in
+from care_sim.base.errors import InvalidInput, one_line, shown
 from care_sim.core.conditions import DEFAULTS, UNUSED_BY_FULL_SCAN
 from care_sim.policies import check_policy, make_policy
 from care_sim.policies.base import Policy
-from care_sim.study.parameters import Parameters, checked_parameters
 from care_sim.study.provenance import SESSION, code_digest, policy_digest
+
+Parameters = tuple[tuple[str, Any], ...]
+"""Names and values, of a scenario's physics, a policy or a detector."""
+
+_ALLOWED = "a flag, a number of at most 64 bits, a text, or a list of one kind of these"
+_DEEPEST = 4
+"""Levels that lists may be nested."""
+_WHOLE = 2**63
+"""Whole numbers have 64 bits in a column: from minus this to less than this."""
+_LONGEST = 8192
+"""Characters of a parameter: a path and its name fit."""
+
+
+def checked_parameters(given: Iterable[tuple[str, Any]], whose: str) -> Parameters:
+    """The parameters with values of Python's own types, lists as tuples, paths as texts.
+
+    Raises InvalidInput for a value or a name that a journal and a column of a results file would
+    not give back: sets, maps, bytes, None, which a column reads as not given, NaN, halves of
+    characters, lists of several kinds.
+    """
+    return tuple(
+        (_name(name, whose), _checked(f"{whose} parameter {name}", value)) for name, value in given
+    )
+
+
+def _checked(what: str, value: Any) -> Any:
+    try:
+        plain = _plain(value)
+        _kind(plain)
+    except (ValueError, TypeError, OverflowError) as error:
+        raise InvalidInput(f"{one_line(what)} must be {_ALLOWED}, got {shown(value)}") from error
+    return plain
+
+
+def _name(name: Any, whose: str) -> str:
+    try:
+        return _text(name)
+    except (ValueError, TypeError) as error:
+        raise InvalidInput(
+            f"the name of a {whose} parameter must be a text, got {shown(name)}"
+        ) from error
+
+
+def _plain(value: Any, levels: int = _DEEPEST) -> Any:
+    """The value in Python's own types. Raises ValueError or TypeError where it is not allowed."""
+    if isinstance(value, np.generic | np.ndarray):
+        value = value.tolist()
+    if isinstance(value, list | tuple) and levels:
+        return tuple(_plain(each, levels - 1) for each in value)
+    # Before int, of which bool is a subclass.
+    if isinstance(value, bool):
+        return value
+    if isinstance(value, int) and -_WHOLE <= value < _WHOLE:
+        return int(value)
+    # NaN is no value: no row with it would be equal to itself.
+    if isinstance(value, float) and value == value:
+        return float(value)
+    # Texts pass through fspath unchanged. Anything else that is no path raises TypeError.
+    return _text(os.fspath(value))
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
+        raise TypeError
+    # Lone surrogates, which no file can hold, raise here.
+    value.encode()
+    # A subclass of str, such as an enum, becomes a plain str.
+    return str.__str__(value)
+
+
+def _kind(value: Any) -> Any:
+    """The kind of values that a column of such values holds. Raises ValueError for a list of
+    several kinds.
+    """
+    if not isinstance(value, tuple):
+        # A column of numbers may mix whole ones with others.
+        return float if type(value) is int else type(value)
+    kinds = {_kind(each) for each in value}
+    if len(kinds) > 1:
+        raise ValueError
+    return (*kinds,)
+
+
+def parameters(texts: Sequence[str]) -> Parameters:
+    """Parameters given as NAME=VALUE. Raises InvalidInput for another form, and for a name that is
+    given twice.
+    """
+    pairs = tuple(_pair(text) for text in texts)
+    for name, count in Counter(name for name, _ in pairs).items():
+        if count > 1:
+            raise InvalidInput(f"a parameter is given once, got {shown(name)} {count} times")
+    return pairs
+
+
+def _pair(text: str) -> tuple[str, Any]:
+    name, equals, value = text.partition("=")
+    if not (name and equals):
+        raise InvalidInput(f"parameters are given as NAME=VALUE, got {shown(text)}")
+    if len(text) > _LONGEST:
+        raise InvalidInput(
+            f"a parameter must be at most {_LONGEST} characters long, got {shown(text)}"
+        )
+    # A Windows path holds backslashes that Python warns of as escapes.
+    with warnings.catch_warnings(action="ignore", category=SyntaxWarning):
+        try:
+            literal = ast.literal_eval(value)
+        except (ValueError, SyntaxError, TypeError, MemoryError, RecursionError):
+            literal = value  # no literal, or one nested deeper than any parameter is
+    return name, tuple(literal) if isinstance(literal, list) else literal
+
 
 Row = dict[str, Any]
 

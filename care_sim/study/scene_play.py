@@ -1,28 +1,80 @@
-"""The plays of a scene: every policy meets the same film. Each gives one row and its events."""
+"""Plays of the scenes of the open loop: every policy of a scene meets the same film, and each play
+gives one row and its events.
+"""
 
 import hashlib
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, astuple, dataclass, fields
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
 import care_sim
-from care_sim.base.portable_hash import portable_bytes
+from care_sim.base.digests import portable_bytes
 from care_sim.core.belief import Belief
 from care_sim.core.forgetting import released_cells
 from care_sim.core.grid import Cells
 from care_sim.core.residual import explained
-from care_sim.evaluation.allocation_differences import AllocationDifference, allocation_difference
+from care_sim.envs.open_loop import OpenLoopEnv
+from care_sim.evaluation.differences import AllocationDifference, allocation_difference
 from care_sim.evaluation.recall import SceneScore, Tally
 from care_sim.evaluation.strata import strata
 from care_sim.loops.film import Film
-from care_sim.loops.open_loop import OpenLoopKeyframe
+from care_sim.loops.open_loop import OpenLoop, OpenLoopKeyframe, SceneKeyframe
 from care_sim.policies.base import Policy
-from care_sim.study.episode_play import peak_rss_mb, result_or_reason
+from care_sim.study.episode_play import GymEnv, peak_rss_mb, result_or_reason
 from care_sim.study.play_config import PlayConfig
-from care_sim.study.play_events import event_sightings
 from care_sim.study.run_config import FULL, REFERENCE, Row
+
+_EVENT_COLUMNS = ("keyframe", "object", "class", "range_m", "azimuth", "chances")
+"""What is known of an event before any policy plays."""
+_NAMES = (
+    "source",
+    "scene",
+    "policy",
+    "budget",
+    "detector",
+    "floor_seed",
+    "camera_latency",
+    "digest",
+)
+"""Columns by which an event finds its play."""
+
+
+def event_sightings(score: SceneScore) -> dict[str, list[Any]]:
+    """What is known of the events, as columns; metres and radians to three decimals."""
+    # Three decimals are millimetres and milliradians, finer than any sensor here.
+    rows = score.event_rows()
+    columns = {name: [row[name] for row in rows] for name in _EVENT_COLUMNS}
+    return {
+        name: [round(v, 3) if isinstance(v, float) else v for v in column]
+        for name, column in columns.items()
+    }
+
+
+def without_events(row: Row) -> Row:
+    """The row without what only its events need."""
+    return {name: value for name, value in row.items() if name != "sightings"}
+
+
+def event_columns(rows: Sequence[Row]) -> dict[str, Any]:
+    """The events of all plays as columns of one table: the names of the play, what was seen where,
+    and when it was found.
+    """
+    # One entry per event. The names of a play repeat over its events.
+    counts = [len(row["ttfds"]) for row in rows]
+    names = {
+        name: np.repeat(np.array([row[name] for row in rows], dtype=object), counts)
+        for name in _NAMES
+    }
+    seen = {
+        name: [value for row in rows for value in row["sightings"][name]] for name in _EVENT_COLUMNS
+    }
+    # A TTFD of 0 keyframes is a detection at first sight.
+    delays = np.array([delay for row in rows for delay in row["ttfds"]], dtype=np.int64)
+    return {**names, **seen, "detected": delays == 0, "ttfd": delays}
+
 
 SUMS = tuple(field.name for field in fields(Tally))
 
@@ -166,7 +218,7 @@ def _released(policy: Policy, belief: Belief) -> int | None:
 
 def film_hash(film: Film) -> str:
     """A hash over what a film shows and who is hidden at its start, measured numbers rounded
-    (`care_sim.base.portable_hash`).
+    (`care_sim.base.digests`).
 
     Of a return it holds the cell and the object, not the range: Bullet finds where a ray meets a
     round body by iteration, which makes a millimetre of a last bit.
@@ -221,3 +273,55 @@ def play_hash(keyframes: Sequence[OpenLoopKeyframe]) -> str:
             portable_bytes(record.fired, record.detections.classes, record.detections.boxes)
         )
     return content.hexdigest()[:16]
+
+
+SceneWatcher = Callable[[OpenLoop, SceneKeyframe], None]
+
+
+class PlayedScene(NamedTuple):
+    """A play: its row, the record of every keyframe and what it found (both hold truth)."""
+
+    row: Row
+    keyframes: list[SceneKeyframe]
+    score: SceneScore
+
+
+def trace_scene(
+    config: PlayConfig,
+    film: Film,
+    *watchers: SceneWatcher,
+    begin: Callable[[OpenLoop], None] = lambda _loop: None,
+    wrap: Callable[[GymEnv, Policy], GymEnv] = lambda env, _policy: env,
+) -> PlayedScene:
+    """Play a policy through the film of its scene.
+
+    The row has every parameter of `PlayConfig.row`, the fields of
+    `care_sim.evaluation.recall.SceneOutcome`, `version`, `keyframes`, `wall_s` and the
+    `episode_hash` that `care_sim.study.scene_play` gives the same play. `begin` is called before
+    the first keyframe, `watchers` after each; `wrap` puts wrappers that watch around the
+    environment.
+    """
+    started = time.perf_counter()
+    inner = config.make_env(film)
+    policy = config.make_policy(inner)
+    keyframes = []
+    with wrap(inner, policy) as env:
+        played = cast(OpenLoopEnv, env.unwrapped)
+        observation, _ = env.reset(seed=config.scene.seed)
+        policy.reset()
+        begin(played.loop)
+        while not played.loop.over:
+            observation, *_ = env.step(policy(observation))
+            keyframes.append(played.last)
+            for watch in watchers:
+                watch(played.loop, played.last)
+        score, records = played.score, played.keyframes
+    row = {
+        **config.row(),
+        "version": care_sim.__version__,
+        **asdict(score.outcome()),
+        "keyframes": len(keyframes),
+        "wall_s": time.perf_counter() - started,
+        "episode_hash": play_hash(records),
+    }
+    return PlayedScene(row, keyframes, score)

@@ -10,7 +10,7 @@ from care_sim.base.checks import check_path, is_number
 from care_sim.base.errors import InvalidInput, counted, shown
 from care_sim.policies import BUILT_IN
 from care_sim.policies.learned.weights import Card, load_weights, shipped_weights
-from care_sim.study.parameters import Parameters
+from care_sim.study.run_config import Parameters
 from care_sim.training.config import AgentConfig, arguments_of
 from care_sim.training.folder import CONFIG, WEIGHTS, read_config
 

@@ -6,14 +6,13 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Literal, get_args
 
-from care_sim.base.bounds import bounded, check_fields
-from care_sim.base.checks import LARGEST_INTEGER, check_known
+from care_sim.base.checks import LARGEST_INTEGER, bounded, check_fields, check_known
 from care_sim.base.errors import InvalidInput, shown
-from care_sim.base.seed_ranges import TRAINING, VALIDATION
+from care_sim.base.seeds import TRAINING, VALIDATION
+from care_sim.core.cells.rays import MOST_COLUMNS, MOST_ROWS
 from care_sim.core.defaults import HEAVIEST
-from care_sim.core.grid_rays import MOST_COLUMNS, MOST_ROWS
 from care_sim.core.wrapping import Wrapping
-from care_sim.study.parameters import parameters
+from care_sim.study.run_config import parameters
 
 Part = Literal["pictures", "place", "tracks", "faults"]
 """What can be left out (`care_sim.training.networks`)."""
@@ -23,7 +22,7 @@ HOW_LONG = ("steps", "out", "resume", "tensorboard", "threads", "processes")
 
 @dataclass(frozen=True, kw_only=True)
 class AgentConfig:
-    """Fields that all learners share. `care_sim.base.seed_ranges` says which seeds are for what."""
+    """Fields that all learners share. `care_sim.base.seeds` says which seeds are for what."""
 
     algorithm: ClassVar[str]
 

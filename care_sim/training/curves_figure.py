@@ -12,9 +12,7 @@ from matplotlib.figure import Figure
 
 from care_sim.base.errors import percent
 from care_sim.core.arrays import Floats
-from care_sim.reports.figures.files import default_style
-from care_sim.reports.figures.names import name_ends
-from care_sim.reports.figures.styles import colours
+from care_sim.reports.figures.styles import colours, default_style, name_ends
 from care_sim.training.curves import (
     TrainingRun,
     interquartile_mean,

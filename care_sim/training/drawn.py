@@ -32,8 +32,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.errors import InvalidInput
-from care_sim.base.seed_ranges import SPLITS, split_of
-from care_sim.core.grid_stack import Grid
+from care_sim.base.seeds import SPLITS, split_of
+from care_sim.core.cells.stack import Grid
 from care_sim.core.rig import Rig
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.envs.open_loop import OpenLoopEnv

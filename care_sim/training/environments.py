@@ -8,13 +8,16 @@ from typing import TYPE_CHECKING, Any
 import gymnasium
 from gymnasium.vector import AutoresetMode
 
-from care_sim.base.cores import CORES
+from care_sim.base.limits import CORES
 from care_sim.base.processes import following, starting
 from care_sim.envs import CLOSED_LOOP, OPEN_LOOP, installed_ids, make_env
-from care_sim.envs.wrappers.grid_observation import GridObservation
-from care_sim.envs.wrappers.sector_actions import SectorReserve, SectorScores
-from care_sim.envs.wrappers.vector_grid_observation import VectorGridObservation
-from care_sim.envs.wrappers.vector_sector_actions import VectorSectorReserve, VectorSectorScores
+from care_sim.envs.wrappers.grid_observation import GridObservation, VectorGridObservation
+from care_sim.envs.wrappers.sector_actions import (
+    SectorReserve,
+    SectorScores,
+    VectorSectorReserve,
+    VectorSectorScores,
+)
 from care_sim.training.config import AgentConfig
 from care_sim.training.drawn import Draw, DrawnEnv, DrawnStreet, Mirrored, MissedChances, drawn
 from care_sim.training.seeds import TrainingSeeds, VectorTrainingSeeds, validation_seeds

@@ -23,11 +23,9 @@ from typing import TYPE_CHECKING, Any
 
 from care_sim.base.checks import LARGEST_INTEGER, is_number
 from care_sim.base.errors import InvalidInput
-from care_sim.base.files import replacing, write_text
-from care_sim.base.json_text import check_file_size, json_content
-from care_sim.base.plugins import is_place
-from care_sim.base.scenario_names import scenario_of
-from care_sim.base.seed_ranges import TRAINING
+from care_sim.base.files import check_file_size, json_content, replacing, write_text
+from care_sim.base.plugins import is_place, scenario_of
+from care_sim.base.seeds import TRAINING
 from care_sim.core.rig import Rig
 from care_sim.policies.learned.weights import Card, save_weights
 from care_sim.scenarios import PLUGINS

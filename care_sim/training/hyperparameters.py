@@ -12,7 +12,7 @@ from typing import Any
 
 from care_sim.base.checks import check_arguments, check_path, is_number
 from care_sim.base.errors import InvalidInput, shown
-from care_sim.base.scenario_names import scenario_of
+from care_sim.base.plugins import scenario_of
 from care_sim.training.config import HOW_LONG, AgentConfig
 
 DEFAULT = "default"

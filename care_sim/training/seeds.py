@@ -1,4 +1,4 @@
-"""Episodes of training and of validation seeds alone (`care_sim.base.seed_ranges`)."""
+"""Episodes of training and of validation seeds alone (`care_sim.base.seeds`)."""
 
 from typing import Any
 
@@ -7,9 +7,9 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 
 from care_sim.base.errors import InvalidInput, shown
-from care_sim.base.seed_ranges import LAST, TRAINING, VALIDATION
+from care_sim.base.seeds import LAST, TRAINING, VALIDATION
 from care_sim.envs.vector.steps import last_rows, same_step
-from care_sim.envs.wrappers.vectors import WorldsWrapper
+from care_sim.envs.wrappers.reading import WorldsWrapper
 
 
 class TrainingSeeds(gymnasium.Wrapper[Any, Any, Any, Any]):

@@ -20,7 +20,7 @@ from stable_baselines3.common.vec_env.base_vec_env import (
 
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.vectors import attribute_of_each
-from care_sim.envs.wrappers.vectors import AnyVector
+from care_sim.envs.wrappers.reading import AnyVector
 
 Infos = list[dict[str, Any]]
 

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from care_sim.loops.scene_records import SceneKeyframe
+from care_sim.loops.open_loop import SceneKeyframe
 
 Colour = tuple[int, int, int]
 
@@ -41,7 +41,7 @@ SHARE_COLOURS = np.array(
     ],
     np.uint8,
 )
-"""Of cells and their returns, by place in `care_sim.core.actions.SHARES`."""
+"""Of cells and their returns, by place in `care_sim.core.firing.actions.SHARES`."""
 
 
 def found_colour(keyframe: SceneKeyframe, row: int) -> Colour:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from care_sim.core.arrays import Floats
-from care_sim.core.boxes import half_extents
+from care_sim.core.cells.boxes import half_extents
 from care_sim.core.frames import Frame, Pose
 
 INTO_FRONT_M = 0.5

@@ -14,10 +14,15 @@ from care_sim.core.arrays import Floats, Integers
 from care_sim.core.frames import Frame, Pose
 from care_sim.core.pinhole import NEAR_M, PinholeCamera
 from care_sim.world.bodies import BodyKind
-from care_sim.world.body_tables import Primitives, stand_at
-from care_sim.world.bullet_bodies import NO_BODY, OPAQUE, TRANSPARENT, BulletBodies
-from care_sim.world.bullet_clients import LentClient, pybullet
-from care_sim.world.polyhedra import Polyhedra
+from care_sim.world.body_tables import Polyhedra, Primitives, stand_at
+from care_sim.world.bullet_bodies import (
+    NO_BODY,
+    OPAQUE,
+    TRANSPARENT,
+    BulletBodies,
+    LentClient,
+    pybullet,
+)
 
 __all__ = ["FAR_M", "NO_BODY", "RAYS_PER_CALL", "BulletWorld", "PixelWindow"]
 

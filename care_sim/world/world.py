@@ -16,13 +16,10 @@ from care_sim.world.approach import ClosestApproach
 from care_sim.world.bodies import CATALOGUE, BodyKind
 from care_sim.world.body_tables import Footprints
 from care_sim.world.bullet import BulletWorld
+from care_sim.world.contact import Passage
 from care_sim.world.copying import check_copyable
-from care_sim.world.crosser import Meeting
-from care_sim.world.linear_motion import LinearMotion, rates_between
-from care_sim.world.passage import Passage
-from care_sim.world.route import Route
-from care_sim.world.route_car import RouteCar
-from care_sim.world.speed_plan import SpeedPlan
+from care_sim.world.motions import LinearMotion, Meeting, rates_between
+from care_sim.world.route import Route, RouteCar, SpeedPlan
 from care_sim.world.traffic import RoadVehicle, Traffic
 
 WORLD_STEP_S = 0.05

@@ -16,11 +16,9 @@ from pathlib import Path
 
 from care_sim.base.errors import InvalidInput
 from care_sim.base.files import replacing
-from care_sim.study.benchmark.player import Player, player_in
-from care_sim.study.benchmark.result import BenchmarkResult, ResultRow
-from care_sim.study.benchmark.result_file import read_result
-from care_sim.study.benchmark.tasks import BLIND, MEASURED, tasks_of
-from care_sim.study.benchmark.worlds import PARTS, World, published_worlds
+from care_sim.study.benchmark.play import Player, player_in
+from care_sim.study.benchmark.result import BenchmarkResult, ResultRow, read_result
+from care_sim.study.benchmark.suite import BLIND, MEASURED, PARTS, World, published_worlds, tasks_of
 
 FOLDER = Path("runs/blind-camera")
 WORKERS = 2

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
-from care_sim import CLASSES
+from care_sim.core.types import CLASSES
 from care_sim.perception.pillars.detector import PillarsDetector
 
 HEIGHT_M = 1.84  # of the LiDAR above the road

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 import care_sim
-from care_sim.base.bounds import allowed, bounded, check_fields, one_of
-from care_sim.base.checks import check_path, check_whole
+from care_sim.base.checks import allowed, bounded, check_fields, check_path, check_whole, one_of
 from care_sim.base.errors import InvalidInput, one_line, shown
 from care_sim.commands.options.shared import seeds_of
 from care_sim.core.allocation import allocate
@@ -30,7 +29,7 @@ from care_sim.scenarios import SCENARIOS, make_scenario
 from care_sim.scenarios.dartout import Dartout
 from care_sim.study.episode_config import ENVIRONMENT_IDS, EpisodeConfig
 from care_sim.study.executors import cluster
-from care_sim.study.parameters import parameters
+from care_sim.study.run_config import parameters
 from care_sim.wrappers import ExportScans, GridObservation, SectorReserve, SectorScores
 
 NO_NUMBERS = (
@@ -231,7 +230,7 @@ def test_any_value_is_quoted_on_one_line(value, text):
 
 def test_a_long_value_is_quoted_by_its_ends():
     assert len(shown("x" * 10**6)) <= 120
-    assert shown(10**5000) == "an int"
+    assert shown(10**5000) == "a value of type int"
     assert one_line("a \x07\n b") == r"a \x07 b"
 
 

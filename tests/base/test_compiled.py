@@ -22,7 +22,7 @@ _BRIEF = ("-k", "not crowds and not window0")
 NOWHERE = """
 import numba.core.caching as caching
 caching.CacheImpl._locator_classes = []
-from care_sim.core.pinhole_kernels import window_around
+from care_sim.core.pinhole import window_around
 import numpy as np
 print(window_around(np.array([[2.5, 3.5, 4.5, 5.5]]), 9, 9))
 """
@@ -172,7 +172,7 @@ from numba.core.event import install_recorder
 with install_recorder("numba:compile") as compiled:
     import care_sim
     alone = len(compiled.buffer)
-    from care_sim.core.pinhole_kernels import window_around
+    from care_sim.core.pinhole import window_around
     import numpy
     window_around(numpy.zeros((1, 4)), 9, 9)
 print(alone, len(compiled.buffer) > 0)
@@ -189,7 +189,7 @@ def test_the_package_alone_compiles_nothing(tmp_path):
 def test_who_waits_at_a_terminal_for_the_first_use_is_told(tmp_path):
     terminal, other_end = pty.openpty()
     code = (
-        "import numpy as np; from care_sim.core.pinhole_kernels import window_around; "
+        "import numpy as np; from care_sim.core.pinhole import window_around; "
         "window_around(np.zeros((1, 4)), 9, 9)"
     )
     heard = []

@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from care_sim.base.cores import usable_cores
+from care_sim.base.limits import usable_cores
 
 ALL = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
 

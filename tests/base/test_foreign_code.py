@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import care_sim
-from care_sim.base.foreign_code import foreign_place
+from care_sim.base.errors import foreign_place
 
 LIBRARIES = [
     sysconfig.get_path("stdlib"), sysconfig.get_path("purelib"), site.getusersitepackages(),
@@ -39,5 +39,5 @@ def test_without_the_list_of_plugins_a_librarys_code_is_nobodys(monkeypatch, err
     def fail():
         raise error
 
-    monkeypatch.setattr("care_sim.base.foreign_code.entry_points", fail)
+    monkeypatch.setattr("care_sim.base.errors.entry_points", fail)
     assert foreign_place(raised_in(f"{sysconfig.get_path('purelib')}/library.py")) == ""

@@ -16,7 +16,7 @@ from PIL import Image
 from care_sim.base.errors import MissingExtra
 from care_sim.core.grid import AngularGrid
 from care_sim.policies.learned import weights
-from care_sim.reports.figures.files import save
+from care_sim.reports.figures.styles import save
 from care_sim.study.rows.parquet import read_rows, write_rows
 from care_sim.viewer.pictures.clip_files import write_clip
 

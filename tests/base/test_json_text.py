@@ -9,50 +9,31 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from care_sim.base import json_text
+from care_sim.base import files
 from care_sim.base.errors import InvalidInput
-from care_sim.base.json_text import (
+from care_sim.base.files import (
     MOST_BYTES,
-    MOST_LEVELS,
-    json_content,
     listed_values,
-    parsed_json,
 )
 from care_sim.policies.learned.weights import load_weights
-from care_sim.reports.page.provenance import CONFIG, description_in
+from care_sim.reports.page.build import CONFIG, description_in
 from care_sim.sources.nuscenes.table_files import LARGEST_TABLE, read_json
 from care_sim.study.journal import LARGEST_JOURNAL, Journal
 from care_sim.training.folder import read_config
 
-DEEP = {n: "[" * n + "]" * n for n in (MOST_LEVELS, MOST_LEVELS + 1, 980, 100_000)}
+DEEP = "[" * 100_000 + "]" * 100_000
 
 
-def test_what_is_not_too_deep_comes_back():
-    for text in ('{"a": [1, {"b": null}]}', DEEP[MOST_LEVELS], "3", '"\\ud800"'):
-        assert parsed_json(text) == json.loads(text)
-    wide = json.dumps([[[n]] for n in range(1000)])
-    assert parsed_json(wide) == json.loads(wide)
-
-
-@pytest.mark.parametrize(
-    "text", [DEEP[MOST_LEVELS + 1], DEEP[980], DEEP[100_000], "[" * 100_000, '{"a":' * 100_000]
-)
-def test_what_is_too_deep_is_a_value_error(text):
-    with pytest.raises(ValueError, match="deep"):
-        parsed_json(text)
-
-
-@pytest.mark.parametrize("levels", [980, 100_000])
-def test_every_reader_says_so_in_one_line(tmp_path, levels):
+def test_every_reader_says_in_one_line_that_a_file_is_too_deep(tmp_path):
     table = tmp_path / "scene.json"
-    table.write_text(DEEP[levels])
+    table.write_text(DEEP)
     with pytest.raises(InvalidInput, match=r"scene\.json: no readable JSON file .*deep"):
         read_json(table)
     weights = tmp_path / "weights.npz"
-    np.savez(weights, card=np.frombuffer(DEEP[levels].encode(), np.uint8))
+    np.savez(weights, card=np.frombuffer(DEEP.encode(), np.uint8))
     with pytest.raises(InvalidInput, match=r"weights\.npz: no \.npz of weights .*deep"):
         load_weights(weights)
-    (tmp_path / CONFIG).write_text(DEEP[levels])
+    (tmp_path / CONFIG).write_text(DEEP)
     description, (trouble,) = description_in(tmp_path)
     assert description == {}
     assert "deep" in trouble
@@ -91,17 +72,6 @@ def test_every_reader_refuses_what_is_too_large_before_it_is_read(
     assert "cannot be read (it " in trouble
 
 
-def test_what_exceeds_the_memory_is_a_value_error(tmp_path, monkeypatch):
-    def full(*_, **__):
-        raise MemoryError
-
-    (tmp_path / "a.json").write_text("{}")
-    assert json_content(tmp_path / "a.json") == {}
-    monkeypatch.setattr(json, "loads", full)
-    with pytest.raises(ValueError, match="memory"):
-        json_content(tmp_path / "a.json")
-
-
 VALUES = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(max_size=8),
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=3), inner),
@@ -112,8 +82,8 @@ VALUES = st.recursive(
 @pytest.fixture
 def narrow(monkeypatch):
     """A reader that sees few characters at a time."""
-    monkeypatch.setattr(json_text, "_CHUNK", 400)
-    monkeypatch.setattr(json_text, "MOST_CHARACTERS", 400)
+    monkeypatch.setattr(files, "_CHUNK", 400)
+    monkeypatch.setattr(files, "MOST_CHARACTERS", 400)
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -135,7 +105,7 @@ WRONG = {
     "[1]]": "text after the end",
     "[] 1": "text after the end",
     '[{"a": 1': "delimiter",
-    f"[{DEEP[100_000]}]": "deep",
+    f"[{DEEP}]": "deep",
 }
 
 

@@ -2,7 +2,6 @@
 
 import errno
 import os
-import re
 import resource
 import shutil
 import subprocess
@@ -11,11 +10,10 @@ import sys
 import pytest
 
 from care_sim.base import limits
-from care_sim.base.causes import causes
-from care_sim.base.limits import LimitReached, check_workers, limit_in
+from care_sim.base.limits import LimitReached, causes, check_workers, limit_in
 from care_sim.study.executors import processes
+from tests.torture.commands import TINY
 from tests.torture.processes import ANOTHER_USER, entry_point
-from tests.torture.warm import TINY
 
 
 def ended(arguments, prefix=(), limited=None):
@@ -73,17 +71,6 @@ def test_memory_that_suffices(name, size, tmp_path):
         limited=lambda: resource.setrlimit(number, (size, size)),
     )
     assert (code, err) == (0, "")
-
-
-def test_too_few_files():
-    code, err = ended(
-        ["list", "policies"], limited=lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (9, 9))
-    )
-    assert code == limits.FAILED
-    assert re.fullmatch(
-        r"care-sim: \d files can be opened, and care-sim needs 16: raise the limit \(ulimit -n\)\n",
-        err,
-    )
 
 
 @pytest.mark.skipif(os.geteuid() != 0 or not shutil.which("setpriv"), reason="needs another user")

@@ -11,7 +11,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from care_sim.base.portable_hash import STEP, portable_bytes
+from care_sim.base.digests import STEP, portable_bytes
 from care_sim.sensors.annotated import NO_ANNOTATIONS, Annotations
 from care_sim.sources.street_films import record
 from care_sim.streets.street import make_street

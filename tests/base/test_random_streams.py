@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
-from care_sim.base.random_streams import check_secret, secret_entropy, streams
+from care_sim.base.seeds import check_secret, secret_entropy, streams
 
 
 def states(sequences):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.base.seed_ranges import SPLITS, check_benchmark_seeds, split_of, training_seeds
+from care_sim.base.seeds import SPLITS, check_benchmark_seeds, split_of, training_seeds
 
 
 def test_test_seeds_end_where_seeds_begin_that_something_is_chosen_by():

@@ -53,17 +53,6 @@ def test_columns_go_as_highway_env_moves_vehicles(roads):
             assert all(vehicle.pose[2] == 0.0 for vehicle in vehicles)
 
 
-def test_worlds_that_are_not_moved_stay():
-    columns = LaneColumns(2)
-    for world in range(2):
-        traffic, vehicles = road(8.0, [(-20.0, 0, 8.0)], 3.5, 14.0)
-        columns.begin(world, traffic.lane_keepers(vehicles, 10.0))
-    before = columns.rows.copy()
-    columns.step(np.array([False, True]), np.zeros(2), DT)
-    assert (columns.rows[0] == before[0]).all()
-    assert (columns.rows[1, :, 0] > before[1, :, 0]).all()
-
-
 def askew(traffic):
     driver = traffic.add_driver(10.0, 0, 8.0, CAR)
     driver._vehicle.heading = 1e-9

@@ -5,9 +5,8 @@ from contextlib import closing
 import numpy as np
 import pytest
 
-from care_sim.batch.loading import load
 from care_sim.batch.motion import KNOWN_BELOW_M, Motion, steps_of
-from care_sim.batch.state import BatchState
+from care_sim.batch.state import BatchState, load
 from care_sim.core.types import Ego
 from care_sim.scenarios import make_scenario
 from care_sim.world.bodies import CATALOGUE
@@ -108,16 +107,6 @@ def test_worlds_move_as_alone_whatever_their_egos_do(name, physics):
     assert hits or physics is not COLLISION_COURSE
 
 
-def test_worlds_of_all_scenarios_take_turns_in_one_batch():
-    names = sorted({name for name, _ in SCENARIOS})
-    with closing(Batch(*(of(name, 7) for name in names))) as batch:
-        for turn in range(1, 4):
-            for _ in range(5):
-                batch.advance(np.linspace(-2.0, 1.0, len(names)))
-            for world in range(len(names)):
-                batch.begin(world, of(names[(world + turn) % len(names)], 20 + turn))
-
-
 @pytest.mark.parametrize(("gap_m", "hit"), [(0.01, False), (-0.01, True)])
 def test_only_a_contact_is_an_impact(gap_m, hit):
     def street():
@@ -166,11 +155,3 @@ def test_of_a_world_without_somebody_it_is_about_nothing_is_near():
         passages = batch.advance(np.zeros(1))
         assert (passages.nearest_m[0], passages.clearance_m[0]) == (np.inf, np.inf)
         assert batch.motion.settle(0) == np.inf
-
-
-@pytest.mark.parametrize(
-    ("duration_s", "keyframe_s", "steps"),
-    [(6.0, 0.1, 120), (6.0, 0.7, 126), (0.05, 1.0, 20), (10.0, 0.05, 200)],
-)
-def test_an_episode_ends_with_a_whole_keyframe(duration_s, keyframe_s, steps):
-    assert steps_of(duration_s, keyframe_s) == steps

@@ -6,14 +6,14 @@ from gymnasium.vector.utils import create_empty_array
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from care_sim.batch.observing import Observing
+from care_sim.batch.loop import Observing
 from care_sim.batch.state import BatchState
 from care_sim.core.belief import MAX_DETECTIONS, MAX_TRACKS
-from care_sim.core.observation_limits import Limits
+from care_sim.core.observation.limits import Limits
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES, Ego, ImageDetections, Tracks
-from care_sim.envs.spaces import observation_space
-from care_sim.sensors.camera import CAMERA_HEIGHT, CAMERA_WIDTH, FRONT_CAMERA
+from care_sim.envs.sensing import observation_space
+from care_sim.sensors.pictures import CAMERA_HEIGHT, CAMERA_WIDTH, FRONT_CAMERA
 
 RIG = Rig(cameras=(FRONT_CAMERA,))
 NOWHERE = np.zeros(RIG.grid.shape, np.float32)

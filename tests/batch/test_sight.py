@@ -1,127 +1,14 @@
 """What the cameras of many worlds show is what each single loop sees, to the last bit."""
 
-import gymnasium
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from care_sim.batch.camera_faults import BatchDelay, BatchMisses, Detected, DrawnAhead
-from care_sim.batch.loading import load
-from care_sim.batch.sight import Sight
-from care_sim.batch.state import BatchState
 from care_sim.core.conditions import CameraFaults
 from care_sim.core.types import ImageDetections
 from care_sim.sensors.annotated import IdentifiedDetections
-from care_sim.sensors.camera_faults import Delay, Misses
-from care_sim.sensors.picture_timing import PictureTiming
-
-FAULTS = {
-    "false_negative_rate": 0.2,
-    "false_negative_per_m": 0.01,
-    "false_negative_burst": 3,
-    "camera_latency": 1,
-    "camera_jitter": 2,
-    "blackout_start_s": 2.0,
-    "blackout_s": 0.5,
-    "camera_confidence": 0.4,
-}
-
-
-class Watched:
-    """Single environments that fire nothing of their own, and a batch that sees their worlds."""
-
-    def __init__(self, name, seeds, **arguments):
-        self.envs = [gymnasium.make(f"CARE-{name}-v0", **arguments).unwrapped for _ in seeds]
-        self.rig = self.envs[0].rig
-        self.state = BatchState(len(seeds))
-        self.sight = Sight(self.rig, [env.conditions for env in self.envs])
-        self.begin(dict(enumerate(seeds)))
-
-    def begin(self, seeds):
-        for world, seed in seeds.items():
-            env = self.envs[world]
-            env.reset(seed=seed)
-            load(self.state, world, env.loop.world)
-            # The streams of the episode, as `reset` takes them.
-            _, camera, *_ = env._streams(seed, count=5)
-            self.sight.begin(world, env.loop.world, camera)
-        self.state.live[:] = False
-        self.state.live[[*seeds]] = True
-
-    def step(self, worlds):
-        """A keyframe of some of the worlds."""
-        self.state.live[:] = False
-        for world in worlds:
-            env = self.envs[world]
-            _, _, terminated, truncated, _ = env.step(np.zeros(self.rig.grid.shape, np.float32))
-            self.state.live[world] = True
-            if terminated or truncated:
-                yield world
-
-    def look(self):
-        state = self.state
-        for world in np.flatnonzero(state.live).tolist():
-            built, sensor = self.envs[world].loop.world, self.envs[world].loop.sensor
-            count = len(built.bullet.primitives.poses)
-            state.bodies.boxes[world, :count] = built.boxes_of(np.arange(count))
-            state.bodies.poses[world, :count] = built.bullet.primitives.poses
-            state.times[world] = built.time
-            state.sensors.poses[world, :4] = sensor.x, sensor.y, sensor.z, sensor.yaw
-            state.sensors.turns[world] = np.cos(sensor.yaw), np.sin(sensor.yaw)
-            state.sensors.turns_back[world] = sensor.turn_back
-        return self.sight.look(state)
-
-    def check(self):
-        """Look, compare with the single loops, and return how many detections arrived."""
-        arrived, shown = self.look()
-        count = 0
-        for world in np.flatnonzero(self.state.live).tolist():
-            loop = self.envs[world].loop
-            rows = arrived.rows[world, : arrived.counts[world]]
-            assert rows.tobytes() == loop.belief.detections.rows().tobytes()
-            bodies = range(self.state.bodies.counts[world])
-            assert shown[world, : len(bodies)].tolist() == [loop.shows(body) for body in bodies]
-            count += len(rows)
-        return count
-
-    def close(self):
-        for env in self.envs:
-            env.close()
-
-
-@pytest.mark.parametrize("faults", [{}, FAULTS])
-@pytest.mark.parametrize("name", ["Dense", "Dartout", "CutIn", "R157"])
-def test_an_episode_is_that_of_the_single_loop(name, faults):
-    watched = Watched(name, [3, 4, 5], **faults)
-    arrived = watched.check()
-    playing = {0, 1, 2}
-    while playing:
-        playing -= set(watched.step(sorted(playing)))
-        arrived += watched.check()
-    watched.close()
-    assert arrived > 20
-
-
-def test_worlds_begin_anew_while_others_go_on():
-    watched = Watched("Dense", [1, 2], **FAULTS)
-    watched.check()
-    for keyframe in range(30):
-        if keyframe == 12:
-            watched.begin({0: 7})
-            watched.check()
-        list(watched.step([1] if keyframe % 5 == 4 else [0, 1]))
-        watched.check()
-    watched.close()
-
-
-def test_several_cameras_see_in_their_order():
-    watched = Watched("Dense", [1, 2], sensor="paper-vehicle", **FAULTS)
-    watched.check()
-    for _ in range(40):
-        list(watched.step([0, 1]))
-        watched.check()
-    watched.close()
+from care_sim.sensors.camera import Delay, Misses, PictureTiming
 
 
 @given(st.integers(0, 2**32), st.integers(0, 12), st.integers(0, 9))

@@ -19,9 +19,18 @@ from care_sim.study.episode_play import trace
 from care_sim.study.provenance import machine, versions
 from tests.bench import environments, vectors
 from tests.bench.choices import TRACKS, choices
-from tests.bench.environments import DRIVE, DRIVING, REACHING, TESTS
+from tests.bench.environments import (
+    DRIVE,
+    DRIVING,
+    EPISODE,
+    MAIN,
+    REACHING,
+    TESTS,
+    Settings,
+    by_name,
+    middle,
+)
 from tests.bench.scans import REFERENCE, growth, growth_figure, scans
-from tests.bench.settings import EPISODE, MAIN, Settings, by_name, middle
 from tests.bench.vectors import ENVPOOL, PPO, row
 
 BY_THE_CLOCK = "steps/s, "

@@ -8,8 +8,7 @@ import numpy as np
 from care_sim.core.belief import Belief
 from care_sim.core.types import CLASSES, Ego, ImageDetections, Tracks
 from tests.bench.casters import SENSOR, moving_bodies
-from tests.bench.environments import driven
-from tests.bench.settings import EPISODE, by_name
+from tests.bench.environments import EPISODE, by_name, driven
 
 TRACKS = 40
 UNTRACKED = 10

@@ -1,12 +1,14 @@
-"""Steps and constructions per second of the environments, and of known ones beside them; steps of
-two processes.
+"""What is measured, and for how long: steps and constructions per second of the environments, and
+of known ones beside them; steps of two processes.
 """
 
 import time
 from contextlib import ExitStack
+from dataclasses import dataclass
 from functools import partial
 
 import gymnasium
+import numpy as np
 from gymnasium import spaces
 from gymnasium.utils.performance import benchmark_init, benchmark_step, benchmark_vector_step
 from gymnasium.vector import AsyncVectorEnv
@@ -16,8 +18,11 @@ from care_sim.base.processes import following, starting
 from care_sim.core.conditions import DEFAULTS
 from care_sim.envs import ENVIRONMENT_IDS
 from care_sim.sensors.engines import ENGINES
-from tests.bench.settings import EPISODE, MAIN
+from care_sim.study.episode_config import EpisodeConfig
 
+EPISODE = EpisodeConfig("dense", "care", 0.1, 0)
+"""The episode that is played unless a row says otherwise; its seed is that of all scenes."""
+MAIN = ENVIRONMENT_IDS[EPISODE.scenario]
 STANDARD_OUTPUT = 1
 DRIVING = "highway-fast-v0"
 REACHING = "PandaReach-v3"
@@ -28,6 +33,27 @@ DRIVE = "CARE-Drive-v0 at 3%"
 """A row of its own: the longest episodes, with six cameras, at a budget that is published."""
 TESTS = ENVIRONMENT_IDS["ncap"]
 """The shortest episodes, of which a study plays the most."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """`seconds` of every single measurement of steps; `repeats`, rounds in each of which everything
+    is measured once; `samples`, scans per engine and choices per round.
+    """
+
+    seconds: float = 3.0
+    repeats: int = 3
+    samples: int = 200
+
+
+def middle(values):
+    """The median."""
+    return float(np.median(values))
+
+
+def by_name(rounds):
+    """Figures of several rounds, round by round under each name."""
+    return {name: [figures[name] for figures in rounds] for name in rounds[0]}
 
 
 class Driven(gymnasium.Wrapper):

@@ -10,7 +10,7 @@ from matplotlib.ticker import NullLocator
 from care_sim.core.allocation import budget_cells
 from care_sim.core.grid import AngularGrid
 from tests.bench.casters import SENSOR, casters, moving_bodies
-from tests.bench.settings import EPISODE
+from tests.bench.environments import EPISODE
 
 BODIES = 30
 """Bodies of the scan that is published."""

@@ -1,7 +1,6 @@
 """The measures of speed: what is counted, and ratios held to the published ones."""
 
 import json
-import sys
 from contextlib import ExitStack
 
 import numpy as np
@@ -11,18 +10,16 @@ from care_sim.core.belief import Belief
 from care_sim.core.residual import explained
 from care_sim.core.rig import Rig
 from care_sim.envs import CLOSED_LOOP
-from care_sim.envs.spaces import observation_space
+from care_sim.envs.sensing import observation_space
 from care_sim.policies.paper.reserves import Care
-from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.sensors.engines import ENGINES
+from care_sim.sensors.pictures import FRONT_CAMERA
 from care_sim.world.bodies import CATALOGUE
-from tests.bench import vectors
 from tests.bench.__main__ import BY_THE_CLOCK, bench_report, main, ratios
-from tests.bench.casters import PEERS, SENSOR, casters, moving_bodies
+from tests.bench.casters import PEERS, SENSOR, casters
 from tests.bench.choices import TRACKS, observation
-from tests.bench.environments import DRIVE, DRIVING, REACHING, makers
-from tests.bench.scans import GROWTH, REFERENCE, agreement, drawn_cells
-from tests.bench.settings import MAIN, Settings
+from tests.bench.environments import DRIVE, DRIVING, REACHING, Settings
+from tests.bench.scans import GROWTH
 from tests.bench.vectors import ENVPOOL, PPO, row
 
 TINY = ["--seconds", "0.01", "--repeats", "2", "--samples", "3"]
@@ -68,21 +65,6 @@ def test_everything_is_measured_in_every_round(measured, known):
 
 def test_ratios_are_those_that_are_published(known):
     assert ratios(known) == pytest.approx(known["ratios"])
-
-
-def test_what_is_not_installed_is_left_out_in_one_line(monkeypatch, grid):
-    for module in ("envpool", "stable_baselines3", "panda_gym", "mujoco", "open3d"):
-        monkeypatch.setitem(sys.modules, module, None)
-    made, (line,) = makers()
-    assert next(iter(made)) == MAIN
-    assert line.startswith(f"{REACHING}: ")
-    figures, (line,) = vectors.learning(Settings())
-    assert figures == {}
-    assert line.startswith(f"{PPO}: ppo needs the extra 'rl'")
-    with ExitStack() as opened:
-        ours, skipped = casters([BUS], grid, opened)
-    assert set(ours) == set(ENGINES)
-    assert [line.partition(":")[0] for line in skipped] == [*PEERS]
 
 
 @pytest.mark.speed
@@ -134,18 +116,6 @@ def test_every_engine_sees_the_bodies_where_they_were_put_last(grid):
             caster.place(np.full((2, 3), [grid.range_m + length, 0.0, 0.0]))
             ranges, bodies = caster.cast(SENSOR, cells[1:2])
             assert (ranges.tolist(), bodies.tolist()) == ([np.inf], [-1])
-
-
-def test_all_engines_agree_on_the_scene_that_is_measured(grid):
-    """Triangles of round parts may lose a ray in a thousand to the body behind them."""
-    bodies = moving_bodies(30, 1)
-    with ExitStack() as opened:
-        made, _ = casters(bodies.kinds, grid, opened)
-        shares = agreement(made, bodies, drawn_cells(grid, 1638))
-    assert shares[REFERENCE] == {"same_body": 1.0, "same_range": 1.0}
-    for name, share in shares.items():
-        assert share["same_body"] > 0.998, name
-        assert share["same_range"] > 0.99, name
 
 
 def test_the_belief_of_a_choice_is_one_that_an_environment_could_show():

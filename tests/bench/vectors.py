@@ -17,7 +17,7 @@ from care_sim.study.executors import processes
 from care_sim.training.config import PpoConfig
 from care_sim.training.environments import side_by_side
 from care_sim.training.run import algorithm, make_learner
-from tests.bench.settings import EPISODE, MAIN, by_name
+from tests.bench.environments import EPISODE, MAIN, by_name
 
 WORLDS = 64
 THREADS = {1: "one thread", 2: "two threads"}

@@ -2,7 +2,7 @@
 
 import sys
 
-from care_sim.base.cores import WORKERS
+from care_sim.base.limits import WORKERS
 from care_sim.certify import ALL_EPISODES, playing, published
 from care_sim.certify.design import drawn
 

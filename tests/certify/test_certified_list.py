@@ -18,8 +18,13 @@ from care_sim.certify.design import (
     STREET,
     drawn,
 )
-from care_sim.core.conditions import DEFAULTS, LOCALISATION, CameraFaults, LidarFaults
-from care_sim.core.return_settings import RETURN_SETTINGS
+from care_sim.core.conditions import (
+    DEFAULTS,
+    LOCALISATION,
+    RETURN_SETTINGS,
+    CameraFaults,
+    LidarFaults,
+)
 from care_sim.envs import IDS
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.envs.scenes import ReplayEnv, StreetEnv

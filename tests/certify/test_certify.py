@@ -24,7 +24,6 @@ from care_sim.certify.design import (
     STREET,
     drawn,
 )
-from care_sim.certify.drive import write_drive
 from care_sim.certify.playing import (
     FARTHEST,
     attempt,
@@ -34,6 +33,7 @@ from care_sim.certify.playing import (
     play_alone,
     playable_here,
     trails_of,
+    write_drive,
 )
 from care_sim.certify.trail import (
     CONFIGURATION,
@@ -46,7 +46,7 @@ from care_sim.certify.trail import (
 from care_sim.certify.verdict import verdict_of
 from care_sim.commands.certify import certify
 from care_sim.commands.options.results import Certify
-from care_sim.core.firing import free_cells
+from care_sim.core.firing import base
 from care_sim.core.types import Scan, Tracks
 from care_sim.driving.braking import BrakingController
 from care_sim.loops.needless import NeedlessBraking
@@ -54,8 +54,7 @@ from care_sim.perception.tracker import TrackMemory
 from care_sim.policies import make_policy, maker
 from care_sim.policies.makers import is_privileged
 from care_sim.sensors.camera import CameraDetector
-from care_sim.sensors.lidar import Lidar
-from care_sim.sensors.recorded_lidar import RecordedLidar
+from care_sim.sensors.lidar import Lidar, RecordedLidar
 from care_sim.world.world import World
 from tests.helpers.places import ROOT
 
@@ -237,7 +236,7 @@ def drifted(_none, memory):
         (World, "step", 4, moved, "CARE-Dense-v0", (TRAIL_STAGES[0], 2)),
         (CameraDetector, "newest", 3, wider, "CARE-Dense-v0", (TRAIL_STAGES[1], 2)),
         (TrackMemory, "predict", 2, drifted, "CARE-Dense-v0", (TRAIL_STAGES[2], 2)),
-        (free_cells, "fired_cells", 3, other, "CARE-Dense-v0", (TRAIL_STAGES[3], 2)),
+        (base, "fired_cells", 3, other, "CARE-Dense-v0", (TRAIL_STAGES[3], 2)),
         (Lidar, "fire", 3, longer, "CARE-Dense-v0", (TRAIL_STAGES[4], 2)),
         (
             RecordedLidar,

@@ -9,8 +9,7 @@ import pytest
 
 from care_sim.certify import published
 from care_sim.certify.design import STREET, drawn
-from care_sim.certify.drive import write_drive
-from care_sim.certify.playing import play_alone
+from care_sim.certify.playing import play_alone, write_drive
 from care_sim.certify.trail import first_difference
 from tests.helpers.places import ROOT
 from tests.helpers.processor_features import reduced

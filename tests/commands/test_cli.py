@@ -1,5 +1,4 @@
 import gc
-import re
 import signal
 import subprocess
 import sys
@@ -10,12 +9,9 @@ import pytest
 
 from care_sim.base.interrupts import SIGNALS
 from care_sim.cli import main
-from care_sim.commands.options.studies import Reproduce
-from care_sim.commands.studies.closed_loop import fixed_study
 from care_sim.policies import contenders
 from care_sim.scenarios import SCENARIOS
 from care_sim.sources.installed import SOURCES
-from care_sim.study.episode_config import grid
 from care_sim.study.results_formats import EPISODES
 from care_sim.study.rows.parquet import read_rows, write_rows
 from tests.helpers.commands import run
@@ -49,22 +45,10 @@ def test_an_unfinished_study_is_told_from_none(capsys, tmp_path):
     assert (code, f"{EPISODES.file} is not a readable Parquet file" in err) == (2, True)
 
 
-def test_the_sources_are_listed_as_they_are_asked_for_and_a_broken_one_with_its_reason(
-    capsys, install
-):
+def test_a_broken_source_is_listed_with_its_reason(capsys, install):
     install("ours", "import nowhere", SOURCES.group, torn="Torn")
     code, out, err = run(capsys, "list", "sources")
     assert (code, err) == (0, "")
-    assert re.findall(r"^\S+", out, re.MULTILINE) == [
-        "streets",
-        "argoverse2:FOLDER",
-        "nuscenes:FOLDER",
-        "kitti:FOLDER",
-        "sweeps:FOLDER",
-        "boreas",
-        "torn",
-    ]
-    assert "    split='val'\n" in out
     (torn,) = (line for line in out.splitlines() if line.startswith("torn"))
     assert "(broken) ModuleNotFoundError: No module named 'nowhere'" in torn
 
@@ -74,10 +58,7 @@ def test_run_prints_the_timeline_and_the_outcome(capsys):
     code, out, _ = run(capsys, "run", "dense", "--policy", "full", "--budget", "0.2", *SHORT)
     assert code == 0
     assert out.count("16384") == 2
-    assert max(map(len, out.splitlines())) <= 100
-    assert all(
-        word in out for word in ("sensor to", "0.3 s after", "detection_distance_m", "episode_hash")
-    )
+    assert "detection_distance_m" in out
 
 
 @pytest.mark.smoke
@@ -129,25 +110,6 @@ def test_all_scenarios_and_policies_are_swept_but_for_a_broken_one_which_is_name
     assert err.endswith("care-sim: none of the policies can be played\n")
 
 
-def test_further_policies_join_a_set_study_and_a_broken_one_is_left_out(capsys, tmp_path, torn):
-    def short(seeds, also):
-        return grid(
-            ["dartout"], ["care", *also], [0.1], seeds, scenario_parameters=(("duration_s", 0.1),)
-        )
-
-    torn_and_sound = ("torn", "uncertainty")
-    study = Reproduce(seeds=(1,), workers=1, also=torn_and_sound, out=tmp_path / "out")
-    assert fixed_study(study, "sweep", short, "reproduce") == 1
-    assert "left out: policy torn cannot be loaded" in capsys.readouterr().err
-    assert {row["policy"] for row in read_rows(tmp_path / "out" / EPISODES.file)} == {
-        "care",
-        "uncertainty",
-    }
-    alone = Reproduce(seeds=(1,), workers=1, also=("torn",), out=tmp_path / "alone")
-    assert fixed_study(alone, "sweep", short, "reproduce") == 1
-    assert {row["policy"] for row in read_rows(tmp_path / "alone" / EPISODES.file)} == {"care"}
-
-
 def test_a_name_that_a_terminal_would_obey_stays_on_its_line(capsys, tmp_path):
     odd, told = tmp_path / "a\nb\x1b[31m\u202ec", r"a\nb\x1b[31m\u202ec"
     axes = ["--policies", "care", "--scenarios", "dartout", "--budgets", "0.1", "--seeds", "1"]
@@ -170,13 +132,11 @@ def test_a_picture_of_the_braking_car(capsys, tmp_path):
     from PIL import Image
 
     picture = tmp_path / "deep" / "keyframe.png"
-    with pytest.raises(SystemExit) as end:
-        main(["run", "dartout", "--policy", "care", "--seed", "0", "--picture", str(picture)])
-    assert end.value.code == 0
+    assert run(capsys, "run", "dartout", "--picture", picture)[0] == 0
     assert Image.open(picture).size == (960, 720)
 
 
-@pytest.mark.parametrize("fault", [TypeError, RecursionError, MemoryError, OverflowError])
+@pytest.mark.parametrize("fault", [RecursionError, MemoryError])
 def test_a_fault_of_the_software_is_one_line_and_its_trace_is_to_be_had(fault, capsys, monkeypatch):
     # Raised by the library, since what this file raises is no fault of the software's own.
     fails = Mock(side_effect=fault("deep\ninside"))
@@ -209,20 +169,6 @@ class Slips(History):
     def demand(self, belief):
         return numpy.concatenate([numpy.zeros(3), belief.tracks.boxes])
 
-class Lacks(History):
-    def demand(self, belief):
-        open("no such file")
-
-class RefusesToStart(History):
-    def __init__(self, rig):
-        raise KeyError("weights")
-
-@dataclass(frozen=True)
-class Cracked(Dartout):
-    def build(self, rng):
-        world = super().build(rng)
-        return world.crack
-
 @dataclass(frozen=True)
 class Peopled(Dartout):
     def build(self, rng):
@@ -236,16 +182,11 @@ class Refuses(Dartout):
         raise InvalidInput("no such gap")
 
 @dataclass(frozen=True)
-class Torn(Generated):
-    def seeds(self):
-        return 1 / 0
-    def street(self, seed):
-        pass
-
-@dataclass(frozen=True)
-class Single(Torn):
+class Single(Generated):
     def seeds(self):
         return 1
+    def street(self, seed):
+        pass
 
 @dataclass(frozen=True)
 class Seedless(Generated):
@@ -258,15 +199,10 @@ class Seedless(Generated):
     ("arguments", "code", "place"),
     [
         ("run dartout --policy faulty:Slips", 1, "faulty.py, line 11"),
-        ("compare dartout --policies faulty:Slips", 1, "faulty.py, line 11"),
         ("sweep --scenarios dartout --policies faulty:Slips --seeds 1", 1, "faulty.py, line 11"),
-        ("run dartout --policy faulty:Lacks", 1, "faulty.py, line 15"),
-        ("run dartout --policy faulty:RefusesToStart", 1, "faulty.py, line 19"),
-        ("run faulty:Cracked", 1, "faulty.py, line 25"),
-        ("run faulty:Peopled", 1, "faulty.py, line 31"),
-        ("run faulty:Torn", 1, "faulty.py, line 42"),
+        ("run faulty:Peopled", 1, "faulty.py, line 17"),
         # Ours stumbles over what it gave.
-        ("run faulty:Single", 1, "class Single, faulty.py, line 46"),
+        ("run faulty:Single", 1, "class Single, faulty.py, line 25"),
         ("run faulty:Refuses", 2, "no such gap"),
         ("run faulty:Seedless", 2, "source faulty:Seedless cannot be loaded: faulty:Seedless"),
         ("run faulty:Nobody", 2, "scenario faulty:Nobody cannot be loaded: AttributeError"),
@@ -291,39 +227,15 @@ def test_a_fault_in_code_of_ones_own_is_told_with_its_file_and_line_unless_it_re
     [
         ("{} list policies | true; exit ${{PIPESTATUS[0]}}", 141, ""),
         ("{} list policies > /dev/full", 2, "care-sim: [Errno 28] No space left on device\n"),
-        ("{} view --help >&-", 0, ""),
         ("{} view --help >&- 2>&-", 0, ""),
-        ("COLUMNS=1 timeout 60 {} view --help > /dev/null", 0, ""),
-        ("PYTHONIOENCODING=ascii {} list policies > /dev/null", 0, ""),
         ("PYTHONIOENCODING=ascii {} view x --x", 2, "care-sim: unrecognized options: --x\n"),
-        (
-            "PYTHONIOENCODING=ascii {} certify --workers 0",
-            2,
-            "care-sim: workers must be a whole number >= 1 and <= 1024, got 0\n",
-        ),
+        ("COLUMNS=² LINES=0 {} report . --minus care | grep -q 'care minus each policy'", 0, ""),
     ],
 )
-def test_output_that_goes_nowhere_ends_quietly(shell, code, complaint):
-    command = shell.format(f"{sys.executable} -c 'from care_sim.cli import main; main()'")
+def test_output_that_goes_nowhere_or_has_no_width_ends_quietly(shell, code, complaint, tmp_path):
+    write_rows(STUDY, tmp_path / EPISODES.file)
+    command = shell.format(f"{sys.executable} -m care_sim")
     ended = subprocess.run(
-        ["bash", "-c", command], capture_output=True, text=True, timeout=120, check=False
+        ["bash", "-c", command], cwd=tmp_path, capture_output=True, text=True, check=False
     )
     assert (ended.returncode, ended.stderr) == (code, complaint)
-
-
-@pytest.mark.parametrize(
-    ("shell", "code"),
-    [
-        ("{} | true; exit ${{PIPESTATUS[0]}}", 141),
-        ("COLUMNS=0 {} | grep -q 'care minus each policy'", 0),
-        ("COLUMNS=² LINES=² {} | grep -q 'care minus each policy'", 0),
-    ],
-)
-def test_tables_are_printed_into_closed_pipes_and_at_odd_widths(shell, code, tmp_path):
-    write_rows(STUDY, tmp_path / EPISODES.file)
-    program = f"{sys.executable} -c 'from care_sim.cli import main; main()'"
-    command = shell.format(f"{program} report {tmp_path} --minus care")
-    ended = subprocess.run(
-        ["bash", "-c", command], capture_output=True, text=True, timeout=120, check=False
-    )
-    assert (ended.returncode, ended.stderr) == (code, "")

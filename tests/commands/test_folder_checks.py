@@ -12,7 +12,7 @@ from care_sim.reports.report import StudyReport
 from care_sim.reports.studies import STUDIES
 from care_sim.sources.named import source_of
 from care_sim.study.episode_config import PLAIN_FIELDS, grid
-from care_sim.study.journal import JOURNAL, Journal
+from care_sim.study.journal import JOURNAL, UNFINISHED, Journal
 from care_sim.study.play_config import PLAY_FIELDS, play_grid
 from care_sim.study.results_formats import (
     _PARAMETERS,
@@ -23,7 +23,6 @@ from care_sim.study.results_formats import (
     VEHICLE,
 )
 from care_sim.study.rows.parquet import read_notes, read_rows, write_rows
-from care_sim.study.unfinished import UNFINISHED
 from tests.helpers.commands import run
 from tests.helpers.made_rows import STUDY, rows
 
@@ -55,11 +54,9 @@ def test_another_study_is_refused_in_a_line_that_names_both_and_touches_nothing(
     assert any(name.endswith(".png") for name in before)
     with pytest.raises(InvalidInput) as refused:
         run_study(short(), folder, workers=1)
-    assert str(refused.value) == (
-        f"{folder} holds the study paper, 20 episodes, which the study sweep, 1 episode, would "
-        "replace: "
-        "give another --out, or --force to replace it"
-    )
+    told = str(refused.value)
+    assert f"{folder} holds the study paper, 20 episodes, which the study sweep, 1 ep" in told
+    assert "--force" in told
     assert held(folder) == before
 
 
@@ -79,15 +76,17 @@ def test_rows_that_nobody_asks_for_now_are_named(folder):
         match=r"; 4 of them, the first dense history 0\.03 seed 4, .* asked for, 16 episodes",
     ):
         check_folder(folder, [config for config in whole if config.seed < 4], PAPER)
-    named = ["history", "all-camera", "care", "full"]
-    late = grid(["dense"], named, [0.03], range(5), camera_latencies=(1,))
+    late = grid(
+        ["dense"],
+        ["history", "all-camera", "care", "full"],
+        [0.03],
+        range(5),
+        camera_latencies=(1,),
+    )
     # The nearest task of the name is told of, wherever it is among them.
     later = [config.changed(lidar_dropout=0.1) for config in late]
-    for asked in (late, [*later, *late], [*late, *later]):
-        with pytest.raises(
-            InvalidInput, match=r"; 15 of them, .* 0\.03 \(camera_latency 0, now 1\), would be"
-        ):
-            check_folder(folder, asked, PAPER)
+    with pytest.raises(InvalidInput, match=r"; 15 of them, .* \(camera_latency 0, now 1\), would"):
+        check_folder(folder, [*later, *late], PAPER)
 
 
 def test_the_same_command_goes_on_with_more_seeds_policies_and_after_changes_of_the_code(
@@ -157,15 +156,8 @@ def test_where_tasks_fail_fewer_rows_replace_no_more(install, tmp_path, capsys):
     capsys.readouterr()
     (failure,) = run_study(short(("history", "moody")), out, workers=1)
     assert failure.config.policy == "moody"
-    assert [
-        line for line in capsys.readouterr().err.splitlines() if "stay as they were" in line
-    ] == [
-        f"the results in {out} stay as they were: 1 of their 2 episodes, the first dartout moody "
-        "0.1, would be gone, "
-        "since this time only 1 episode did not fail; the journal keeps what was played: mend what "
-        "failed, or "
-        "--force to replace them"
-    ]
+    (told,) = (one for one in capsys.readouterr().err.splitlines() if "stay as they were" in one)
+    assert "1 of their 2 episodes, the first dartout moody 0.1, would be gone" in told
     assert {name: content for name, content in held(out).items() if name not in NOTES} == before
     run_study(short(("history", "moody")), out, workers=1, force=True)
     assert [row["policy"] for row in read_rows(out / EPISODES.file)] == ["history"]
@@ -179,25 +171,11 @@ def test_an_interrupted_study_of_other_options_keeps_its_folder(tmp_path):
     before = held(tmp_path)
     for other, gone, what in (
         (short(seeds=(0, 1)), 2, "seed 2"),
-        (short(("random",)), 4, "dartout history 0.1"),
-        (
-            short(("history", "care"), range(3), camera_latencies=(1,)),
-            4,
-            "0.1 (camera_latency 0, now 1)",
-        ),
+        (short(("history", "care"), range(3), camera_latencies=(1,)), 4, "camera_latency 0, now 1"),
     ):
-        with pytest.raises(InvalidInput) as refused:
+        told = f"holds the unfinished study sweep, 4 rows; {gone} of them, the first dart.*{what}"
+        with pytest.raises(InvalidInput, match=told):
             run_study(other, tmp_path, workers=1)
-        told = str(refused.value)
-        assert (
-            f"holds the unfinished study sweep, 4 rows; {gone} of them, "
-            "the first dartout history 0.1" in told
-        )
-        assert what in told
-        assert told.endswith(
-            ", are not asked for now: give the command that began it, another --out, or --force "
-            "to play beside them"
-        )
     assert held(tmp_path) == before
     assert run_study(short(("history", "care"), range(4)), tmp_path, workers=1) == []
 
@@ -256,11 +234,8 @@ def test_plays_by_one_presence_are_known_by_it_and_are_not_those_of_the_other(tm
         write_rows([config.row() for config in by[own]], tmp_path / PLAYS.file, "protocol")
         check_folder(tmp_path, by[own], STUDIES["protocol"])
         check_folder(tmp_path, [*by[other], *by[own]], STUDIES["protocol"])
-        with pytest.raises(
-            InvalidInput, match="; 2 of them, the first street-0000-straight care"
-        ) as refused:
+        with pytest.raises(InvalidInput, match=rf"presence {own}, now {other}\), would be gone"):
             check_folder(tmp_path, by[other], STUDIES["protocol"])
-        assert f"care 0.1 (presence {own}, now {other}), would be gone" in str(refused.value)
 
 
 def test_every_parameter_is_a_column_that_is_read():

@@ -36,14 +36,6 @@ def test_leads_are_told_over_any_entry(capsys, library):
     assert (told[0], "unknown entry 'nobody'; known: care, place" in told[2]) == (2, True)
 
 
-def test_where_the_control_is_missing_it_is_said_where_it_lies(capsys, library, here):
-    told = "no place among these files: add a folder with its result for leads\n"
-    for words, lacks in ((["results/data/leaderboard/care.json"], True), ([library], False)):
-        code, out, err = run(capsys, "leaderboard", *words)
-        assert (code, err) == (0, told if lacks else "")
-        assert ("inus place" in out) != lacks
-
-
 def test_every_file_that_is_of_no_use_has_a_line(capsys, here):
     for name in ("a", "b"):
         (here / f"{name}.json").write_text("{")
@@ -68,12 +60,6 @@ def test_two_of_one_name_and_different_code_are_two_entries(capsys, here):
     # A lead is told over the name that the table shows.
     out = run(capsys, "leaderboard", ".", "--minus", "mine:Mine #aaaaaaa")[1]
     assert re.search(r"mine:Mine .*\+100\.0", " ".join(out.split()))
-    assert "As the files say, played by 2 versions of the code; care-sim" in " ".join(out.split())
-    for n, processor in enumerate(("one", "other")):
-        made = {"policy_code": f"{n}", "machine": {"processor": processor}}
-        made_result("mine:Mine", n, made_by=made).write(here / f"{n}.json")
-    out = run(capsys, "leaderboard", ".")[1]
-    assert "As the files say, played on 2 kinds of processor; care-sim" in " ".join(out.split())
 
 
 def test_a_chart_is_written_in_both_formats_where_it_is_told(capsys, library, here):

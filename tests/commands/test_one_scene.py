@@ -52,18 +52,6 @@ def test_the_seed_is_that_of_the_street_and_a_scene_has_a_name(played):
             assert out.startswith(name)
 
 
-def test_a_scene_and_another_seed_are_told_to_be_one_too_many(played):
-    with few_and_short(4):
-        line = ("run", "street", "--policy", "random", "--scene", "street-0001-bend")
-        plain, named, other = (played(*line, *more) for more in ((), ("--seed", 1), ("--seed", 2)))
-    assert plain[2] == named[2] == ""
-    assert other[2] == "street-0001-bend is that of --scene, --seed 2 changes nothing\n"
-    # The line tells how long it took.
-    hashes = {re.search(r"^episode_hash +(\S+)$", out, re.MULTILINE)[1] for _, out, _ in
-              (plain, named, other)}  # fmt: skip
-    assert len(hashes) == 1
-
-
 def test_a_source_of_a_single_street_has_no_other_seed(tmp_path, monkeypatch):
     (tmp_path / "onestreet.py").write_text(
         "from dataclasses import dataclass\n"
@@ -131,14 +119,6 @@ def test_of_a_moment_that_never_comes_there_is_no_picture_and_the_play_is_told(p
         assert (code, err.splitlines()[-1]) == (0, f"{told}: no picture")
         assert re.search("^found % +100.0$", out, re.M)
     assert not picture.exists()
-
-
-def test_pictures_and_scans_leave_the_play_as_it_is(played, drive, tmp_path, open3d):
-    line = ("run", f"argoverse2:{drive}", "--budget", "0.05")
-    watched = (*line, "--picture", tmp_path / "x.png", "--export", tmp_path / "scans")
-    outs = [played(*one)[1].partition("wall_s")[0] for one in (line, watched)]
-    assert outs[0] == outs[1]
-    assert len([*(tmp_path / "scans").glob("*.pcd")]) == 10
 
 
 def test_one_that_fails_leaves_the_others(played, drive, install, tmp_path):

@@ -8,149 +8,71 @@ import pytest
 from tests.helpers.commands import run
 
 LINES = r"""
---foo                                     | '--foo' is no option of care-sim; `care-sim` lists commands
 walk                                      | unknown command 'walk'
 polices                                   | unknown command 'polices'; perhaps `list policies`; known:
-train walk                                | unknown command after train 'walk'; known: curves, detector,
 merge one                                 | merge needs two folders at least: care-sim report FOLDER FOLDER
 bench --seconds 3                         | `care-sim bench` is `make bench` now
-list walls                                | must be one of policies, agents, scenarios, sources,
 run                                       | missing: SCENARIO|SOURCE|AGENT
 run dens                                  | unknown scenario 'dens'; the nearest is dense; known:
-run moon                                  | ; `care-sim list scenarios` tells what each is
 run no/body                               | unknown agent 'no/body'; known: learned-scorer,
-run .                                     | holds no agent: no weights.npz
-run ppo --scenario nowhere                | unknown scenario 'nowhere'
 run ppo --policy care                     | --policy has no meaning for an agent
-run dense --scenario dense                | --scenario is for an agent
 run dense --policy kare                   | unknown policy 'kare'; the nearest is care; known: all-camera,
 run dense --bugdet 1                      | unrecognized options: --bugdet 1; perhaps --budget
 run dense --budget x                      | --budget takes {None}|FLOAT:
 run dense --budget 1.5                    | budget must lie in (0, 1], got 1.5
-run dense --budget 0                      | budget must lie in (0, 1], got 0.0
-run dense --seed                          | --seed needs a value: INT
 run dense --seed abc                      | --seed takes INT: invalid literal for int() with base 10: 'abc'
-run dense --seed -1                       | seed must be a whole number >= 0
-run dense --seed 18446744073709551616     | seed must be
-run dense --camera-latency -1             | camera_latency must be a whole number >= 0
 run dense --false-negative-rate 1.1       | false_negative_rate must lie in [0, 1]
-run dense --ego-speed-sigma 1e19          | ego_speed_sigma
-run dense --engine warp                   | unknown engine 'warp'
-run dense --scenario-parameters wheels=3  | 'wheels'; known:
 run dense --scenario-parameters wheels    | NAME=VALUE, got 'wheels'
 run dense --scenario-parameters a=3 a=4   | once
 run dense --scenario-parameters ego_speed_mps=(1e300,1e300) | ego_speed_mps of dense
-run dense --policy-parameters k=3         | unknown parameter
-run dense --policy-parameters a={[1]}     | unknown parameter
 run dense --video ''                      | an argument is empty
-sweep --out=                              | an argument is empty
 run dartout --record NOWHERE/file/x.rrd   | file
-run dartout --picture TABLE               | table.png
 run dartout --picture x.gif               | unknown ending of a picture '.gif'; known: .png
-run dartout --at 3                        | --at has no meaning without --picture
-run street --picture x.png --at -1        | at must be a finite number >= 0, got -1
 run dartout --scene x                     | --scene has no meaning in the closed loop
 run street --seed 400                     | seed must be of a scene of streets, 0 to 149, got 400
-run street --scene nowhere                | unknown scene 'nowhere'; known: street-0000
-run street --driver careful-human         | --driver has no meaning in the open loop
 run street --scenario-parameters x=1      | --scenario-parameters has no meaning in the open loop
-run street --engine bullet                | engine cannot be changed in the open loop
-run argoverse2                            | source must be argoverse2:FOLDER, nuscenes:FOLDER,
 run argoverse2:nowhere                    | source argoverse2:nowhere: nowhere is no folder
-compare dartout --split val               | --split has no meaning in the closed loop
-compare street --policies nobody          | unknown policy 'nobody'
-compare dartout --video x.txt             | unknown ending of a clip '.txt'; known: .gif,
 sweep --policy care                       | perhaps --policies
-sweep --seeds 0                           | seeds must be one number, a count from 1 to 1,000
 sweep --seeds 1001                        | seeds must be one number, a count from 1 to 1,000
-sweep --seeds 9999999999999999999999      | seeds
 sweep --seeds 999 1000 10000              | got 999 of test and 1000 of calibration and 10000 of train
 sweep --budgets                           | --budgets needs at least one value
-sweep --scenarios                         | --scenarios needs at least one value
-sweep --budgets inf                       | budget
-sweep --workers 0                         | workers must be a whole number >= 1
 sweep --false-negative-rate 0.3 --false-negative-rates 0.1 | give false_negative_rate one value or several, not both
-reproduce --no_floor                      | unrecognized options: --no_floor
-reproduce --seeds 1000000000              | seeds
-study crowding --driver careful-human     | unrecognized options: --driver careful-human
 study faults --camera-latency 1           | camera_latency is a fault that grows
-study ncap --tests nothing                | unknown test 'nothing'
 study ncap --step-kph 33 --tests CPNCO-50 | no speed of these tests is a multiple of 33 km/h
-study validate                            | missing: WORLD
-study validate moon                       | unknown scenario 'moon'
 study validate cutin --seeds 1000 1001    | 1,000
-study validate cutin --training-seeds 0   | training_seeds must be a whole number >= 1
 study validate cutin --factors mirrored=half | mirrored of cutin 'half'
 study order --scenes 4                    | --scenes has no meaning without --source
-study order --budgets 0.1                 | --budgets has no meaning without --source
-study order --source streets --also fan   | --also has no meaning with --source
-study order --source streets --policies   | --policies needs at least one value
-study order --source moon                 | unknown source 'moon'
 study firing --sensor os1-64              | --sensor has no meaning without --source
-study firing --source streets --sensors os1-64 | --sensors has no meaning with --source
-study firing --sensors                    | --sensors needs at least one value
-study firing --sensors os2                | unknown sensor 'os2'
-study realism --source streets --seeds 3  | --seeds has no meaning with --source
 study realism --seeds 990 991             | got 990 of test and 1090 of calibration
 study realism --tables dense              | unknown table 'dense'; the nearest is dense-5; known:
-study realism --tables                    | --tables needs at least one value
-study ablate --source streets --seeds 3   | --seeds has no meaning with --source
-study ablate --source streets --budgets   | --budgets needs at least one value
-study ablate --source streets --scenes street-0001 | unknown scene 'street-0001'
-study mechanism --floor-seeds 2           | unrecognized options: --floor-seeds 2
 study mechanism --scenes 1 --driver full  | driver must be a policy with a budget, got 'full'
-study mechanism --scenes 1 --presence seen | presence must be 'annotated' or 'visible', got 'seen'
 study mechanism --scenes 1 --driver care-sbf --policy-parameters care-sbf.k_safe=0 | the driver care-sbf plays without parameters, got k_safe
 study mechanism --scenes 1 --policy-parameters ppo.path=w.npz | policy parameter ppo.path is of a policy that is not played; played are history, all-camera, care
 protocol --source waymo:.                 | unknown source 'waymo:.'; known: streets, argoverse2:FOLDER,
-protocol --split val                      | unknown split of the streets 'val'; known: calibration, evaluation
 protocol --version v1.0-mini              | version has no meaning for streets
 protocol --scenes 151                     | scenes must be a number from 1 to 150 or names, got 151
-protocol --scenes -1                      | scenes must be a number from 1 to 150 or names, got -1
-protocol --scenes 1e2                     | scenes must be a number from 1 to 150 or names, got 1e2
-protocol --scenes street-9                | unknown scene 'street-9'
-protocol --floor-seeds 0                  | floor_seeds must be a whole number >= 1 and <= 1000, got 0
-protocol --detector yolo                  | unknown detector 'yolo'
 protocol --camera-latency 1 --camera-latencies 0 1 | give camera_latency one value or several
 report                                    | report needs the folder of a study, its --out
 report NOWHERE                            | no results at
-report NOWHERE -o x.html                  | no results at
-report NOWHERE --out x                    | --out is for several folders
 report a b --page x.html                  | --page and --minus take one folder
-report a --source argoverse2:x            | --source has no meaning without --page
 report a -o x --source streets --episodes 0 | --source has no meaning without --page and --episodes
-report a --split val                      | --split has no meaning without --source
 report a --minus care -o x.html           | --minus has no meaning with --page
-report a -o x.html --episodes -1          | episodes must be
-benchmark                                 | --policy needs at least one value
-benchmark --policy nobody                 | unknown policy 'nobody'
 benchmark --policy care --cell-order best | cell_order
 benchmark --policy care --quick --sealed x | either quick or sealed
-benchmark --policy care --sealed x        | give --out
 benchmark --policy care --sealed none.txt --out s | none.txt holds no salt
 benchmark --policy care place --name Ours | names one entry
 benchmark --policy care --name 'a|b'      | without | <
 leaderboard                               | name a folder
 leaderboard .                             | no result of care-sim benchmark in .
-leaderboard none                          | none cannot be read
 leaderboard . --sealed x                  | give verify too
 leaderboard . --verify --minus care       | minus is for a table
-leaderboard . --verify --chart a.png      | chart is for a table
 leaderboard . --chart mine.pdf            | unknown ending of a chart '.pdf'; known: .png, .svg
-judge --detectors                         | --detectors needs at least one value
-judge --detectors nobody                  | unknown detector 'nobody'
 judge --detectors cluster --against nobody | unknown detector 'nobody'
-judge --detector cluster                  | judge takes --detectors, one or several
 judge --least-scores 2                    | least_scores must be from 0 to 1, got 2
 judge --detectors cluster --detector-parameters min_points=3 | DETECTOR.NAME=VALUE of one of cluster, got min_points
-judge --detectors cluster --policy nobody | unknown policy 'nobody'
 export nuscenes --source argoverse2:x --out y | source must be nuscenes:FOLDER
-export nuscenes --source nuscenes:nowhere --out y | nowhere is no folder
-view NOWHERE/x.rrd                        | No such file
 view TABLE                                | is no recording of `care-sim run --record`
 certify --episode 3 --all                 | episode plays one episode: remove all
-certify --episode 10000                   | episode must be a whole number >= 0 and <= 9999
-train learned-scorer --out TABLE          | table.png
 train learned-sets --out NOWHERE          | is a folder, a file is wanted
 """  # noqa: E501
 CASES = [line.split(" | ", 1) for line in LINES.strip("\n").splitlines()]

@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_sim.core.actions import (
+from care_sim.core.allocation import allocate
+from care_sim.core.firing.actions import (
     ALONG,
     CHOSEN,
     EXPLOITATION,
@@ -15,8 +16,7 @@ from care_sim.core.actions import (
     scores_of,
     shares_of,
 )
-from care_sim.core.allocation import allocate
-from care_sim.core.firing.free_cells import fired_cells
+from care_sim.core.firing.base import fired_cells
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand

@@ -4,9 +4,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.actions import scores_of
 from care_sim.core.allocation import allocate, budget_cells, taken_by_stage
-from care_sim.core.firing.free_cells import fired_cells
+from care_sim.core.firing.actions import scores_of
+from care_sim.core.firing.base import fired_cells
 from care_sim.core.types import Demand
 
 CELLS = 40

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.allocation import allocate
-from care_sim.core.cell_order import reordered
-from care_sim.core.cell_order_kernels import COLUMN_STEP, ROW_STEP, SetMargins
+from care_sim.core.cells.order import COLUMN_STEP, ROW_STEP, SetMargins, reordered
 from care_sim.core.defaults import AS_DEMANDED, CELL_ORDERS
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig

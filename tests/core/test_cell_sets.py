@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.cell_sets import CellSets
+from care_sim.core.cells.sets import CellSets
 
 groups = st.lists(st.lists(st.integers(0, 99), max_size=6), max_size=6)
 places = st.integers(0, 8)

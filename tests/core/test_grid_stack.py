@@ -8,14 +8,13 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.boxes import box_corners
-from care_sim.core.cell_order import reordered
-from care_sim.core.cell_order_kernels import SetMargins
-from care_sim.core.cell_sets import CellSets
+from care_sim.core.cells.boxes import box_corners
+from care_sim.core.cells.order import SetMargins, reordered
+from care_sim.core.cells.sets import CellSets
+from care_sim.core.cells.stack import GridStack
 from care_sim.core.defaults import CELL_ORDERS
 from care_sim.core.forgetting import Forgetting, ForgettingRules
 from care_sim.core.grid import AT_LIDAR_M, LEAST_DEPTH_M, AngularGrid
-from care_sim.core.grid_stack import GridStack
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.residual import wedges
 from care_sim.core.rig import Rig

@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.cell_order import reordered
-from care_sim.core.cell_order_kernels import SetMargins
+from care_sim.core.cells.order import SetMargins, reordered
 from care_sim.core.grid import AngularGrid
 
 DEGREE = np.pi / 180

@@ -8,15 +8,15 @@ from hypothesis import strategies as st
 from care_sim.core.belief import MAX_DETECTIONS, MAX_TRACKS, Belief
 from care_sim.core.conditions import Sensing
 from care_sim.core.frames import Frame
-from care_sim.core.observation_limits import MAX_AGE_S, MAX_SPEED_MPS, Limits
+from care_sim.core.observation.limits import MAX_AGE_S, MAX_SPEED_MPS, Limits
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.residual import camera_layers, explained
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES, Ego, ImageDetections, Tracks
-from care_sim.envs.spaces import observation_space
+from care_sim.envs.sensing import observation_space
+from care_sim.loops.episode import SensorSeeds
 from care_sim.loops.film import Film, Shot
 from care_sim.loops.open_loop import OpenLoop
-from care_sim.loops.seeds import SensorSeeds
 from care_sim.perception.proxy import ReturnsProxy
 from care_sim.sensors.annotated import Annotations, Cloud, IdentifiedDetections
 from care_sim.sensors.surround import SURROUND_CAMERAS

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_sim.core.pcg64 import refill, seed_stream, word_streams
+from care_sim.core.firing.floor import refill, seed_stream, word_streams
 
 
 @given(st.integers(0, 2**128 - 1), st.integers(1, 60))

@@ -3,10 +3,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_sim.core.boxes import box_corners
+from care_sim.core.cells.boxes import box_corners
 from care_sim.core.frames import Frame
-from care_sim.core.pinhole import NEAR_M, PinholeCamera, camera_models
-from care_sim.core.pinhole_kernels import box_rays, window_around
+from care_sim.core.pinhole import NEAR_M, PinholeCamera, box_rays, camera_models, window_around
 from care_sim.sensors.surround import SURROUND_CAMERAS
 
 cameras = st.builds(

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from care_sim.core.random_floor import RandomFloor
+from care_sim.core.firing.floor import RandomFloor
 
 
 def of_numpy(seed, number, cells, count):

@@ -1,10 +1,12 @@
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.conditions import COLUMNS_WHERE_CHANGED, DEFAULTS, Conditions
-from care_sim.core.return_settings import (
+from care_sim.core.conditions import (
+    COLUMNS_WHERE_CHANGED,
+    DEFAULTS,
     RAYS,
     RETURN_SETTINGS,
+    Conditions,
     FilmedReturns,
     ReturnSettings,
     changed_settings,

@@ -2,12 +2,11 @@ import numpy as np
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.conditions import ClosedLoopConditions
-from care_sim.core.driver_settings import DriverSettings
+from care_sim.core.conditions import ClosedLoopConditions, DriverSettings
 from care_sim.core.types import Ego, Tracks
 from care_sim.driving.braking import BrakingController
+from care_sim.driving.drivers import HUMAN_MODEL as HUMAN
 from care_sim.driving.drivers import CarefulHuman, brake_delay_s, check_driver, make_driver
-from care_sim.driving.human_model import HUMAN_MODEL as HUMAN
 
 FRONT, HALF_WIDTH, KEYFRAME = 2.5, 0.9, 0.1
 BESIDE = HALF_WIDTH + 1.0

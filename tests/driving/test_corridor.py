@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from care_sim.core.driver_settings import DriverSettings
+from care_sim.core.conditions import DriverSettings
 from care_sim.core.frames import Frame
 from care_sim.core.types import Ego, Tracks
 from care_sim.driving.braking import BrakingController

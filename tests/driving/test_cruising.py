@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from care_sim.core.types import Command, Tracks
-from care_sim.driving.cruising import Cruising, CruisingRules
-from care_sim.world.route import Route
-from care_sim.world.speed_plan import SpeedPlan
+from care_sim.driving.drivers import Cruising, CruisingRules
+from care_sim.world.route import Route, SpeedPlan
 
 CRUISE, FRONT, HALF_WIDTH, KEYFRAME = 8.0, 1.5, 0.9, 0.1
 RULES = CruisingRules()

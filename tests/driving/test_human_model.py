@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_sim.driving.human_model import HUMAN_MODEL as HUMAN
+from care_sim.driving.drivers import HUMAN_MODEL as HUMAN
 
 TIMES = np.linspace(0, 6, 60_001)
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from care_sim.core.types import Ego
-from care_sim.driving.odometry import Odometry
+from care_sim.driving.localisation import Odometry
 
 MOTION = Ego(8.0, 0.1, -1.0)
 

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import care_sim
-from care_sim.core.driver_settings import DriverSettings
+from care_sim.core.conditions import DriverSettings
 from care_sim.core.frames import Frame
 from care_sim.core.types import Ego, Tracks
 from care_sim.driving.braking import BrakingController

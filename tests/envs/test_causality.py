@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 
 from care_sim.envs import CLOSED_LOOP
-from care_sim.sensors.engines.bullet import Bullet
-from care_sim.sensors.engines.fast import Fast
+from care_sim.sensors.engines import Bullet, Fast
 
 BEHIND = (-15.0, 1.0, 0.0)
 

@@ -12,7 +12,7 @@ import pytest
 import care_sim
 from care_sim.base.errors import InvalidInput
 from care_sim.certify.design import AS_LISTED, CLOSED, DRIVE, REPLAY, STREET, drawn
-from care_sim.certify.drive import write_drive
+from care_sim.certify.playing import write_drive
 from care_sim.envs.scenarios import ScenarioEnv
 from care_sim.scenarios.dartout import Dartout
 from tests.envs.test_determinism import digest

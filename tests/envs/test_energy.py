@@ -6,7 +6,7 @@ import pytest
 
 import care_sim
 from care_sim.base.errors import InvalidInput
-from care_sim.core.actions import scores_of
+from care_sim.core.firing.actions import scores_of
 from care_sim.envs.scenes import FilmEnv
 from tests.helpers.lidars import CORNERS
 from tests.helpers.short_streets import few_and_short

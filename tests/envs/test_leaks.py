@@ -16,8 +16,8 @@ import pytest
 from care_sim.base.errors import BrokenScenario
 from care_sim.envs import CLOSED_LOOP
 from care_sim.scenarios.dartout import Dartout
-from care_sim.world.bullet_clients import MOST_FREE, pybullet
-from care_sim.world.clearance_judge import judge_here
+from care_sim.world.bullet_bodies import MOST_FREE, pybullet
+from care_sim.world.contact import judge_here
 
 CYCLES = int(os.environ.get("CARE_SIM_CYCLES", "150"))
 MOST_CLIENTS = 1024

@@ -8,7 +8,7 @@ import pytest
 
 import care_sim
 from care_sim.base.errors import InvalidInput
-from care_sim.core.return_settings import RETURN_SETTINGS
+from care_sim.core.conditions import RETURN_SETTINGS
 from care_sim.envs import CLOSED_LOOP
 from tests.envs.test_causality import BEHIND, observe
 from tests.helpers.short_streets import few_and_short

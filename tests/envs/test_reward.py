@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 from care_sim.base.errors import InvalidInput
 from care_sim.envs.reward import KEEP_CLEAR_M, REWARD_WEIGHTS, EpisodeReward, weights
 from care_sim.envs.vector.steps import Rewards
-from care_sim.loops.record_columns import Records
-from care_sim.loops.records import Keyframe
+from care_sim.loops.records import Keyframe, Records
 
 
 def keyframe(**changes):

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from care_sim import CLASSES, Detections
+from care_sim.core.types import CLASSES, Detections
 from care_sim.envs.scenarios import ScenarioEnv
 from care_sim.policies import make_policy
 from care_sim.scenarios.base import Scenario
-from care_sim.study.benchmark.tasks import reached
+from care_sim.study.benchmark.suite import reached
 from care_sim.world.traffic import Traffic
 from care_sim.world.world import World
 

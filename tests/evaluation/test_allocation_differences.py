@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.evaluation.allocation_differences import AllocationDifference, allocation_difference
+from care_sim.evaluation.differences import AllocationDifference, allocation_difference
 
 
 def cells(*numbers):

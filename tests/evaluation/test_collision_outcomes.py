@@ -1,6 +1,6 @@
 import pytest
 
-from care_sim.evaluation.collision_outcomes import collision_outcome
+from care_sim.evaluation.outcomes import collision_outcome
 
 
 @pytest.mark.parametrize(

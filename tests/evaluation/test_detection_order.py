@@ -1,7 +1,7 @@
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.evaluation.detection_order import DetectionOrder, detection_order
+from care_sim.evaluation.differences import DetectionOrder, detection_order
 
 
 def test_five_events_by_hand():

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from care_sim.evaluation.drives import drive_outcome
+from care_sim.evaluation.outcomes import drive_outcome
 from care_sim.loops.records import Keyframe, Sight
 from care_sim.world.approach import Impact
-from care_sim.world.crosser import Crosser, Meeting
-from care_sim.world.walker import Walk
+from care_sim.world.motions import Crosser, Meeting, Walk
 
 KINDS = {4: "child", 5: "bicycle", 6: "car"}
 

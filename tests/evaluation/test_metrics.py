@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from care_sim.evaluation.metrics import outcome
+from care_sim.evaluation.outcomes import outcome
 from care_sim.loops.records import Keyframe, Outcome
 
 NO_IMPACT = (False, None, None, None)

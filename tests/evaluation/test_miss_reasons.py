@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from care_sim.core.allocation import allocate
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
-from care_sim.evaluation.miss_reasons import (
+from care_sim.evaluation.rays import (
     ELSEWHERE,
     EXPLAINED,
     MISS_REASONS,
@@ -17,9 +17,9 @@ from care_sim.evaluation.miss_reasons import (
     STARVED,
     TOO_FEW_RETURNS,
     Appearance,
+    ServedDemand,
     miss_reason,
 )
-from care_sim.evaluation.ray_shares import ServedDemand
 
 OBJECT = np.arange(10, 16)
 WEDGE = np.array([3, 4, 5, 6, 10, 11, 12, 13, 14, 15])

@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_sim.evaluation.ncap_score import score
+from care_sim.evaluation.outcomes import score
 
 SPEEDS = st.floats(0.1, 60.0)
 

@@ -7,7 +7,7 @@ from care_sim.core.allocation import allocate
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
-from care_sim.evaluation.ray_shares import RAY_SHARES, ServedDemand, rays_by_share, shares_of_credit
+from care_sim.evaluation.rays import RAY_SHARES, ServedDemand, rays_by_share, shares_of_credit
 
 CELLS = st.lists(st.integers(0, 29), max_size=8, unique=True).map(
     lambda cells: np.array(cells, np.int64)

@@ -1,6 +1,6 @@
 import numpy as np
 
-from care_sim.evaluation.reserve_use import ReserveUse, reserve_use
+from care_sim.evaluation.rays import ReserveUse, reserve_use
 
 HULL = np.arange(0, 4)
 

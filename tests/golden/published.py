@@ -17,7 +17,7 @@ import pyarrow.parquet as pq
 from care_sim.reports.leaderboard import leaderboard_table, leads_table
 from care_sim.reports.report import CONFIG, read_results
 from care_sim.reports.table import Table
-from care_sim.study.benchmark.result_file import read_result
+from care_sim.study.benchmark.result import read_result
 from care_sim.study.rows.reading import policy_of
 from care_sim.study.run_config import FULL
 from tests.golden.cells import Cell, cells

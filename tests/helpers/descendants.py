@@ -44,22 +44,24 @@ class Marked:
 
     def alive(self):
         """Those that run, the process itself included."""
-        return [
-            int(folder.name)
-            for folder in Path("/proc").iterdir()
-            if folder.name.isdigit() and self._runs(folder)
-        ]
+        return marked(self._mark)
 
     def all_end_within(self, seconds):
         """Whether none is left after that time."""
         return until(lambda: not self.alive(), seconds)
 
-    def _runs(self, folder):
-        try:
-            state = (folder / "stat").read_text().rpartition(")")[2].split()[0]
-            return self._mark.encode() in (folder / "environ").read_bytes() and state not in "ZX"
-        except OSError:
-            return False
+
+def marked(mark):
+    """The ids of the processes that run and have a mark somewhere in their environment."""
+    return [int(folder.name) for folder in Path("/proc").glob("[0-9]*") if _runs(folder, mark)]
+
+
+def _runs(folder, mark):
+    try:
+        state = (folder / "stat").read_text().rpartition(")")[2].split()[0]
+        return mark.encode() in (folder / "environ").read_bytes() and state not in "ZX"
+    except OSError:
+        return False
 
 
 def until(condition, seconds):

@@ -2,8 +2,7 @@
 
 from care_sim.policies import BUILT_IN, tags_of
 from care_sim.study.benchmark.result import BenchmarkResult, ResultRow
-from care_sim.study.benchmark.tasks import CAMERAS, Entry
-from care_sim.study.benchmark.worlds import PARTS, published_worlds
+from care_sim.study.benchmark.suite import CAMERAS, PARTS, Entry, published_worlds
 
 
 def made_result(policy="mine", share=0.5, tags=None, worlds=None, **given):

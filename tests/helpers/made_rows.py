@@ -1,7 +1,7 @@
 """Rows made by hand."""
 
 from care_sim.study.episode_config import grid
-from care_sim.study.vehicle.play import VEHICLE_COUNTS, VEHICLE_LISTS, VEHICLE_MEASURES
+from care_sim.study.vehicle_play import VEHICLE_COUNTS, VEHICLE_LISTS, VEHICLE_MEASURES
 
 NEAREST_M = 3.0
 """How near an actor came that was never detected."""

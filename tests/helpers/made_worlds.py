@@ -1,6 +1,6 @@
 """Rows of validations, made by hand."""
 
-from care_sim.base.seed_ranges import training_seeds
+from care_sim.base.seeds import training_seeds
 from care_sim.study.episode_config import grid
 from tests.helpers.made_rows import row
 

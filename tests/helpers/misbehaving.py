@@ -1,5 +1,7 @@
 """An installed package whose policies do not behave."""
 
+import re
+
 THIRD_PARTY = """
 import os, signal, threading, time
 from pathlib import Path
@@ -115,22 +117,7 @@ class Forks(History):
             time.sleep(600)
             os._exit(0)
 """
-ENTRY_POINTS = """
-[care_sim.policies]
-dies = misbehaving:Dies
-killed-once = misbehaving:KilledOnce
-raises = misbehaving:Raises
-raises-oddly = misbehaving:RaisesOddly
-exits = misbehaving:Exits
-raises-in-the-brake = misbehaving:RaisesInTheBrake
-dies-in-the-brake = misbehaving:DiesInTheBrake
-narrow = misbehaving:Narrow
-keeps = misbehaving:Keeps
-draws-in-common = misbehaving:DrawsInCommon
-raises-its-own = misbehaving:RaisesItsOwn
-raises-without-text = misbehaving:RaisesWithoutText
-raises-at-length = misbehaving:RaisesAtLength
-fails-at-start = misbehaving:FailsAtStart
-starts-thread = misbehaving:StartsThread
-forks = misbehaving:Forks
-"""
+CLASSES = re.findall(r"^class (\w+)\(History\)", THIRD_PARTY, re.M)
+ENTRY_POINTS = "[care_sim.policies]\n" + "".join(
+    f"{re.sub('(?<!^)(?=[A-Z])', '-', name).lower()} = misbehaving:{name}\n" for name in CLASSES
+)

@@ -9,12 +9,11 @@ from care_sim.core.rig import Rig
 from care_sim.core.sensor_setup import LIDAR_POSITION
 from care_sim.core.types import CLASSES
 from care_sim.loops.closed_loop import ClosedLoop
-from care_sim.loops.seeds import SensorSeeds
+from care_sim.loops.episode import SensorSeeds
 from care_sim.perception.tracker import MemoryRules
-from care_sim.sensors.camera import FRONT_CAMERA
+from care_sim.sensors.pictures import FRONT_CAMERA
 from care_sim.world.bodies import CATALOGUE
-from care_sim.world.route import Route
-from care_sim.world.speed_plan import SpeedPlan
+from care_sim.world.route import Route, SpeedPlan
 from care_sim.world.traffic import Traffic
 from care_sim.world.world import World
 
@@ -83,19 +82,9 @@ def test_a_keyframe_tells_time_speed_and_distance_at_its_scan(street):
         [10.0, 10.0, 10.0, 10.0, 9.5, 9.0]
     )
     assert [frame.distance_m for frame in frames] == pytest.approx([ahead - x for x in travelled])
-    assert [frame.distance_m for frame in frames[:4]] == pytest.approx(
-        [ahead, ahead - 1, ahead - 2, ahead - 3]
-    )
     assert [frame.nearest_m for frame in frames[:3]] == pytest.approx(
         [frame.distance_m + LIDAR_POSITION[0] for frame in frames[1:4]]
     )
-
-
-def test_without_a_first_sighting_there_is_nothing_to_score(street):
-    world = street()
-    world.add("car", "car", (15.0, 5.0, 0.0))
-    frame = loop_in(world).keyframe(EVERYTHING)
-    assert (frame.in_view, frame.detected, frame.distance_m) == (False, False, np.inf)
 
 
 def test_the_next_belief_forecasts_a_moving_body_where_the_sensor_then_is(street):
@@ -135,24 +124,6 @@ def test_a_body_that_is_not_fired_at_any_more_is_forecast_on_and_on_and_then_for
     assert len(loop.belief.tracks) == 0
 
 
-def test_the_ego_that_has_turned_sees_its_tracks_turned(street):
-    world = street()
-    world.add("car", "car", (20.0, 0.0, 0.0))
-    loop = loop_in(world)
-    loop.keyframe(EVERYTHING)
-    world.ego._vehicle.heading = -0.2
-    loop.keyframe(EVERYTHING)
-    x, y, heading = world.ego.pose
-    assert heading == pytest.approx(0.2)
-    ahead, left = 20.0 - x, 0.0 - y
-    expected = (
-        ahead * np.cos(0.2) + left * np.sin(0.2) - LIDAR_POSITION[0],
-        left * np.cos(0.2) - ahead * np.sin(0.2),
-    )
-    assert loop.belief.tracks.boxes[0, :2] == pytest.approx(expected)
-    assert loop.belief.tracks.boxes[0, 6] == pytest.approx(-0.2)
-
-
 @pytest.mark.parametrize(("x", "in_view"), [(12.0, True), (20.0, False)])
 def test_the_first_sighting_is_in_view_before_a_hoarding_and_not_behind_it(street, x, in_view):
     world = street()
@@ -171,15 +142,6 @@ def test_in_view_is_what_the_camera_saw_before_the_scan(street):
     )
     loop = loop_in(world)
     assert [loop.keyframe(NOTHING).in_view for _ in range(3)] == [False, False, True]
-
-
-def test_in_view_is_about_the_first_sighting_and_nobody_else(street):
-    world = street()
-    world.add("bystander", "pedestrian", (12.0, 3.0, 0.0))
-    world.first_sighting = world.add("person", "pedestrian", (-12.0, 3.0, 0.0))
-    loop = loop_in(world)
-    assert len(loop.belief.detections) == 1
-    assert not loop.keyframe(NOTHING).in_view
 
 
 def test_only_the_first_sighting_counts_as_detected(street):
@@ -212,21 +174,7 @@ def test_late_detections_tell_how_far_the_car_has_turned_since_their_picture(str
     assert np.ravel(changes[1:]) == pytest.approx([0.1, 0.0, -0.05])
 
 
-def test_fresh_detections_are_of_the_picture_just_taken(street):
-    world = street()
-    person = world.add("person", "pedestrian", (12.0, 2.0, 0.0))
-    loop = loop_in(world)
-    for _ in range(2):
-        loop.keyframe(NOTHING)
-        expected = FRONT_CAMERA.project_boxes(loop.sensor.boxes_to_local(world.boxes([person])))[0]
-        detections = loop.belief.detections
-        assert (detections.ages.tolist(), detections.yaw_changes.tolist()) == ([0.0], [0.0])
-        assert detections.boxes[0] == pytest.approx(expected, abs=4.0)
-
-
-@pytest.mark.parametrize(
-    ("latency_s", "age_s"), [(0.05, 0.05), (0.12, 0.15), (0.15, 0.15), (0.3, 0.3)]
-)
+@pytest.mark.parametrize(("latency_s", "age_s"), [(0.05, 0.05), (0.12, 0.15), (0.3, 0.3)])
 def test_a_latency_in_seconds_shows_the_picture_of_that_instant(street, latency_s, age_s):
     """It is rounded up to the world's steps of 0.05 s."""
     world = street()
@@ -279,74 +227,25 @@ def misses_and_losses(world, seeds):
     return detections, scans
 
 
-def test_equal_seeds_miss_and_lose_alike(row_of_cars):
-    assert misses_and_losses(row_of_cars(), (7, 8, 9)) == misses_and_losses(
-        row_of_cars(), (7, 8, 9)
-    )
-
-
-def test_the_camera_misses_by_its_own_seed(row_of_cars):
-    (misses, losses), (other_misses, same_losses) = (
-        misses_and_losses(row_of_cars(), (s, 8, 9)) for s in (7, 9)
-    )
-    assert misses != other_misses
+def test_the_camera_misses_and_the_lidar_loses_each_by_its_own_seed(row_of_cars):
+    misses, losses = misses_and_losses(row_of_cars(), (7, 8, 9))
+    assert misses_and_losses(row_of_cars(), (7, 8, 9)) == (misses, losses)
+    other_misses, same_losses = misses_and_losses(row_of_cars(), (9, 8, 9))
+    same_misses, other_losses = misses_and_losses(row_of_cars(), (7, 9, 9))
+    assert misses == same_misses != other_misses
     assert losses == same_losses
-
-
-def test_the_lidar_loses_by_its_own_seed(row_of_cars):
-    (misses, losses), (same_misses, other_losses) = (
-        misses_and_losses(row_of_cars(), (7, s, 9)) for s in (8, 9)
-    )
-    assert misses == same_misses
     assert all(one != other for one, other in zip(losses, other_losses, strict=True))
+    assert losses[0] != losses[1]
 
 
-def test_losses_differ_between_keyframes():
-    world = World(Traffic((1,), 0, 3.5, 14.0), 0.0)
-    loop = loop_in(world, lidar_dropout=0.5)
-    lost = []
-    for _ in range(2):
-        loop.keyframe(EVERYTHING)
-        lost.append(loop.belief.ranges)
-    world.close()
-    assert not np.array_equal(*lost)
-
-
-def test_flawless_sensors_see_every_car_at_every_keyframe(row_of_cars):
-    loop = loop_in(row_of_cars())
-    for _ in range(2):
-        assert len(loop.belief.detections) == 6
-        loop.keyframe(EVERYTHING)
-        assert len(loop.belief.tracks) == 6
-
-
-def test_a_camera_that_misses_everything_detects_nothing_but_the_truth_stays_in_view(row_of_cars):
+def test_what_the_sensors_lose_stays_in_view_for_the_scoring(row_of_cars):
     world = row_of_cars()
     world.first_sighting = world.actors[0]
-    loop = loop_in(world, false_negative_rate=1.0)
-    for _ in range(3):
-        assert len(loop.belief.detections) == 0
-        assert loop.keyframe(EVERYTHING).in_view
-
-
-def test_a_lidar_that_loses_everything_gives_no_return_and_no_track(row_of_cars):
-    world = row_of_cars()
-    world.first_sighting = world.actors[0]
-    loop = loop_in(world, lidar_dropout=1.0)
-    for _ in range(3):
-        assert not loop.keyframe(EVERYTHING).detected
-        assert len(loop.belief.tracks) == 0
-        assert np.all(loop.belief.ranges == RIG.grid.range_m)
-
-
-def test_range_noise_reaches_the_belief(row_of_cars):
-    scans = []
-    for sigma in (0.0, 0.1):
-        loop = loop_in(row_of_cars(), lidar_range_sigma=sigma)
-        loop.keyframe(EVERYTHING)
-        scans.append(loop.belief.ranges)
-    near = scans[0] < RIG.grid.range_m - 1.0
-    assert (scans[1] - scans[0])[near].std() == pytest.approx(0.1, rel=0.1)
+    loop = loop_in(world, false_negative_rate=1.0, lidar_dropout=1.0)
+    frame = loop.keyframe(EVERYTHING)
+    assert (frame.in_view, frame.detected) == (True, False)
+    assert (len(loop.belief.detections), len(loop.belief.tracks)) == (0, 0)
+    assert np.all(loop.belief.ranges == RIG.grid.range_m)
 
 
 def test_the_belief_shows_the_scan_in_its_cells_and_zero_elsewhere(row_of_cars):
@@ -358,19 +257,12 @@ def test_the_belief_shows_the_scan_in_its_cells_and_zero_elsewhere(row_of_cars):
     np.testing.assert_array_equal(np.flatnonzero(loop.belief.ranges), cells)
 
 
-@pytest.mark.parametrize(("min_returns", "detected"), [(3, True), (10**6, False)])
-def test_a_detector_that_asks_for_too_many_returns_stays_silent_and_the_car_drives_on(
-    street, min_returns, detected
-):
+def test_a_detector_that_asks_for_too_many_returns_stays_silent_and_the_car_drives_on(street):
     world = street()
     world.first_sighting = world.add("bus", "bus", (BUMPER + 12.0 + BUS, 0.0, 0.0))
-    loop = loop_in(world, min_returns=min_returns)
+    loop = loop_in(world, min_returns=10**6)
     frame = loop.keyframe(EVERYTHING)
-    assert (frame.detected, frame.braking, len(loop.belief.tracks)) == (
-        detected,
-        detected,
-        int(detected),
-    )
+    assert (frame.detected, frame.braking, len(loop.belief.tracks)) == (False, False, 0)
 
 
 def test_a_collision_is_told_at_its_keyframe_with_the_speed_of_the_contact(street):
@@ -390,9 +282,9 @@ def test_the_guarded_strip_is_that_of_the_driver(street):
     assert (wide.guarded_m, human.guarded_m) == (pytest.approx(width + 2.0), width)
 
 
-@pytest.mark.parametrize("comfort", [0.8, 2.5])
-def test_comfort_is_that_of_the_drive_too(street, comfort):
+def test_comfort_is_that_of_the_drive_too(street):
     """A car that drives by a plan and is slower than it gains speed as its settings say."""
+    comfort = 0.8
     world = street(Route(legs=((300.0, 0.0),)))
     world.speed_plan = SpeedPlan(world.route, 2 * SPEED, 2.0, 1.5)
     loop = loop_in(world, comfort_mps2=comfort)

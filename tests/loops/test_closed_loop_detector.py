@@ -25,13 +25,6 @@ def play(name="CARE-Dartout-v0", seed=0, policy="full", keyframes=60, **argument
         return infos, observation
 
 
-def test_the_proxy_by_name_is_the_proxy():
-    usual, seen = play(policy="care")
-    named, seen_too = play(policy="care", detector="returns")
-    assert usual[-1]["outcome"] == named[-1]["outcome"]
-    assert all(np.array_equal(seen[key], seen_too[key]) for key in seen)
-
-
 def test_a_clustering_detector_finds_the_person_and_the_car_brakes():
     infos, _ = play(detector="cluster")
     outcome = infos[-1]["outcome"]
@@ -99,28 +92,19 @@ def test_a_detector_that_finds_nothing_leaves_no_track_and_no_brake(recorder):
     assert (observation["tracks"][:, 0] == -1).all()
 
 
-def test_the_oracle_plays_beside_a_detector_whose_boxes_lie_on_nobody():
-    infos, _ = play(name="CARE-Dense-v0", policy="history-oracle", detector="cluster")
-    assert infos[-1]["outcome"]["rays_fired"] > 0
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         ({"detector": "radar"}, "radar"),
         ({"detector": "cluster", "min_returns": 5}, "min_returns is of the detector returns"),
         ({"detector_parameters": 3}, "detector_parameters must map"),
+        ({"detector_parameters": {"min_returns": 40}}, "min_returns is a condition"),
         ({"detector": "cluster", "detector_parameters": {"reach": 1}}, "reach"),
     ],
 )
 def test_bad_arguments_are_named(arguments, message):
     with pytest.raises(InvalidInput, match=message):
         gymnasium.make("CARE-Dartout-v0", **arguments)
-
-
-def test_the_threshold_of_the_proxy_is_a_condition_alone():
-    with pytest.raises(InvalidInput, match="min_returns is a condition"):
-        gymnasium.make("CARE-Dartout-v0", detector_parameters={"min_returns": 40})
 
 
 def test_a_box_is_of_whom_it_has_returns_though_somebody_hidden_is_nearer(monkeypatch):

@@ -4,8 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.base.times import LAST_BITS_S
-from care_sim.loops.episode import most_keyframes
-from care_sim.loops.seeds import EpisodeSeeds
+from care_sim.loops.episode import EpisodeSeeds, most_keyframes
 from care_sim.world.world import WORLD_STEP_S
 
 

@@ -5,10 +5,10 @@ import pytest
 
 from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.rig import Rig
+from care_sim.loops.episode import SensorSeeds
 from care_sim.loops.false_box_pools import pool_of_another_drive
-from care_sim.loops.seeds import SensorSeeds
 from care_sim.scenarios import SCENARIOS
-from care_sim.sensors.camera import FRONT_CAMERA
+from care_sim.sensors.pictures import FRONT_CAMERA
 
 RIG = Rig(cameras=(FRONT_CAMERA,))
 

@@ -8,9 +8,9 @@ import pytest
 from care_sim.core.conditions import Sensing
 from care_sim.core.frames import Frame
 from care_sim.core.rig import Rig
+from care_sim.loops.episode import SensorSeeds
 from care_sim.loops.film import Sweep
 from care_sim.loops.open_loop import OpenLoop
-from care_sim.loops.seeds import SensorSeeds
 from care_sim.perception.proxy import ReturnsProxy
 from care_sim.sensors.annotated import Cloud
 from care_sim.sensors.surround import SURROUND_CAMERAS
@@ -117,8 +117,3 @@ def test_every_sweep_has_its_own_faults():
     kept = [set(clouds[1].cells[clouds[1].times == t]) for t in np.unique(clouds[1].times)]
     assert all(1800 < len(one) < 2200 for one in kept)
     assert kept[0] != kept[1]
-
-
-def test_a_film_without_sweeps_plays_as_ever():
-    clouds, *_ = played(handmade_film(), returns_of(AHEAD, 0))
-    assert clouds[0].times is None

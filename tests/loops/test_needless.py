@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from care_sim.core.driver_settings import DriverSettings
+from care_sim.core.conditions import DriverSettings
 from care_sim.core.frames import Frame
 from care_sim.core.sensor_setup import LIDAR_POSITION
 from care_sim.core.types import Tracks
@@ -73,7 +73,7 @@ def test_the_wait_before_the_brake_is_released_does_not_count(world):
     assert answers == [False] * 6 + [True] * 4
 
 
-def unfounded(world, box, unseen=None):
+def unfounded(world, box, in_view=False, behind=()):
     """Whether the brake is, with a track of a standing car at this x, y of the sensor's frame."""
     sensor = Frame.mounted(world.ego.pose, LIDAR_POSITION)
     track = Tracks(
@@ -85,7 +85,7 @@ def unfounded(world, box, unseen=None):
         np.array([3]),
     )
     judge = UnfoundedBraking(1.1, 0.87 + 0.3, DriverSettings())
-    return judge.judge_tracks(world, sensor, track, track, unseen)
+    return judge.judge_tracks(world, sensor, track, track, True, in_view, np.array(behind))
 
 
 def test_a_track_in_the_way_without_a_body_is_made_up(world):
@@ -103,4 +103,7 @@ def test_a_body_whose_place_is_misjudged_is_not_made_up(world):
 def test_a_body_that_nobody_has_seen_is_no_reason(world):
     hidden = world.add("hidden", "child", (10.0, 0.0, 0.0))
     assert not unfounded(world, (10.0, 0.0))
-    assert unfounded(world, (10.0, 0.0), unseen=hidden.body)
+    world.first_sighting = hidden
+    assert unfounded(world, (10.0, 0.0))
+    assert not unfounded(world, (10.0, 0.0), in_view=True)
+    assert not unfounded(world, (10.0, 0.0), behind=[hidden.body])

@@ -10,9 +10,9 @@ from care_sim.core.frames import Frame
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES, Detections, Ego, ImageDetections
 from care_sim.driving.localisation import Localisation
+from care_sim.loops.episode import SensorSeeds
 from care_sim.loops.film import Film, Shot
 from care_sim.loops.open_loop import OpenLoop
-from care_sim.loops.seeds import SensorSeeds
 from care_sim.perception.points_only import PointsOnly
 from care_sim.perception.proxy import ReturnsProxy
 from care_sim.sensors.annotated import NO_OBJECT, Annotations, Cloud, IdentifiedDetections
@@ -91,14 +91,6 @@ def test_what_is_fired_at_is_detected_and_tracked_over_ground(speed, bend):
     assert loop.belief.ego == Ego(6.0)
 
 
-def test_what_is_not_fired_at_is_not_detected():
-    loop = loop_of(film())
-    elsewhere = np.setdiff1d(np.arange(RIG.grid.size), on_the_car(loop))
-    assert len(loop.keyframe(elsewhere).detections) == 0
-    assert len(loop.keyframe(on_the_car(loop)[:2]).detections) == 0
-    assert len(loop.belief.tracks) == 0
-
-
 def test_a_detector_meets_the_points_of_fired_cells_alone():
     class Keeps:
         def detect(self, points, sensor_height_m):
@@ -121,21 +113,6 @@ def test_the_last_scan_is_shown_with_what_was_not_fired_and_what_did_not_return(
     assert not loop.belief.ranges.any()
 
 
-def test_a_lost_return_is_shown_as_none():
-    loop = loop_of(film(), lidar_dropout=1.0)
-    loop.keyframe(WALL)
-    assert loop.belief.ranges.ravel()[WALL].tolist() == [RIG.grid.range_m] * 3
-
-
-def test_the_film_ends_with_its_last_keyframe():
-    loop = loop_of(film())
-    shown = []
-    while not loop.over:
-        shown.append(loop.shot.token)
-        loop.keyframe(NOWHERE)
-    assert shown == [f"shot {n}" for n in range(4)]
-
-
 def test_a_picture_one_keyframe_old_is_the_one_before():
     """The strict-causal camera: nothing at the first keyframe, then what the one before saw, half a
     second old.
@@ -147,22 +124,6 @@ def test_a_picture_one_keyframe_old_is_the_one_before():
         assert loop.belief.detections.boxes[:, 0].tolist() == [100 + before]
         assert loop.belief.detections.ages.tolist() == [0.5]
         assert loop.belief.detections.yaw_changes == pytest.approx([0.1])
-
-
-def test_the_camera_is_black_by_the_clock_of_the_film():
-    loop, seen = loop_of(film(), blackout_start_s=0.5, blackout_s=0.5), []
-    while not loop.over:
-        seen.append(len(loop.belief.detections))
-        loop.keyframe(NOWHERE)
-    assert seen == [1, 0, 1, 1]
-
-
-def test_keyframes_without_an_annotation_are_played():
-    loop = loop_of(film(annotated=(False, True, False, False)))
-    assert len(loop.keyframe(np.arange(RIG.grid.size)).detections) == 0
-    assert len(loop.keyframe(np.arange(RIG.grid.size)).detections) == 1
-    loop.keyframe(NOWHERE)
-    assert len(loop.belief.tracks) == 1
 
 
 def test_truth_moves_a_forecast_to_its_object_while_that_is_annotated():
@@ -198,14 +159,6 @@ def test_a_wrong_pose_moves_the_forecast_of_what_stands():
     assert off == pytest.approx(2 * e1 - e0 - e2)
 
 
-def test_a_wrong_heading_enters_the_change_of_yaw_since_a_picture():
-    spread = {"ego_yaw_sigma_deg": 2.0}
-    loop = loop_of(film(bend=0.1), camera_latency=1, **spread)
-    loop.keyframe(NOWHERE)
-    before, now = errors_of(3, **spread)[1:, 2]
-    assert loop.belief.detections.yaw_changes == pytest.approx([0.1 + now - before])
-
-
 def test_a_full_scan_is_read_without_a_draw():
     loop, other = loop_of(film(), lidar_dropout=0.5), loop_of(film(), lidar_dropout=0.5)
     scan = loop.full_scan()
@@ -229,12 +182,6 @@ def test_policies_meet_the_same_faults_whatever_they_fire():
         one.keyframe(fired).detections.returns
         == other.keyframe(np.arange(RIG.grid.size)).detections.returns
     )
-
-
-def test_the_camera_misses_what_is_far():
-    """5% a metre, and the other car 20 m away; 0.1% a metre is next to nothing."""
-    assert len(loop_of(film(), false_negative_per_m=0.05).belief.detections) == 0
-    assert len(loop_of(film(), false_negative_per_m=0.001).belief.detections) == 1
 
 
 def test_an_appearance_is_missed_no_more_often_than_what_was_there_before():

@@ -38,11 +38,3 @@ def test_the_last_detection_counts_and_the_gone_stay_at_their_forecast(tracks_at
     tracks = tracks_at(("car", 1.0, 0.0, 0.0, 0.0), ("car", 2.0, 0.0, 0.0, 0.0))
     assert places(noted(([0, 1], [7, 7]), ([0], [30])), tracks) == [100, 200]
     assert places(noted(([0, 1], [7, 99])), tracks) == [200, -1]
-
-
-def test_forecasts_are_left_as_they_are(tracks_at):
-    tracks = tracks_at(("car", 1.0, 0.0, 0.0, 0.0))
-    before = tracks.boxes.copy()
-    noted(([0], [7])).boxes(tracks, present)
-    assert np.array_equal(tracks.boxes, before)
-    assert noted().boxes(tracks_at(), present).shape == (0, 7)

@@ -11,9 +11,9 @@ import pytest
 from care_sim.cli import main
 from care_sim.core.frames import turned
 from care_sim.core.types import CLASSES, Detections
+from care_sim.sources.nuscenes.detections import MODALITIES, result_boxes
 from care_sim.sources.nuscenes.films import nuscenes_film
 from care_sim.sources.nuscenes.recordings import split_scenes
-from care_sim.sources.nuscenes.results_form import MODALITIES, result_boxes
 from care_sim.sources.nuscenes.tables import Database
 from tests.helpers.nuscenes_drive import OBJECTS, SPLIT, write_drive
 from tests.helpers.places import ROOT

@@ -13,8 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from care_sim.sensors.engines import ENGINES
-from care_sim.sensors.engines.bullet import Bullet
+from care_sim.sensors.engines import ENGINES, Bullet
 from care_sim.world.bodies import BodyKind, Part
 from care_sim.world.body_tables import SHAPES
 from care_sim.world.bullet import NO_BODY, BulletWorld

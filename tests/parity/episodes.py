@@ -7,9 +7,9 @@ import numpy as np
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.frames import Frame
-from care_sim.evaluation.metrics import outcome
+from care_sim.evaluation.outcomes import outcome
 from care_sim.loops.records import Keyframe
-from care_sim.sensors.camera import Picture
+from care_sim.sensors.pictures import Picture
 from care_sim.study.designs.paper import paper_study
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.episode_play import trace

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from care_sim.core.types import CLASSES
 from care_sim.perception.detectors import make_detector
-from care_sim.perception.graded import CURVES, GradedProxy, chance
 from care_sim.perception.matching import found_objects
+from care_sim.perception.proxy import CURVES, GradedProxy, chance
 from care_sim.sensors.annotated import NO_OBJECT, Annotations, Cloud
 from care_sim.sources.street_films import street_film
 

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from care_sim.core.frames import Frame
 from care_sim.core.types import CLASSES, Detections
-from care_sim.perception import track_kernels as kernels
+from care_sim.perception import tracker
 from care_sim.perception.tracker import MemoryRules, TrackMemory
 
 STILL = Frame(0.0, 0.0, 1.84, 0.0)
@@ -247,7 +247,7 @@ def test_whoever_can_be_only_one_is_matched_as_the_assignment_matches(frames):
         ]
 
     plain = told()
-    pairs = kernels.possible_pairs
+    pairs = tracker.possible_pairs
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(kernels, "possible_pairs", lambda *given: (*pairs(*given)[:3], False))
+        patch.setattr(tracker, "possible_pairs", lambda *given: (*pairs(*given)[:3], False))
         assert told() == plain

@@ -8,9 +8,9 @@ import gymnasium
 import numpy as np
 import pytest
 
-from care_sim.core.actions import scores_of
 from care_sim.core.allocation import allocate
-from care_sim.core.random_floor import RandomFloor
+from care_sim.core.firing.actions import scores_of
+from care_sim.core.firing.floor import RandomFloor
 from care_sim.envs.sensing import sensing
 from care_sim.policies import make_policy
 from care_sim.sensors.setups import sensor_setup

@@ -5,8 +5,8 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.belief import Belief
+from care_sim.core.cells.stack import GridStack
 from care_sim.core.grid import AngularGrid
-from care_sim.core.grid_stack import GridStack
 from care_sim.core.rig import Rig
 from care_sim.core.types import Ego, ImageDetections, Tracks
 from care_sim.policies.controls.patterns import Fan, cells_by_row, entry_cells, entry_elevation_deg

@@ -12,12 +12,11 @@ from gymnasium.vector import SyncVectorEnv
 import care_sim
 from care_sim.base.errors import InvalidInput
 from care_sim.certify.design import AS_LISTED
-from care_sim.core.cell_sets import CellSets
+from care_sim.core.cells.sets import CellSets, WorldSets
+from care_sim.core.cells.stack import GridStack
 from care_sim.core.defaults import CELL_ORDERS
 from care_sim.core.grid import AngularGrid
-from care_sim.core.grid_stack import GridStack
 from care_sim.core.types import Demand
-from care_sim.core.world_sets import WorldSets
 from care_sim.envs.sensing import sensing
 from care_sim.policies import BUILT_IN
 from care_sim.policies.base import FixedPolicy, PrivilegedPolicy, RowPolicy

@@ -7,7 +7,7 @@ import pytest
 from care_sim.reports.figures.leaderboard import leaderboard_figure, score_chart
 from care_sim.reports.leaderboard import leaderboard_table, leads_table
 from care_sim.reports.table import Bold
-from care_sim.study.benchmark.tasks import Entry
+from care_sim.study.benchmark.suite import Entry
 from tests.helpers.made_results import made_result
 
 FULL = made_result("full", share=1)

@@ -17,10 +17,9 @@ from care_sim.study.designs import (
     ablations,
     faults,
     firing,
-    ncap,
-    order,
     paper,
     realism,
+    standards,
     validate,
     vehicle,
 )
@@ -39,9 +38,9 @@ EPISODES = {
     "r157": [each for each in CUT_INS if not each["collision"]],
     "validate": made_worlds.world(made_worlds.SATURATED, {"care": (15.0, 0), "fan": (14.0, 0)}),
     "ncap": [
-        row(config, 9.0) for config in ncap.ncap_study([0, 1], ["care", "full"], ["CPNCO-50"])
+        row(config, 9.0) for config in standards.ncap_study([0, 1], ["care", "full"], ["CPNCO-50"])
     ],
-    "order": [row(config, 9.0) for config in order.order_study([0]) if config.scenario == "dense"],
+    "order": [row(config, 9.0) for config in firing.order_study([0]) if config.scenario == "dense"],
     "firing": [row(config, 9.0) for config in firing.firing_study([0])],
     "realism": [row(config, 9.0) for config in realism.realism_study([0])],
     "vehicle": [vehicle_row(config, 9.0) for config in vehicle.vehicle_study([0])],
@@ -50,15 +49,15 @@ EPISODES = {
 
 def test_a_column_that_no_row_fills_may_be_missing(tmp_path):
     """Only tests with cars that hide the target have the reading of Euro NCAP's."""
-    bare = [row(config, 9.0) for config in ncap.ncap_study([0], ["full"], ["CCFtap"])]
+    bare = [row(config, 9.0) for config in standards.ncap_study([0], ["full"], ["CCFtap"])]
     study = STUDIES["ncap"]
     write_rows(bare, tmp_path / "episodes.parquet", "ncap")
     read = read_rows(tmp_path / "episodes.parquet", study.schema)
     assert study.tables(read) == study.tables(bare)
     # Where it is there, it is checked.
-    wrong = [{**one, ncap.REPORTED_COLUMN: "yes"} for one in bare]
+    wrong = [{**one, standards.REPORTED_COLUMN: "yes"} for one in bare]
     write_rows(wrong, tmp_path / "episodes.parquet", "ncap")
-    with pytest.raises(InvalidInput, match=f"its column {ncap.REPORTED_COLUMN} must hold"):
+    with pytest.raises(InvalidInput, match=f"its column {standards.REPORTED_COLUMN} must hold"):
         read_rows(tmp_path / "episodes.parquet", study.schema)
 
 
@@ -105,7 +104,7 @@ def test_a_file_changes_nothing_in_the_tables(tmp_path):
         "ablate": ablations.ablation_study(range(2)),
         "faults": faults.fault_study(range(2)),
         "firing": firing.firing_study(range(2)),
-        "ncap": ncap.ncap_study(range(2), ["care", "fan", "full"], ["CPNA-25", "CCRs"]),
+        "ncap": standards.ncap_study(range(2), ["care", "fan", "full"], ["CPNA-25", "CCRs"]),
         "paper": paper.paper_study(range(2)),
         "validate": validate.validation_study("cutin", [(("mirrored", "drawn"),)], [0.1], [0], 1),
     }

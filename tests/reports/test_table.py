@@ -10,8 +10,7 @@ import pytest
 from rich.console import Console
 
 import care_sim.reports.page
-from care_sim.reports.latex import escaped, latex
-from care_sim.reports.report import MOST_LINES, shortened
+from care_sim.reports.report import MOST_LINES, escaped, latex, shortened
 from care_sim.reports.table import Bold, Table
 from care_sim.reports.tables.crowding import crowding_tables
 from care_sim.reports.tables.sweep import sweep_tables

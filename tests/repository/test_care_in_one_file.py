@@ -11,7 +11,7 @@ import pytest
 
 from care_sim.core.firing.base import demanded
 from care_sim.core.types import ImageDetections
-from care_sim.loops.seeds import EpisodeSeeds
+from care_sim.loops.episode import EpisodeSeeds
 from care_sim.perception.tracker import TrackMemory
 from care_sim.study.designs.paper import paper_study
 from care_sim.study.episode_config import EpisodeConfig

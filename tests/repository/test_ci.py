@@ -65,11 +65,3 @@ def test_later_pythons_that_run_are_tested_and_the_others_named(clone):
     assert out == "Python 3.12 is not here: nothing was tested with it\n"
     smoke = f"make smoke PYTHON={python} VENV=build/python3.13 noninteractive"
     assert told[-2:] == [smoke, "care-sim certify"]
-
-
-def test_what_fails_with_a_later_python_fails(clone):
-    program(clone / "bin" / "python3.12", "exit 0")
-    program(clone / "build" / "python3.12" / "bin" / "care-sim", "exit 1")
-    with pytest.raises(AssertionError):
-        ran(clone)
-    assert (clone / "told").read_text().splitlines()[-1].startswith("make smoke PYTHON=python3.12 ")

@@ -1,11 +1,8 @@
 """Texts for other places name what this repository holds."""
 
-import re
-
 import pytest
 from pyarrow.parquet import read_metadata
 
-from care_sim.envs import IDS
 from tests.helpers.places import PUBLISHED, ROOT
 
 yaml = pytest.importorskip("yaml")
@@ -36,20 +33,3 @@ def test_the_paper_has_the_same_authors_wherever_it_is_cited():
     names = [f"{one['family-names']}, {one['given-names']}" for one in paper["authors"]]
     for page in (ROOT / "docs" / "cite.md", COMMUNITY / "dataset-card.md"):
         assert f"author    = {{{' and '.join(names)}}}" in page.read_text()
-
-
-def test_the_space_shows_a_page_of_the_site_and_counts_its_entries():
-    card = front_matter("space-card.md")
-    page = (ROOT / card["app_file"]).with_suffix(".md")
-    assert page.exists()
-    entries = [*page.parent.glob("*.json")]
-    assert f" {len(entries)} policies " in card["short_description"]
-    assert card["sdk"] == "static"
-
-
-def test_the_entry_for_gymnasium_names_the_tested_version():
-    entry = (COMMUNITY / "gymnasium.md").read_text()
-    (version,) = re.findall(r"^gymnasium==(.*)$", (ROOT / "constraints.txt").read_text(), re.M)
-    assert f"badge/Gymnasium-v{version}-blue" in entry
-    assert len(IDS) == 8
-    assert "Eight environments" in entry

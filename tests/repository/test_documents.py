@@ -17,16 +17,15 @@ from pyarrow.parquet import read_schema
 
 from care_sim import cli
 from care_sim.base.errors import InvalidInput
-from care_sim.base.seed_ranges import SPLITS
+from care_sim.base.seeds import SPLITS
 from care_sim.commands.table import COMMANDS
 from care_sim.core.conditions import DEFAULTS
 from care_sim.core.types import CLASSES, ImageDetections, Tracks
 from care_sim.envs import IDS
 from care_sim.sources.street_films import street_film
-from care_sim.study.benchmark.player import player_in
-from care_sim.study.benchmark.result_file import read_result
-from care_sim.study.benchmark.tasks import tasks_of
-from care_sim.study.benchmark.worlds import PARTS, published_worlds
+from care_sim.study.benchmark.play import player_in
+from care_sim.study.benchmark.result import read_result
+from care_sim.study.benchmark.suite import PARTS, published_worlds, tasks_of
 from care_sim.study.results_formats import RESULTS_FORMATS
 from care_sim.training.config import PpoConfig
 from care_sim.training.folder import read_table
@@ -361,7 +360,7 @@ def test_what_a_field_may_be_is_told_in_a_clone_and_on_the_site():
     griffe = pytest.importorskip("griffe")
     extensions = griffe.load_extensions(str(ROOT / "docs" / "dynamic_docstrings.py"))
     scenario = griffe.load(
-        "care_sim.scenarios.r157.scenario.R157", search_paths=[ROOT], extensions=extensions
+        "care_sim.scenarios.r157.R157", search_paths=[ROOT], extensions=extensions
     )
     assert scenario["gap_m"].docstring.value.endswith("\n\nAllowed: 0.1 to 200.")
     assert scenario["side"].docstring.value.endswith("\n\nAllowed: left, right.")

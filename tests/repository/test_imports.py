@@ -58,6 +58,7 @@ def test_an_episode_loads_nothing_heavy_that_it_does_not_use(engine):
     [
         ("care_sim.cli", {"highway_env", "matplotlib", "pandas", "pybullet"}),
         ("care_sim.commands.shared.run_study", {"highway_env", "pandas", "scipy.stats"}),
+        ("care_sim.wrappers", {"rerun"}),
     ],
 )
 def test_what_only_worlds_need_is_loaded_with_the_first_world(module, unused):
@@ -65,15 +66,6 @@ def test_what_only_worlds_need_is_loaded_with_the_first_world(module, unused):
     line = f"import sys, {module}; print(*sys.modules)"
     told = subprocess.run([sys.executable, "-c", line], capture_output=True, text=True, check=True)
     assert unused & {*told.stdout.split()} == set()
-
-
-def test_the_wrapper_that_records_loads_rerun_only_when_it_is_used():
-    line = (
-        "import sys; from care_sim.wrappers import RecordRerun; import care_sim.cli; "
-        "print('rerun' in sys.modules)"
-    )
-    done = subprocess.run([sys.executable, "-c", line], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "False"
 
 
 def test_only_the_viewer_imports_rerun():

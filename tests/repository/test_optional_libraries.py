@@ -14,7 +14,7 @@ import pytest
 from care_sim.base.extras import install_command
 from tests.extras_alone import USES
 from tests.helpers.places import ROOT
-from tests.repository.test_house import MODULES, imported
+from tests.repository.test_house import MODULES
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 EXTRAS = PROJECT["optional-dependencies"]
@@ -58,105 +58,24 @@ def brought(extra):
 OPTIONAL = set().union(*map(brought, EXTRAS))
 
 
-def named_by(node):
-    """The top modules that an import names."""
-    if isinstance(node, ast.ImportFrom):
-        return {(node.module or "").partition(".")[0]}
-    return {alias.name.partition(".")[0] for alias in node.names}
-
-
-def is_for_types(node):
-    return isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
-
-
-def at_loading(node):
-    """The imports that run when a module is loaded."""
-    for child in ast.iter_child_nodes(node):
-        if isinstance(child, ast.Import | ast.ImportFrom):
-            yield child
-        elif not (
-            isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda)
-            or is_for_types(child)
-        ):
-            yield from at_loading(child)
-
-
-@pytest.fixture(scope="module")
-def trees():
-    return {module: ast.parse(path.read_text()) for module, path in MODULES.items()}
-
-
 def test_all_is_all_but_what_developers_need():
     users = set(EXTRAS) - FOR_DEVELOPERS
     assert brought("all") == set().union(*map(brought, users))
     assert brought("all") < brought("dev")
 
 
-def test_every_library_is_one_that_the_project_asks_for(trees):
+def test_every_library_is_one_that_the_project_asks_for():
     base = {re.split(r"[\[>=<]", wanted)[0].replace("-", "_") for wanted in PROJECT["dependencies"]}
     named = {MODULE_OF.get(name, name) for name in base}
     known = named.union(OPTIONAL, sys.stdlib_module_names, *(BESIDE.get(name, ()) for name in base))
-    asked = {
-        name
-        for tree in trees.values()
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Import | ast.ImportFrom)
-        for name in named_by(node)
-    }
+    asked = set()
+    for path in MODULES.values():
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ImportFrom):
+                asked.add((node.module or "").partition(".")[0])
+            elif isinstance(node, ast.Import):
+                asked |= {alias.name.partition(".")[0] for alias in node.names}
     assert asked - known - {"care_sim"} == set()
-
-
-def test_only_modules_that_others_load_when_they_need_them_load_libraries_of_extras(trees):
-    imports = {module: [*at_loading(tree)] for module, tree in trees.items()}
-    needing = {
-        module for module, nodes in imports.items() if OPTIONAL & set().union(*map(named_by, nodes))
-    }
-    # Whoever loads one of them as it is loaded itself needs the library, too.
-    loads = {
-        module: {*imported(ast.Module(nodes, []))} | {module.rpartition(".")[0]}
-        for module, nodes in imports.items()
-    }
-    size = 0
-    while size < len(needing):
-        size = len(needing)
-        needing |= {module for module, others in loads.items() if others & needing}
-    assert "care_sim.viewer.recording.recording" in needing
-    assert {module for module in needing if not module.startswith(NEED_LIBRARIES)} == set()
-
-
-def test_a_message_names_an_extra_that_brings_the_library(trees):
-    told = 0
-    for tree in trees.values():
-        for node in ast.walk(tree):
-            if isinstance(node, ast.Call) and ast.unparse(node.func) == "_import":
-                module, _, extra = (getattr(argument, "value", None) for argument in node.args)
-                # In a loop over modules that is no text.
-                assert module is None or module in brought(extra)
-                told += 1
-            if isinstance(node, ast.Try):
-                told += bool(extras_in(node.handlers))
-                names = {
-                    name
-                    for inner in node.body
-                    if isinstance(inner, ast.Import | ast.ImportFrom)
-                    for name in named_by(inner)
-                }
-                for extra in extras_in(node.handlers):
-                    assert names & OPTIONAL <= brought(extra), ast.unparse(node)
-        assert extras_in([tree]) <= set(EXTRAS)
-    assert told > 8
-
-
-def extras_in(nodes):
-    """The extras that errors below these nodes name, where that is no variable."""
-    return {
-        node.args[1].value
-        for top in nodes
-        for node in ast.walk(top)
-        if isinstance(node, ast.Call)
-        and ast.unparse(node.func) == "missing_extra"
-        and isinstance(node.args[1], ast.Constant)
-    }
 
 
 def test_how_an_extra_is_installed_is_said_in_one_place_as_the_pages_say_it():
@@ -168,13 +87,15 @@ def test_how_an_extra_is_installed_is_said_in_one_place_as_the_pages_say_it():
 
 
 WITHOUT = """
-import json, sys
+import importlib, json, sys
 class Nothing:
     def find_spec(self, name, path=None, target=None):
         if name.partition(".")[0] in OPTIONAL:
             raise ModuleNotFoundError(f"No module named {name!r}", name=name)
-OPTIONAL, LINES = map(json.loads, sys.argv[1:])
+OPTIONAL, MODULES, LINES = map(json.loads, sys.argv[1:])
 sys.meta_path.insert(0, Nothing())
+for module in MODULES:
+    importlib.import_module(module)
 from care_sim.cli import main
 for line in LINES:
     print("$", line, file=sys.stderr)
@@ -200,18 +121,22 @@ MISSED = {
 }
 
 
+def without_extras(folder, modules, lines):
+    """What a process that lacks all optional libraries says as it loads modules and runs lines."""
+    given = map(json.dumps, (sorted(OPTIONAL), modules, lines))
+    command = [sys.executable, "-c", WITHOUT, *given]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True).stderr
+
+
+def test_only_modules_that_others_load_when_they_need_them_load_libraries_of_extras(tmp_path):
+    modules = [name for name in sorted(MODULES) if not name.startswith(NEED_LIBRARIES)]
+    assert without_extras(tmp_path, modules, []) == ""
+
+
 @pytest.mark.slow
 def test_a_command_without_its_extra_says_so_in_a_line(tmp_path):
-    given = [json.dumps(sorted(OPTIONAL)), json.dumps([*MISSED])]
     (tmp_path / "drive.mcap").touch()
-    done = subprocess.run(
-        [sys.executable, "-c", WITHOUT, *given],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    told = done.stderr.split("$ ")[1:]
+    told = without_extras(tmp_path, [], [*MISSED]).split("$ ")[1:]
     assert len(told) == len(MISSED)
     for lines, extra in zip(told, MISSED.values(), strict=True):
         command, *hints, line, end = lines.splitlines()

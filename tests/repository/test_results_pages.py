@@ -10,13 +10,12 @@ import numpy as np
 import pytest
 
 from care_sim import cli
-from care_sim.base.seed_ranges import TRAINING
-from care_sim.loops.seeds import EpisodeSeeds
+from care_sim.base.seeds import TRAINING
+from care_sim.loops.episode import EpisodeSeeds
 from care_sim.policies import BUILT_IN
 from care_sim.scenarios import make_scenario
-from care_sim.study.benchmark.made_by import processor_of
-from care_sim.study.benchmark.result_file import read_result
-from care_sim.study.benchmark.worlds import TESTS, published_worlds
+from care_sim.study.benchmark.result import processor_of, read_result
+from care_sim.study.benchmark.suite import TESTS, published_worlds
 from care_sim.study.results_formats import EPISODES
 from care_sim.study.rows.parquet import read_rows
 from care_sim.training.supervised.sets import ROUNDS

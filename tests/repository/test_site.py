@@ -12,8 +12,6 @@ from urllib.parse import unquote, urlsplit
 
 import pytest
 
-import care_sim.wrappers
-from care_sim.viewer.recording.entities import ENTITIES
 from tests.helpers.places import ROOT
 
 pytestmark = pytest.mark.slow
@@ -52,23 +50,6 @@ def site(built):
 
 def test_the_site_is_built_without_a_warning(built):
     assert "WARNING" not in built[1]
-
-
-def test_the_site_tells_of_environments_recordings_and_wrappers(site):
-    page = (site / "environments" / "dense.html").read_text()
-    for part in (
-        "CARE-Dense-v0",
-        "Reward",
-        "Episode end",
-        "lidar_dropout",
-        "vehicles",
-        "encroachment_s",
-    ):
-        assert part in page
-    watch = (site / "watch.html").read_text()
-    assert [name for name in ENTITIES if f"<code>{name}</code>" not in watch] == []
-    wrappers = (site / "api" / "wrappers.html").read_text()
-    assert {*care_sim.wrappers.__all__} <= {*re.findall(r'<h2 id="[\w.]*\.(\w+)"', wrappers)}
 
 
 def test_the_notebook_shows_what_came_out(site):
@@ -169,20 +150,3 @@ def test_the_search_finds_a_page(chromium, address):
     page.wait_for_selector(".md-search-result__item a")
     assert "newcomer" in page.locator(".md-search-result__list").inner_text().lower()
     page.context.close()
-
-
-def test_code_is_copied_with_a_button_and_the_palette_turns(chromium, address):
-    context = chromium.new_context(**DESK | {"color_scheme": "light"})
-    context.grant_permissions(["clipboard-read", "clipboard-write"])
-    page = context.new_page()
-    page.goto(address)
-    block = page.locator(".highlight").first
-    block.hover()
-    block.locator("button[title='Copy to clipboard']").first.click()
-    copied = page.evaluate("navigator.clipboard.readText()")
-    assert copied.strip() == block.locator("code").inner_text().strip()
-    paper = "getComputedStyle(document.body).backgroundColor"
-    before = page.evaluate(paper)
-    page.locator("label[title='Dark']").first.click()
-    page.wait_for_function(f"{paper} !== '{before}'")
-    context.close()

@@ -16,13 +16,8 @@ from care_sim.core.rig import Rig
 from care_sim.core.sensor_setup import LIDAR_POSITION
 from care_sim.core.types import Demand
 from care_sim.scenarios import make_scenario
-from care_sim.sensors.camera import (
-    FRONT_CAMERA,
-    CameraDetector,
-    Picture,
-    class_table,
-    faultless_detections,
-)
+from care_sim.sensors.camera import CameraDetector
+from care_sim.sensors.pictures import FRONT_CAMERA, Picture, class_table, faultless_detections
 
 pytestmark = pytest.mark.slow
 GRID = AngularGrid()

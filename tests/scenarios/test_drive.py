@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.base.random_streams import streams
+from care_sim.base.seeds import streams
 from care_sim.scenarios.drive import DriveScenario
 from care_sim.sensors.surround import SURROUND_CAMERAS
 

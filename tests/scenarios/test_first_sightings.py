@@ -12,8 +12,7 @@ from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.core.sensor_setup import LIDAR_POSITION
 from care_sim.scenarios import make_scenario
-from care_sim.sensors.camera import FRONT_CAMERA, Picture
-from care_sim.sensors.confidence import MIN_PIXELS
+from care_sim.sensors.pictures import FRONT_CAMERA, MIN_PIXELS, Picture
 
 GRID = AngularGrid()
 KEYFRAME = 0.1

@@ -7,7 +7,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.rig import Rig
 from care_sim.policies.controls.rehearsed import rehearsal
 from care_sim.scenarios import SCENARIOS, make_scenario
-from care_sim.scenarios.mirroring import MirrorableScenario, MirroredWorld
+from care_sim.scenarios.base import MirrorableScenario, MirroredWorld
 
 every_scenario = pytest.mark.parametrize(
     "name", [name for name, kind in SCENARIOS.items() if issubclass(kind, MirrorableScenario)]

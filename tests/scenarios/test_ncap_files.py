@@ -2,7 +2,6 @@
 
 import pytest
 
-from care_sim.scenarios.ncap.forms import Across, AcrossExit, Ahead, Oncoming
 from care_sim.scenarios.ncap.table import (
     LARGE_HEIGHT_M,
     LARGE_LENGTH_M,
@@ -11,6 +10,10 @@ from care_sim.scenarios.ncap.table import (
     SMALL_LENGTH_M,
     SMALL_WIDTH_M,
     TESTS,
+    Across,
+    AcrossExit,
+    Ahead,
+    Oncoming,
 )
 from care_sim.world.bodies import CATALOGUE
 from tests.helpers.openscenario import declared, limits, sizes, variation

@@ -9,9 +9,8 @@ from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
 from care_sim.scenarios import make_scenario
-from care_sim.scenarios.ncap.forms import Across, Ahead, Bend
-from care_sim.scenarios.ncap.table import TESTS
-from care_sim.scenarios.ncap.turning import bend_route
+from care_sim.scenarios.ncap.meetings import bend_route
+from care_sim.scenarios.ncap.table import TESTS, Across, Ahead, Bend
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.world import WORLD_STEP_S
 from tests.helpers.ncap_worlds import LEFT_HAND, RIGHT_HAND, built, ends_of

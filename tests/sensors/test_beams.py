@@ -1,9 +1,8 @@
 import numpy as np
 import pytest
 
-from care_sim.core.conditions import Sensing
+from care_sim.core.conditions import ReturnSettings, Sensing
 from care_sim.core.frames import Frame
-from care_sim.core.return_settings import ReturnSettings
 from care_sim.sensors.beams import Beams
 from care_sim.sensors.engines import ENGINES
 from care_sim.sensors.lidar import Lidar

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.sensors.camera_errors import LEAST_PX, jittered
+from care_sim.sensors.pictures import FRONT_CAMERA
 
 SPREADS = (0.1, 0.02, 0.15, 0.05)
 

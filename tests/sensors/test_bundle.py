@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from care_sim.core.grid import AngularGrid
-from care_sim.sensors.bundle import bundle
+from care_sim.sensors.beams import bundle
 
 GRIDS = [
     AngularGrid(),

@@ -5,15 +5,17 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import Sensing
 from care_sim.core.frames import Frame
 from care_sim.core.types import CLASSES
-from care_sim.sensors.camera import (
+from care_sim.sensors.camera import CameraDetector
+from care_sim.sensors.pictures import (
     FRONT_CAMERA,
-    CameraDetector,
+    FULL_CONFIDENCE,
+    MIN_PIXELS,
     Picture,
     class_table,
+    confidence_of,
     faultless_detections,
     window_on,
 )
-from care_sim.sensors.confidence import FULL_CONFIDENCE, MIN_PIXELS, confidence_of
 from care_sim.world.bodies import CATALOGUE
 
 SENSOR = Frame(0.0, 0.0, 1.84, 0.0)

@@ -11,9 +11,8 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import CAMERA_FAULTS, CameraFaults, Conditions, Sensing
 from care_sim.core.types import ImageDetections
 from care_sim.sensors.annotated import IdentifiedDetections
-from care_sim.sensors.camera import FRONT_CAMERA
-from care_sim.sensors.camera_faults import Delay, Misses, mounted
-from care_sim.sensors.picture_timing import PictureTiming
+from care_sim.sensors.camera import Delay, Misses, PictureTiming, mounted
+from care_sim.sensors.pictures import FRONT_CAMERA
 
 NEAR, FAR = np.full(40, 10.0), np.full(40, 30.0)
 

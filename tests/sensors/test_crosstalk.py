@@ -1,16 +1,13 @@
 import numpy as np
 import pytest
 
-from care_sim.core.conditions import Sensing
+from care_sim.core.conditions import ReturnSettings, Sensing
 from care_sim.core.frames import Frame
-from care_sim.core.return_settings import ReturnSettings
 from care_sim.core.types import Scan
 from care_sim.sensors.annotated import NO_OBJECT, Cloud
-from care_sim.sensors.crosstalk import Crosstalk, crosstalk_of
 from care_sim.sensors.engines import ENGINES
-from care_sim.sensors.lidar import Lidar
-from care_sim.sensors.lidar_faults import CellFaults
-from care_sim.sensors.recorded_lidar import RecordedLidar
+from care_sim.sensors.lidar import Lidar, RecordedLidar
+from care_sim.sensors.lidar_faults import CellFaults, Crosstalk, crosstalk_of
 from care_sim.world.bodies import CATALOGUE
 
 SENSOR = Frame(0.0, 0.0, 1.84, 0.0)

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from care_sim.core.frames import Frame
 from care_sim.core.types import CLASSES, ImageDetections
 from care_sim.sensors.annotated import IdentifiedDetections
-from care_sim.sensors.box_pool import box_areas
-from care_sim.sensors.camera import FRONT_CAMERA, Picture, class_table, faultless_detections
-from care_sim.sensors.camera_errors import UNHIDDEN, RecallTable, seen_as, whole_boxes
-from care_sim.sensors.camera_profiles import YOLOX
+from care_sim.sensors.camera_errors import UNHIDDEN, seen_as, whole_boxes
+from care_sim.sensors.camera_profiles import YOLOX, RecallTable
+from care_sim.sensors.false_boxes import box_areas
+from care_sim.sensors.pictures import FRONT_CAMERA, Picture, class_table, faultless_detections
 from care_sim.world.bodies import CATALOGUE
 
 TABLE = RecallTable((10.0, 30.0), (0.5, 1.0), ((0.2, 0.4), (0.6, 0.8)))

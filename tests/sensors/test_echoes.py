@@ -3,13 +3,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_sim.core.conditions import Sensing
+from care_sim.core.conditions import ReturnSettings, Sensing
 from care_sim.core.frames import Frame
-from care_sim.core.return_settings import ReturnSettings
 from care_sim.sensors.beams import Beams
-from care_sim.sensors.echoes import echoes_of, reported
 from care_sim.sensors.engines import ENGINES
 from care_sim.sensors.lidar import Lidar
+from care_sim.sensors.signal import echoes_of, reported
 from care_sim.world.bodies import BodyKind, Part
 
 SENSOR = Frame(0.0, 0.0, 1.84, 0.0)

@@ -16,18 +16,18 @@ from hypothesis import strategies as st
 from care_sim.core.conditions import Sensing
 from care_sim.core.types import CLASSES, ImageDetections
 from care_sim.envs.open_loop import FilmEnv
-from care_sim.scenarios.dense import Dense
+from care_sim.scenarios.dartout import Dense
 from care_sim.sensors.annotated import NO_OBJECT, IdentifiedDetections
-from care_sim.sensors.box_pool import EMPTY_POOL, BoxPool
-from care_sim.sensors.camera import FRONT_CAMERA, CameraDetector
-from care_sim.sensors.false_boxes import MOST_DRAWS, FalseBoxes
+from care_sim.sensors.camera import CameraDetector
+from care_sim.sensors.false_boxes import EMPTY_POOL, MOST_DRAWS, BoxPool, FalseBoxes
+from care_sim.sensors.pictures import FRONT_CAMERA
 from care_sim.sensors.surround import SURROUND_CAMERAS
-from care_sim.sources.argoverse2 import films as argoverse2
-from care_sim.sources.kinds import recordings
+from care_sim.sources.argoverse2 import recordings as argoverse2
+from care_sim.sources.installed import recordings
 from care_sim.sources.nuscenes.tables import CAMERA_CHANNELS
 from care_sim.sources.street_films import record
 from care_sim.streets.street import make_street
-from care_sim.world import bullet_clients as clients
+from care_sim.world import bullet_bodies as clients
 from tests.helpers.nuscenes_drive import write_drive
 from tests.helpers.short_streets import part_of
 from tests.helpers.telling_apart import CHANCE, areas_under_the_curve

@@ -7,10 +7,10 @@ import pytest
 
 from care_sim.core.types import ImageDetections
 from care_sim.sensors.annotated import IdentifiedDetections
-from care_sim.sensors.box_pool import EMPTY_POOL, NO_ROWS, BoxPool
-from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.sensors.camera_errors import Ghosts
 from care_sim.sensors.camera_profiles import YOLOX
+from care_sim.sensors.false_boxes import EMPTY_POOL, NO_ROWS, BoxPool
+from care_sim.sensors.pictures import FRONT_CAMERA
 
 KEYFRAME_S = 0.1
 OBJECTS = 50

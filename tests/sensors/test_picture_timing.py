@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 import care_sim
 from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import Sensing
-from care_sim.sensors.picture_timing import picture_timing
+from care_sim.sensors.camera import picture_timing
 
 
 def timing(keyframe_s=0.1, step_s=0.05, **faults):

@@ -11,10 +11,11 @@ from care_sim.core.types import CLASSES, ImageDetections
 from care_sim.envs.open_loop import FilmEnv
 from care_sim.loops.film import Film
 from care_sim.sensors.annotated import NO_OBJECT, IdentifiedDetections
-from care_sim.sensors.box_pool import BoxPool
-from care_sim.sensors.camera import FRONT_CAMERA, CameraDetector
+from care_sim.sensors.camera import CameraDetector
 from care_sim.sensors.camera_errors import UNHIDDEN, whole_boxes
 from care_sim.sensors.camera_profiles import PROFILES, YOLOX
+from care_sim.sensors.false_boxes import BoxPool
+from care_sim.sensors.pictures import FRONT_CAMERA
 
 CAR, TRUCK, BICYCLE, PEDESTRIAN = (
     CLASSES.index(name) for name in ("car", "truck", "bicycle", "pedestrian")

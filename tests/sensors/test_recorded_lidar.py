@@ -6,7 +6,7 @@ import pytest
 from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import Sensing
 from care_sim.sensors.annotated import NO_OBJECT, Cloud
-from care_sim.sensors.recorded_lidar import RecordedLidar
+from care_sim.sensors.lidar import RecordedLidar
 
 CELLS = np.array([100, 100, 700, 9000, 16000])
 RANGES = np.array([7.0, 12.0, 30.0, 5.0, 49.999])

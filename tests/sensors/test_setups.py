@@ -14,7 +14,7 @@ from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.sensor_setup import LIDAR_POSITION, SensorSetup
-from care_sim.sensors.camera import FRONT_CAMERA
+from care_sim.sensors.pictures import FRONT_CAMERA
 from care_sim.sensors.setups import (
     DEFAULT_SETUP,
     sensor_columns,

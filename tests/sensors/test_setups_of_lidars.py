@@ -10,7 +10,7 @@ from care_sim.core.grid import AngularGrid
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.sensor_setup import LIDAR_POSITION, SensorSetup
 from care_sim.policies.learned.weights import Card, load_weights, save_weights
-from care_sim.sensors.camera import FRONT_CAMERA
+from care_sim.sensors.pictures import FRONT_CAMERA
 from care_sim.sensors.setups import (
     DEFAULT_SETUP,
     sensor_columns,

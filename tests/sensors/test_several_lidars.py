@@ -5,24 +5,21 @@ from contextlib import closing
 import numpy as np
 import pytest
 
-from care_sim.core.conditions import Sensing
+from care_sim.core.cells.stack import GridStack
+from care_sim.core.conditions import ReturnSettings, Sensing
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
-from care_sim.core.grid_stack import GridStack
-from care_sim.core.return_settings import ReturnSettings
 from care_sim.core.types import Scan
 from care_sim.perception.proxy import ReturnsRule
 from care_sim.sensors.annotated import Cloud, cloud_of
 from care_sim.sensors.beams import Beams
-from care_sim.sensors.crosstalk import Crosstalk
 from care_sim.sensors.engines import ENGINES, make_engine
-from care_sim.sensors.lidar import Lidar
-from care_sim.sensors.lidar_faults import CellFaults
-from care_sim.sensors.recorded_lidar import RecordedLidar
+from care_sim.sensors.lidar import Lidar, RecordedLidar
+from care_sim.sensors.lidar_faults import CellFaults, Crosstalk
 from care_sim.sensors.surround import full_sweep
 from care_sim.world.bodies import CATALOGUE, BodyKind, Part
 from care_sim.world.bullet import NO_BODY, BulletWorld
-from care_sim.world.linear_motion import LinearMotion
+from care_sim.world.motions import LinearMotion
 from tests.helpers.lidars import DEGREE, STACK
 
 SENSOR = Frame(3.0, -2.0, 1.84, 0.6)
@@ -117,7 +114,7 @@ def test_cells_in_any_order_and_of_some_lidars_alone(street, engine):
 
 
 def test_the_first_engine_draws_the_cameras_pictures(street):
-    from care_sim.sensors.camera import FRONT_CAMERA
+    from care_sim.sensors.pictures import FRONT_CAMERA
 
     window = (0, 0, FRONT_CAMERA.width, FRONT_CAMERA.height)
     for name, make in ENGINES.items():

@@ -4,18 +4,16 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from care_sim.core.conditions import Sensing
+from care_sim.core.conditions import ReturnSettings, Sensing
 from care_sim.core.frames import Frame
-from care_sim.core.return_settings import ReturnSettings
-from care_sim.loops.told import told_by
+from care_sim.loops.truth import told_by
 from care_sim.sensors.annotated import Cloud
 from care_sim.sensors.beams import Beams
 from care_sim.sensors.engines import ENGINES
-from care_sim.sensors.lidar import Lidar
-from care_sim.sensors.recorded_lidar import RecordedLidar
+from care_sim.sensors.lidar import Lidar, RecordedLidar
 from care_sim.sensors.signal import Signal
 from care_sim.world.bodies import BodyKind, Part
-from care_sim.world.linear_motion import LinearMotion
+from care_sim.world.motions import LinearMotion
 
 WALL = BodyKind("wall", None, (0.2, 30.0, 6.0), (
     Part("box", (0.2, 30.0, 6.0), (0.0, 0.0, 3.0), (0.5,) * 3),
@@ -159,7 +157,7 @@ def test_without_strength_and_noise_more_shots_change_nothing(near, grid, sensin
 
 def test_what_a_return_tells_stands_beside_every_shot_of_its_cell():
     fired = np.array([2, 5, 5, 5, 9, 9])
-    told = told_by(fired, np.array([5, 5, 9]), intensities=np.array([0.4, 0.1, 0.2]), times_s=None)
+    told = told_by(fired, np.array([5, 5, 9]), intensities=np.array([0.4, 0.1, 0.2]))
     assert {name: values.tolist() for name, values in told.items()} == {
         "intensities": [0.0, 0.4, 0.4, 0.4, 0.2, 0.2]
     }

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_sim.core.return_settings import ReturnSettings
+from care_sim.core.conditions import ReturnSettings
 from care_sim.sensors.signal import Signal
 
 METRES = np.linspace(1, 200, 2000)

@@ -3,10 +3,9 @@ import pytest
 
 from care_sim.core.frames import Frame
 from care_sim.sensors.engines import ENGINES
-from care_sim.sensors.surfaces import brightness
-from care_sim.world.bodies import CATALOGUE, BodyKind, Part
+from care_sim.sensors.signal import brightness
+from care_sim.world.bodies import CATALOGUE, REFLECTANCES, BodyKind, Part
 from care_sim.world.bullet import NO_BODY, pybullet
-from care_sim.world.materials import REFLECTANCES
 
 SENSOR = Frame(0.0, 0.0, 1.84, 0.0)
 EYE = SENSOR.origin

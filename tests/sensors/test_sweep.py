@@ -1,15 +1,14 @@
 import numpy as np
 import pytest
 
+from care_sim.core.conditions import ReturnSettings
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
-from care_sim.core.return_settings import ReturnSettings
 from care_sim.sensors.annotated import cloud_of
-from care_sim.sensors.beams import Beams
+from care_sim.sensors.beams import Beams, RollingSweep
 from care_sim.sensors.engines import ENGINES
-from care_sim.sensors.sweep import RollingSweep
 from care_sim.world.bodies import BodyKind, Part
-from care_sim.world.linear_motion import LinearMotion
+from care_sim.world.motions import LinearMotion
 
 SENSOR = Frame(0.0, 0.0, 1.84, 0.0)
 WALL = BodyKind("wall", None, (0.2, 30.0, 6.0), (

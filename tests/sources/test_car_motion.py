@@ -3,7 +3,7 @@ import pytest
 
 from care_sim.core.frames import Frame
 from care_sim.core.types import Ego
-from care_sim.sources.car_motion import motions
+from care_sim.sources.box_films import motions
 
 TIMES = np.array([0.0, 0.5, 1.0, 1.6, 2.0, 2.5])
 

@@ -8,7 +8,7 @@ from care_sim.core.types import CLASSES, Ego
 from care_sim.envs.open_loop import FilmEnv
 from care_sim.evaluation.sightings import Sightings
 from care_sim.sensors.annotated import NO_OBJECT
-from care_sim.sensors.confidence import FULL_CONFIDENCE, MIN_PIXELS
+from care_sim.sensors.pictures import FULL_CONFIDENCE, MIN_PIXELS
 from care_sim.sensors.surround import SURROUND_CAMERAS
 from care_sim.sources.street_films import SIGHT_M, record
 from care_sim.streets.street import Street, make_street

@@ -22,7 +22,7 @@ CROSSINGS = example("source")
 (TOML,) = fenced(ROOT / "docs" / "write" / "source.md", "toml")
 LOGS = '''
 from dataclasses import dataclass
-from care_sim.sources.argoverse2.films import argoverse2_film, logs
+from care_sim.sources.argoverse2.recordings import argoverse2_film, logs
 from care_sim.sources.recordings import Recordings
 
 

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from care_sim.streets.approach import EGO_LENGTH_M, EGO_WIDTH_M, Approach, Line
-from care_sim.world.route import Route
-from care_sim.world.speed_plan import SpeedPlan
+from care_sim.streets.sight import EGO_LENGTH_M, EGO_WIDTH_M, Approach, Line
+from care_sim.world.route import Route, SpeedPlan
 
 HALF_M = 0.3
 RADIUS_M = 10.0

@@ -3,7 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_sim.streets.curve import Curve, Walked
+from care_sim.streets.layouts import Curve
+from care_sim.streets.people import Walked
 
 curves = st.builds(
     Curve,

@@ -3,8 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_sim.streets.draft import TIMES, Draft, PlacedBodies
-from care_sim.streets.footprints import footprints_meet
+from care_sim.streets.draft import TIMES, Draft, PlacedBodies, footprints_meet
 
 SQUARE = np.array([[2.0, 2.0]])
 

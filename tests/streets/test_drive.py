@@ -6,13 +6,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from care_sim.streets.approach import EGO_LENGTH_M, EGO_WIDTH_M, Approach
-from care_sim.streets.curve import Curve
-from care_sim.streets.dimensions import SPEED_LIMIT_MPS
+from care_sim.streets.draft import footprints_meet
 from care_sim.streets.drive import LENGTH_M, draw_drive
 from care_sim.streets.encounters import ENCROACHMENT_S, MOST_SIGHT_S, Course, Wanted, Way
-from care_sim.streets.footprints import footprints_meet
-from care_sim.streets.sight import hides, needed_s
+from care_sim.streets.layouts import SPEED_LIMIT_MPS, Curve
+from care_sim.streets.sight import EGO_LENGTH_M, EGO_WIDTH_M, Approach, hides, needed_s
 from care_sim.world.bodies import CATALOGUE
 
 SEEDS = (0, 2, 9, 12, 18, 19, 24, 25)

@@ -7,19 +7,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_sim.streets.approach import EGO_WIDTH_M, Approach
 from care_sim.streets.encounters import (
+    AT_GARDEN,
+    AT_KERB,
+    AT_YARD,
     COMERS,
     ENCROACHMENT_S,
     MOST_SIGHT_S,
     Course,
+    Spot,
     draw_encounter,
 )
-from care_sim.streets.hiding import AT_GARDEN, AT_KERB, AT_YARD, Spot
 from care_sim.streets.layouts import LAYOUTS
+from care_sim.streets.sight import EGO_WIDTH_M, Approach
 from care_sim.world.bodies import CATALOGUE
-from care_sim.world.route import Route
-from care_sim.world.speed_plan import SpeedPlan
+from care_sim.world.route import Route, SpeedPlan
 
 PLACE_M = 250.0
 APPROACH = Approach.along(SpeedPlan(Route(legs=((400.0, 0.0),)), 8.0, 2.0, 1.5), PLACE_M, PLACE_M)

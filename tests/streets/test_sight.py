@@ -5,12 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_sim.streets.approach import EGO_LENGTH_M, Approach, Line
-from care_sim.streets.sight import hides, needed_s, sight_of
+from care_sim.streets.sight import EGO_LENGTH_M, Approach, Line, hides, needed_s, sight_of
 from care_sim.world.bodies import CATALOGUE
-from care_sim.world.route import Route
-from care_sim.world.speed_plan import SpeedPlan
-from care_sim.world.walker import Walk
+from care_sim.world.motions import Walk
+from care_sim.world.route import Route, SpeedPlan
 
 places = st.tuples(st.floats(-10, 10), st.floats(-10, 10))
 

@@ -7,8 +7,7 @@ import pytest
 
 from care_sim.evaluation.sightings import Sightings
 from care_sim.sources.street_films import record
-from care_sim.streets.draft import STREET_KEYFRAME_S
-from care_sim.streets.footprints import footprints_meet
+from care_sim.streets.draft import STREET_KEYFRAME_S, footprints_meet
 from care_sim.streets.layouts import LAYOUTS
 from care_sim.streets.people import (
     CYCLING_MPS,

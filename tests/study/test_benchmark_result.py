@@ -12,15 +12,14 @@ from hypothesis import strategies as st
 from care_sim.base.errors import InvalidInput
 from care_sim.core.defaults import CELL_ORDERS
 from care_sim.policies import tags_of
-from care_sim.study.benchmark.made_by import is_of_this_code, made_by, own_code_of
-from care_sim.study.benchmark.replay import ONE_IN
-from care_sim.study.benchmark.result_file import read_result
-from care_sim.study.benchmark.tasks import Entry
-from care_sim.study.benchmark.worlds import (
+from care_sim.study.benchmark.play import ONE_IN
+from care_sim.study.benchmark.result import is_of_this_code, made_by, own_code_of, read_result
+from care_sim.study.benchmark.suite import (
     BENCHMARK_VERSION,
     PARTS,
     SIZES,
     STREETS,
+    Entry,
     published_worlds,
 )
 from tests.helpers.made_results import made_result

@@ -7,16 +7,10 @@ from itertools import islice
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.base.seed_ranges import LAST, split_of
-from care_sim.study.benchmark.player import player_in
-from care_sim.study.benchmark.screening import reachable
-from care_sim.study.benchmark.tasks import (
+from care_sim.base.seeds import LAST, split_of
+from care_sim.study.benchmark.play import player_in, reachable
+from care_sim.study.benchmark.suite import (
     BENCHMARK_BUDGET,
-    Entry,
-    camera_conditions,
-    tasks_of,
-)
-from care_sim.study.benchmark.worlds import (
     BENCHMARK_VERSION,
     DRIVES,
     FIRST_SEED,
@@ -24,10 +18,13 @@ from care_sim.study.benchmark.worlds import (
     SIZES,
     STREETS,
     TESTS,
+    Entry,
     Salt,
+    camera_conditions,
     candidates,
     published_worlds,
     quick_tenth,
+    tasks_of,
 )
 
 DIGESTS = {1: "feb863cc393f139e"}

@@ -8,8 +8,7 @@ from uuid import uuid4
 import numpy as np
 import pytest
 
-from care_sim.base.digests import files_below
-from care_sim.base.entry_files import entry_files, paths_in
+from care_sim.base.digests import entry_files, files_below, paths_in
 from care_sim.base.errors import InvalidInput
 from care_sim.commands.shared.run_study import run_study
 from care_sim.sources.named import source_of

@@ -6,7 +6,7 @@ from importlib.machinery import ModuleSpec
 import numpy as np
 import pytest
 
-from care_sim.base import entry_files
+from care_sim.base import digests
 from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import COLUMNS_WHERE_CHANGED
 from care_sim.study import provenance
@@ -149,7 +149,7 @@ def test_the_digest_of_a_policy_without_source_holds_for_one_run_and_its_workers
     package, monkeypatch
 ):
     monkeypatch.setattr(
-        entry_files, "find_spec", lambda name: ModuleSpec(name, None, origin="/nowhere/ours.zip")
+        digests, "find_spec", lambda name: ModuleSpec(name, None, origin="/nowhere/ours.zip")
     )
     ours = EpisodeConfig("dense", "near")
     before = ours.digest()

@@ -6,7 +6,7 @@ import gymnasium
 import numpy as np
 
 import care_sim  # noqa: F401 (registers the environments)
-from care_sim.base.portable_hash import portable_bytes
+from care_sim.base.digests import portable_bytes
 from care_sim.study.episode_play import EpisodeHash
 
 

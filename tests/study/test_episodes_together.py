@@ -4,8 +4,7 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.study.episode_config import EpisodeConfig, grid, of_seeds
-from care_sim.study.episode_play import run_episode
-from care_sim.study.episodes_together import play_episodes, play_together
+from care_sim.study.episode_play import play_episodes, play_together, run_episode
 from care_sim.study.journal import JOURNAL, Journal
 from care_sim.study.runner import run_all
 

@@ -10,7 +10,6 @@ from care_sim.evaluation.sightings import Sightings
 from care_sim.policies.paper.reserves import Care
 from care_sim.sources.named import source_of
 from care_sim.sources.scenes import Scene
-from care_sim.study.mechanism_config import MechanismConfig, mechanism_plays
 from care_sim.study.mechanism_play import (
     BELIEF_MARKS,
     BELIEF_SUMS,
@@ -18,7 +17,7 @@ from care_sim.study.mechanism_play import (
     play_mechanism,
     share_belief,
 )
-from care_sim.study.play_config import PlayConfig
+from care_sim.study.play_config import MechanismConfig, PlayConfig, mechanism_plays
 from tests.helpers.handmade_film import (
     BEHIND,
     BESIDE,

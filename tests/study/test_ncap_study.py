@@ -6,7 +6,7 @@ import pytest
 
 from care_sim.scenarios.ncap.table import TESTS
 from care_sim.study.designs.defaults import NCAP_POLICIES
-from care_sim.study.designs.ncap import NcapCase, ncap_cases, ncap_study
+from care_sim.study.designs.standards import NcapCase, ncap_cases, ncap_study
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.episode_play import run_episode
 

@@ -4,7 +4,7 @@ import pytest
 
 from care_sim.core.defaults import AS_DEMANDED
 from care_sim.sources.scenes import Scene, Streets
-from care_sim.study.designs.order import (
+from care_sim.study.designs.firing import (
     ORDERS,
     order_plays,
     order_study,

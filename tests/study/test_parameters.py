@@ -16,9 +16,9 @@ from care_sim.commands.shared.run_study import run_study
 from care_sim.reports.studies import SWEEP
 from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.journal import Journal
-from care_sim.study.parameters import checked_parameters
 from care_sim.study.rows.parquet import read_rows, write_rows
 from care_sim.study.rows.reading import policy_of
+from care_sim.study.run_config import checked_parameters
 
 ANYTHING = """
 from care_sim.policies.paper.tracks import History

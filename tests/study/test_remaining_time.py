@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from care_sim.study.episode_config import EpisodeConfig, grid
-from care_sim.study.progress import ProgressLines, ProgressReporter, rounded_duration
-from care_sim.study.remaining_time import RemainingTime
+from care_sim.study.progress import ProgressLines, ProgressReporter, RemainingTime, rounded_duration
 from care_sim.study.runner import Failure
 
 POLICIES = ["history", "all-camera", "care", "care-sbf", "random", "full"]

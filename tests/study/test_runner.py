@@ -360,7 +360,7 @@ def test_a_worker_imports_nothing_of_tables_and_commands():
         "dask",
         "open3d",
         "care_sim.reports.report",
-        "care_sim.reports.figures.files",
+        "care_sim.reports.figures.styles",
     }
     assert not needless & set(loaded.stdout.split())
 

@@ -10,8 +10,7 @@ from care_sim.batch.scanning import Scanning
 from care_sim.batch.sight import Sight
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.journal import Journal
-from care_sim.study.runner import run_all
-from care_sim.study.shared_compiling import compile_from_the_end
+from care_sim.study.runner import compile_from_the_end, run_all
 
 
 @compiled()

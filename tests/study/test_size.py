@@ -13,7 +13,7 @@ from care_sim.study.designs.ablations import ablation_study
 from care_sim.study.designs.crowding import crowding_study
 from care_sim.study.designs.faults import fault_study
 from care_sim.study.designs.paper import paper_study
-from care_sim.study.designs.r157 import r157_study
+from care_sim.study.designs.standards import r157_study
 from care_sim.study.episode_config import grid, of_seeds
 from care_sim.study.play_config import play_grid
 

@@ -11,8 +11,7 @@ from care_sim.commands.shared.run_study import run_study
 from care_sim.reports.report import next_steps, read_results
 from care_sim.reports.studies import SWEEP
 from care_sim.study.episode_config import grid
-from care_sim.study.journal import JOURNAL, Journal
-from care_sim.study.unfinished import UNFINISHED, Unfinished, how_far
+from care_sim.study.journal import JOURNAL, UNFINISHED, Journal, Unfinished, how_far
 
 SHORT = (("duration_s", 0.1),)
 

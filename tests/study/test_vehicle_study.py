@@ -22,7 +22,7 @@ from care_sim.study.designs.vehicle import (
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.episode_play import run_episode
 from care_sim.study.rows.reading import key_of
-from care_sim.study.vehicle.play import vehicle_row
+from care_sim.study.vehicle_play import vehicle_row
 
 SHORT = (("duration_s", 4.0),)
 DENSE_CARE = EpisodeConfig("dense", "care", 0.03, scenario_parameters=SHORT)

@@ -15,9 +15,9 @@ from care_sim.reports.merging import merged
 from care_sim.scenarios.dartout import Dartout
 from care_sim.study.episode_config import grid
 from care_sim.study.episode_play import run_episode
-from care_sim.study.world_hash import check_worlds
+from care_sim.study.rows.checks import check_worlds
 from care_sim.world.bodies import CATALOGUE
-from care_sim.world.walker import Walk
+from care_sim.world.motions import Walk
 
 _BUILT = count()
 # Without processes, whose start takes seconds.

@@ -12,8 +12,7 @@ import time
 from itertools import islice
 from pathlib import Path
 
-from tests.torture.campaigns import CAMPAIGNS
-from tests.torture.case import Name
+from tests.torture.case import CAMPAIGNS, Name
 from tests.torture.field import Field, names
 
 
@@ -24,28 +23,22 @@ def main():
             tally = field.play([Name.of(options.case)])
         print(*tally.failures, tally, sep="\n")
         return int(bool(tally.failures))
-    failed = False
-    options.failures.parent.mkdir(parents=True, exist_ok=True)
-    with (
-        options.failures.open("w") as file,
-        Field(options.workers, lambda failure: _write(file, failure)) as field,
-    ):
-        shares = sum(CAMPAIGNS[name] for name in options.campaigns)
+    failures = []
+    shares = sum(CAMPAIGNS[name] for name in options.campaigns)
+    with Field(options.servers) as field:
         for name in options.campaigns:
-            seconds = (
-                options.seconds * CAMPAIGNS[name] / shares if options.seconds else float("inf")
-            )
-            drawn = names(name, options.seed, options.first)
-            drawn = islice(drawn, options.cases) if options.cases else drawn
+            seconds = (options.seconds or float("inf")) * CAMPAIGNS[name] / shares
+            drawn = islice(names(name, options.seed, options.first), options.cases or None)
             tally = field.play(drawn, time.monotonic() + seconds)
-            failed |= bool(tally.failures)
+            failures += tally.failures
             print(f"{name}: {tally}", flush=True)
             firsts = {failure.key: failure for failure in reversed(tally.failures)}
             for failure in firsts.values():
                 print(f"  {failure.name}: {failure.kind} at {failure.place or '?'}", flush=True)
-    if failed:
+            _write(options.failures, failures)
+    if failures:
         print(f"Every failure is in {options.failures}; make torture CASE=NAME plays one alone.")
-    return int(failed)
+    return int(bool(failures))
 
 
 def _options():
@@ -55,7 +48,7 @@ def _options():
     parser.add_argument("--cases", type=int, default=0, help="of each, at most")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--first", type=int, default=0, help="number of the first case")
-    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--servers", type=int, default=2)
     parser.add_argument("--case", help="CAMPAIGN:SEED:NUMBER, alone")
     parser.add_argument("--failures", type=Path, default=Path("build/torture/failures.jsonl"))
     options = parser.parse_args()
@@ -64,9 +57,9 @@ def _options():
     return options
 
 
-def _write(file, failure):
-    file.write(json.dumps(failure.__dict__) + "\n")
-    file.flush()
+def _write(path, failures):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text("".join(json.dumps(failure.__dict__) + "\n" for failure in failures))
 
 
 if __name__ == "__main__":

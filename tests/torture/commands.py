@@ -1,10 +1,12 @@
 """Campaign: random command lines, played in this process."""
 
+import io
+import os
 import re
 import signal
 import sys
 
-from tests.torture import props, worker
+from tests.torture import props
 from tests.torture.case import FOUND, Case, Fault
 from tests.torture.grammar import Grammar, is_safe
 from tests.torture.judge import ending, exception
@@ -14,8 +16,6 @@ HONEST_S = 0.7
 """After this a command that may take long is interrupted; it has to end as one that was."""
 ENCODINGS = ("utf-8",) * 12 + ("ascii", "latin-1")
 """Of stdout and stderr, as the environments of users have them."""
-
-
 TINY = ("--scenario-parameters", "duration_s=0.2")
 FOUND_CASES = (
     (("study", "crowding", "--seeds", "2147483647", "--workers", "1"), True, "utf-8"),
@@ -37,7 +37,7 @@ the terminal.
 
 def line(name):
     """The command line of a case, whether it may take long, and the encoding."""
-    return FOUND_CASES[name.number] if name.seed == FOUND else drawn_line(Case(name, None).rng)
+    return FOUND_CASES[name.number] if name.seed == FOUND else drawn_line(Case(name).rng)
 
 
 def drawn_line(rng):
@@ -50,46 +50,40 @@ def drawn_line(rng):
 
 
 def prepare(name):
-    """Import what the case's command imports, before its time counts: an import that is interrupted
-    leaves a mess.
-    """
-    import care_sim.reports.page.build
-    import care_sim.reports.report
-    import care_sim.sources.street_films
-    import care_sim.study.episode_play
-    import care_sim.study.scene_play
-
+    """Import what the case's command imports, before its time counts."""
     drawn, *_ = line(name)
-    first, text = " ".join(drawn[:1]), " ".join(drawn)
-    if first == "train":
+    text = " ".join(drawn)
+    if drawn[:1] == ["train"]:
         import sb3_contrib  # noqa: F401
         import stable_baselines3  # noqa: F401
-    if first == "certify":
-        import care_sim.commands.certify  # noqa: F401
-    if "--record" in text:
-        import rerun  # noqa: F401
     if "--cluster" in text:
         import dask.distributed  # noqa: F401
     for known in ("results", "drive", "base"):
         if known in text:
             props.template(known)
-    _play_once()
+    warm_up()
 
 
-def _play_once():
-    """Compiled code is loaded at its first use, which takes seconds."""
-    if not _play_once.__dict__.setdefault("done", False):
-        _play_once.done = True
+def warm_up():
+    """Import what most commands import, and load compiled code, which takes seconds."""
+    import rerun  # noqa: F401
+
+    import care_sim.commands.certify
+    import care_sim.reports.page.build
+    import care_sim.reports.report
+    import care_sim.sources.street_films
+    import care_sim.study.episode_play
+    import care_sim.study.scene_play
+    import care_sim.training.curves_figure  # noqa: F401
+
+    if not warm_up.__dict__.setdefault("done", False):
+        warm_up.done = True
         props.care_sim("run", "dense", "--scenario-parameters", "duration_s=0.3")
-        props.template("results")
 
 
 def play(case):
     arguments, long, encoding = line(case.name)
-    case.tell(
-        f"care-sim {' '.join(_quoted(word) for word in arguments)}"
-        + ("" if encoding == "utf-8" else f" ({encoding})")
-    )
+    case.tell(f"care-sim {' '.join(map(_quoted, arguments))} ({encoding})")
     lay_out(arguments, case.folder)
     return run(arguments, encoding, HONEST_S if long else None)
 
@@ -100,19 +94,24 @@ def lay_out(arguments, folder):
     props.lay_out({part.split("/")[0] for part in parts}, folder)
 
 
-def run(arguments, encoding="utf-8", interrupted_after=None):
-    """Play a command line in this process and judge its ending."""
+def run(arguments, encoding="utf-8", interrupted_after=0.0, before=None, after=None):
+    """Play a command line in this process, between the calls `before` and `after`, and judge its
+    ending.
+    """
     from care_sim.base.interrupts import raise_them
+    from care_sim.base.limits import check_at_start
     from care_sim.cli import main
 
-    worker.streams.encode(encoding)
+    _speak(encoding)
     code = None
-    raise_them()  # as the command does that has the process to itself
-    if interrupted_after is not None:
-        signal.setitimer(signal.ITIMER_REAL, interrupted_after)
     try:
+        if before:
+            before()
+        raise_them()  # as the command does that has the process to itself
+        check_at_start()
+        signal.setitimer(signal.ITIMER_REAL, interrupted_after or 0.0)
         with props.inline():
-            main(list(arguments))
+            main([*arguments])
     except SystemExit as end:
         code = end.code
     except BaseException as error:
@@ -120,17 +119,34 @@ def run(arguments, encoding="utf-8", interrupted_after=None):
         raise exception(error) from error
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
-    sys.stdout.flush()
-    sys.stderr.flush()
-    out, err = worker.streams.read()
+        if after:
+            after()
     if code is not None and not isinstance(code, int):
         raise Fault("an exit code that is no number", repr(code)[:500])
-    return ending(code or 0, out, err, arguments)
+    return ending(code or 0, *_said(), arguments)
+
+
+def _speak(encoding):
+    """Let stdout and stderr, which are files, begin anew in the encoding of a user."""
+    for number, name, errors in ((1, "stdout", "strict"), (2, "stderr", "backslashreplace")):
+        os.ftruncate(number, 0)
+        os.lseek(number, 0, os.SEEK_SET)
+        file = io.FileIO(number, "w", closefd=False)
+        setattr(sys, name, io.TextIOWrapper(file, encoding, errors, write_through=True))
+
+
+def _said():
+    """What stands in stdout and stderr, without the colours that FORCE_COLOR gives them."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    texts = [os.pread(number, os.fstat(number).st_size, 0) for number in (1, 2)]
+    return [uncoloured(text.decode("utf-8", "replace")) for text in texts]
+
+
+def uncoloured(text):
+    return re.sub(r"\x1b\[[\d;]*m", "", text)
 
 
 def _quoted(word):
-    return (
-        word
-        if re.fullmatch(r"[\w./=:+-]+", word, re.ASCII) and len(word) < 200
-        else ascii(word)[:300]
-    )
+    is_plain = re.fullmatch(r"[\w./=:+-]{1,200}", word, re.ASCII)
+    return word if is_plain else ascii(word)[:300]

@@ -1,74 +1,48 @@
 """Campaign: damaged, changed and foreign files, read by the commands that read such files; those of
 recorded drives have a campaign of their own.
+
+Torn journals are among them: the same command must give the same rows, or say in one line why not.
 """
 
-import os
-import tempfile
-from functools import lru_cache
-from pathlib import Path
+import json
 
-from tests.torture import props, spoil
-from tests.torture.case import DONE, Case, Name
-from tests.torture.commands import run
+from tests.torture import props, spoil, study
+from tests.torture.case import DONE, FOUND, REFUSED, Fault
+from tests.torture.commands import run, warm_up
 
-LIMIT_S = 10.0
+LIMIT_S = 20.0
+OTHERS = ("results", "drive", "base", "scorer", "ppo", "recording")
 
 
 def prepare(_name):
-    import care_sim.reports.page.build
-    import care_sim.sources.street_films
-    import care_sim.study.scene_play
-    import care_sim.training.curves_figure  # noqa: F401
-
-    for name in ("results", "protocol", "drive", "base", "scorer", "ppo", "trained", "recording"):
+    for name in (*OTHERS, "protocol", "trained"):
         props.template(name)
-    _check_pristine()
-
-
-@lru_cache(maxsize=1)
-def _check_pristine():
-    """What is as the program left it is accepted, or no damage to it would tell anything."""
-    with tempfile.TemporaryDirectory(dir=os.environ.get("TORTURE_FOLDER")) as folder:
-        here = os.getcwd()
-        os.chdir(folder)
-        try:
-            for kind in KINDS:
-                place = Path(folder) / kind.__name__
-                place.mkdir()
-                os.chdir(place)
-                if kind is not recordings and kind(Pristine(Name("files", 0, 0), place)) != DONE:
-                    raise RuntimeError(f"refused as it is: {kind.__name__}")
-        finally:
-            os.chdir(here)
-
-
-class Pristine(Case):
-    """A case that damages nothing."""
+    warm_up()
+    study.expected()
 
 
 def play(case):
-    kind = case.rng.choices(list(KINDS), list(KINDS.values()))[0]
+    if case.name.seed == FOUND:
+        ended = FOUND_CASES[case.name.number](case)
+        if ended != DONE:
+            raise Fault("refused as it is", case.name)
+        return ended
+    kind = case.rng.choices([*KINDS], [*KINDS.values()])[0]
     case.tell(kind.__name__)
     return kind(case)
 
 
 def spoilt(case, path, *own):
     """Damage a file in one of its own ways, or in one that fits every file."""
-    if isinstance(case, Pristine):
+    if case.name.seed == FOUND:
         return
-    rng = case.rng
-    others = [
-        file
-        for name in ("results", "drive", "base")
-        for file in props.template(name).rglob("*")
-        if file.is_file()
-    ]
-    others += [props.template(name) for name in ("scorer", "ppo", "recording")]
-    roll = rng.random()
+    rng, roll = case.rng, case.rng.random()
     if own and roll < 0.6:
         told = rng.choice(own)(rng, path)
     elif roll < 0.95:
-        told = spoil.raw(rng, path, sorted(others))
+        places = [place for name in OTHERS for place in (props.template(name),)]
+        files = [file for place in places for file in (place, *place.rglob("*"))]
+        told = spoil.raw(rng, path, sorted(file for file in files if file.is_file()))
     else:
         told = spoil.instead(rng, path)
     case.tell(f"{path.relative_to(case.folder)}: {told}")
@@ -95,42 +69,28 @@ def weights(case):
 
 def results(case):
     """Results of a closed-loop study."""
-    folder = props.copy("results", case.folder / "results")
-    path = case.rng.choice(("episodes.parquet", "episodes.parquet", "config.json", "journal.jsonl"))
-    own = {"config.json": spoil.json_node, "journal.jsonl": spoil.json_lines_node}.get(
-        path, _parquet
-    )
-    spoilt(case, folder / path, own)
-    return run(
-        case.rng.choice(
-            (("report", "results"), ("report", "results", "-o", "page.html", "--episodes", "0"))
-        )
-    )
+    return _reported(case, "results", "episodes.parquet", "config.json", "journal.jsonl")
 
 
 def plays(case):
     """Results of the protocol."""
-    folder = props.copy("protocol", case.folder / "results")
-    path = case.rng.choice(("plays.parquet", "plays.parquet", "events.parquet", "config.json"))
-    spoilt(case, folder / path, spoil.json_node if path == "config.json" else _parquet)
-    return run(
-        case.rng.choice(
-            (("report", "results"), ("report", "results", "-o", "page.html", "--episodes", "0"))
-        )
-    )
+    return _reported(case, "protocol", "plays.parquet", "events.parquet", "config.json")
+
+
+def _reported(case, template, rows, *others):
+    folder = props.copy(template, case.folder / "results")
+    path = folder / case.rng.choice((rows, rows, *others))
+    own = {".json": spoil.json_node, ".jsonl": spoil.json_lines_node}.get(path.suffix, _parquet)
+    spoilt(case, path, own)
+    page = ("report", "results", "-o", "page.html", "--episodes", "0")
+    return run(case.rng.choice((page, page[:2])))
 
 
 def training(case):
     """Folders of training runs."""
     folder = props.copy("trained", case.folder / "trained")
-    path, own = case.rng.choice(
-        (
-            ("config.json", spoil.json_node),
-            ("episodes.csv", spoil.csv),
-            ("curve.csv", spoil.csv),
-        )
-    )
-    spoilt(case, folder / path, own)
+    path = folder / case.rng.choice(("config.json", "episodes.csv", "curve.csv"))
+    spoilt(case, path, spoil.csv if path.suffix == ".csv" else spoil.json_node)
     return run(("train", "curves", "trained", "--out", "curve.png"))
 
 
@@ -145,11 +105,63 @@ def recordings(case):
     return run(("view", "out.rrd"))
 
 
-KINDS = {
-    weights: 4,
-    results: 4,
-    plays: 2,
-    training: 2,
-    recordings: 1,
-}
+def journal(case):
+    """A journal that is changed, or torn by a crash, which keeps no study from going on."""
+    rng, out = case.rng, props.copy("undisturbed", case.folder / "out")
+    path = out / study.JOURNAL
+    if rng.random() < 0.7:
+        for other in out.iterdir():
+            if other != path:
+                other.unlink()
+    is_torn = rng.random() < 0.5
+    if is_torn:
+        path.write_bytes(_torn(rng, path.read_bytes()))
+    elif case.name.seed != FOUND:
+        change = rng.choice((spoil.raw, spoil.json_lines_node, _other_digits, _swapped_digests))
+        case.tell(f"{change.__name__}: {change(rng, path)}")
+    ended = run(study.command("out", workers=1))
+    if ended == DONE:
+        study.check_whole(out, once=False)
+    elif ended == REFUSED and is_torn:
+        raise Fault("a torn journal that keeps the study from going on")
+    return ended
+
+
+def _torn(rng, data):
+    """What is left of a journal after a crash, or after somebody joined and sorted files."""
+    lines = data.splitlines(keepends=True)
+    at = rng.randrange(len(data))
+    return rng.choice(
+        (
+            data[:at],
+            # Some file systems keep the length when the power fails, and the last block is zeros.
+            data[:at] + bytes(len(data) - at),
+            b"".join(line * rng.choice((1, 1, 2, 3)) for line in lines),
+            b"".join(line for line in lines if rng.random() < 0.7),
+            b"".join(rng.sample(lines, len(lines))),
+            b"".join(line + rng.choice((b"", b"\n", b" \n", b"\r\n")) for line in lines),
+        )
+    )
+
+
+def _other_digits(rng, path):
+    """As a bit of a digit flips: the line stays JSON."""
+    data = bytearray(path.read_bytes())
+    at = rng.choice([at for at, byte in enumerate(data) if chr(byte).isdigit()])
+    data[at] = ord(rng.choice("0123456789"))
+    path.write_bytes(data)
+    return f"byte {at}"
+
+
+def _swapped_digests(rng, path):
+    rows = [json.loads(line) for line in path.read_text().splitlines()]
+    one, other = rng.sample(rows, 2)
+    one["digest"], other["digest"] = other["digest"], one["digest"]
+    path.write_text("".join(json.dumps(row) + "\n" for row in rows))
+    return "two rows"
+
+
+KINDS = {weights: 4, results: 4, plays: 2, training: 2, recordings: 1, journal: 3}
 """What is read, and how often."""
+FOUND_CASES = (weights, results, plays, training, journal)
+"""Played without damage, or no damage would tell anything."""

@@ -9,7 +9,7 @@ import stat
 from pathlib import Path
 
 from tests.torture import commands, props
-from tests.torture.case import Fault
+from tests.torture.case import Fault, words
 
 LIMIT_S = 20.0
 SHORT = ("--scenario-parameters", "duration_s=0.2")
@@ -25,24 +25,17 @@ FOLDERS = (
     ("report", "../results", "../results", "--out"),
     ("run", "dartout", *SHORT, "--export"),
 )
-OUTPUTS = (
-    "journal.jsonl",
-    "config.json",
-    "episodes.parquet",
-    "tables.md",
-    "tables.tex",
-    "unfinished.json",
-    "episode.json",
-    "000.pcd",
+OUTPUTS = words(
+    "journal.jsonl config.json episodes.parquet tables.md tables.tex unfinished.json "
+    "episode.json 000.pcd"
 )
 """Names of files in a folder of results, under which links and other things are planted."""
 SYSTEM = ("/dev/null", "/dev/full", "/proc", "/proc/self/nothing", "/proc/version", "/dev/null/x")
 
 
 def prepare(_name):
-    import rerun  # noqa: F401
-
-    commands._play_once()
+    commands.warm_up()
+    props.template("results")
 
 
 def play(case):
@@ -95,28 +88,10 @@ def _working_name(rng):
 
 def _name(rng):
     """The name of an output, plain or odd; a path near the longest there is among them."""
-    return rng.choice(
-        (
-            "out",
-            "out",
-            "out",
-            "out",
-            "deep/er/out",
-            os.fsdecode(b"z\xfc"),
-            "n" * rng.randrange(240, 260),
-            "/".join(["d" * 200] * rng.randrange(15, 22)),
-            "ä" * rng.randrange(118, 130),
-            "a b",
-            "~",
-            "$HOME",
-            "a\nb",
-            "x=1",
-            "[a]*?",
-            "..",
-            ".",
-            "../here-too",
-        )
-    )
+    long = ("n" * rng.randrange(240, 260), "ä" * rng.randrange(118, 130))
+    deep = "/".join(["d" * 200] * rng.randrange(15, 22))
+    plain = words("out out out out deep/er/out ~ $HOME x=1 [a]*? .. . ../here-too")
+    return rng.choice((*plain, *long, deep, os.fsdecode(b"z\xfc"), "a b", "a\nb"))
 
 
 def _lay_out(rng, target, folder):
@@ -142,9 +117,7 @@ def _odd(rng, path):
 def _file(mode, owner=0):
     def make(path, _outside):
         path.write_bytes(b"")
-        path.chmod(mode)
-        if not os.geteuid():
-            os.chown(path, owner, owner)
+        _give(path, owner, mode)
 
     return make
 
@@ -153,12 +126,16 @@ def _folder(mode, owner=0):
     def make(path, _outside):
         path.mkdir()
         (path / "config.json").touch()
-        path.chmod(mode)
-        if not os.geteuid():
-            os.chown(path, owner, owner)
-            os.chown(path / "config.json", 12345, 12345)
+        _give(path / "config.json", 12345, 0o644)
+        _give(path, owner, mode)
 
     return make
+
+
+def _give(path, owner, mode):
+    path.chmod(mode)
+    if not os.geteuid():
+        os.chown(path, owner, owner)
 
 
 def _fixed(link):

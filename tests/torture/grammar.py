@@ -8,157 +8,43 @@ from pathlib import Path
 from types import UnionType
 
 from tests.torture import hostile
+from tests.torture.case import words
 
-PIECES = (
-    "dartout",
-    "dense",
-    "cutin",
-    "care",
-    "history",
-    "full",
-    "all-camera",
-    "ppo",
-    "learned-scorer",
-    "random",
-    "all",
-    "fast",
-    "bullet",
-    "returns",
-    "cluster",
-    "pillars",
-    "torchscript",
-    "streets",
-    "evaluation",
-    "calibration",
-    "val",
-    "street-0000",
-    "CARE-Dense-v0",
-    "CARE-Street-v0",
-    "SectorScores",
-    "0.03",
-    "0.1",
-    "1",
-    "2",
-    "3",
-    "0",
-    "0.5",
-    "31",
-)
+PIECES = [
+    *words("dartout dense cutin care history full all-camera ppo learned-scorer random all fast"),
+    *words("bullet returns cluster pillars torchscript streets evaluation calibration val"),
+    *words("street-0000 CARE-Dense-v0 CARE-Street-v0 SectorScores 0.03 0.1 1 2 3 0 0.5 31"),
+]
 """Values that fit somewhere."""
-PATHS = (
-    "out",
-    "out/deep/er",
-    "results",
-    "results/episodes.parquet",
-    "results/config.json",
-    "results/journal.jsonl",
-    "empty",
-    "text",
-    "text/under",
-    "none",
-    "link",
-    "loop",
-    "broken-link",
-    "null",
-    "zero",
-    "full",
-    "pipe",
-    "locked",
-    "x.png",
-    "x.gif",
-    "x.webp",
-    "x.mp4",
-    "x.rrd",
-    "x.html",
-    "x.npz",
-    "x.json",
-    "x.",
-    ".x",
-    "x.PNG",
-    "a b.png",
-    "ü.png",
-    "\udcff.png",
-    "n" * 300,
-    "/proc/self/nothing/out",
-    "",
-    ".",
-    "..",
-    "x\x00y",
-    "-x",
-    "\x1b[31m.png",
-)
-CLUSTERS = (
-    "nonsense",
-    "",
-    "ucx://x",
-    "tls://x",
-    "tcp://",
-    "x://y",
-    "inproc://x",
-    ":",
-    "tcp://127.0.0.1:99999",
-    "a b",
-    "\n",
-)
-SOURCES = (
-    "streets",
-    "argoverse2:drive",
-    "nuscenes:base",
-    "argoverse2:none",
-    "nuscenes:empty",
-    "argoverse2:",
-    ":",
-    "nuscenes",
-    "argoverse2:text",
-    "nuscenes:\x00",
-)
+PATHS = [
+    *words("out out/deep/er results results/episodes.parquet results/config.json"),
+    *words("results/journal.jsonl empty text text/under none link loop broken-link null zero"),
+    *words("full pipe locked x.png x.gif x.webp x.mp4 x.rrd x.html x.npz x.json x. .x x.PNG"),
+    *words("ü.png . .. -x /proc/self/nothing/out"),
+    *("", "a b.png", "\udcff.png", "n" * 300, "x\x00y", "\x1b[31m.png"),
+]
+CLUSTERS = [
+    *words("nonsense ucx://x tls://x tcp:// x://y inproc://x : tcp://127.0.0.1:99999"),
+    *("", "a b", "\n"),
+]
+SOURCES = [
+    *words("streets argoverse2:drive nuscenes:base argoverse2:none nuscenes:empty argoverse2:"),
+    *(":", "nuscenes", "argoverse2:text", "nuscenes:\x00"),
+]
 WORK = {
-    "seeds",
-    "scenes",
-    "episodes",
-    "steps",
-    "repeats",
-    "samples",
-    "resets",
-    "seconds",
-    "floor_seeds",
-    "evaluate_every",
-    "environments",
-    "rollout",
-    "epochs",
-    "batch",
-    "memory",
+    *words("seeds scenes episodes steps repeats samples resets seconds floor_seeds"),
+    *words("evaluate_every environments rollout epochs batch memory"),
 }
 """Options that say how much is to be done; a large value honestly takes its time."""
-TINY = {
-    "workers": "1",
-    "seeds": "1",
-    "scenes": "1",
-    "episodes": "0",
-    "episode": "0",
-    "floor_seeds": "1",
-    "steps": "64",
-    "repeats": "1",
-    "samples": "1",
-    "resets": "1",
-    "seconds": "0.01",
-    "environments": "1",
-    "rollout": "8",
-    "evaluate_every": "64",
-}
-LONG = (
-    "reproduce",
-    "sweep",
-    "protocol",
-    "study",
-    "judge",
-    "certify",
-    "benchmark",
-    "leaderboard",
-    "train",
-    "report",
-    "export",
+TINY = dict.fromkeys(
+    words("workers seeds scenes floor_seeds repeats samples resets environments"), "1"
 )
+TINY |= {"episodes": "0", "episode": "0", "steps": "64", "evaluate_every": "64"}
+TINY |= {"seconds": "0.01", "rollout": "8", "scenario_parameters": "duration_s=0.2"}
+LONG = {
+    *words("reproduce sweep protocol study judge certify benchmark leaderboard train"),
+    *words("report export"),
+}
 """Commands that may take their time."""
 
 
@@ -199,24 +85,14 @@ class Grammar:
         rng = self._rng
         if rng.random() < 0.03:
             return [self._text() for _ in range(rng.randrange(4))]
-        words, kind = rng.choice(list(commands().items()))
-        self.long = words[0] in LONG
-        known = list(options(kind))
-        given = [
-            one for one in known if one[2] or one[3] or rng.random() < min(1.0, 2.5 / len(known))
-        ]
-        tiny = [
-            (name, TINY[name])
-            for name, *_ in known
-            if name in TINY and name not in {one[0] for one in given}
-        ]
-        if any(name == "scenario_parameters" for name, *_ in known):
-            tiny.append(("scenario_parameters", "duration_s=0.2"))
-        arguments = [piece for one in given for piece in self._option(*one)]
-        rest = [
-            piece for name, value in tiny if rng.random() < 0.97 for piece in (_flag(name), value)
-        ]
-        line = [*words, *arguments, *rest]
+        first, kind = rng.choice([*commands().items()])
+        self.long = first[0] in LONG
+        known, share = [*options(kind)], 2.5
+        given = [one for one in known if one[2] or one[3] or rng.random() < share / len(known)]
+        names = {one[0] for one in known} - {one[0] for one in given}
+        tiny = {name: TINY[name] for name in sorted(names & {*TINY}) if rng.random() < 0.97}
+        line = [*first, *(piece for one in given for piece in self._option(*one))]
+        line += [piece for name, value in tiny.items() for piece in (_flag(name), value)]
         return self._spoilt(line) if rng.random() < 0.05 else line
 
     def _option(self, name, hint, positional, _needed):
@@ -225,21 +101,16 @@ class Grammar:
             return [_flag(name) if rng.random() < 0.5 else f"--no-{name.replace('_', '-')}"]
         if positional:
             return values
-        return (
-            [_flag(name), *values]
-            if rng.random() < 0.95
-            else [f"{_flag(name)}={value}" for value in values[:1]]
-        )
+        if rng.random() < 0.05:
+            return [f"{_flag(name)}={value}" for value in values[:1]]
+        return [_flag(name), *values]
 
     def _values(self, name, hint):
         """One value, several or none, as the option's type has it; now and then not."""
-        several = typing.get_origin(hint) is tuple
-        inner = typing.get_args(hint)[0] if several else hint
-        count = (
-            self._rng.choice((0, 1, 1, 1, 2, 3))
-            if several
-            else (1 if self._rng.random() < 0.97 else 2)
-        )
+        if typing.get_origin(hint) is tuple:
+            inner, count = typing.get_args(hint)[0], self._rng.choice((0, 1, 1, 1, 2, 3))
+        else:
+            inner, count = hint, 1 + (self._rng.random() < 0.03)
         return [self._value(name, inner) for _ in range(count)]
 
     def _value(self, name, hint):
@@ -260,26 +131,16 @@ class Grammar:
 
     def _names(self, name):
         """What fits an option of this name; thrice, so that it is drawn more often."""
+        from care_sim.core.conditions import DRIVERS
         from care_sim.core.defaults import CELL_ORDERS
-        from care_sim.core.driver_settings import DRIVERS
         from care_sim.core.firing.listing import HARDWARE
         from care_sim.policies import policy_names
         from care_sim.scenarios import SCENARIOS
 
-        names = {
-            "scenario": [*SCENARIOS],
-            "scenarios": [*SCENARIOS, "all"],
-            "policy": policy_names(),
-        }
-        names |= {
-            "policies": [*policy_names(), "all"],
-            "also": policy_names(),
-            "engine": ["fast", "bullet"],
-            "cell_order": [*CELL_ORDERS],
-            "firing": [*HARDWARE, "tiles:2x16"],
-            "driver": [*DRIVERS],
-        }
-        return names.get(name, []) * 6
+        names = {"scenario": [*SCENARIOS], "scenarios": [*SCENARIOS, "all"]}
+        names |= {"policy": policy_names(), "policies": [*policy_names(), "all"]}
+        names |= {"engine": ["fast", "bullet"], "cell_order": [*CELL_ORDERS], "driver": [*DRIVERS]}
+        return (names | {"firing": [*HARDWARE, "tiles:2x16"]}).get(name, []) * 6
 
     def _parameter(self, option):
         """NAME=VALUE, or something like it."""
@@ -345,27 +206,10 @@ def _parameter_names(option):
 
     if option in ("scenario_parameters", "env_parameters"):
         names = [field.name for scenario in SCENARIOS.values() for field in fields(scenario)]
-        return [
-            *names,
-            "budget",
-            "keyframe_s",
-            "render_mode",
-            "detector",
-            "source",
-            "reward_weights",
-            "floor",
-            "self",
-        ]
+        more = "budget keyframe_s render_mode detector source reward_weights floor self"
+        return [*names, *words(more)]
     if option == "detector_parameters":
-        return ["file", "min_returns", "grid", "x", "self"]
+        return words("file min_returns grid x self")
     names = [text.partition("=")[0] for name in BUILT_IN for text in parameter_texts(maker(name))]
-    return [
-        *names,
-        *(f"care-sbf.{name}" for name in names),
-        "path",
-        "ppo.path",
-        "learned-scorer.path",
-        "learned-sets.path",
-        "none.x",
-        "rig",
-    ]
+    more = "path ppo.path learned-scorer.path learned-sets.path none.x rig"
+    return [*names, *(f"care-sbf.{name}" for name in names), *words(more)]

@@ -17,7 +17,7 @@ import uuid
 from contextlib import suppress
 from pathlib import Path
 
-from tests.helpers.descendants import listen_to_interrupts
+from tests.helpers.descendants import listen_to_interrupts, marked
 from tests.helpers.places import ROOT
 from tests.torture.case import Fault
 
@@ -40,17 +40,6 @@ def new_mark():
     return uuid.uuid4().hex
 
 
-def marked(mark):
-    """The processes that carry a mark, by id."""
-    wanted, found = mark.encode(), []
-    for entry in Path("/proc").iterdir():
-        if entry.name.isdigit():
-            with suppress(OSError):
-                if wanted in (entry / "environ").read_bytes() and _state(entry) != "Z":
-                    found.append(int(entry.name))
-    return found
-
-
 def end(mark):
     """End all of a mark."""
     for _ in range(50):
@@ -61,10 +50,6 @@ def end(mark):
         if not left:
             return
         time.sleep(0.02)
-
-
-def _state(entry):
-    return (entry / "stat").read_text().rpartition(")")[2].split()[0]
 
 
 def patience():
@@ -122,9 +107,8 @@ class Command:
         if stdout is not None:
             os.close(output)
         self._said = [bytearray(), bytearray()]
-        for stream, said in zip(
-            (self.process.stdout, self.process.stderr), self._said, strict=True
-        ):
+        streams = self.process.stdout, self.process.stderr
+        for stream, said in zip(streams, self._said, strict=True):
             if stream:
                 threading.Thread(target=_listen, args=(stream, said), daemon=True).start()
         self.started = time.monotonic()
@@ -149,18 +133,12 @@ class Command:
         deadline = time.monotonic() + seconds * patience()
         while self.process.poll() is None:
             if time.monotonic() > deadline:
-                raise Fault(
-                    "hang",
-                    f"{self.arguments}\n{self.said()}\n{self.stacks()}",
-                    "a process of its own",
-                )
-            for pid in marked(self.mark):
-                if (held := _resident(pid)) > MEMORY:
-                    raise Fault(
-                        "memory above 1 GB",
-                        f"{held} bytes: {self.arguments}",
-                        "a process of its own",
-                    )
+                told = f"{self.arguments}\n{self.said()}\n{self.stacks()}"
+                raise Fault("hang", told, "a process of its own")
+            for held in map(_resident, marked(self.mark)):
+                if held > MEMORY:
+                    told = f"{held} bytes: {self.arguments}"
+                    raise Fault("memory above 1 GB", told, "a process of its own")
             time.sleep(5 * POLL_S)
         return self.process.returncode
 
@@ -176,10 +154,9 @@ class Command:
     def check_gone(self):
         """A fault where it left a process behind."""
         deadline = time.monotonic() + LEAVES_S
-        while left := marked(self.mark):
+        while marked(self.mark):
             if time.monotonic() > deadline:
-                told = "\n".join(f"{pid} {_told(pid)}" for pid in left)
-                raise Fault("processes left behind", f"{self.arguments}\n{told}", _kinds(left))
+                raise Fault("processes left behind", f"{self.arguments}\n{self.stacks()}")
             time.sleep(0.1)
 
     def stacks(self):
@@ -211,22 +188,9 @@ def _resident(pid):
 
 
 def _told(pid):
+    folder = Path("/proc") / str(pid)
     with suppress(OSError):
-        line = (
-            Path(f"/proc/{pid}/cmdline")
-            .read_bytes()
-            .replace(b"\0", b" ")
-            .decode("utf-8", "replace")
-        )
-        return f"{line[:200]} ({Path(f'/proc/{pid}/wchan').read_text()})"
+        words = (folder / "cmdline").read_bytes().split(b"\0")
+        line = b" ".join(words).decode("utf-8", "replace")
+        return f"{line[:200]} ({(folder / 'wchan').read_text()})"
     return ""
-
-
-def _kinds(pids):
-    """What kinds of processes they are, for a fault's place."""
-    lines = [_told(pid) for pid in pids]
-    kinds = ("forkserver", "resource_tracker", "spawn_main", "rerun", "ffmpeg")
-    return (
-        ", ".join(kind for kind in kinds if any(kind in line for line in lines))
-        or "the command itself"
-    )

@@ -1,19 +1,21 @@
 """Things that lie about in the folder of a case: small results, recordings, weights, and what is no
 file at all.
 
-Templates are made once a process, by the program itself, and copied where a case wants them.
+Templates are made once, by the program itself, and copied where a case wants them.
 """
 
 import os
 import shutil
 import stat
-import tempfile
 import time
+import traceback
 from concurrent.futures import Executor, Future
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
-from functools import lru_cache, partial
+from functools import partial
 from io import StringIO
 from pathlib import Path
+
+from tests.torture.case import words
 
 PLAYS_S = 1.0
 """So long an executor of this process plays; then it is as if somebody pressed Ctrl-C."""
@@ -44,15 +46,11 @@ def inline(seconds=PLAYS_S):
     from care_sim.reports.page.build import write_page
     from care_sim.study import executors
 
-    usual, defaults = (
-        executors.processes,
-        {made: made.__defaults__ for made in (write_page, trails_of)},
-    )
-    executors.processes = partial(Inline, seconds)
+    usual = executors.processes
+    defaults = {made: made.__defaults__ for made in (write_page, trails_of)}
+    executors.processes = own = partial(Inline, seconds)
     for made, values in defaults.items():
-        made.__defaults__ = tuple(
-            executors.processes if value is usual else value for value in values
-        )
+        made.__defaults__ = tuple(own if value is usual else value for value in values)
     try:
         yield
     finally:
@@ -75,25 +73,24 @@ def care_sim(*arguments):
     return said.getvalue()
 
 
-@lru_cache(maxsize=1)
-def _templates():
-    return Path(tempfile.mkdtemp(prefix="props-", dir=os.environ.get("TORTURE_FOLDER")))
-
-
-@lru_cache
 def template(name):
-    """The template of that name, made by the function of the name below."""
-    path = _templates() / name
-    if name in LOGS:
-        _log(name, path)
+    """The template of that name, made once by the function of the name below; in a process of its
+    own, since Rerun makes no recording in a fork of a process that has made one.
+    """
+    path = Path(os.environ["TORTURE_FOLDER"]) / "templates" / name
+    if path.exists():
         return path
-    here = os.open(".", os.O_RDONLY)
-    os.chdir(_templates())
-    try:
-        globals()[f"_make_{name.replace('-', '_')}"](path)
-    finally:
-        os.fchdir(here)
-        os.close(here)
+    path.parent.mkdir(exist_ok=True)
+    if not (child := os.fork()):
+        try:
+            os.chdir(path.parent)
+            _log(name, path) if name in LOGS else globals()[f"_make_{name}"](path)
+        except BaseException:
+            traceback.print_exc()
+            os._exit(1)
+        os._exit(0)
+    if os.waitpid(child, 0)[1]:
+        raise RuntimeError(f"no template {name}")
     return path
 
 
@@ -112,20 +109,9 @@ def _make_results(path):
 
 
 def _make_protocol(path):
-    drive = template("drive")
-    options = (
-        "--policies",
-        "care",
-        "history",
-        "full",
-        "--budgets",
-        "0.1",
-        "--floor-seeds",
-        "1",
-        "--workers",
-        "1",
-    )
-    care_sim("protocol", "--source", f"argoverse2:{drive}", *options, "--out", path)
+    source = f"argoverse2:{template('drive')}"
+    options = words("--policies care history full --budgets 0.1 --floor-seeds 1 --workers 1")
+    care_sim("protocol", "--source", source, *options, "--out", path)
 
 
 LOGS = ("npy", "csv", "headless", "ascii", "binary", "kitti", "nuscenes")

@@ -2,142 +2,99 @@
 
 import io
 import json
-import os
 import zipfile
+from contextlib import suppress
 
 import numpy as np
 
+from tests.torture.case import words
+
 DEEP = 100_000
-PLAIN = (
-    None,
-    True,
-    0,
-    -1,
-    1,
-    0.5,
-    1e308,
-    -1e308,
-    10**22,
-    2**63,
-    float("nan"),
-    float("inf"),
-    "",
-    "x",
-    "care",
-    "\ud800",
-    "\x00",
-    "\x1b[31m",
-    "x" * 100_000,
-    [],
-    {},
-    [[]],
-    [1, 2],
-    {"a": 1},
-    "<script>",
-    "$x_1$",
-    "2**9",
-    [None],
-    [[1, [2]]],
-    5e-324,
-)
+PLAIN = [
+    *(None, True, 0, -1, 1, 0.5, 1e308, -1e308, 10**22, 2**63, float("nan"), float("inf"), 5e-324),
+    *("", "x", "care", "\ud800", "\x00", "\x1b[31m", "x" * 100_000, "<script>", "$x_1$", "2**9"),
+    *([], {}, [[]], [1, 2], {"a": 1}, [None], [[1, [2]]]),
+]
 """What may stand in JSON where something else belongs."""
+
+
+ODD_BYTES = (
+    b"\0",
+    b"\xff\xfe",
+    b"[" * 1000,
+    b"9" * 400,
+    b"\n",
+    b'"',
+    b"\r\n",
+    b"NaN",
+    b"\x9d" * 64,
+)
 
 
 def raw(rng, path, others=()):
     """Damage bytes; `others` are files whose content may take the place of this one's. Says what
     was done.
     """
-    data = bytearray(path.read_bytes())
-    change = rng.choice(_RAW)
-    path.write_bytes(change(rng, data, others))
-    return change.__name__
-
-
-def _flip_bits(rng, data, _):
-    for _ in range(rng.choice((1, 1, 3, 30))):
-        if data:
-            data[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
-    return data
-
-
-def _cut(rng, data, _):
-    return data[: rng.randrange(len(data) + 1)]
-
-
-def _cut_the_front(rng, data, _):
-    return data[rng.randrange(len(data) + 1) :]
-
-
-def _blank(rng, data, _):
-    start = rng.randrange(len(data) + 1)
-    end = min(len(data), start + rng.choice((8, 512, 4096)))
-    data[start:end] = rng.choice((b"\0", b"\xff", b" ", b"9")) * (end - start)
-    return data
-
-
-def _insert(rng, data, _):
+    data = path.read_bytes()
     at = rng.randrange(len(data) + 1)
-    data[at:at] = rng.choice(
-        (
-            b"\0",
-            b"\xff\xfe",
-            b"[" * 1000,
-            b"9" * 400,
-            b"\n",
-            b'"',
-            b"\r\n",
-            b"NaN",
-            rng.randbytes(64),
-        )
-    )
+    end = min(len(data), at + rng.choice((8, 512, 4096)))
+    name = rng.choices([*RAW], [share for share, _ in RAW.values()])[0]
+    if name == "another" and others:
+        path.write_bytes(rng.choice(others).read_bytes())
+    else:
+        path.write_bytes(RAW[name][1](rng, data, at, end))
+    return name
+
+
+def _flipped(rng, data, *_):
+    data = bytearray(data)
+    for _ in range(rng.choice((1, 1, 3, 30)) if data else 0):
+        data[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
     return data
 
 
-def _repeat(rng, data, _):
-    start = rng.randrange(len(data) + 1)
-    end = min(len(data), start + rng.choice((8, 512, 4096)))
-    data[end:end] = data[start:end] * rng.choice((1, 1, 50))
-    return data
+def _blank(rng, data, at, end):
+    return data[:at] + rng.choice((b"\0", b"\xff", b" ", b"9")) * (end - at) + data[end:]
 
 
-def _of_another(rng, data, others):
-    return rng.choice(others).read_bytes() if others else data
+def _repeated(rng, data, at, end):
+    return data[:end] + data[at:end] * rng.choice((1, 1, 50)) + data[end:]
 
 
-def _nothing(_rng, _data, _others):
-    return b""
-
-
-def _deep(rng, _data, _others):
+def _deep(rng, *_):
     return rng.choice((b"[" * DEEP, b'{"a":' * DEEP, b"[" * DEEP + b"]" * DEEP))
 
 
-def _noise(rng, data, _others):
-    return rng.randbytes(min(len(data), 5000))
-
-
-_RAW = (
-    (_flip_bits,) * 6
-    + (_cut,) * 3
-    + (_cut_the_front, _blank, _blank, _insert, _insert, _repeat, _repeat)
-)
-_RAW += (_of_another, _nothing, _deep, _noise)
+RAW = {
+    "bits": (6, _flipped),
+    "cut": (3, lambda rng, data, at, end: data[:at]),
+    "front cut": (1, lambda rng, data, at, end: data[at:]),
+    "blank": (2, _blank),
+    "inserted": (2, lambda rng, data, at, end: data[:at] + rng.choice(ODD_BYTES) + data[at:]),
+    "repeated": (2, _repeated),
+    "another": (1, lambda rng, data, at, end: data),
+    "empty": (1, lambda rng, data, at, end: b""),
+    "deep": (1, _deep),
+    "noise": (1, lambda rng, data, at, end: rng.randbytes(min(len(data), 5000))),
+}
+"""How often bytes are damaged in a way, and how: from the byte `at` on, or up to `end`."""
 
 
 def instead(rng, path):
     """Put something that is no file in its place."""
     path.unlink()
-    change = rng.choice(("folder", "gone", "loop", "zeros", "locked"))
-    if change == "folder":
-        path.mkdir()
-    elif change == "loop":
-        path.symlink_to(path.name)
-    elif change == "zeros":
-        path.symlink_to("/dev/zero")
-    elif change == "locked":
-        path.write_bytes(b"x")
-        path.chmod(0)
+    change = rng.choice([*INSTEAD])
+    INSTEAD[change](path)
     return change
+
+
+INSTEAD = {
+    "folder": lambda path: path.mkdir(),
+    "gone": lambda path: None,
+    "loop": lambda path: path.symlink_to(path.name),
+    "zeros": lambda path: path.symlink_to("/dev/zero"),
+    "locked": lambda path: path.touch(0),
+}
 
 
 def json_node(rng, path):
@@ -187,91 +144,48 @@ def table(rng, read, write):
     import pyarrow as pa
 
     whole = read()
-    change = rng.choice(
-        (
-            "drop",
-            "rename",
-            "values",
-            "values",
-            "values",
-            "no rows",
-            "rows",
-            "double",
-            "type",
-            "notes",
-        )
-    )
     name = rng.choice(whole.column_names)
     at = whole.column_names.index(name)
-    count = len(whole)
+    change = rng.choice(words("drop rename value value value empty rows double type notes"))
     if change == "drop":
         whole = whole.drop_columns([name])
     elif change == "rename":
-        whole = whole.rename_columns(
-            [
-                *whole.column_names[:at],
-                rng.choice(("x", "", "\x1b[31m", "seed")),
-                *whole.column_names[at + 1 :],
-            ]
-        )
-    elif change == "no rows":
+        names = [*whole.column_names]
+        names[at] = rng.choice(("x", "", "\x1b[31m", "seed"))
+        whole = whole.rename_columns(names)
+    elif change == "empty":
         whole = whole.slice(0, 0)
     elif change == "rows":
-        whole = whole.take(pa.array([rng.randrange(count) for _ in range(rng.randrange(1, 5))]))
+        whole = whole.take(rng.choices(range(len(whole)), k=rng.randrange(1, 5)))
     elif change == "double":
         whole = pa.concat_tables([whole, whole])
     elif change == "notes":
-        notes = {
-            key: rng.choice(
-                (b"", b"x", b"\xff", b"[", b"[1", b"[[", b"{}", b"5", b"[null]", b"[[[1]]]")
-            )
-            for key in whole.schema.metadata or {b"a": b""}
-        }
-        whole = whole.replace_schema_metadata(notes)
-        return f"notes {notes}"
+        odd = (b"", b"x", b"\xff", b"[", b"[1", b"[[", b"{}", b"5", b"[null]", b"[[[1]]]")
+        notes = {key: rng.choice(odd) for key in whole.schema.metadata or {b"a": b""}}
+        whole, change = whole.replace_schema_metadata(notes), f"notes {notes}"
     else:
-        values = whole.column(at).to_pylist()
-        with_others = _other_column(rng, values, every=change == "type")
-        whole = whole.set_column(at, name, with_others)
-        change = f"{change} {with_others.type} {ascii(with_others[0].as_py())[:60]}"
+        values = _other_column(rng, whole.column(at).to_pylist(), change == "type")
+        whole = whole.set_column(at, name, values)
+        change = f"{change} {values.type} {ascii(values[0].as_py())[:60]}"
     write(whole)
     return f"column {name!r}: {change}"
+
+
+ODD_CELLS = [
+    *(None, float("nan"), float("inf"), -1, 0, 1e308, 2**62, -(2**62), "x", "", "\x1b[31m"),
+    *("$x_1$", b"\xff", [1], [], {"a": 1}, True, 5e-324),
+]
 
 
 def _other_column(rng, values, every):
     """A column with one value that does not belong, or of another kind from top to bottom."""
     import pyarrow as pa
 
-    odd = rng.choice(
-        (
-            None,
-            float("nan"),
-            float("inf"),
-            -1,
-            0,
-            1e308,
-            2**62,
-            -(2**62),
-            "x",
-            "",
-            "\x1b[31m",
-            "$x_1$",
-            b"\xff",
-            [1],
-            [],
-            {"a": 1},
-            True,
-            5e-324,
-        )
-    )
-    if not every:
-        changed = [*values]
-        if changed:
-            changed[rng.randrange(len(changed))] = odd
-        try:
-            return pa.array(changed)
-        except (pa.ArrowException, OverflowError, TypeError, ValueError):
-            pass
+    odd = rng.choice(ODD_CELLS)
+    if not every and values:
+        values[rng.randrange(len(values))] = odd
+        with suppress(pa.ArrowException, OverflowError, TypeError, ValueError):
+            return pa.array(values)
     return pa.array([odd] * len(values))
 
 
@@ -362,9 +276,3 @@ def points(rng, path):
     values[rng.randrange(len(values))] = rng.choice((np.nan, np.inf, -np.inf, 1e30, -1e30, 0))
     path.write_bytes(values.tobytes() * rng.choice((1, 1, 2)) + b"\0" * rng.choice((0, 0, 1, 4)))
     return "numbers"
-
-
-def sparse(path, size):
-    """A file of so many bytes that takes no space."""
-    with path.open("wb") as file:
-        os.truncate(file.fileno(), size)

@@ -12,16 +12,8 @@ MEASURED = {"wall_s", "peak_rss_mb"}
 """Columns that time and memory decide."""
 SEEDS = 6
 ARGUMENTS = (
-    "sweep",
-    "--scenarios",
-    "dartout",
-    "--policies",
-    "history",
-    "care",
-    "--seeds",
-    str(SEEDS),
-    "--scenario-parameters",
-    "duration_s=0.5",
+    *("sweep", "--scenarios", "dartout", "--policies", "history", "care", "--seeds", str(SEEDS)),
+    *("--scenario-parameters", "duration_s=0.5"),
 )
 ROWS = 2 * SEEDS
 JOURNAL, ROWS_FILE = "journal.jsonl", "episodes.parquet"
@@ -66,18 +58,11 @@ def check_whole(folder, once=True):
     if set(wanted) - set(key):
         raise Fault("a row lost", str(sorted(set(wanted) - set(key))))
     for ours, theirs in zip(rows, expected(), strict=True):
-        names = sorted(ours | theirs)
-        wrong = {
-            name: (ours.get(name), theirs.get(name))
-            for name in names
-            if repr(ours.get(name)) != repr(theirs.get(name))
-        }
-        if wrong:
-            raise Fault(
-                "a row wrong",
-                f"{theirs['policy']} {theirs['seed']}: (is, should be) {wrong}",
-                ", ".join(wrong),
-            )
+        names = [one for one in ours | theirs if repr(ours.get(one)) != repr(theirs.get(one))]
+        if names:
+            wrong = {name: (ours.get(name), theirs.get(name)) for name in sorted(names)}
+            what = f"{theirs['policy']} {theirs['seed']}: (is, should be) {wrong}"
+            raise Fault("a row wrong", what, ", ".join(wrong))
     if once:
         _check_played_once(folder)
     left = sorted(path.name for path in folder.iterdir() if path.name.startswith("."))
@@ -102,14 +87,10 @@ def check_not_torn(folder):
     """A fault if a file that readers open is there but not whole."""
     from care_sim.base.errors import InvalidInput
 
-    if (folder / ROWS_FILE).exists():
-        try:
+    try:
+        if (folder / ROWS_FILE).exists():
             steady(folder)
-        except InvalidInput as error:
-            raise Fault("a file torn", str(error), ROWS_FILE) from error
-    for name in ("config.json",):
-        if (folder / name).exists():
-            try:
-                json.loads((folder / name).read_text())
-            except ValueError as error:
-                raise Fault("a file torn", f"{name}: {error}", name) from error
+        if (folder / "config.json").exists():
+            json.loads((folder / "config.json").read_text())
+    except (InvalidInput, ValueError) as error:
+        raise Fault("a file torn", str(error), folder.name) from error

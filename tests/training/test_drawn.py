@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_sim import SensorSetup
 from care_sim.base.errors import InvalidInput
-from care_sim.base.seed_ranges import TRAINING, VALIDATION, split_of
+from care_sim.base.seeds import TRAINING, VALIDATION, split_of
 from care_sim.core.grid import AngularGrid
+from care_sim.core.sensor_setup import SensorSetup
 from care_sim.envs import make_env
 from care_sim.envs.open_loop import FilmEnv
 from care_sim.envs.sensing import sensing

@@ -13,7 +13,7 @@ import pytest
 
 import care_sim
 from care_sim.base.errors import InvalidInput, MissingExtra
-from care_sim.base.seed_ranges import TRAINING, VALIDATION
+from care_sim.base.seeds import TRAINING, VALIDATION
 from care_sim.cli import main, parsed_command
 from care_sim.commands.train import end_of_training
 from care_sim.core.wrapping import Wrapping

@@ -14,7 +14,7 @@ from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor, VecNormalize
 
 from care_sim.base.errors import InvalidInput
-from care_sim.base.seed_ranges import TRAINING
+from care_sim.base.seeds import TRAINING
 from care_sim.training.config import PpoConfig
 from care_sim.training.environments import side_by_side, training
 from care_sim.training.run import make_learner

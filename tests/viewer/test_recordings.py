@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.actions import CHOSEN, EXPLOITATION, FLOOR, RESERVE, SHARES
+from care_sim.core.firing.actions import CHOSEN, EXPLOITATION, FLOOR, RESERVE, SHARES
 from care_sim.core.grid import AngularGrid
 from care_sim.envs.wrappers.record_rerun import RecordRerun, recording
 from care_sim.loops.watcher import Watcher
@@ -15,7 +15,7 @@ from care_sim.sources.named import source_of
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.episode_play import run_episode, trace
 from care_sim.study.play_config import play_grid
-from care_sim.study.scene_trace import trace_scene
+from care_sim.study.scene_play import trace_scene
 from care_sim.viewer.recording import entities
 from care_sim.viewer.recording.recording import Recording
 from tests.helpers.lidars import CORNERS

@@ -5,7 +5,7 @@ from scipy import ndimage
 from care_sim.core.frames import Frame
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.sensor_setup import LIDAR_POSITION
-from care_sim.sensors.camera import FRONT_CAMERA
+from care_sim.sensors.pictures import FRONT_CAMERA
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.bullet import NO_BODY, BulletWorld
 

@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 
 from care_sim.core.frames import Frame
-from care_sim.sensors.camera import FRONT_CAMERA
+from care_sim.sensors.pictures import FRONT_CAMERA
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.bullet import NO_BODY, BulletWorld
-from care_sim.world.bullet_clients import borrow, give_back, pybullet
+from care_sim.world.bullet_bodies import borrow, give_back, pybullet
 
 AHEAD = np.array([[1.0, 0.0, 0.0], [0.9, 0.0, -np.sqrt(0.19)]])
 SENSOR = Frame(0.0, 0.0, 1.84, 0.0)
@@ -40,7 +40,7 @@ def test_a_world_answers_as_in_a_fresh_client_whatever_was_there_before(monkeypa
     used.close()
     again = BulletWorld(ground)
     after = answers(again)
-    monkeypatch.setattr("care_sim.world.bullet_clients._free", [])
+    monkeypatch.setattr("care_sim.world.bullet_bodies._free", [])
     fresh = BulletWorld(ground)
     assert again._client.number != fresh._client.number
     assert after == answers(fresh)
@@ -72,7 +72,7 @@ def test_a_client_that_somebody_filled_or_closed_is_no_trouble():
 
 
 def test_a_world_that_is_not_asked_borrows_no_client(monkeypatch):
-    monkeypatch.setattr("care_sim.world.bullet_clients._free", free := [borrow()])
+    monkeypatch.setattr("care_sim.world.bullet_bodies._free", free := [borrow()])
     world = BulletWorld()
     bus = world.add(CATALOGUE["bus"], (30.0, 0.0, 0.0))
     world.move(bus, (10.0, 0.0, 0.0))
@@ -95,7 +95,7 @@ def test_who_has_closed_is_refused_and_takes_no_client(asked):
 
 
 def test_whoever_does_not_close_gives_the_client_back_with_the_last_reference(monkeypatch):
-    monkeypatch.setattr("care_sim.world.bullet_clients._free", free := [])
+    monkeypatch.setattr("care_sim.world.bullet_bodies._free", free := [])
     world = BulletWorld()
     world.cast(SENSOR.origin, AHEAD, 50.0)
     number = world._client.number

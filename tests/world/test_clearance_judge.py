@@ -9,11 +9,11 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from care_sim.core.frames import Frame
-from care_sim.world import clearance_judge
+from care_sim.world import contact
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.bullet import BulletWorld
-from care_sim.world.bullet_clients import pybullet
-from care_sim.world.clearance_judge import ClearanceJudge, judge_here
+from care_sim.world.bullet_bodies import pybullet
+from care_sim.world.contact import ClearanceJudge, judge_here
 
 KINDS = ("pedestrian", "bicycle", "car", "bus", "trailer", "hoarding")
 BODIES = st.lists(
@@ -115,7 +115,7 @@ def test_a_judge_that_was_closed_before_it_was_asked_is_replaced():
 
 
 def test_a_judge_of_many_kinds_is_replaced(monkeypatch):
-    monkeypatch.setattr(clearance_judge, "MOST_KINDS", 3)
+    monkeypatch.setattr(contact, "MOST_KINDS", 3)
 
     def ask(name):
         judge = judge_here()

@@ -2,8 +2,7 @@
 
 import pytest
 
-from care_sim.world.crosser import Crosser
-from care_sim.world.walker import Walk
+from care_sim.world.motions import Crosser, Walk
 
 WALK = Walk((20.0, -4.0), 1.5707963267948966, 2.0, 100.0, 6.0)
 

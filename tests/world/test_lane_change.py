@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_sim.world.lane_change import LaneChange
+from care_sim.world.motions import LaneChange
 
 
 @pytest.mark.parametrize("side", [1, -1])

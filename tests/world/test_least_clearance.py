@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.body_tables import Footprints
 from care_sim.world.bullet import BulletWorld
-from care_sim.world.clearance_judge import ClearanceJudge
-from care_sim.world.passage import PADDING_M, LeastClearance, least_gap
+from care_sim.world.contact import PADDING_M, ClearanceJudge, LeastClearance, least_gap
 
 KINDS = ("adult", "bicycle", "car", "motorcycle", "pedestrian", "trailer", "truck", "van", "hedge")
 POSES = st.tuples(st.floats(-9.0, 9.0), st.floats(-9.0, 9.0), st.floats(-7.0, 7.0))

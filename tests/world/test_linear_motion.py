@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from care_sim.core.frames import Frame
 from care_sim.world.bullet import BulletWorld
-from care_sim.world.linear_motion import LinearMotion, rates_between
+from care_sim.world.motions import LinearMotion, rates_between
 
 STILL = np.zeros(3)
 rates = st.tuples(st.floats(-40, 40), st.floats(-40, 40), st.floats(-2, 2)).map(np.array)

@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 
 from care_sim import InvalidInput
 from care_sim.world.bodies import CATALOGUE
-from care_sim.world.route import Route, through
-from care_sim.world.route_car import RouteCar
+from care_sim.world.route import Route, RouteCar, through
 from care_sim.world.traffic import Traffic
 
 LEGS = st.lists(

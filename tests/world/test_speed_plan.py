@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_sim.world.route import Route
-from care_sim.world.speed_plan import SpeedPlan
+from care_sim.world.route import Route, SpeedPlan
 
 CRUISE, SIDEWAYS, COMFORT = 8.0, 2.0, 1.5
 STRAIGHT = SpeedPlan(Route(legs=((200.0, 0.0),)), CRUISE, SIDEWAYS, COMFORT)

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from care_sim.world.lane_flow import LaneFlow
-from care_sim.world.street_traffic import FlowingLane, StreetTraffic
+from care_sim.world.lane_flow import FlowingLane, LaneFlow, StreetTraffic
 
 
 def along_x(places):

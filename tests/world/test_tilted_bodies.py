@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from care_sim.core.frames import Frame
 from care_sim.core.types import CLASSES
-from care_sim.sensors.camera import FRONT_CAMERA
+from care_sim.sensors.pictures import FRONT_CAMERA
 from care_sim.world.bodies import CATALOGUE, sized
 from care_sim.world.bullet import NO_BODY, BulletWorld
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_sim.world.walker import Walk
+from care_sim.world.motions import Walk
 
 RUN = Walk(
     start=(10.0, -4.0), heading=np.pi / 2, speed=2.5, acceleration=5.0, length_m=8.0, starts_s=1.0

@@ -3,8 +3,8 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.types import CLASSES
+from care_sim.world.motions import Walk
 from care_sim.world.traffic import Traffic
-from care_sim.world.walker import Walk
 from care_sim.world.world import WORLD_STEP_S, World, whole_steps
 
 

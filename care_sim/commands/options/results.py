@@ -6,8 +6,7 @@ from typing import Annotated
 
 import tyro
 
-from care_sim.base.bounds import bounded, check_fields
-from care_sim.base.checks import LARGEST_INTEGER, check_whole
+from care_sim.base.checks import LARGEST_INTEGER, bounded, check_fields, check_whole
 from care_sim.base.errors import InvalidInput
 from care_sim.certify import ALL_EPISODES
 from care_sim.commands.options.shared import (

@@ -7,12 +7,12 @@ from typing import Annotated, Any
 
 import tyro
 
-from care_sim.base.bounds import bounded, check_fields
-from care_sim.base.cores import MOST_WORKERS, WORKERS
+from care_sim.base.checks import bounded, check_fields
 from care_sim.base.errors import InvalidInput, shown
-from care_sim.base.seed_ranges import CALIBRATION, split_of
+from care_sim.base.limits import MOST_WORKERS, WORKERS
+from care_sim.base.seeds import CALIBRATION, split_of
 from care_sim.core.conditions import ClosedLoopConditions, Conditions
-from care_sim.study.parameters import parameters
+from care_sim.study.run_config import parameters
 
 Flag = Annotated[bool, tyro.conf.FlagCreatePairsOff]
 """A switch that has no opposite."""
@@ -187,7 +187,7 @@ class StudyOptions(WorkerOptions):
 def seeds_of(numbers: Sequence[int]) -> Sequence[int]:
     """The seeds that one number means (that many, from 0) or several numbers (these; twice the same
     is that seed alone). Raises InvalidInput for a number below one or above that of the test seeds,
-    and for seeds of several splits (`care_sim.base.seed_ranges`).
+    and for seeds of several splits (`care_sim.base.seeds`).
     """
     if len(numbers) != 1:
         split_of(numbers)

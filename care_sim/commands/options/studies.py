@@ -6,7 +6,7 @@ from typing import Annotated
 
 import tyro
 
-from care_sim.base.bounds import bounded
+from care_sim.base.checks import bounded
 from care_sim.base.errors import InvalidInput
 from care_sim.commands.options.shared import (
     EpisodeOptions,
@@ -16,7 +16,7 @@ from care_sim.commands.options.shared import (
     SourceOptions,
     StudyOptions,
 )
-from care_sim.core.driver_settings import FIXED
+from care_sim.core.conditions import FIXED
 from care_sim.study.designs.defaults import (
     FILM_BUDGETS,
     FILM_POLICIES,

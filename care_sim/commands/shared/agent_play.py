@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
-from care_sim.base.scenario_names import scenario_of
+from care_sim.base.plugins import scenario_of
 from care_sim.commands.options.shared import EpisodeOptions
 from care_sim.commands.options.studies import Protocol, Sweep
 from care_sim.commands.shared.command_line import command_line

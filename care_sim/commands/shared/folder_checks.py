@@ -9,7 +9,7 @@ from care_sim.reports.studies import SWEEP
 from care_sim.reports.study import Study
 from care_sim.study.journal import JOURNAL, Finished, Journal, is_written, read_journal
 from care_sim.study.results_formats import RESULTS_FORMATS
-from care_sim.study.row_identity import USUAL, asked_with, identity, row_label
+from care_sim.study.rows.checks import USUAL, asked_with, identity, row_label
 from care_sim.study.rows.parquet import read_notes, read_rows
 from care_sim.study.run_config import Row, RunConfig
 

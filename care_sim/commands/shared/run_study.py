@@ -5,19 +5,33 @@ import re
 import shlex
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from care_sim.base.checks import check_whole
-from care_sim.base.errors import InvalidInput, counted, print_lines
+from care_sim.base.errors import InvalidInput, counted, print_lines, report_problems
 from care_sim.base.files import write_text
-from care_sim.commands.shared.folder_checks import check_folder, lost
-from care_sim.reports.report import CONFIG, TABLES, StudyReport
-from care_sim.reports.studies import SWEEP, study_of
+from care_sim.base.interrupts import DONE, FAILED
+from care_sim.commands.options.shared import StudyOptions
+from care_sim.commands.shared.command_line import command_line
+from care_sim.commands.shared.console import TableConsole
+from care_sim.commands.shared.folder_checks import check_folder, free_folder, lost
+from care_sim.reports.report import (
+    CONFIG,
+    TABLES,
+    StudyReport,
+    next_steps,
+    print_report,
+    read_results,
+)
+from care_sim.reports.studies import STUDIES, SWEEP, study_of
 from care_sim.reports.study import Study
+from care_sim.study import executors
 from care_sim.study.executors import ExecutorFactory, processes
-from care_sim.study.journal import JOURNAL, Journal
+from care_sim.study.journal import JOURNAL, UNFINISHED, Journal, Unfinished, forget
 from care_sim.study.progress import run_with_progress
 from care_sim.study.provenance import code_digest, machine, versions
+from care_sim.study.rows.checks import check_worlds
 from care_sim.study.rows.parquet import (
     check_columns,
     read_table,
@@ -26,8 +40,34 @@ from care_sim.study.rows.parquet import (
 )
 from care_sim.study.run_config import Row, RunConfig
 from care_sim.study.runner import Failure, by_reason
-from care_sim.study.unfinished import UNFINISHED, Unfinished, forget
-from care_sim.study.world_hash import check_worlds
+
+
+def play_study(
+    options: StudyOptions,
+    name: str,
+    configs: Sequence[RunConfig],
+    folder: str,
+    left_out: Sequence[str] = (),
+) -> int:
+    """Play the tasks of the study `name`, in runs/ under `folder` unless the options say otherwise,
+    and print their tables, the tasks that failed and the policies that were left out; returns the
+    exit code.
+    """
+    study = STUDIES[name]
+    make_executor = executors.cluster(options.cluster) if options.cluster else executors.processes
+    usual = Path("runs", folder) if options.force else None
+    out = options.out or usual or free_folder(folder, configs, study)
+    again = command_line(replace(options, out=out))
+    failures = run_study(configs, out, options.workers, make_executor, study, options.force, again)
+    # What is printed is read back from the folder, as `care-sim report` would print it.
+    if len(failures) < len(configs):
+        rows, _, missing = read_results(out)
+        print_report(rows, TableConsole(), study, missing, verbose=options.verbose)
+        print_lines(*next_steps(out, study, rows))
+    lines = [f"failed: {line}" for line in by_reason(failures, study.results.unit)]
+    report_problems([*lines, *left_out])
+    return FAILED if failures or left_out else DONE
+
 
 _MANY = 1000
 """Rows whose tables and figures take more than a second."""
@@ -46,7 +86,7 @@ def run_study(
     failed.
 
     Names the folder, and leaves in it how large the study is and the `command` that plays it, until
-    it has ended (`care_sim.study.unfinished`). Writes `journal.jsonl` as tasks finish, and when all
+    it has ended (`care_sim.study.journal`). Writes `journal.jsonl` as tasks finish, and when all
     have ended and some did not fail, the results: `config.json`, Parquet files, tables and figures
     of `study`. No other study can take the folder until then. A folder that holds all of it
     stays as it is, unless `force`; `report` draws lost figures. Where the folder holds rows

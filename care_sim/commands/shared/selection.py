@@ -13,12 +13,12 @@ from care_sim.base.errors import (
     MissingExtra,
     report_problems,
 )
-from care_sim.base.scenario_names import scenario_of
+from care_sim.base.plugins import scenario_of
 from care_sim.commands.options.shared import EpisodeOptions, PlayOptions, SourceOptions
 from care_sim.core.conditions import DEFAULTS
 from care_sim.policies import check_policy, contenders
 from care_sim.scenarios import PLUGINS, SCENARIOS, make_scenario, scenario_names
-from care_sim.study.parameters import Parameters, parameters
+from care_sim.study.run_config import Parameters, parameters
 
 if TYPE_CHECKING:
     from care_sim.sources.scenes import Source

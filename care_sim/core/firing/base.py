@@ -11,10 +11,13 @@ from typing import Any, ClassVar, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from care_sim.base.checks import check_number
+from care_sim.base.compiled import compiled
 from care_sim.core.allocation import budget_cells
-from care_sim.core.arrays import Floats, Integers
+from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.cells.stack import Grid
+from care_sim.core.defaults import CELLS
 from care_sim.core.grid import Cells
-from care_sim.core.grid_stack import Grid
 
 Floor: TypeAlias = Callable[[], NDArray[np.integer]] | None
 """Draws the random floor of a keyframe, a permutation of all cells; None of an environment without
@@ -119,3 +122,184 @@ def shots_by_cell(fired: Cells, size: int) -> tuple[Cells, Integers | None]:
         return fired, None
     shots = np.bincount(fired, minlength=size)
     return np.flatnonzero(shots), shots
+
+
+_DIGIT = 11
+"""Bits that are counted at a time; three times as many hold every score."""
+
+
+class FreeCells(Hardware):
+    """A sensor that aims every shot, in any order. The paper assumes it (Sec. 3)."""
+
+    name = CELLS
+    unit = "cell"
+    product = "agile scanner that aims single shots"
+    source = (
+        "AEye, white paper Rethinking the Three Rs of LiDAR: Rate, Resolution and Range, "
+        "RRRWP_19_0812, 2019"
+    )
+
+    def __init__(self, grid: Grid):
+        super().__init__(grid, unit_cells=1)
+
+    @cached_property
+    def unit_of(self) -> Integers:
+        """(N,) the cells themselves."""
+        return np.arange(self.grid.size)
+
+    def fire(self, scores: NDArray[Any], budget: int, floor: Floor, last: Cells) -> Cells:
+        """The demanded cells up to the budget, then the floor."""
+        return fired_cells(scores, budget, floor)
+
+    def best(self, worth: Floats, budget: int, last: Cells) -> Integers:
+        """Any cells can fire together."""
+        return ranked(worth)[:budget]
+
+
+def fired_cells(scores: NDArray[np.floating] | Mask, budget: int, floor: Floor) -> Cells:
+    """The cells that an action fires, ascending.
+
+    They are the `budget` highest strictly positive `scores` (E, A), ties by ascending index. Where
+    there are fewer, the `floor` tops them up; None leaves the rest unspent.
+    """
+    flat = scores.ravel().astype(np.float32, copy=False)
+    chosen = np.empty(len(flat), np.bool_)
+    count = choose_demanded(flat, budget, chosen)
+    # An action that spends the budget itself needs no floor, and a floor takes longer to draw than
+    # a scan of its cells.
+    if floor is not None and count < budget:
+        count = top_up(chosen, count, floor(), budget)
+    cells = np.empty(count + 1, np.int64)
+    list_chosen(chosen, cells)
+    return cells[:count]
+
+
+@compiled()
+def choose_demanded(scores: NDArray[np.float32], budget: int, chosen: Mask) -> int:
+    """Set in `chosen` (N,) whether a cell is one of the `budget` with the highest strictly positive
+    `scores` (N,), of equals the lower one. Returns how many are.
+    """
+    # Counted as narrow as the scores are: as many of both are computed at once.
+    count = np.int32(0)
+    for cell in range(len(scores)):
+        is_positive = scores[cell] > np.float32(0)
+        chosen[cell] = is_positive
+        count = np.int32(count + is_positive)
+    if count <= budget:
+        return int(count)
+
+    # Bits of positive floats ascend as their values do.
+    ranks = scores.view(np.int32)
+    least, equals = _nth_highest(ranks, budget)
+    for cell in range(len(ranks)):
+        is_last = ranks[cell] == least and equals > 0
+        equals -= is_last
+        chosen[cell] = ranks[cell] > least or is_last
+    return budget
+
+
+@compiled()
+def top_up(chosen: Mask, count: int, floor: NDArray[np.integer], budget: int) -> int:
+    """Choose the first of the `floor` besides, up to the budget; `count` are chosen before. Returns
+    how many are afterwards.
+    """
+    for cell in floor:
+        if count >= budget:
+            break
+        count += not chosen[cell]
+        chosen[cell] = True
+    return count
+
+
+@compiled()
+def list_chosen(chosen: Mask, cells: Cells) -> None:
+    """Fill `cells` with those that are `chosen`, ascending; it is longer than their number."""
+    # Every cell is written, and the next one over it if it is not chosen: no branch could foretell
+    # the cells of a random floor.
+    count = 0
+    for cell in range(len(chosen)):
+        cells[count] = cell
+        count += chosen[cell]
+
+
+@compiled()
+def _nth_highest(numbers: NDArray[np.int32], n: int) -> tuple[int, int]:
+    """The nth highest of `numbers`, of which n or more are above 0; and how many of those that
+    equal it are among the n highest.
+    """
+    # All are written, and the next one over what is not kept: that needs no branch.
+    kept = np.empty(len(numbers) + 1, np.int32)
+    count = 0
+    for number in numbers:
+        kept[count] = number
+        count += number > 0
+
+    # Its bits are found a few at a time, the highest first, by counting how many numbers have which
+    # of them; only those with the same bits so far are counted.
+    known = 0
+    for shift in (_DIGIT * 2, _DIGIT, 0):
+        holding = np.zeros(1 << _DIGIT, np.int64)
+        for number in kept[:count]:
+            holding[number >> shift & (1 << _DIGIT) - 1] += 1
+        digit = len(holding) - 1
+        while holding[digit] < n:
+            n -= holding[digit]
+            digit -= 1
+        known = known << _DIGIT | digit
+        same = 0
+        for number in kept[:count]:
+            kept[same] = number
+            same += number >> shift == known
+        count = same
+    return known, n
+
+
+MOST_SHOTS = 100
+"""Ten times the reach, as far as reach grows with the root of the shots."""
+
+
+class Energy(FreeCells):
+    """Free cells, each of which may be fired up to `shots` times at a keyframe; what its receiver
+    counts adds up (`care_sim.sensors.signal`, `care_sim.sensors.lidar_faults`).
+
+    The scores say how the energy is to be shared. Shots are dealt one by one, each to the cell
+    whose score is the highest per shot that it would then have (as seats are dealt to parties by
+    D'Hondt). So equal scores have equally many shots, all cells their first one before any its
+    second, and scores of 3 to 1 ask for three shots to one. The floor spends what is left once
+    every demanded cell has `shots`. With one shot that is free cells.
+
+    No product is known that aims every shot and counts photons over several.
+    """
+
+    name = "energy"
+    numbers = ("SHOTS",)
+    usual = (4,)
+    unit = counted = "shot"
+    product = "agile scanner whose receiver counts photons over several shots of a direction"
+    source = (
+        "AEye, RRRWP_19_0812, for shots that revisit a direction; Ouster, US 2023/0243975 A1, "
+        "abstract, for counts added up over laser cycles"
+    )
+
+    def __init__(self, grid: Grid, shots: int):
+        check_number("shots of firing energy", shots, 1, MOST_SHOTS)
+        super().__init__(grid)
+        self.most_shots = shots
+
+    def fire(self, scores: NDArray[Any], budget: int, floor: Floor, last: Cells) -> Cells:
+        """A cell for every shot, ascending: one that is fired n times stands there n times."""
+        # A score is what an action holds, float32; a share of it needs more bits.
+        flat = scores.ravel().astype(np.float32).astype(np.float64)
+        cells = demanded(scores)
+        # The nth shot of a cell comes after n shots of every cell before it, so that no more cells
+        # than the budget holds n times can have an nth shot.
+        numbers = range(1, self.most_shots + 1)
+        rounds = [cells[: budget // number] for number in numbers]
+        claims = [flat[cells] / number for number, cells in zip(numbers, rounds, strict=True)]
+        # Equal claims are ranked by the number of the shot, then by the cell, lower first.
+        dealt = np.argsort(-np.concatenate(claims), kind="stable")[:budget]
+        fired = np.concatenate(rounds)[dealt]
+        if floor is not None and len(fired) < budget:
+            free = floor()
+            fired = np.concatenate([fired, free[flat[free] <= 0][: budget - len(fired)]])
+        return np.sort(fired)

@@ -4,11 +4,16 @@ import re
 from collections.abc import Callable
 
 from care_sim.base.errors import InvalidInput, shown
-from care_sim.core.firing.base import Hardware
-from care_sim.core.firing.free_cells import Energy, FreeCells
-from care_sim.core.firing.units import RingSegments, Tiles, WholeColumns, WholeRows
-from care_sim.core.firing.windows import AzimuthWindow, VerticalWindow
-from care_sim.core.grid_stack import Grid
+from care_sim.core.cells.stack import Grid
+from care_sim.core.firing.base import Energy, FreeCells, Hardware
+from care_sim.core.firing.units import (
+    AzimuthWindow,
+    RingSegments,
+    Tiles,
+    VerticalWindow,
+    WholeColumns,
+    WholeRows,
+)
 
 HARDWARE: dict[str, type[Hardware]] = {
     kind.name: kind

@@ -15,9 +15,8 @@ from care_sim.core.grid import AngularGrid
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.envs.scenarios import CutInEnv, DartoutEnv, DenseEnv, R157Env, ScenarioEnv
 from care_sim.scenarios.cutin import CutIn
-from care_sim.scenarios.dartout import Dartout
-from care_sim.scenarios.dense import Dense
-from care_sim.scenarios.r157.scenario import R157
+from care_sim.scenarios.dartout import Dartout, Dense
+from care_sim.scenarios.r157 import R157
 
 OF_EACH_WORLD = ("budget", *CAMERA_FAULTS, "camera_confidence")
 """Arguments that may be a list, of a value for each world: what an allocator has to cope with."""

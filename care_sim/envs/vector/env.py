@@ -1,8 +1,11 @@
 """The vector environments of the closed loop: thin Gymnasium adapters around `Worlds`."""
 
-from collections.abc import Sequence
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from functools import partial
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
+from weakref import finalize
 
 import gymnasium
 import numpy as np
@@ -11,21 +14,59 @@ from gymnasium.vector.utils import batch_space, create_empty_array
 from numpy.typing import NDArray
 
 from care_sim.base.checks import as_array, check_flag, check_whole
-from care_sim.base.cores import CORES
 from care_sim.base.errors import InvalidInput, shown
+from care_sim.base.limits import CORES
 from care_sim.base.vectors import shared_attribute
 from care_sim.core.arrays import Floats, Mask
 from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.rig import Rig
 from care_sim.core.types import Action
+from care_sim.envs import scenarios
 from care_sim.envs.closed_loop import ClosedLoopEnv
-from care_sim.envs.sensing import Observed
-from care_sim.envs.spaces import checked_scores
+from care_sim.envs.sensing import Observed, checked_scores
 from care_sim.envs.vector.arguments import Maker, autoreset_of, makers_of, models_of, why_separate
 from care_sim.envs.vector.steps import joined, kept, last_rows, same_step, seeds_of, worlds_to_reset
-from care_sim.envs.vector.threads import Threads
 from care_sim.envs.vector.worlds import CompiledWorlds, SeparateWorlds, Stepped, Worlds
 from care_sim.scenarios.base import Scenario
+
+_T = TypeVar("_T")
+
+
+class Threads:
+    """Up to `count` threads. They begin when they are first needed; none outlives this object."""
+
+    def __init__(self, count: int):
+        self._count = count
+        self._pool: ThreadPoolExecutor | None = None
+        self._process = -1
+        self._others: list[Future[Any]] = []
+
+    def all(self, tasks: Sequence[Callable[[], _T]]) -> list[_T]:
+        """What every task gives. The first of them is done by the thread that asks."""
+        if len(tasks) < 2:
+            return [task() for task in tasks]
+        # A fork copies no threads: in a new process they begin anew.
+        if self._pool is None or self._process != os.getpid():
+            self._pool = ThreadPoolExecutor(self._count - 1, "care-sim worlds")
+            self._process = os.getpid()
+            self._others = []
+            finalize(self, self._pool.shutdown, wait=False)
+        # Whoever was interrupted while waiting has left some at work.
+        wait(self._others)
+        self._others = others = [self._pool.submit(task) for task in tasks[1:]]
+        # All are waited for, whatever one of them raises: nothing goes on behind the caller's back.
+        try:
+            first = tasks[0]()
+        finally:
+            wait(others)
+        return [first, *(other.result() for other in others)]
+
+    def close(self) -> None:
+        """End the threads; they begin again if they are needed."""
+        if self._pool is not None and self._process == os.getpid():
+            self._pool.shutdown()
+        self._pool = None
+
 
 MOST_WORLDS = 2**16
 MOST_THREADS = 1024
@@ -288,3 +329,45 @@ def _rows(observed: Observed, share: slice) -> Observed:
 def _places(who: Mask) -> list[int]:
     places: list[int] = np.flatnonzero(who).tolist()
     return places
+
+
+class DartoutVectorEnv(ClosedLoopVectorEnv):
+    """`CARE-Dartout-v0` many times."""
+
+    single = scenarios.DartoutEnv
+
+
+class DenseVectorEnv(ClosedLoopVectorEnv):
+    """`CARE-Dense-v0` many times."""
+
+    single = scenarios.DenseEnv
+
+
+class CutInVectorEnv(ClosedLoopVectorEnv):
+    """`CARE-CutIn-v0` many times."""
+
+    single = scenarios.CutInEnv
+
+
+class R157VectorEnv(ClosedLoopVectorEnv):
+    """`CARE-R157-v0` many times."""
+
+    single = scenarios.R157Env
+
+
+class NcapVectorEnv(ClosedLoopVectorEnv):
+    """`CARE-NCAP-v0` many times."""
+
+    single = scenarios.NcapEnv
+
+
+class DriveVectorEnv(ClosedLoopVectorEnv):
+    """`CARE-Drive-v0` many times."""
+
+    single = scenarios.DriveEnv
+
+
+class ScenarioVectorEnv(ClosedLoopVectorEnv):
+    """Any scenario of the closed loop many times."""
+
+    single = scenarios.ScenarioEnv

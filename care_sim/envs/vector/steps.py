@@ -11,7 +11,7 @@ from care_sim.base.compiled import compiled
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.arrays import Floats, Mask
 from care_sim.envs.reward import BEGINNING, REWARD_WEIGHTS, earned_at, weighted
-from care_sim.loops.record_columns import Records
+from care_sim.loops.records import Records
 
 
 def seeds_of(seed: int | Sequence[int | None] | None, worlds: int) -> list[int | None]:

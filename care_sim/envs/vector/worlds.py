@@ -1,6 +1,6 @@
 """What plays some of the worlds of a vector environment, in one thread."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, replace
 from typing import Any, NamedTuple, Protocol
 
@@ -10,16 +10,34 @@ from numpy.typing import NDArray
 
 from care_sim.base.times import LAST_BITS_S
 from care_sim.batch.loop import BatchLoop
-from care_sim.batch.records import History
-from care_sim.core.arrays import Floats, Mask
+from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.envs.sensing import Observed
 from care_sim.envs.vector.arguments import Maker
 from care_sim.envs.vector.steps import Rewards
-from care_sim.evaluation.metrics import outcome_of
+from care_sim.evaluation.outcomes import outcome_of
 from care_sim.loops.episode import most_keyframes
-from care_sim.loops.record_columns import Records
-from care_sim.loops.records import Outcome
+from care_sim.loops.records import Outcome, Records, kind_of
+
+
+class History:
+    """The records of the running episodes of `worlds` worlds, of up to `keyframes` each."""
+
+    def __init__(self, worlds: int, keyframes: int):
+        self._columns = Records(
+            *(np.zeros((keyframes, worlds), kind_of(name)) for name in Records._fields)
+        )
+
+    def note(self, who: Mask, keyframes: Integers, records: Records) -> None:
+        """Keep the records of the worlds `who` (W,), of their `keyframes` (W,)."""
+        worlds = np.flatnonzero(who)
+        for table, column in zip(self._columns, records, strict=True):
+            table[keyframes[worlds], worlds] = column[worlds]
+
+    def episode(self, world: int, keyframes: int) -> Records:
+        """The first `keyframes` records of a world's episode, (keyframes,) each."""
+        columns: Iterable[np.ndarray] = self._columns
+        return Records(*(table[:keyframes, world] for table in columns))
 
 
 class Stepped(NamedTuple):

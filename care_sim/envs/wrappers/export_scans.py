@@ -17,11 +17,11 @@ from care_sim.base.checks import check_path
 from care_sim.base.errors import InvalidInput
 from care_sim.base.extras import import_open3d
 from care_sim.base.files import replacing, why_unwritable, write_text
-from care_sim.core.actions import SHARES
 from care_sim.core.arrays import Floats
+from care_sim.core.firing.actions import SHARES
 from care_sim.core.grid import Cells
 from care_sim.core.types import CLASSES, Action, Tracks
-from care_sim.envs.wrappers.watching import Watching, numbered
+from care_sim.envs.wrappers.record_rerun import Watching, numbered
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.open_loop import OpenLoop
 from care_sim.loops.records import Keyframe

@@ -1,6 +1,4 @@
-"""A detector that sees points only: the road removed, DBSCAN, boxes on the shown sides, classes by
-size.
-"""
+"""The steps of the detector `cluster`, put together."""
 
 from dataclasses import dataclass
 
@@ -12,10 +10,13 @@ from care_sim.core.conditions import MIN_RETURNS
 from care_sim.core.frames import turned
 from care_sim.core.grid import AngularGrid
 from care_sim.core.types import Detections
-from care_sim.perception.cluster.box_fitting import DECIMALS, fit_sides
-from care_sim.perception.cluster.grouping import clusters_of
-from care_sim.perception.cluster.road import KERB_CLEARANCE_M, heights_above, road_plane
-from care_sim.perception.cluster.size_classes import MOST_MISFIT, Guess, best_guess
+from care_sim.perception.cluster.boxes import DECIMALS, MOST_MISFIT, Guess, best_guess, fit_sides
+from care_sim.perception.cluster.points import (
+    KERB_CLEARANCE_M,
+    clusters_of,
+    heights_above,
+    road_plane,
+)
 
 OWN_ROOF_M = 2.0
 """Nearer to the sensor than this there is the roof that carries it: of a recorded nuScenes sweep a
@@ -35,9 +36,10 @@ class _Candidate:
 
 
 class ClusterDetector:
-    """Classical detection in four steps, with nothing learned: remove the road (`road`), group the
-    points (`grouping`), fit a rectangle to each group (`box_fitting`), tell its class
-    (`size_classes`).
+    """A detector that sees points only: the road removed, DBSCAN, boxes on the shown sides, classes
+    by size.
+
+    These four steps are classical, with nothing learned (`points`, `boxes`).
 
     `grid` tells how far apart neighbouring points are. A cluster counts from three points on, as
     for the proxy. The confidence of n points is 1 - 1 / sqrt(n), since the error of an average

@@ -15,8 +15,8 @@ from care_sim.base.array_files import Arrays, read_arrays, write_arrays
 from care_sim.base.checks import check_number
 from care_sim.base.errors import InvalidInput
 from care_sim.base.extras import import_torch
-from care_sim.base.json_text import parsed_json
-from care_sim.base.torch_threads import one_thread
+from care_sim.base.files import parsed_json
+from care_sim.base.limits import one_thread
 from care_sim.core.arrays import Floats
 from care_sim.core.types import CLASSES, Detections
 from care_sim.perception.pillars.decoding import peaks_of, points_within

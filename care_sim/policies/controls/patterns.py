@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from care_sim.base.checks import check_number, check_whole
 from care_sim.core.belief import Belief
+from care_sim.core.cells.stack import Grid
 from care_sim.core.grid import Cells, Head
-from care_sim.core.grid_stack import Grid
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.policies.base import FixedPolicy, Policy

@@ -11,17 +11,17 @@ from typing import ClassVar
 import numpy as np
 
 from care_sim.base.checks import check_flag, check_known, check_whole
-from care_sim.base.seed_ranges import training_seeds
+from care_sim.base.seeds import training_seeds
 from care_sim.core.arrays import Floats
 from care_sim.core.belief import Belief
-from care_sim.core.boxes import planar_ranges
+from care_sim.core.cells.boxes import planar_ranges
 from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.frames import Frame
 from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.loops.closed_loop import ClosedLoop
-from care_sim.loops.seeds import EpisodeSeeds
+from care_sim.loops.episode import EpisodeSeeds
 from care_sim.policies.base import FixedPolicy, Policy
 from care_sim.policies.controls.patterns import likeliest_first
 from care_sim.policies.controls.patterns_and_tracks import HistoryPattern

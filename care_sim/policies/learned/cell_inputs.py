@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Mask
 from care_sim.core.belief import Belief
-from care_sim.core.cell_sets import CellSets
+from care_sim.core.cells.sets import CellSets
 from care_sim.core.grid import Cells
 from care_sim.core.residual import explained, wedges
 from care_sim.core.rig import Rig

@@ -14,12 +14,12 @@ from care_sim.base.checks import check_whole
 from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Integers
 from care_sim.core.belief import Belief, Observation
-from care_sim.core.beliefs import Beliefs
-from care_sim.core.cell_sets import CellSets
+from care_sim.core.cells.sets import CellSets
 from care_sim.core.grid import Cells
+from care_sim.core.observation.beliefs import Beliefs
 from care_sim.core.residual import camera_layers_of
 from care_sim.core.rig import Rig
-from care_sim.perception.cluster.road import KERB_CLEARANCE_M
+from care_sim.perception.cluster.points import KERB_CLEARANCE_M
 from care_sim.policies.learned.sectors import Tiling
 
 BlockPictures = NDArray[np.float32]

@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.belief import Observation
-from care_sim.core.beliefs import Beliefs
+from care_sim.core.cells.sets import WorldSets
+from care_sim.core.observation.beliefs import Beliefs
 from care_sim.core.rig import Rig
-from care_sim.core.world_sets import WorldSets
 from care_sim.core.wrapping import Wrapping
 from care_sim.policies.base import RowPolicy
 from care_sim.policies.learned.grid_features import CHANNELS, EGO_INPUTS, GridFeatures

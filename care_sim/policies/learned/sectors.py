@@ -13,16 +13,15 @@ from numpy.typing import NDArray
 
 from care_sim.base.checks import check_whole
 from care_sim.base.errors import InvalidInput
-from care_sim.core.allocator import Allocator
 from care_sim.core.arrays import Integers
 from care_sim.core.belief import Belief
-from care_sim.core.beliefs import Beliefs
-from care_sim.core.cell_sets import CellSets
+from care_sim.core.cells.sets import CellSets, WorldSets
+from care_sim.core.cells.stack import Grid
+from care_sim.core.firing.actions import Allocator
 from care_sim.core.grid import Cells
-from care_sim.core.grid_stack import Grid
+from care_sim.core.observation.beliefs import Beliefs
 from care_sim.core.rig import Rig
 from care_sim.core.types import Action, Demand
-from care_sim.core.world_sets import WorldSets
 
 _Cells = TypeVar("_Cells", int, Integers)
 

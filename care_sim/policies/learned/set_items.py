@@ -8,7 +8,7 @@ import numpy as np
 
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.belief import Belief
-from care_sim.core.cell_sets import CellSets
+from care_sim.core.cells.sets import CellSets
 from care_sim.core.residual import explaining_tracks, wedge_rays, wedges
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES

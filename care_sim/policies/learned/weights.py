@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from care_sim.base.array_files import Arrays, read_arrays, write_arrays
 from care_sim.base.checks import is_number
 from care_sim.base.errors import InvalidInput
-from care_sim.base.json_text import parsed_json
+from care_sim.base.files import parsed_json
+from care_sim.core.cells.stack import Grid, GridStack
 from care_sim.core.grid import AngularGrid
-from care_sim.core.grid_stack import Grid, GridStack
 from care_sim.core.rig import Rig
 from care_sim.core.wrapping import Wrapping, wrapping_of_line
 

@@ -7,19 +7,18 @@ from typing import ClassVar, NamedTuple
 
 from care_sim.base.checks import check_flag, check_whole
 from care_sim.core.belief import Belief
-from care_sim.core.beliefs import Beliefs
-from care_sim.core.cell_sets import CellSets
+from care_sim.core.cells.sets import CellSets, WorldSets
 from care_sim.core.conditions import MIN_RETURNS
+from care_sim.core.observation.beliefs import Beliefs
 from care_sim.core.residual import camera_layers, unexplained_layer_of
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
-from care_sim.core.world_sets import WorldSets
 from care_sim.policies.base import Policy, RowPolicy
 from care_sim.policies.controls.patterns import cells_by_row, entry_cells
 from care_sim.policies.own.sight_lines import SightLines, columns_ahead
 
 CORE_FIRST = "core-spread"
-"""The order of the cells in hulls and wedges (`care_sim.core.cell_order`), unless the rig has one:
+"""The order of the cells in hulls and wedges (`care_sim.core.cells.order`), unless the rig has one:
 the rim is there for errors of the forecast, without which the object lies in the core alone."""
 HULL_CELLS_PER_RETURN = 2
 """Cells that a hull gets in a round for every return that a detection needs."""

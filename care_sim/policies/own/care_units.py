@@ -5,7 +5,7 @@ import numpy as np
 from care_sim.core.allocation import allocate
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.belief import Belief
-from care_sim.core.boxes import planar_ranges
+from care_sim.core.cells.boxes import planar_ranges
 from care_sim.core.grid import Cells
 from care_sim.core.residual import ray_starts, wedge_rays, wedges
 from care_sim.core.rig import Rig

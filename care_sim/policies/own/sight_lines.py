@@ -9,9 +9,8 @@ import numpy as np
 from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Mask
 from care_sim.core.belief import Belief
-from care_sim.core.grid import Cells
-from care_sim.core.grid_kernels import GridSpacing
-from care_sim.core.grid_stack import Grid
+from care_sim.core.cells.stack import Grid
+from care_sim.core.grid import Cells, GridSpacing
 from care_sim.core.rig import Rig
 
 AHEAD_RAD = math.atan(13 / 50)

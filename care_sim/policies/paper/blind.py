@@ -8,13 +8,13 @@ from zlib import crc32
 import numpy as np
 
 from care_sim.base.checks import check_seed
+from care_sim.base.digests import portable_bytes
 from care_sim.base.errors import InvalidInput
 from care_sim.base.extras import import_open3d
-from care_sim.base.portable_hash import portable_bytes
 from care_sim.core.arrays import Floats
 from care_sim.core.belief import Belief
+from care_sim.core.cells.stack import Grid
 from care_sim.core.grid import Cells
-from care_sim.core.grid_stack import Grid
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.loops.truth import Truth

@@ -4,12 +4,12 @@ reserve layer, and CARE with safety-bounded forgetting.
 
 from care_sim.base.checks import check_flag
 from care_sim.core.belief import Belief
-from care_sim.core.beliefs import Beliefs
+from care_sim.core.cells.sets import WorldSets
 from care_sim.core.forgetting import Forgetting, ForgettingRules
+from care_sim.core.observation.beliefs import Beliefs
 from care_sim.core.residual import camera_layers, camera_layers_of, unexplained_layer_of, wedges_of
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
-from care_sim.core.world_sets import WorldSets
 from care_sim.policies.base import Policy, RowPolicy
 
 

@@ -8,14 +8,14 @@ import numpy as np
 
 from care_sim.core.arrays import Floats, Mask
 from care_sim.core.belief import Belief
-from care_sim.core.beliefs import Beliefs
-from care_sim.core.boxes import planar_ranges
+from care_sim.core.cells.boxes import planar_ranges
+from care_sim.core.cells.sets import WorldSets
+from care_sim.core.cells.stack import Grid
 from care_sim.core.frames import Frame, turned
 from care_sim.core.grid import Cells
-from care_sim.core.grid_stack import Grid
+from care_sim.core.observation.beliefs import Beliefs
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand, Ego
-from care_sim.core.world_sets import WorldSets
 from care_sim.policies.base import Policy, PrivilegedPolicy, RowPolicy
 
 
@@ -82,7 +82,7 @@ def uniform_pattern(grid: Grid, count: int) -> Cells:
 GROUND_CLEARANCE_M = 0.3
 """Returns lower than this above a level road are ground (the threshold of the Argoverse 2 map API).
 A detector that fits the road's plane knows it better: see
-`care_sim.perception.cluster.road.KERB_CLEARANCE_M`.
+`care_sim.perception.cluster.points.KERB_CLEARANCE_M`.
 """
 BOX_MARGIN_M = 0.2
 """Boxes reach this much further: an error of 1 m/s in the car's own speed moves a box by 0.1 m in a

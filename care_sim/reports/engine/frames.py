@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.return_settings import RETURN_SETTINGS
+from care_sim.core.conditions import RETURN_SETTINGS
 from care_sim.evaluation.scene_contrasts import Tallies, averaged
 from care_sim.reports.engine.contrasts import Contrast, contrast
 from care_sim.reports.engine.measures import Measure, Recall, Units, tally_of
@@ -12,12 +12,12 @@ from care_sim.reports.formatting import marked, tag_notes
 from care_sim.study.rows.reading import (
     READ_WITH,
     Key,
+    Setting,
     grouped,
     policy_of,
     setting_of,
     tags_of_row,
 )
-from care_sim.study.rows.settings import Setting
 from care_sim.study.run_config import FULL, Row
 
 

@@ -11,8 +11,7 @@ from care_sim.reports.engine.contrasts import Contrast, contrast
 from care_sim.reports.engine.frames import Frame
 from care_sim.reports.engine.measures import AVOIDED, BRAKED, DETECTION, Measure, Recall, Units
 from care_sim.reports.formatting import median
-from care_sim.study.rows.reading import Key, detections, tags_of_row
-from care_sim.study.rows.settings import Setting
+from care_sim.study.rows.reading import Key, Setting, detections, tags_of_row
 from care_sim.study.run_config import FULL, Row
 
 NO_ACTOR = Quartiles(None, None, None, 0)

@@ -11,9 +11,8 @@ from PIL import Image, ImageDraw
 from care_sim.base.checks import check_number
 from care_sim.base.errors import InvalidInput
 from care_sim.loops.closed_loop import ClosedLoop
-from care_sim.loops.open_loop import OpenLoop
+from care_sim.loops.open_loop import OpenLoop, SceneKeyframe
 from care_sim.loops.records import Keyframe
-from care_sim.loops.scene_records import SceneKeyframe
 from care_sim.loops.watcher import Watched
 from care_sim.study.run_config import Row
 from care_sim.viewer.palette import BACKGROUND, DETECTED, HIT, State

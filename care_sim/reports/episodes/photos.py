@@ -8,7 +8,7 @@ from typing import Any
 from care_sim.base.checks import check_known, check_number
 from care_sim.base.errors import InvalidInput
 from care_sim.base.files import PNG, check_output, replacing
-from care_sim.envs.wrappers.watching import Watching
+from care_sim.envs.wrappers.record_rerun import Watching
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.open_loop import OpenLoop
 from care_sim.loops.watcher import Watched

@@ -11,12 +11,12 @@ from rich.text import Text
 from care_sim.base.errors import printable
 from care_sim.driving.drivers import brake_delay_s
 from care_sim.evaluation.recall import CENSORED_AT, SceneOutcome
+from care_sim.loops.open_loop import SceneKeyframe
 from care_sim.loops.records import DriveOutcome, Keyframe
-from care_sim.loops.scene_records import SceneKeyframe
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.play_config import PlayConfig
 from care_sim.study.run_config import Row
-from care_sim.study.scene_trace import PlayedScene
+from care_sim.study.scene_play import PlayedScene
 
 _COLUMNS = (
     "time\ns",

@@ -17,8 +17,7 @@ from care_sim.reports.tables.validate import WorldPlays, played_worlds
 from care_sim.reports.tables.vehicle import VehicleRows, mean_over_forecasts, total
 from care_sim.sensors.setups import DEFAULT_SETUP
 from care_sim.study.designs.faults import FAULT_PLACES, FAULTS, faults_alone
-from care_sim.study.designs.firing import AWARE, rows_by_firing
-from care_sim.study.designs.order import rows_by_order
+from care_sim.study.designs.firing import AWARE, rows_by_firing, rows_by_order
 from care_sim.study.designs.validate import CAMERA_POLICIES, MEMORISER
 from care_sim.study.designs.variants import USUAL_VARIANT, Place, Variant
 from care_sim.study.designs.vehicle import (
@@ -28,8 +27,7 @@ from care_sim.study.designs.vehicle import (
     POSE_LEVELS,
     is_late,
 )
-from care_sim.study.rows.reading import detections, setting_of
-from care_sim.study.rows.settings import Setting
+from care_sim.study.rows.reading import Setting, detections, setting_of
 from care_sim.study.run_config import FULL, REFERENCE, Row
 
 _Read = Callable[[Sequence[Row]], Point | None]

@@ -14,8 +14,7 @@ from matplotlib.figure import Figure
 
 from care_sim.base.errors import percent
 from care_sim.reports.engine.controls import BEST_CONTROL, is_control
-from care_sim.reports.figures.names import name_ends
-from care_sim.reports.figures.styles import CALM, colours
+from care_sim.reports.figures.styles import CALM, colours, name_ends
 from care_sim.reports.formatting import MARKS, marked, tag_notes
 from care_sim.study.run_config import FULL, REFERENCE
 

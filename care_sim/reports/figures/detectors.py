@@ -6,9 +6,7 @@ from matplotlib.figure import Figure
 
 from care_sim.evaluation.detector_quality import SceneBoxes, counts, curve, reliability
 from care_sim.reports.detectors import has_scores
-from care_sim.reports.figures.files import default_style
-from care_sim.reports.figures.names import name_ends
-from care_sim.reports.figures.styles import CALM, colours
+from care_sim.reports.figures.styles import CALM, colours, default_style, name_ends
 
 DETECTORS_FIGURE = "detectors"
 _FEWEST = 20

@@ -9,11 +9,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from care_sim.base.errors import percent
-from care_sim.reports.figures.files import default_style
-from care_sim.reports.figures.styles import BLUE, INK, ORANGE, YELLOW
+from care_sim.reports.figures.styles import BLUE, INK, ORANGE, YELLOW, default_style
 from care_sim.reports.leaderboard import names_in, ranked
 from care_sim.study.benchmark.result import BenchmarkResult
-from care_sim.study.benchmark.tasks import BENCHMARK_BUDGET
+from care_sim.study.benchmark.suite import BENCHMARK_BUDGET
 
 LEADERBOARD_FIGURE = "leaderboard"
 _PARTS = {"drives": (ORANGE, "v"), "tests": (YELLOW, "s"), "streets": (BLUE, "^")}

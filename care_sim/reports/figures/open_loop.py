@@ -10,10 +10,10 @@ from care_sim.base.errors import counted, percent
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, Ratio
 from care_sim.reports.engine.controls import BEST_CONTROL
 from care_sim.reports.figures.curves import BUDGET, Panel, Point, curves_figure, point
-from care_sim.reports.protocol.controls import OverControl, named_controls, over_controls
+from care_sim.reports.protocol.contrasts import OverControl, named_controls, over_controls
 from care_sim.reports.protocol.paper import published_level
 from care_sim.reports.protocol.rows import SettingPlays, plays_by_setting
-from care_sim.study.designs.order import rows_by_order
+from care_sim.study.designs.firing import rows_by_order
 from care_sim.study.run_config import FULL, Row
 
 

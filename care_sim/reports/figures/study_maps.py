@@ -2,32 +2,137 @@
 what is avoided in the Euro NCAP tests and in the cut-ins of UN Regulation 157.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import chain, product
+from textwrap import fill
+from typing import Any, NamedTuple
 
 import numpy as np
-from matplotlib.colors import ListedColormap
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Rectangle
 
 from care_sim.base.errors import counted, percent
-from care_sim.evaluation.ncap_score import BEST_SCORE
+from care_sim.core.arrays import Floats
+from care_sim.evaluation.outcomes import BEST_SCORE
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL
 from care_sim.reports.engine.contrasts import Contrast
 from care_sim.reports.engine.measures import DETECTION, GATE_M, Measure, Recall
-from care_sim.reports.figures.maps import Map, differences_figure, map_of_means, maps_figure
 from care_sim.reports.figures.styles import INK
-from care_sim.reports.formatting import marked, signed
-from care_sim.reports.protocol.paper_ablations import NEAR_FIELD
+from care_sim.reports.formatting import marked, mean, signed
+from care_sim.reports.protocol.paper import NEAR_FIELD
+from care_sim.reports.table import Bold
 from care_sim.reports.tables.ablations import AblationStudy
 from care_sim.reports.tables.crowding import COLLAPSE_M, Crowd
 from care_sim.reports.tables.ncap import NcapRows
 from care_sim.reports.tables.r157 import cut_in_rows
 from care_sim.reports.tables.realism import Order, RealismStudy, Verdict
 from care_sim.study.designs.ablations import ABLATION_PLACES
-from care_sim.study.designs.r157 import case_of
+from care_sim.study.designs.standards import case_of
 from care_sim.study.designs.variants import USUAL_VARIANT, FilmPlace, Place
 from care_sim.study.rows.reading import is_avoided
 from care_sim.study.run_config import FULL, Row
+
+_TEXT_INCHES, _CELL_INCHES = (0.56, 0.24), (0.17, 0.16)
+"""Width and height of a cell with a text, and of one without."""
+_PANEL_INCHES = 0.5, 0.5
+"""Room for the title of a map and between two."""
+_LETTER_INCHES, _SLANT = 0.065, 0.9
+_INCH_LETTERS = 12
+_LUMINANCE, _PALE = (0.299, 0.587, 0.114), 0.5
+
+
+class Map(NamedTuple):
+    """Values (lines, columns), nan where there is nothing, and a text for each or none at all."""
+
+    title: str
+    values: Floats
+    texts: Sequence[Sequence[str]] = ()
+
+
+def maps_figure(
+    title: str,
+    maps: Sequence[Sequence[Map]],
+    lines: Sequence[str],
+    columns: Sequence[str],
+    note: str = "",
+    unit: str = "",
+    **colours: Any,
+) -> Figure:
+    """Maps in rows, all of the same lines and columns; `colours` are arguments of Matplotlib's
+    `imshow`, and `unit` names their bar, which is left out without it.
+    """
+    width, height = _TEXT_INCHES if maps[0][0].texts else _CELL_INCHES
+    beside, below = (_LETTER_INCHES * max(map(len, names)) for names in (lines, columns))
+    size = (
+        max(beside + (_PANEL_INCHES[0] + width * len(columns)) * len(maps[0]) + bool(unit), 7.0),
+        0.8 + _SLANT * below + (_PANEL_INCHES[1] + height * len(lines)) * len(maps),
+    )
+    figure = Figure(figsize=size, layout="constrained")
+    shape = len(maps), len(maps[0])
+    panels = figure.subplots(*shape, sharex=True, sharey=True, squeeze=False)
+    for axes, each in zip(panels.ravel(), chain(*maps), strict=True):
+        image = axes.imshow(each.values, aspect="auto", **colours)
+        _write(axes, each, image)
+        axes.set_xticks(range(len(columns)), columns)
+        axes.set_yticks(range(len(lines)), lines)
+        axes.tick_params(length=0, labelsize=7)
+        if _LETTER_INCHES * max(map(len, columns)) > width:
+            for tick in axes.get_xticklabels():
+                tick.set(rotation=60, ha="right", rotation_mode="anchor")
+        axes.spines[:].set(visible=True, linewidth=0.4)
+        axes.grid(False)
+        axes.set_title(each.title, loc="left", fontsize=8)
+    wide = int(_INCH_LETTERS * size[0])
+    figure.suptitle(fill(title, wide), x=0.01, ha="left", fontsize=9)
+    figure.supxlabel(fill(note, wide), fontsize=8)
+    if unit:
+        figure.colorbar(image, ax=panels, label=unit, fraction=0.02, pad=0.01)
+    return figure
+
+
+def differences_figure(
+    title: str,
+    lines: Mapping[str, Sequence[Contrast | None]],
+    columns: Sequence[str],
+    note: str,
+    widest: float = 0.0,
+) -> Figure:
+    """A map of mean differences, whose sign is their colour; the scale is at least `widest`."""
+    values = np.array([[each.mean if each else np.nan for each in own] for own in lines.values()])
+    # Symmetric about zero.
+    widest = max(widest, float(np.nanmax(np.abs(values), initial=0.0)))
+    drawn = Map("", values, [[*map(mean, own)] for own in lines.values()])
+    scale: dict[str, Any] = {"cmap": "PuOr", "vmin": -widest, "vmax": widest}
+    return maps_figure(title, [[drawn]], [*lines], columns, note, **scale)
+
+
+def map_of_means(
+    title: str,
+    lines: Sequence[Any],
+    columns: Sequence[Any],
+    values: Iterable[tuple[Any, Any, float]],
+) -> Map:
+    """The mean of all values of the same line and column."""
+    cells: dict[tuple[Any, Any], list[float]] = {}
+    for line, column, value in values:
+        cells.setdefault((line, column), []).append(value)
+    means = [[np.mean(cells.get((line, each), np.nan)) for each in columns] for line in lines]
+    return Map(title, np.array(means))
+
+
+def _write(axes: Axes, drawn: Map, image: Any) -> None:
+    """The texts, in black or white, whichever is read on the colour of the cell."""
+    for line, column in product(*map(range, drawn.values.shape)) if drawn.texts else ():
+        text, value = drawn.texts[line][column], drawn.values[line, column]
+        pale = float(np.dot(to_rgb(image.to_rgba(value)), _LUMINANCE)) > _PALE
+        look: dict[str, Any] = {
+            "color": INK if np.isnan(value) else "black" if pale else "white",
+            "weight": "bold" if isinstance(text, Bold) else "normal",
+        }
+        axes.text(column, line, text, ha="center", va="center", size=7, **look)
+
 
 _CROWDING_NOTE = (
     f"bold: the interval excludes 0; asterisk: and at least {GATE_M} m; frame: all-camera "

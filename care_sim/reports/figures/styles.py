@@ -1,8 +1,69 @@
 """The one style of all figures: readable on a light and on a dark page, on a transparent ground."""
 
-from collections.abc import Iterable
+import re
+import warnings
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import partial
+from io import StringIO
 from itertools import cycle
+from pathlib import Path
 from typing import Any
+
+import numpy as np
+from matplotlib import rc_context, rcdefaults, rcParams
+from matplotlib.axes import Axes
+from matplotlib.axis import Tick
+from matplotlib.figure import Figure
+from matplotlib.text import Annotation, Text
+
+from care_sim.base.errors import printable, printable_lines
+from care_sim.base.files import PNG, SVG, check_output, replacing
+
+_NAME_POINTS = 8
+_LINE_SPACING = 1.15
+_INCH_POINTS = 72
+
+
+def name_ends(figure: Figure, ends: Mapping[Axes, Mapping[str, tuple[float, str]]]) -> None:
+    """Name curves right of their axes, each at the height of its right end and in its colour; names
+    that would overlap move up or down. The figure keeps the layout that it has then.
+    """
+    names = {axes: [*map(partial(_name, axes), own, own.values())] for axes, own in ends.items()}
+    # Heights on paper are known once the names have taken their room.
+    with texts_as_they_are(figure):
+        figure.draw_without_rendering()
+    figure.set_layout_engine("none")
+    points = _INCH_POINTS / figure.dpi
+    for axes, own in names.items():
+        heights = {name: axes.transData.transform(name.xy)[1] * points for name in own}
+        upwards = sorted(own, key=lambda name: heights[name])
+        box = axes.get_window_extent()
+        least = _LINE_SPACING * _NAME_POINTS
+        moved = apart([heights[name] for name in upwards], least, box.y0 * points, box.y1 * points)
+        for name, place in zip(upwards, moved, strict=True):
+            name.set_position((4, place - heights[name]))
+
+
+def _name(axes: Axes, name: str, end: tuple[float, str]) -> Annotation:
+    height, colour = end
+    look: dict[str, Any] = {"va": "center", "size": _NAME_POINTS, "color": colour}
+    look |= {"xycoords": axes.get_yaxis_transform(), "textcoords": "offset points"}
+    return axes.annotate(name, (1.0, height), (4, 0), annotation_clip=False, **look)
+
+
+def apart(heights: Sequence[float], least: float, low: float, high: float) -> list[float]:
+    """Ascending heights, moved as little as can be so that each is at least `least` above the one
+    before and all are between `low` and `high`, where there is room.
+    """
+    from scipy.optimize import isotonic_regression
+
+    steps = least * np.arange(len(heights))
+    moved = isotonic_regression(np.array(heights) - steps).x + steps
+    moved = np.maximum(moved, low + steps)
+    # The highest stays below the top, and those below it have room for the ones above.
+    return [float(place) for place in np.minimum(moved, high - steps[::-1])]
+
 
 INK = "#757575"
 """Of texts and axes: a grey with a contrast of 4.5 to white and to black alike."""
@@ -72,3 +133,79 @@ def colours(policies: Iterable[str]) -> dict[str, str]:
     # Policies of others get what is left, in their order; so the same study has the same colours.
     spare = cycle(_SPARE)
     return {policy: _COLOURS.get(policy) or next(spare) for policy in policies}
+
+
+FORMATS = (".png", ".svg")
+"""Endings of the two files of a figure."""
+_NO_METADATA = dict.fromkeys(("Creator", "Date", "Format", "Type"))
+_UNUSED_ID = re.compile(r' id="[A-Za-z0-9_.]+_\d+"')
+"""Matplotlib counts its groups anew in every figure, and nothing refers to them."""
+
+
+@contextmanager
+def default_style() -> Iterator[None]:
+    """Draw in the style of the project, whatever the user's settings are. Every function that makes
+    a figure runs within it.
+    """
+    with rc_context():
+        rcdefaults()
+        rcParams.update(STYLE)
+        yield
+
+
+def save(figure: Figure, stem: Path) -> None:
+    """Write a figure as PNG, on white, and as SVG, on a transparent ground, with its texts as they
+    are.
+    """
+    drawing = svg_text(figure, stem.name)
+    with default_style(), texts_as_they_are(figure):
+        with replacing(stem.with_suffix(".png")) as unfinished:
+            figure.savefig(unfinished, dpi=200)
+        with replacing(stem.with_suffix(".svg")) as unfinished:
+            unfinished.write_text(drawing, encoding="utf-8")
+
+
+def svg_text(figure: Figure, name: str) -> str:
+    """The SVG of a figure of this name, the same text for the same figure. Several of them can
+    stand in one page.
+    """
+    drawn = StringIO()
+    # Ids within an SVG are random without a salt.
+    salt: dict[Any, Any] = {"svg.hashsalt": printable(name)}
+    with default_style(), rc_context(salt), texts_as_they_are(figure):
+        figure.savefig(drawn, format="svg", transparent=True, metadata=_NO_METADATA)
+    return _UNUSED_ID.sub("", drawn.getvalue())
+
+
+@contextmanager
+def texts_as_they_are(figure: Figure) -> Iterator[None]:
+    """Within it the figure can be drawn with any texts: a $ in a name begins no formula, control
+    codes are shown as escapes, and what the font has no sign for is drawn as a box.
+    """
+    # Labels of ticks are Matplotlib's own, and powers of ten among them are formulas.
+    of_ticks = {id(label) for tick in figure.findobj(Tick) for label in tick.findobj(Text)}
+    for text in figure.findobj(Text):
+        if id(text) not in of_ticks:
+            text.set_parse_math(False)
+            text.set_text(printable_lines(text.get_text()))
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", r"Glyph .* missing from font")
+        yield
+
+
+def check_figure(stem: Path) -> None:
+    """Raise what `care_sim.base.files.check_output` does where `save` could not write a figure."""
+    check_output(stem.with_suffix(".png"), PNG)
+    check_output(stem.with_suffix(".svg"), SVG)
+
+
+def remove_others(folder: Path, names: Iterable[str], kept: Container[str]) -> None:
+    """Remove the figures of the given names from a folder, all but those `kept`; a * in a name
+    stands for any text.
+    """
+    found = [
+        path for name in names for suffix in FORMATS for path in folder.glob(f"{name}{suffix}")
+    ]
+    for path in found:
+        if path.stem not in kept:
+            path.unlink(missing_ok=True)

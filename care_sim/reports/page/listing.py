@@ -10,8 +10,13 @@ from care_sim.reports.formatting import marked
 from care_sim.reports.page.episodes import Episode
 from care_sim.reports.page.played_rows import in_open_loop
 from care_sim.reports.page.story import packed
-from care_sim.study.rows.reading import policy_of, setting_of, stops_for_nothing, tags_of_row
-from care_sim.study.rows.settings import Setting
+from care_sim.study.rows.reading import (
+    Setting,
+    policy_of,
+    setting_of,
+    stops_for_nothing,
+    tags_of_row,
+)
 from care_sim.study.run_config import Row
 
 

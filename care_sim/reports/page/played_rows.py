@@ -4,13 +4,12 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import OF_BOTH_LOOPS
 from care_sim.envs.open_loop import UNFILMED
 from care_sim.sensors.setups import setup_of_columns
-from care_sim.sources.kinds import RECORDING_KINDS
+from care_sim.sources.installed import RECORDING_KINDS
 from care_sim.sources.named import source_of
 from care_sim.sources.scenes import SPLITS, Scene, Source, Streets
 from care_sim.study.episode_config import PLAIN_FIELDS, EpisodeConfig
-from care_sim.study.parameters import Parameters
 from care_sim.study.play_config import PlayConfig
-from care_sim.study.run_config import Row
+from care_sim.study.run_config import Parameters, Row
 
 
 def in_open_loop(row: Row) -> bool:

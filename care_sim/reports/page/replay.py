@@ -11,14 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from care_sim.core.return_settings import FilmedReturns
+from care_sim.core.conditions import FilmedReturns
 from care_sim.core.types import CLASSES
 from care_sim.evaluation.recall import CENSORED_AT
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.film import Film
-from care_sim.loops.open_loop import OpenLoop
+from care_sim.loops.open_loop import OpenLoop, SceneKeyframe
 from care_sim.loops.records import Keyframe, Outcome
-from care_sim.loops.scene_records import SceneKeyframe
 from care_sim.loops.watcher import sought
 from care_sim.reports.page.story import CENTI, fullness, known_before, whole, whole_pose
 from care_sim.sensors.annotated import NO_OBJECT
@@ -27,8 +26,7 @@ from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.episode_play import trace
 from care_sim.study.play_config import PlayConfig
 from care_sim.study.run_config import Row
-from care_sim.study.scene_play import SUMS
-from care_sim.study.scene_trace import trace_scene
+from care_sim.study.scene_play import SUMS, trace_scene
 from care_sim.world.bodies import CATALOGUE
 
 _WAY_STEP_M = 2.0

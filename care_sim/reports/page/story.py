@@ -12,9 +12,9 @@ import numpy as np
 
 from care_sim.core.arrays import Mask
 from care_sim.core.belief import Belief
+from care_sim.core.cells.stack import Grid
 from care_sim.core.frames import Frame
 from care_sim.core.grid import Cells
-from care_sim.core.grid_stack import Grid
 from care_sim.core.residual import explained
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES, ImageDetections

@@ -5,15 +5,49 @@ new idea adds to either.
 from collections.abc import Sequence
 
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, TTFD
+from care_sim.reports.engine.controls import BEST_CONTROL, named_by_budget
 from care_sim.reports.engine.measures import Measure, Recall
+from care_sim.reports.engine.parts import OverControl
 from care_sim.reports.engine.tables import minus_tables
 from care_sim.reports.protocol.comparisons import PolicyPair
-from care_sim.reports.protocol.formatting import claims_of_paper
-from care_sim.reports.protocol.notes import UNITS_OF_DIFFERENCES, left_out, papers, played
+from care_sim.reports.protocol.formatting import (
+    UNITS_OF_DIFFERENCES,
+    claims_of_paper,
+    left_out,
+    papers,
+    played,
+)
 from care_sim.reports.protocol.paper import Claims, claims_about
 from care_sim.reports.protocol.rows import HISTORY, SettingPlays, plays_by_setting
 from care_sim.reports.table import Table
 from care_sim.study.run_config import REFERENCE, Row
+
+__all__ = ["OverControl", "named_controls", "over_controls"]
+
+
+def over_controls(plays: SettingPlays) -> list[OverControl]:
+    """First-sighting and overall recall of every other policy less the best control's, paired by
+    scene; without the measures in which there is no difference at any budget.
+    """
+    rivals = [policy for policy in plays.policies if policy not in plays.controls]
+    made = [plays.over_control(Recall(ratio), rivals) for ratio in (FIRST_SIGHTING, OVERALL)]
+    return [each for each in made if any(any(line) for line in each.differences.values())]
+
+
+def named_controls(plays: SettingPlays, measures: Sequence[OverControl]) -> str:
+    """The best control of every measure at every budget, in a sentence."""
+    named = (
+        f"in {each.ratio.name} "
+        + named_by_budget(
+            {
+                budget: control
+                for budget, control in zip(plays.budgets, each.controls, strict=True)
+                if control
+            }
+        )
+        for each in measures
+    )
+    return f"{BEST_CONTROL.capitalize()}: {'; '.join(named)}."
 
 
 def protocol_contrast_tables(plays: SettingPlays) -> list[Table]:

@@ -5,8 +5,7 @@ events policies detect earlier than history.
 from collections.abc import Iterator, Sequence
 
 from care_sim.base.errors import percent
-from care_sim.evaluation.allocation_differences import AllocationDifference
-from care_sim.evaluation.detection_order import DetectionOrder, detection_order
+from care_sim.evaluation.differences import AllocationDifference, DetectionOrder, detection_order
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL
 from care_sim.evaluation.strata import SCENE_THIRDS, thirds
 from care_sim.reports.engine.tables import PAPER, budget_table
@@ -18,12 +17,11 @@ from care_sim.reports.protocol.comparisons import (
     SceneThird,
     means,
 )
-from care_sim.reports.protocol.formatting import claims_of_paper, rounded
-from care_sim.reports.protocol.notes import papers
+from care_sim.reports.protocol.formatting import claims_of_paper, papers, rounded
 from care_sim.reports.protocol.paper import ALLOCATION_SOURCE, PUBLISHED_ALLOCATIONS, claims_about
 from care_sim.reports.protocol.rows import HISTORY, SettingPlays
 from care_sim.reports.table import Table, TableRow
-from care_sim.study.rows.settings import WITHOUT_LABELS
+from care_sim.study.rows.reading import WITHOUT_LABELS
 from care_sim.study.run_config import REFERENCE, Row
 
 

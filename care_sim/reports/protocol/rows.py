@@ -24,7 +24,7 @@ from care_sim.reports.engine.contrasts import Contrast, of_interval
 from care_sim.reports.engine.frames import Frame, by_floor_seed
 from care_sim.reports.engine.measures import OPEN_LOOP, Measure, Recall, loop_of, tally_of
 from care_sim.reports.engine.parts import Part, parts
-from care_sim.study.rows.settings import Setting
+from care_sim.study.rows.reading import Setting
 from care_sim.study.run_config import FULL, Row
 
 HISTORY = "history"

@@ -1,6 +1,7 @@
 """Tables of the first-sighting protocol: those of levels, and all others in their order."""
 
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
 
 from care_sim.base.errors import percent
 from care_sim.evaluation.scene_contrasts import (
@@ -11,18 +12,158 @@ from care_sim.evaluation.scene_contrasts import (
     among,
     ratio_level,
 )
-from care_sim.reports.engine.tables import PAPER, control_tables
-from care_sim.reports.protocol.contrasts import protocol_contrast_tables
-from care_sim.reports.protocol.controls import over_controls
+from care_sim.evaluation.sightings import RANGE_M
+from care_sim.evaluation.strata import ENTRY, RING_WIDTH_M
+from care_sim.reports.engine.tables import PAPER, budget_table, control_tables
+from care_sim.reports.formatting import ends, interval
+from care_sim.reports.protocol.comparisons import reference_pairs
+from care_sim.reports.protocol.contrasts import over_controls, protocol_contrast_tables
 from care_sim.reports.protocol.details import allocation_tables, earlier_tables, thirds_tables
-from care_sim.reports.protocol.formatting import rounded, share, share_ends, written
-from care_sim.reports.protocol.notes import left_out, of_full, papers
-from care_sim.reports.protocol.paper import LEVEL_SOURCES, PUBLISHED_LEVELS, PublishedLevel
+from care_sim.reports.protocol.formatting import (
+    MET,
+    NOT_MET,
+    UNDECIDED,
+    judged,
+    left_out,
+    of_full,
+    papers,
+    rounded,
+    share,
+    share_ends,
+    share_with_ends,
+    verdict,
+    written,
+)
+from care_sim.reports.protocol.paper import (
+    LEVEL_SOURCES,
+    PAPER_BUDGETS,
+    PUBLISHED_LEVELS,
+    PublishedLevel,
+    claims_about,
+)
 from care_sim.reports.protocol.rows import SettingPlays, plays_by_setting
-from care_sim.reports.protocol.statements import statements_tables
-from care_sim.reports.protocol.strata import entry_tables, strata_tables
 from care_sim.reports.table import Table, TableRow
 from care_sim.study.run_config import FULL, Row
+
+_ENTRIES = (
+    f"Entry: where the film first shows the object; emergence nearer than "
+    f"{RANGE_M - RING_WIDTH_M:.0f} m, ring up to {RANGE_M:.0f} m, beyond farther off. At start: "
+    "present at scene start, no event."
+)
+
+
+def entry_tables(plays: SettingPlays) -> list[Table]:
+    """First-sighting recall by entry, plain and as a share of the full scan's, and CARE less
+    history and less all-camera; none of rows of before there were entries, and without an event.
+    """
+    lines = _lines(plays, FIRST_SIGHTING, [ENTRY], of_full=bool(plays.full))
+    shares = ", in brackets of the full scan's" if plays.full else ""
+    notes = (f"Levels in %{shares}; differences in points. {_ENTRIES}",)
+    return budget_table(plays, "first-sighting recall by entry", "policy", lines, notes)
+
+
+def strata_tables(plays: SettingPlays) -> list[Table]:
+    """The levels of every policy and of the full scan by stratum, and CARE less history and less
+    all-camera. First sightings by entry have a table of their own.
+    """
+    kinds = {
+        FIRST_SIGHTING: [kind for kind in plays.strata if kind != ENTRY],
+        OVERALL: [*plays.strata],
+    }
+    return [
+        table
+        for ratio, own in kinds.items()
+        for table in budget_table(
+            plays,
+            f"{ratio.name} by stratum",
+            "policy",
+            _lines(plays, ratio, own),
+            (f"Levels in %; differences in points. {_ENTRIES if ENTRY in own else ''}".rstrip(),),
+            terminal=False,
+        )
+    ]
+
+
+def _lines(
+    plays: SettingPlays, ratio: Ratio, kinds: Sequence[str], of_full: bool = False
+) -> Iterator[TableRow]:
+    """The lines of every stratum; none without a policy at a budget."""
+    counted = "events" if ratio is FIRST_SIGHTING else "object frames"
+    for kind in kinds if plays.policies else ():
+        for label in plays.strata.get(kind, ()):
+            within = f"{kind}/{label}"
+            # A stratum with nothing to find has no lines.
+            if count := plays.counted(ratio, within):
+                yield (f"{kind}: {label}, {count:,.0f} {counted}",)
+                yield from _lines_within(plays, ratio, within, of_full)
+
+
+def _lines_within(
+    plays: SettingPlays, ratio: Ratio, within: str, of_full: bool
+) -> Iterator[TableRow]:
+    def level(policy: str, budget: float) -> str:
+        own = written(ratio, plays.level(ratio, policy, budget, within).by_event)
+        share = plays.share_of_full(ratio, policy, budget, within) if of_full else None
+        return f"{own} ({share_with_ends(share)})" if share else own
+
+    for policy in plays.policies:
+        yield (plays.marked(policy), *(level(policy, budget) for budget in plays.budgets))
+    # The full scan has one budget and is the same beside all.
+    if plays.full:
+        own = written(ratio, plays.level(ratio, FULL, 1.0, within).by_event)
+        yield (FULL, *[own] * len(plays.budgets))
+    for pair in reference_pairs(plays, ratio, within):
+        yield (pair.label, *(interval(pair.measured(plays, budget)) for budget in plays.budgets))
+
+
+def statements_tables(plays: SettingPlays) -> list[Table]:
+    """One line per statement, at the paper's budgets; none where the paper says nothing of such
+    plays.
+    """
+    said = claims_about(plays.setting)
+    # Only the budgets of which the paper speaks: a verdict needs a claim.
+    budgets = [budget for budget in plays.budgets if budget in PAPER_BUDGETS]
+    lines: list[TableRow] = []
+    sources: list[str] = []
+    verdicts: Counter[str] = Counter()
+    heading = ""
+    for each, claims in said.items():
+        if not set(each.policies) <= set(plays.policies):
+            continue
+        found = {budget: each.measured(plays, budget) for budget in budgets}
+        if not any(found.values()):
+            continue
+        # Statements come measure by measure. A heading opens each measure.
+        if each.heading != heading:
+            heading = each.heading
+            lines.append((heading,))
+        entries = [
+            entry
+            for budget, difference in found.items()
+            for entry in (judged(difference, claims.at(budget)), ends(difference))
+        ]
+        lines.append((each.label, *entries))
+        sources.append(claims.source)
+        # A budget that was not played, or of which the paper says nothing, is no verdict.
+        verdicts.update(
+            verdict(difference, claim.sign)
+            for budget, difference in found.items()
+            if difference and (claim := claims.at(budget))
+        )
+    if not lines:
+        return []
+    listed = ", ".join(f"{verdicts[each]} {each}" for each in (MET, NOT_MET, UNDECIDED))
+    return [
+        Table(
+            f"{plays.setting.label}: the paper's statements",
+            ("statement", *(name for each in budgets for name in (percent(each), "interval"))),
+            tuple(lines),
+            (f"{verdicts.total()} verdicts, the paper's difference in brackets: {listed}.",),
+            papers(sources),
+            files_only=("interval",),
+        )
+    ]
+
 
 _RATIOS = {"first sightings %": FIRST_SIGHTING, "overall %": OVERALL, "TTFD": TTFD}
 

@@ -14,9 +14,8 @@ from care_sim.reports.engine.levels import level
 from care_sim.reports.engine.measures import BRAKED, DETECTION, Measure, Recall
 from care_sim.reports.engine.tables import PAPER, under_headings
 from care_sim.reports.formatting import interval, quarters
-from care_sim.reports.protocol.formatting import claims_of_paper, rounded
-from care_sim.reports.protocol.notes import papers
-from care_sim.reports.protocol.paper_ablations import (
+from care_sim.reports.protocol.formatting import claims_of_paper, papers, rounded
+from care_sim.reports.protocol.paper import (
     NEAR_FIELD,
     PUBLISHED_CHANGES,
     PUBLISHED_ON_ALL_LEVELS,
@@ -28,7 +27,7 @@ from care_sim.reports.table import Table, TableRow
 from care_sim.study.designs import ablations as design
 from care_sim.study.designs.ablations import Ablation
 from care_sim.study.designs.variants import USUAL_VARIANT, FilmPlace, Place
-from care_sim.study.rows.settings import Setting
+from care_sim.study.rows.reading import Setting
 from care_sim.study.run_config import FULL, Row
 
 _OPEN_MEASURES = {

@@ -11,13 +11,10 @@ import numpy as np
 from care_sim.base.checks import check_known
 from care_sim.base.errors import InvalidInput, counted, percent
 from care_sim.core.arrays import Floats, Mask
-from care_sim.evaluation.allocation_differences import AllocationDifference
-from care_sim.evaluation.detection_order import DetectionOrder, detection_order
-from care_sim.evaluation.miss_reasons import MISS_REASONS
-from care_sim.evaluation.ray_shares import RAY_SHARES, shares_of_credit
+from care_sim.evaluation.differences import AllocationDifference, DetectionOrder, detection_order
+from care_sim.evaluation.rays import MISS_REASONS, RAY_SHARES, shares_of_credit
 from care_sim.reports.formatting import marked, spread_of_counts
-from care_sim.reports.protocol.formatting import PAPER
-from care_sim.reports.protocol.notes import papers
+from care_sim.reports.protocol.formatting import PAPER, papers
 from care_sim.reports.table import Table, TableRow
 from care_sim.study import mechanism_play as played
 from care_sim.study.rows.reading import policy_of, setting_of, tags_of_row

@@ -10,18 +10,16 @@ import numpy as np
 from care_sim.base.checks import check_known
 from care_sim.base.errors import percent
 from care_sim.evaluation.censoring import Reading
-from care_sim.evaluation.collision_outcomes import CollisionOutcome, collision_outcome
-from care_sim.evaluation.ncap_score import score
+from care_sim.evaluation.outcomes import CollisionOutcome, collision_outcome, score
 from care_sim.reports.engine.contrasts import Contrast, contrast
 from care_sim.reports.engine.controls import BEST_CONTROL, best_of
 from care_sim.reports.engine.measures import Measure, Units
-from care_sim.reports.engine.policy_rows import PolicyRows
+from care_sim.reports.engine.parts import PolicyRows
 from care_sim.reports.engine.tables import under_headings
 from care_sim.reports.formatting import interval, tag_notes
 from care_sim.reports.table import Table, TableRow
-from care_sim.scenarios.ncap.forms import Ahead
-from care_sim.scenarios.ncap.table import TESTS
-from care_sim.study.designs import ncap as design
+from care_sim.scenarios.ncap.table import TESTS, Ahead
+from care_sim.study.designs import standards as design
 from care_sim.study.rows.reading import stops_for_nothing
 from care_sim.study.run_config import FULL, REFERENCE, Row
 

@@ -15,7 +15,7 @@ from care_sim.reports.protocol.paper import claims_about
 from care_sim.reports.protocol.rows import SettingPlays, plays_by_setting
 from care_sim.reports.table import Bold, Table
 from care_sim.reports.tables.paper_statements import statements
-from care_sim.study.designs.order import (
+from care_sim.study.designs.firing import (
     BASE_ORDER,
     MIRRORED_ORDER,
     rows_by_order,

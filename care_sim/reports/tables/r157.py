@@ -6,17 +6,17 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from care_sim.base.errors import percent
-from care_sim.core.driver_settings import FIXED
-from care_sim.evaluation.collision_outcomes import CollisionOutcome, collision_outcome
+from care_sim.core.conditions import FIXED
+from care_sim.evaluation.outcomes import CollisionOutcome, collision_outcome
 from care_sim.reports.engine.contrasts import contrast_of_rows
 from care_sim.reports.engine.controls import BEST_CONTROL, best_of
 from care_sim.reports.engine.measures import AVOIDANCE
-from care_sim.reports.engine.policy_rows import PolicyRows
+from care_sim.reports.engine.parts import PolicyRows
 from care_sim.reports.engine.tables import under_headings
 from care_sim.reports.formatting import interval, tag_notes
 from care_sim.reports.table import Table, TableRow
-from care_sim.scenarios.r157.grid import KPH
-from care_sim.study.designs.r157 import case_of
+from care_sim.scenarios.r157 import KPH
+from care_sim.study.designs.standards import case_of
 from care_sim.study.rows.reading import is_avoided, stops_for_nothing
 from care_sim.study.run_config import REFERENCE, Row
 

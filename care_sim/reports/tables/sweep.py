@@ -6,12 +6,15 @@ from collections.abc import Sequence
 
 from care_sim.base.errors import percent
 from care_sim.evaluation.censoring import Quartiles
+from care_sim.reports.engine.frames import Frame
 from care_sim.reports.engine.levels import Cell, levels
 from care_sim.reports.engine.measures import BRAKED, DETECTED, DETECTION
 from care_sim.reports.engine.parts import Part, parts
 from care_sim.reports.engine.tables import control_tables, minus_tables
+from care_sim.reports.engine.varied import Varied
 from care_sim.reports.formatting import ends, marked, spread, unsigned
 from care_sim.reports.table import Table
+from care_sim.study.designs.firing import AWARE, rows_by_firing
 from care_sim.study.designs.paper import (
     PAPER_EPISODES,
     PublishedResult,
@@ -155,3 +158,12 @@ def _median(values: Quartiles | None, cell: Cell) -> str:
     # Fewer values than episodes: the actor never came into view in the others.
     of = f" (of {values.count})" if values.count < cell.episodes else ""
     return f"{values.median:.1f}{of}"
+
+
+def firing_tables(rows: Sequence[Row]) -> list[Table]:
+    """The levels of all cells by hardware, and the lead of the policy that knows its hardware over
+    the other policies at the same budget.
+    """
+    frames = {firing: Frame(own) for firing, own in rows_by_firing(rows).items()}
+    varied = Varied("hardware", frames)
+    return [varied.levels(), *varied.leads(AWARE)]

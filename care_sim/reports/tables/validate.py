@@ -13,19 +13,19 @@ from care_sim.evaluation.censoring import FEWEST_PAIRS, quartiles
 from care_sim.reports.engine.contrasts import Contrast, contrast_of_rows
 from care_sim.reports.engine.controls import BEST_CONTROL
 from care_sim.reports.engine.measures import AVOIDED, DETECTION
-from care_sim.reports.engine.policy_rows import PolicyRows
+from care_sim.reports.engine.parts import PolicyRows
 from care_sim.reports.engine.tables import under_headings
 from care_sim.reports.formatting import interval, mean, median, tag_notes
 from care_sim.reports.table import Bold, Table, TableRow
 from care_sim.study.designs.validate import CAMERA_POLICIES, MEMORISER, is_training
 from care_sim.study.rows.reading import (
+    Setting,
     detections,
     is_avoided,
     is_missed,
     preventable,
     setting_of,
 )
-from care_sim.study.rows.settings import Setting
 from care_sim.study.run_config import FULL, Row
 
 BEST_CAMERA = "best camera policy"

@@ -13,15 +13,14 @@ from care_sim.reports.engine.frames import Frame
 from care_sim.reports.engine.measures import AVOIDED, DETECTION
 from care_sim.reports.engine.tables import under_headings
 from care_sim.reports.formatting import interval, median, spread_of_counts
-from care_sim.reports.protocol.formatting import PAPER
-from care_sim.reports.protocol.notes import papers
+from care_sim.reports.protocol.formatting import PAPER, papers
 from care_sim.reports.table import Table, TableRow
 from care_sim.reports.tables.mechanism import CELLS_AT_APPEARANCE, VEHICLE_CELLS
 from care_sim.study.designs import vehicle as design
 from care_sim.study.designs.variants import Group, Variant
 from care_sim.study.rows.reading import detections
 from care_sim.study.run_config import REFERENCE, Row
-from care_sim.study.vehicle.play import ASKED
+from care_sim.study.vehicle_play import ASKED
 
 _Entries = Callable[[Group, Variant, Sequence[Row]], TableRow]
 """The entries of a level in a group of places, given the rows of CARE there."""

@@ -6,22 +6,21 @@ from functools import partial
 
 import numpy as np
 
-from care_sim.base.bounds import bounded, one_of
+from care_sim.base.checks import bounded, one_of
 from care_sim.base.errors import InvalidInput
 from care_sim.core.frames import Pose
-from care_sim.scenarios.base import LONGEST_EPISODE_S, NO_LIMIT_MPS, Scenario
-from care_sim.scenarios.mirroring import MIRRORED
-from care_sim.scenarios.ncap.approach import across, ahead, braking_ahead
-from care_sim.scenarios.ncap.forms import (
-    Across,
-    AcrossExit,
-    Ahead,
-    BrakingAhead,
-    NcapTest,
-    Oncoming,
-    Variation,
+from care_sim.scenarios.base import LONGEST_EPISODE_S, MIRRORED, NO_LIMIT_MPS, Scenario
+from care_sim.scenarios.ncap.meetings import (
+    Ego,
+    Meeting,
+    Sizes,
+    across,
+    across_exit,
+    ahead,
+    braking_ahead,
+    oncoming,
+    standing_cars,
 )
-from care_sim.scenarios.ncap.meeting import Ego, Meeting
 from care_sim.scenarios.ncap.table import (
     LARGE_HEIGHT_M,
     LARGE_LENGTH_M,
@@ -30,9 +29,15 @@ from care_sim.scenarios.ncap.table import (
     SMALL_LENGTH_M,
     SMALL_WIDTH_M,
     TESTS,
+    Across,
+    AcrossExit,
+    Ahead,
+    BrakingAhead,
+    NcapTest,
+    Oncoming,
+    Variation,
 )
-from care_sim.scenarios.ncap.turning import Sizes, across_exit, oncoming, standing_cars
-from care_sim.streets.dimensions import LANE_WIDTH_M, Range, draw
+from care_sim.streets.layouts import LANE_WIDTH_M, Range, draw
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.route import Route
 from care_sim.world.traffic import Traffic
@@ -44,9 +49,10 @@ DRAWN = "drawn"
 
 @dataclass(frozen=True)
 class Ncap(Scenario):
-    """A test of Euro NCAP's protocols on an empty proving ground: the ego at the test's speed, the
-    target, and the cars that hide it where the test has them.
+    """A test of Euro NCAP's protocols of emergency braking, on an empty proving ground.
 
+    There are the ego at the test's speed, the target, and the cars that hide the target where the
+    test has them.
     An ego that does not brake hits the target as the protocol wants it. The seed draws only what
     the protocol leaves open: within its tolerance the ego's speed, when the sensor begins, the
     sizes of the cars that stand there, and, unless `mirrored` says, the side.

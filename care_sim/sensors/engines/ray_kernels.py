@@ -7,8 +7,7 @@ import numpy as np
 
 from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers
-from care_sim.core.grid import Cells
-from care_sim.core.grid_kernels import GridSpacing
+from care_sim.core.grid import Cells, GridSpacing
 from care_sim.sensors.engines.geometry_kernels import Vector, dot
 from care_sim.sensors.engines.solid_kernels import meet, solid_of
 from care_sim.sensors.engines.window_kernels import Parts, SensorPose, place_parts

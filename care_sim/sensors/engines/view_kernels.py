@@ -31,7 +31,7 @@ class Lens(NamedTuple):
 
 class Meshes(NamedTuple):
     """The polyhedra of parts one after the other, in the frames of their bodies, as in
-    `care_sim.world.polyhedra.Polyhedra.tables`: `corners` (c, 3); `faces` (f, 4), outward normals
+    `care_sim.world.body_tables.Polyhedra.tables`: `corners` (c, 3); `faces` (f, 4), outward normals
     and distances from the body's origin; `edges` (e, 2), the two faces that meet in each, counted
     within the part; `starts` (k + 1, 3), where the rows of a part begin in these three; `owners`
     (k,) body ids, the parts of a body side by side; `reaches` (k,) how far each part reaches from

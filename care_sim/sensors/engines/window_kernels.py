@@ -11,7 +11,7 @@ import numpy as np
 
 from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers
-from care_sim.core.grid_kernels import GridSpacing, row_at
+from care_sim.core.grid import GridSpacing, row_at
 from care_sim.sensors.engines.geometry_kernels import Axes, Vector, body_axes, dot
 
 WINDOW_MARGIN = 0.001

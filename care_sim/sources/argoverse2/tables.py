@@ -1,23 +1,97 @@
-"""The tables of an Argoverse 2 log: annotations and poses of the car. They are checked, and what is
-wrong is named in one line.
+"""The tables of an Argoverse 2 log, Feather files: annotations, poses of the car and sweeps. They
+are checked, and what is missing or broken is named in one line.
 """
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pyarrow
+from numpy.typing import NDArray
+from pyarrow import feather, types
 
 from care_sim.base.errors import InvalidInput, shown, unknown
 from care_sim.core.arrays import Floats, Integers
-from care_sim.sources.argoverse2.feather import Columns, read_columns
-from care_sim.sources.plausible import (
+from care_sim.sources.film_checks import (
     AWAY_M,
     MAP_M,
     REACH_M,
     SIZES_M,
     STAMPS_NS,
+    ValueRange,
     check_span,
     quaternion_fault,
 )
+
+Columns = dict[str, NDArray[Any]]
+
+
+def read_columns(
+    path: Path, kinds: Mapping[str, type], ranges: Mapping[str, ValueRange]
+) -> Columns:
+    """The named columns of a Feather file as arrays of the given kinds, int, float or str; numbers
+    lie in their ranges.
+
+    Raises InvalidInput for a file that is missing or truncated, lacks a column, holds another kind
+    in it, or has an empty or infinite value, or one beyond its range.
+    """
+    try:
+        with path.open("rb") as file:
+            table = feather.read_table(file)
+        table.validate(full=True)
+        # Names that are no UTF-8 show only when they are read.
+        names = table.column_names
+    except FileNotFoundError:
+        raise InvalidInput(f"{path}: no such file") from None
+    except (OSError, pyarrow.ArrowException, UnicodeDecodeError) as error:
+        raise InvalidInput(f"{path}: no readable Feather file ({_first_line(error)})") from error
+    for name in kinds:
+        count = names.count(name)
+        if count != 1:
+            found = "lacks the column" if not count else f"has {count} columns"
+            raise InvalidInput(f"{path}: {found} {name!r}; needed: {', '.join(kinds)}")
+    columns = {name: _column(path, table[name], name, kind) for name, kind in kinds.items()}
+    for name, (least, most) in ranges.items():
+        fits = (columns[name] >= least) & (columns[name] <= most)
+        if not fits.all():
+            row = fits.argmin()
+            got = f"got {columns[name][row]:g} in row {row}"
+            raise InvalidInput(f"{path}: column {name!r} must lie in [{least:g}, {most:g}], {got}")
+    return columns
+
+
+def _column(path: Path, column: pyarrow.ChunkedArray, name: str, kind: type) -> NDArray[Any]:
+    if not _HOLDS[kind](column.type):
+        raise InvalidInput(
+            f"{path}: column {name!r} must hold {kind.__name__} values, has {column.type}"
+        )
+    if column.null_count:
+        raise InvalidInput(f"{path}: column {name!r} has {column.null_count} empty values")
+    values: NDArray[Any] = np.asarray(column.to_pylist() if kind is str else column, dtype=kind)
+    if kind is float and not np.isfinite(values).all():
+        raise InvalidInput(
+            f"{path}: column {name!r} has a value that is not finite, in row "
+            f"{np.isfinite(values).argmin()}"
+        )
+    return values
+
+
+def _is_text(kind: pyarrow.DataType) -> bool:
+    kind = kind.value_type if types.is_dictionary(kind) else kind
+    return bool(types.is_string(kind) or types.is_large_string(kind))
+
+
+_HOLDS: dict[type, Callable[[pyarrow.DataType], bool]] = {
+    int: types.is_integer,
+    float: lambda kind: types.is_floating(kind) or types.is_integer(kind),
+    str: _is_text,
+}
+
+
+def _first_line(error: Exception) -> str:
+    return (str(error).splitlines() or [type(error).__name__])[0]
+
 
 ARGOVERSE2_CATEGORIES: dict[str, str | None] = {
     "REGULAR_VEHICLE": "car",
@@ -102,7 +176,7 @@ def read_boxes(path: Path) -> tuple[Integers, Columns]:
     car, each with the `number` of its track in the film.
 
     Raises InvalidInput for a file that is missing, truncated or incomplete, an unknown category, a
-    box that no drive holds (`care_sim.sources.plausible`), an object annotated twice at once.
+    box that no drive holds (`care_sim.sources.film_checks`), an object annotated twice at once.
     """
     boxes = read_columns(path, _BOX_TYPES, _BOX_RANGES)
     # A sweep that annotates the recording car alone is annotated too: nobody else is there.
@@ -136,7 +210,7 @@ def read_poses(path: Path) -> Columns:
     """The checked poses of the car, in order of time.
 
     Raises InvalidInput for a file that is missing, truncated or incomplete, a pose that no drive
-    holds (`care_sim.sources.plausible`), two poses at once.
+    holds (`care_sim.sources.film_checks`), two poses at once.
     """
     poses = read_columns(path, _POSE_TYPES, _POSE_RANGES)
     stamps = poses["timestamp_ns"]

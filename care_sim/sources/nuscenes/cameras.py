@@ -1,23 +1,27 @@
-"""The cameras of a recorded car, and what they saw when no detector was run: projected boxes with
-visibility.
+"""Where cars and sensors of nuScenes stand, when its pictures were taken, and what they show when
+no detector was run: projected boxes with visibility.
 """
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats
 from care_sim.core.frames import Frame
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import ImageDetections
 from care_sim.sensors.annotated import Annotations, IdentifiedDetections
-from care_sim.sensors.camera import CAMERA_HEIGHT, CAMERA_WIDTH
-from care_sim.sensors.confidence import MIN_PIXELS, confidence_of
+from care_sim.sensors.pictures import CAMERA_HEIGHT, CAMERA_WIDTH, MIN_PIXELS, confidence_of
 from care_sim.sensors.surround import View
+from care_sim.sources.film_checks import MAP_M, MOUNT_M, quaternion_fault
+from care_sim.sources.nuscenes.table_files import JsonRow
+from care_sim.sources.nuscenes.tables import Database
 
 PICTURE = (1600, 900)
 """Width and height of a picture in pixels."""
@@ -136,3 +140,106 @@ def projected(camera: RecordedCamera, boxes: Floats) -> Floats:
 def _rows(columns: list[Floats], camera: int) -> Floats:
     zeros = np.zeros(len(columns[0]))
     return np.column_stack([*columns, zeros + camera, zeros, zeros])
+
+
+FOCALS = (10.0, 1e5)
+"""Pixels: of a picture 1600 wide, views of 179 degrees and of one."""
+_FORWARD_FROM_RIGHT = Rotation.from_euler("z", np.pi / 2)
+"""In LIDAR_TOP's own frame x points right and y forward."""
+
+
+def frame_of(database: Database, table: str, row: JsonRow) -> Frame:
+    """The frame that a row of `ego_pose`, `calibrated_sensor` or `sample_annotation` tells."""
+    # The tables write w first, SciPy writes it last.
+    w, x, y, z = database.numbers(table, row, "rotation", 4).tolist()
+    mounted = table == "calibrated_sensor"
+    fault = quaternion_fault(np.array([[x, y, z, w]]), has_heading=not mounted)
+    if fault is not None:
+        raise InvalidInput(f"{database.path(table)}: rotation of {row['token']!r}: {fault[1]}")
+    origin = database.numbers(table, row, "translation", 3, within=MOUNT_M if mounted else MAP_M)
+    return Frame.turned_by(Rotation.from_quat([x, y, z, w]), origin)
+
+
+def lidar_mount(database: Database, data: JsonRow) -> Frame:
+    """The sensor frame of the recording `data` in the car's: x forward where LIDAR_TOP has y
+    forward.
+    """
+    token = data["calibrated_sensor_token"]
+    own = frame_of(database, "calibrated_sensor", database.row("calibrated_sensor", token))
+    # The car's frame stands on the road.
+    if own.z < 0:
+        path = database.path("calibrated_sensor")
+        raise InvalidInput(f"{path}: {token!r} lies below the road, at {own.z:g} m")
+    return Frame.turned_by(own.rotation * _FORWARD_FROM_RIGHT, own.origin)
+
+
+def camera_of(database: Database, data: JsonRow, lidar: Frame) -> RecordedCamera:
+    """The camera that made the recording `data`, in the sensor frame of the LiDAR."""
+    token = data["calibrated_sensor_token"]
+    row = database.row("calibrated_sensor", token)
+    intrinsic = database.numbers("calibrated_sensor", row, "camera_intrinsic", 3, 3)
+    if not FOCALS[0] <= intrinsic[0, 0] <= FOCALS[1]:
+        raise InvalidInput(
+            f"{database.path('calibrated_sensor')}: {token!r} has a camera_intrinsic whose focal "
+            "length is not within "
+            f"{FOCALS[0]:g} and {FOCALS[1]:g} pixels"
+        )
+    if not all(0 <= middle <= size for middle, size in zip(intrinsic[:2, 2], PICTURE, strict=True)):
+        raise InvalidInput(
+            f"{database.path('calibrated_sensor')}: {token!r} has a camera_intrinsic whose "
+            "principal point lies "
+            f"outside the picture of {PICTURE[0]} x {PICTURE[1]}"
+        )
+    return recorded_camera(frame_of(database, "calibrated_sensor", row), intrinsic, lidar)
+
+
+OWN, SWEEP = CAMERA_TIMES = ("own", "sweep")
+"""Each camera at its own time, or all at that of the sweep."""
+MOST_APART_S = 0.5
+"""A keyframe: ten times as far as a picture of nuScenes is from its sweep."""
+
+
+class Pictures(NamedTuple):
+    """The pictures of a keyframe, one per camera: the frame of the LiDAR when each was taken, and
+    `timing` (k, 2), its age in seconds and by how much the car has turned since.
+
+    The cameras take turns, each when the sweep passes its view, and the car drives on: at 9 m/s the
+    first picture is 0.4 m behind the sweep. Each picture is that of the LiDAR's frame at its own
+    time. Its detections have an age and a yaw change, so that wedges are turned back as those of
+    late cameras are. Two things are neglected: boxes are those of the sweep's time, however objects
+    move within 50 ms, and a wedge has no depth, so it cannot be moved by the way that the car has
+    driven.
+    """
+
+    moments: list[Frame]
+    timing: Floats
+
+
+def pictures_of(
+    database: Database,
+    sample: JsonRow,
+    recordings: Sequence[JsonRow],
+    lidar: Frame,
+    sensor: Frame,
+    camera_times: str = OWN,
+) -> Pictures:
+    """The pictures in the `recordings` of a sample. `lidar` is the LiDAR's frame in the car,
+    `sensor` that in the world at the sweep.
+
+    Raises InvalidInput for a picture without a pose, or far from its sample in time.
+    """
+    if camera_times == SWEEP:
+        return Pictures([sensor] * len(recordings), np.zeros((len(recordings), 2)))
+    cars = [frame_of(database, "ego_pose", database.pose_of(row)) for row in recordings]
+    moments = [car.holding(lidar.origin, lidar.rotation) for car in cars]
+    ages = np.array([sample["timestamp"] - row["timestamp"] for row in recordings]) * 1e-6
+    for row, age in zip(recordings, ages.tolist(), strict=True):
+        if abs(age) > MOST_APART_S:
+            raise InvalidInput(
+                f"{database.path('sample_data')}: {row['token']!r} was taken {abs(age):g} s from "
+                f"its sample, may be {MOST_APART_S:g} s (timestamps are microseconds)"
+            )
+    turns = sensor.yaw - np.array([moment.yaw for moment in moments])
+    turns = (turns + np.pi) % (2 * np.pi) - np.pi
+    # The last picture of a keyframe may be taken a millisecond after the sweep.
+    return Pictures(moments, np.column_stack([np.maximum(ages, 0.0), turns]))

@@ -1,10 +1,5 @@
-"""Detections of a 2D detector that somebody ran on the pictures, from a file.
-
-Two forms. nuScenes: rows with `sample_data_token`, `bbox_corners` (left, top, right, bottom),
-`category_name` or `detection_name`, and `score` or `detection_score`, as a list or as a map
-`results` from tokens to lists. COCO results: rows with `image_id`, `bbox` (left, top, width,
-height), `category_id` and `score`; `image_id` is the token of the picture or its file name. Known
-categories outside the five classes are left out.
+"""Detections from a file of a 2D detector that somebody ran on the pictures, and detections in the
+results form of the nuScenes detection task, which the official devkit scores.
 """
 
 from collections import defaultdict
@@ -15,12 +10,18 @@ from typing import cast
 import numpy as np
 
 from care_sim.base.checks import check_number, check_whole
-from care_sim.base.errors import InvalidInput
+from care_sim.base.errors import InvalidInput, unknown
 from care_sim.core.arrays import Floats, Integers
-from care_sim.core.types import CLASSES, ImageDetections
+from care_sim.core.conditions import MIN_RETURNS
+from care_sim.core.forgetting import ForgettingRules
+from care_sim.core.frames import turned
+from care_sim.core.types import CLASSES, Detections, ImageDetections
+from care_sim.loops.film import Shot
 from care_sim.sensors.annotated import NO_OBJECT, Annotations, IdentifiedDetections
-from care_sim.sources.nuscenes.cameras import RecordedCamera, projected
-from care_sim.sources.nuscenes.categories import class_of
+from care_sim.sources.nuscenes.cameras import (
+    RecordedCamera,
+    projected,
+)
 from care_sim.sources.nuscenes.table_files import JsonRow, read_json
 from care_sim.sources.nuscenes.tables import Database
 
@@ -40,7 +41,14 @@ Found = tuple[int, float, Floats]
 
 
 class DetectionFile:
-    """The detections of a file, by the token or the file name of their picture."""
+    """The detections of a file, by the token or the file name of their picture.
+
+    Two forms. nuScenes: rows with `sample_data_token`, `bbox_corners` (left, top, right, bottom),
+    `category_name` or `detection_name`, and `score` or `detection_score`, as a list or as a map
+    `results` from tokens to lists. COCO results: rows with `image_id`, `bbox` (left, top, width,
+    height), `category_id` and `score`; `image_id` is the token of the picture or its file name.
+    Known categories outside the five classes are left out.
+    """
 
     def __init__(self, path: Path):
         self.path = path
@@ -173,3 +181,151 @@ def objects_behind(
     )
     best = overlap.argmax(axis=1)
     return np.where(overlap.max(axis=1) >= SAME_OBJECT_IOU, annotations.objects[best], NO_OBJECT)
+
+
+MODALITIES = {
+    "use_camera": True,
+    "use_lidar": True,
+    "use_radar": False,
+    "use_map": False,
+    "use_external": False,
+}
+"""What the form's `meta` must tell. The camera decides where a policy looks, and the LiDAR measures
+the boxes.
+"""
+MOST_BOXES = 500
+"""A sample with more is refused."""
+STANDING_MPS = ForgettingRules.static_mps
+"""Up to this speed nothing moves: the paper's tau_static."""
+_VEHICLE = ("vehicle.parked", "vehicle.moving")
+ATTRIBUTES = {
+    "car": _VEHICLE,
+    "truck": _VEHICLE,
+    "bus": _VEHICLE,
+    "bicycle": ("cycle.without_rider", "cycle.with_rider"),
+    "pedestrian": ("pedestrian.standing", "pedestrian.moving"),
+}
+"""The attribute of what stands, and of what moves. A bicycle that moves is ridden. Of the eight
+official attributes two are left out, a vehicle that only stopped and a person who sits: a box and
+its speed cannot tell them.
+"""
+
+
+def result_boxes(shot: Shot, detections: Detections, velocities: Floats) -> list[JsonRow]:
+    """The detections (n) of a keyframe as boxes of its sample, surest first, the MOST_BOXES surest
+    of more.
+
+    The form is that of
+    https://github.com/nutonomy/nuscenes-devkit/blob/master/python-sdk/nuscenes/eval/detection/README.md
+    `velocities` (n, 2) m/s over ground, in sensor axes. In the form, places, headings and
+    velocities are those of the world, sizes are width, length and height, and a rotation is a
+    quaternion w, x, y, z.
+    """
+    scores = confidences(detections)
+    # Stable: of equal scores the earlier one stays, on every machine.
+    order = np.argsort(-scores, kind="stable")[:MOST_BOXES]
+    world = shot.sensor.boxes_to_world(detections.boxes)
+    moves = turned(velocities, shot.sensor.yaw)
+    columns = zip(
+        detections.classes[order].tolist(),
+        world[order],
+        moves[order],
+        scores[order].tolist(),
+        strict=True,
+    )
+    return [
+        {"sample_token": shot.token, **_result_box(CLASSES[label], *rest)}
+        for label, *rest in columns
+    ]
+
+
+def confidences(detections: Detections) -> Floats:
+    """(n,) the detector's own scores. For a detector without scores n / (n + MIN_RETURNS) of n
+    returns: a half if an object just counts, towards 1 with more returns. It is never 0, which the
+    devkit reads as a recall that was not reached.
+    """
+    if detections.scores is not None:
+        return detections.scores
+    scores: Floats = detections.returns / (detections.returns + MIN_RETURNS)
+    return scores
+
+
+def attribute(name: str, speed_mps: float) -> str:
+    """The official attribute of a class at a speed over ground."""
+    standing, moving = ATTRIBUTES[name]
+    return moving if speed_mps > STANDING_MPS else standing
+
+
+def _result_box(name: str, box: Floats, velocity: Floats, score: float) -> JsonRow:
+    x, y, z, length, width, height, yaw = box.tolist()
+    return {
+        "translation": [x, y, z],
+        "size": [width, length, height],
+        # A turn by yaw about z.
+        "rotation": [float(np.cos(yaw / 2)), 0.0, 0.0, float(np.sin(yaw / 2))],
+        "velocity": velocity.tolist(),
+        "detection_name": name,
+        "detection_score": score,
+        "attribute_name": attribute(name, float(np.hypot(*velocity))),
+    }
+
+
+NUSCENES_CATEGORIES: dict[str, str | None] = {
+    "human.pedestrian.adult": "pedestrian",
+    "human.pedestrian.child": "pedestrian",
+    "human.pedestrian.construction_worker": "pedestrian",
+    "human.pedestrian.police_officer": "pedestrian",
+    "vehicle.bicycle": "bicycle",
+    "vehicle.bus.bendy": "bus",
+    "vehicle.bus.rigid": "bus",
+    "vehicle.car": "car",
+    "vehicle.truck": "truck",
+    # Outside the five classes.
+    "animal": None,
+    "human.pedestrian.personal_mobility": None,
+    "human.pedestrian.stroller": None,
+    "human.pedestrian.wheelchair": None,
+    "movable_object.barrier": None,
+    "movable_object.debris": None,
+    "movable_object.pushable_pullable": None,
+    "movable_object.trafficcone": None,
+    "static_object.bicycle_rack": None,
+    "vehicle.construction": None,
+    "vehicle.emergency.ambulance": None,
+    "vehicle.emergency.police": None,
+    "vehicle.motorcycle": None,
+    "vehicle.trailer": None,
+    # What nuScenes-lidarseg adds to the table.
+    "flat.driveable_surface": None,
+    "flat.other": None,
+    "flat.sidewalk": None,
+    "flat.terrain": None,
+    "noise": None,
+    "static.manmade": None,
+    "static.other": None,
+    "static.vegetation": None,
+    "vehicle.ego": None,
+}
+"""The class of every category, None outside the five: as the official detection task maps them."""
+
+
+DETECTION_NAMES: dict[str, str | None] = {
+    **{name: name for name in ("bicycle", "bus", "car", "pedestrian", "truck")},
+    **dict.fromkeys(("barrier", "construction_vehicle", "motorcycle", "traffic_cone", "trailer")),
+}
+"""The same for the names of the official detection task."""
+
+
+class UnknownCategory(InvalidInput):
+    """A name that is neither a category of nuScenes nor one of its detection task."""
+
+
+def class_of(name: str) -> str | None:
+    """The class of a category or of a name of the detection task, None outside the five.
+
+    Raises UnknownCategory for any other name.
+    """
+    known = NUSCENES_CATEGORIES | DETECTION_NAMES
+    if name not in known:
+        raise UnknownCategory(str(unknown("category", name, known)))
+    return known[name]

@@ -13,9 +13,9 @@ from care_sim.base.digests import Stamp, file_digest, file_stamp
 from care_sim.base.errors import InvalidInput
 from care_sim.loops.film import Film
 from care_sim.sources.film_checks import report_once
+from care_sim.sources.nuscenes.cameras import CAMERA_TIMES, OWN
 from care_sim.sources.nuscenes.detections import DetectionFile
 from care_sim.sources.nuscenes.films import nuscenes_film, sweep_files
-from care_sim.sources.nuscenes.pictures import CAMERA_TIMES, OWN
 from care_sim.sources.nuscenes.table_files import FIELDS, JsonRow, read_json
 from care_sim.sources.nuscenes.tables import Database
 from care_sim.sources.recordings import Recordings
@@ -28,7 +28,7 @@ class NuScenes(Recordings):
 
     The cameras' boxes come from the file `camera_detections`, or else from annotations. A detector
     gets `sweeps` of the LiDAR at a keyframe: its own, and the last of those since the keyframe
-    before, under whose mask they were fired (`care_sim.loops.held_mask`). `camera_times` says when
+    before, under whose mask they were fired (`care_sim.loops.open_loop`). `camera_times` says when
     pictures are taken: each camera at its `own` time, or all at that of the `sweep`. With
     `empty_boxes` also boxes without a recorded point are annotated.
     """

@@ -18,10 +18,10 @@ from care_sim.core.frames import Frame, turned
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.loops.film import Shot, Sweep
 from care_sim.sensors.annotated import NO_OBJECT, Annotations, Cloud
-from care_sim.sources.nuscenes.mounts import frame_of
+from care_sim.sources.film_checks import REACH_M
+from care_sim.sources.nuscenes.cameras import frame_of
 from care_sim.sources.nuscenes.table_files import JsonRow
 from care_sim.sources.nuscenes.tables import LIDAR, Database
-from care_sim.sources.plausible import REACH_M
 
 VALUES_PER_POINT = 5
 """float32 x, y, z, intensity and ring."""

@@ -11,15 +11,17 @@ import pyarrow.compute as pc
 from care_sim.base.checks import check_whole
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats
-from care_sim.sources.nuscenes.by_sample import FORM, boxes_by_sample, recordings_by_sample
+from care_sim.sources.film_checks import STAMPS_NS, ValueRange, check_span
 from care_sim.sources.nuscenes.table_files import (
+    FORM,
     JsonRow,
+    boxes_by_sample,
     cached_table,
     check_tokens,
     finite_numbers,
+    recordings_by_sample,
     table_rows,
 )
-from care_sim.sources.plausible import STAMPS_NS, ValueRange, check_span
 
 LIDAR = "LIDAR_TOP"
 CAMERA_CHANNELS = (

@@ -4,6 +4,7 @@ pictures.
 
 from collections import defaultdict
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -11,24 +12,82 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from care_sim.base.errors import InvalidInput, report_problems
-from care_sim.core.arrays import Floats
+from care_sim.core.arrays import Floats, Integers
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.sensor_setup import SensorSetup
-from care_sim.core.types import ImageDetections
+from care_sim.core.types import CLASSES, Detections, ImageDetections
 from care_sim.loops.film import Film, Shot
-from care_sim.perception.cluster.road import SETTLING_M
-from care_sim.sensors.annotated import NO_ANNOTATIONS, Annotations, IdentifiedDetections
+from care_sim.perception.cluster.points import SETTLING_M
+from care_sim.perception.detectors import CLUSTER, PRIVILEGED, check_detector, make_detector
+from care_sim.perception.tracker import MemoryRules, TrackMemory
+from care_sim.sensors.annotated import (
+    NO_ANNOTATIONS,
+    NO_OBJECT,
+    Annotations,
+    Cloud,
+    IdentifiedDetections,
+)
 from care_sim.sensors.surround import SURROUND_CAMERAS
-from care_sim.sources.car_motion import motions
+from care_sim.sources.box_films import motions
 from care_sim.sources.film_checks import LEAST_KEYFRAMES
 from care_sim.sources.nuscenes.detections import DetectionFile, Found, objects_behind
-from care_sim.sources.nuscenes.sweeps import recorded_cloud
+from care_sim.sources.nuscenes.sweeps import points_of_grid, recorded_cloud
 from care_sim.sources.sweeps.logs import SWEEPS_KEYFRAME_S, Log
-from care_sim.sources.sweeps.reference import reference
-from care_sim.sources.sweeps.tables import in_seconds
+from care_sim.sources.sweeps.points import in_seconds
 from care_sim.world.bodies import CATALOGUE
+
+STABLE_KEYFRAMES = 3
+"""The paper counts stable entries. The gate of the third detection is the first narrow one, since
+the track then has a velocity.
+"""
+_RULES = MemoryRules(coast_s=SWEEPS_KEYFRAME_S)
+"""A track outlives one missed keyframe. After more, its gate holds clusters of something else."""
+
+
+def check_reference(name: str) -> None:
+    """Raise InvalidInput for no detector, and for one that needs annotations itself."""
+    check_detector(name)
+    if name in PRIVILEGED:
+        raise InvalidInput(f"reference must be a detector that sees points alone, got {name}")
+
+
+def reference(
+    sweeps: Sequence[Floats],
+    sensors: Sequence[Frame],
+    detector: str,
+    grid: AngularGrid,
+    sensor_height_m: float,
+) -> list[Annotations]:
+    """Return the annotations of every keyframe, from its points (n, 3) in the frame of its sensor.
+
+    The `detector` gets the full scan of every keyframe. Detections are tracked by place alone,
+    since the class of a cluster changes with its view. An object is annotated at the keyframes at
+    which it is detected, if these are at least `STABLE_KEYFRAMES`, with the class that it has most
+    often.
+    """
+    made = make_detector(detector, sensor_height_m, **{"grid": grid} if detector == CLUSTER else {})
+    memory = TrackMemory(SWEEPS_KEYFRAME_S, _RULES)
+    found: list[Detections] = []
+    tracks: list[Integers] = []
+    for points, sensor in zip(sweeps, sensors, strict=True):
+        cells, kept = points_of_grid(points, grid)
+        cloud = Cloud(cells, kept, np.full(len(cells), NO_OBJECT))
+        detections, _ = made.detect(cloud, NO_ANNOTATIONS)
+        alike = replace(detections, classes=np.zeros(len(detections), np.int64))
+        found.append(detections)
+        tracks.append(memory.update(alike, sensor))
+        memory.predict()
+    counts = np.zeros((max((ids.max(initial=-1) for ids in tracks)) + 1, len(CLASSES)), np.int64)
+    for detections, ids in zip(found, tracks, strict=True):
+        np.add.at(counts, (ids, detections.classes), 1)
+    stable, classes = counts.sum(axis=1) >= STABLE_KEYFRAMES, counts.argmax(axis=1)
+    return [
+        Annotations(ids[stable[ids]], classes[ids[stable[ids]]], detections.boxes[stable[ids]])
+        for detections, ids in zip(found, tracks, strict=True)
+    ]
+
 
 BOXES_FILE = "camera_boxes.json"
 _ROAD_M = (3.0, 12.0)
@@ -43,7 +102,7 @@ _NOTHING_SEEN = IdentifiedDetections(
 
 
 def film_of_log(log: Log, setup: SensorSetup, detector: str, boxes: Path | None) -> Film:
-    """Return the film of a log, annotated by `detector` (`care_sim.sources.sweeps.reference`).
+    """Return the film of a log, annotated by `detector` (`care_sim.sources.sweeps.films`).
 
     The points of a sweep are in the axes of the LiDAR, as `setup` says that it is mounted. Camera
     boxes come from the file `boxes`. Without them the film has cameras that report nothing, and a

@@ -1,28 +1,158 @@
-"""Folders of logs without labels."""
+"""Folders of logs without labels; ROS 2 bags and MCAP files as logs."""
 
 import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from care_sim.base.checks import check_known
-from care_sim.base.errors import InvalidInput, shown
+from care_sim.base.errors import InvalidInput, error_line, shown
+from care_sim.base.extras import import_rosbags
 from care_sim.core.arrays import Floats
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.loops.film import Film
 from care_sim.perception.detectors import CLUSTER
 from care_sim.sensors.setups import DEFAULT_SETUP, Sensor, sensor_setup
-from care_sim.sources.film_checks import FULL_TURN
 from care_sim.sources.recordings import Recordings
-from care_sim.sources.sweeps.bags import BAG_SUFFIXES, is_bag, log_of_bag
-from care_sim.sources.sweeps.films import BOXES_FILE, film_of_log
-from care_sim.sources.sweeps.logs import Log
-from care_sim.sources.sweeps.points import READERS, read_sweep
-from care_sim.sources.sweeps.reference import check_reference
-from care_sim.sources.sweeps.tables import columns_of, in_seconds, read_csv
+from care_sim.sources.sweeps.films import BOXES_FILE, check_reference, film_of_log
+from care_sim.sources.sweeps.logs import POSES_FILE, SWEEPS_FOLDER, TIMES_FILE, Log, log_of_folder
+from care_sim.sources.sweeps.points import checked_points
+
+BAG_SUFFIXES = (".mcap", ".db3")
+METADATA_FILE = "metadata.yaml"
+POINTS = "sensor_msgs/msg/PointCloud2"
+POSES = ("nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseStamped")
+_NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
+"""The datatypes of sensor_msgs/PointField."""
+
+
+def is_bag(path: Path) -> bool:
+    """Return whether a path is a bag: a file by its suffix, or a folder with `metadata.yaml`."""
+    return path.suffix in BAG_SUFFIXES or (path / METADATA_FILE).is_file()
+
+
+def log_of_bag(path: Path, topics: Sequence[str]) -> Log:
+    """Return the log in a bag: its points, and the poses of the car from odometry or stamped poses.
+    Times are those of the messages' headers.
+
+    Of several topics of a kind `topics` names the right one. Points are in the LiDAR's axes: no
+    transform is applied to them. A message that was logged twice counts once.
+
+    Raises InvalidInput for a bag that cannot be read, and for topics that are missing or ambiguous;
+    then it lists them. Raises MissingExtra without the extra `rosbags`.
+    """
+    with _opened(path) as reader:
+        _check_topics(path, reader, topics)
+        points, posed = (_topic(path, reader, topics, kinds) for kinds in ([POINTS], POSES))
+        logged = {_stamp(cloud): moment for cloud, moment in _messages(reader, points)}
+        poses = {_stamp(message): _pose(message) for message, _ in _messages(reader, posed)}
+    times = sorted(logged)
+
+    def points_of(number: int) -> Floats:
+        time_s = times[number]
+        with _opened(path) as opened:
+            again = _topic(path, opened, topics, [POINTS])
+            moment = _messages(opened, again, start=logged[time_s], stop=logged[time_s] + 1)
+            found = [points_of_cloud(cloud) for cloud, _ in moment if _stamp(cloud) == time_s]
+        return checked_points(f"{path}: {points[0].topic} at {time_s:.3f} s", found[0])
+
+    return Log(
+        path.stem,
+        f"{path}: {points[0].topic}",
+        np.array(times),
+        points_of,
+        np.array([(time_s, *poses[time_s]) for time_s in sorted(poses)], float).reshape(-1, 8),
+        f"{path}: {posed[0].topic}",
+    )
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[Any]:
+    """Open a bag. The library's errors become one line."""
+    highlevel, typesys = import_rosbags()
+    # Older bags do not hold the definitions of their messages.
+    usual = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
+    try:
+        with highlevel.AnyReader([path], default_typestore=usual) as reader:
+            yield reader
+    except (KeyboardInterrupt, InvalidInput):
+        raise
+    # A damaged bag raises whatever its parser meets.
+    except Exception as error:
+        raise InvalidInput(f"{path}: no bag that can be read ({error_line(error)})") from error
+
+
+def _check_topics(path: Path, reader: Any, topics: Sequence[str]) -> None:
+    """Raise InvalidInput for a topic that the bag lacks, or that holds neither points nor poses."""
+    known = {one.topic for one in reader.connections if one.msgtype in (POINTS, *POSES)}
+    for topic in topics:
+        if topic not in known:
+            raise InvalidInput(
+                f"{path}: {topic} is no topic of points or poses; the bag has {_listed(reader)}"
+            )
+
+
+def _topic(path: Path, reader: Any, topics: Sequence[str], kinds: Sequence[str]) -> list[Any]:
+    """Return the connections of the only topic of some kinds, or of the one that `topics` names.
+    A topic has one for each publisher.
+    """
+    found = [one for one in reader.connections if one.msgtype in kinds]
+    named = [one for one in found if one.topic in topics] or found
+    own = {one.topic for one in named}
+    if len(own) != 1:
+        told = "several topics" if own else "no topic"
+        wanted = "; name one with --topics" if own else ""
+        raise InvalidInput(
+            f"{path}: {told} of {' or '.join(kinds)}{wanted}; the bag has {_listed(reader)}"
+        )
+    return named
+
+
+def _listed(reader: Any) -> str:
+    told = dict.fromkeys(f"{one.topic} ({one.msgtype})" for one in reader.connections)
+    return ", ".join(told) or "none"
+
+
+def _messages(reader: Any, connections: Sequence[Any], **between: int) -> Iterator[tuple[Any, int]]:
+    """Yield the messages of connections, each with the time at which it was logged."""
+    for own, logged, raw in reader.messages(connections, **between):
+        yield reader.deserialize(raw, own.msgtype), logged
+
+
+def _stamp(message: Any) -> float:
+    stamp = message.header.stamp
+    return float(stamp.sec + stamp.nanosec * 1e-9)
+
+
+def points_of_cloud(cloud: Any) -> Floats:
+    """Return (n, 3) x, y and z of a point cloud. Its rows may be padded."""
+    fields = {field.name: field for field in cloud.fields}
+    axes = [fields[axis] for axis in "xyz"]
+    order = ">" if cloud.is_bigendian else "<"
+    kind = np.dtype(
+        {
+            "names": ["x", "y", "z"],
+            "formats": [order + _NUMBERS[axis.datatype] for axis in axes],
+            "offsets": [axis.offset for axis in axes],
+            "itemsize": cloud.point_step,
+        }
+    )
+    bytes_of = np.asarray(cloud.data, np.uint8).reshape(cloud.height, cloud.row_step)
+    filled = np.ascontiguousarray(bytes_of[:, : cloud.width * cloud.point_step])
+    rows = filled.view(kind).ravel()
+    return np.stack([rows[axis] for axis in "xyz"], axis=1).astype(float)
+
+
+def _pose(message: Any) -> list[float]:
+    """Return place and quaternion of odometry or of a stamped pose."""
+    pose = getattr(message.pose, "pose", message.pose)
+    place, turn = pose.position, pose.orientation
+    return [place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w]
+
 
 SETUP_FILE = "sensor.toml"
 
@@ -31,7 +161,7 @@ SETUP_FILE = "sensor.toml"
 class Sweeps(Recordings):
     """LiDAR sweeps and poses of the car that nobody annotated: folders, MCAP files or ROS 2 bags.
 
-    A scene is a bag (`care_sim.sources.sweeps.bags`), or a folder:
+    A scene is a bag (`care_sim.sources.sweeps.recordings`), or a folder:
 
     - `sweeps/`: one file per sweep, all PCD, NPY, CSV or BIN
       (`care_sim.sources.sweeps.points.read_sweep`). A name is a time: nanoseconds, microseconds or
@@ -129,85 +259,3 @@ class Sweeps(Recordings):
             f"{folder}: no scene, a bag or a folder with {SWEEPS_FOLDER}/ (one file per sweep) and "
             f"{POSES_FILE} (time, x, y, z, yaw of the car)"
         )
-
-
-SWEEPS_FOLDER, POSES_FILE, TIMES_FILE = "sweeps", "poses.csv", "times.csv"
-_TURN = ("qx", "qy", "qz", "qw")
-_LEAST_NAME = 1e9
-"""A whole number below this may be the number of a sweep, and is no time."""
-
-
-def log_of_folder(folder: Path) -> Log:
-    """Return the log in a folder: `sweeps/`, files of one kind, `poses.csv`, and `times.csv` where
-    the names of the sweeps are not their times.
-
-    Raises InvalidInput for what is missing or ambiguous.
-    """
-    sweeps = _sweep_files(folder / SWEEPS_FOLDER)
-    times = _times(folder, sweeps)
-    order = np.argsort(times, kind="stable")
-    files = [sweeps[row] for row in order.tolist()]
-    path = folder / POSES_FILE
-    return Log(
-        folder.name,
-        str(folder / SWEEPS_FOLDER),
-        times[order],
-        lambda number: read_sweep(files[number]),
-        _poses(path),
-        str(path),
-    )
-
-
-def _sweep_files(folder: Path) -> list[Path]:
-    found = sorted(path for path in folder.glob("*") if path.suffix in READERS)
-    kinds = sorted({path.suffix for path in found})
-    if len(kinds) != 1:
-        raise InvalidInput(
-            f"{folder}: sweeps must be files of one kind, {', '.join(READERS)}, got "
-            f"{' and '.join(kinds) or 'none'}"
-        )
-    return found
-
-
-def _times(folder: Path, sweeps: list[Path]) -> Floats:
-    """Return (n,) the seconds of the sweeps, by `times.csv`, else by their names."""
-    path = folder / TIMES_FILE
-    if path.exists():
-        table = read_csv(path)
-        times = in_seconds(columns_of(path, table, ["time"])[:, 0])
-        names = map(str, table["file"].to_pylist() if "file" in table.column_names else ())
-        told = dict(zip(names, times.tolist(), strict=False))
-        for sweep in sweeps:
-            if sweep.name not in told:
-                raise InvalidInput(f"{path}: no row of columns file and time for {sweep.name}")
-        return np.array([told[sweep.name] for sweep in sweeps])
-    for sweep in sweeps:
-        whole, point, part = sweep.stem.partition(".")
-        is_time = whole.isdecimal() and (part.isdecimal() if point else True)
-        if not is_time or not (point or float(whole[:40]) >= _LEAST_NAME):
-            raise InvalidInput(
-                f"{sweep}: its name is no time: nano-, micro- or milliseconds since 1970, or "
-                f"seconds with a decimal point; write {TIMES_FILE} with the columns file and time"
-            )
-    return in_seconds(np.array([float(sweep.stem[:40]) for sweep in sweeps]))
-
-
-def _poses(path: Path) -> Floats:
-    """Return (m, 8) seconds, x, y, z and quaternion x, y, z, w of the car."""
-    if not path.is_file():
-        raise InvalidInput(
-            f"{path}: no such file; it holds the poses of the car, columns time, x, y, z (metres) "
-            "and yaw (radians) or qx, qy, qz, qw; a single row where the car stands"
-        )
-    table = read_csv(path)
-    place = columns_of(path, table, ("time", "x", "y", "z"))
-    if "yaw" in table.column_names:
-        (yaws,) = columns_of(path, table, ["yaw"]).T
-        wrong = ~(np.abs(yaws) <= FULL_TURN)
-        if wrong.any():
-            got = shown(float(yaws[wrong.argmax()]))
-            raise InvalidInput(f"{path}: yaw must be radians within a full turn, got {got}")
-        turns = Rotation.from_euler("Z", yaws[:, None]).as_quat()
-    else:
-        turns = columns_of(path, table, _TURN)
-    return np.column_stack([in_seconds(place[:, 0]), place[:, 1:], turns])

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from care_sim.scenarios.dense import VEHICLE_PLACES
+from care_sim.scenarios.dartout import VEHICLE_PLACES
 from care_sim.study.episode_config import EpisodeConfig, grid
 
 _CROWDING_BUDGETS = (0.01, 0.02, 0.03, 0.04, 0.05, 0.10, 0.20, 0.35)

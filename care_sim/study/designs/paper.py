@@ -22,7 +22,7 @@ def paper_study(
     seeds: Sequence[int], also: Sequence[str] = (), cell_order: str = AS_DEMANDED
 ) -> list[EpisodeConfig]:
     """The episodes of the study, 49 a seed; five seeds give the paper's 245. `also` are further
-    policies, `cell_order` is that of all (`care_sim.core.cell_order`).
+    policies, `cell_order` is that of all (`care_sim.core.cells.order`).
 
     The paper states the total, the scenes and the conditions; this split is ours: budgets on the
     dense street (17) and in the dart-out (13), the cut-in (5), missed detections (8) and camera

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from care_sim.base.errors import InvalidInput
-from care_sim.base.seed_ranges import split_of
+from care_sim.base.seeds import split_of
 from care_sim.core.conditions import YOLOX_CAMERA
 from care_sim.core.defaults import CELLS
 from care_sim.core.firing.listing import HARDWARE, settled
 from care_sim.scenarios.ncap.table import TESTS
 from care_sim.sources.scenes import Scene, Source
 from care_sim.study.designs.defaults import NCAP_STEP_KPH
-from care_sim.study.designs.ncap import NcapCase, ncap_cases
+from care_sim.study.designs.standards import NcapCase, ncap_cases
 from care_sim.study.designs.variants import FilmPlace, Group, Place, Variant
 from care_sim.study.episode_config import EpisodeConfig, of_cases
 from care_sim.study.play_config import PlayConfig

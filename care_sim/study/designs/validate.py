@@ -7,7 +7,7 @@ What is chosen is chosen on training seeds, and what is said is said of test see
 from collections.abc import Sequence
 from typing import Any
 
-from care_sim.base.seed_ranges import (
+from care_sim.base.seeds import (
     TRAINING,
     VALIDATION,
     check_benchmark_seeds,
@@ -15,8 +15,7 @@ from care_sim.base.seed_ranges import (
 )
 from care_sim.policies import controls
 from care_sim.study.episode_config import EpisodeConfig, grid
-from care_sim.study.parameters import Parameters
-from care_sim.study.run_config import FULL, Row
+from care_sim.study.run_config import FULL, Parameters, Row
 
 CAMERA_POLICIES = ("all-camera", "care", "care-sightlines", "care-sector")
 """The causal policies with a camera; the best of them has to beat the best control."""

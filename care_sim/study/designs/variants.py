@@ -8,10 +8,9 @@ from care_sim.base.errors import percent
 from care_sim.perception.detectors import PROXY
 from care_sim.sources.scenes import Scene, Source
 from care_sim.study.episode_config import EpisodeConfig, grid
-from care_sim.study.parameters import Parameters
 from care_sim.study.play_config import PlayConfig, play_grid
 from care_sim.study.rows.reading import Key, key_of
-from care_sim.study.run_config import Row, flat
+from care_sim.study.run_config import Parameters, Row, flat
 
 
 class Place(NamedTuple):

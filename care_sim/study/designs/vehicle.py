@@ -7,11 +7,10 @@ from itertools import product
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.forgetting import VEHICLE_SIGMA_M
-from care_sim.scenarios.ncap.forms import AcrossExit
-from care_sim.scenarios.ncap.table import TESTS
+from care_sim.scenarios.ncap.table import TESTS, AcrossExit
 from care_sim.study.designs.variants import Group, Place, Variant
 from care_sim.study.episode_config import EpisodeConfig
-from care_sim.study.parameters import Parameters
+from care_sim.study.run_config import Parameters
 
 
 def _turning_tests() -> Iterator[Parameters]:

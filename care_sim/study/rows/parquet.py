@@ -9,8 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from care_sim.base.errors import InvalidInput
-from care_sim.base.files import replacing
-from care_sim.base.json_text import parsed_json
+from care_sim.base.files import parsed_json, replacing
 from care_sim.study.rows.schema import Schema
 from care_sim.study.run_config import Row
 

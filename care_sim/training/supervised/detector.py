@@ -17,12 +17,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from care_sim.base.bounds import bounded
+from care_sim.base.checks import bounded
 from care_sim.base.errors import print_lines
 from care_sim.base.extras import import_torch
 from care_sim.base.files import ZIP, check_output
-from care_sim.base.seed_ranges import TRAINING, VALIDATION
-from care_sim.base.torch_threads import one_thread
+from care_sim.base.limits import one_thread
+from care_sim.base.seeds import TRAINING, VALIDATION
 from care_sim.core.arrays import Floats, Mask
 from care_sim.core.types import CLASSES, Detections
 from care_sim.perception.matching import UNSERVED, served_by

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.belief import Belief
-from care_sim.core.grid_stack import Grid
+from care_sim.core.cells.stack import Grid
 from care_sim.core.types import CLASSES
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.envs.open_loop import FilmEnv

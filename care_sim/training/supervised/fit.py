@@ -12,8 +12,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from care_sim.base.bounds import bounded, check_fields
-from care_sim.base.checks import LARGEST_INTEGER
+from care_sim.base.checks import LARGEST_INTEGER, bounded, check_fields
 from care_sim.base.errors import InvalidInput, print_lines
 from care_sim.base.extras import import_torch
 from care_sim.core.grid import AngularGrid

@@ -34,15 +34,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.array_files import Arrays
-from care_sim.base.bounds import bounded
-from care_sim.base.checks import LARGEST_INTEGER
+from care_sim.base.checks import LARGEST_INTEGER, bounded
 from care_sim.base.extras import import_torch
 from care_sim.base.files import ZIP, check_output
-from care_sim.base.seed_ranges import TRAINING, VALIDATION
-from care_sim.base.torch_threads import one_thread
+from care_sim.base.limits import one_thread
+from care_sim.base.seeds import TRAINING, VALIDATION
 from care_sim.core.arrays import Mask
 from care_sim.core.belief import Belief
-from care_sim.core.boxes import planar_ranges
+from care_sim.core.cells.boxes import planar_ranges
 from care_sim.core.conditions import MIN_RETURNS
 from care_sim.core.grid import Cells
 from care_sim.envs.open_loop import FilmEnv

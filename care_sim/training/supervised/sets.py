@@ -37,13 +37,12 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from care_sim.base.array_files import Arrays
-from care_sim.base.bounds import bounded
-from care_sim.base.checks import LARGEST_INTEGER, check_known
+from care_sim.base.checks import LARGEST_INTEGER, bounded, check_known
 from care_sim.base.errors import print_lines
 from care_sim.base.extras import import_torch
 from care_sim.base.files import ZIP, check_output
-from care_sim.base.seed_ranges import TRAINING, VALIDATION
-from care_sim.base.torch_threads import one_thread
+from care_sim.base.limits import one_thread
+from care_sim.base.seeds import TRAINING, VALIDATION
 from care_sim.core.rig import Rig
 from care_sim.policies.learned.learned_sets import STEPS, LearnedSets
 from care_sim.policies.learned.set_items import ITEM_INPUTS, MIRRORED, STRIP_INPUTS, ItemReader

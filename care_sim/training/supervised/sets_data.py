@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.core.arrays import Floats, Integers
-from care_sim.core.boxes import planar_ranges
+from care_sim.core.cells.boxes import planar_ranges
 from care_sim.evaluation.sightings import RANGE_M
 from care_sim.policies import make_policy
 from care_sim.policies.base import Policy

@@ -5,8 +5,8 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from care_sim.core.arrays import Floats
-from care_sim.core.boxes import BOX_EDGES, box_corners
-from care_sim.core.grid_stack import Grid
+from care_sim.core.cells.boxes import BOX_EDGES, box_corners
+from care_sim.core.cells.stack import Grid
 from care_sim.core.pinhole import NEAR_M, PinholeCamera
 from care_sim.viewer import palette
 

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from care_sim.core.actions import SHARES
+from care_sim.core.cells.stack import Grid
+from care_sim.core.firing.actions import SHARES
 from care_sim.core.grid import AngularGrid, Cells
-from care_sim.core.grid_stack import Grid
 from care_sim.core.rig import Rig
 from care_sim.viewer import palette
 from care_sim.viewer.pictures.drawing import (
@@ -77,7 +77,7 @@ class View:
     ranges: NDArray[np.floating]
     """(E, A) the scan in metres: 0 not fired, maximum range without a return."""
     shares: NDArray[np.uint8] | None
-    """(E, A) the shares of the budget, a place in `care_sim.core.actions.SHARES` for each cell.
+    """(E, A) each cell's share of the budget, a place in `care_sim.core.firing.actions.SHARES`.
     They colour the cells; without them the ranges do.
     """
     is_moment: bool

@@ -9,12 +9,11 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from care_sim.core.arrays import Floats
-from care_sim.core.boxes import box_corners, planar_ranges
+from care_sim.core.cells.boxes import box_corners, planar_ranges
 from care_sim.core.residual import wedge_rays
 from care_sim.core.rig import Rig
 from care_sim.evaluation.sightings import RANGE_M
-from care_sim.loops.open_loop import OpenLoop
-from care_sim.loops.scene_records import SceneKeyframe
+from care_sim.loops.open_loop import OpenLoop, SceneKeyframe
 from care_sim.loops.watcher import TrueSituation, Watched, returned
 from care_sim.viewer import palette
 from care_sim.viewer.palette import State

@@ -7,10 +7,10 @@ import numpy as np
 import rerun as rr
 from rerun.components import InterpolationMode
 
-from care_sim.core.actions import ALONG, CHOSEN, EXPLOITATION, FLOOR, RESERVE, SHARES
-from care_sim.core.boxes import planar_ranges
+from care_sim.core.cells.boxes import planar_ranges
+from care_sim.core.firing.actions import ALONG, CHOSEN, EXPLOITATION, FLOOR, RESERVE, SHARES
+from care_sim.loops.open_loop import SceneKeyframe
 from care_sim.loops.records import Keyframe
-from care_sim.loops.scene_records import SceneKeyframe
 from care_sim.loops.watcher import TrueSituation, Watched
 from care_sim.viewer import palette
 from care_sim.viewer.recording.lane import Lane

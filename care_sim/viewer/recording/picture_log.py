@@ -8,10 +8,10 @@ import numpy as np
 import rerun as rr
 from PIL import Image
 
-from care_sim.core.actions import SHARES
 from care_sim.core.arrays import Floats, Mask
+from care_sim.core.cells.stack import Grid
+from care_sim.core.firing.actions import SHARES
 from care_sim.core.grid import Cells
-from care_sim.core.grid_stack import Grid
 from care_sim.core.residual import wedges
 from care_sim.core.types import CLASSES, ImageDetections
 from care_sim.loops.closed_loop import ClosedLoop

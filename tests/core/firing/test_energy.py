@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.actions import scores_of
+from care_sim.core.firing.actions import scores_of
 from care_sim.core.firing.base import shots_by_cell
 from care_sim.core.firing.listing import hardware_of, settled
 from care_sim.core.grid import AngularGrid

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.actions import scores_of
 from care_sim.core.conditions import Conditions
+from care_sim.core.firing.actions import scores_of
 from care_sim.core.firing.base import demanded, ranked
 from care_sim.core.firing.listing import HARDWARE, hardware_of, settled
 from care_sim.core.grid import AngularGrid

@@ -2,8 +2,8 @@
 
 import pytest
 
-from care_sim import SensorSetup
 from care_sim.core.pinhole import PinholeCamera
+from care_sim.core.sensor_setup import SensorSetup
 from care_sim.envs import CLOSED_LOOP
 from tests.helpers.vectors import MODES, native, played_alike
 

@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from care_sim.envs.vector.threads import Threads
+from care_sim.envs.vector.env import Threads
 
 
 @pytest.fixture

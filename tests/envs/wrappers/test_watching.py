@@ -13,8 +13,8 @@ import pytest
 from gymnasium.vector import SyncVectorEnv
 
 import care_sim
-from care_sim.core.actions import CHOSEN
-from care_sim.envs.wrappers.watching import Watching, numbered
+from care_sim.core.firing.actions import CHOSEN
+from care_sim.envs.wrappers.record_rerun import Watching, numbered
 from care_sim.wrappers import ExportScans, RecordRerun, SectorReserve
 
 LIBRARIES = {RecordRerun: "rerun", ExportScans: "open3d"}

@@ -7,16 +7,17 @@ from hypothesis import strategies as st
 
 from care_sim.core.frames import turned
 from care_sim.core.grid import AngularGrid
-from care_sim.perception.cluster.box_fitting import Sides, _closeness, fit_sides
-from care_sim.perception.cluster.grouping import (
+from care_sim.perception.cluster.boxes import Sides, _closeness, best_guess, fit_sides
+from care_sim.perception.cluster.points import (
     COLUMNS_APART,
     NEAR_RADIUS_M,
+    STEEPEST,
     _even,
     cluster_radius,
     clusters_of,
+    heights_above,
+    road_plane,
 )
-from care_sim.perception.cluster.road import STEEPEST, heights_above, road_plane
-from care_sim.perception.cluster.size_classes import best_guess
 from tests.helpers.made_points import HEIGHT, face, road, shell
 
 

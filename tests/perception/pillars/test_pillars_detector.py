@@ -8,7 +8,7 @@ import pytest
 
 from care_sim.base.array_files import write_arrays
 from care_sim.base.errors import InvalidInput, MissingExtra
-from care_sim.core.boxes import planar_ranges
+from care_sim.core.cells.boxes import planar_ranges
 from care_sim.perception.detectors import make_detector
 from care_sim.perception.matching import found_objects
 from care_sim.perception.pillars import detector as pillars

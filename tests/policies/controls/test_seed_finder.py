@@ -14,10 +14,9 @@ from care_sim.core.rig import Rig
 from care_sim.policies import contenders, policy_names, tags_of
 from care_sim.policies.controls.rehearsed import SeedFinder, rehearsal
 from care_sim.scenarios.base import Scenario
-from care_sim.sensors.camera import FRONT_CAMERA
-from care_sim.world.crosser import Crosser, Meeting
+from care_sim.sensors.pictures import FRONT_CAMERA
+from care_sim.world.motions import Crosser, Meeting, Walk
 from care_sim.world.traffic import Traffic
-from care_sim.world.walker import Walk
 from care_sim.world.world import World
 
 BLIND = {"budget": 0.03, "false_negative_rate": 1.0}

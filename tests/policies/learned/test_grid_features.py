@@ -11,7 +11,7 @@ from care_sim.core.residual import camera_layers
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES, Ego, ImageDetections, Tracks
 from care_sim.policies.learned.grid_features import CHANNELS, GridFeatures
-from care_sim.sensors.camera import FRONT_CAMERA
+from care_sim.sensors.pictures import FRONT_CAMERA
 
 RIG = Rig(cameras=(FRONT_CAMERA,), budget=492)
 FEATURES = GridFeatures(RIG)

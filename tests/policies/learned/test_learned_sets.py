@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import care_sim
 from care_sim.base.errors import InvalidInput
 from care_sim.core.belief import Belief
-from care_sim.core.cell_sets import CellSets
+from care_sim.core.cells.sets import CellSets
 from care_sim.core.grid import AngularGrid
 from care_sim.core.types import CLASSES, Ego, Tracks
 from care_sim.policies.learned.learned_sets import STEPS, SetNetwork

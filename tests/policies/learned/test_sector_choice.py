@@ -5,17 +5,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_sim.core.actions import scores_of
 from care_sim.core.allocation import allocate
 from care_sim.core.belief import Belief
-from care_sim.core.beliefs import Beliefs
+from care_sim.core.firing.actions import scores_of
 from care_sim.core.grid import AngularGrid
+from care_sim.core.observation.beliefs import Beliefs
 from care_sim.core.residual import explained, explained_of
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES, Demand, Ego, ImageDetections, Tracks
 from care_sim.policies.learned.grid_features import GridFeatures
 from care_sim.policies.learned.sectors import SectorActions, SectorChoice, Tiling, reserve_demand
-from care_sim.sensors.camera import FRONT_CAMERA
+from care_sim.sensors.pictures import FRONT_CAMERA
 
 
 def a_belief(rng, rig):

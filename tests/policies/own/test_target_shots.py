@@ -8,15 +8,15 @@ import pytest
 
 import care_sim
 from care_sim.base.errors import InvalidInput
+from care_sim.core.cells.stack import GridStack
 from care_sim.core.conditions import Conditions
 from care_sim.core.grid import AngularGrid
-from care_sim.core.grid_stack import GridStack
 from care_sim.core.residual import wedges
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
 from care_sim.policies.own.care_units import CareUnits, TargetShots
-from care_sim.sensors.camera import FRONT_CAMERA
+from care_sim.sensors.pictures import FRONT_CAMERA
 from care_sim.world.bodies import CATALOGUE
 
 FOG = {"lidar_stated_range_m": 20.0, "visibility_m": 50.0}

@@ -7,7 +7,7 @@ from care_sim.reports.engine.controls import is_control, named_by_budget
 from care_sim.reports.engine.frames import Frame
 from care_sim.reports.engine.measures import DETECTION, Recall
 from care_sim.reports.engine.parts import Part
-from care_sim.reports.protocol.controls import named_controls, over_controls
+from care_sim.reports.protocol.contrasts import named_controls, over_controls
 from care_sim.reports.protocol.rows import plays_by_setting
 from tests.helpers.made_plays import found, play, study
 from tests.helpers.made_rows import rows

@@ -6,8 +6,7 @@ import pytest
 from care_sim.base.errors import InvalidInput
 from care_sim.evaluation.recall import Tally
 from care_sim.reports.protocol.rows import plays_by_setting
-from care_sim.study.rows.reading import setting_of
-from care_sim.study.rows.settings import Setting
+from care_sim.study.rows.reading import Setting, setting_of
 from tests.helpers.made_plays import FRAMES, found, play, study
 
 

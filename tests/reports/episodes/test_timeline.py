@@ -16,7 +16,7 @@ from care_sim.reports.episodes.timeline import (
 from care_sim.sources.named import source_of
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.play_config import play_grid
-from care_sim.study.scene_trace import trace_scene
+from care_sim.study.scene_play import trace_scene
 from tests.helpers.made_rows import row
 
 ENCOUNTER = {

@@ -16,8 +16,7 @@ from care_sim.reports.figures.curves import (
     curves_figure,
     point,
 )
-from care_sim.reports.figures.names import apart
-from care_sim.reports.figures.styles import CALM, INK, colours
+from care_sim.reports.figures.styles import CALM, INK, apart, colours
 from tests.helpers.drawn import heights
 
 NAN = float("nan")

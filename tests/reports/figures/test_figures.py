@@ -11,18 +11,17 @@ from care_sim.reports.figures.closed_loop import (
     sweep_figures,
     validation_figures,
 )
-from care_sim.reports.figures.files import remove_others, save, svg_text
 from care_sim.reports.figures.study_maps import (
     ablation_figures,
     crowding_figures,
     open_ablation_figures,
 )
+from care_sim.reports.figures.styles import remove_others, save, svg_text
 from care_sim.reports.report import StudyReport
 from care_sim.reports.studies import STUDIES
 from care_sim.study.designs.ablations import ablation_study
 from care_sim.study.designs.faults import FAULTS, fault_study
-from care_sim.study.designs.firing import firing_study
-from care_sim.study.designs.order import ORDERS, order_study
+from care_sim.study.designs.firing import ORDERS, firing_study, order_study
 from care_sim.study.designs.variants import Variant
 from tests.helpers import made_plays, made_worlds
 from tests.helpers.drawn import heights, ticks, titles

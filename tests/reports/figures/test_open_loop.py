@@ -5,10 +5,10 @@ from fnmatch import fnmatch
 import pytest
 
 from care_sim.reports.figures.open_loop import open_order_figures, protocol_figures
-from care_sim.reports.protocol.controls import over_controls
+from care_sim.reports.protocol.contrasts import over_controls
 from care_sim.reports.protocol.rows import plays_by_setting
 from care_sim.reports.studies import STUDIES
-from care_sim.study.designs.order import ORDERS
+from care_sim.study.designs.firing import ORDERS
 from tests.helpers.drawn import heights, titles
 from tests.helpers.made_plays import found, play, study
 from tests.reports.engine.test_controls import PLAYS

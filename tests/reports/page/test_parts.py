@@ -2,9 +2,8 @@
 
 import pytest
 
+from care_sim.reports.page.build import provenance_of, settings, sort_key
 from care_sim.reports.page.listing import _world, episode_groups
-from care_sim.reports.page.provenance import provenance_of, settings
-from care_sim.reports.page.sorting import sort_key
 from tests.helpers.made_rows import STUDY, rows
 
 

@@ -147,7 +147,7 @@ def test_fullness_counts_the_cells_of_a_sector_in_all_rows():
 
 
 def test_a_box_in_the_middle_of_the_picture_is_straight_ahead(seen):
-    from care_sim.sensors.camera import FRONT_CAMERA
+    from care_sim.sensors.pictures import FRONT_CAMERA
 
     detections = seen(
         ("car", 160.0, 80.0, 320.0, 100.0), ("car", 0.0, 80.0, 160.0, 100.0), yaw_change=0.1

@@ -15,8 +15,7 @@ from care_sim.reports.page.replay import replayed
 from care_sim.sources.named import source_of
 from care_sim.study.play_config import play_grid
 from care_sim.study.rows.reading import with_tags
-from care_sim.study.scene_play import play_scene
-from care_sim.study.scene_trace import trace_scene
+from care_sim.study.scene_play import play_scene, trace_scene
 
 
 @pytest.fixture(scope="module")

@@ -3,7 +3,7 @@ none, and how much was played.
 """
 
 from care_sim.reports.findings import gate_tables
-from care_sim.reports.protocol.notes import protocol_closing
+from care_sim.reports.protocol.formatting import protocol_closing
 from care_sim.reports.protocol.tables import protocol_tables
 from care_sim.reports.report import read_results
 from care_sim.reports.table import Bold

@@ -18,7 +18,7 @@ from care_sim.reports.protocol.paper import (
 from care_sim.reports.protocol.tables import protocol_tables
 from care_sim.reports.table import Bold
 from care_sim.study.rows.parquet import read_rows, with_tuples, write_rows
-from care_sim.study.rows.settings import Setting
+from care_sim.study.rows.reading import Setting
 from tests.helpers.made_plays import found, play, study
 from tests.reports.engine.test_controls import PLAYS
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from care_sim.reports.protocol.paper_ablations import PUBLISHED_CHANGES, USUAL
+from care_sim.reports.protocol.paper import PUBLISHED_CHANGES, USUAL
 from care_sim.reports.studies import STUDIES
 from care_sim.reports.table import Bold
 from care_sim.reports.tables.ablations import ablation_tables

@@ -1,7 +1,6 @@
 import pytest
 
-from care_sim.core.conditions import LOCALISATION, Sensing
-from care_sim.core.return_settings import RETURN_SETTINGS
+from care_sim.core.conditions import LOCALISATION, RETURN_SETTINGS, Sensing
 from care_sim.reports.engine.frames import Frame
 from care_sim.reports.figures.closed_loop import fault_figures
 from care_sim.reports.studies import STUDIES

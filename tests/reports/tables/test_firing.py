@@ -2,7 +2,7 @@
 rows hold the numbers of the closed loop.
 """
 
-from care_sim.reports.tables.firing import firing_tables
+from care_sim.reports.tables.sweep import firing_tables
 from tests.helpers.made_plays import study
 
 

@@ -4,8 +4,7 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import Conditions
-from care_sim.evaluation.miss_reasons import ELSEWHERE, EXPLAINED, NOT_DEMANDED, STARVED
-from care_sim.evaluation.ray_shares import RAY_SHARES
+from care_sim.evaluation.rays import ELSEWHERE, EXPLAINED, NOT_DEMANDED, RAY_SHARES, STARVED
 from care_sim.reports.tables.mechanism import mechanism_closing, mechanism_tables
 from care_sim.study.mechanism_play import BELIEF_MARKS, BELIEF_SUMS, DIFFERING, RECEIVED
 

@@ -7,7 +7,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.reports.figures.study_maps import ncap_figures
 from care_sim.reports.table import Bold
 from care_sim.reports.tables.ncap import impact_of, ncap_headline, ncap_tables
-from care_sim.study.designs.ncap import NcapCase
+from care_sim.study.designs.standards import NcapCase
 from care_sim.study.episode_config import grid
 from care_sim.study.rows.reading import with_added_columns
 from tests.helpers.made_rows import row

@@ -3,7 +3,7 @@
 from care_sim.reports.studies import STUDIES
 from care_sim.reports.table import Bold
 from care_sim.reports.tables.order import order_closing, order_tables
-from care_sim.study.designs.order import ORDERS, order_study
+from care_sim.study.designs.firing import ORDERS, order_study
 from tests.helpers.made_plays import study
 from tests.helpers.made_rows import as_in_the_paper
 

@@ -5,7 +5,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from care_sim.scenarios.r157.grid import (
+from care_sim.scenarios.r157 import (
     EGO_KPH,
     GAP_M,
     GAP_STEP_M,

@@ -7,21 +7,39 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from care_sim.driving.human_model import HUMAN_MODEL as HUMAN
-from care_sim.scenarios.r157.grid import (
+from care_sim.driving.drivers import HUMAN_MODEL as HUMAN
+from care_sim.scenarios.r157 import (
     GAP_STEP_M,
     KINDS,
+    KPH,
     RELATIVE_KPH,
     CutInCase,
     cases,
     kinds_in_turn,
+    preventable,
+    verdicts,
 )
-from care_sim.scenarios.r157.lane_intrusion import intrusion_s, must_be_avoided
-from care_sim.scenarios.r157.preventable import preventable, verdicts
 from care_sim.world.bodies import CATALOGUE
 
 EGO_LENGTH, EGO_WIDTH, _ = CATALOGUE["ego"].size
 STEP_S = 0.001
+
+
+def intrusion_s(one):
+    """Seconds from the begin of a lane change to the lane intrusion: when the side of the vehicle
+    crosses a line 0.3 m beyond the lane marking.
+    """
+    return ((HUMAN.lane_m - one.width_m) / 2 + 0.3) / one.lateral_mps
+
+
+def must_be_avoided(one):
+    """Whether paragraph 5.2.5.2 obliges the system to avoid a collision: the lateral movement has
+    been visible for 0.72 s, and at the intrusion the time to collision is above
+    v_rel / (2 * 6 m/s^2) + 0.35 s.
+    """
+    closing = one.relative_kph * KPH
+    ttc = one.gap_m / closing - intrusion_s(one)
+    return intrusion_s(one) >= 0.72 and ttc > closing / (2 * 6.0) + 0.35
 
 
 def case(relative_kph, gap_m, lateral_mps, kind="car"):

@@ -3,8 +3,7 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.scenarios import make_scenario
-from care_sim.scenarios.r157.grid import KINDS, SIDES, cases
-from care_sim.scenarios.r157.preventable import verdicts
+from care_sim.scenarios.r157 import KINDS, SIDES, cases, verdicts
 
 
 def build(seed=0, **parameters):

@@ -8,8 +8,7 @@ import pytest
 
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
-from care_sim.sensors.engines import ENGINES
-from care_sim.sensors.engines.fast import Fast
+from care_sim.sensors.engines import ENGINES, Fast
 from care_sim.world.bodies import CATALOGUE, BodyKind, Part
 from care_sim.world.bullet import NO_BODY, BulletWorld
 from tests.parity.engines import Engines

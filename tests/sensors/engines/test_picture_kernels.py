@@ -9,13 +9,12 @@ from hypothesis.extra.numpy import arrays
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.core.pinhole import PinholeCamera
-from care_sim.sensors.camera import FRONT_CAMERA, Picture
-from care_sim.sensors.engines.box_kernels import visible_boxes
-from care_sim.sensors.engines.bullet import Bullet
-from care_sim.sensors.engines.fast import Fast
+from care_sim.sensors.engines import Bullet, Fast
+from care_sim.sensors.engines.picture_kernels import visible_boxes
+from care_sim.sensors.pictures import FRONT_CAMERA, Picture
 from care_sim.world.bodies import CATALOGUE, BodyKind, Part
+from care_sim.world.body_tables import directions, polyhedron
 from care_sim.world.bullet import NO_BODY, BulletWorld
-from care_sim.world.polyhedra import directions, polyhedron
 
 SENSOR = Frame(0.0, 0.0, 1.84, 0.0)
 CROOKED = PinholeCamera(400, 220, 1.2, (0.5, 0.1, -0.2), 0.3, 0.05, 0.1)

@@ -6,7 +6,7 @@ import pytest
 from care_sim.base.errors import InvalidInput
 from care_sim.core.types import CLASSES
 from care_sim.sensors.annotated import NO_OBJECT
-from care_sim.sources.argoverse2.films import (
+from care_sim.sources.argoverse2.recordings import (
     ARGOVERSE2_CATEGORIES,
     ARGOVERSE2_SENSOR_HEIGHT_M,
     UP_LIDAR,

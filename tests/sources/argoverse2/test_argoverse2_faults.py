@@ -3,7 +3,7 @@ import pyarrow as pa
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.sources.argoverse2.films import argoverse2_film, sweep_files
+from care_sim.sources.argoverse2.recordings import argoverse2_film, sweep_files
 from tests.helpers.av2_log import CAR_AHEAD, box, parked, replaced, rewrite, stamp
 
 

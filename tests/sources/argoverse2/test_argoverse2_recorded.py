@@ -7,7 +7,11 @@ from pyarrow import feather
 from care_sim.core.grid import AngularGrid
 from care_sim.envs.open_loop import FilmEnv
 from care_sim.sensors.annotated import NO_OBJECT
-from care_sim.sources.argoverse2.films import ARGOVERSE2_SENSOR_HEIGHT_M, UP_LIDAR, argoverse2_film
+from care_sim.sources.argoverse2.recordings import (
+    ARGOVERSE2_SENSOR_HEIGHT_M,
+    UP_LIDAR,
+    argoverse2_film,
+)
 
 loaded = functools.cache(argoverse2_film)
 

@@ -10,10 +10,15 @@ from pyarrow import feather
 from care_sim.base.errors import InvalidInput
 from care_sim.core.frames import Frame
 from care_sim.sensors.annotated import NO_OBJECT
-from care_sim.sources.argoverse2.films import UP_LIDAR, _bodies, argoverse2_film, logs
-from care_sim.sources.argoverse2.recordings import Argoverse2
+from care_sim.sources.argoverse2.recordings import (
+    UP_LIDAR,
+    Argoverse2,
+    _bodies,
+    argoverse2_film,
+    logs,
+)
 from care_sim.sources.argoverse2.tables import read_boxes, read_points
-from care_sim.sources.boxes_as_bodies import annotations_of
+from care_sim.sources.box_films import annotations_of
 from care_sim.sources.named import source_of
 from care_sim.sources.nuscenes.sweeps import owners
 from tests.helpers.av2_log import CAR_AHEAD, parked, stamp

@@ -9,7 +9,7 @@ from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.core.types import CLASSES
 from care_sim.sensors.annotated import NO_OBJECT, Annotations
-from care_sim.sources.nuscenes.categories import DETECTION_NAMES, NUSCENES_CATEGORIES
+from care_sim.sources.nuscenes.detections import DETECTION_NAMES, NUSCENES_CATEGORIES
 from care_sim.sources.nuscenes.recordings import OFFICIAL, split_scenes
 from care_sim.sources.nuscenes.sweeps import owners, read_points
 from care_sim.sources.nuscenes.tables import Database

@@ -9,9 +9,9 @@ from care_sim.core.frames import Frame
 from care_sim.core.types import CLASSES, Detections, Ego, ImageDetections
 from care_sim.loops.film import Shot
 from care_sim.sensors.annotated import Annotations, Cloud, IdentifiedDetections
+from care_sim.sources.nuscenes.detections import MOST_BOXES, attribute, confidences, result_boxes
 from care_sim.sources.nuscenes.films import nuscenes_film
 from care_sim.sources.nuscenes.recordings import split_scenes
-from care_sim.sources.nuscenes.results_form import MOST_BOXES, attribute, confidences, result_boxes
 from care_sim.sources.nuscenes.tables import Database
 from tests.helpers.nuscenes_drive import KEYFRAMES, OBJECTS, SPLIT, write_drive
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.sources.kinds import recordings
-from care_sim.sources.sweeps.bags import points_of_cloud
+from care_sim.sources.installed import recordings
+from care_sim.sources.sweeps.recordings import points_of_cloud
 from tests.helpers.sweeps_log import START_NS, write_log
 
 pytest.importorskip("rosbags")

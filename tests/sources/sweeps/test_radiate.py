@@ -5,8 +5,8 @@ import pytest
 from scipy.spatial import cKDTree
 
 from care_sim.evaluation.sightings import Sightings
-from care_sim.sources.kinds import recordings
-from care_sim.sources.sweeps.recordings import log_of_folder
+from care_sim.sources.installed import recordings
+from care_sim.sources.sweeps.logs import log_of_folder
 from tests.helpers.examples import EXAMPLES, loaded
 from tests.helpers.places import ROOT
 

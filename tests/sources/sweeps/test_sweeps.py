@@ -10,7 +10,7 @@ from care_sim.core.types import CLASSES
 from care_sim.evaluation.sightings import Sightings
 from care_sim.sensors.annotated import NO_OBJECT
 from care_sim.sources.film_checks import check_film
-from care_sim.sources.kinds import recordings
+from care_sim.sources.installed import recordings
 from tests.helpers.places import ROOT
 from tests.helpers.sweeps_log import (
     APPEARS_S,
@@ -96,7 +96,7 @@ def test_every_form_of_file_holds_the_same_points(tmp_path, folder, form):
 
 
 def film_of_points(folder):
-    from care_sim.sources.sweeps.recordings import log_of_folder
+    from care_sim.sources.sweeps.logs import log_of_folder
 
     return log_of_folder(folder).points_of(7)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.sources.kinds import recordings
+from care_sim.sources.installed import recordings
 from tests.helpers.sweeps_log import START_NS, STEP_NS, pcd_header, stamps, sweep, write_log
 
 

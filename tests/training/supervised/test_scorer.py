@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from care_sim.base.seed_ranges import TRAINING, VALIDATION
+from care_sim.base.seeds import TRAINING, VALIDATION
 from care_sim.cli import main
 from care_sim.envs.open_loop import FilmEnv
 from care_sim.envs.scenarios import DriveEnv

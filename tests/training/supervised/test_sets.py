@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import care_sim
-from care_sim.base.seed_ranges import TRAINING
+from care_sim.base.seeds import TRAINING
 from care_sim.cli import main
-from care_sim.core.boxes import planar_ranges
+from care_sim.core.cells.boxes import planar_ranges
 from care_sim.core.grid import AngularGrid
 from care_sim.envs.scenarios import DriveEnv
 from care_sim.policies.learned.learned_sets import LEARNED_RETURNS, STEPS, SetNetwork

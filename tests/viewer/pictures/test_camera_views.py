@@ -6,7 +6,7 @@ import pytest
 
 from care_sim.sensors.annotated import NO_OBJECT
 from care_sim.viewer.palette import EXPLAINED_COLOUR, FALSE_COLOUR, UNEXPLAINED_COLOUR
-from care_sim.viewer.pictures.camera_views import PICTURES_TOP, cameras_picture
+from care_sim.viewer.pictures.episode_view import PICTURES_TOP, cameras_picture
 from care_sim.viewer.pictures.furnished_world import furnished
 from care_sim.viewer.pictures.keyframe import PICTURE_WIDTH
 

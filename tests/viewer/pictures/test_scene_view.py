@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from care_sim.core.actions import EXPLOITATION, FLOOR, RESERVE
+from care_sim.core.firing.actions import EXPLOITATION, FLOOR, RESERVE
 from care_sim.core.residual import wedge_rays
-from care_sim.envs.wrappers.watching import Watching
+from care_sim.envs.wrappers.record_rerun import Watching
 from care_sim.sources.named import source_of
 from care_sim.study.play_config import play_grid
-from care_sim.study.scene_trace import trace_scene
+from care_sim.study.scene_play import trace_scene
 from care_sim.viewer.palette import EXPLAINED_COLOUR, FOUND_COLOUR, NOT_FOUND_COLOUR, SHARE_COLOURS
 from care_sim.viewer.pictures.keyframe import (
     BELOW_SIZE,

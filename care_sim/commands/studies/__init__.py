@@ -1,1 +1,0 @@
-"""What `care-sim study NAME`, `sweep`, `reproduce` and `protocol` play."""

@@ -1,0 +1,1 @@
+"""Observations: their bounds, and those of many worlds as one table."""

@@ -1,0 +1,122 @@
+"""Results of episodes and drives, as pure functions of their keyframes; outcomes of collisions."""
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from enum import StrEnum
+
+import numpy as np
+
+from care_sim.loops.records import DriveOutcome, EncounterOutcome, Keyframe, Outcome, Records, Sight
+from care_sim.world.approach import Impact
+from care_sim.world.motions import Meeting
+
+
+def outcome(keyframes: Sequence[Keyframe]) -> Outcome:
+    """The result of an episode; the fields of `Outcome` say what each number is."""
+    return outcome_of(Records.of(keyframes), keyframes[-1].impact)
+
+
+def outcome_of(records: Records, impact: Impact | None) -> Outcome:
+    """The result of an episode with these `records`, (n,) each, which ends with the `impact`."""
+    # The first detection counts from the first keyframe on, in view or not: LiDAR may find what the
+    # camera does not show.
+    found = np.flatnonzero(records.detected)
+    first = float(records.distance_m[found[0]]) if len(found) else None
+
+    # What a policy lets come near is counted from when it could have been seen, not while it was
+    # hidden behind something.
+    is_seen = bool(records.in_view.any())
+    since = int(records.in_view.argmax())
+    unseen = since if is_seen else len(records.in_view)
+    nearest = float(records.distance_m[since:].min())
+    hits = np.flatnonzero(~np.isnan(records.impact_speed_mps))
+    return Outcome(
+        detection_distance_m=first,
+        # Without an actor every distance is inf, and there was nobody to detect.
+        undetected_to_m=nearest if first is None and np.isfinite(nearest) else None,
+        braked=bool(records.braking.any()),
+        braked_before_view=bool(records.unfounded[:unseen].any()),
+        min_distance_m=float(records.nearest_m[since:].min()) if is_seen else None,
+        clearance_m=float(records.clearance_m[since:].min()) if is_seen else None,
+        collision=len(hits) > 0,
+        impact_speed_mps=float(records.impact_speed_mps[hits[0]]) if len(hits) else None,
+        closing_speed_mps=impact.closing_mps if impact else None,
+        hit_kind=impact.kind if impact else None,
+        hit_at_front=impact.at_front if impact else None,
+        rays_fired=int(records.fired.sum()),
+    )
+
+
+def drive_outcome(
+    keyframes: Sequence[Keyframe], meetings: Sequence[Meeting], progress: float
+) -> DriveOutcome:
+    """The result of a drive with `meetings`, after a share `progress` of its way."""
+    impact = keyframes[-1].impact
+    return DriveOutcome(
+        **asdict(outcome(keyframes)),
+        hit_standing=impact.speed_mps == 0.0 if impact else None,
+        needless_braking=sum(record.needless for record in keyframes),
+        progress=min(max(progress, 0.0), 1.0),
+        encounters=tuple(
+            _encounter(
+                one,
+                [record.sights[number] for record in keyframes],
+                impact is not None and impact.body == one.body,
+            )
+            for number, one in enumerate(meetings)
+        ),
+    )
+
+
+def _encounter(meeting: Meeting, sights: Sequence[Sight], hit: bool) -> EncounterOutcome:
+    found = next((n for n, sight in enumerate(sights) if sight.detected), None)
+    return EncounterOutcome(
+        who=meeting.who,
+        side=meeting.side,
+        along_m=meeting.along_m,
+        way=meeting.way,
+        course=meeting.course,
+        occluder=meeting.occluder,
+        occluder_reported=meeting.occluder_reported,
+        set_off=bool(meeting.crosser.went),
+        view_keyframe=next((n for n, sight in enumerate(sights) if sight.in_view), None),
+        detection_keyframe=found,
+        detection_distance_m=None if found is None else sights[found].distance_m,
+        hit=hit,
+    )
+
+
+SAME_SPEED_MPS = 1 / 3.6
+"""Within 1 km/h a speed is the same: the tolerance of a test speed in Euro NCAP's protocols."""
+
+
+class CollisionOutcome(StrEnum):
+    """How it ended."""
+
+    AVOIDED = "avoided"
+    MITIGATED = "mitigated"
+    HIT = "hit"
+
+
+def collision_outcome(impact_mps: float | None, unbraked_mps: float) -> CollisionOutcome:
+    """How it ended, from the speed of the impact, None without one, and that at which a car hits
+    that does not brake.
+    """
+    if impact_mps is None:
+        return CollisionOutcome.AVOIDED
+    slower = impact_mps < unbraked_mps - SAME_SPEED_MPS
+    return CollisionOutcome.MITIGATED if slower else CollisionOutcome.HIT
+
+
+BEST_SCORE = 5.0
+"""Of a test without a contact."""
+_MOST_OF_A_HIT = 4.0
+
+
+def score(impact: float | None, reference: float) -> float:
+    """5 without an impact, else 4 max(0, 1 - impact / reference), speeds in m/s (Ljungbergh et al.
+    2024, NeuroNCAP).
+    """
+    if impact is None:
+        return BEST_SCORE
+    return _MOST_OF_A_HIT * max(0.0, 1.0 - impact / reference)

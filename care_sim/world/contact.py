@@ -1,0 +1,277 @@
+"""Contact and clearance: what happens to the ego while its world moves on to the next keyframe."""
+
+import math
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from care_sim.base.compiled import compiled
+from care_sim.core.arrays import Floats, Integers
+from care_sim.world.approach import ClosestApproach, Impact
+from care_sim.world.bodies import BodyKind
+from care_sim.world.body_tables import Footprints
+from care_sim.world.bullet import BulletWorld
+from care_sim.world.bullet_bodies import OPAQUE, BulletBodies, LentClient, pybullet
+
+PADDING_M = 0.05
+"""PyBullet's distances may be this much less than those of the exact hulls; 2 mm were seen."""
+
+
+@compiled()
+def least_gap(box: Floats, other: Floats) -> float:
+    """What two boxes (7,) on the ground are apart at least, metres; -inf where they may overlap."""
+    # In the plane, and in the axes of the first: there an upright rectangle holds the other.
+    dx, dy, turned = other[0] - box[0], other[1] - box[1], other[6] - box[6]
+    cos, sin = math.cos(box[6]), math.sin(box[6])
+    ahead, aside = cos * dx + sin * dy, cos * dy - sin * dx
+    cos, sin = abs(math.cos(turned)), abs(math.sin(turned))
+    along = abs(ahead) - (box[3] + other[3] * cos + other[4] * sin) / 2
+    across = abs(aside) - (box[4] + other[3] * sin + other[4] * cos) / 2
+    if along <= 0 and across <= 0:
+        return -math.inf
+    return math.hypot(max(along, 0.0), max(across, 0.0))
+
+
+@compiled(brief=True)
+def nearest_parts(own: Floats, other: Floats, poses: Floats) -> tuple[Floats, Integers]:
+    """What the parts of two bodies are apart at least, metres, ascending, (n * m,); and which two
+    each tells of: i * m + j is part i of n and part j of m. -inf where they may overlap.
+
+    Of the parts the boxes are told, (n, 6) and (m, 6), centre and size in the frame of their body;
+    the bodies stand at `poses` (2, 7) as in `care_sim.world.body_tables.Primitives.poses`.
+    """
+    boxes, others = _standing_parts(own, poses[0]), _standing_parts(other, poses[1])
+    # A body that does not stand upright is in no such box.
+    tilted = poses[0, 3] != 0 or poses[0, 4] != 0 or poses[1, 3] != 0 or poses[1, 4] != 0
+    gaps = np.empty(len(boxes) * len(others))
+    pairs = np.empty(len(gaps), np.int64)
+    count = 0
+    for i in range(len(boxes)):
+        for j in range(len(others)):
+            box, there = boxes[i], others[j]
+            aside = max(least_gap(box, there), 0.0)
+            above = max(abs(box[2] - there[2]) - (box[5] + there[5]) / 2, 0.0)
+            apart = math.hypot(aside, above)
+            gap = apart if apart > 0 and not tilted else -math.inf
+
+            # Each takes its place among those before it: they are few.
+            place = count
+            while place and gaps[place - 1] > gap:
+                gaps[place], pairs[place] = gaps[place - 1], pairs[place - 1]
+                place -= 1
+            gaps[place], pairs[place] = gap, count
+            count += 1
+    return gaps, pairs
+
+
+@compiled()
+def _standing_parts(parts: Floats, pose: Floats) -> Floats:
+    """(n, 7) the boxes of the parts (n, 6) of an upright body, in the world frame."""
+    boxes = np.empty((len(parts), 7))
+    yaw = 2 * math.atan2(pose[5], pose[6])
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    for n in range(len(boxes)):
+        x, y = parts[n, 0], parts[n, 1]
+        boxes[n, 0] = pose[0] + cos * x - sin * y
+        boxes[n, 1] = pose[1] + sin * x + cos * y
+        boxes[n, 2] = pose[2] + parts[n, 2]
+        boxes[n, 3:6] = parts[n, 3:6]
+        boxes[n, 6] = yaw
+    return boxes
+
+
+CONTACT_REACH_M = 0.5
+"""Contact is looked for among bodies this close: far more than the centimetres by which hulls are
+padded.
+"""
+MOST_KINDS = 256
+"""A judge that worlds share knows no more kinds of bodies: streets may have kinds of their own."""
+
+
+class StandIn(NamedTuple):
+    """What stands in for a body: a body for each of its n parts, and the boxes of these, (n, 6)
+    centre and size in the frame of the body.
+    """
+
+    bodies: list[int]
+    boxes: Floats
+
+
+StandIns = tuple[StandIn, StandIn]
+"""For an ego and another body."""
+
+
+class ClearanceJudge:
+    """The distances of `BulletWorld.clearance`, to the last bit, between an ego and another body,
+    given by their kinds and poses.
+    """
+
+    def __init__(self) -> None:
+        self._client = LentClient()
+        self._bodies = BulletBodies(self._client, ground=False)
+        self._egos: dict[BodyKind, StandIn] = {}
+        self._others: dict[BodyKind, StandIn] = {}
+
+    def stand_ins(self, ego: BodyKind, other: BodyKind) -> StandIns:
+        """What stands in for an ego of one kind and another body of the other."""
+        return self._known(self._egos, ego), self._known(self._others, other)
+
+    def clearance(
+        self,
+        bodies: StandIns,
+        poses: Floats | Sequence[Sequence[float]],
+        within: float = 100.0,
+    ) -> float:
+        """Smallest distance between the hulls of two stand-ins at `poses` (2, 7), as in
+        `Primitives.poses`, metres; negative when they overlap, inf beyond `within`.
+        """
+        ego, other = bodies
+        places = np.asarray(poses, float)
+        gaps, pairs = nearest_parts(ego.boxes, other.boxes, places)
+        own, others = places.tolist()
+        least = math.inf
+        for gap, pair in zip(gaps.tolist(), pairs.tolist(), strict=True):
+            if gap - PADDING_M > min(least, within):
+                break
+            part, there = divmod(pair, len(other.bodies))
+            number = self._bodies.put(ego.bodies[part], own)
+            other_number = self._bodies.put(other.bodies[there], others)
+            least = min(least, self._bodies.clearance(number, other_number, within))
+        return least
+
+    def touch(self, kinds: tuple[BodyKind, BodyKind], poses: Floats) -> bool:
+        """Whether the hulls of an ego and another body of these kinds touch at `poses` (2, 7), as
+        in `Primitives.poses`.
+        """
+        return self.clearance(self.stand_ins(*kinds), poses, CONTACT_REACH_M) <= 0.0
+
+    @property
+    def serves_on(self) -> bool:
+        """Whether it can be asked further: it knows few kinds, and nobody else has closed or
+        emptied its client.
+        """
+        made = self._bodies.made
+        if not made:
+            return not self._client.closed
+        client = self._client.number
+        is_whole = pybullet.isConnected(client) and made == pybullet.getNumBodies(client)
+        return is_whole and len(self._egos) + len(self._others) < MOST_KINDS
+
+    def close(self) -> None:
+        """Free the simulator."""
+        self._client.close()
+
+    def _known(self, known: dict[BodyKind, StandIn], kind: BodyKind) -> StandIn:
+        if kind not in known:
+            bodies = [self._bodies.add([part], (), OPAQUE) for part in kind.parts]
+            boxes = np.array([(*part.centre, *part.size) for part in kind.parts], float)
+            known[kind] = StandIn(bodies, boxes)
+        return known[kind]
+
+
+class _Shared(threading.local):
+    judge: ClearanceJudge | None = None
+
+
+_SHARED = _Shared()
+
+
+def judge_here() -> ClearanceJudge:
+    """The judge that the worlds of this thread share. It serves until the next call, and in this
+    thread alone.
+    """
+    if _SHARED.judge is None or not _SHARED.judge.serves_on:
+        _SHARED.judge = ClearanceJudge()
+    return _SHARED.judge
+
+
+class Passage:
+    """How close the body `ego` comes to the body `target`, if there is one, and how it first hits
+    any other. It looks after every world step: between two keyframes the car may hit something and
+    be past it, or come closest to it.
+
+    `footprints` and `bullet` say where all bodies are, `kinds` what they are, and `velocities_of`
+    gives the (n, 2) velocities of bodies (n,).
+    """
+
+    def __init__(
+        self,
+        footprints: Footprints,
+        bullet: BulletWorld,
+        kinds: Mapping[int, BodyKind],
+        ego: int,
+        target: int | None,
+        velocities_of: Callable[[Integers], Floats],
+    ):
+        self._footprints = footprints
+        self._bullet = bullet
+        self._kinds = kinds
+        self._ego = ego
+        self._velocities_of = velocities_of
+        self._judge = judge_here()
+        self._impact: Impact | None = None
+        self._nearest_m = np.inf
+        self._least: LeastClearance | None = None
+        if target is not None:
+            self._two = np.array([ego, target])
+            self._least = LeastClearance(self._judge, kinds[ego], kinds[target])
+
+    def look(self, speed_mps: float) -> None:
+        """Look at the world after a step, which left the ego with a speed."""
+        if self._impact is None:
+            self._impact = self._contact(speed_mps)
+        if self._least is not None:
+            boxes = own, other = self._footprints.boxes[self._two]
+            away = np.hypot(other[0] - own[0], other[1] - own[1])
+            self._nearest_m = min(self._nearest_m, float(away))
+            self._least.note(boxes, self._bullet.primitives.poses[self._two])
+
+    def closest(self) -> ClosestApproach:
+        """What came of it."""
+        clearance_m = np.inf if self._least is None else self._least.metres()
+        return ClosestApproach(self._nearest_m, clearance_m, self._impact)
+
+    def _contact(self, speed_mps: float) -> Impact | None:
+        """The ego's contact with a body now."""
+        # The exact distance is PyBullet's; asking it about every body would take most of a step.
+        own = self._kinds[self._ego]
+        for body in self._footprints.near(self._ego, CONTACT_REACH_M).tolist():
+            poses = self._bullet.primitives.poses[[self._ego, body]]
+            kind = self._kinds[body]
+            if self._judge.touch((own, kind), poses):
+                (velocity,) = self._velocities_of(np.array([body]))
+                boxes = self._footprints.boxes
+                return Impact.on(body, kind.name, boxes, self._ego, speed_mps, velocity)
+        return None
+
+
+class LeastClearance:
+    """Between the hulls of an `ego` and an `other` body of these kinds, at the moments that were
+    noted. PyBullet's exact distance costs more than everything else that is scored in a step, so it
+    is asked about few: while two bodies come nearer, about the last moment alone.
+    """
+
+    def __init__(self, judge: ClearanceJudge, ego: BodyKind, other: BodyKind):
+        self._judge = judge
+        self._kinds = ego, other
+        self._moments: list[tuple[float, Floats]] = []
+
+    def note(self, boxes: Floats, poses: Floats) -> None:
+        """Note where the two are now: the boxes (2, 7) that hold them, and their poses (2, 7) as in
+        `care_sim.world.body_tables.Primitives.poses`.
+        """
+        self._moments.append((least_gap(*boxes) - PADDING_M, poses))
+
+    def metres(self) -> float:
+        """The least clearance of all moments; negative when the hulls overlapped."""
+        # First the moment at which they could be nearest. Whoever was farther apart than what is
+        # found by then need not be asked about.
+        least = math.inf
+        for at_least, poses in sorted(self._moments, key=lambda moment: moment[0]):
+            if at_least > least:
+                break
+            stand_ins = self._judge.stand_ins(*self._kinds)
+            least = min(least, self._judge.clearance(stand_ins, poses))
+        return least
