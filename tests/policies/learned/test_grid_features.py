@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_sim.base.errors import InvalidInput
 from care_sim.core.belief import Belief
 from care_sim.core.residual import camera_layers
 from care_sim.core.rig import Rig
@@ -47,10 +46,6 @@ def scan(*returns):
     return ranges
 
 
-def test_an_empty_belief_is_black():
-    assert not FEATURES(belief())["grid"].any()
-
-
 def test_the_car_itself():
     assert FEATURES(belief())["ego"] == pytest.approx([0.2, 0.1, -0.2, 492 / 16384])
 
@@ -65,12 +60,6 @@ def test_hulls_and_wedges_are_shares_of_blocks():
     )
     np.testing.assert_allclose(drawn["residual"], pooled(unexplained[0]), atol=1e-6)
     np.testing.assert_allclose(drawn["explained"], pooled(explained[0]), atol=1e-6)
-
-
-def test_hulls_that_overlap_count_a_cell_once():
-    np.testing.assert_array_equal(
-        pictures(belief([CAR, CAR]))["forecast"], pictures(belief([CAR]))["forecast"]
-    )
 
 
 def test_the_nearest_return_of_a_block_and_the_share_fired():
@@ -115,18 +104,3 @@ def test_every_value_stays_within_its_bounds(seed):
     assert drawn["grid"].min() >= 0
     assert drawn["grid"].max() <= 1
     assert np.abs(drawn["ego"]).max() <= 1
-
-
-def test_other_blocks():
-    features = GridFeatures(RIG, 16, 2)
-    assert pictures(belief([CAR]), features)["forecast"].shape == (2, 16)
-    np.testing.assert_allclose(
-        pictures(belief([CAR]), features)["forecast"],
-        pictures(belief([CAR]))["forecast"].reshape(2, 4, 16, 4).mean((1, 3)),
-        atol=1e-6,
-    )
-
-
-def test_blocks_that_do_not_divide_the_grid_are_refused():
-    with pytest.raises(InvalidInput, match="azimuths must divide the 512"):
-        GridFeatures(RIG, 60, 8)

@@ -14,7 +14,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.belief import Belief
 from care_sim.core.cells.sets import CellSets
 from care_sim.core.grid import AngularGrid
-from care_sim.core.types import CLASSES, Ego, Tracks
+from care_sim.core.types import Ego, Tracks
 from care_sim.policies.learned.learned_sets import STEPS, SetNetwork
 from care_sim.policies.learned.set_items import ITEM_INPUTS, MIRRORED, STRIP_INPUTS, ItemReader
 from care_sim.policies.learned.set_kernels import best_cells, needed_cells
@@ -100,13 +100,6 @@ def test_the_order_of_a_sum_changes_no_chance(drawn, tmp_path, encounter, enviro
         np.testing.assert_array_equal(other.chances(items), network.chances(items))
         told = (each.strip_chances(items, reader.places) for each in (network, other))
         np.testing.assert_array_equal(*told)
-
-
-def test_without_boxes_and_tracks_the_strips_alone_are_served(drawn, environment, belief_of):
-    policy = care_sim.make_policy("learned-sets", environment, path=drawn)
-    ((cells,),) = policy.demand(belief_of()).layers
-    assert len(np.unique(cells)) == len(cells) == 819
-    assert set(cells) <= {*policy._items.strips.ravel()}
 
 
 def test_of_a_mirrored_street_the_same_is_told(environment, belief_of, car):
@@ -264,22 +257,3 @@ def test_weights_for_something_else_are_refused_in_one_line(tmp_path, environmen
     with pytest.raises(InvalidInput, match=message) as refusal:
         care_sim.make_policy("learned-sets", environment, path=tmp_path / "w.npz")
     assert "\n" not in str(refusal.value)
-
-
-@pytest.mark.parametrize(
-    ("parameters", "message"),
-    [
-        ({"min_returns": 0}, "min_returns must be a whole number"),
-        ({"refresh_per_s": -1}, "refresh_per_s must"),
-        ({"refresh_per_s": float("nan")}, "refresh_per_s must"),
-    ],
-)
-def test_bad_parameters_are_named(environment, parameters, message):
-    with pytest.raises(InvalidInput, match=message):
-        care_sim.make_policy("learned-sets", environment, **parameters)
-
-
-def test_every_class_has_a_column():
-    assert [name for name in ITEM_INPUTS if name.startswith("is a ")][1:] == [
-        f"is a {name}" for name in CLASSES
-    ]

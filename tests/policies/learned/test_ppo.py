@@ -2,8 +2,6 @@
 without PyTorch.
 """
 
-import subprocess
-import sys
 from dataclasses import asdict
 
 import gymnasium
@@ -71,17 +69,6 @@ def test_every_sector_sees_its_blocks_and_one_more_on_each_side_over_the_seam():
     assert not scores(observation(wrapping, 0, (0, 0))).any()
 
 
-def test_without_a_seam_the_last_sector_is_no_neighbour_of_the_first():
-    wrapping = Wrapping(azimuths=4, elevations=1, columns=4, rows=1)
-    kernel = np.ones((1, len(CHANNELS), 3, 3))
-    network = {"window.weight": kernel, "hidden.weight": [[1.0]], "score.weight": [0.1]}
-    lit = np.tanh(0.1)
-    for goes_round, expected in ((True, [lit, lit, 0, lit]), (False, [lit, lit, 0, 0])):
-        scores = score_map(wrapping, goes_round, **network)
-        found = scores(observation(wrapping, 1, (0, 0)))
-        np.testing.assert_allclose(found, [expected], atol=1e-6)
-
-
 def test_the_cars_own_motion_and_the_place_count():
     wrapping = Wrapping(azimuths=2, elevations=1, columns=2, rows=1)
     own = {
@@ -136,23 +123,6 @@ def test_numpy_predicts_what_stable_baselines3_does(tmp_path, env, goes_round):
         observations, *_ = envs.step(actions)
     assert np.abs(actions).max() > 0.01
     envs.close()
-
-
-WITHOUT_TORCH = """
-import sys
-import gymnasium, care_sim
-env = gymnasium.make("CARE-Dense-v0", budget=0.03)
-policy = care_sim.make_policy("ppo", env, path=sys.argv[1])
-observation, _ = env.reset(seed=0)
-for _ in range(3):
-    observation, *_ = env.step(policy(observation))
-assert not {"torch", "stable_baselines3"} & set(sys.modules)
-"""
-
-
-def test_it_acts_without_torch(tmp_path):
-    path = untrained(tmp_path / "w.npz")
-    subprocess.run([sys.executable, "-c", WITHOUT_TORCH, str(path)], check=True, timeout=120)
 
 
 @pytest.mark.parametrize(
@@ -232,10 +202,3 @@ def test_it_is_no_policy_behind_wrappers_of_learners(env):
         ):
             care_sim.make_policy("ppo", wrapped)
     care_sim.make_policy("ppo", SectorReserve(env).unwrapped)
-
-
-def test_the_observation_of_a_wrapped_environment_is_refused_in_one_line(env):
-    policy = care_sim.make_policy("ppo", env)
-    seen, _ = GridObservation(env).reset(seed=0)
-    with pytest.raises(InvalidInput, match="an observation of CARE-Sim's environments is needed"):
-        policy(seen)
