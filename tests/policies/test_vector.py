@@ -281,10 +281,3 @@ def test_what_is_no_observation_of_its_rig_is_refused_in_one_line(key, value, de
         policy(observations[0], np.ones(2, np.bool_))
     with pytest.raises(InvalidInput, match="mask must be 3 truth values"):
         policy.reset(np.arange(3))
-
-
-def test_actions_are_for_reading(dense):
-    rig, observations = dense
-    for make in (Care, Random, Halved):
-        with pytest.raises(ValueError, match="read-only"):
-            vector_policy(lambda make=make: make(rig), WORLDS)(observations[0])[0] = 1.0

@@ -5,8 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-import care_sim
-from care_sim.base.errors import InvalidInput
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
 from care_sim.policies import controls
@@ -23,7 +21,6 @@ from care_sim.policies.controls.patterns import (
 from care_sim.policies.controls.patterns_and_tracks import HistoryPlace, HistoryRows, PlaceHulls
 from care_sim.policies.controls.rehearsed import HistoryLearnedPlace, learned_cells
 from care_sim.policies.learned.weights import Card, save_weights
-from care_sim.policies.paper.tracks import uniform_pattern
 
 CONTROLS = [
     "rows",
@@ -121,12 +118,6 @@ def test_the_sweep_fires_every_cell_once_in_a_turn():
     assert np.array_equal(cells[GRID.size :], cells[: 17_000 - GRID.size])
 
 
-@pytest.mark.parametrize("budget", [100, 1638])
-def test_the_stride_is_the_even_pattern_of_the_budget_that_it_is_told(budget):
-    ((cells,),) = Stride(Rig(budget=819)).demand(BudgetAlone(budget)).layers
-    assert np.array_equal(cells, uniform_pattern(GRID, budget))
-
-
 def test_place_takes_the_highest_of_its_map(tmp_path):
     sightings = np.zeros(GRID.shape, np.float32)
     sightings[9, 300] = 2
@@ -136,18 +127,6 @@ def test_place_takes_the_highest_of_its_map(tmp_path):
     assert cells[:2].tolist() == [4 * 512 + 7, 9 * 512 + 300]
     rows = cells_by_row(Rig())
     assert np.array_equal(cells[2:], rows[~np.isin(rows, cells[:2])])
-
-
-def test_place_refuses_weights_of_another_kind(tmp_path):
-    save_weights(tmp_path / "other.npz", {}, Card("learned-scorer", GRID))
-    with pytest.raises(InvalidInput, match="kind is 'learned-scorer', needed is 'place'"):
-        Place(Rig(), tmp_path / "other.npz")
-
-
-@pytest.mark.parametrize("elevation", [float("nan"), 91, "level"])
-def test_rows_refuse_what_is_no_elevation(elevation):
-    with pytest.raises(InvalidInput, match="elevation_deg must lie in"):
-        Rows(Rig(), elevation)
 
 
 HULL = [row * GRID.columns + column for row in range(7, 14) for column in range(249, 263)]
@@ -217,11 +196,3 @@ def test_the_map_has_its_share_first_and_the_hulls_two_rounds(map_file, belief_o
     for one, other, core in zip(few, more, cores, strict=True):
         assert len({*one} | {*other}) == 12
         assert {*one} | {*other} <= {*core}
-
-
-def test_it_asks_no_camera(map_file, environment, encounter):
-    policy = care_sim.make_policy("place-hulls", environment, path=map_file)
-    for observation in encounter:
-        blind = observation | {"detections": np.zeros_like(observation["detections"])}
-        blind["detections"][:, 0] = -1
-        assert np.array_equal(policy(observation), policy(blind))

@@ -237,18 +237,3 @@ def test_all_leaves_controls_out_unless_they_are_named():
     assert contenders() == [name for name in policy_names() if "control" not in tags_of(name)]
     assert expanded(["all", "seed-finder", "care"], contenders()) == [*contenders(), "seed-finder"]
     assert expanded(["care"], contenders()) == ["care"]
-
-
-@pytest.mark.parametrize(
-    ("parameters", "message"),
-    [
-        ({"scenario": "moon"}, "unknown scenario 'moon'"),
-        ({"scenario": ["moon"]}, "unknown scenario"),
-        ({"seeds": 0}, "seeds must be"),
-        ({"seeds": 1.5}, "seeds must"),
-        ({"hidden_first": 1}, "hidden_first must be True or False"),
-    ],
-)
-def test_other_parameters_are_refused(make, parameters, message):
-    with pytest.raises(InvalidInput, match=message):
-        care_sim.make_policy("seed-finder", make(), **parameters)

@@ -21,7 +21,6 @@ from care_sim.policies.learned.weights import (
     Weights,
     load_weights,
     save_weights,
-    shipped_weights,
 )
 from care_sim.training.validation import ValidationScore, play, rule
 from tests.helpers.untrained import shapes, untrained
@@ -173,26 +172,6 @@ def test_the_shipped_weights_fit_any_budget_and_see_the_person_early(name, budge
         distances[policy] = score.distance_m
         env.close()
     assert distances[name] > distances["history"] + 2
-
-
-def test_on_the_dense_street_a_place_is_enough_and_so_are_pictures(tmp_path, env):
-    """What the results say of the shipped weights: without pictures as early, without the place
-    nearly so.
-    """
-    weights = load_weights(shipped_weights("ppo-dense"))
-    paths = [shipped_weights("ppo-dense")]
-    for name in ("window.weight", "place"):
-        paths.append(tmp_path / f"without-{name}.npz")
-        save_weights(
-            paths[-1], weights.arrays | {name: np.zeros_like(weights.arrays[name])}, weights.card
-        )
-    distances = []
-    for path in paths:
-        policy = care_sim.make_policy("ppo", env, path=path)
-        played = play(env, lambda seen, _, policy=policy: policy(seen), dict.fromkeys(range(3), ""))
-        distances.append(ValidationScore.of(played).distance_m)
-    assert distances[0] == distances[1] > 15
-    assert distances[2] > distances[0] - 1
 
 
 def test_it_is_no_policy_behind_wrappers_of_learners(env):

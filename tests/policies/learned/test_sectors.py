@@ -169,14 +169,6 @@ def test_no_more_tiles_than_hold_enough():
     assert counts == [0, 1, 1, 2, 4]
 
 
-def test_every_picture_is_ranked_by_itself():
-    scores = np.array([[[0.2, 0.1], [0.0, 0.3]], [[-1, -1], [-1, 2]], [[-1, -1], [-1, -1]]])
-    ranked, counts = QUARTERS.ranked(scores, 16)
-    assert counts.tolist() == [3, 1, 0]
-    assert ranked[0].tolist() == [3, 0, 1, 2]
-    assert ranked[1, 0] == 3
-
-
 @given(st.sampled_from([1, 2, 4, 8, 16, 512]), st.sampled_from([1, 2, 4, 32]))
 def test_the_tiles_part_the_grid(azimuths, elevations):
     tiling = Tiling(AngularGrid(), azimuths, elevations)

@@ -100,16 +100,6 @@ def test_without_camera_and_tracks_it_is_the_sector_then_rows(belief_of):
     assert asked == [[], [sector], [], [], [], [rows[:512]], [], [rows[:819]]]
 
 
-@pytest.mark.parametrize("shape", [(64, 16), (1024, 64)])
-def test_the_row_of_the_sector_is_that_of_any_grid(shape, belief_of):
-    grid = AngularGrid(*shape)
-    (sector,) = CareSector(Rig(grid=grid)).demand(belief_of()).layers[1]
-    x, y, z = grid.directions[sector].T
-    assert np.rad2deg(np.abs(np.arctan2(y, x))).max() < 14.6
-    off = np.abs(np.rad2deg(np.arcsin(z)) + 1.25)
-    assert off.max() <= np.rad2deg(grid.row_height) / 2
-
-
 def test_wedges_and_hulls_are_served_in_rounds(environment, encounter):
     policy = care_sim.make_policy("care-sector", environment)
     served = np.zeros(5, int)
@@ -213,30 +203,3 @@ def test_the_newest_picture_decides_whether_pictures_are_late(
         layers = policy.demand(policy.rig.read({**observation, "detections": detections})).layers
         asked += sum(map(len, layers[5]))
     assert (asked == 0) == is_late
-
-
-def test_a_late_picture_gets_one_round_of_its_wedges(environment, encounter):
-    policy = care_sim.make_policy("care-sightlines", environment)
-    rest = {}
-    for age in (0.0, 0.1):
-        asked = []
-        for observation in encounter:
-            detections = observation["detections"].copy()
-            detections[:, ImageDetections.AGE] = age
-            policy({**observation, "detections": detections})
-            first, more = policy.demanded.layers[0], policy.demanded.layers[5]
-            asked.append((sum(map(len, first)), sum(map(len, more))))
-        rest[age] = np.sum(asked, axis=0)
-    assert rest[0.0][0] == rest[0.1][0] > 0
-    assert rest[0.0][1] > 0
-    assert rest[0.1][1] == 0
-
-
-def test_one_round_of_wedges_leaves_hulls_their_second(environment, encounter):
-    policy = care_sim.make_policy("care-sightlines", environment, wedge_rounds=1)
-    longest = np.zeros(2, int)
-    for observation in encounter:
-        layers = policy.demand(policy.rig.read(observation)).layers
-        found = [max(map(len, layers[number]), default=0) for number in (5, 7)]
-        longest = np.maximum(longest, found)
-    assert longest.tolist() == [0, 9]

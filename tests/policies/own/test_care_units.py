@@ -65,7 +65,7 @@ def test_the_units_that_are_worth_the_most_by_hand(asks, belief_of, firing, cell
     assert [*dict.fromkeys(rig.hardware.unit_of[taken].tolist())] == units
 
 
-@pytest.mark.parametrize("firing", ["tiles", "segments", "rows", "azimuth-window"])
+@pytest.mark.parametrize("firing", ["tiles", "azimuth-window"])
 def test_what_it_demands_fires(firing):
     with gymnasium.make("CARE-Dense-v0", budget=0.05, firing=firing) as env:
         policy = care_sim.make_policy("care-units", env)
@@ -161,12 +161,6 @@ def test_the_shots_that_care_units_asks_for_are_paid_and_fired():
             assert (fired[cells] >= asked).all()
             several = max(several, np.count_nonzero(asked > 1))
         assert several > 50
-
-
-def test_with_free_cells_the_demand_tells_no_shots(belief_of, car):
-    policy = CareUnits(rig("cells", **FOG))
-    policy.reset()
-    assert policy.demand(belief_of([car(1, 12.0)])).shots is None
 
 
 class Asks(Policy):

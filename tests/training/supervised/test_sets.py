@@ -61,6 +61,12 @@ def test_what_acts_is_what_has_learned(learned, tmp_path):
     losses = sets.losses_of(learned, [one])
     assert losses["items"] == pytest.approx(told, rel=1e-2)
     assert losses["strips"] == pytest.approx(strips, rel=1e-3)
+    # In a batch a keyframe of fewer items is padded, and padding tells nobody anything.
+    other = next(example for example in drawn(5) if len(example.answers) == 2)
+    alone = [sets.losses_of(learned, [each])["items"] for each in (one, other)]
+    assert sets.losses_of(learned, [one, other])["items"] == pytest.approx(
+        np.average(alone, weights=[5, 2]), rel=1e-4
+    )
 
 
 @pytest.mark.parametrize("without", [["attention"], ["inputs"], ["attention", "inputs", "place"]])
