@@ -134,6 +134,9 @@ def test_runs_that_differ_by_their_seed_lie_together(folders, tmp_path):
     groups = grouped_runs(map(read_run, [*folders, others]))
     assert [len(group) for group in groups] == [2, 1, 1, 1]
     assert curves_table(groups).rows[-1][0] == "ppo, CARE-Dense-v0, without tracks"
+    longer = read_run(folder(tmp_path / "longer", PpoConfig(seed=5), (*DISTANCES, 16.0)))
+    (row,) = curves_table([[*groups[0], longer]]).rows
+    assert row[1:3] == ("3", "200"), "the last evaluation that all have"
 
 
 def learned(axes):
