@@ -184,7 +184,8 @@ def read_config(path: Path) -> dict[str, Any]:
         raise InvalidInput(f"{path} is damaged: {error}") from error
     if not isinstance(config, dict):
         raise InvalidInput(f"{path} is no configuration of a training run: it holds no map")
-    listed = config.get("env") if isinstance(config.get("env"), list) else [config.get("env")]
+    env = config.get("env")
+    listed = env if isinstance(env, list) else [env]
     right = {
         "algorithm": config.get("algorithm") in ALGORITHMS,
         "env": bool(listed) and all(isinstance(name, str) for name in listed),

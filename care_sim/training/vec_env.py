@@ -53,7 +53,8 @@ class GymnasiumVecEnv(VecEnv):
         # Seeds are for one reset.
         self._reset_seeds()
         self.reset_infos = info_of_each(infos, self.num_envs)
-        return self._kept(observation)
+        seen: VecEnvObs = self._kept(observation)
+        return seen
 
     def step_async(self, actions: NDArray[Any]) -> None:
         """Take the actions (W, ...) of the next `step_wait`."""

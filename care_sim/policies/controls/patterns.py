@@ -2,6 +2,7 @@
 
 import math
 from os import PathLike
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +30,7 @@ class Pattern(FixedPolicy):
     Raises InvalidInput for less than one shot.
     """
 
-    tags = ("causal", "control")
+    tags: ClassVar[tuple[str, ...]] = ("causal", "control")
     source = "own: a pattern that never changes"
     is_pattern = True
 
