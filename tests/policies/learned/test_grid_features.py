@@ -62,6 +62,12 @@ def test_hulls_and_wedges_are_shares_of_blocks():
     np.testing.assert_allclose(drawn["explained"], pooled(explained[0]), atol=1e-6)
 
 
+def test_hulls_that_overlap_count_a_cell_once():
+    np.testing.assert_array_equal(
+        pictures(belief([CAR, CAR]))["forecast"], pictures(belief([CAR]))["forecast"]
+    )
+
+
 def test_the_nearest_return_of_a_block_and_the_share_fired():
     drawn = pictures(belief(ranges=scan((0, 0, 10.0), (3, 7, 20.0), (1, 1, 50.0), (0, 8, 50.0))))
     assert drawn["nearness"][0, 0] == pytest.approx(0.8)

@@ -68,6 +68,17 @@ def test_every_sector_sees_its_blocks_and_one_more_on_each_side_over_the_seam():
     assert not scores(observation(wrapping, 0, (0, 0))).any()
 
 
+def test_without_a_seam_the_last_sector_is_no_neighbour_of_the_first():
+    wrapping = Wrapping(azimuths=4, elevations=1, columns=4, rows=1)
+    kernel = np.ones((1, len(CHANNELS), 3, 3))
+    network = {"window.weight": kernel, "hidden.weight": [[1.0]], "score.weight": [0.1]}
+    lit = np.tanh(0.1)
+    for goes_round, expected in ((True, [lit, lit, 0, lit]), (False, [lit, lit, 0, 0])):
+        scores = score_map(wrapping, goes_round, **network)
+        found = scores(observation(wrapping, 1, (0, 0)))
+        np.testing.assert_allclose(found, [expected], atol=1e-6)
+
+
 def test_the_cars_own_motion_and_the_place_count():
     wrapping = Wrapping(azimuths=2, elevations=1, columns=2, rows=1)
     own = {
