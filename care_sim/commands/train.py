@@ -30,7 +30,7 @@ def train(options: Learner) -> int:
     """Train an agent."""
     table = read_hyperparameters(options.kind, options.env, options.hyperparameters, options.drawn)
     config = options.kind(**{one.name: getattr(options, one.name) for one in fields(options.kind)})
-    print_lines(*table.told(config))
+    print_lines(table.told(config))
     train_agent(config)
     print_lines(*end_of_training(config))
     return 0

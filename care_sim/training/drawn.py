@@ -25,7 +25,7 @@ one in an episode, and follow what is seen late.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Protocol
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -246,7 +246,7 @@ class MissedChances(gymnasium.Wrapper[Any, Any, Any, Any]):
     It asks the truth, as every reward may. Observation and action stay as they are.
     """
 
-    _count: "_Count"
+    _count: "_InWorld | _InScene"
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -269,20 +269,10 @@ class MissedChances(gymnasium.Wrapper[Any, Any, Any, Any]):
         return observation, -float(self._count.missed()), terminated, truncated, info
 
 
-class _Count(Protocol):
-    """Counts the chances of the episodes of a loop."""
-
-    def look(self) -> None:
-        """See who could be detected, before the keyframe."""
-        ...
-
-    def missed(self) -> int:
-        """How many of them were not, after it."""
-        ...
-
-
 class _InWorld:
-    """Of the closed loop."""
+    """Counts the chances of the closed loop: `look` sees, before a keyframe, who could be detected,
+    and `missed` returns, after it, how many of them were not.
+    """
 
     def __init__(self, env: ClosedLoopEnv):
         self._env = env
@@ -307,7 +297,7 @@ class _InWorld:
 
 
 class _InScene:
-    """Of the open loop."""
+    """The same of the open loop."""
 
     def __init__(self, env: OpenLoopEnv):
         self._env = env

@@ -6,13 +6,12 @@ from itertools import cycle, islice
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
-from gymnasium.vector import AutoresetMode, SyncVectorEnv
+from gymnasium.vector import AutoresetMode
 
 from care_sim.base.limits import CORES
 from care_sim.base.processes import following, starting
 from care_sim.envs import CLOSED_LOOP, OPEN_LOOP, installed_ids, make_env
 from care_sim.envs.wrappers.grid_observation import GridObservation, VectorGridObservation
-from care_sim.envs.wrappers.reading import AnyVector
 from care_sim.envs.wrappers.sector_actions import (
     SectorReserve,
     SectorScores,
@@ -113,12 +112,14 @@ def side_by_side(config: AgentConfig) -> "VecEnv":
 
     from care_sim.training.vec_env import GymnasiumVecEnv
 
-    if not (config.processes or config.drawn):
-        return VecMonitor(GymnasiumVecEnv(*many(config)))
-    makers: list[Callable[[], gymnasium.Env[Any, Any]]] = [
-        partial(training, config, None if config.drawn else budget) for budget in _budgets(config)
-    ]
+    budgets = [*islice(cycle(config.budget), config.environments)]
     # Worlds of one vector have one scenario, and episodes that are drawn do not.
+    is_vector = not config.drawn and config.env[0] in (*CLOSED_LOOP, *installed_ids())
+    if is_vector and not config.processes:
+        return VecMonitor(GymnasiumVecEnv(worlds(config, budgets)))
+    makers: list[Callable[[], gymnasium.Env[Any, Any]]] = [
+        partial(training, config, budget) for budget in budgets
+    ]
     if not config.processes:
         return VecMonitor(DummyVecEnv(makers))
     # Spawned, not forked: PyTorch has threads by now, and a fork copies their locks.
@@ -128,55 +129,29 @@ def side_by_side(config: AgentConfig) -> "VecEnv":
         )
 
 
-def many(config: AgentConfig) -> list[AnyVector]:
-    """The training environments as vector environments: one of all, or, where they have no vector
-    of their own, one for each budget. Their worlds, one of each in turn, are those that `training`
-    makes one by one.
+def worlds(config: AgentConfig, budgets: list[float]) -> VectorGridObservation:
+    """The worlds of one vector environment, each with its budget: those that `training` makes one
+    by one.
     """
-    vectors = list[AnyVector]()
-    wrapper = VECTOR_ACTIONS[config.action]
-    for plain_vector in _plain_vectors(config):
-        seeded = VectorTrainingSeeds(plain_vector, config.seed)
-        acting = wrapper(seeded, config.azimuths, config.elevations)
-        vectors.append(VectorGridObservation(acting, config.columns, config.rows))
-    return vectors
-
-
-def _plain_vectors(config: AgentConfig) -> list[AnyVector]:
-    # The pictures that learners see are drawn at once, and need no copies of what they show.
-    budgets = _budgets(config)
     (name,) = config.env
-    if name in (*CLOSED_LOOP, *installed_ids()):
-        return [
-            gymnasium.make_vec(
-                f"care_sim:{name}",
-                config.environments,
-                "vector_entry_point",
-                autoreset_mode=AutoresetMode.DISABLED,
-                copy=False,
-                threads=_threads(config.environments),
-                **_arguments(config, name, budgets),
-            )
-        ]
-    count = len(config.budget)
-    return [
-        SyncVectorEnv(
-            [partial(plain, config, budget) for budget in budgets[place::count]],
-            copy=False,
-            autoreset_mode=AutoresetMode.DISABLED,
-        )
-        for place in range(count)
-    ]
+    # The pictures that learners see are drawn at once, and need no copies of what they show.
+    vector = gymnasium.make_vec(
+        f"care_sim:{name}",
+        len(budgets),
+        "vector_entry_point",
+        autoreset_mode=AutoresetMode.DISABLED,
+        copy=False,
+        threads=_threads(len(budgets)),
+        **_arguments(config, name, budgets),
+    )
+    seeded = VectorTrainingSeeds(vector, config.seed)
+    acting = VECTOR_ACTIONS[config.action](seeded, config.azimuths, config.elevations)
+    return VectorGridObservation(acting, config.columns, config.rows)
 
 
-def _threads(worlds: int) -> int:
+def _threads(count: int) -> int:
     """Threads that pay for so many worlds, at most one for every core."""
-    return min(CORES, max(1, worlds // WORLDS_A_THREAD))
-
-
-def _budgets(config: AgentConfig) -> list[float]:
-    """Those of the training environments."""
-    return [*islice(cycle(config.budget), config.environments)]
+    return min(CORES, max(1, count // WORLDS_A_THREAD))
 
 
 def _arguments(config: AgentConfig, name: str, budget: float | list[float]) -> dict[str, Any]:

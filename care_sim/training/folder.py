@@ -2,7 +2,7 @@
 
 | file | content |
 |---|---|
-| `config.json` | the effective configuration, and the hash of the code of a scenario of one's own |
+| `config.json` | the effective configuration |
 | `curve.csv` | steps, seconds, return and detection distance of every evaluation |
 | `episodes.csv` | the same of every episode of it, and of the rules that the learner is beside |
 | `checkpoint.zip` | the learner, by Stable-Baselines3; loading it executes code: load your own |
@@ -15,7 +15,6 @@ experience that SAC learns from is not kept (half a gigabyte): a resumed run gat
 """
 
 import csv
-import json
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -24,12 +23,10 @@ from typing import TYPE_CHECKING, Any
 from care_sim.base.checks import LARGEST_INTEGER, is_number
 from care_sim.base.errors import InvalidInput
 from care_sim.base.files import check_file_size, json_content, replacing, write_text
-from care_sim.base.plugins import is_place, scenario_of
 from care_sim.base.seeds import TRAINING
 from care_sim.core.rig import Rig
 from care_sim.policies.learned.weights import Card, save_weights
-from care_sim.scenarios import PLUGINS
-from care_sim.study.provenance import machine_line, package_versions, scenario_digest
+from care_sim.study.provenance import machine_line, package_versions
 from care_sim.training.config import ALGORITHMS, AgentConfig
 from care_sim.training.seeds import validation_seeds
 from care_sim.training.validation import Row, ValidationScore
@@ -41,8 +38,6 @@ CONFIG, CURVE, EPISODES = "config.json", "curve.csv", "episodes.csv"
 CHECKPOINT, WEIGHTS = "checkpoint.zip", "weights.npz"
 LEARNER = "learner"
 """Among the policies of the episodes, where others are rules."""
-_CODE = "scenario_code"
-"""Of the configuration of a run on a scenario of one's own: the hash of its code."""
 _LARGEST_DRAWN = 1e30
 """The largest return or distance that a figure can draw."""
 
@@ -75,8 +70,7 @@ class Folder:
         self.path.mkdir(parents=True, exist_ok=True)
         # The checkpoint first: a folder with a configuration alone could not be resumed.
         self.save(model)
-        content = json.loads(self.config.to_json()) | _own_code(self.config.env)
-        write_text(self.path / CONFIG, json.dumps(content, indent=1) + "\n")
+        write_text(self.path / CONFIG, self.config.to_json())
 
     def rules(self, play: Callable[[], dict[str, list[Row]]]) -> dict[str, ValidationScore]:
         """What rules score: measured at the beginning of a run, read when it is resumed."""
@@ -167,13 +161,7 @@ class Folder:
         for file in (self.path / CONFIG, self.checkpoint):
             if not file.exists():
                 raise InvalidInput(f"{self.path} holds no run to be resumed: no {file.name}")
-        before = read_config(self.path / CONFIG)
-        self.config.check_same(before)
-        if before.get(_CODE) != _own_code(self.config.env).get(_CODE):
-            raise InvalidInput(
-                f"{self.path}: the code of {' '.join(self.config.env)} is another than when it was "
-                "trained; give another --out"
-            )
+        self.config.check_same(read_config(self.path / CONFIG))
 
 
 def rule_scores(episodes: Sequence[Row]) -> dict[str, ValidationScore]:
@@ -183,21 +171,6 @@ def rule_scores(episodes: Sequence[Row]) -> dict[str, ValidationScore]:
         if row["policy"] != LEARNER:
             played.setdefault(row["policy"], []).append(row)
     return {name: ValidationScore.of(rows) for name, rows in played.items()}
-
-
-def _own_code(envs: Sequence[str]) -> dict[str, Any]:
-    """The hash of the code of a scenario of one's own, None where it cannot be read; of several
-    environments by name. Nothing where none is one's own.
-    """
-    names = {env: scenario_of(env) for env in envs}
-    own = {
-        env: scenario_digest(name)
-        for env, name in names.items()
-        if is_place(name) or name in PLUGINS.entries()
-    }
-    if not own:
-        return {}
-    return {_CODE: own if len(envs) > 1 else own[envs[0]]}
 
 
 def read_config(path: Path) -> dict[str, Any]:
@@ -211,7 +184,8 @@ def read_config(path: Path) -> dict[str, Any]:
         raise InvalidInput(f"{path} is damaged: {error}") from error
     if not isinstance(config, dict):
         raise InvalidInput(f"{path} is no configuration of a training run: it holds no map")
-    listed = config.get("env") if isinstance(config.get("env"), list) else [config.get("env")]
+    env = config.get("env")
+    listed = env if isinstance(env, list) else [env]
     right = {
         "algorithm": config.get("algorithm") in ALGORITHMS,
         "env": bool(listed) and all(isinstance(name, str) for name in listed),

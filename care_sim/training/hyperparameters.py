@@ -3,7 +3,6 @@
 Those that come with the package lie in `recipes`, one file for each learner.
 """
 
-import json
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -33,14 +32,12 @@ class Hyperparameters:
     path: Path
     table: str | None
 
-    def told(self, config: AgentConfig) -> list[str]:
-        """What counts, in a line, and in another what departs from the table."""
+    def told(self, config: AgentConfig) -> str:
+        """What counts, options included, in a line."""
         if self.table is None:
-            return [f"hyperparameters: {self.path.name} has none for {' '.join(config.env)}"]
-        effective = {name: getattr(config, name) for name in self.values}
-        departing = {name: value for name, value in effective.items() if value != self.values[name]}
-        lines = [f"hyperparameters of {self.path} [{self.table}]: {_listed(self.values)}"]
-        return lines + ([f"but, by options: {_listed(departing)}"] if departing else [])
+            return f"hyperparameters: {self.path.name} has none for {' '.join(config.env)}"
+        listed = ", ".join(f"{name} {getattr(config, name)}" for name in self.values)
+        return f"hyperparameters of {self.path} [{self.table}], options included: {listed}"
 
 
 def shipped_file(algorithm: str) -> Path:
@@ -86,12 +83,6 @@ def read_hyperparameters(
     return Hyperparameters(values, path, table)
 
 
-def as_table(env: str, values: Mapping[str, Any]) -> str:
-    """A file of one environment's table, as `read_hyperparameters` takes it."""
-    lines = [f"{name} = {_toml(value)}" for name, value in values.items()]
-    return "\n".join([f"[{_toml(env)}]", *lines, ""])
-
-
 def _tables(path: Path) -> dict[str, dict[str, Any]]:
     check_path("hyperparameters", path)
     if not path.is_file():
@@ -120,19 +111,3 @@ def _settled(kind: type[AgentConfig], where: str, name: str, value: Any) -> Any:
         wanted = "numbers" if name == "budget" else "texts NAME=VALUE"
         raise InvalidInput(f"{where}: {name} must be a list of {wanted}, got {shown(value)}")
     return tuple(value)
-
-
-def _listed(values: Mapping[str, Any]) -> str:
-    return ", ".join(f"{name} {_toml(value)}" for name, value in values.items())
-
-
-def _toml(value: Any) -> str:
-    """A value as TOML writes it."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, tuple):
-        return f"[{', '.join(map(_toml, value))}]"
-    if isinstance(value, str):
-        # What TOML escapes in a basic string, JSON escapes alike.
-        return json.dumps(value, ensure_ascii=False)
-    return repr(value)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import gymnasium
 import numpy as np
@@ -10,22 +10,15 @@ from numpy.typing import NDArray
 
 import care_sim
 
+if TYPE_CHECKING:
+    from stable_baselines3.common.base_class import BaseAlgorithm
+
 Row = dict[str, Any]
 """How an episode was played: `seed`, `env`, `return`, and `distance_m`, the metres at which the
 first-sighting actor was detected, 0 where it never was; None in the open loop.
 """
 Choose = Callable[[Any, bool], NDArray[np.float32]]
 """The action for an observation. The flag tells that the episode begins with it."""
-
-
-class Learner(Protocol):
-    """What acts: any algorithm of Stable-Baselines3."""
-
-    def predict(
-        self, observation: Any, state: Any, episode_start: Any, deterministic: bool
-    ) -> tuple[Any, Any]:
-        """Action and memory."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -59,7 +52,7 @@ def play(env: gymnasium.Env[Any, Any], choose: Choose, episodes: Mapping[int, st
     return [_episode(env, choose, seed, name) for seed, name in episodes.items()]
 
 
-def acting(learner: Learner) -> Choose:
+def acting(learner: "BaseAlgorithm") -> Choose:
     """The learner's choice, with its memory from keyframe to keyframe."""
     memory = None
 

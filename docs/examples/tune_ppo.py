@@ -17,7 +17,6 @@ from optuna.storages import JournalStorage
 from optuna.storages.journal import JournalFileBackend
 
 from care_sim.training.config import PpoConfig
-from care_sim.training.hyperparameters import as_table
 from care_sim.training.run import train_agent
 
 ENV, STEPS = "CARE-CutIn-v0", 40_000
@@ -64,7 +63,8 @@ def main(folder: Path, trials: int, steps: int = STEPS, **settings: int) -> None
         study.enqueue_trial({name: getattr(PpoConfig, name) for name in TRIED})
     # Weights that have grown without bounds give actions that are no numbers: such a trial fails.
     study.optimize(objective, trials, catch=(ValueError,))
-    (folder / "best.toml").write_text(as_table(ENV, study.best_params))
+    best = [f"{name} = {value}" for name, value in study.best_params.items()]
+    (folder / "best.toml").write_text("\n".join([f"[{ENV}]", *best, ""]))
 
 
 if __name__ == "__main__":

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from care_sim.base.errors import InvalidInput
 from care_sim.core.belief import Belief
 from care_sim.core.cells.stack import GridStack
 from care_sim.core.grid import AngularGrid
@@ -12,7 +11,6 @@ from care_sim.core.types import Ego, ImageDetections, Tracks
 from care_sim.policies.controls.patterns import Fan, cells_by_row, entry_cells, entry_elevation_deg
 from care_sim.policies.learned.cell_inputs import CellInputs
 from care_sim.policies.learned.grid_features import CHANNELS, GridFeatures
-from care_sim.policies.learned.sectors import Tiling
 from care_sim.policies.own.sight_lines import AHEAD_RAD, SightLines, columns_ahead
 from care_sim.policies.paper.blind import horizon_rows
 from tests.helpers.lidars import DEGREE, ROOF, STACK
@@ -102,13 +100,6 @@ def test_one_lidar_in_a_stack_is_chosen_from_as_if_it_were_the_grid():
     assert fans[0] == fans[1]
 
 
-def test_the_rows_nearest_to_the_horizon_are_those_of_all_lidars():
-    rows = [int(cells[0]) // 64 for cells in horizon_rows(STACK, 3 * 64)]
-    # Row 2 of the left corner is level; the right one is tilted, and the roof has none at 0.
-    assert rows[0] == 8 + 2
-    assert len({*rows}) == 3
-
-
 def test_a_return_stands_above_the_road_by_the_height_of_its_own_lidar():
     """Level rays at 0.5 m above the road and at 1.8 m both meet what stands; 0.5 m down, the first
     meets the road.
@@ -131,9 +122,3 @@ def test_a_return_stands_above_the_road_by_the_height_of_its_own_lidar():
     # And the road is nearer to the lower one.
     nearness = inputs.rig_inputs[[high, deep], 1]
     assert nearness == pytest.approx(1 - np.array([1.8, 0.5]) / np.sin(5 * DEGREE) / 50)
-
-
-def test_tiles_lie_in_one_lidar_each():
-    assert Tiling(STACK, 8, 4).tile_shape == (4, 8)
-    with pytest.raises(InvalidInput, match="tiles that lie in one LiDAR each: 2 of them are 8"):
-        Tiling(STACK, 8, 2)

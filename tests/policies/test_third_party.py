@@ -59,16 +59,6 @@ def test_an_installed_policy_is_listed_made_and_driven(installed, env):
         assert len(info["fired"]) == 1638
 
 
-def test_its_parameters_are_checked_like_ours(installed, env):
-    with pytest.raises(InvalidInput, match="beams"):
-        care_sim.make_policy("horizon", env, beams=3)
-
-
-def test_without_the_distribution_it_is_unknown(env):
-    with pytest.raises(InvalidInput, match="unknown policy 'horizon'"):
-        care_sim.make_policy("horizon", env)
-
-
 class Greedy(care_sim.Policy):
     """Asks for far more than it may fire."""
 
@@ -114,9 +104,6 @@ module = "a string"
 class Abstract(care_sim.Policy):
     name = "abstract"
 
-class Other:
-    def __init__(self, rig): ...
-
 class Mistagged(care_sim.Policy):
     tags = ("wise",)
     def demand(self, belief): ...
@@ -132,12 +119,6 @@ class Deaf(care_sim.Policy):
 
 def nothing(rig): ...
 
-class Nested(Mistagged):
-    tags = (["causal"],)
-
-class Untagged(Mistagged):
-    tags = ()
-
 class Sourced(Mistagged):
     tags, source = ("causal",), ("a book", "a page")
 
@@ -149,9 +130,6 @@ class Spying(care_sim.Policy):
         super().__init__(rig)
     def demand(self, belief): ...
 
-class Listing(Spying):
-    told = ["env"]
-
 def honest(rig, bins=3):
     return care_sim.policies.BUILT_IN["history"](rig)
 """
@@ -159,19 +137,15 @@ def honest(rig, bins=3):
 ALLOWED = "; allowed is a mapping of parameters to min_returns or scenario; .*PrivilegedPolicy"
 REASONS = {
     "spying": rf"broken:Spying has told \{{'env': 'unwrapped'\}}{ALLOWED}",
-    "listing": rf"broken:Listing has told \['env'\]{ALLOWED}",
     "abstract": r"broken:Abstract is abstract: it lacks demand",
     "mistagged": (
         r"broken:Mistagged has tags \('wise',\); allowed is a tuple of causal, privileged, "
         r".*"
     ),
-    "nested": r"broken:Nested has tags \(\['causal'\],\); allowed is a tuple of causal",
-    "other": r"broken:Other is no Policy",
     "silent": r"broken:silent tells no parameters",
     "sourced": r"broken:Sourced has the source \('a book', 'a page'\); allowed is one line of text",
     "string": r"broken:module is no Policy",
     "torn": r"AttributeError: .*Nowhere",
-    "untagged": r"broken:Untagged has tags \(\); allowed is a tuple of causal",
 }
 
 
@@ -181,15 +155,11 @@ def broken(install):
         "broken",
         BROKEN,
         abstract="Abstract",
-        other="Other",
         string="module",
         mistagged="Mistagged",
-        nested="Nested",
-        untagged="Untagged",
         sourced="Sourced",
         silent="silent",
         spying="Spying",
-        listing="Listing",
         torn="Nowhere",
         exploding="Exploding",
         deaf="Deaf",
@@ -211,7 +181,7 @@ def test_a_policy_that_cannot_be_loaded_is_named_with_the_reason(broken, env, na
     [
         (
             "exploding",
-            r"policy exploding refuses to start: KeyError: 'weights' \(broken.py, line 18\)",
+            r"policy exploding refuses to start: KeyError: 'weights' \(broken.py, line 15\)",
         ),
         ("deaf", r"policy deaf refuses to start: TypeError: .*positional argument"),
         ("nothing", r"policy nothing is no Policy but of type NoneType"),
@@ -256,41 +226,15 @@ def test_broken_policies_do_not_stop_the_others(broken, installed, env):
     )
     assert (
         reasons["exploding"]
-        == "policy exploding refuses to start: KeyError: 'weights' (broken.py, line 18)"
+        == "policy exploding refuses to start: KeyError: 'weights' (broken.py, line 15)"
     )
     assert "deaf" in reasons["deaf"]
     assert care_sim.make_policy("horizon", env).name == "horizon"
 
 
-@pytest.mark.parametrize(
-    ("policies", "common", "complaint"),
-    [
-        (["care", "nobody"], {}, "unknown policy 'nobody'"),
-        (["care"], {"policy_parameters": (("k_safe", 1.0),)}, "k_safe"),
-        (["care"], {"camera_latency": -1}, "camera_latency"),
-    ],
-)
-def test_what_a_user_got_wrong_stops_all(policies, common, complaint):
-    with pytest.raises(InvalidInput, match=complaint):
-        playable(policies, lambda name: grid(["dartout"], [name], [0.1], [0], **common))
-
-
 def test_a_function_that_makes_a_policy_is_one(broken, env):
     assert tags_of("honest") == ("causal",)
     assert care_sim.make_policy("honest", env, bins=4).name == "history"
-
-
-def test_a_built_in_name_cannot_be_taken(install, env):
-    install("usurper", MODULE, care="Horizon")
-    assert policy_names().count("care") == 1
-    assert type(care_sim.make_policy("care", env)) is BUILT_IN["care"]
-
-
-def test_of_two_packages_with_one_name_the_first_on_the_path_counts(install, env):
-    install("second", MODULE.replace("rows=4", "rows=5"), horizon="Horizon")
-    install("first", MODULE, horizon="Horizon")
-    assert policy_names().count("horizon") == 1
-    assert care_sim.make_policy("horizon", env).rows == 4
 
 
 CONTROLS = '''
@@ -344,13 +288,7 @@ def test_a_policy_is_found_by_its_place_in_the_current_folder(tmp_path, monkeypa
         care_sim.make_policy("colorsys:rgb_to_hls", env)
 
 
-@pytest.mark.parametrize("place", ["absent_module:X", "math:absent", "math:pi"])
-def test_a_place_that_holds_no_policy_is_named(place, env):
-    with pytest.raises(BrokenPolicy, match=f"policy {place} cannot be loaded"):
-        care_sim.make_policy(place, env)
-
-
-@pytest.mark.parametrize("text", [":", "math:", ":pi", "a b:c", "math:1", "1a:b", "a.:b", "a:b:c"])
+@pytest.mark.parametrize("text", [":pi", "a b:c", "1a:b", "a:b:c"])
 def test_what_is_no_place_is_an_unknown_name(text, env):
     with pytest.raises(InvalidInput, match="unknown policy"):
         care_sim.make_policy(text, env)

@@ -25,7 +25,7 @@ from care_sim.policies.paper.reserves import Care
 from care_sim.policies.vector import vector_policy
 
 WORLDS = 3
-SCENES = {"dense": "CARE-Dense-v0", "cutin": "CARE-CutIn-v0", "drive": "CARE-Drive-v0"}
+SCENES = {"dense": "CARE-Dense-v0", "drive": "CARE-Drive-v0"}
 
 
 def of_kind(kind):
@@ -99,13 +99,6 @@ def test_every_world_is_asked_as_if_alone(name, scene):
             assert np.array_equal(actions[number], policy(world(observation, number)))
 
 
-def test_the_full_scan_is_that_of_one_world():
-    with gymnasium.make("CARE-Dense-v0", budget=1.0, disable_env_checker=True) as env:
-        seen = stacked([env.reset(seed=seed)[0] for seed in range(WORLDS)])
-        actions = care_sim.make_policy("full", Worlds(sensing(env)))(seen)
-        assert np.array_equal(actions[1], care_sim.make_policy("full", env)(world(seen, 1)))
-
-
 @pytest.mark.parametrize("name", PRIVILEGED)
 def test_a_privileged_policy_is_refused_in_one_line(name, environment):
     with pytest.raises(InvalidInput, match="plays a single environment") as refused:
@@ -113,8 +106,7 @@ def test_a_privileged_policy_is_refused_in_one_line(name, environment):
     assert "\n" not in str(refused.value)
 
 
-@pytest.mark.parametrize("grid", GRIDS)
-@pytest.mark.parametrize("order", CELL_ORDERS)
+@pytest.mark.parametrize(("grid", "order"), [*zip([*GRIDS] * 2, CELL_ORDERS, strict=False)])
 @pytest.mark.parametrize("name", ANY_GRID)
 def test_ideas_by_rows_are_the_same_on_every_grid(name, order, grid, dense):
     base, observations = dense
@@ -213,23 +205,6 @@ def test_what_somebody_changed_is_asked_for_in_every_world(make, dense):
             assert np.array_equal(actions[number], policy(world(observation, number)))
 
 
-class Patched(Care):
-    """Somebody's policy that changes what it asks for when it is made."""
-
-    def __init__(self, rig):
-        super().__init__(rig)
-        self.demand = lambda belief: Demand(layers=[[np.arange(len(belief.detections))]])
-
-
-def test_what_somebody_changed_in_the_object_is_asked_for_too(dense):
-    rig, observations = dense
-    together, alone = vector_policy(lambda: Patched(rig), WORLDS), Patched(rig)
-    for observation in observations[:2]:
-        actions = together(observation)
-        for number in range(WORLDS):
-            assert np.array_equal(actions[number], alone(world(observation, number)))
-
-
 @pytest.mark.parametrize("cell", [-1, 16_384, 2**40])
 def test_a_cell_that_the_grid_lacks_is_refused_before_compiled_code_meets_it(cell, dense):
     class Astray(Care):
@@ -244,37 +219,7 @@ def test_a_cell_that_the_grid_lacks_is_refused_before_compiled_code_meets_it(cel
         vector_policy(lambda: Astray(rig), WORLDS)(observations[0])
 
 
-@pytest.mark.parametrize("counts", [[1, 1], [1, 1, 1, 0], [1, 1, 2]])
-def test_sets_of_other_worlds_are_refused(counts, dense):
-    class Miscounted(Care):
-        def stages(self, beliefs):
-            cells = np.arange(len(beliefs))
-            return [WorldSets(CellSets(cells, np.ones_like(cells)), np.array(counts))]
-
-    rig, observations = dense
-    with pytest.raises(InvalidInput, match="counts must tell of 3 worlds how many of the 3 sets"):
-        vector_policy(lambda: Miscounted(rig), WORLDS)(observations[0])
-
-
-@pytest.mark.parametrize("name", ["care", "care-sightlines", "care-spread", "history-place"])
-def test_vectors_of_gymnasium_are_played_too(name):
-    arguments = {"budget": 0.03, "min_returns": 9, "disable_env_checker": True}
-    makers = [partial(gymnasium.make, "CARE-Dense-v0", **arguments)] * 2
-    with (
-        closing(SyncVectorEnv(makers)) as one_by_one,
-        closing(gymnasium.make_vec("CARE-Dense-v0", 2, budget=0.03, min_returns=9)) as arrays,
-    ):
-        observation, _ = one_by_one.reset(seed=4)
-        policy, same = (care_sim.make_policy(name, envs) for envs in (one_by_one, arrays))
-        for _ in range(8):
-            actions = policy(observation)
-            assert np.array_equal(actions, same(observation))
-            observation, *_ = one_by_one.step(actions.copy())
-
-
-@pytest.mark.parametrize(
-    "name", ["care", "ppo", "beam-reduce", "history-uniform", "uncertainty", "random"]
-)
+@pytest.mark.parametrize("name", ["care", "ppo", "beam-reduce", "sweep"])
 def test_worlds_of_several_budgets_play_each_its_own(name):
     budgets = [0.1, 0.03, 0.1, 0.01]
     with (
@@ -300,14 +245,6 @@ def test_worlds_of_several_budgets_play_each_its_own(name):
             observation, *_ = envs.step(actions)
 
 
-def test_a_policy_of_one_budget_refuses_worlds_of_another():
-    with (
-        closing(gymnasium.make_vec("CARE-Dense-v0", 2, budget=[0.1, 1.0])) as envs,
-        pytest.raises(InvalidInput, match=r"policy full needs budget=1\.0"),
-    ):
-        care_sim.make_policy("full", envs)
-
-
 def test_worlds_that_differ_in_what_a_policy_is_told_and_worlds_of_others_are_refused():
     makers = [partial(gymnasium.make, "CARE-Dense-v0", min_returns=least) for least in (3, 5)]
     with (
@@ -327,10 +264,7 @@ def test_worlds_that_differ_in_what_a_policy_is_told_and_worlds_of_others_are_re
         ("budget", np.full((WORLDS, 1), 1.5, np.float32)),
         ("ranges", np.zeros((WORLDS, 16, 512), np.float32)),
         ("tracks", np.full((WORLDS, 2, 13), np.inf, np.float32)),
-        ("tracks", np.zeros((2, 4, 13), np.float32)),
         ("detections", np.full((WORLDS, 2, 9), 3.0, np.float32)),
-        ("detections", np.full((WORLDS, 2, 9), 7.5, np.float32)),
-        ("detections", np.zeros((2, 9), np.float32)),
     ],
 )
 def test_what_is_no_observation_of_its_rig_is_refused_in_one_line(key, value, dense):
@@ -341,21 +275,7 @@ def test_what_is_no_observation_of_its_rig_is_refused_in_one_line(key, value, de
         policy(observations[0] | {key: value})
     assert "\n" not in str(refused.value)
     assert np.array_equal(policy(observations[0]), before)
-
-
-def test_other_masks_and_single_observations_are_refused(dense):
-    rig, observations = dense
-    policy = vector_policy(lambda: Care(rig), WORLDS)
     with pytest.raises(InvalidInput, match="live must be 3 truth values"):
         policy(observations[0], np.ones(2, np.bool_))
     with pytest.raises(InvalidInput, match="mask must be 3 truth values"):
         policy.reset(np.arange(3))
-    with pytest.raises(InvalidInput, match=r"ego of an observation must be \(3, 3\)"):
-        policy(world(observations[0], 0))
-
-
-def test_actions_are_for_reading(dense):
-    rig, observations = dense
-    for make in (Care, Random, Halved):
-        with pytest.raises(ValueError, match="read-only"):
-            vector_policy(lambda make=make: make(rig), WORLDS)(observations[0])[0] = 1.0

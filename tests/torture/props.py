@@ -175,12 +175,14 @@ def _make_trained(path):
 
     path.mkdir()
     (path / "config.json").write_text(PpoConfig().to_json())
-    rules = [f"{name},0,10000,CARE-Dense-v0,-3.0,12.0" for name in ("random", "care", "full")]
-    heads = {"curve": "steps,seconds", "episodes": "policy,steps,seed,env"}
-    rows = {"curve": ["0,0.1,-5.0,8.0", "64,1.5,-4.0,9.5"], "episodes": rules}
-    for name, head in heads.items():
-        lines = [f"{head},return,distance_m", *rows[name]]
-        (path / f"{name}.csv").write_text("\n".join(lines) + "\n")
+    played = (("random", 0), ("care", 0), ("full", 0), ("learner", 0), ("learner", 64))
+    (path / "episodes.csv").write_text(
+        "policy,steps,seed,env,return,distance_m\n"
+        + "".join(f"{name},{steps},2000,CARE-Dense-v0,-3.0,12.0\n" for name, steps in played)
+    )
+    (path / "curve.csv").write_text(
+        "steps,seconds,return,distance_m\n0,0.1,-5.0,8.0\n64,1.5,-4.0,9.5\n"
+    )
 
 
 def lay_out(names, folder):

@@ -1,4 +1,4 @@
-"""Episodes that differ: what a seed draws, and that it is then played."""
+"""Episodes that differ: what a seed draws, that it is played, and the reward that all share."""
 
 from dataclasses import replace
 
@@ -12,11 +12,13 @@ from care_sim.base.seeds import TRAINING, VALIDATION, split_of
 from care_sim.core.grid import AngularGrid
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.envs import make_env
+from care_sim.envs.open_loop import FilmEnv
 from care_sim.envs.sensing import sensing
-from care_sim.training.config import PpoConfig, RecurrentPpoConfig, SacConfig
-from care_sim.training.drawn import STREETS, Mirrored, drawn
+from care_sim.training.config import PpoConfig, SacConfig
+from care_sim.training.drawn import STREETS, Mirrored, MissedChances, drawn
 from care_sim.training.environments import plain, training, validation_episodes, wrapped
 from care_sim.wrappers import GridObservation, SectorReserve
+from tests.helpers.handmade_film import BEHIND, BESIDE, ENTRY, WALKER, handmade_film, returns_of
 
 BUDGETS = (0.01, 0.03, 0.1)
 TOLD = {"env_parameters": ("scoring_info=True", "CARE-NCAP-v0.test=drawn",
@@ -60,7 +62,7 @@ def test_an_episode_is_that_of_the_environment_which_was_drawn():
     """World, budget, faults and floor, to the last bit."""
     env = plain(CONFIG)
     met = set()
-    for seed in range(TRAINING, TRAINING + 6):
+    for seed in range(TRAINING, TRAINING + 4):
         draw = drawn(seed, 2, BUDGETS)
         name = CONFIG.env[draw.place]
         own = make_env(name, budget=draw.budget, **CONFIG.arguments(name), **draw.faults)
@@ -75,24 +77,12 @@ def test_an_episode_is_that_of_the_environment_which_was_drawn():
     assert met == set(CONFIG.env)
 
 
-def test_a_budget_of_ones_own_changes_nothing_else():
-    """What `full` plays is what the others play."""
-    drawn_budgets, whole = plain(CONFIG), plain(CONFIG, 1.0)
-    for seed in range(VALIDATION, VALIDATION + 8):
-        told = [env.reset(seed=seed)[1] for env in (drawn_budgets, whole)]
-        np.testing.assert_equal(*told)
-        assert drawn_budgets.unwrapped.conditions == whole.unwrapped.conditions
-        assert whole.rig.budget == 16_384
-    drawn_budgets.close()
-    whole.close()
-
-
 def test_who_learns_without_faults_is_validated_with_them():
     config = replace(CONFIG, env=("CARE-Dense-v0",), without=("faults",), env_parameters=())
     learns, shown = training(config), wrapped(config)
-    faulty = {seed for seed in range(VALIDATION, VALIDATION + 12) if drawn(seed, 1, BUDGETS).faults}
+    faulty = {seed for seed in range(VALIDATION, VALIDATION + 6) if drawn(seed, 1, BUDGETS).faults}
     assert faulty
-    for seed in range(VALIDATION, VALIDATION + 12):
+    for seed in range(VALIDATION, VALIDATION + 6):
         learns.env.reset(seed=seed)
         shown.reset(seed=seed)
         usual = sensing(make_env("CARE-Dense-v0")).conditions
@@ -102,22 +92,19 @@ def test_who_learns_without_faults_is_validated_with_them():
     shown.close()
 
 
-def test_one_seed_one_episode_and_training_seeds_alone():
-    with training(CONFIG) as env:
-        seeds = [env.reset(seed=0 if n == 0 else None)[1]["seed"] for n in range(10)]
-        again = [env.reset(seed=0 if n == 0 else None)[1]["seed"] for n in range(10)]
-    assert seeds == again
-    assert min(seeds) >= TRAINING
+def test_every_reset_draws_another_episode_and_a_budget_of_ones_own_changes_no_other_part():
+    """What `full` plays is what the others play."""
+    with plain(CONFIG) as env, plain(CONFIG, 1.0) as whole, training(CONFIG) as learns:
+        told = [one.reset(seed=VALIDATION)[1] for one in (env, whole)]
+        np.testing.assert_equal(*told)
+        assert env.unwrapped.conditions == whole.unwrapped.conditions
+        assert whole.rig.budget == 16_384
+        first, second = (env.reset()[1]["seed"] for _ in range(2))
+        env.reset(seed=VALIDATION)
+        assert env.reset()[1]["seed"] == first != second
+        assert learns.reset(seed=0)[1]["seed"] >= TRAINING
     assert min(validation_episodes(CONFIG)) >= VALIDATION
     assert set(validation_episodes(CONFIG).values()) == set(CONFIG.env)
-
-
-def test_without_a_seed_every_reset_draws_another_episode():
-    with plain(CONFIG) as env:
-        env.reset(seed=5)
-        first, second = (env.reset()[1]["seed"] for _ in range(2))
-        env.reset(seed=5)
-        assert env.reset()[1]["seed"] == first != second
 
 
 def test_an_environment_named_twice_is_drawn_twice_as_often():
@@ -203,13 +190,11 @@ def test_the_running_episode_is_what_an_environment_shows():
         (PpoConfig, {"without": ("faults",)}, "without faults needs --drawn"),
         (PpoConfig, {"without": ("wheels",)}, "unknown part to be without 'wheels'"),
         (SacConfig, {"without": ("place",)}, "without place needs ppo: sac sees all sectors"),
-        (RecurrentPpoConfig, {"without": ("place",)}, "without place needs ppo"),
         (
             PpoConfig,
             {"env_parameters": ("CARE-Moon-v0.gravity=1",)},
             "unknown environment of env_parameter CARE-Moon-v0.gravity",
         ),
-        (PpoConfig, {"env_parameters": ("CARE-Dense-v0.budget=1",)}, "budget is no env_parameter"),
     ],
 )
 def test_what_does_not_fit_is_refused_at_once(kind, options, message):
@@ -231,11 +216,113 @@ def test_environments_with_other_lidars_are_refused():
         wrapped(config)
 
 
-def test_a_lone_environment_is_written_as_it_was_before_there_could_be_several():
-    assert PpoConfig(env="CARE-CutIn-v0").recipe["env"] == "CARE-CutIn-v0"
+def test_a_run_goes_on_with_its_own_recipe_alone():
     assert PpoConfig(env="CARE-CutIn-v0") == PpoConfig(env=("CARE-CutIn-v0",))
+    before = PpoConfig(env="CARE-CutIn-v0").recipe
+    assert before["env"] == "CARE-CutIn-v0"
+    PpoConfig(env="CARE-CutIn-v0", steps=7).check_same(before)
     before = PpoConfig().recipe
-    del before["drawn"], before["without"]
-    PpoConfig().check_same(before)
     with pytest.raises(InvalidInput, match="trained with drawn False, asked is True"):
         PpoConfig(drawn=True).check_same(before)
+
+
+def played(env, choose, seed=0):
+    """Rewards of an episode."""
+    env.reset(seed=seed)
+    rewards, over = [], False
+    while not over:
+        _, reward, terminated, truncated, _ = env.step(choose())
+        rewards.append(reward)
+        over = terminated or truncated
+    env.close()
+    return rewards
+
+
+@pytest.mark.parametrize("name", ["CARE-Dense-v0", "CARE-NCAP-v0", "CARE-Drive-v0"])
+def test_the_full_scan_misses_none(name):
+    env = MissedChances(make_env(name, budget=1.0))
+    seen = np.ones(env.action_space.shape, np.float32)
+    # A drive in which somebody comes out.
+    assert set(played(env, lambda: seen, seed=10_002)) == {0.0}
+
+
+def test_who_never_fires_misses_every_keyframe_at_which_a_full_scan_would_detect():
+    env = MissedChances(make_env("CARE-Dense-v0", floor=False))
+    nothing = np.zeros(env.action_space.shape, np.float32)
+    detectable = []
+
+    def choose():
+        detectable.append(env.unwrapped.loop.detectable())
+        return nothing
+
+    rewards = played(env, choose)
+    assert [-reward for reward in rewards] == detectable
+    assert 5 < sum(detectable) < len(detectable)
+
+
+def test_who_was_detected_once_is_no_chance_any_more():
+    env = MissedChances(make_env("CARE-Dense-v0", budget=1.0, floor=False))
+    shape, keyframes = env.action_space.shape, []
+
+    def choose():
+        keyframes.append(len(keyframes))
+        return np.full(shape, float(len(keyframes) == 30), np.float32)
+
+    rewards = played(env, choose)
+    assert sum(rewards[:29]) < 0
+    assert set(rewards[29:]) == {0.0}
+
+
+def test_of_a_drive_everybody_counts_whom_it_lets_the_ego_meet():
+    env = MissedChances(make_env("CARE-Drive-v0", floor=False, encounters=3))
+    nothing = np.zeros(env.action_space.shape, np.float32)
+    most = []
+
+    def choose():
+        loop = env.unwrapped.loop
+        most.append(sum(loop.would_detect(one.body) for one in loop.world.meetings))
+        return nothing
+
+    rewards = played(env, choose, seed=10_002)
+    assert [-reward for reward in rewards] == most
+    assert sum(most) > 5
+
+
+def scores(*numbers, index):
+    action = np.zeros((32, 512), np.float32)
+    for number in numbers:
+        action.ravel()[returns_of(number, index)] = 1.0
+    return action
+
+
+@pytest.mark.parametrize(
+    ("found", "expected"),
+    [
+        # Present at the start: AHEAD. First sightings: the WALKER at keyframe 1, the others at 2.
+        ([(), (), ()], [0, -1, -4]),
+        ([(), (WALKER,), ()], [0, 0, -3]),
+        ([(), (WALKER,), (BESIDE, BEHIND)], [0, 0, -1]),
+        ([(), (), (WALKER,)], [0, -1, -3]),
+    ],
+)
+def test_of_a_scene_the_first_sightings_count(found, expected):
+    env = MissedChances(FilmEnv(handmade_film(), budget=0.5, floor=False))
+    actions = (scores(*numbers, index=index) for index, numbers in enumerate(found))
+    assert played(env, lambda: next(actions)) == expected
+
+
+def test_an_event_counts_until_it_is_censored():
+    """The four first sightings cost 1 at each of K = 6 keyframes and nothing after."""
+    env = MissedChances(FilmEnv(handmade_film(10), budget=0.5, floor=False))
+    nothing = np.zeros((32, 512), np.float32)
+    assert played(env, lambda: nothing) == [0, -1, *[-4] * 5, -3, 0, 0]
+
+
+def test_who_is_out_of_range_or_gone_is_no_chance():
+    """The bus is beyond 50 m and two are gone again, at keyframes 2 and 3."""
+    film = handmade_film()
+    near, far = film.shots[ENTRY], film.shots[1]
+    film = replace(film, shots=(film.shots[0], near, far, far))
+    env = MissedChances(FilmEnv(film, budget=0.5, floor=False))
+    nothing = np.zeros((32, 512), np.float32)
+    assert played(env, lambda: nothing) == [0, -4, -1, -1]

@@ -2,6 +2,7 @@
 
 import math
 from os import PathLike
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,31 +23,41 @@ LOWEST_DEG = -10.7
 follow the rig's `sensor_height_m`."""
 
 
-class Fan(FixedPolicy):
-    """Fires what lies ahead, up to the horizon, the columns nearest to straight ahead first.
+class Pattern(FixedPolicy):
+    """Fires the first cells of `pattern` (N,) at every keyframe. With `shots` it asks for as many
+    times fewer cells, each of which hardware that fires cells several times then fires as often.
 
-    The fan lies between the horizon and `LOWEST_DEG`: at 3% of the paper's grid 20 degrees to
-    either side. When the fan has gone all round, the other rows follow in the same way. Several
-    LiDARs make one fan.
-
-    With `shots` it asks for as many times fewer cells, each of which hardware that fires cells
-    several times then fires as often. Raises InvalidInput for less than one.
+    Raises InvalidInput for less than one shot.
     """
 
-    name = "fan"
-    tags = ("causal", "control")
+    tags: ClassVar[tuple[str, ...]] = ("causal", "control")
     source = "own: a pattern that never changes"
     is_pattern = True
 
-    def __init__(self, rig: Rig, shots: int = 1):
+    def __init__(self, rig: Rig, pattern: Cells, shots: int = 1):
         super().__init__(rig)
         check_whole("shots", shots, 1)
+        self._pattern = pattern
         self._shots = shots
-        self._pattern = np.concatenate([fanned(rig.grid, is_low) for is_low in (True, False)])
 
     def fixed(self, budget: int) -> Demand:
         """The same cells at every keyframe."""
         return Demand(layers=[[self._pattern[: budget // self._shots]]])
+
+
+class Fan(Pattern):
+    """Fires what lies ahead, up to the horizon, the columns nearest to straight ahead first.
+
+    The fan lies between the horizon and `LOWEST_DEG`: at 3% of the paper's grid 20 degrees to
+    either side. When the fan has gone all round, the other rows follow in the same way. Several
+    LiDARs make one fan. `shots` are as of `Pattern`.
+    """
+
+    name = "fan"
+
+    def __init__(self, rig: Rig, shots: int = 1):
+        fans = [fanned(rig.grid, is_low) for is_low in (True, False)]
+        super().__init__(rig, np.concatenate(fans), shots)
 
 
 def fanned(grid: Grid, is_low: bool) -> Cells:
@@ -72,30 +83,20 @@ ENTRY_DISTANCE_M = 50.0
 """The range of scoring: what enters it by driving enters it there."""
 
 
-class Rows(FixedPolicy):
+class Rows(Pattern):
     """Fires the rows nearest to the elevation at which things enter the range, nearest first.
 
     The last row is thinned evenly. That elevation follows from the rig (`entry_elevation_deg`),
-    unless one is given. `shots` are as of `Fan`. Raises InvalidInput for an elevation that is none,
-    and for less than one shot.
+    unless one is given. `shots` are as of `Pattern`. Raises InvalidInput for an elevation that is
+    none.
     """
 
     name = "rows"
-    tags = ("causal", "control")
-    source = "own: a pattern that never changes"
-    is_pattern = True
 
     def __init__(self, rig: Rig, elevation_deg: float | None = None, shots: int = 1):
-        super().__init__(rig)
-        check_whole("shots", shots, 1)
-        self._shots = shots
         if elevation_deg is not None:
             check_number("elevation_deg", elevation_deg, -90, 90)
-        self._pattern = cells_by_row(rig, elevation_deg)
-
-    def fixed(self, budget: int) -> Demand:
-        """The same cells at every keyframe."""
-        return Demand(layers=[[self._pattern[: budget // self._shots]]])
+        super().__init__(rig, cells_by_row(rig, elevation_deg), shots)
 
 
 def entry_elevation_deg(rig: Rig, above_m: float = 0.0) -> float:
@@ -186,7 +187,7 @@ class Sweep(Policy):
         return Demand(layers=[[self._turn[places]]])
 
 
-class Place(FixedPolicy):
+class Place(Pattern):
     """Fires the cells in which most first sightings were detected in the calibration's streets.
 
     It knows a place and sees nothing: what a policy with a camera must beat.
@@ -198,15 +199,9 @@ class Place(FixedPolicy):
     name = "place"
     tags = ("causal", "learned", "control")
     source = "own: a map that never changes"
-    is_pattern = True
 
     def __init__(self, rig: Rig, path: str | PathLike[str] | None = None):
-        super().__init__(rig)
-        self._pattern = likeliest_cells(rig, path)
-
-    def fixed(self, budget: int) -> Demand:
-        """The same cells at every keyframe."""
-        return Demand(layers=[[self._pattern[:budget]]])
+        super().__init__(rig, likeliest_cells(rig, path))
 
 
 def likeliest_cells(rig: Rig, path: str | PathLike[str] | None) -> Cells:

@@ -22,8 +22,8 @@ from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.episode import EpisodeSeeds
-from care_sim.policies.base import FixedPolicy, Policy
-from care_sim.policies.controls.patterns import likeliest_first
+from care_sim.policies.base import Policy
+from care_sim.policies.controls.patterns import Pattern, likeliest_first
 from care_sim.policies.controls.patterns_and_tracks import HistoryPattern
 from care_sim.scenarios import SCENARIOS, make_scenario
 from care_sim.scenarios.base import Scenario
@@ -57,7 +57,7 @@ def rehearsal(scenario: Scenario, seed: int, rig: Rig) -> ClosedLoop:
     return ClosedLoop(world, equipped, ClosedLoopConditions(), seeds.sensors)
 
 
-class LearnedPlace(FixedPolicy):
+class LearnedPlace(Pattern):
     """Fires the cells in which this very scenario hid its actor in other seeds.
 
     They are those in which a full scan first detected the first-sighting actor in the first `seeds`
@@ -71,15 +71,9 @@ class LearnedPlace(FixedPolicy):
     tags = ("causal", "learned", "control")
     source = "own: a map of the scenario's training seeds that never changes"
     told: ClassVar[Mapping[str, str]] = {"scenario": "scenario"}
-    is_pattern = True
 
     def __init__(self, rig: Rig, scenario: Scenario | str | None = None, seeds: int = 10):
-        super().__init__(rig)
-        self._pattern = learned_cells(rig, scenario, seeds)
-
-    def fixed(self, budget: int) -> Demand:
-        """The same cells at every keyframe."""
-        return Demand(layers=[[self._pattern[:budget]]])
+        super().__init__(rig, learned_cells(rig, scenario, seeds))
 
 
 def learned_cells(rig: Rig, scenario: Scenario | str | None, seeds: int) -> Cells:

@@ -135,7 +135,7 @@ class PpoPolicy(RowPolicy):
         scores = self._score_map.of_all(self._features.of_all(beliefs))
         if self._reserve_alone:
             return self._choice.reserve(beliefs, scores)
-        return self._choice.alone(scores)
+        return self._choice.alone(scores, beliefs.budgets)
 
 
 class PpoDartoutPolicy(PpoPolicy):

@@ -5,7 +5,6 @@ number of worlds.
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import accumulate, pairwise
 from typing import TypeVar
 
 import numpy as np
@@ -118,21 +117,18 @@ class SectorChoice:
         self._sectors = sectors
 
     def reserve(self, beliefs: Beliefs, scores: NDArray[np.floating]) -> list[WorldSets]:
-        """The forecasts' hulls, then the sectors with a positive score as layers of the reserve,
-        best first.
+        """The forecasts' hulls, then the sectors with a positive score in the reserve, best first;
+        each world has the budget that it is told.
         """
-        return [self.hulls(beliefs), *self._layers(scores, enough_beside_hulls(self._rig.budget))]
-
-    def alone(self, scores: NDArray[np.floating]) -> list[WorldSets]:
-        """The sectors with a positive score alone, best first."""
-        return [WorldSets.nothing(len(scores)), *self._layers(scores, self._rig.budget)]
-
-    def hulls(self, beliefs: Beliefs) -> WorldSets:
-        """The hulls of the forecasts."""
         hulls = beliefs.hulls
-        return WorldSets(self._rig.listed(hulls.sets), hulls.counts)
+        listed = WorldSets(self._rig.listed(hulls.sets), hulls.counts)
+        return [listed, self._best(scores, enough_beside_hulls(beliefs.budgets))]
 
-    def best(self, scores: NDArray[np.floating], enough: Integers) -> WorldSets:
+    def alone(self, scores: NDArray[np.floating], budgets: Integers) -> list[WorldSets]:
+        """The sectors with a positive score alone, best first, for `budgets` (W,)."""
+        return [WorldSets.nothing(len(scores)), self._best(scores, budgets)]
+
+    def _best(self, scores: NDArray[np.floating], enough: Integers) -> WorldSets:
         """Of each world one set, the cells of the sectors with a positive score, best first, up to
         the one that makes them `enough` (W,). One set gives in turn what a layer for each sector
         would.
@@ -142,18 +138,6 @@ class SectorChoice:
         counts = np.minimum(counts, -(-enough // tile))
         cells = self._listed[ranked[np.arange(ranked.shape[1]) < counts[:, None]]]
         return WorldSets(CellSets(cells.ravel(), counts * tile), np.ones(len(counts), np.int64))
-
-    def _layers(self, scores: NDArray[np.floating], enough: int) -> list[WorldSets]:
-        """The best sector of every world that has one, then the next of each, and so on."""
-        ranked, counts = self._sectors.ranked(scores, enough)
-        has = np.arange(counts.max(initial=0))[:, None] < counts
-        cells = self._listed[ranked.T[: len(has)][has]]
-        sizes = np.full(*cells.shape)
-        ends = accumulate(np.count_nonzero(has, axis=1).tolist(), initial=0)
-        return [
-            WorldSets(CellSets(cells[first:last].ravel(), sizes[first:last]), told)
-            for (first, last), told in zip(pairwise(ends), has.astype(np.int64), strict=True)
-        ]
 
     @cached_property
     def _listed(self) -> Cells:
@@ -173,12 +157,9 @@ class SectorActions:
         self._budgets = budgets
 
     def reserve(self, beliefs: Beliefs, scores: NDArray[np.floating]) -> Action:
-        """See `SectorChoice.reserve`; each world with the budget that it is told."""
-        budgets = beliefs.budgets
-        best = self._choice.best(scores, enough_beside_hulls(budgets))
-        return self._allocator.scores([self._choice.hulls(beliefs), best], budgets)
+        """See `SectorChoice.reserve`."""
+        return self._allocator.scores(self._choice.reserve(beliefs, scores), beliefs.budgets)
 
     def alone(self, scores: NDArray[np.floating]) -> Action:
         """See `SectorChoice.alone`."""
-        best = self._choice.best(scores, self._budgets)
-        return self._allocator.scores([WorldSets.nothing(len(scores)), best], self._budgets)
+        return self._allocator.scores(self._choice.alone(scores, self._budgets), self._budgets)

@@ -1,8 +1,5 @@
 """The detector around a network: what it takes, what it gives, what it refuses."""
 
-import pickle
-import zipfile
-
 import numpy as np
 import pytest
 
@@ -112,12 +109,6 @@ def test_points_that_are_none_are_refused(file, points):
         PillarsDetector(file).detect(points, HEIGHT)
 
 
-@pytest.mark.parametrize("score", [-0.1, 1.5, "sure"])
-def test_a_score_beyond_its_bounds_is_refused(file, score):
-    with pytest.raises(InvalidInput, match="least_score"):
-        PillarsDetector(file, least_score=score)
-
-
 def test_without_pytorch_the_extra_is_named(file, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "torch", None)
     with pytest.raises(MissingExtra, match=r"\.\[rl\]"):
@@ -158,24 +149,8 @@ def test_weights_whose_answer_is_no_number_are_told_of(tmp_path):
     assert "\n" not in str(refused.value)
 
 
-def missing(path):
-    path.unlink()
-
-
-def torn(path):
-    path.write_bytes(path.read_bytes()[:-2000])
-
-
 def text(path):
     path.write_text("not weights")
-
-
-def pickled(path):
-    path.write_bytes(pickle.dumps(drawn_arrays()))
-
-
-def objects(path):
-    np.savez(path, card=np.array([{"format": pillars.FORMAT}], object))
 
 
 def lacking(path):
@@ -188,12 +163,6 @@ def of_another_shape(path):
     pillars.save_detector(path, drawn_arrays() | {"body0.bias": np.zeros(3)}, {})
 
 
-def not_finite(path):
-    with np.load(path) as file:
-        entries = dict(file)
-    np.savez(path, **entries | {"body0.bias": np.full(64, np.inf, np.float32)})
-
-
 def turned_round(path):
     pillars.save_detector(path, drawn_arrays() | {pillars.CALIBRATION: -np.ones((5, 2))}, {})
 
@@ -202,21 +171,7 @@ def of_another_format(path):
     write_arrays(path, drawn_arrays(), '{"format": "care-sim weights 1"}')
 
 
-def of_two_names(path):
-    """NumPy calls both entries by one name."""
-    with zipfile.ZipFile(path, "a") as archive:
-        archive.writestr("body0.bias", archive.read("body0.bias.npy"))
-
-
-def too_large(path):
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr("card.npy", bytes(2**27))
-
-
-SPOILT = [
-    missing, torn, text, pickled, objects, lacking, of_another_shape, not_finite, turned_round,
-    of_another_format, of_two_names, too_large,
-]  # fmt: skip
+SPOILT = [text, lacking, of_another_shape, turned_round, of_another_format]
 
 
 @pytest.mark.parametrize("spoil", SPOILT)
@@ -226,9 +181,3 @@ def test_a_wrong_file_is_refused_in_one_line_that_names_it(tmp_path, spoil):
     with pytest.raises(InvalidInput, match=r"spoilt\.npz") as refused:
         make_detector("pillars", HEIGHT, file=path)
     assert "\n" not in str(refused.value)
-
-
-def test_a_file_holds_the_numbers_of_every_layer():
-    shapes = pillars.array_shapes()
-    assert len(shapes) == 2 * len(LAYERS) + 1
-    assert 5e5 < sum(np.prod(shape) for shape in shapes.values()) < 1.5e6

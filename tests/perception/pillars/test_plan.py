@@ -56,10 +56,6 @@ def test_points_off_the_plan_are_left_out_and_the_others_lie_in_their_pillar(x, 
     assert np.abs(seen.inputs[0, :2]).max() <= 1 + 1e-6
 
 
-def test_a_cloud_without_points_has_none_on_the_plan():
-    assert on_plan(np.empty((0, 3)), HEIGHT).inputs.shape == (0, len(POINT_INPUTS))
-
-
 def test_cells_cover_the_plan():
     x, y = cell_centres()
     assert x[0, 0] - CELL_M / 2 == -REACH_M

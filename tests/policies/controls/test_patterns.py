@@ -2,15 +2,12 @@
 
 from dataclasses import dataclass
 
-import gymnasium
 import numpy as np
 import pytest
 
-import care_sim
-from care_sim.base.errors import InvalidInput
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
-from care_sim.policies import controls, make_policy, tags_of
+from care_sim.policies import controls
 from care_sim.policies.controls.patterns import (
     Fan,
     Place,
@@ -19,9 +16,11 @@ from care_sim.policies.controls.patterns import (
     Sweep,
     cells_by_row,
     entry_elevation_deg,
+    likeliest_cells,
 )
+from care_sim.policies.controls.patterns_and_tracks import HistoryPlace, HistoryRows, PlaceHulls
+from care_sim.policies.controls.rehearsed import HistoryLearnedPlace, learned_cells
 from care_sim.policies.learned.weights import Card, save_weights
-from care_sim.policies.paper.tracks import uniform_pattern
 
 CONTROLS = [
     "rows",
@@ -54,12 +53,6 @@ def chosen(policy):
     return cells
 
 
-@pytest.mark.parametrize("name", CONTROLS)
-def test_a_control_is_tagged_and_no_contender(name):
-    assert "control" in tags_of(name)
-    assert name not in care_sim.policies.contenders()
-
-
 def test_these_are_the_controls_that_a_car_can_have():
     assert {*controls()} == {*CONTROLS}
 
@@ -70,30 +63,6 @@ def test_a_pattern_names_as_many_cells_as_may_fire_once(make, budget):
     cells = chosen(make(Rig(budget=budget)))
     assert len(np.unique(cells)) == len(cells) == budget
     assert 0 <= cells.min() <= cells.max() < GRID.size
-
-
-@pytest.mark.parametrize("name", CONTROLS[:5])
-def test_a_pattern_fires_the_same_whatever_it_is_shown(name):
-    """Two scenarios and two seeds, of which it sees nothing."""
-    fired = []
-    for scenario, seed in (("CARE-Dartout-v0", 0), ("CARE-CutIn-v0", 5)):
-        with gymnasium.make(f"care_sim:{scenario}", budget=0.03) as env:
-            policy = make_policy(name, env)
-            observation, _ = env.reset(seed=seed)
-            policy.reset()
-            fired.append([])
-            for _ in range(3):
-                action = policy(observation)
-                observation, *_ = env.step(action)
-                fired[-1].append(np.flatnonzero(action))
-    assert all(np.array_equal(a, b) for a, b in zip(*fired, strict=True))
-
-
-def test_rows_begin_where_a_car_enters_the_range():
-    """-1.25 degrees lies nearest to row 9 at -1.33, then row 8 at 0.0 and row 10 at -2.67."""
-    rows = cells_by_row(Rig())[:: GRID.columns] // GRID.columns
-    assert rows[:3].tolist() == [9, 8, 10]
-    assert sorted(rows) == [*range(GRID.rows)]
 
 
 @pytest.mark.parametrize(
@@ -149,12 +118,6 @@ def test_the_sweep_fires_every_cell_once_in_a_turn():
     assert np.array_equal(cells[GRID.size :], cells[: 17_000 - GRID.size])
 
 
-@pytest.mark.parametrize("budget", [100, 1638])
-def test_the_stride_is_the_even_pattern_of_the_budget_that_it_is_told(budget):
-    ((cells,),) = Stride(Rig(budget=819)).demand(BudgetAlone(budget)).layers
-    assert np.array_equal(cells, uniform_pattern(GRID, budget))
-
-
 def test_place_takes_the_highest_of_its_map(tmp_path):
     sightings = np.zeros(GRID.shape, np.float32)
     sightings[9, 300] = 2
@@ -166,37 +129,70 @@ def test_place_takes_the_highest_of_its_map(tmp_path):
     assert np.array_equal(cells[2:], rows[~np.isin(rows, cells[:2])])
 
 
-def test_place_refuses_weights_of_another_kind(tmp_path):
-    save_weights(tmp_path / "other.npz", {}, Card("learned-scorer", GRID))
-    with pytest.raises(InvalidInput, match="kind is 'learned-scorer', needed is 'place'"):
-        Place(Rig(), tmp_path / "other.npz")
+HULL = [row * GRID.columns + column for row in range(7, 14) for column in range(249, 263)]
+"""Of a car 1.95 m wide whose rear is 17.7 m ahead: 3.2 degrees, 4.5 columns, to either side, and 2
+columns of margin. From 1.85 m below the sensor there, -6.0 degrees, to 0.15 m below it at its front
+22.3 m away, -0.4 degrees: rows 8 to 12, and 1 row of margin.
+"""
 
 
-@pytest.mark.parametrize("elevation", [float("nan"), 91, "level"])
-def test_rows_refuse_what_is_no_elevation(elevation):
-    with pytest.raises(InvalidInput, match="elevation_deg must lie in"):
-        Rows(Rig(), elevation)
+def test_the_hull_of_the_track_comes_first_and_then_the_rows(belief_of, car):
+    demand = HistoryRows(Rig()).demand(belief_of([car(1, 20)]))
+    assert [cells.tolist() for cells in demand.exploitation] == [HULL]
+    ((pattern,),) = demand.layers
+    assert np.array_equal(pattern, cells_by_row(Rig())[:819])
 
 
-@pytest.mark.parametrize("make", PATTERNS)
-def test_the_order_of_cells_leaves_a_pattern_as_it_is(make):
-    """In random order other cells would come first."""
-    fired = []
-    for order in ("as-demanded", "random"):
-        with gymnasium.make("CARE-Dense-v0", budget=0.03, cell_order=order) as env:
-            observation, _ = env.reset(seed=0)
-            fired.append(make_policy(make.name, env)(observation))
-    assert np.array_equal(*fired)
+def test_the_hull_of_the_track_comes_first_and_then_the_map(belief_of, car, tmp_path):
+    sightings = np.zeros(GRID.shape, np.float32)
+    sightings[4, 7] = 3
+    sightings[9, 300] = 2
+    save_weights(tmp_path / "map.npz", {"sightings": sightings}, Card("place", GRID))
+    demand = HistoryPlace(Rig(), tmp_path / "map.npz").demand(belief_of([car(1, 20)]))
+    assert [cells.tolist() for cells in demand.exploitation] == [HULL]
+    ((pattern,),) = demand.layers
+    assert pattern[:2].tolist() == [4 * GRID.columns + 7, 9 * GRID.columns + 300]
+    assert len(set(pattern)) == len(pattern) == 819
 
 
-@pytest.mark.parametrize("shape", [(64, 16), (1024, 64)])
-@pytest.mark.parametrize("make", [Rows, Fan, Stride, Sweep])
-def test_a_pattern_covers_any_grid(make, shape):
-    grid = AngularGrid(*shape)
-    cells = chosen(make(Rig(grid=grid, budget=grid.size)))
-    assert sorted(cells) == [*range(grid.size)]
+def test_the_hull_of_the_track_comes_first_and_then_the_learned_map(belief_of, car):
+    demand = HistoryLearnedPlace(Rig(), "cutin", 1).demand(belief_of([car(1, 20)]))
+    assert [cells.tolist() for cells in demand.exploitation] == [HULL]
+    ((pattern,),) = demand.layers
+    assert np.array_equal(pattern, learned_cells(Rig(), "cutin", 1)[:819])
 
 
-def test_the_stride_makes_its_pattern_once():
-    policy = Stride(Rig(budget=492))
-    assert chosen(policy) is chosen(policy)
+@pytest.mark.parametrize("make", [HistoryRows, HistoryPlace])
+def test_the_hull_follows_the_cell_order_of_the_rig_and_the_pattern_does_not(make, belief_of, car):
+    belief = belief_of([car(1, 20)])
+    usual, upwards = (make(Rig(cell_order=order)) for order in ("as-demanded", "rows-up"))
+    (hull,) = upwards.demand(belief).exploitation
+    assert hull.tolist() == sorted(HULL, key=lambda cell: (-(cell // GRID.columns), cell))
+    assert np.array_equal(upwards.demand(belief).layers, usual.demand(belief).layers)
+
+
+@pytest.fixture
+def map_file(tmp_path):
+    """A map of two cells; the others follow as `rows` has them."""
+    sightings = np.zeros(GRID.shape, np.float32)
+    sightings[4, 7] = 3
+    sightings[9, 300] = 2
+    save_weights(tmp_path / "map.npz", {"sightings": sightings}, Card("place", GRID))
+    return tmp_path / "map.npz"
+
+
+def test_the_map_has_its_share_first_and_the_hulls_two_rounds(map_file, belief_of, car):
+    """35% of 819 cells are 286; a round is two cells for each of the three returns."""
+    rig = Rig()
+    belief = belief_of([car(1, 20), car(2, 12, -9)])
+    first, few, more, rest = PlaceHulls(rig, map_file).demand(belief).layers
+    likeliest = likeliest_cells(rig, map_file)
+    assert likeliest[:2].tolist() == [4 * GRID.columns + 7, 9 * GRID.columns + 300]
+    assert [cells.tolist() for cells in first] == [likeliest[:286].tolist()]
+    assert [cells.tolist() for cells in rest] == [likeliest[:819].tolist()]
+
+    # A near car's core holds more than both rounds.
+    cores = rig.grid.hulls(belief.tracks.boxes, 0, 0)
+    for one, other, core in zip(few, more, cores, strict=True):
+        assert len({*one} | {*other}) == 12
+        assert {*one} | {*other} <= {*core}

@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_sim.base.errors import InvalidInput
 from care_sim.core.belief import Belief
 from care_sim.core.residual import camera_layers
 from care_sim.core.rig import Rig
@@ -45,10 +44,6 @@ def scan(*returns):
     for row, column, distance in returns:
         ranges[row, column] = distance
     return ranges
-
-
-def test_an_empty_belief_is_black():
-    assert not FEATURES(belief())["grid"].any()
 
 
 def test_the_car_itself():
@@ -115,18 +110,3 @@ def test_every_value_stays_within_its_bounds(seed):
     assert drawn["grid"].min() >= 0
     assert drawn["grid"].max() <= 1
     assert np.abs(drawn["ego"]).max() <= 1
-
-
-def test_other_blocks():
-    features = GridFeatures(RIG, 16, 2)
-    assert pictures(belief([CAR]), features)["forecast"].shape == (2, 16)
-    np.testing.assert_allclose(
-        pictures(belief([CAR]), features)["forecast"],
-        pictures(belief([CAR]))["forecast"].reshape(2, 4, 16, 4).mean((1, 3)),
-        atol=1e-6,
-    )
-
-
-def test_blocks_that_do_not_divide_the_grid_are_refused():
-    with pytest.raises(InvalidInput, match="azimuths must divide the 512"):
-        GridFeatures(RIG, 60, 8)

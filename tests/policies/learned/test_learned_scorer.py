@@ -1,8 +1,7 @@
-"""The learned scorer: its network against plain NumPy, its reserve, its files."""
+"""The learned scorer: what is seen of a cell, its network against plain NumPy, its reserve."""
 
 from dataclasses import asdict, replace
 
-import gymnasium
 import numpy as np
 import pytest
 from hypothesis import given
@@ -10,15 +9,116 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 import care_sim
-from care_sim.base.errors import InvalidInput
 from care_sim.core.allocation import allocate
 from care_sim.core.belief import Belief
 from care_sim.core.grid import AngularGrid
+from care_sim.core.residual import wedges
 from care_sim.core.rig import Rig
-from care_sim.core.types import Demand
+from care_sim.core.types import CLASSES, Demand, ImageDetections
 from care_sim.policies.learned.cell_inputs import RIG_INPUTS, SCAN_INPUTS, CellInputs
-from care_sim.policies.learned.learned_scorer import CellNetwork, LearnedScorer, highest
-from care_sim.policies.learned.weights import Card, load_weights, save_weights, shipped_weights
+from care_sim.policies.learned.learned_scorer import CellNetwork, highest
+from care_sim.policies.learned.weights import Card, load_weights, save_weights
+from care_sim.sensors.surround import SURROUND_CAMERAS
+
+GRID = AngularGrid()
+RIG = Rig(GRID, SURROUND_CAMERAS)
+BARE = replace(RIG, azimuth_margin=0, elevation_margin=0)
+(UNEXPLAINED, BOX, SMALL, EXPLAINED, HULL, FIRED, STANDING, NEAR), SIZE, NEARNESS = range(8), 8, 9
+AHEAD = 8 * GRID.columns + 256
+"""A cell that looks straight ahead and level: row 8 is 0.003 degrees above the horizon."""
+DOWN = 20 * GRID.columns + 256
+"""16 degrees down: it meets the road 6.7 m away."""
+
+
+@pytest.fixture
+def seen_of(belief_of):
+    """Makes the inputs (N, `SCAN_INPUTS`) of a belief from camera detections, tracks and ranges by
+    cell.
+    """
+
+    def make(pictures=(), tracks=(), ranges=None):
+        scan = np.zeros(GRID.size, np.float32)
+        scan[list(ranges or {})] = list((ranges or {}).values())
+        table = [[CLASSES.index(name), 0.9, *box, 0, 0, 0] for name, *box in pictures]
+        detections = ImageDetections.from_rows(np.array(table, float).reshape(-1, 9))
+        belief = replace(belief_of(tracks, ranges=scan.reshape(GRID.shape)), detections=detections)
+        seen = CellInputs(RIG).of(belief, RIG.hulls(belief.tracks.boxes))
+        return belief, seen.rows(np.arange(GRID.size))
+
+    return make
+
+
+def cells_with(seen, column):
+    return np.flatnonzero(seen[:, column]).tolist()
+
+
+def test_an_unexplained_box_marks_its_wedge_and_what_is_in_the_box(seen_of):
+    belief, seen = seen_of([("pedestrian", 150, 80, 160, 110)])
+    (wedge,), (bare,) = wedges(belief.detections, RIG), wedges(belief.detections, BARE)
+    assert cells_with(seen, UNEXPLAINED) == cells_with(seen, SMALL) == wedge.tolist()
+    assert cells_with(seen, BOX) == bare.tolist()
+    assert set(bare) < set(wedge)
+    assert seen[wedge, SIZE] == pytest.approx(np.log2(len(wedge) + 1) / 10)
+    assert not seen[:, [EXPLAINED, HULL, FIRED, STANDING, NEAR, NEARNESS]].any()
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_where_wedges_overlap_the_smallest_says_size_and_kind(seen_of, order):
+    pictures = [("car", 120, 80, 200, 120), ("pedestrian", 150, 80, 160, 110)]
+    belief, seen = seen_of([pictures[n] for n in order])
+    large, small = sorted(wedges(belief.detections, RIG), key=len, reverse=True)
+    around = np.setdiff1d(large, small)
+    assert cells_with(seen, SMALL) == small.tolist()
+    assert seen[small, SIZE] == pytest.approx(np.log2(len(small) + 1) / 10)
+    assert seen[around, SIZE] == pytest.approx(np.log2(len(large) + 1) / 10)
+
+
+def test_a_detection_that_a_forecast_explains_is_marked_as_such_and_its_hull(seen_of, car):
+    belief, seen = seen_of([("car", 140, 80, 180, 120)], [car(1, 12.0)])
+    assert cells_with(seen, EXPLAINED) == wedges(belief.detections, RIG)[0].tolist()
+    assert cells_with(seen, HULL) == RIG.hulls(belief.tracks.boxes)[0].tolist()
+    assert not seen[:, [UNEXPLAINED, BOX, SMALL, SIZE]].any()
+
+
+def test_a_standing_return_marks_its_surroundings_across_the_seam_too(seen_of):
+    seam = 8 * GRID.columns
+    _, seen = seen_of(ranges={seam: 10.0})
+    around = [row * GRID.columns + column for row in (7, 8, 9) for column in (0, 1, 2, 510, 511)]
+    assert cells_with(seen, FIRED) == cells_with(seen, STANDING) == [seam]
+    assert cells_with(seen, NEAR) == around
+    assert seen[seam, NEARNESS] == pytest.approx(0.8)
+
+
+def test_on_a_grid_with_a_gap_surroundings_end_where_it_ends(belief_of):
+    """Columns of a degree from -60 to 60: the last is no neighbour of column 0."""
+    grid = AngularGrid(120, 5, 0.2, -0.2, field_of_view=np.pi * 2 / 3)
+    scan = np.zeros(grid.shape, np.float32)
+    scan[2, 0] = 10.0
+    marks = CellInputs(Rig(grid)).of(belief_of(ranges=scan), []).rows(np.arange(grid.size))
+    assert cells_with(marks, STANDING) == [240]
+    assert {cell % 120 for cell in cells_with(marks, NEAR)} == {0, 1, 2}
+
+
+def test_the_road_a_hull_and_no_return_do_not_stand(seen_of, car):
+    _, seen = seen_of((), [car(1, 12.0)], {DOWN: 6.7, AHEAD + 100: GRID.range_m, AHEAD: 12.0})
+    assert cells_with(seen, FIRED) == sorted([DOWN, AHEAD + 100, AHEAD])
+    assert cells_with(seen, NEARNESS) == sorted([DOWN, AHEAD])
+    assert seen[AHEAD, HULL] == 1
+    assert not seen[:, [STANDING, NEAR]].any()
+
+
+def test_the_inputs_of_the_rig_are_those_of_the_ray():
+    elevation, ground, cosine, sine, covered = CellInputs(RIG).rig_inputs.T.reshape(
+        len(RIG_INPUTS), *GRID.shape
+    )
+    assert elevation[:, 0] == pytest.approx(np.linspace(GRID.top, GRID.bottom, 32) / 0.5, abs=1e-6)
+    assert ground[7, 3] == 0
+    assert ground[20, 3] == pytest.approx(1 - 1.84 / np.sin(np.deg2rad(16)) / 50, abs=1e-3)
+    assert cosine[0, 256] == pytest.approx(1, abs=1e-4)
+    assert cosine[0, 0] == pytest.approx(-1, abs=1e-4)
+    assert sine == pytest.approx(sine[:, ::-1], abs=1e-6)
+    assert covered[8].all()
+
 
 INPUTS = SCAN_INPUTS + len(RIG_INPUTS)
 CARD = Card("learned-scorer", asdict(AngularGrid()))
@@ -93,66 +193,3 @@ def test_the_shipped_weights_look_where_the_camera_sees_someone_new(encounter, e
             ended = terminated or truncated
         found[name] = info["outcome"]["detection_distance_m"]
     assert found["learned-scorer"] >= found["care"] - 1.0
-
-
-def test_shipped_weights_are_small_and_say_what_they_are():
-    path = shipped_weights("learned-scorer")
-    card = load_weights(path).card
-    assert path.stat().st_size < 3e6
-    assert (card.kind, card.budget, card.wrapper, card.scenario) == (
-        "learned-scorer",
-        None,
-        None,
-        "CARE-Street-v0",
-    )
-    assert card.seeds["calibration"] == list(range(1000, 1020))
-    assert card.result["loss held out"] < np.log(2)
-
-
-def test_weights_of_the_user_are_used(drawn, encounter, environment):
-    own = care_sim.make_policy("learned-scorer", environment, path=str(drawn))
-    usual = care_sim.make_policy("learned-scorer", environment)
-    assert any(not np.array_equal(own(o), usual(o)) for o in encounter[::8])
-
-
-@pytest.mark.parametrize(
-    ("card", "arrays", "message"),
-    [
-        (replace(CARD, kind="ppo"), {}, "kind is 'ppo', needed is 'learned-scorer'"),
-        (
-            replace(CARD, grid={**CARD.grid, "columns": 256}),
-            {},
-            "grid is columns 256 .* needed is columns 512",
-        ),
-        (CARD, {}, "no array 'layer'"),
-        (
-            CARD,
-            {"layer": np.zeros((3, 4))},
-            f"array 'layer' has the shape .3, 4., needed is {INPUTS} x any",
-        ),
-        (
-            CARD,
-            {"layer": np.zeros((INPUTS, 4)), "bias": np.zeros(4), "out": np.zeros(5)},
-            "array 'out' has the shape",
-        ),
-    ],
-)
-def test_weights_for_something_else_are_refused_in_one_line(
-    tmp_path, environment, card, arrays, message
-):
-    save_weights(tmp_path / "w.npz", arrays, card)
-    with pytest.raises(InvalidInput, match=message) as refusal:
-        care_sim.make_policy("learned-scorer", environment, path=tmp_path / "w.npz")
-    assert "\n" not in str(refusal.value)
-
-
-def test_a_rig_with_another_grid_is_refused():
-    with pytest.raises(InvalidInput, match=r"grid is .* rows 32 .* needed is .* rows 16 "):
-        LearnedScorer(Rig(AngularGrid(rows=16)))
-
-
-def test_it_plays_six_cameras_with_the_same_weights():
-    env = gymnasium.make("CARE-Street-v0", budget=0.1)
-    scorer = care_sim.make_policy("learned-scorer", env)
-    assert scorer(env.reset(seed=2000)[0]).max() == 1
-    env.close()

@@ -10,11 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import care_sim
-from care_sim.base.errors import InvalidInput
 from care_sim.core.belief import Belief
 from care_sim.core.cells.sets import CellSets
 from care_sim.core.grid import AngularGrid
-from care_sim.core.types import CLASSES, Ego, Tracks
+from care_sim.core.types import Ego, Tracks
 from care_sim.policies.learned.learned_sets import STEPS, SetNetwork
 from care_sim.policies.learned.set_items import ITEM_INPUTS, MIRRORED, STRIP_INPUTS, ItemReader
 from care_sim.policies.learned.set_kernels import best_cells, needed_cells
@@ -100,13 +99,6 @@ def test_the_order_of_a_sum_changes_no_chance(drawn, tmp_path, encounter, enviro
         np.testing.assert_array_equal(other.chances(items), network.chances(items))
         told = (each.strip_chances(items, reader.places) for each in (network, other))
         np.testing.assert_array_equal(*told)
-
-
-def test_without_boxes_and_tracks_the_strips_alone_are_served(drawn, environment, belief_of):
-    policy = care_sim.make_policy("learned-sets", environment, path=drawn)
-    ((cells,),) = policy.demand(belief_of()).layers
-    assert len(np.unique(cells)) == len(cells) == 819
-    assert set(cells) <= {*policy._items.strips.ravel()}
 
 
 def test_of_a_mirrored_street_the_same_is_told(environment, belief_of, car):
@@ -230,56 +222,3 @@ def test_items_follow_the_cell_order_of_the_rig(environment, belief_of, car):
     (cells,) = ItemReader(rig, 48).of(belief_of([car(1, 12, -9)])).sets
     (hull,) = rig.hulls(Tracks.from_rows(np.array([car(1, 12, -9)], float)).boxes)
     assert cells.tolist() == sorted(hull)[:48]
-
-
-def test_the_shipped_weights_find_the_person_as_soon_as_care_does(environment):
-    found = {}
-    for name in ("learned-sets", "care"):
-        policy = care_sim.make_policy(name, environment)
-        observation, _ = environment.reset(seed=0)
-        policy.reset()
-        ended = False
-        while not ended:
-            observation, _, terminated, truncated, info = environment.step(policy(observation))
-            ended = terminated or truncated
-        found[name] = info["outcome"]["detection_distance_m"]
-    assert found["learned-sets"] >= found["care"] - 1.0
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"kind": "ppo"}, "kind is 'ppo', needed is 'learned-sets'"),
-        ({"grid": AngularGrid(columns=256)}, "grid is columns 256 .* needed is columns 512"),
-        ({"arrays": {}}, "no array 'first'"),
-        ({"arrays": {"first": np.zeros((3, 4))}}, "array 'first' has the shape .3, 4., needed"),
-        ({"arrays": {"map": np.zeros(5)}}, "array 'map' has the shape .5,., needed is 416"),
-        ({"arrays": {"second": np.zeros((4, 4))}}, "array 'second' has the shape"),
-    ],
-)
-def test_weights_for_something_else_are_refused_in_one_line(tmp_path, environment, change, message):
-    arrays = change.pop("arrays", None)
-    given_arrays = drawn_arrays() | arrays if arrays else ({} if arrays == {} else drawn_arrays())
-    save_weights(tmp_path / "w.npz", given_arrays, replace(CARD, **change))
-    with pytest.raises(InvalidInput, match=message) as refusal:
-        care_sim.make_policy("learned-sets", environment, path=tmp_path / "w.npz")
-    assert "\n" not in str(refusal.value)
-
-
-@pytest.mark.parametrize(
-    ("parameters", "message"),
-    [
-        ({"min_returns": 0}, "min_returns must be a whole number"),
-        ({"refresh_per_s": -1}, "refresh_per_s must"),
-        ({"refresh_per_s": float("nan")}, "refresh_per_s must"),
-    ],
-)
-def test_bad_parameters_are_named(environment, parameters, message):
-    with pytest.raises(InvalidInput, match=message):
-        care_sim.make_policy("learned-sets", environment, **parameters)
-
-
-def test_every_class_has_a_column():
-    assert [name for name in ITEM_INPUTS if name.startswith("is a ")][1:] == [
-        f"is a {name}" for name in CLASSES
-    ]

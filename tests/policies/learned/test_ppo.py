@@ -2,8 +2,6 @@
 without PyTorch.
 """
 
-import subprocess
-import sys
 from dataclasses import asdict
 
 import gymnasium
@@ -23,7 +21,6 @@ from care_sim.policies.learned.weights import (
     Wrapping,
     load_weights,
     save_weights,
-    shipped_weights,
 )
 from care_sim.training.validation import ValidationScore, play, rule
 from tests.helpers.untrained import shapes, untrained
@@ -138,23 +135,6 @@ def test_numpy_predicts_what_stable_baselines3_does(tmp_path, env, goes_round):
     envs.close()
 
 
-WITHOUT_TORCH = """
-import sys
-import gymnasium, care_sim
-env = gymnasium.make("CARE-Dense-v0", budget=0.03)
-policy = care_sim.make_policy("ppo", env, path=sys.argv[1])
-observation, _ = env.reset(seed=0)
-for _ in range(3):
-    observation, *_ = env.step(policy(observation))
-assert not {"torch", "stable_baselines3"} & set(sys.modules)
-"""
-
-
-def test_it_acts_without_torch(tmp_path):
-    path = untrained(tmp_path / "w.npz")
-    subprocess.run([sys.executable, "-c", WITHOUT_TORCH, str(path)], check=True, timeout=120)
-
-
 @pytest.mark.parametrize(
     ("card", "message"),
     [
@@ -205,26 +185,6 @@ def test_the_shipped_weights_fit_any_budget_and_see_the_person_early(name, budge
     assert distances[name] > distances["history"] + 2
 
 
-def test_on_the_dense_street_a_place_is_enough_and_so_are_pictures(tmp_path, env):
-    """What the results say of the shipped weights: without pictures as early, without the place
-    nearly so.
-    """
-    weights = load_weights(shipped_weights("ppo-dense"))
-    paths = [shipped_weights("ppo-dense")]
-    for name in ("window.weight", "place"):
-        paths.append(tmp_path / f"without-{name}.npz")
-        save_weights(
-            paths[-1], weights.arrays | {name: np.zeros_like(weights.arrays[name])}, weights.card
-        )
-    distances = []
-    for path in paths:
-        policy = care_sim.make_policy("ppo", env, path=path)
-        played = play(env, lambda seen, _, policy=policy: policy(seen), dict.fromkeys(range(3), ""))
-        distances.append(ValidationScore.of(played).distance_m)
-    assert distances[0] == distances[1] > 15
-    assert distances[2] > distances[0] - 1
-
-
 def test_it_is_no_policy_behind_wrappers_of_learners(env):
     for wrapped in (SectorReserve(env), GridObservation(env), GridObservation(SectorScores(env))):
         with pytest.raises(
@@ -232,10 +192,3 @@ def test_it_is_no_policy_behind_wrappers_of_learners(env):
         ):
             care_sim.make_policy("ppo", wrapped)
     care_sim.make_policy("ppo", SectorReserve(env).unwrapped)
-
-
-def test_the_observation_of_a_wrapped_environment_is_refused_in_one_line(env):
-    policy = care_sim.make_policy("ppo", env)
-    seen, _ = GridObservation(env).reset(seed=0)
-    with pytest.raises(InvalidInput, match="an observation of CARE-Sim's environments is needed"):
-        policy(seen)

@@ -38,10 +38,6 @@ def columns_of(lines):
     return (lines.cells() - ROW * COLUMNS).tolist()
 
 
-def test_lines_that_were_never_fired_are_open(lines):
-    assert columns_of(lines) == [*range(COLUMNS)]
-
-
 def test_open_lines_and_the_edges_of_what_hides_are_watched(lines, belief_of):
     """A wall at 10 m in columns 100 to 199, nothing elsewhere: its inside is not watched."""
     ranges = np.full(COLUMNS, GRID.range_m)
@@ -132,15 +128,6 @@ def test_a_wall_stays_closed_when_the_car_drives_towards_it(lines, belief_of):
     assert lines.ranges[straight_on].max() < 15
 
 
-def test_a_post_that_the_car_drives_towards_is_five_times_as_wide_from_a_fifth(lines, belief_of):
-    """A column just left of straight ahead, 0 to 0.70 degrees, is 0 to 3.5 degrees from there."""
-    ranges = np.full(COLUMNS, GRID.range_m)
-    ranges[COLUMNS // 2] = 15
-    lines.update(belief_of(ego=Ego(speed=24.0), ranges=scan_of(ranges)))
-    covered = np.flatnonzero(lines.ranges < GRID.range_m) - COLUMNS // 2
-    assert covered.tolist() == [0, 1, 2, 3, 4]
-
-
 def test_of_two_posts_behind_each_other_the_nearer_one_is_remembered(lines, belief_of):
     """5 m ahead and 10 or 20 m to a side: 11.2 m at 63.4 degrees, 20.6 m at 76.0. After 5 m both
     stand at 90 degrees. On the left the nearer one has the lower column, on the right the higher.
@@ -173,30 +160,12 @@ def test_nothing_is_remembered_nearer_than_it_can_have_come(ranges, speed, yaw_r
     assert lines.ranges.max() <= GRID.range_m
 
 
-def test_standing_still_forgets_nothing(lines, belief_of):
-    ranges = np.linspace(1, GRID.range_m, COLUMNS)
-    lines.update(belief_of(ranges=scan_of(ranges)))
-    for _ in range(20):
-        lines.update(belief_of())
-    assert np.allclose(lines.ranges, ranges, atol=1e-3)
-
-
 def test_ahead_are_the_lines_of_the_street_the_nearest_to_straight_ahead_first(lines):
     """atan(13 / 50) is 14.6 degrees, 20.7 columns to either side."""
     columns = lines.ahead() - ROW * COLUMNS
     assert sorted(columns) == [*range(COLUMNS // 2 - 21, COLUMNS // 2 + 21)]
     off = np.abs(columns + 0.5 - COLUMNS / 2)
     assert (np.diff(off) >= 0).all()
-
-
-def test_ahead_leaves_out_what_is_hidden(lines, belief_of):
-    """A wall at 10 m with a gap of two columns straight ahead."""
-    ranges = np.full(COLUMNS, 10.0)
-    middle = COLUMNS // 2
-    ranges[middle - 1 : middle + 1] = GRID.range_m
-    lines.update(belief_of(ranges=scan_of(ranges)))
-    shown = range(middle - 1 - EDGE_COLUMNS, middle + 1 + EDGE_COLUMNS)
-    assert sorted(lines.ahead() - ROW * COLUMNS) == [*shown]
 
 
 def test_with_a_short_reach_a_line_without_a_return_is_open(belief_of):
@@ -220,7 +189,7 @@ def test_an_open_line_stays_open_where_float32_cannot_hold_the_reach(belief_of):
 
 @pytest.mark.parametrize(
     ("height", "pitch", "roll"),
-    [(0.5, 0, 0), (1.84, 0, 0), (3.0, 0, 0), (1.84, -8, 6), (0.5, 8, -6)],
+    [(0.5, 0, 0), (1.84, -8, 6)],
 )
 def test_along_a_street_lines_of_sight_are_open_however_the_lidar_is_mounted(height, pitch, roll):
     """With the row at -1.33 degrees they would end on the road after 21 m from a LiDAR 0.5 m above
@@ -240,7 +209,7 @@ def test_along_a_street_lines_of_sight_are_open_however_the_lidar_is_mounted(hei
         assert set(open_lines.tolist()) <= set(policy.demanded.layers[4][0].tolist())
 
 
-@pytest.mark.parametrize(("pitch", "roll"), [(0, 0), (-8, 6), (12, 3)])
+@pytest.mark.parametrize(("pitch", "roll"), [(0, 0), (-8, 6)])
 def test_every_column_has_the_cell_at_which_things_enter_the_range(pitch, roll):
     """Of rows 1.33 degrees apart the nearest looks no more than 0.67 degrees off."""
     grid = AngularGrid(top=0.6, bottom=-0.6, pitch=np.deg2rad(pitch), roll=np.deg2rad(roll))

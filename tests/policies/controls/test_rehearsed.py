@@ -1,5 +1,6 @@
-"""What an agent does that looks the episode up, and that a secret leaves it nothing to look up."""
+"""What an agent does that has played the scenario before, unless there is a secret."""
 
+from contextlib import closing
 from dataclasses import dataclass
 
 import gymnasium
@@ -9,15 +10,66 @@ import pytest
 import care_sim
 from care_sim.base.errors import InvalidInput
 from care_sim.commands.shared.selection import expanded
-from care_sim.core.belief import Belief
 from care_sim.core.rig import Rig
 from care_sim.policies import contenders, policy_names, tags_of
-from care_sim.policies.controls.rehearsed import SeedFinder, rehearsal
+from care_sim.policies.controls.rehearsed import LearnedPlace, SeedFinder, learned_cells, rehearsal
+from care_sim.scenarios import make_scenario
 from care_sim.scenarios.base import Scenario
 from care_sim.sensors.pictures import FRONT_CAMERA
 from care_sim.world.motions import Crosser, Meeting, Walk
 from care_sim.world.traffic import Traffic
 from care_sim.world.world import World
+
+GRID = Rig().grid
+
+
+def hull_when_a_full_scan_finds_the_actor(seed, **parameters):
+    with closing(gymnasium.make("CARE-Dartout-v0", budget=1.0, **parameters)) as env:
+        env.reset(seed=seed)
+        loop, info = env.unwrapped.loop, {"detected": False}
+        while not info["detected"]:
+            boxes = loop.sensor.boxes_to_local(loop.world.boxes([loop.world.first_sighting]))
+            *_, info = env.step(np.ones(GRID.shape, np.float32))
+        (hull,) = env.unwrapped.rig.hulls(boxes)
+        return hull
+
+
+def test_of_one_seed_it_fires_where_the_full_scan_first_finds_the_actor():
+    hull = hull_when_a_full_scan_finds_the_actor(10_000)
+    cells = learned_cells(Rig(), "dartout", 1)
+    assert sorted(cells[: len(hull)]) == sorted(hull)
+    assert sorted(cells) == [*range(GRID.size)]
+
+
+def test_the_cells_that_held_most_actors_come_first():
+    """At speeds so different they are found near and far, in many cells and in few."""
+    speeds = {"ego_speed_mps": (4.0, 14.0)}
+    hulls = [hull_when_a_full_scan_finds_the_actor(10_000 + n, **speeds) for n in range(3)]
+    held = [sum(cell in hull for hull in hulls) for cell in range(GRID.size)]
+    assert {*held} == {0, 1, 2, 3}
+    found = learned_cells(Rig(), make_scenario("dartout", **speeds), 3)
+    assert [held[cell] for cell in found] == sorted(held, reverse=True)
+
+
+@pytest.mark.parametrize(("mirrored", "side"), [("never", -1), ("always", 1)])
+def test_it_is_told_the_scenario_of_its_environment_with_its_parameters(mirrored, side):
+    with closing(gymnasium.make("CARE-CutIn-v0", budget=0.03, mirrored=mirrored)) as env:
+        policy = care_sim.make_policy("learned-place", env, seeds=2)
+        env.reset(seed=0)
+        cells = policy.demand(env.unwrapped.loop.belief).layers[0][0][:50]
+        assert np.array_equal(np.sign(GRID.directions[cells][:, 1]), np.full(50, side))
+        told = learned_cells(env.unwrapped.rig, make_scenario("cutin", mirrored=mirrored), 2)
+        assert np.array_equal(cells, told[:50])
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [({"scenario": "moon"}, "unknown scenario 'moon'"), ({"seeds": 0}, "seeds must be")],
+)
+def test_what_is_not_known_is_refused(parameters, message):
+    with pytest.raises(InvalidInput, match=message):
+        LearnedPlace(Rig(), **parameters)
+
 
 BLIND = {"budget": 0.03, "false_negative_rate": 1.0}
 ENVIRONMENTS = {"dartout": "CARE-Dartout-v0", "dense": "CARE-Dense-v0", "cutin": "CARE-CutIn-v0"}
@@ -105,18 +157,6 @@ def test_it_knows_the_scenario_of_its_environment(make, scenario):
     assert own.found == 9
 
 
-def test_it_knows_the_parameters_of_the_scenario(make):
-    env = make("cutin", budget=0.03, mirrored="always", ego_speed_mps=(12.2, 12.8))
-
-    def watch(policy, *_):
-        loop = env.unwrapped.loop
-        (true,) = loop.sensor.boxes_to_local(loop.world.boxes([loop.world.first_sighting]))
-        np.testing.assert_allclose(policy._expected(), [true], atol=0.05)
-        assert policy.found == 3
-
-    played(env, "seed-finder", watch=watch)
-
-
 def test_in_a_drive_it_knows_all_whom_the_ego_is_to_meet():
     env = gymnasium.make("care_sim:CARE-Drive-v0", disable_env_checker=True, budget=0.01)
     with env:
@@ -192,40 +232,8 @@ def test_it_may_ask_for_the_hidden_one_before_its_tracks(make):
     played(env, "seed-finder", watch=watch, hidden_first=True)
 
 
-def test_of_a_rig_alone_it_knows_the_dense_street(make):
-    env = make("cutin", budget=0.03)
-    observation, _ = env.reset(seed=9)
-    dense = care_sim.make_policy("seed-finder", env, scenario="dense")
-    np.testing.assert_array_equal(SeedFinder(env.unwrapped.rig)(observation), dense(observation))
-
-
-def test_after_reset_it_looks_again(make):
-    env = make(**BLIND)
-    finder = care_sim.make_policy("seed-finder", env)
-    for seed in (2, 7):
-        observation, _ = env.reset(seed=seed)
-        finder.reset()
-        finder.remember(Belief.from_observation(observation))
-        assert finder.found == seed
-
-
 def test_all_leaves_controls_out_unless_they_are_named():
     assert "control" in tags_of("seed-finder")
     assert contenders() == [name for name in policy_names() if "control" not in tags_of(name)]
     assert expanded(["all", "seed-finder", "care"], contenders()) == [*contenders(), "seed-finder"]
     assert expanded(["care"], contenders()) == ["care"]
-
-
-@pytest.mark.parametrize(
-    ("parameters", "message"),
-    [
-        ({"scenario": "moon"}, "unknown scenario 'moon'"),
-        ({"scenario": ["moon"]}, "unknown scenario"),
-        ({"seeds": 0}, "seeds must be"),
-        ({"seeds": 1.5}, "seeds must"),
-        ({"hidden_first": 1}, "hidden_first must be True or False"),
-    ],
-)
-def test_other_parameters_are_refused(make, parameters, message):
-    with pytest.raises(InvalidInput, match=message):
-        care_sim.make_policy("seed-finder", make(), **parameters)

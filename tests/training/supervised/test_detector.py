@@ -1,18 +1,17 @@
 """The training of the learned detector: it learns, and makes the same bytes again."""
 
-from concurrent.futures import BrokenExecutor, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from itertools import repeat
 
 import numpy as np
 import pytest
 
-from care_sim.base.errors import InvalidInput
 from care_sim.cli import main
-from care_sim.perception.pillars.detector import PillarsDetector, load_detector, save_detector
+from care_sim.perception.pillars.detector import PillarsDetector, load_detector
 from care_sim.perception.pillars.network import REACH_M, Fixed, answers, on_plan, place_planes
 from care_sim.training.supervised import detector
 from care_sim.training.supervised.detector import PLAIN, Judged, Peaks, calibration_of, right
-from care_sim.training.supervised.detector_data import Example, targets_of
+from care_sim.training.supervised.detector_data import Example, targets_of, turned_example
 from tests.helpers.made_points import HEIGHT, road, shell
 
 torch = pytest.importorskip("torch")
@@ -35,10 +34,9 @@ def test_it_learns_where_a_car_stands():
     with detector.one_thread(torch):
         torch.manual_seed(0)
         network = Learning()
-        curve = detector.train_detector(torch, network, repeat(street(0)), 25)
-    assert len(curve) == 1
+        assert len(detector.train_detector(network, repeat(street(0)), 25)) == 25
     network.eval()
-    (judged,) = detector.scores_by_scan(torch, network, street(0))
+    (judged,) = detector.scores_by_scan(network, street(0))
     surest = judged.peaks.take(np.arange(2))
     assert surest.classes.tolist() == [0, 0]
     assert judged.right[:2].all()
@@ -85,27 +83,6 @@ def test_the_command_writes_the_same_file_again_with_its_card(tmp_path, monkeypa
     PillarsDetector(one).detect(road(), HEIGHT)
 
 
-class Falls(Exception):
-    """What no code catches."""
-
-
-def fall(*_):
-    raise Falls
-
-
-@pytest.mark.parametrize("ending", ["scores_by_scan", "calibration_of"])
-def test_what_was_learned_is_kept_where_the_check_of_it_fails(
-    tmp_path, monkeypatch, capsys, ending
-):
-    monkeypatch.setattr(detector, ending, fall)
-    path = tmp_path / "w.npz"
-    assert trained(path, monkeypatch, "--steps", "3") == 1
-    arrays, card = load_detector(path)
-    assert np.array_equal(arrays["calibration"], PLAIN)
-    assert (card["steps"], card["result"]) == (3, "not checked, scores not calibrated")
-    assert f"{path} holds what 3 steps have taught, not checked" in capsys.readouterr().err
-
-
 def test_an_interrupt_leaves_what_was_learned_until_then(tmp_path, monkeypatch, capsys):
     steps = iter(range(5))
 
@@ -119,20 +96,8 @@ def test_an_interrupt_leaves_what_was_learned_until_then(tmp_path, monkeypatch, 
     assert trained(tmp_path / "w.npz", monkeypatch, "--steps", "9") == 130
     _, card = load_detector(tmp_path / "w.npz")
     assert (card["steps"], card["steps asked for"], len(card["curve"])) == (4, 9, 2)
+    assert card["result"] == "not checked, scores not calibrated"
     assert "interrupted" in capsys.readouterr().err
-
-
-def test_a_player_that_dies_is_told_of_in_one_line(tmp_path, monkeypatch, capsys):
-    def dead(seed):
-        if seed in detector.HELD_OUT:
-            raise BrokenExecutor
-        return street(seed)
-
-    path = tmp_path / "w.npz"
-    assert trained(path, monkeypatch, "--steps", "2", play=dead) == 1
-    assert load_detector(path)[1]["steps"] == 2
-    error = capsys.readouterr().err
-    assert error.endswith("care-sim: the worker process died that plays what is learned from\n")
 
 
 def test_a_training_that_diverges_writes_nothing(tmp_path, monkeypatch, capsys):
@@ -142,17 +107,7 @@ def test_a_training_that_diverges_writes_nothing(tmp_path, monkeypatch, capsys):
     assert "the training diverged: the loss of step 1 is nan" in capsys.readouterr().err
 
 
-def test_weights_that_nobody_could_read_are_not_written(tmp_path):
-    path = tmp_path / "w.npz"
-    one = Learning()
-    with torch.no_grad():
-        next(iter(one.parameters()))[0] = float("inf")
-    with pytest.raises(InvalidInput, match=r"not written: array 'point0.weight' is not of finite"):
-        save_detector(path, one.arrays(), {})
-    assert not path.exists()
-
-
-@pytest.mark.parametrize("steps", [*range(1, 8), 19, 20, 21, 39, 40, 41])
+@pytest.mark.parametrize("steps", [1, 2, 19, 20, 21, 41])
 def test_any_number_of_steps_has_a_rate_of_learning(monkeypatch, steps):
     class One(torch.nn.Module):
         def __init__(self):
@@ -164,7 +119,7 @@ def test_any_number_of_steps_has_a_rate_of_learning(monkeypatch, steps):
 
     monkeypatch.setattr(detector, "targets_of", lambda batch: [np.zeros(1)] * 3)
     monkeypatch.setattr(detector, "loss", lambda torch, answer, wanted: answer.sum())
-    assert len(detector.train_detector(torch, One(), repeat(street(0)), steps)) == 1
+    assert len(detector.train_detector(One(), repeat(street(0)), steps)) == steps
 
 
 def test_plays_come_in_order_whatever_they_take(monkeypatch):
@@ -180,7 +135,7 @@ def test_a_scan_turns_with_what_stands_in_it():
     rng = np.random.default_rng(0)
     for _ in range(6):
         (before,) = street(3)
-        after = detector.turned_example(before, rng)
+        after = turned_example(before, rng)
         for old, new in zip(before.boxes, after.boxes, strict=True):
             corner = 2.3 * np.array([np.cos(new[6]), np.sin(new[6])])
             near = np.hypot(*(after.points[:, :2] - new[:2] - corner).T).min()
@@ -194,7 +149,7 @@ def test_what_a_turn_takes_off_the_plan_is_no_object_any_more():
     corner = np.array([[50.0, -50.0, -1, 4.6, 1.9, 1.7, 0.0], [-50.0, 20.0, -1, 4.6, 1.9, 1.7, 0]])
     before = Example(np.empty((0, 3), np.float32), HEIGHT, np.array([0, 1]), corner)
     rng = np.random.default_rng(0)
-    turns = [detector.turned_example(before, rng) for _ in range(20)]
+    turns = [turned_example(before, rng) for _ in range(20)]
     assert {len(after.classes) for after in turns} == {0, 1, 2}
     for after in turns:
         assert np.abs(after.boxes[:, :2]).max(initial=0) < REACH_M
@@ -221,14 +176,3 @@ def test_scores_become_the_share_that_is_right():
     fitted = calibration_of([Judged(peaks(logits, np.zeros(4000)), hits, 4000, True)])
     assert fitted[0] == pytest.approx([0.5, -1], abs=0.15)
     assert np.array_equal(fitted[1:], PLAIN[1:])
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [(("--steps", "0"), "steps must be a whole number"), (("--sead", "0"), "--sead")],
-)
-def test_bad_options_are_refused_in_one_line(tmp_path, monkeypatch, capsys, options, message):
-    assert trained(tmp_path / "w.npz", monkeypatch, *options) == 2
-    error = capsys.readouterr().err
-    assert message in error
-    assert error.count("\n") == 1

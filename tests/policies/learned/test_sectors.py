@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from care_sim.base.errors import InvalidInput
 from care_sim.core.allocation import allocate
 from care_sim.core.belief import Belief
 from care_sim.core.beliefs import Beliefs
@@ -58,34 +59,40 @@ NOTHING = Belief(
 )
 
 
+FOUR = np.array([4])
+
+
 def listed(stages):
     return [[cells.tolist() for cells in stage.sets] for stage in stages]
 
 
-def test_sectors_become_layers_behind_the_hulls_best_first():
+def test_sectors_follow_the_hulls_best_first():
     rig = Rig(GRID, budget=4)
     scores = np.array([[[0.1, 0.2], [0.3, 0.4]]])
     choice = SectorChoice(rig, QUARTERS)
     first, second = [10, 11, 14, 15], [8, 9, 12, 13]
-    assert listed(choice.reserve(Beliefs.of(NOTHING, rig), scores)) == [[], [first], [second]]
-    assert listed(choice.alone(scores)) == [[], [first]]
-    assert listed(choice.alone(-scores)) == [[]]
+    assert listed(choice.reserve(Beliefs.of(NOTHING, rig), scores)) == [[], [first + second]]
+    assert listed(choice.alone(scores, FOUR)) == [[], [first]]
+    assert listed(choice.alone(-scores, FOUR)) == [[], [[]]]
 
 
-def test_worlds_without_another_sector_are_left_out_of_a_layer():
-    choice = SectorChoice(Rig(GRID, budget=8), QUARTERS)
+def test_each_world_has_its_own_sectors_up_to_its_budget():
     scores = np.array([[[0.5, -1], [-1, -1]], [[0.2, 0.3], [-1, -1]], [[-1, -1], [-1, 0]]])
-    stages = choice.alone(scores)
     left, right = [0, 1, 4, 5], [2, 3, 6, 7]
-    assert listed(stages) == [[], [left, right], [left]]
-    assert [stage.counts.tolist() for stage in stages] == [[0, 0, 0], [1, 1, 0], [0, 1, 0]]
+    choice = SectorChoice(Rig(GRID, budget=8), QUARTERS)
+    for budgets, second in (([8, 8, 8], right + left), ([8, 4, 8], right)):
+        stages = choice.alone(scores, np.array(budgets))
+        assert listed(stages) == [[], [left, second, []]]
+        assert [stage.counts.tolist() for stage in stages] == [[0, 0, 0], [1, 1, 1]]
 
 
 def test_equal_scores_go_by_ascending_sector():
     """Also where a network is so sure that its scores are equal in float32."""
     scores = np.tanh(np.array([[[12, 14], [13, 15]]], np.float32))
     assert len(np.unique(scores)) == 1
-    assert listed(SectorChoice(Rig(GRID, budget=4), QUARTERS).alone(scores)) == [[], [[0, 1, 4, 5]]]
+    assert listed(SectorChoice(Rig(GRID, budget=4), QUARTERS).alone(scores, FOUR))[1] == [
+        [0, 1, 4, 5]
+    ]
 
 
 RIGS = {
@@ -116,7 +123,7 @@ def test_every_world_acts_and_sees_as_if_it_were_alone(name, seed, worlds):
         for drawn, rows in pictures.items():
             assert features(belief)[drawn].tobytes() == rows[world].tobytes()
         own = scores[world : world + 1]
-        exploitation, *layers = (stage.sets for stage in choice.alone(own))
+        exploitation, *layers = (stage.sets for stage in choice.alone(own, np.array([rig.budget])))
         for demand, actions in (
             (rig.in_cell_order(reserve_demand(belief, rig, sectors, scores[world])), reserved),
             (Demand(exploitation, layers), only),
@@ -135,3 +142,45 @@ def test_a_forecast_of_another_world_explains_nothing():
     assert np.concatenate(found).tolist() == known.tolist()
     assert known.any()
     assert together.detected.sum() == len(known)
+
+
+def test_tiles_are_counted_from_the_top_row_and_from_straight_behind():
+    assert QUARTERS.cells.tolist() == [[0, 1, 4, 5], [2, 3, 6, 7], [8, 9, 12, 13], [10, 11, 14, 15]]
+    assert QUARTERS.shape == (2, 2)
+    assert QUARTERS.tile_shape == (2, 2)
+
+
+def best(tiling, scores, enough):
+    """The tiles that `Tiling.ranked` gives for one picture."""
+    (ranked,), (count,) = tiling.ranked(np.array([scores]), enough)
+    return ranked[:count].tolist()
+
+
+def test_the_best_come_first_ties_by_index_and_none_that_is_not_positive():
+    assert best(QUARTERS, [[0.2, -0.1], [0.9, 0.2]], 16) == [2, 0, 3]
+    assert best(QUARTERS, np.zeros((2, 2)), 16) == []
+    sectors = Tiling(AngularGrid())
+    equal = best(sectors, np.tile([0.5, 0.25], 64), 10**6)
+    assert equal == [*range(0, 128, 2), *range(1, 128, 2)]
+
+
+def test_no_more_tiles_than_hold_enough():
+    counts = [len(best(QUARTERS, np.ones((2, 2)), cells)) for cells in (0, 1, 4, 5, 100)]
+    assert counts == [0, 1, 1, 2, 4]
+
+
+@given(st.sampled_from([1, 2, 4, 8, 16, 512]), st.sampled_from([1, 2, 4, 32]))
+def test_the_tiles_part_the_grid(azimuths, elevations):
+    tiling = Tiling(AngularGrid(), azimuths, elevations)
+    assert np.array_equal(np.sort(tiling.cells.ravel()), np.arange(AngularGrid().size))
+    tall, wide = tiling.tile_shape
+    rows, columns = np.divmod(tiling.cells, 512)
+    assert np.array_equal(
+        rows // tall * azimuths + columns // wide, np.indices(tiling.cells.shape)[0]
+    )
+
+
+@pytest.mark.parametrize(("azimuths", "elevations"), [(3, 4), (0, 4), (32, 5), (32, 64), (1.5, 4)])
+def test_tiles_that_do_not_divide_the_grid_are_refused(azimuths, elevations):
+    with pytest.raises(InvalidInput, match=r"azimuths|elevations"):
+        Tiling(AngularGrid(), azimuths, elevations)

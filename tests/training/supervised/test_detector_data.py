@@ -1,4 +1,4 @@
-"""What the learned detector learns from: scans with the truth of their time."""
+"""What the learned detector learns from, and what it should answer."""
 
 from contextlib import closing
 
@@ -12,7 +12,16 @@ from care_sim.perception.pillars.network import REACH_M
 from care_sim.policies import maker, tags_of
 from care_sim.sensors.setups import setup_names
 from care_sim.sources.street_films import street_film
-from care_sim.training.supervised.detector_data import OTHER_SETUPS, POLICIES, play, scanned
+from care_sim.training.supervised.detector_data import (
+    OTHER_SETUPS,
+    POLICIES,
+    Example,
+    Targets,
+    loss,
+    play,
+    scanned,
+    targets_of,
+)
 
 DRIVE = 10_003
 
@@ -59,3 +68,52 @@ def test_policies_and_set_ups_are_known_and_none_was_learned():
         maker(name)
         assert not {"learned", "privileged", "non-causal"} & set(tags_of(name))
     assert set(OTHER_SETUPS) < set(setup_names())
+
+
+torch = pytest.importorskip("torch")
+NOTHING = np.empty((0, 3), np.float32)
+CAR = [10.3, -4.2, -1.0, 4.6, 1.9, 1.7, 0.3]
+PERSON = [11.3, -4.2, -1.0, 0.6, 0.6, 1.8, 0.0]
+
+
+def wanted(classes, boxes):
+    made = targets_of([Example(NOTHING, 1.84, np.array(classes), np.array(boxes))])
+    return Targets(*map(torch.from_numpy, made))
+
+
+def test_a_bump_is_highest_in_the_cell_of_the_centre_and_of_its_class_alone():
+    sure = wanted([0], [CAR]).sure[0]
+    assert sure.max() == sure[0, 62, 47] == 1
+    assert (sure[0] == 1).sum() == 1
+    assert not sure[1:].any()
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_between_two_a_cell_tells_of_the_nearer(order):
+    labels, objects = zip(*[((0, CAR), (4, PERSON))[n] for n in order], strict=True)
+    boxes = wanted(labels, objects).boxes[0]
+    assert boxes[3, 62, 47] == pytest.approx(np.log(4.6))
+    assert boxes[3, 63, 47] == pytest.approx(np.log(0.6))
+
+
+def test_an_object_at_the_edge_of_the_plan_stays_on_it():
+    sure = wanted([2], [[51.9, -51.9, -1, 12, 2.5, 3, 0]]).sure[0]
+    assert sure[2, 103, 0] == 1
+
+
+def test_the_loss_falls_towards_what_was_wanted_and_not_with_what_nobody_asked():
+    asked = wanted([0], [CAR])
+    right = torch.cat([torch.logit(asked.sure.clamp(1e-4, 1 - 1e-4)), asked.boxes], 1)
+    off = [float(loss(torch, right + shift, asked)) for shift in (0.0, 0.5, 3.0)]
+    assert off[0] < 0.2 < off[1] < off[2]
+
+    # Nobody asks a cell far from everything for a box.
+    elsewhere = right.clone()
+    elsewhere[:, 5:, 10, 10] = 9.0
+    assert float(loss(torch, elsewhere, asked)) == pytest.approx(off[0])
+
+
+def test_an_empty_street_asks_for_silence():
+    asked = wanted(np.empty(0, np.int64), np.empty((0, 7)))
+    quiet, loud = (torch.full((1, 15, 104, 104), logit) for logit in (-9.0, 0.0))
+    assert float(loss(torch, quiet, asked)) < 1e-3 < float(loss(torch, loud, asked))
