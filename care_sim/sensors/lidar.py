@@ -125,7 +125,7 @@ class RecordedLidar:
         # A cell is dropped with all its returns, of which a recorded sweep may have several.
         answering = np.zeros(self.grid.size, dtype=bool)
         answering[cells] = ~self._faults.draw_lost(cells)
-        returned = cloud.take(answering[cloud.cells]).to_shots(shots)
+        returned = cloud.of_cells(answering).to_shots(shots)
         if self._faults.is_noisy:
             returned = self._noisy(returned, shots)
         return self._crosstalk.over_cloud(returned, answering) if self._crosstalk else returned
@@ -134,7 +134,7 @@ class RecordedLidar:
         """What every cell would return, each fired once, before noise and dropout, which stay
         undrawn.
         """
-        return cloud.take(~self._faults.dead[cloud.cells]).to_shots()
+        return cloud.of_cells(~self._faults.dead).to_shots()
 
     def ranges(self, cloud: Cloud) -> Floats:
         """(N,) the nearest return of every cell in metres, inf without one."""

@@ -11,7 +11,7 @@ from care_sim.core.cells.stack import Grid
 from care_sim.core.conditions import LidarFaults, ReturnSettings
 from care_sim.core.grid import Cells
 from care_sim.core.types import Scan
-from care_sim.sensors.annotated import NO_OBJECT, Cloud, joined
+from care_sim.sensors.annotated import NO_OBJECT, Cloud, joined, rings_of
 from care_sim.sensors.beams import RollingSweep
 from care_sim.world.bullet import NO_BODY
 
@@ -129,6 +129,7 @@ class Crosstalk:
             np.full(len(cells), NO_OBJECT),
             None if cloud.intensities is None else np.full(len(cells), FULL_INTENSITY),
             None if cloud.times is None else self._sweep.seconds(cells),
+            rings=None if cloud.rings is None else rings_of(cells, self._grid),
         )
         return joined([cloud.take(~ghosts[cloud.cells]), feigned])
 

@@ -226,16 +226,13 @@ def result_boxes(shot: Shot, detections: Detections, velocities: Floats) -> list
     order = np.argsort(-scores, kind="stable")[:MOST_BOXES]
     world = shot.sensor.boxes_to_world(detections.boxes)
     moves = turned(velocities, shot.sensor.yaw)
-    columns = zip(
-        detections.classes[order].tolist(),
-        world[order],
-        moves[order],
-        scores[order].tolist(),
-        strict=True,
-    )
+    told = detections.attributes or [""] * len(detections)
     return [
-        {"sample_token": shot.token, **_result_box(CLASSES[label], *rest)}
-        for label, *rest in columns
+        {"sample_token": shot.token}
+        | _result_box(
+            CLASSES[detections.classes[row]], world[row], moves[row], float(scores[row]), told[row]
+        )
+        for row in order.tolist()
     ]
 
 
@@ -250,13 +247,17 @@ def confidences(detections: Detections) -> Floats:
     return scores
 
 
-def attribute(name: str, speed_mps: float) -> str:
-    """The official attribute of a class at a speed over ground."""
+def attribute(name: str, speed_mps: float, told: str = "") -> str:
+    """The official attribute: the one that the detector `told`, where its class may have it, else
+    that of the class at a speed over ground.
+    """
     standing, moving = ATTRIBUTES[name]
+    if told.partition(".")[0] == standing.partition(".")[0]:
+        return told
     return moving if speed_mps > STANDING_MPS else standing
 
 
-def _result_box(name: str, box: Floats, velocity: Floats, score: float) -> JsonRow:
+def _result_box(name: str, box: Floats, velocity: Floats, score: float, told: str) -> JsonRow:
     x, y, z, length, width, height, yaw = box.tolist()
     return {
         "translation": [x, y, z],
@@ -266,7 +267,7 @@ def _result_box(name: str, box: Floats, velocity: Floats, score: float) -> JsonR
         "velocity": velocity.tolist(),
         "detection_name": name,
         "detection_score": score,
-        "attribute_name": attribute(name, float(np.hypot(*velocity))),
+        "attribute_name": attribute(name, float(np.hypot(*velocity)), told),
     }
 
 
