@@ -21,6 +21,7 @@ from care_sim.loops.film import Film, Shot
 from care_sim.loops.gathering import acted_on, with_sweeps
 from care_sim.loops.truth import Told, TrackObjects, told_by
 from care_sim.perception.points_only import Detector
+from care_sim.perception.recorded import RecordedDetector
 from care_sim.perception.tracker import TrackMemory
 from care_sim.sensors.annotated import Cloud
 from care_sim.sensors.camera import CameraDetector
@@ -116,6 +117,8 @@ class OpenLoop:
         mask = fired if self._sweep_mask == COMING else self._held
         gathered = with_sweeps(cloud, self._lidar, mask, shot)
         self._held = fired
+        if isinstance(self._detector, RecordedDetector):
+            self._detector.at(shot.token, shot.sensor)
         reported, objects = self._detector.detect(gathered, shot.annotations)
         sure = acted_on(reported, self._detector.track_score)
         detections = reported if sure.all() else reported.take(sure)

@@ -22,6 +22,7 @@ from care_sim.perception.points_only import (
     TorchScriptDetector,
 )
 from care_sim.perception.proxy import GradedProxy, ReturnsProxy
+from care_sim.perception.recorded import RecordedDetector
 
 PROXY = "returns"
 """The paper's proxy."""
@@ -31,8 +32,10 @@ CLUSTER = "cluster"
 """The classical one. It is told the grid, and so how far apart neighbouring points are."""
 PILLARS = "pillars"
 """The learned one."""
-PRIVILEGED = (PROXY, GRADED)
-"""Those that read whose return each one is; all others are `PointDetector`s."""
+RECORDED = "recorded"
+"""The upper bound: what a real detector reported of full scans."""
+PRIVILEGED = (PROXY, GRADED, RECORDED)
+"""Those that read more than points; all others are `PointDetector`s."""
 
 
 def _faults(made: Any) -> Iterator[str]:
@@ -48,6 +51,7 @@ DETECTORS: Plugins[Any] = Plugins(
         GRADED: GradedProxy,
         CLUSTER: ClusterDetector,
         PILLARS: PillarsDetector,
+        RECORDED: RecordedDetector,
         "torchscript": TorchScriptDetector,
     },
     faults=_faults,

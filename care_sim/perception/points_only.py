@@ -38,6 +38,8 @@ class Detector(Protocol):
         ...
 
 
+FARTHEST_M = 1e7
+"""Beyond this no map goes, metres."""
 MOST_SWEEPS = 100
 """Sweeps that a detector may gather: five seconds of a LiDAR that turns 20 times a second."""
 MOST_DETECTIONS = 500
@@ -145,7 +147,7 @@ class PointsOnly:
                 f"detector {self._name} fails on {len(cloud)} points: {error_line(error)}"
             ) from error
         detections = checked(self._name, found, len(cloud))
-        return detections, _objects_behind(detections.boxes, cloud)
+        return detections, objects_behind(detections.boxes, cloud)
 
 
 def _column(cloud: Cloud, field: str) -> Floats | Integers:
@@ -208,7 +210,7 @@ def checked(name: str, found: Any, points: int) -> Detections:
     return Detections(classes, table["boxes"], returns, scores, velocities, attributes)
 
 
-def _objects_behind(boxes: Floats, cloud: Cloud) -> Integers:
+def objects_behind(boxes: Floats, cloud: Cloud) -> Integers:
     """(n,) the object that most of the returns within each box lie on, or NO_OBJECT."""
     # Returns on nobody have no vote: a box that stands on the road holds some of it.
     named = cloud.objects != NO_OBJECT
