@@ -3,13 +3,13 @@ results form of the nuScenes detection task, which the official devkit scores.
 """
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import cast
+from typing import Any
 
 import numpy as np
 
-from care_sim.base.checks import check_number, check_whole
+from care_sim.base.checks import check_number
 from care_sim.base.errors import InvalidInput, unknown
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.conditions import MIN_RETURNS
@@ -18,6 +18,7 @@ from care_sim.core.frames import turned
 from care_sim.core.types import CLASSES, Detections, ImageDetections
 from care_sim.loops.film import Shot
 from care_sim.sensors.annotated import NO_OBJECT, Annotations, IdentifiedDetections
+from care_sim.sources.nuscenes.camera_categories import Categories
 from care_sim.sources.nuscenes.cameras import (
     RecordedCamera,
     projected,
@@ -25,10 +26,6 @@ from care_sim.sources.nuscenes.cameras import (
 from care_sim.sources.nuscenes.table_files import JsonRow, read_json
 from care_sim.sources.nuscenes.tables import Database
 
-COCO = {1: "pedestrian", 2: "bicycle", 3: "car", 6: "bus", 8: "truck"}
-"""The categories of COCO that the five classes hold."""
-COCO_LAST = 90
-"""The categories of COCO are numbered from 1 to this."""
 FARTHEST_PX = 1e5
 """How far a box may reach, within the picture or beside it, so that its area stays a number."""
 SAME_OBJECT_IOU = 0.5
@@ -47,15 +44,20 @@ class DetectionFile:
     `category_name` or `detection_name`, and `score` or `detection_score`, as a list or as a map
     `results` from tokens to lists. COCO results: rows with `image_id`, `bbox` (left, top, width,
     height), `category_id` and `score`; `image_id` is the token of the picture or its file name.
+
+    Numbers of other pictures and categories are told by a map with the COCO rows as `annotations`,
+    `images` (rows with `id` and `file_name`), and `categories`: a name of
+    `care_sim.sources.nuscenes.camera_categories.CATEGORY_MAPS`, or rows with `id` and `name`.
     Known categories outside the five classes are left out.
     """
 
     def __init__(self, path: Path):
         self.path = path
         self.pictures: dict[str, list[Found]] = defaultdict(list)
-        for number, row in enumerate(_rows(path)):
+        rows, images, categories = _parts(path)
+        for number, row in enumerate(rows):
             try:
-                picture, detection = _read(row)
+                picture, detection = _read(row, images, categories)
             except KeyError as error:
                 raise InvalidInput(
                     f"{path}: detection {number} cannot be read (it lacks {error})"
@@ -107,9 +109,25 @@ class DetectionFile:
         )
 
 
-def _rows(path: Path) -> list[JsonRow]:
-    """The rows of either form, which may be none."""
+def _parts(path: Path) -> tuple[list[JsonRow], dict[int, str] | None, Categories]:
+    """The rows, the file names of numbered pictures, and the categories."""
     content = read_json(path)
+    if not isinstance(content, dict) or "annotations" not in content:
+        return _rows(path, content), None, Categories()
+    try:
+        images = {int(image["id"]): str(image["file_name"]) for image in content.get("images", ())}
+        categories = Categories(content.get("categories", "coco"))
+    except (KeyError, TypeError, ValueError) as error:
+        raise InvalidInput(
+            f"{path}: images must be rows with id and file_name ({error})"
+        ) from error
+    except InvalidInput as error:
+        raise InvalidInput(f"{path}: {error}") from error
+    return _rows(path, content["annotations"]), images, categories
+
+
+def _rows(path: Path, content: Any) -> list[JsonRow]:
+    """The rows of either form, which may be none."""
     results = content.get("results") if isinstance(content, dict) else None
     if isinstance(results, dict) and all(isinstance(rows, list) for rows in results.values()):
         # Rows of the map do not repeat their token. What is no row stays, and is refused with its
@@ -126,15 +144,23 @@ def _rows(path: Path) -> list[JsonRow]:
     return content
 
 
-def _read(row: JsonRow) -> tuple[str, Found | None]:
+def _read(
+    row: JsonRow, images: Mapping[int, str] | None, categories: Categories
+) -> tuple[str, Found | None]:
     """The picture and the detection on it, None outside the five classes."""
     if not isinstance(row, dict):
         raise TypeError(f"no map of fields: {row!r}")
     if "image_id" in row:
         left, top, width, height = _box(row["bbox"])
-        label = _coco_class(row["category_id"])
+        label = categories.class_of(row["category_id"])
         corners = np.array([left, top, left + width, top + height])
-        picture = str(row["image_id"])
+        picture = row["image_id"]
+        if isinstance(picture, int):
+            if picture not in (images or {}):
+                raise ValueError(
+                    f"image_id {picture} is none of the {len(images or {})} images told"
+                )
+            picture = (images or {})[picture]
         score = row["score"]
     else:
         picture = row["sample_data_token"]
@@ -156,11 +182,6 @@ def _box(numbers: object) -> Floats:
     if np.abs(box).max() > FARTHEST_PX:
         raise ValueError(f"a box beyond {FARTHEST_PX:g} pixels: {numbers!r}")
     return box.astype(float)
-
-
-def _coco_class(number: object) -> str | None:
-    check_whole("category_id", number, 1, COCO_LAST)
-    return COCO.get(cast(int, number))
 
 
 def objects_behind(
