@@ -109,20 +109,20 @@ class DetectionFile:
         )
 
 
-def _parts(path: Path) -> tuple[list[JsonRow], dict[int, str] | None, Categories]:
+def _parts(path: Path) -> tuple[list[JsonRow], dict[int, str], Categories]:
     """The rows, the file names of numbered pictures, and the categories."""
     content = read_json(path)
     if not isinstance(content, dict) or "annotations" not in content:
-        return _rows(path, content), None, Categories()
+        return _rows(path, content), {}, Categories()
     try:
-        images = {int(image["id"]): str(image["file_name"]) for image in content.get("images", ())}
         categories = Categories(content.get("categories", "coco"))
-    except (KeyError, TypeError, ValueError) as error:
-        raise InvalidInput(
-            f"{path}: images must be rows with id and file_name ({error})"
-        ) from error
     except InvalidInput as error:
         raise InvalidInput(f"{path}: {error}") from error
+    try:
+        images = {int(image["id"]): str(image["file_name"]) for image in content.get("images", ())}
+    except (KeyError, TypeError, ValueError) as error:
+        told = f"images must be rows with id and file_name ({error})"
+        raise InvalidInput(f"{path}: {told}") from error
     return _rows(path, content["annotations"]), images, categories
 
 
@@ -145,7 +145,7 @@ def _rows(path: Path, content: Any) -> list[JsonRow]:
 
 
 def _read(
-    row: JsonRow, images: Mapping[int, str] | None, categories: Categories
+    row: JsonRow, images: Mapping[int, str], categories: Categories
 ) -> tuple[str, Found | None]:
     """The picture and the detection on it, None outside the five classes."""
     if not isinstance(row, dict):
@@ -156,11 +156,9 @@ def _read(
         corners = np.array([left, top, left + width, top + height])
         picture = row["image_id"]
         if isinstance(picture, int):
-            if picture not in (images or {}):
-                raise ValueError(
-                    f"image_id {picture} is none of the {len(images or {})} images told"
-                )
-            picture = (images or {})[picture]
+            if picture not in images:
+                raise ValueError(f"image_id {picture} is none of the {len(images)} images told")
+            picture = images[picture]
         score = row["score"]
     else:
         picture = row["sample_data_token"]
