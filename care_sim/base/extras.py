@@ -55,6 +55,11 @@ def import_torch() -> ModuleType:
     return _import("torch", "PyTorch", "rl")
 
 
+def import_onnxruntime() -> ModuleType:
+    """ONNX Runtime. Raises MissingExtra with the extra to install."""
+    return _import("onnxruntime", "ONNX Runtime", "onnx")
+
+
 def import_imageio_ffmpeg() -> ModuleType:
     """FFmpeg, as imageio-ffmpeg brings it. Raises MissingExtra with the extra to install."""
     return _import("imageio_ffmpeg", "A film as MP4", "video")

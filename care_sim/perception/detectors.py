@@ -13,13 +13,13 @@ from care_sim.base.checks import check_known
 from care_sim.base.errors import InvalidInput, MissingExtra, error_line, printable, shown
 from care_sim.base.plugins import Plugins
 from care_sim.perception.cluster.detector import ClusterDetector
+from care_sim.perception.network_detectors import OnnxDetector, TorchScriptDetector
 from care_sim.perception.pillars.detector import PillarsDetector
 from care_sim.perception.points_only import (
     BrokenDetector,
     Detector,
     PointDetector,
     PointsOnly,
-    TorchScriptDetector,
 )
 from care_sim.perception.proxy import GradedProxy, ReturnsProxy
 from care_sim.perception.recorded import RecordedDetector
@@ -53,6 +53,7 @@ DETECTORS: Plugins[Any] = Plugins(
         PILLARS: PillarsDetector,
         RECORDED: RecordedDetector,
         "torchscript": TorchScriptDetector,
+        "onnx": OnnxDetector,
     },
     faults=_faults,
 )

@@ -4,17 +4,13 @@
 goes through it.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
-from os import PathLike, fspath
-from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 
 from care_sim.base.checks import check_known, check_number, check_whole
 from care_sim.base.errors import InvalidInput, MissingExtra, error_line
-from care_sim.base.extras import import_torch
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.frames import turned
 from care_sim.core.types import CLASSES, Detections
@@ -258,63 +254,3 @@ def _faults(
 
 def _is_count(numbers: Floats) -> Mask:
     return np.asarray((numbers >= 0) & (numbers % 1 == 0))
-
-
-class TorchScriptDetector:
-    """A learned detector from a TorchScript file, and the example to follow for one's own.
-
-    Runs the module in `file`: `forward(points, sensor_height_m) -> (classes, boxes, scores)`.
-
-    `points` is a float32 tensor (P, k) with the `fields`, of
-    `care_sim.perception.points_only.FIELDS` and with commas between them if given as one text, x, y
-    and z unless given; `sensor_height_m` is a float; `classes` (n,) index
-    `care_sim.core.types.CLASSES`, `boxes` (n, 7) are x, y, z, length, width, height, yaw in the
-    sensor frame, `scores` (n,) lie in [0, 1]. A fourth output, where there is one, is `velocities`
-    (n, 2). Runs on `device`, the CPU unless given. Needs torch. Raises MissingExtra without it,
-    InvalidInput for a file that is no TorchScript module.
-
-    One around an ONNX file, in a package of its own:
-
-        class OnnxDetector:
-            def __init__(self, file: str):
-                self._session = onnxruntime.InferenceSession(file)
-
-            def detect(self, points, sensor_height_m):
-                inputs = {"points": points.astype("float32")}
-                classes, boxes, scores = self._session.run(None, inputs)
-                return Detections(classes, boxes, inside(points, boxes).sum(axis=1), scores)
-
-    is found under the name `mine` by this entry in the package's pyproject.toml:
-
-        [project.entry-points."care_sim.detectors"]
-        mine = "my_package:OnnxDetector"
-    """
-
-    def __init__(
-        self,
-        file: str | PathLike[str],
-        fields: str | Sequence[str] = FIELDS[:3],
-        device: str = "cpu",
-    ):
-        self.fields = fields.split(",") if isinstance(fields, str) else fields
-        self._torch = import_torch()
-        self._device = device
-        self._file = fspath(file)
-        if not Path(file).is_file():
-            raise InvalidInput(
-                f"{self._file}: no such file; allowed is a TorchScript module (torch.jit.save)"
-            )
-        try:
-            self._module = self._torch.jit.load(self._file, map_location=device).eval()
-        except RuntimeError as error:
-            raise InvalidInput(f"{self._file}: no TorchScript module (torch.jit.save)") from error
-
-    def detect(self, points: Floats, sensor_height_m: float) -> Detections:
-        """See `care_sim.perception.points_only.PointDetector`."""
-        # Nothing is learned here, so no gradients are kept.
-        with self._torch.inference_mode():
-            given = self._torch.from_numpy(points.astype(np.float32)).to(self._device)
-            outputs = self._module(given, float(sensor_height_m))
-        classes, boxes, scores, *velocities = (output.cpu().numpy() for output in outputs)
-        held = inside(points[:, :3], boxes).sum(axis=1)
-        return Detections(classes, boxes, held, scores, *velocities)

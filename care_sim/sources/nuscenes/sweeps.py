@@ -77,7 +77,8 @@ def read_points(path: Path) -> Floats:
             f"{path}: must hold float32 x, y, z within {REACH_M[1]:g} m, intensity, and a whole "
             f"ring from 0 to {RINGS - 1} per point{_other_form(values)}"
         )
-    x, y, z, intensity, ring = rows.astype(float).T
+    with np.errstate(invalid="ignore"):
+        x, y, z, intensity, ring = rows.astype(float).T
     return np.column_stack([y, -x, z, intensity / FULL_INTENSITY, ring])
 
 
