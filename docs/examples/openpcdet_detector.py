@@ -1,6 +1,6 @@
 """A detector of OpenPCDet (https://github.com/open-mmlab/OpenPCDet): give its config and checkpoint.
 
-    care-sim protocol --source nuscenes:FOLDER --sweeps 10 --detector openpcdet_detector:OpenPCDet \
+care-sim protocol --source nuscenes:FOLDER --sweeps 10 --detector openpcdet_detector:OpenPCDet \
         --detector-parameters config=cbgs_voxel0075_res3d_centerpoint.yaml checkpoint=centerpoint.pth
 """
 

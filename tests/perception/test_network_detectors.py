@@ -59,5 +59,7 @@ def test_conventions_that_are_none_are_named(told, fault):
 
 
 def test_a_label_beyond_the_classes_is_named():
-    with pytest.raises(InvalidInput, match="answers the labels 9 to 9, and its classes have 0 to 8"):
+    with pytest.raises(
+        InvalidInput, match="answers the labels 9 to 9, and its classes have 0 to 8"
+    ):
         network().detections(POINTS, [9], np.ones((1, 7)), [1.0])

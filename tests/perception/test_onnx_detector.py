@@ -79,7 +79,7 @@ def test_a_file_that_is_no_network_is_named(tmp_path):
     with pytest.raises(InvalidInput, match="no such file; allowed is an ONNX network"):
         make_detector("onnx", 1.84, file=path)
     path.write_bytes(b"nothing")
-    with pytest.raises(InvalidInput, match="none.onnx: no ONNX network"):
+    with pytest.raises(InvalidInput, match=r"none\.onnx: no ONNX network"):
         make_detector("onnx", 1.84, file=path)
     with pytest.raises(InvalidInput, match="unknown device 'tpu'"):
         make_detector("onnx", 1.84, file=path, device="tpu")
