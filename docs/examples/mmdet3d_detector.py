@@ -1,7 +1,6 @@
-"""A detector of mmdetection3d 1.x (https://github.com/open-mmlab/mmdetection3d): give its config and
-checkpoint.
+"""A detector of mmdetection3d 1.x (https://github.com/open-mmlab/mmdetection3d).
 
-    care-sim protocol --source nuscenes:FOLDER --sweeps 10 --detector mmdet3d_detector:MMDet3D \
+care-sim protocol --source nuscenes:FOLDER --sweeps 10 --detector mmdet3d_detector:MMDet3D \
         --detector-parameters config=centerpoint_voxel0075_nus.py checkpoint=centerpoint.pth
 """
 

@@ -1,7 +1,7 @@
-"""A detector of OpenPCDet (https://github.com/open-mmlab/OpenPCDet): give its config and checkpoint.
+"""A detector of OpenPCDet (https://github.com/open-mmlab/OpenPCDet).
 
 care-sim protocol --source nuscenes:FOLDER --sweeps 10 --detector openpcdet_detector:OpenPCDet \
-        --detector-parameters config=cbgs_voxel0075_res3d_centerpoint.yaml checkpoint=centerpoint.pth
+        --detector-parameters config=cbgs_voxel0075_centerpoint.yaml checkpoint=centerpoint.pth
 """
 
 import numpy as np
