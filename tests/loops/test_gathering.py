@@ -102,6 +102,8 @@ def test_a_turn_of_the_car_is_undone():
     seen = gathering.add(cloud(0.1, -10.0), Frame(0.0, 0.0, HEIGHT, np.pi / 2))
     earlier = seen.points[seen.times < 0]
     assert earlier == pytest.approx(np.array([[0.0, -10.0, -1.0]]), abs=1e-9)
+    moved = seen.poses[1].matrix @ [10.0, 0.0, -1.0, 1.0]
+    assert moved == pytest.approx([0.0, -10.0, -1.0, 1.0], abs=1e-9)
 
 
 def test_an_environment_feeds_its_detector_several_sweeps(monkeypatch):
