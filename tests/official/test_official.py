@@ -134,7 +134,7 @@ def test_velocities_and_attributes_are_the_detectors_own(tmp_path, database):
         options = ("--policy", "full", "--detector", "recorded")
         exported(database, out, *options, "--detector-parameters", f"file={file}")
         scores.append(scored(database, out))
-    assert scores[0]["label_tp_errors"]["car"]["vel_err"] == pytest.approx(0, abs=1e-3)
+    assert scores[0]["label_tp_errors"]["car"]["vel_err"] < 0.01
     assert scores[1]["label_tp_errors"]["car"]["vel_err"] > 1
     assert scores[0]["nd_score"] > scores[1]["nd_score"]
 
