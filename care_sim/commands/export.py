@@ -77,8 +77,7 @@ def _scene_results(config: PlayConfig) -> dict[str, list[JsonRow]]:
     film = config.film()
     shots = zip(film.shots, play_through_film(config, film).keyframes, strict=True)
     return {
-        shot.token: result_boxes(shot, record.detections, record.velocities)
-        for shot, record in shots
+        shot.token: result_boxes(shot, record.reported, record.velocities) for shot, record in shots
     }
 
 

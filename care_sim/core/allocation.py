@@ -5,6 +5,7 @@ a policy calls `allocate` for lines 1 to 5, without a floor. Line 6, the floor, 
 those of the hardware (`care_sim.core.firing`), which every action passes, whatever made it.
 """
 
+import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -161,6 +162,11 @@ HIGHEST_CELL = 2**24
 _SETS = "a list of sets of cells"
 
 
+def half_up(number: float) -> int:
+    """The nearest whole number, of two the higher one, as people round: 2.5 is 3."""
+    return math.floor(number + 0.5)
+
+
 def budget_cells(budget: float, cells: int, unit: str = "cell") -> int:
     """B = round(beta * N) (Eq. 1): the cells that a fraction `budget` of all `cells` is, or as many
     units of another hardware (`care_sim.core.firing`).
@@ -169,9 +175,9 @@ def budget_cells(budget: float, cells: int, unit: str = "cell") -> int:
     """
     if not (is_number(budget) and 0 < budget <= 1):
         raise InvalidInput(f"budget must lie in (0, 1], got {shown(budget)}")
-    if round(float(budget) * cells) < 1:
+    if half_up(float(budget) * cells) < 1:
         raise InvalidInput(f"budget {budget} leaves no {unit} of {cells}; {1 / cells:.2g} is one")
-    return round(float(budget) * cells)
+    return half_up(float(budget) * cells)
 
 
 def allocate(
@@ -193,7 +199,7 @@ def allocate(
     check_whole("budget", budget, 0, HIGHEST_CELL)
     stages = stages_of(demand)
     # A layer may use all that is left of B, so that it inherits what exploitation did not need.
-    limits = [round((1 - reserve_fraction) * budget)] + [budget] * (len(stages) - 1)
+    limits = [half_up((1 - reserve_fraction) * budget)] + [budget] * (len(stages) - 1)
     chosen = _filled(stages, limits)
     if floor is None:
         return chosen

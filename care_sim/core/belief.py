@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from care_sim.base.checks import as_array
 from care_sim.base.compiled import compiled
 from care_sim.base.errors import InvalidInput
+from care_sim.core.allocation import half_up
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.types import CLASSES, Ego, ImageDetections, Tracks
 
@@ -159,7 +160,7 @@ class Belief:
         tracks = _rows(observation, "tracks", Tracks.COLUMNS)
         return cls(
             Ego(*ego),
-            round(budget * ranges.size),
+            half_up(budget * ranges.size),
             ImageDetections.from_checked_rows(detections),
             Tracks.from_checked_rows(tracks),
             ranges,

@@ -173,6 +173,8 @@ def changed_settings(settings: ReturnSettings, usual: ReturnSettings) -> list[st
 
 MIN_RETURNS = 3
 """Fired rays that must hit an object. The fewest that span a surface."""
+BEFORE, COMING = SWEEP_MASKS = "before", "coming"
+"""Which mask the sweeps between two keyframes fire."""
 IDEAL_CAMERA, YOLOX_CAMERA = CAMERA_PROFILES = "ideal", "yolox"
 """The camera that reports whatever shows enough pixels, and the one that errs as measured."""
 CAMERA_CONFIDENCE = 0.25
@@ -293,6 +295,11 @@ class Sensing(CameraFaults, LidarFaults, ReturnSettings):
     """
     min_returns: int = bounded(MIN_RETURNS, 1, LARGEST_INTEGER)
     """Fired rays that must hit an object for it to be detected."""
+    sweep_mask: str = one_of(BEFORE, SWEEP_MASKS)
+    """Which cells the sweeps between two keyframes fire, of a film that has them: those of the mask
+    `before`, the only one that was chosen then, or those of the `coming` keyframe, as where all
+    sweeps of a keyframe are masked alike.
+    """
     camera_confidence: float = bounded(CAMERA_CONFIDENCE, 0, 1)
     """Least confidence of a camera detection, 0 to 1; visible pixels decide, and the least box has
     0.25 (`care_sim.sensors.pictures`).
@@ -370,6 +377,7 @@ COLUMNS_WHERE_CHANGED = (
     "firing",
     "camera_profile",
     "camera_latency_s",
+    "sweep_mask",
 )
 """Conditions that are a column of results only where they are not the default: so rows, and the
 digests made of them, stay as they were before there was a choice."""

@@ -51,14 +51,24 @@ class Detections:
     """(n,) how many fired rays hit each."""
     scores: Floats | None = None
     """(n,) confidences from 0 to 1; None of a detector that has none."""
+    velocities: Floats | None = None
+    """(n, 2) over ground, in sensor axes, m/s; None of a detector that does not tell them."""
+    attributes: Sequence[str] | None = None
+    """(n,) nuScenes attributes, "" where unknown; None of a detector that does not tell them."""
 
     def __len__(self) -> int:
         return len(self.classes)
 
     def take(self, rows: Integers | Mask) -> "Detections":
         """Some of them, by index or mask."""
-        scores = None if self.scores is None else self.scores[rows]
-        return Detections(self.classes[rows], self.boxes[rows], self.returns[rows], scores)
+        return Detections(
+            self.classes[rows],
+            self.boxes[rows],
+            self.returns[rows],
+            None if self.scores is None else self.scores[rows],
+            None if self.velocities is None else self.velocities[rows],
+            None if self.attributes is None else np.asarray(self.attributes)[rows].tolist(),
+        )
 
 
 class _Table:

@@ -38,7 +38,7 @@ from itertools import chain, pairwise
 
 import numpy as np
 
-from care_sim.core.allocation import stages_of, taken_by_stage
+from care_sim.core.allocation import half_up, stages_of, taken_by_stage
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
@@ -143,7 +143,7 @@ def reserve_use(
         keyframes=1,
         filled=int(len(exploited) + len(taken) == budget),
         # What exploitation may take is rounded, and the reserve keeps the rest.
-        filled_rho=int(len(taken) >= budget - round((1 - reserve_fraction) * budget)),
+        filled_rho=int(len(taken) >= budget - half_up((1 - reserve_fraction) * budget)),
         explained_cells=len(removed),
         untaken_cells=len(np.setdiff1d(removed, exploited)),
     )

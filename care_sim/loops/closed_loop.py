@@ -18,6 +18,7 @@ from care_sim.driving.corridor import along_route
 from care_sim.driving.drivers import Cruising, CruisingRules, make_driver
 from care_sim.driving.localisation import Localisation, Odometry
 from care_sim.loops.episode import SensorSeeds
+from care_sim.loops.gathering import Gathering, acted_on
 from care_sim.loops.needless import NeedlessBraking, UnfoundedBraking
 from care_sim.loops.observation_limits import Limits
 from care_sim.loops.records import Keyframe, Sight
@@ -166,6 +167,11 @@ class ClosedLoop:
         self._classes = np.array([*labels.values()], np.int64)
         self._returns_rule = ReturnsRule(labels, conditions.min_returns)
         self._detector = detector
+        self._gathering = (
+            Gathering(detector.gathers, rig.keyframe_s)
+            if detector and detector.gathers > 1
+            else None
+        )
         self._min_returns = conditions.min_returns
         self._limits = Limits(rig)
         self._memory = TrackMemory(rig.keyframe_s)
@@ -326,7 +332,12 @@ class ClosedLoop:
         cloud = cloud_of(scan, objects, self.rig.grid)
         boxes = self._local_boxes(self._reported)
         present = Annotations(self._reported, self._classes, boxes)
+        if self._gathering is not None:
+            cloud = self._gathering.add(cloud, self._localisation.taken_for(self.sensor))
         detections, behind = self._detector.detect(cloud, present)
+        if self._detector.track_score:
+            sure = acted_on(detections, self._detector.track_score)
+            detections, behind = detections.take(sure), behind[sure]
         hit = np.isin(present.objects, behind)
         candidates = Annotations(present.objects[hit], present.classes[hit], present.boxes[hit])
         found = found_objects(candidates, detections)

@@ -2,14 +2,14 @@
 react.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.belief import Belief
-from care_sim.core.conditions import Sensing
+from care_sim.core.conditions import COMING, Sensing
 from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
 from care_sim.core.types import Detections, Scan, Tracks
@@ -17,35 +17,17 @@ from care_sim.driving.localisation import Localisation, Odometry
 from care_sim.loops.episode import SensorSeeds
 from care_sim.loops.false_box_pools import pool_of_film
 from care_sim.loops.film import Film, Shot
+from care_sim.loops.gathering import acted_on, with_sweeps
 from care_sim.loops.observation_limits import Limits
 from care_sim.loops.truth import Told, TrackObjects, told_by
 from care_sim.perception.points_only import Detector
+from care_sim.perception.recorded import RecordedDetector
 from care_sim.perception.tracker import TrackMemory
-from care_sim.sensors.annotated import Cloud, joined
+from care_sim.sensors.annotated import Cloud
 from care_sim.sensors.camera import CameraDetector
 from care_sim.sensors.camera_profiles import invents_boxes
 from care_sim.sensors.false_boxes import EMPTY_POOL
 from care_sim.sensors.lidar import RecordedLidar
-
-
-def with_sweeps(returned: Cloud, lidar: RecordedLidar, held: Cells, shot: Shot) -> Cloud:
-    """The returns of a keyframe, and those of the sweeps before it, which fired the cells `held` by
-    the mask of the keyframe before.
-
-    All are in the sensor frame of the keyframe: the motion of the car is compensated, that of
-    others is not. Each has its time, seconds from the keyframe, 0 or less. Without sweeps the
-    returns of the keyframe are as they were.
-    """
-    if not shot.sweeps:
-        return returned
-    clouds = [replace(returned, times=np.zeros(len(returned)))]
-    for sweep in shot.sweeps:
-        # Cells are those of the sensor as it stood then; faults are drawn for every sweep.
-        own = lidar.fire(held, sweep.cloud)
-        points = shot.sensor.points_of(sweep.sensor, own.points)
-        times = np.full(len(own), sweep.time_s - shot.time_s)
-        clouds.append(replace(own, points=points, times=times))
-    return joined(clouds)
 
 
 @dataclass(frozen=True)
@@ -53,13 +35,15 @@ class OpenLoopKeyframe:
     """The record of one keyframe of the open loop: what was fired, and what the detector made of
     the returns.
 
-    `velocities` (n, 2) are those of the detections' tracks, over ground, in sensor axes; 0 for a
-    track that has just begun.
+    `detections` became tracks; `reported` are these and what was too unsure. `velocities` (n, 2)
+    are those that the detector reported, or without them those of the tracks, over ground, in
+    sensor axes; 0 for a track that has just begun and for what became none.
     """
 
     index: int
     fired: Cells
     detections: Detections
+    reported: Detections
     velocities: Floats
 
 
@@ -105,6 +89,7 @@ class OpenLoop:
         self._limits = Limits(rig)
         self._memory = TrackMemory(film.keyframe_s)
         self._track_objects = TrackObjects()
+        self._sweep_mask = sensing.sweep_mask
         self._held: Cells = np.empty(0, np.int64)
         self.index = 0
         self.told = {}
@@ -129,13 +114,21 @@ class OpenLoop:
         # In the order of the closed loop, but for the car: a film moves on by itself.
         cloud = self._lidar.fire(fired, shot.cloud)
         self.told = told_by(fired, cloud.cells, cloud.intensities, cloud.times)
-        gathered = with_sweeps(cloud, self._lidar, self._held, shot)
+        mask = fired if self._sweep_mask == COMING else self._held
+        gathered = with_sweeps(cloud, self._lidar, mask, shot)
         self._held = fired
-        detections, objects = self._detector.detect(gathered, shot.annotations)
+        if isinstance(self._detector, RecordedDetector):
+            self._detector.at(shot.token, shot.sensor)
+        reported, objects = self._detector.detect(gathered, shot.annotations)
+        sure = acted_on(reported, self._detector.track_score)
+        detections = reported if sure.all() else reported.take(sure)
         taken_for = self._localisation.taken_for(shot.sensor)
         tracks = self._memory.update(detections, taken_for)
-        self._track_objects.note(tracks, objects)
-        velocities = self._memory.velocities(tracks, taken_for)
+        self._track_objects.note(tracks, objects[sure])
+        velocities = reported.velocities
+        if velocities is None:
+            velocities = np.zeros((len(reported), 2))
+            velocities[sure] = self._memory.velocities(tracks, taken_for)
 
         # After the last keyframe there is nothing to look at, and no cells are to be chosen.
         self.index += 1
@@ -143,7 +136,7 @@ class OpenLoop:
         self.last_ranges = self._range_image(fired, cloud)
         if not self.over:
             self._look(self.last_ranges)
-        return OpenLoopKeyframe(index, fired, detections, velocities)
+        return OpenLoopKeyframe(index, fired, detections, reported, velocities)
 
     def true_boxes(self, tracks: Tracks) -> Floats:
         """(n, 7) where the objects behind forecasts are now, in the sensor frame; a track without

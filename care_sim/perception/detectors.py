@@ -13,15 +13,16 @@ from care_sim.base.checks import check_known
 from care_sim.base.errors import InvalidInput, MissingExtra, error_line, printable, shown
 from care_sim.base.plugins import Plugins
 from care_sim.perception.cluster.detector import ClusterDetector
+from care_sim.perception.network_detectors import OnnxDetector, TorchScriptDetector
 from care_sim.perception.pillars.detector import PillarsDetector
 from care_sim.perception.points_only import (
     BrokenDetector,
     Detector,
     PointDetector,
     PointsOnly,
-    TorchScriptDetector,
 )
 from care_sim.perception.proxy import GradedProxy, ReturnsProxy
+from care_sim.perception.recorded import RecordedDetector
 
 PROXY = "returns"
 """The paper's proxy."""
@@ -31,8 +32,10 @@ CLUSTER = "cluster"
 """The classical one. It is told the grid, and so how far apart neighbouring points are."""
 PILLARS = "pillars"
 """The learned one."""
-PRIVILEGED = (PROXY, GRADED)
-"""Those that read whose return each one is; all others are `PointDetector`s."""
+RECORDED = "recorded"
+"""The upper bound: what a real detector reported of full scans."""
+PRIVILEGED = (PROXY, GRADED, RECORDED)
+"""Those that read more than points; all others are `PointDetector`s."""
 
 
 def _faults(made: Any) -> Iterator[str]:
@@ -48,7 +51,9 @@ DETECTORS: Plugins[Any] = Plugins(
         GRADED: GradedProxy,
         CLUSTER: ClusterDetector,
         PILLARS: PillarsDetector,
+        RECORDED: RecordedDetector,
         "torchscript": TorchScriptDetector,
+        "onnx": OnnxDetector,
     },
     faults=_faults,
 )
@@ -69,16 +74,20 @@ def check_detector(name: object) -> None:
 def make_detector(name: str, sensor_height_m: float, /, **parameters: object) -> Detector:
     """The detector for a film whose LiDAR is `sensor_height_m` above the road.
 
-    All but the proxies are handed points alone, whoever wrote them. Raises InvalidInput for an
+    All but the proxies are handed points alone, whoever wrote them; of these the parameters
+    `sweeps` and `track_score` say how they are fed
+    (`care_sim.perception.points_only.PointDetector`). Raises InvalidInput for an
     unknown name or parameter, or a value that is not allowed; BrokenDetector for one that cannot be
     loaded or made; MissingExtra for one whose library is not installed.
     """
     make = _maker(name)
-    _check_parameters(name, make, parameters)
+    fed = {} if name in PRIVILEGED else _fed(make, parameters)
+    own = {given: value for given, value in parameters.items() if given not in fed}
+    _check_parameters(name, make, own)
     if name in PRIVILEGED:
-        proxy: Detector = make(**parameters)
+        proxy: Detector = make(**own)
         return proxy
-    return PointsOnly(name, _point_detector(name, make, parameters), sensor_height_m)
+    return PointsOnly(name, _point_detector(name, make, own), sensor_height_m, **fed)
 
 
 def detector_lines() -> list[str]:
@@ -93,6 +102,15 @@ def _maker(name: str) -> Callable[..., Any]:
         return DETECTORS.maker(name)
     except InvalidInput as error:
         raise BrokenDetector(f"detector {name} cannot be loaded: {error}") from error
+
+
+def _fed(make: Callable[..., Any], parameters: dict[str, object]) -> dict[str, Any]:
+    """Those parameters that say how any detector is fed, unless its maker takes them itself."""
+    try:
+        own = inspect.signature(make).parameters
+    except (TypeError, ValueError):
+        return {}
+    return {n: parameters[n] for n in ("sweeps", "track_score") if n in parameters and n not in own}
 
 
 def _point_detector(

@@ -4,23 +4,28 @@
 goes through it.
 """
 
-from os import PathLike, fspath
-from pathlib import Path
+from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
 
-from care_sim.base.checks import check_flag
+from care_sim.base.checks import check_known, check_number, check_whole
 from care_sim.base.errors import InvalidInput, MissingExtra, error_line
-from care_sim.base.extras import import_torch
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.frames import turned
 from care_sim.core.types import CLASSES, Detections
-from care_sim.sensors.annotated import NO_OBJECT, Annotations, Cloud
+from care_sim.sensors.annotated import AT_KEYFRAME, NO_OBJECT, Annotations, Cloud, joined
 
 
 class Detector(Protocol):
-    """What a loop calls at every keyframe."""
+    """What a loop calls at every keyframe.
+
+    `gathers`: how many sweeps it is given at once in the closed loop, its own keyframe's among
+    them. `track_score`: the least score of a detection that becomes a track.
+    """
+
+    gathers: int
+    track_score: float
 
     def detect(self, cloud: Cloud, annotations: Annotations) -> tuple[Detections, Integers]:
         """Detections in the sensor frame from the returns of the fired cells, and (n,) the
@@ -28,29 +33,60 @@ class Detector(Protocol):
         """
 
 
+FARTHEST_M = 1e7
+"""Beyond this no map goes, metres."""
+MOST_SWEEPS = 100
+"""Sweeps that a detector may gather: five seconds of a LiDAR that turns 20 times a second."""
 MOST_DETECTIONS = 500
 """Boxes per keyframe: as many as the official nuScenes evaluation takes."""
+
+
+ATTRIBUTES = (
+    "", "cycle.with_rider", "cycle.without_rider", "pedestrian.moving",
+    "pedestrian.sitting_lying_down", "pedestrian.standing", "vehicle.moving", "vehicle.parked",
+    "vehicle.stopped",
+)  # fmt: skip
+"""Those of nuScenes, and none."""
+_WIDTHS = {"boxes": 7, "velocities": 2}
+"""Numbers per detection, of columns with several."""
 
 
 class BrokenDetector(InvalidInput):
     """A detector that cannot be loaded or made, fails, or returns what is no `Detections`."""
 
 
+FIELDS = ("x", "y", "z", "intensity", "ring", "time_lag")
+"""What a detector may ask of every point. Places in the sensor frame, metres. `intensity` from 0 to
+1, 0 where nothing measured it. `ring`: the laser, 0 the lowest, as nuScenes counts. `time_lag`:
+seconds since the point was measured, 0 or more, as CenterPoint counts.
+"""
+
+
 class PointDetector(Protocol):
-    """What a real detector is: sees the points of one keyframe, remembers nothing of the one
+    """What a real detector is: sees the points of one keyframe, and remembers nothing of the one
     before.
+
+    A class may say by attributes what it is fed; all of them are optional:
+
+    - `fields`: columns of the points, of `FIELDS`; x, y and z without it.
+    - `sweeps`: how many sweeps the closed loop gathers for it (1). A film has those of its source.
+    - `track_score`: the least score of a detection that becomes a track (0). All are exported.
+    - `far`: whether it gets points beyond the reach of the grid, which a recorded LiDAR has (True).
+    - `wants_poses`: whether `detect` gets the `poses` of the sweeps (False).
+
+    `sweeps` and `track_score` are also parameters of every detector by name.
     """
 
     def detect(self, points: Floats, sensor_height_m: float) -> Detections:
-        """Detections in the sensor frame from points (P, 3) in the sensor frame, metres; P may be
-        0.
+        """Detections in the sensor frame from points (P, 3), or (P, k) with the `fields` asked for;
+        P may be 0.
 
         The sensor is `sensor_height_m` above the road. The points are the detector's own to change.
-        A detector whose attribute `wants_times` is true gets (P, 4): last the time of each point in
-        seconds from the keyframe, 0 or less.
-        `returns` are the points on each object, `scores` confidences from 0 to 1, or None. Whatever
-        is returned becomes a track, so what is too unsure to act on is left out here; at most
-        MOST_DETECTIONS.
+        Points of earlier sweeps are moved by how the car moved since, others' motion is not undone.
+        `poses`, where wanted, are `SweepPose`s, the keyframe's first.
+
+        `returns` are the points on each object, `scores` confidences from 0 to 1, or None,
+        `velocities` and `attributes` the detector's own, or None; at most MOST_DETECTIONS.
         """
 
 
@@ -61,23 +97,43 @@ class PointsOnly:
     reached from it. What it returns is copied and checked; only then the objects are named.
     """
 
-    def __init__(self, name: str, detector: PointDetector, sensor_height_m: float):
+    def __init__(
+        self,
+        name: str,
+        detector: PointDetector,
+        sensor_height_m: float,
+        sweeps: int | None = None,
+        track_score: float | None = None,
+    ):
         self._name = name
         self._detector = detector
         self._sensor_height_m = sensor_height_m
+        self._fields = tuple(getattr(detector, "fields", FIELDS[:3]))
+        for field in self._fields:
+            try:
+                check_known(f"field of detector {name}", field, FIELDS)
+            except InvalidInput as error:
+                raise BrokenDetector(str(error)) from error
+        self._far = getattr(detector, "far", True)
+        self._wants_poses = getattr(detector, "wants_poses", False)
+        self.gathers = getattr(detector, "sweeps", 1) if sweeps is None else sweeps
+        check_whole(f"sweeps of detector {name}", self.gathers, 1, MOST_SWEEPS)
+        least = getattr(detector, "track_score", 0.0) if track_score is None else track_score
+        check_number(f"track_score of detector {name}", least, 0, 1)
+        self.track_score = float(least)
 
     def detect(self, cloud: Cloud, annotations: Annotations) -> tuple[Detections, Integers]:
         """See `care_sim.perception.points_only.Detector`.
 
         Raises BrokenDetector where it fails or returns what is no detections.
         """
+        if cloud.far is not None and self._far:
+            cloud = joined([replace(cloud, far=None), cloud.far])
         # A copy: what the detector does to its points must not reach the film, which is shared.
-        points = np.array(cloud.points, dtype=np.float64)
-        if getattr(self._detector, "wants_times", False):
-            times = np.zeros(len(cloud)) if cloud.times is None else cloud.times
-            points = np.column_stack([points, times])
+        points = np.column_stack([_column(cloud, field) for field in self._fields]).astype(float)
+        poses = {"poses": cloud.poses or (AT_KEYFRAME,)} if self._wants_poses else {}
         try:
-            found = self._detector.detect(points, self._sensor_height_m)
+            found = self._detector.detect(points, self._sensor_height_m, **poses)
         except (KeyboardInterrupt, MissingExtra):
             raise
         except BaseException as error:
@@ -85,7 +141,17 @@ class PointsOnly:
                 f"detector {self._name} fails on {len(cloud)} points: {error_line(error)}"
             ) from error
         detections = checked(self._name, found, len(cloud))
-        return detections, _objects_behind(detections.boxes, cloud)
+        return detections, objects_behind(detections.boxes, cloud)
+
+
+def _column(cloud: Cloud, field: str) -> Floats | Integers:
+    """(P,) a field of the returns."""
+    if field in FIELDS[:3]:
+        return cloud.points[:, FIELDS.index(field)]
+    values = {"intensity": cloud.intensities, "ring": cloud.rings, "time_lag": cloud.times}[field]
+    if values is None:
+        return np.zeros(len(cloud))
+    return -values if field == "time_lag" else values
 
 
 def inside(points: Floats, boxes: Floats) -> Mask:
@@ -109,26 +175,36 @@ def checked(name: str, found: Any, points: int) -> Detections:
     """
     if not isinstance(found, Detections):
         raise BrokenDetector(f"detector {name} must return Detections, got {type(found).__name__}")
-    columns = (
-        ("classes", "boxes", "returns")
-        if found.scores is None
-        else ("classes", "boxes", "returns", "scores")
-    )
+    optional = [c for c in ("scores", "velocities") if getattr(found, c) is not None]
+    columns = ("classes", "boxes", "returns", *optional)
     table = {column: _numbers(name, column, getattr(found, column)) for column in columns}
+    velocities = table.get("velocities")
     for column, values in table.items():
-        shape = (len(table["classes"]), 7) if column == "boxes" else (len(table["classes"]),)
+        count = len(table["classes"])
+        shape = (count, _WIDTHS[column]) if column in _WIDTHS else (count,)
         if values.shape != shape:
             raise BrokenDetector(
                 f"detector {name}: {column} must have the shape {shape}, got {values.shape}"
             )
-    for fault in _faults(points, **table):
+    scores = table.get("scores")
+    for fault in _faults(points, table["classes"], table["boxes"], table["returns"], scores):
         raise BrokenDetector(f"detector {name}: {fault}")
     classes = table["classes"].astype(np.int64)
     returns = table["returns"].astype(np.int64)
-    return Detections(classes, table["boxes"], returns, table.get("scores"))
+    attributes = None if found.attributes is None else [*map(str, found.attributes)]
+    if attributes is not None and len(attributes) != len(classes):
+        count = len(attributes)
+        raise BrokenDetector(f"detector {name}: attributes must be {len(classes)}, got {count}")
+    for attribute in attributes or ():
+        if attribute not in ATTRIBUTES:
+            allowed = ", ".join(filter(None, ATTRIBUTES))
+            raise BrokenDetector(
+                f"detector {name}: attributes must be of {allowed}, or empty, got {attribute!r:.80}"
+            )
+    return Detections(classes, table["boxes"], returns, scores, velocities, attributes)
 
 
-def _objects_behind(boxes: Floats, cloud: Cloud) -> Integers:
+def objects_behind(boxes: Floats, cloud: Cloud) -> Integers:
     """(n,) the object that most of the returns within each box lie on, or NO_OBJECT."""
     # Returns on nobody have no vote: a box that stands on the road holds some of it.
     named = cloud.objects != NO_OBJECT
@@ -152,7 +228,9 @@ def _numbers(name: str, column: str, values: Any) -> Floats:
     # What is detected ends in observations, which are float32. NaN fails this comparison, too.
     if not (np.abs(numbers) <= np.finfo(np.float32).max).all():
         raise BrokenDetector(f"detector {name}: {column} must be finite, in single precision")
-    return numbers if numbers.size else numbers.reshape((0, 7) if column == "boxes" else 0)
+    if numbers.size:
+        return numbers
+    return np.empty((0, _WIDTHS[column]) if column in _WIDTHS else 0)
 
 
 def _faults(
@@ -174,56 +252,3 @@ def _faults(
 
 def _is_count(numbers: Floats) -> Mask:
     return np.asarray((numbers >= 0) & (numbers % 1 == 0))
-
-
-class TorchScriptDetector:
-    """A learned detector from a TorchScript file, and the example to follow for one's own.
-
-    Runs the module in `file`: `forward(points, sensor_height_m) -> (classes, boxes, scores)`.
-
-    `points` is a float32 tensor (P, 3) in the sensor frame, `sensor_height_m` a float; `classes`
-    (n,) index `care_sim.core.types.CLASSES`, `boxes` (n, 7) are x, y, z, length, width, height, yaw
-    in the sensor frame, `scores` (n,) lie in [0, 1]. With `times` the points are (P, 4), last the
-    seconds from the keyframe, 0 or less. Runs on the CPU. Needs torch. Raises MissingExtra without
-    it, InvalidInput for a file that is no TorchScript module.
-
-    One around an ONNX file, in a package of its own:
-
-        class OnnxDetector:
-            def __init__(self, file: str):
-                self._session = onnxruntime.InferenceSession(file)
-
-            def detect(self, points, sensor_height_m):
-                inputs = {"points": points.astype("float32")}
-                classes, boxes, scores = self._session.run(None, inputs)
-                return Detections(classes, boxes, inside(points, boxes).sum(axis=1), scores)
-
-    is found under the name `mine` by this entry in the package's pyproject.toml:
-
-        [project.entry-points."care_sim.detectors"]
-        mine = "my_package:OnnxDetector"
-    """
-
-    def __init__(self, file: str | PathLike[str], times: bool = False):
-        check_flag("times", times)
-        self.wants_times = times
-        self._torch = import_torch()
-        self._file = fspath(file)
-        if not Path(file).is_file():
-            raise InvalidInput(
-                f"{self._file}: no such file; allowed is a TorchScript module (torch.jit.save)"
-            )
-        try:
-            self._module = self._torch.jit.load(self._file, map_location="cpu").eval()
-        except RuntimeError as error:
-            raise InvalidInput(f"{self._file}: no TorchScript module (torch.jit.save)") from error
-
-    def detect(self, points: Floats, sensor_height_m: float) -> Detections:
-        """See `care_sim.perception.points_only.PointDetector`."""
-        # Nothing is learned here, so no gradients are kept.
-        with self._torch.inference_mode():
-            outputs = self._module(
-                self._torch.from_numpy(points.astype(np.float32)), float(sensor_height_m)
-            )
-        classes, boxes, scores = (output.numpy() for output in outputs)
-        return Detections(classes, boxes, inside(points[:, :3], boxes).sum(axis=1), scores)

@@ -103,6 +103,9 @@ class ReturnsProxy:
     number of 1 or more.
     """
 
+    gathers = 1
+    track_score = 0.0
+
     def __init__(self, min_returns: int = MIN_RETURNS):
         check_whole("min_returns", min_returns, 1)
         self._min_returns = min_returns
@@ -156,6 +159,9 @@ class GradedProxy:
     anything moves it is drawn anew at every keyframe; what stands before a car that stands keeps
     its luck.
     """
+
+    gathers = 1
+    track_score = 0.0
 
     def detect(self, cloud: Cloud, annotations: Annotations) -> tuple[Detections, Integers]:
         """See `care_sim.perception.points_only.Detector`."""

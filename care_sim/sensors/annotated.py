@@ -6,6 +6,7 @@ The objects are truth: for the scoring and privileged policies.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -40,13 +41,31 @@ class Annotations:
 NO_ANNOTATIONS = Annotations(np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, 7)))
 
 
+class SweepPose(NamedTuple):
+    """One of several sweeps: seconds since it was taken, 0 or more, and the (4, 4) matrix that
+    moves points from the sensor's frame then into its frame at the keyframe, as far as the car
+    knows its own motion.
+    """
+
+    lag_s: float
+    matrix: Floats
+
+
+AT_KEYFRAME = SweepPose(0.0, np.eye(4))
+
+
 @dataclass(frozen=True)
 class Cloud:
     """Returns: `cells` (P,) ascending (several returns of a recorded sweep may share one), `points`
     (P, 3) in the sensor frame, `objects` (P,) the annotated object that each lies on or NO_OBJECT,
-    `intensities` (P,), 0 to 1, where pulses have strength (`care_sim.sensors.signal`), and `times`
-    (P,), seconds from the keyframe, where they have their own (`care_sim.sensors.beams`). `shots`
-    (P,) is how often a cell must be fired for each to return; None where once is enough for all.
+    `intensities` (P,), 0 to 1, where pulses have strength (`care_sim.sensors.signal`) or a LiDAR
+    recorded it, and `times` (P,), seconds from the keyframe, where they have their own
+    (`care_sim.sensors.beams`). `shots` (P,) is how often a cell must be fired for each to return;
+    None where once is enough for all. `rings` (P,) number the lasers of a recorded LiDAR.
+
+    `far` are the returns of a recorded LiDAR from beyond the reach of the grid. A real detector
+    gets them too, since it was trained with them; no ray, no proxy and no score counts them.
+    `poses` are those of gathered sweeps, the keyframe's first; of one sweep none need be told.
     """
 
     cells: Cells
@@ -55,6 +74,9 @@ class Cloud:
     intensities: Floats | None = None
     times: Floats | None = None
     shots: Floats | None = None
+    rings: Integers | None = None
+    far: "Cloud | None" = None
+    poses: tuple["SweepPose", ...] = ()
 
     def __len__(self) -> int:
         return len(self.cells)
@@ -65,26 +87,35 @@ class Cloud:
             return self
         return self.take(self.shots <= (1 if fired is None else fired[self.cells]))
 
+    def of_cells(self, answering: Mask) -> "Cloud":
+        """The returns, near and far, of the cells that are `answering` (N,)."""
+        own = self.take(answering[self.cells])
+        return replace(own, far=self.far.take(answering[self.far.cells])) if self.far else own
+
     def take(self, kept: Mask) -> "Cloud":
-        """Some of the returns, by mask (P,)."""
+        """Some of the returns, by mask (P,); those from far away stay."""
         return self.ordered(np.flatnonzero(kept))
 
     def ordered(self, rows: Integers) -> "Cloud":
-        """The returns in these rows, in this order."""
+        """The returns in these rows, in this order; those from far away stay."""
+        columns = (self.intensities, self.times, self.shots, self.rings)
         return Cloud(
             self.cells[rows],
             self.points.take(rows, axis=0),
             self.objects[rows],
-            None if self.intensities is None else self.intensities[rows],
-            None if self.times is None else self.times[rows],
-            None if self.shots is None else self.shots[rows],
+            *(None if column is None else column[rows] for column in columns),
+            far=self.far,
+            poses=self.poses,
         )
 
 
 def joined(clouds: Sequence[Cloud]) -> Cloud:
-    """The returns of clouds with the same columns, in the order of their cells."""
+    """The returns of clouds in the order of their cells, with the columns that all of them have;
+    those from far away joined in the same way.
+    """
     cells = np.concatenate([cloud.cells for cloud in clouds])
     order = np.argsort(cells, kind="stable")
+    far = [cloud.far for cloud in clouds if cloud.far is not None]
     return Cloud(
         cells[order],
         np.concatenate([cloud.points for cloud in clouds])[order],
@@ -92,10 +123,12 @@ def joined(clouds: Sequence[Cloud]) -> Cloud:
         _column([cloud.intensities for cloud in clouds], order),
         _column([cloud.times for cloud in clouds], order),
         _column([cloud.shots for cloud in clouds], order),
+        _column([cloud.rings for cloud in clouds], order),
+        far=joined(far) if far else None,
     )
 
 
-def _column(columns: Sequence[Floats | None], order: Integers) -> Floats | None:
+def _column(columns: Sequence[Any], order: Integers) -> Any:
     known = [column for column in columns if column is not None]
     return np.concatenate(known)[order] if len(known) == len(columns) else None
 
@@ -106,7 +139,14 @@ def cloud_of(scan: Scan, objects: Integers, grid: Grid) -> Cloud:
     points = scan.points
     if points is None:
         points = grid.points(scan.cells, np.where(returned, scan.ranges, 0.0))
-    return Cloud(scan.cells, points, objects, scan.intensities, scan.times).take(returned)
+    rings = rings_of(scan.cells, grid)
+    columns = (scan.intensities, scan.times)
+    return Cloud(scan.cells, points, objects, *columns, rings=rings).take(returned)
+
+
+def rings_of(cells: Cells, grid: Grid) -> Integers:
+    """(n,) the lasers that fire the cells: its rows, 0 the lowest, as nuScenes counts."""
+    return grid.rows - 1 - cells // grid.columns
 
 
 @dataclass(frozen=True)

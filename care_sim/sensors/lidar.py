@@ -15,7 +15,7 @@ from care_sim.core.firing.base import shots_by_cell
 from care_sim.core.frames import Frame
 from care_sim.core.grid import Cells
 from care_sim.core.types import Scan
-from care_sim.sensors.annotated import NO_OBJECT, Cloud, joined
+from care_sim.sensors.annotated import NO_OBJECT, Cloud, joined, rings_of
 from care_sim.sensors.beams import Beams, RollingSweep
 from care_sim.sensors.engines import Engine
 from care_sim.world.bullet import NO_BODY
@@ -134,6 +134,7 @@ class Crosstalk:
             np.full(len(cells), NO_OBJECT),
             None if cloud.intensities is None else np.full(len(cells), FULL_INTENSITY),
             None if cloud.times is None else self._sweep.seconds(cells),
+            rings=None if cloud.rings is None else rings_of(cells, self._grid),
         )
         return joined([cloud.take(~ghosts[cloud.cells]), feigned])
 
@@ -257,7 +258,7 @@ class RecordedLidar:
         # A cell is dropped with all its returns, of which a recorded sweep may have several.
         answering = np.zeros(self.grid.size, dtype=bool)
         answering[cells] = ~self._faults.draw_lost(cells)
-        returned = cloud.take(answering[cloud.cells]).to_shots(shots)
+        returned = cloud.of_cells(answering).to_shots(shots)
         if self._faults.is_noisy:
             returned = self._noisy(returned, shots)
         return self._crosstalk.over_cloud(returned, answering) if self._crosstalk else returned
@@ -266,7 +267,7 @@ class RecordedLidar:
         """What every cell would return, each fired once, before noise and dropout, which stay
         undrawn.
         """
-        return cloud.take(~self._faults.dead[cloud.cells]).to_shots()
+        return cloud.of_cells(~self._faults.dead).to_shots()
 
     def ranges(self, cloud: Cloud) -> Floats:
         """(N,) the nearest return of every cell in metres, inf without one."""

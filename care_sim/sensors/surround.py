@@ -15,7 +15,7 @@ from care_sim.core.cells.stack import Grid
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid, Cells, Head
 from care_sim.core.pinhole import PinholeCamera
-from care_sim.sensors.annotated import NO_OBJECT, Cloud, IdentifiedDetections
+from care_sim.sensors.annotated import NO_OBJECT, Cloud, IdentifiedDetections, rings_of
 from care_sim.sensors.engines.picture_kernels import boxes_of_window
 from care_sim.sensors.pictures import (
     CAMERA_FROM_LIDAR,
@@ -96,7 +96,7 @@ def full_sweep(
     """
     parts = [_own_sweep(world, head, sensor, boxes, height_m, up) for head in grid.heads]
     cells, ranges, bodies = map(np.concatenate, zip(*parts, strict=True))
-    return Cloud(cells, grid.points(cells, ranges), bodies)
+    return Cloud(cells, grid.points(cells, ranges), bodies, rings=rings_of(cells, grid))
 
 
 def _own_sweep(

@@ -4,7 +4,7 @@ world, what its sensors make of them, and the car's own motion.
 
 from collections.abc import Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -141,11 +141,7 @@ def sense(
         bounds = _table([one.bounds for one in annotated])
         swept = full_sweep(world, grid, sensor, bounds, height_m, up)
     identified = IdentifiedDetections(seen.detections, numbers_of(seen.objects, numbers))
-    return (
-        annotations,
-        identified,
-        Cloud(swept.cells, swept.points, numbers_of(swept.objects, numbers)),
-    )
+    return annotations, identified, replace(swept, objects=numbers_of(swept.objects, numbers))
 
 
 def annotations_of(annotated: Sequence[AnnotatedBody]) -> Annotations:

@@ -150,7 +150,7 @@ class _StreetBodies:
         seen = surround_detections(self._world, views, sensor, labels, boxes)
         swept = full_sweep(self._world, self._setup.grid, sensor, everything, sensor.z)
         identified = IdentifiedDetections(seen.detections, numbers_of(seen.objects, numbers))
-        cloud = Cloud(swept.cells, swept.points, numbers_of(swept.objects, numbers))
+        cloud = replace(swept, objects=numbers_of(swept.objects, numbers))
         # Seen by the full sweep or by a camera, whatever a policy will fire later.
         shown = np.isin(labelled, np.concatenate([cloud.objects, identified.objects]))
         if self._returns.shapes_beams:

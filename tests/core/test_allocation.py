@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.allocation import allocate, budget_cells, taken_by_stage
+from care_sim.core.allocation import allocate, budget_cells, half_up, taken_by_stage
 from care_sim.core.firing.actions import scores_of
 from care_sim.core.firing.base import fired_cells
 from care_sim.core.types import Demand
@@ -30,7 +30,7 @@ def in_turns(sets, limit, taken):
 def by_the_letter(demand, budget, reserve_fraction, floor):
     """Algorithm 1 once more, in the simplest words."""
     taken = []
-    in_turns(demand.exploitation, round((1 - reserve_fraction) * budget), taken)
+    in_turns(demand.exploitation, half_up((1 - reserve_fraction) * budget), taken)
     for layer in demand.layers:
         in_turns(layer, budget, taken)
     rest = [cell for cell in floor or () if cell not in taken]
@@ -81,7 +81,7 @@ def test_a_floor_of_another_form_is_refused(floor):
 @given(demands, budgets, fractions)
 def test_what_the_stages_take_is_what_each_adds_by_the_letter(demand, budget, rho):
     taken = []
-    in_turns(demand.exploitation, round((1 - rho) * budget), taken)
+    in_turns(demand.exploitation, half_up((1 - rho) * budget), taken)
     expected = [[*taken]]
     for layer in demand.layers:
         before = len(taken)

@@ -119,6 +119,26 @@ def test_a_full_scan_reaches_the_truth_and_a_starved_one_does_not(tmp_path, data
     )
 
 
+def test_velocities_and_attributes_are_the_detectors_own(tmp_path, database):
+    """What a detector reported, played back under a full scan, scores as it was reported."""
+    results = truth(database)
+    told = written(tmp_path / "told.json", results)
+    # The same with every velocity turned back.
+    for own in results.values():
+        for box in own:
+            box["velocity"] = [-v for v in box["velocity"]]
+    wrong = written(tmp_path / "wrong.json", results)
+    scores = []
+    for file in (told, wrong):
+        out = tmp_path / f"played-{file.name}"
+        options = ("--policy", "full", "--detector", "recorded")
+        exported(database, out, *options, "--detector-parameters", f"file={file}")
+        scores.append(scored(database, out))
+    assert scores[0]["label_tp_errors"]["car"]["vel_err"] < 0.01
+    assert scores[1]["label_tp_errors"]["car"]["vel_err"] > 1
+    assert scores[0]["nd_score"] > scores[1]["nd_score"]
+
+
 def test_a_split_of_splits_json_is_scored_alone(tmp_path, database):
     results = exported(database, tmp_path / "second.json", "--policy", "full", "--split", "second")
     assert scored(database, results, "SPLIT=second")["mean_ap"] == pytest.approx(0.5)

@@ -54,6 +54,8 @@ class ClusterDetector:
     per keyframe 16 match no such object.
     """
 
+    far = False
+
     def __init__(self, grid: AngularGrid = _GRID):
         self._grid = grid
 

@@ -84,6 +84,8 @@ class PillarsDetector:
     that is not of such weights.
     """
 
+    far = False
+
     def __init__(self, file: str | PathLike[str] | None = None, least_score: float = LEAST_SCORE):
         check_number("least_score", least_score, 0.0, 1.0)
         self._torch = import_torch()

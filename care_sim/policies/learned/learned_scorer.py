@@ -5,6 +5,7 @@ from os import PathLike
 import numpy as np
 from numpy.typing import NDArray
 
+from care_sim.core.allocation import half_up
 from care_sim.core.belief import Belief
 from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
@@ -46,7 +47,7 @@ class LearnedScorer(Policy):
         self._inputs = CellInputs(rig)
         self._network = CellNetwork(weights, self._inputs.rig_inputs)
         # What exploitation leaves, as Algorithm 1 rounds it.
-        self._reserve = rig.budget - round((1 - rig.reserve_fraction) * rig.budget)
+        self._reserve = rig.budget - half_up((1 - rig.reserve_fraction) * rig.budget)
 
     def demand(self, belief: Belief) -> Demand:
         """Hulls, then the cells of the highest scores."""

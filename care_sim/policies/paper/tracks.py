@@ -6,6 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from care_sim.core.allocation import half_up
 from care_sim.core.arrays import Floats, Mask
 from care_sim.core.belief import Belief
 from care_sim.core.beliefs import Beliefs
@@ -51,7 +52,7 @@ class HistoryUniform(Policy):
     def __init__(self, rig: Rig):
         super().__init__(rig)
         # What exploitation leaves, as Algorithm 1 rounds it.
-        reserve = rig.budget - round((1 - rig.reserve_fraction) * rig.budget)
+        reserve = rig.budget - half_up((1 - rig.reserve_fraction) * rig.budget)
         self._pattern = uniform_pattern(rig.grid, reserve)
 
     def demand(self, belief: Belief) -> Demand:

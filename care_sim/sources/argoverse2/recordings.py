@@ -120,7 +120,8 @@ def argoverse2_film(log: Path, grid: AngularGrid | None = None, empty_boxes: boo
         annotations, pictures, cloud = sense(kept, sensor, ARGOVERSE2_SENSOR_HEIGHT_M, grid)
         if len(recorded) == len(keyframes):
             points = read_points(recorded[len(shots)])
-            cloud = recorded_cloud(points - UP_LIDAR, grid, annotations, sensor)
+            points[:, :3] -= UP_LIDAR
+            cloud = recorded_cloud(points, grid, annotations, sensor)
         seen = (annotations, pictures, cloud)
         shots.append(Shot(float(times[row]), str(moments[row]), sensor, egos[row], *seen))
         reported = np.array([body.label is not None for body in bodies], bool)

@@ -224,16 +224,21 @@ def read_poses(path: Path) -> Columns:
     return {name: column[order] for name, column in poses.items()}
 
 
+_OF_LASERS = ("intensity", "laser_number")
+
+
 def read_points(path: Path) -> Floats:
-    """(n, 3) the points of a sweep in the frame of the car, corrected for its motion.
+    """(n, 5) the points of a sweep in the frame of the car, corrected for its motion, with their
+    intensities from 0 to 1 and the numbers of their lasers.
 
     Raises InvalidInput for a file that is missing, truncated or incomplete, or a point beyond the
     reach of any LiDAR.
     """
-    names = ("x", "y", "z")
-    return table(
-        read_columns(path, dict.fromkeys(names, float), dict.fromkeys(names, REACH_M)), names
-    )
+    places = ("x", "y", "z")
+    reaches = dict.fromkeys(places, REACH_M) | dict.fromkeys(_OF_LASERS, (0, 255))
+    names = (*places, *_OF_LASERS)
+    columns = read_columns(path, dict.fromkeys(names, float), reaches)
+    return table(columns | {"intensity": columns["intensity"] / 255}, names)
 
 
 def _seen(boxes: Columns, row: int) -> str:

@@ -3,13 +3,13 @@ results form of the nuScenes detection task, which the official devkit scores.
 """
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import cast
+from typing import Any
 
 import numpy as np
 
-from care_sim.base.checks import check_number, check_whole
+from care_sim.base.checks import check_number
 from care_sim.base.errors import InvalidInput, unknown
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.conditions import MIN_RETURNS
@@ -18,6 +18,7 @@ from care_sim.core.frames import turned
 from care_sim.core.types import CLASSES, Detections, ImageDetections
 from care_sim.loops.film import Shot
 from care_sim.sensors.annotated import NO_OBJECT, Annotations, IdentifiedDetections
+from care_sim.sources.nuscenes.camera_categories import Categories
 from care_sim.sources.nuscenes.cameras import (
     RecordedCamera,
     projected,
@@ -25,10 +26,6 @@ from care_sim.sources.nuscenes.cameras import (
 from care_sim.sources.nuscenes.table_files import JsonRow, read_json
 from care_sim.sources.nuscenes.tables import Database
 
-COCO = {1: "pedestrian", 2: "bicycle", 3: "car", 6: "bus", 8: "truck"}
-"""The categories of COCO that the five classes hold."""
-COCO_LAST = 90
-"""The categories of COCO are numbered from 1 to this."""
 FARTHEST_PX = 1e5
 """How far a box may reach, within the picture or beside it, so that its area stays a number."""
 SAME_OBJECT_IOU = 0.5
@@ -47,15 +44,20 @@ class DetectionFile:
     `category_name` or `detection_name`, and `score` or `detection_score`, as a list or as a map
     `results` from tokens to lists. COCO results: rows with `image_id`, `bbox` (left, top, width,
     height), `category_id` and `score`; `image_id` is the token of the picture or its file name.
+
+    Numbers of other pictures and categories are told by a map with the COCO rows as `annotations`,
+    `images` (rows with `id` and `file_name`), and `categories`: a name of
+    `care_sim.sources.nuscenes.camera_categories.CATEGORY_MAPS`, or rows with `id` and `name`.
     Known categories outside the five classes are left out.
     """
 
     def __init__(self, path: Path):
         self.path = path
         self.pictures: dict[str, list[Found]] = defaultdict(list)
-        for number, row in enumerate(_rows(path)):
+        rows, images, categories = _parts(path)
+        for number, row in enumerate(rows):
             try:
-                picture, detection = _read(row)
+                picture, detection = _read(row, images, categories)
             except KeyError as error:
                 raise InvalidInput(
                     f"{path}: detection {number} cannot be read (it lacks {error})"
@@ -107,9 +109,25 @@ class DetectionFile:
         )
 
 
-def _rows(path: Path) -> list[JsonRow]:
-    """The rows of either form, which may be none."""
+def _parts(path: Path) -> tuple[list[JsonRow], dict[int, str], Categories]:
+    """The rows, the file names of numbered pictures, and the categories."""
     content = read_json(path)
+    if not isinstance(content, dict) or "annotations" not in content:
+        return _rows(path, content), {}, Categories()
+    try:
+        categories = Categories(content.get("categories", "coco"))
+    except InvalidInput as error:
+        raise InvalidInput(f"{path}: {error}") from error
+    try:
+        images = {int(image["id"]): str(image["file_name"]) for image in content.get("images", ())}
+    except (KeyError, TypeError, ValueError) as error:
+        told = f"images must be rows with id and file_name ({error})"
+        raise InvalidInput(f"{path}: {told}") from error
+    return _rows(path, content["annotations"]), images, categories
+
+
+def _rows(path: Path, content: Any) -> list[JsonRow]:
+    """The rows of either form, which may be none."""
     results = content.get("results") if isinstance(content, dict) else None
     if isinstance(results, dict) and all(isinstance(rows, list) for rows in results.values()):
         # Rows of the map do not repeat their token. What is no row stays, and is refused with its
@@ -126,15 +144,21 @@ def _rows(path: Path) -> list[JsonRow]:
     return content
 
 
-def _read(row: JsonRow) -> tuple[str, Found | None]:
+def _read(
+    row: JsonRow, images: Mapping[int, str], categories: Categories
+) -> tuple[str, Found | None]:
     """The picture and the detection on it, None outside the five classes."""
     if not isinstance(row, dict):
         raise TypeError(f"no map of fields: {row!r}")
     if "image_id" in row:
         left, top, width, height = _box(row["bbox"])
-        label = _coco_class(row["category_id"])
+        label = categories.class_of(row["category_id"])
         corners = np.array([left, top, left + width, top + height])
-        picture = str(row["image_id"])
+        picture = row["image_id"]
+        if isinstance(picture, int):
+            if picture not in images:
+                raise ValueError(f"image_id {picture} is none of the {len(images)} images told")
+            picture = images[picture]
         score = row["score"]
     else:
         picture = row["sample_data_token"]
@@ -156,11 +180,6 @@ def _box(numbers: object) -> Floats:
     if np.abs(box).max() > FARTHEST_PX:
         raise ValueError(f"a box beyond {FARTHEST_PX:g} pixels: {numbers!r}")
     return box.astype(float)
-
-
-def _coco_class(number: object) -> str | None:
-    check_whole("category_id", number, 1, COCO_LAST)
-    return COCO.get(cast(int, number))
 
 
 def objects_behind(
@@ -226,16 +245,13 @@ def result_boxes(shot: Shot, detections: Detections, velocities: Floats) -> list
     order = np.argsort(-scores, kind="stable")[:MOST_BOXES]
     world = shot.sensor.boxes_to_world(detections.boxes)
     moves = turned(velocities, shot.sensor.yaw)
-    columns = zip(
-        detections.classes[order].tolist(),
-        world[order],
-        moves[order],
-        scores[order].tolist(),
-        strict=True,
-    )
+    told = detections.attributes or [""] * len(detections)
     return [
-        {"sample_token": shot.token, **_result_box(CLASSES[label], *rest)}
-        for label, *rest in columns
+        {"sample_token": shot.token}
+        | _result_box(
+            CLASSES[detections.classes[row]], world[row], moves[row], float(scores[row]), told[row]
+        )
+        for row in order.tolist()
     ]
 
 
@@ -250,13 +266,17 @@ def confidences(detections: Detections) -> Floats:
     return scores
 
 
-def attribute(name: str, speed_mps: float) -> str:
-    """The official attribute of a class at a speed over ground."""
+def attribute(name: str, speed_mps: float, told: str = "") -> str:
+    """The official attribute: the one that the detector `told`, where its class may have it, else
+    that of the class at a speed over ground.
+    """
     standing, moving = ATTRIBUTES[name]
+    if told.partition(".")[0] == standing.partition(".")[0]:
+        return told
     return moving if speed_mps > STANDING_MPS else standing
 
 
-def _result_box(name: str, box: Floats, velocity: Floats, score: float) -> JsonRow:
+def _result_box(name: str, box: Floats, velocity: Floats, score: float, told: str) -> JsonRow:
     x, y, z, length, width, height, yaw = box.tolist()
     return {
         "translation": [x, y, z],
@@ -266,7 +286,7 @@ def _result_box(name: str, box: Floats, velocity: Floats, score: float) -> JsonR
         "velocity": velocity.tolist(),
         "detection_name": name,
         "detection_score": score,
-        "attribute_name": attribute(name, float(np.hypot(*velocity))),
+        "attribute_name": attribute(name, float(np.hypot(*velocity)), told),
     }
 
 

@@ -26,6 +26,7 @@ VALUES_PER_POINT = 5
 """float32 x, y, z, intensity and ring."""
 MOST_SWEEP_BYTES = 2**28
 """Bytes of a file: 13 million points, some hundred times a sweep of any LiDAR."""
+FULL_INTENSITY = 255.0
 RINGS = 256
 """More than any LiDAR has. nuScenes' has 32."""
 OWN_CAR_M = 1.0
@@ -35,8 +36,8 @@ from sweeps).
 
 
 def read_points(path: Path) -> Floats:
-    """(n, 3) points of a `.pcd.bin` file in the sensor frame: x forward, y left. In the file x is
-    right, y forward.
+    """(n, 5) points of a `.pcd.bin` file: places in the sensor frame (x forward, y left), intensity
+    from 0 to 1, and ring. In the file x is right, y forward, and intensities go to 255.
 
     Raises InvalidInput for a file that is missing, truncated or larger than `MOST_SWEEP_BYTES`, for
     a place that is not finite,
@@ -70,27 +71,46 @@ def read_points(path: Path) -> Floats:
             f"{path}: must hold float32 x, y, z within {REACH_M[1]:g} m, intensity, and a whole "
             f"ring from 0 to {RINGS - 1} per point"
         )
-    points = places.astype(float)
-    return np.column_stack([points[:, 1], -points[:, 0], points[:, 2]])
+    with np.errstate(invalid="ignore"):
+        x, y, z, intensity, ring = rows.astype(float).T
+    return np.column_stack([y, -x, z, intensity / FULL_INTENSITY, ring])
 
 
 def recorded_cloud(
     points: Floats, grid: AngularGrid, annotations: Annotations, sensor: Frame
 ) -> Cloud:
-    """The points (n, 3) that a ray of `grid` could have returned, each with the annotated box that
-    it lies in.
+    """The points (n, 3), or (n, 5) with intensities and rings, that a ray of `grid` could have
+    returned, each with the annotated box that it lies in; those beyond its reach are far.
     """
-    cells, kept = points_of_grid(points, grid)
-    return Cloud(cells, kept, owners(kept, annotations, sensor))
+    near, far = (
+        cloud_of_points(*points_of_grid(points, grid, beyond), annotations, sensor)
+        for beyond in (False, True)
+    )
+    return replace(near, far=far)
 
 
-def points_of_grid(points: Floats, grid: AngularGrid) -> tuple[Cells, Floats]:
-    """Those of points (n, 3) that a ray of `grid` could have returned, in the order of their cells,
-    and the cells first.
+def cloud_of_points(cells: Cells, points: Floats, annotations: Annotations, sensor: Frame) -> Cloud:
+    """Points (n, 3 or 5) of ascending cells as a cloud. NaN is what nobody recorded."""
+    columns = points[:, 3:].T if points.shape[1] > 3 else np.full((2, len(points)), np.nan)
+    known = [None if np.isnan(column).any() else column for column in columns]
+    intensities, rings = known
+    return Cloud(
+        cells,
+        points[:, :3],
+        owners(points[:, :3], annotations, sensor),
+        intensities,
+        rings=None if rings is None else rings.astype(np.int64),
+    )
+
+
+def points_of_grid(points: Floats, grid: AngularGrid, beyond: bool = False) -> tuple[Cells, Floats]:
+    """Those of points (n, 3 or more) that a ray of `grid` could have returned, in the order of
+    their cells, and the cells first; or those `beyond` its reach.
     """
-    ranges = np.linalg.norm(points, axis=1)
-    cells = grid.cells_of(points)
-    (kept,) = np.nonzero((cells >= 0) & (ranges > OWN_CAR_M) & (ranges <= grid.range_m))
+    ranges = np.linalg.norm(points[:, :3], axis=1)
+    cells = grid.cells_of(points[:, :3])
+    reached = ranges > grid.range_m if beyond else ranges <= grid.range_m
+    (kept,) = np.nonzero((cells >= 0) & (ranges > OWN_CAR_M) & reached)
     # Of several points in a cell all stay.
     order = kept[np.argsort(cells[kept], kind="stable")]
     return cells[order], points[order]
@@ -170,7 +190,9 @@ def _sweep(
 ) -> Sweep:
     car = frame_of(database, "ego_pose", database.pose_of(row))
     own = car.holding(lidar.origin, lidar.rotation)
-    cells, points = points_of_grid(read_points(database.root / row["filename"]), grid)
-    objects = owners(shot.sensor.points_of(own, points), shot.annotations, shot.sensor)
+    # Nobody annotated the moment: points belong to the boxes of the keyframe, seen from here.
+    boxes = own.boxes_of(shot.sensor, shot.annotations.boxes)
+    points = read_points(database.root / row["filename"])
+    cloud = recorded_cloud(points, grid, replace(shot.annotations, boxes=boxes), own)
     time_s = shot.time_s - (sample["timestamp"] - row["timestamp"]) * 1e-6
-    return Sweep(time_s, own, Cloud(cells, points, objects))
+    return Sweep(time_s, own, cloud)

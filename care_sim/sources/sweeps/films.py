@@ -23,9 +23,7 @@ from care_sim.perception.detectors import CLUSTER, PRIVILEGED, check_detector, m
 from care_sim.perception.tracker import MemoryRules, TrackMemory
 from care_sim.sensors.annotated import (
     NO_ANNOTATIONS,
-    NO_OBJECT,
     Annotations,
-    Cloud,
     IdentifiedDetections,
 )
 from care_sim.sensors.camera import NOTHING_SEEN
@@ -33,7 +31,7 @@ from care_sim.sensors.surround import SURROUND_CAMERAS
 from care_sim.sources.box_films import motions
 from care_sim.sources.film_checks import LEAST_KEYFRAMES, report_once
 from care_sim.sources.nuscenes.detections import DetectionFile, Found, objects_behind
-from care_sim.sources.nuscenes.sweeps import points_of_grid, recorded_cloud
+from care_sim.sources.nuscenes.sweeps import recorded_cloud
 from care_sim.sources.sweeps.logs import SWEEPS_KEYFRAME_S, Log
 from care_sim.sources.sweeps.points import in_seconds
 from care_sim.world.bodies import CATALOGUE
@@ -60,7 +58,7 @@ def reference(
     grid: AngularGrid,
     sensor_height_m: float,
 ) -> list[Annotations]:
-    """Return the annotations of every keyframe, from its points (n, 3) in the frame of its sensor.
+    """Return the annotations of every keyframe, from its points (n, 5) in the frame of its sensor.
 
     The `detector` gets the full scan of every keyframe. Detections are tracked by place alone,
     since the class of a cluster changes with its view. An object is annotated at the keyframes at
@@ -72,9 +70,9 @@ def reference(
     found: list[Detections] = []
     tracks: list[Integers] = []
     for points, sensor in zip(sweeps, sensors, strict=True):
-        cells, kept = points_of_grid(points, grid)
-        cloud = Cloud(cells, kept, np.full(len(cells), NO_OBJECT))
-        detections, _ = made.detect(cloud, NO_ANNOTATIONS)
+        detections, _ = made.detect(
+            recorded_cloud(points, grid, NO_ANNOTATIONS, sensor), NO_ANNOTATIONS
+        )
         alike = replace(detections, classes=np.zeros(len(detections), np.int64))
         found.append(detections)
         tracks.append(memory.update(alike, sensor))
@@ -121,7 +119,7 @@ def film_of_log(log: Log, setup: SensorSetup, detector: str, boxes: Path | None)
     cars = log.cars(log.times_s)
     egos = motions(log.times_s, cars)
     mount = Rotation.from_euler("ZYX", [grid.heading, -grid.pitch, grid.roll])
-    sweeps = [_off_the_car(mount.apply(log.points_of(row)), setup) for row in rows.tolist()]
+    sweeps = [_off_the_car(_turned(mount, log.points_of(row)), setup) for row in rows.tolist()]
     _check_height(log, setup, sweeps)
     sensors = [cars[row].holding(np.array(setup.position)) for row in rows.tolist()]
     height_m = setup.position[2]
@@ -154,8 +152,13 @@ def film_of_log(log: Log, setup: SensorSetup, detector: str, boxes: Path | None)
     )
 
 
+def _turned(mount: Rotation, points: Floats) -> Floats:
+    """Return points (n, 5) in the sensor frame of which the axes of the LiDAR are turned."""
+    return np.column_stack([mount.apply(points[:, :3]), points[:, 3:]])
+
+
 def _off_the_car(points: Floats, setup: SensorSetup) -> Floats:
-    """Return the points (n, 3) that do not lie on the recording car, which would be an object."""
+    """Return the points (n, 5) that do not lie on the recording car, which would be an object."""
     x, y, _ = setup.position
     length, width, _ = CATALOGUE["ego"].size
     ahead, left = np.abs(points[:, :2] + (x, y)).T

@@ -3,7 +3,7 @@ the usual units.
 """
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from pyarrow import csv
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats
 from care_sim.sources.film_checks import REACH_M
-from care_sim.sources.nuscenes.sweeps import MOST_SWEEP_BYTES, RINGS
+from care_sim.sources.nuscenes.sweeps import FULL_INTENSITY, MOST_SWEEP_BYTES, RINGS
 
 UNITS_S = ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3))
 """Times from so large a number on are counts of nanoseconds, microseconds, milliseconds since 1970;
@@ -60,16 +60,19 @@ def in_seconds(times: Floats) -> Floats:
 
 
 _AXES = ("x", "y", "z")
+COLUMNS = (*_AXES, "intensity", "ring")
+"""What is told of every point; other columns of files are left out."""
 _MOST_HEADER_LINES = 100
 _KINDS = {"F": "f", "I": "i", "U": "u"}
 
 
 def read_sweep(path: Path) -> Floats:
-    """Return the points (n, 3) of a sweep as the file has them, metres.
+    """Return the points (n, 5) of a sweep: x, y, z as the file has them, metres, intensity and
+    ring, each NaN where the file does not tell it. Intensities above 1 are taken for shares of 255.
 
-    - PCD: fields x, y, z, `DATA ascii` or `binary`.
-    - NPY: an array (n, 3 or more) that begins with x, y, z.
-    - CSV: columns x, y, z, or no heading and x, y, z first.
+    - PCD: fields x, y, z, and intensity and ring if there are, `DATA ascii` or `binary`.
+    - NPY: an array (n, 3 or more) that begins with x, y, z, intensity, ring.
+    - CSV: columns x, y, z, and intensity and ring if there are; or no heading and x, y, z first.
     - BIN: float32 x, y, z, intensity (KITTI), with a whole ring behind them in nuScenes' form.
 
     Raises InvalidInput with the path for a file that is missing, too large or of another form, and
@@ -90,23 +93,32 @@ def read_sweep(path: Path) -> Floats:
     return checked_points(path, points)
 
 
+def _full(points: Floats) -> Floats:
+    """(n, 5) of points (n, 3 or more), intensities from 0 to 1."""
+    full = np.full((len(points), len(COLUMNS)), np.nan)
+    full[:, : points.shape[1]] = points[:, : len(COLUMNS)]
+    if np.nanmax(full[:, 3], initial=0) > 1:
+        full[:, 3] /= FULL_INTENSITY
+    return full
+
+
 def checked_points(place: object, points: Floats) -> Floats:
     """Return the points without rays that met nothing: NaN in x, y and z (as PCL writes them).
 
     Raises InvalidInput with the `place` where no point is left, and for one that is not finite or
     farther than any LiDAR reaches.
     """
-    points = points[~np.isnan(points).all(axis=1)]
+    points = points[~np.isnan(points[:, :3]).all(axis=1)]
     if not len(points):
         raise InvalidInput(f"{place}: no points")
-    near = (np.abs(points) <= REACH_M[1]).all(axis=1)
+    near = (np.abs(points[:, :3]) <= REACH_M[1]).all(axis=1)
     if not near.all():
         wrong = int(near.argmin())
         raise InvalidInput(
-            f"{place}: point {wrong} lies at {points[wrong].tolist()}, must be metres within "
+            f"{place}: point {wrong} lies at {points[wrong, :3].tolist()}, must be metres within "
             f"{REACH_M[1]:g}"
         )
-    return points
+    return _full(points)
 
 
 def _pcd(path: Path) -> Floats:
@@ -126,7 +138,7 @@ def _pcd(path: Path) -> Floats:
     if form == "ascii":
         starts = dict(zip(names, np.cumsum([0, *counts]).tolist(), strict=False))
         table = np.array(body.decode("ascii").split(), dtype=float).reshape(points, -1)
-        return table[:, [starts[axis] for axis in _AXES]]
+        return _by_name({name: table[:, start] for name, start in starts.items()})
     if form != "binary":
         raise ValueError(f"DATA {form}, must be ascii or binary")
     # Padding may have one name several times.
@@ -134,12 +146,20 @@ def _pcd(path: Path) -> Floats:
     fields = zip(names, numbers, counts, strict=True)
     kind = np.dtype(
         [
-            (name if name in _AXES else f"{place} {name}", f"<{_KINDS[letter]}{size}", (count,))
+            (name if name in COLUMNS else f"{place} {name}", f"<{_KINDS[letter]}{size}", (count,))
             for place, (name, (letter, size), count) in enumerate(fields)
         ]
     )
     rows = np.frombuffer(body, kind, points)
-    return np.concatenate([rows[axis] for axis in _AXES], axis=1).astype(float)
+    return _by_name({name: rows[name][:, 0] for name in COLUMNS if name in names})
+
+
+def _by_name(columns: Mapping[str, Any]) -> Floats:
+    """(n, 5) columns by their names, of which x, y and z must be there."""
+    count = len(columns["x"])
+    lacking = {name: np.full(count, np.nan) for name in COLUMNS[len(_AXES) :]}
+    known = {name: columns[name] for name in COLUMNS if name in columns or name in _AXES}
+    return np.column_stack([(lacking | known)[name] for name in COLUMNS]).astype(float)
 
 
 def _npy(path: Path) -> Floats:
@@ -147,7 +167,7 @@ def _npy(path: Path) -> Floats:
     array = np.asarray(np.lib.format.open_memmap(path, mode="r"))
     if array.ndim != 2 or array.shape[1] < 3 or array.dtype.kind not in "fiu":
         raise ValueError(f"must be numbers (n, 3 or more), got {array.dtype} {array.shape}")
-    return array[:, :3].astype(float)
+    return array[:, : len(COLUMNS)].astype(float)
 
 
 def _csv(path: Path) -> Floats:
@@ -157,7 +177,9 @@ def _csv(path: Path) -> Floats:
     try:
         float(first)
     except ValueError:
-        return columns_of(path, read_csv(path), _AXES)
+        table = read_csv(path)
+        known = [name for name in COLUMNS if name in _AXES or name in table.column_names]
+        return _by_name(dict(zip(known, columns_of(path, table, known).T, strict=True)))
     table = read_csv(path, headless=True)
     return columns_of(path, table, ("f0", "f1", "f2"))
 
@@ -170,7 +192,7 @@ def _bin(path: Path) -> Floats:
                 rows = values.reshape(-1, count)
                 rings = rows[:, 4] if count == 5 else np.zeros(1)
                 if ((rings >= 0) & (rings < RINGS) & (rings == np.rint(rings))).all():
-                    return rows[:, :3].astype(float)
+                    return rows.astype(float)
     raise ValueError("must hold float32 x, y, z, intensity and perhaps a whole ring")
 
 

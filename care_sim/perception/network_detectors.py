@@ -1,0 +1,189 @@
+"""Detectors that run a network: what a network of anybody's needs around it, and two that run one
+from a file, TorchScript or ONNX.
+"""
+
+from collections.abc import Sequence
+from os import PathLike, fspath
+from pathlib import Path
+
+import numpy as np
+
+from care_sim.base.checks import check_known, check_number
+from care_sim.base.errors import InvalidInput
+from care_sim.base.extras import import_extra, import_torch
+from care_sim.core.arrays import Floats, Integers
+from care_sim.core.types import CLASSES, Detections
+from care_sim.perception.points_only import FIELDS, inside
+
+FORWARD, RIGHT = AXES = "forward", "right"
+"""Where the x axis of a network points: forward, as ours and KITTI's, or right, as that of the raw
+sweeps of nuScenes; y is left of it.
+"""
+Names = str | Sequence[str]
+
+
+class NetworkDetector:
+    """The conventions of a network, for a detector built around one (`docs/write/detector.md`).
+
+    - `fields`: the columns that it was trained with, of `care_sim.perception.points_only.FIELDS`.
+    - `axes`: `forward` or `right` (`AXES`).
+    - `full_intensity`: the intensity that a full return had in training: 255 for nuScenes.
+    - `classes`: the names of its labels in order; those outside the five classes are left out.
+
+    Names may come as one text with commas. Raises InvalidInput for values that are not allowed.
+    """
+
+    def __init__(
+        self,
+        fields: Names = FIELDS[:3],
+        axes: str = FORWARD,
+        full_intensity: float = 1.0,
+        classes: Names = CLASSES,
+    ):
+        check_known("axes", axes, AXES)
+        check_number("full_intensity", full_intensity, 0)
+        self.fields = _listed(fields)
+        for field in self.fields:
+            check_known("field", field, FIELDS)
+        self._axes = axes
+        self._full_intensity = full_intensity
+        names = _listed(classes)
+        if not {*names} & {*CLASSES}:
+            raise InvalidInput(
+                f"classes must name one of {', '.join(CLASSES)} at least, got {', '.join(names)}"
+            )
+        self._labels = np.array([CLASSES.index(n) if n in CLASSES else -1 for n in names])
+
+    def points_for(self, points: Floats) -> np.ndarray:
+        """(P, k) float32 points as the network was trained with them."""
+        given = np.array(points, np.float32)
+        if self._axes == RIGHT:
+            given[:, 0], given[:, 1] = -points[:, 1], points[:, 0]
+        if "intensity" in self.fields:
+            given[:, self.fields.index("intensity")] *= self._full_intensity
+        return given
+
+    def detections(
+        self,
+        points: Floats,
+        labels: Integers,
+        boxes: Floats,
+        scores: Floats,
+        velocities: Floats | None = None,
+    ) -> Detections:
+        """What the network answers to `points` (P, k), as detections: `labels` (n,) into its
+        classes, `boxes` (n, 7) centre, length, width, height and yaw in its axes, `scores` (n,),
+        `velocities` (n, 2) or None.
+
+        Raises InvalidInput for a label that no class has.
+        """
+        labels = np.asarray(labels, np.int64)
+        if labels.size and not 0 <= labels.min() <= labels.max() < len(self._labels):
+            raise InvalidInput(
+                f"the network answers the labels {labels.min()} to {labels.max()}, and its classes "
+                f"have 0 to {len(self._labels) - 1}; name them all in classes"
+            )
+        kept = self._labels[labels] >= 0
+        # Wrong shapes are named where all answers are checked; nothing has any shape.
+        own = np.asarray(boxes, float)[kept] if labels.size else np.empty((0, 7))
+        moves = None if velocities is None else np.asarray(velocities, float)[kept]
+        if self._axes == RIGHT and labels.size:
+            own = np.column_stack([own[:, 1], -own[:, 0], own[:, 2:6], own[:, 6] - np.pi / 2])
+            moves = None if moves is None else np.column_stack([moves[:, 1], -moves[:, 0]])
+        held = inside(points[:, :3], own).sum(axis=1)
+        return Detections(self._labels[labels][kept], own, held, np.asarray(scores)[kept], moves)
+
+
+class TorchScriptDetector(NetworkDetector):
+    """Runs a TorchScript module: `forward(points, sensor_height_m) -> (classes, boxes, scores)`.
+
+    `points` is a float32 tensor (P, k) with the `fields`, `sensor_height_m` a float; `classes`
+    (n,), `boxes` (n, 7), `scores` (n,) and, as a fourth output, `velocities` (n, 2) are those of
+    `NetworkDetector.detections`. It runs on `device`: cpu, cuda, cuda:1. Needs torch. Raises
+    MissingExtra without it, InvalidInput for a file that is no TorchScript module.
+    """
+
+    def __init__(
+        self,
+        file: str | PathLike[str],
+        device: str = "cpu",
+        fields: Names = FIELDS[:3],
+        axes: str = FORWARD,
+        full_intensity: float = 1.0,
+        classes: Names = CLASSES,
+    ):
+        super().__init__(fields, axes, full_intensity, classes)
+        self._torch = import_torch()
+        self._device = device
+        _check_file(file, "a TorchScript module (torch.jit.save)")
+        try:
+            self._module = self._torch.jit.load(fspath(file), map_location=device).eval()
+        except RuntimeError as error:
+            raise InvalidInput(f"{file}: no TorchScript module for {device}") from error
+
+    def detect(self, points: Floats, sensor_height_m: float) -> Detections:
+        """See `care_sim.perception.points_only.PointDetector`."""
+        # Nothing is learned here, so no gradients are kept.
+        with self._torch.inference_mode():
+            given = self._torch.from_numpy(self.points_for(points)).to(self._device)
+            outputs = self._module(given, float(sensor_height_m))
+        return self.detections(points, *(output.cpu().numpy() for output in outputs))
+
+
+class OnnxDetector(NetworkDetector):
+    """Runs an ONNX file: inputs `points` (P, k) float32 and, if the network has it,
+    `sensor_height_m` (1,) float32; outputs in the order classes, boxes, scores, and velocities if
+    it has them, as of `TorchScriptDetector`.
+
+    `device`: cpu or cuda, for which ONNX Runtime needs its own package. Needs onnxruntime. Raises
+    MissingExtra without it, InvalidInput for a file that is no such network.
+    """
+
+    def __init__(
+        self,
+        file: str | PathLike[str],
+        device: str = "cpu",
+        fields: Names = FIELDS[:3],
+        axes: str = FORWARD,
+        full_intensity: float = 1.0,
+        classes: Names = CLASSES,
+    ):
+        super().__init__(fields, axes, full_intensity, classes)
+        check_known("device", device, ("cpu", "cuda"))
+        runtime = import_extra("onnxruntime", "ONNX Runtime", "onnx")
+        _check_file(file, "an ONNX network")
+        options = runtime.SessionOptions()
+        # Workers share the cores already.
+        options.intra_op_num_threads = 1
+        provider = "CUDAExecutionProvider" if device == "cuda" else "CPUExecutionProvider"
+        if provider not in runtime.get_available_providers():
+            raise InvalidInput(f"onnxruntime has no {provider} here: install onnxruntime-gpu")
+        try:
+            self._session = runtime.InferenceSession(fspath(file), options, providers=[provider])
+        except Exception as error:
+            told = " ".join(str(error).split())[:200]
+            raise InvalidInput(f"{file}: no ONNX network ({told})") from error
+        self._inputs = [each.name for each in self._session.get_inputs()]
+        if "points" not in self._inputs or {*self._inputs} - {"points", "sensor_height_m"}:
+            raise InvalidInput(
+                f"{file}: its inputs must be points and perhaps sensor_height_m, they are "
+                f"{', '.join(self._inputs)}"
+            )
+
+    def detect(self, points: Floats, sensor_height_m: float) -> Detections:
+        """See `care_sim.perception.points_only.PointDetector`."""
+        known = {
+            "points": self.points_for(points),
+            "sensor_height_m": np.array([sensor_height_m], np.float32),
+        }
+        outputs = self._session.run(None, {name: known[name] for name in self._inputs})
+        return self.detections(points, *outputs)
+
+
+def _listed(names: Names) -> tuple[str, ...]:
+    return tuple(names.split(",")) if isinstance(names, str) else tuple(names)
+
+
+def _check_file(file: str | PathLike[str], allowed: str) -> None:
+    if not Path(file).is_file():
+        raise InvalidInput(f"{fspath(file)}: no such file; allowed is {allowed}")

@@ -1,0 +1,126 @@
+"""What a real detector reported of full scans, played back: an upper bound of what it would report
+of the scans that a policy fires.
+"""
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from care_sim.base.checks import check_number, check_whole
+from care_sim.base.errors import InvalidInput
+from care_sim.base.files import parsed_json
+from care_sim.core.arrays import Integers
+from care_sim.core.frames import Frame
+from care_sim.core.types import CLASSES, Detections
+from care_sim.perception.points_only import ATTRIBUTES, FARTHEST_M, inside, objects_behind
+from care_sim.sensors.annotated import Annotations, Cloud
+
+_MARGIN_M = 0.2
+"""Reported boxes are off by a few centimetres, and returns lie on the surface of the object."""
+
+
+class RecordedDetector:
+    """Plays back what a detector reported of full scans: an upper bound, not a detector.
+
+    `file` holds results in the official form of the nuScenes detection task, whose samples are the
+    keyframes of the film. A box counts where `least_returns` of the returns that the policy fired
+    lie in it. The detector saw the full scan, so it might have missed the object in fewer. What
+    scores below `track_score` becomes no track.
+    """
+
+    gathers = 1
+
+    def __init__(
+        self, file: str | os.PathLike[str], least_returns: int = 1, track_score: float = 0.0
+    ):
+        check_whole("least_returns", least_returns, 0)
+        check_number("track_score", track_score, 0, 1)
+        self.track_score = float(track_score)
+        self._least_returns = least_returns
+        self._file = Path(file)
+        self._results = _results(self._file)
+        self._here: tuple[str, Frame] | None = None
+
+    def at(self, token: str, sensor: Frame) -> None:
+        """The keyframe that is detected next, and where its sensor is. Raises InvalidInput for a
+        keyframe that the file lacks.
+        """
+        if token not in self._results:
+            raise InvalidInput(f"{self._file}: has no results of the keyframe {token!r}")
+        self._here = token, sensor
+
+    def detect(self, cloud: Cloud, annotations: Annotations) -> tuple[Detections, Integers]:
+        """See `care_sim.perception.points_only.Detector`. Raises InvalidInput in the closed loop,
+        whose keyframes nobody recorded.
+        """
+        if self._here is None:
+            raise InvalidInput("the detector recorded plays films of nuScenes alone")
+        token, sensor = self._here
+        reported = _detections(self._file, token, self._results[token], sensor)
+        grown = reported.boxes.copy()
+        grown[:, 3:6] += 2 * _MARGIN_M
+        held = inside(cloud.points, grown).sum(axis=1)
+        kept = held >= self._least_returns
+        found = Detections(
+            reported.classes,
+            reported.boxes,
+            held,
+            reported.scores,
+            reported.velocities,
+            reported.attributes,
+        ).take(kept)
+        return found, objects_behind(grown[kept], cloud)
+
+
+def _results(path: Path) -> dict[str, list[Any]]:
+    try:
+        content = parsed_json(path.read_bytes())
+    except (OSError, ValueError) as error:
+        raise InvalidInput(f"{path}: cannot be read ({error})") from error
+    results = content.get("results") if isinstance(content, dict) else None
+    if not isinstance(results, dict) or not all(isinstance(r, list) for r in results.values()):
+        raise InvalidInput(
+            f"{path}: must hold a map `results` from sample tokens to lists of boxes, the form of "
+            "the nuScenes detection task"
+        )
+    return results
+
+
+def _detections(path: Path, token: str, rows: list[Any], sensor: Frame) -> Detections:
+    """The boxes of a sample in its sensor frame. Classes outside the five are left out."""
+    kept, boxes, velocities = [], [], []
+    for number, row in enumerate(rows):
+        try:
+            if row["detection_name"] not in CLASSES:
+                continue
+            width, length, height = row["size"]
+            w, x, y, z = row["rotation"]
+            yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+            box = [*row["translation"], length, width, height, yaw]
+            told = [*box, row["detection_score"], *(row.get("velocity") or (0.0, 0.0))]
+            numbers = np.array(told, dtype=float)
+            if numbers.shape != (10,) or not (np.abs(numbers) <= FARTHEST_M).all():
+                raise ValueError("not the numbers of a box")
+            if not (numbers[3:6] > 0).all() or not 0 <= numbers[7] <= 1:
+                raise ValueError("sizes must be above 0 and scores from 0 to 1")
+        except (KeyError, TypeError, ValueError) as error:
+            raise InvalidInput(
+                f"{path}: box {number} of {token!r} cannot be read ({error})"
+            ) from error
+        boxes.append(numbers[:7])
+        velocities.append(numbers[8:])
+        attribute = str(row.get("attribute_name", ""))
+        kept.append((CLASSES.index(row["detection_name"]), numbers[7], attribute))
+    world = np.array(velocities).reshape(-1, 2)
+    moves = sensor.vectors_to_local(np.column_stack([world, np.zeros(len(world))]))
+    classes, scores, attributes = zip(*kept, strict=True) if kept else ((), (), ())
+    return Detections(
+        np.array(classes, np.int64),
+        sensor.boxes_to_local(np.array(boxes).reshape(-1, 7)),
+        np.zeros(len(kept), np.int64),
+        np.array(scores, float),
+        moves[:, :2],
+        [one if one in ATTRIBUTES else "" for one in attributes],
+    )

@@ -1,0 +1,65 @@
+"""Networks of anybody's: their columns, axes, labels and velocities, from TorchScript and ONNX."""
+
+import numpy as np
+import pytest
+
+from care_sim.base.errors import InvalidInput
+from care_sim.core.types import CLASSES
+from care_sim.perception.network_detectors import NetworkDetector
+
+NUSCENES = "car,truck,construction_vehicle,bus,trailer,barrier,motorcycle,bicycle,pedestrian"
+POINTS = np.array([[10.0, 2.0, -1.0, 0.5, 0.1], [10.5, 2.0, -1.0, 0.25, 0.2]])
+
+
+def network(**told):
+    own = {"fields": "x,y,z,intensity,time_lag", "axes": "right", "full_intensity": 255.0}
+    return NetworkDetector(**own | {"classes": NUSCENES} | told)
+
+
+def test_points_come_in_the_axes_and_units_of_the_training():
+    # nuScenes: x right, y forward, intensities to 255.
+    given = network().points_for(POINTS)
+    assert given.dtype == np.float32
+    assert given[0].tolist() == pytest.approx([-2.0, 10.0, -1.0, 127.5, 0.1])
+    assert POINTS[0, 0] == 10.0
+
+
+def test_answers_come_back_in_our_axes_and_classes():
+    # A pedestrian who stands ahead, left of the middle, and walks right; and a barrier.
+    boxes = np.array([[-2.0, 10.0, -1.0, 3.0, 1.0, 2.0, np.pi / 2], [0, 0, 0, 1, 1, 1, 0]])
+    moves = np.array([[1.5, 0.0], [0.0, 0.0]])
+    found = network().detections(POINTS, [8, 5], boxes, [0.9, 0.8], moves)
+    assert [CLASSES[label] for label in found.classes] == ["pedestrian"]
+    assert found.boxes[0].tolist() == pytest.approx([10.0, 2.0, -1.0, 3.0, 1.0, 2.0, 0.0])
+    assert found.velocities.tolist() == [[0.0, -1.5]]
+    assert found.returns.tolist() == [2]
+    assert found.scores.tolist() == [0.9]
+
+
+def test_turned_axes_are_undone():
+    rng = np.random.default_rng(0)
+    points = np.column_stack([rng.normal(size=(9, 3)), np.zeros((9, 2))])
+    boxes = np.column_stack([network().points_for(points)[:, :3], np.ones((9, 3)), np.zeros(9)])
+    found = network().detections(points, [0] * 9, boxes, np.ones(9))
+    assert found.boxes[:, :3] == pytest.approx(points[:, :3], abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("told", "fault"),
+    [
+        ({"fields": "x,y,z,colour"}, "unknown field 'colour'"),
+        ({"axes": "up"}, "unknown axes 'up'"),
+        ({"classes": "tree,dog"}, "classes must name one of car, truck"),
+        ({"full_intensity": -1}, "full_intensity"),
+    ],
+)
+def test_conventions_that_are_none_are_named(told, fault):
+    with pytest.raises(InvalidInput, match=fault):
+        network(**told)
+
+
+def test_a_label_beyond_the_classes_is_named():
+    with pytest.raises(
+        InvalidInput, match="answers the labels 9 to 9, and its classes have 0 to 8"
+    ):
+        network().detections(POINTS, [9], np.ones((1, 7)), [1.0])

@@ -1,0 +1,85 @@
+"""The detector `recorded`: what another one reported of full scans, played back."""
+
+import json
+
+import numpy as np
+import pytest
+
+from care_sim.base.errors import InvalidInput
+from care_sim.core.frames import Frame
+from care_sim.core.types import CLASSES
+from care_sim.perception.detectors import make_detector
+from care_sim.sensors.annotated import NO_ANNOTATIONS, Cloud
+
+HEIGHT = 1.84
+SENSOR = Frame(100.0, 50.0, HEIGHT, np.pi / 2)
+"""The car looks along the y axis of the world."""
+CAR = {
+    "translation": [100.0, 60.0, 1.0],
+    "size": [2.0, 4.0, 1.6],
+    "rotation": [float(np.cos(np.pi / 4)), 0.0, 0.0, float(np.sin(np.pi / 4))],
+    "velocity": [0.0, 3.0],
+    "detection_name": "car",
+    "detection_score": 0.8,
+    "attribute_name": "vehicle.moving",
+}
+"""10 m ahead, driving on."""
+ON_IT = Cloud(np.array([3]), np.array([[8.1, 0.0, -0.5]]), np.array([7]))
+BESIDE = Cloud(np.array([3]), np.array([[8.1, 4.0, -0.5]]), np.array([7]))
+
+
+def file_of(tmp_path, *boxes):
+    path = tmp_path / "results.json"
+    path.write_text(json.dumps({"meta": {}, "results": {"here": list(boxes)}}))
+    return path
+
+
+def played(path, cloud, **parameters):
+    detector = make_detector("recorded", HEIGHT, file=path, **parameters)
+    detector.at("here", SENSOR)
+    return detector.detect(cloud, NO_ANNOTATIONS)
+
+
+def test_a_reported_box_counts_where_it_was_fired_at(tmp_path):
+    path = file_of(tmp_path, CAR, CAR | {"detection_name": "barrier"})
+    found, objects = played(path, ON_IT)
+    assert [CLASSES[label] for label in found.classes] == ["car"]
+    assert found.boxes[0] == pytest.approx([10.0, 0.0, 1.0 - HEIGHT, 4.0, 2.0, 1.6, 0.0])
+    assert found.velocities[0] == pytest.approx([3.0, 0.0])
+    assert (found.scores.tolist(), found.attributes) == ([0.8], ["vehicle.moving"])
+    assert (found.returns.tolist(), objects.tolist()) == ([1], [7])
+    missed, _ = played(path, BESIDE)
+    assert len(missed) == 0
+    few, _ = played(path, ON_IT, least_returns=2)
+    assert len(few) == 0
+
+
+@pytest.mark.parametrize(
+    ("box", "fault"),
+    [
+        ({"size": [2.0, 4.0]}, "box 0 of 'here' cannot be read"),
+        ({"size": [2.0, -4.0, 1.0]}, "sizes must be above 0"),
+        ({"detection_score": 3}, "scores from 0 to 1"),
+        ({"translation": [1e30, 0, 0]}, "not the numbers of a box"),
+    ],
+)
+def test_a_box_that_is_none_is_named(tmp_path, box, fault):
+    with pytest.raises(InvalidInput, match=fault):
+        played(file_of(tmp_path, CAR | box), ON_IT)
+
+
+def test_keyframes_that_nobody_recorded_are_named(tmp_path):
+    detector = make_detector("recorded", HEIGHT, file=file_of(tmp_path))
+    with pytest.raises(InvalidInput, match="plays films of nuScenes alone"):
+        detector.detect(ON_IT, NO_ANNOTATIONS)
+    with pytest.raises(InvalidInput, match="has no results of the keyframe 'there'"):
+        detector.at("there", SENSOR)
+
+
+def test_a_file_of_something_else_is_named(tmp_path):
+    path = tmp_path / "list.json"
+    path.write_text("[]")
+    with pytest.raises(InvalidInput, match=r"list.json: must hold a map `results`"):
+        make_detector("recorded", HEIGHT, file=path)
+    with pytest.raises(InvalidInput, match="cannot be read"):
+        make_detector("recorded", HEIGHT, file=tmp_path / "none.json")
