@@ -41,6 +41,18 @@ try:
 except InvalidInput as error:
     assert "the bag has /points" in str(error), error
 """
+ONNX = """
+import base64
+from pathlib import Path
+
+# A network that takes points (P, 3) and finds nothing.
+Path("none.onnx").write_bytes(base64.b64decode(
+    "CAg6zAEKFgoBYxIHY2xhc3NlcyIISWRlbnRpdHkKFAoBYhIFYm94ZXMiCElkZW50aXR5ChUKAXMSBnNjb3JlcyIISWRl"
+    "bnRpdHkSAWcqCQgAEAdCAWNKACoLCAAIBxABQgFiSgAqCQgAEAFCAXNKAFoZCgZwb2ludHMSDwoNCAESCQoDEgFQCgII"
+    "A2IVCgdjbGFzc2VzEgoKCAgHEgQKAggAYhcKBWJveGVzEg4KDAgBEggKAggACgIIB2IUCgZzY29yZXMSCgoICAESBAoC"
+    "CABCBAoAEA0="
+))
+"""
 USES = {
     "open3d": [f"care-sim run dense --policy farthest-points {SHORT} --export scans"],
     "rl": [
@@ -56,6 +68,10 @@ USES = {
         "minari list local",
     ],
     "rosbags": ["python bag.py"],
+    "onnx": [
+        "python network.py",
+        f"care-sim run dense --detector onnx --detector-parameters file=none.onnx {SHORT}",
+    ],
 }
 """What each extra is for, as commands; what they write lies in an empty folder."""
 
@@ -67,6 +83,7 @@ def fails(extra: str, wheel: Path, constraints: Path) -> str:
         (folder / "cluster.py").write_text(SCHEDULER)
         (folder / "vector.py").write_text(VECTOR)
         (folder / "bag.py").write_text(BAG)
+        (folder / "network.py").write_text(ONNX)
         venv.create(folder / "venv", with_pip=True)
         install = ["python", "-m", "pip", "install", "--quiet", "--constraint", f"{constraints}"]
         for command in ([*install, f"{wheel}[{extra}]"], *map(str.split, USES[extra])):

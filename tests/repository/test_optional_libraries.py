@@ -114,6 +114,7 @@ MISSED = {
     "reproduce --cluster tcp://127.0.0.1:1": "cluster",
     "export minari dense --dataset care-sim/dense/care-v0": "minari",
     "run sweeps:drive.mcap": "rosbags",
+    "run dartout --detector onnx --detector-parameters file=net.onnx": "onnx",
     "train ppo": "rl",
     "train recurrent-ppo": "rl",
     "train detector --out weights.npz": "rl",
