@@ -71,6 +71,16 @@ def test_care_priority_adds_the_explained_wedges_as_a_second_layer(environment, 
     assert any(not np.array_equal(priority(o), care(o)) for o in encounter)
 
 
+def test_all_camera_has_one_layer_or_those_of_care_priority(environment, encounter):
+    named = [("all-camera", {}), ("all-camera", {"unexplained_first": True}), ("care-priority", {})]
+    one, two, priority = (care_sim.make_policy(n, environment, **own) for n, own in named)
+    for observation in encounter:
+        belief = Belief.from_observation(observation)
+        assert len(one.demand(belief).layers) <= 1
+        assert layers_of(two.demand(belief)) == layers_of(priority.demand(belief))
+    assert any(not np.array_equal(one(o), two(o)) for o in encounter)
+
+
 def scan_of(*points):
     """A last scan with returns (x, y, z) in the sensor frame, moved to the middle of their cells;
     and the cells.

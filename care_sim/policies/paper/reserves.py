@@ -18,13 +18,24 @@ class AllCamera(RowPolicy):
 
     It is history plus one reserve layer with the wedges of every camera detection. It lacks only
     the residual filter of CARE.
+
+    With `unexplained_first` the reserve has the layers (U, M), as in `CarePriority`: the other
+    reading of a reserve for every detection. Its cells then differ from those of CARE only where
+    the unexplained wedges do not fill the reserve.
     """
 
     name = "all-camera"
     source = "CARE paper, Sec. 5.1"
 
+    def __init__(self, rig: Rig, *, unexplained_first: bool = False):
+        super().__init__(rig)
+        check_flag("unexplained_first", unexplained_first)
+        self._unexplained_first = unexplained_first
+
     def stages(self, beliefs: Beliefs) -> list[WorldSets]:
-        """Hulls, then the wedges of all detections."""
+        """Hulls, then the wedges of all detections, in one layer or in two."""
+        if self._unexplained_first:
+            return [beliefs.hulls, *camera_layers_of(beliefs)]
         return [beliefs.hulls, wedges_of(beliefs)]
 
 
