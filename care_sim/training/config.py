@@ -11,7 +11,7 @@ from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.seeds import TRAINING, VALIDATION
 from care_sim.core.cells.rays import MOST_COLUMNS, MOST_ROWS
 from care_sim.core.defaults import HEAVIEST
-from care_sim.policies.learned.weights import Wrapping
+from care_sim.core.wrapping import Wrapping
 from care_sim.study.rows.parameters import parameters
 
 Part = Literal["pictures", "place", "tracks", "faults"]

@@ -5,10 +5,11 @@ detector `pillars`.
 import numpy as np
 
 from care_sim.core.grid import AngularGrid
+from care_sim.core.wrapping import Wrapping
 from care_sim.perception.pillars.detector import CALIBRATION, array_shapes, save_detector
 from care_sim.policies.learned.grid_features import CHANNELS, EGO_INPUTS
 from care_sim.policies.learned.ppo import BLOCK_MARGIN
-from care_sim.policies.learned.weights import Card, Wrapping, save_weights
+from care_sim.policies.learned.weights import Card, save_weights
 
 USUAL = Wrapping()
 
