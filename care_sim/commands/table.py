@@ -40,9 +40,8 @@ def _study(options: str, run: str, about: str) -> Command:
 
 
 def _weights(options: str, run: str, about: str) -> Command:
-    """A trainer, whose options and function are both in its module of `training.supervised`."""
-    module = run.partition(":")[0]
-    return Command(f"training.supervised.{module}:{options}", f"training.supervised.{run}", about)
+    """A trainer of `training.supervised`."""
+    return Command(f"training.supervised.options:{options}", f"training.supervised.{run}", about)
 
 
 GROUPS: dict[str, dict[str, Command]] = {

@@ -167,6 +167,11 @@ def half_up(number: float) -> int:
     return math.floor(number + 0.5)
 
 
+def halves_up(numbers: NDArray[np.floating]) -> Integers:
+    """`half_up` of every number (n,)."""
+    return np.floor(numbers + 0.5).astype(np.int64)
+
+
 def budget_cells(budget: float, cells: int, unit: str = "cell") -> int:
     """B = round(beta * N) (Eq. 1): the cells that a fraction `budget` of all `cells` is, or as many
     units of another hardware (`care_sim.core.firing`).

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.errors import InvalidInput
+from care_sim.core.allocation import halves_up
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.belief import (
     HIGHEST,
@@ -84,7 +85,7 @@ class Beliefs:
         own = np.zeros((len(live), 3))
         own[live] = egos
         cells = np.zeros(len(live), np.int64)
-        cells[live] = np.rint(budgets[:, 0].astype(np.float64) * rig.grid.size)
+        cells[live] = halves_up(budgets[:, 0].astype(np.float64) * rig.grid.size)
         rows = detections, Tracks.from_checked_rows(known), detected, tracked
         return cls(rig, live, own, cells, scans, *rows)
 

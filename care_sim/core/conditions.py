@@ -364,7 +364,17 @@ class Conditions(Sensing):
 
 @dataclass(frozen=True, kw_only=True)
 class ClosedLoopConditions(DriverSettings, Conditions):
-    """All conditions: those of both loops, and the driver, whom only the closed loop has."""
+    """All conditions: those of both loops, and the driver, whom only the closed loop has. Raises
+    InvalidInput for a `sweep_mask`, which films alone have.
+    """
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.sweep_mask != BEFORE:
+            raise InvalidInput(
+                "sweep_mask is of films: a keyframe of the closed loop is one sweep, fired by its "
+                "own mask"
+            )
 
 
 DEFAULTS = {field.name: field.default for field in fields(ClosedLoopConditions)}

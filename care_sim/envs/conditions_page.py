@@ -17,6 +17,7 @@ _ROWS = (
     ("engine", "sensors", 'what casts the rays, "fast" or "bullet"'),
     ("min_returns", "LiDAR detector", "fired rays that must hit an object"),
     ("camera_confidence", "camera detector", "least confidence of a detection"),
+    ("sweep_mask", "open loop", "which mask the sweeps between keyframes fire"),
     ("camera_profile", "camera", "the detector that it is like"),
     ("false_negative_rate", "camera", "share of the objects that it misses"),
     ("false_negative_per_m", "camera", "growth of that share with distance, 1/m"),

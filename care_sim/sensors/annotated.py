@@ -98,14 +98,16 @@ class Cloud:
 
     def ordered(self, rows: Integers) -> "Cloud":
         """The returns in these rows, in this order; those from far away stay."""
-        columns = (self.intensities, self.times, self.shots, self.rings)
         return Cloud(
             self.cells[rows],
             self.points.take(rows, axis=0),
             self.objects[rows],
-            *(None if column is None else column[rows] for column in columns),
-            far=self.far,
-            poses=self.poses,
+            None if self.intensities is None else self.intensities[rows],
+            None if self.times is None else self.times[rows],
+            None if self.shots is None else self.shots[rows],
+            None if self.rings is None else self.rings[rows],
+            self.far,
+            self.poses,
         )
 
 

@@ -55,6 +55,7 @@ LEFT_OUT = {
     "camera_detections": "a file of the user's",
     "camera_latency_s": "begins with the next list: one more choice changes every episode of this",
     "camera_profile": "begins with the next list, too",
+    "sweep_mask": "of films with sweeps between their keyframes",
     "sweeps": "of nuScenes",
     "camera_times": "of nuScenes",
     "empty_boxes": "of nuScenes and Argoverse 2",

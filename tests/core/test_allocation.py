@@ -5,8 +5,10 @@ from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.allocation import allocate, budget_cells, half_up, taken_by_stage
-from care_sim.core.firing.actions import scores_of
+from care_sim.core.cells.sets import CellSets, WorldSets
+from care_sim.core.firing.actions import Allocator, scores_of
 from care_sim.core.firing.base import fired_cells
+from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 
 CELLS = 40
@@ -161,3 +163,13 @@ def test_a_budget_out_of_its_domain_is_refused_by_name(budget):
 def test_what_is_no_demand_is_refused_in_one_line(demand):
     with pytest.raises(InvalidInput, match=r"^demand must be a Demand, got "):
         allocate(demand, 3, 0.3)
+
+
+def test_worlds_round_a_half_share_up_as_one_does():
+    """Of 5 cells a reserve of a half leaves 3 to exploitation, not the even 2."""
+    rig = Rig(budget=5, reserve_fraction=0.5)
+    hulls, wedges = np.arange(10), np.arange(50, 60)
+    alone = allocate(Demand([hulls], [[wedges]]), 5, 0.5)
+    stages = [WorldSets(CellSets.of([own]), np.array([1])) for own in (hulls, wedges)]
+    scores = Allocator(rig, 1).scores(stages, np.array([5]))
+    assert sorted(alone.tolist()) == np.flatnonzero(scores.ravel()).tolist() == [0, 1, 2, 50, 51]

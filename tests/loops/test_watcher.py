@@ -25,7 +25,7 @@ class Notes(Watching):
     def look(self, loop):
         labelled = [actor.body for actor in loop.world.actors if actor.label is not None]
         (picture,) = loop.cameras.pictures
-        seen = np.isin(picture.bodies, labelled) & (picture.pixels >= MIN_PIXELS)
+        seen = np.isin(picture[:, 0], labelled) & (picture[:, 5] >= MIN_PIXELS)
         self.shown.append(int(np.count_nonzero(seen)))
 
     def keep(self, watched):

@@ -73,7 +73,7 @@ def installed(install):
 
 
 def test_an_installed_detector_is_listed_made_and_handed_points_only(installed):
-    assert detector_names()[5:] == [
+    assert detector_names()[7:] == [
         "blind",
         "listed",
         "loose",
@@ -116,7 +116,8 @@ def test_a_broken_one_gets_one_line(installed, name, line):
         (
             "yolo",
             {},
-            "unknown detector 'yolo'; known: cluster, graded, pillars, returns, torchscript; "
+            "unknown detector 'yolo'; known: cluster, graded, onnx, pillars, recorded, returns, "
+            "torchscript; "
             "`care-sim list detectors` tells what each is",
         ),
         (
@@ -166,21 +167,23 @@ def test_a_torchscript_file_detects(tmp_path):
 
 
 @pytest.mark.filterwarnings("ignore:.*torch.jit.*:DeprecationWarning")
-def test_a_torchscript_file_is_given_times_if_it_is_told_to(tmp_path):
-    """It reports the time of the first point as its score."""
+def test_a_torchscript_file_is_given_the_fields_that_it_asks_for(tmp_path):
+    """It reports the lag of the first point as its score, and velocities."""
     torch = pytest.importorskip("torch")
 
     class Clock(torch.nn.Module):
         def forward(self, points: torch.Tensor, sensor_height_m: float):
             boxes = torch.cat([points[:1, :3], torch.ones(1, 4)], dim=1)
-            return torch.tensor([4]), boxes, -points[:1, 3]
+            return torch.tensor([4]), boxes, points[:1, 3], torch.ones(1, 2)
 
     torch.jit.script(Clock()).save(str(tmp_path / "clock.pt"))
-    detector = make_detector("torchscript", HEIGHT, file=tmp_path / "clock.pt", times=True)
+    asked = {"file": tmp_path / "clock.pt", "fields": "x,y,z,time_lag"}
+    detector = make_detector("torchscript", HEIGHT, **asked)
     earlier = replace(CLOUD, times=np.full(len(CLOUD), -0.25))
     assert [detector.detect(cloud, CAR)[0].scores.tolist() for cloud in (CLOUD, earlier)] == [
         [0.0],
         [0.25],
     ]
-    with pytest.raises(InvalidInput, match="times must be"):
-        make_detector("torchscript", HEIGHT, file=tmp_path / "clock.pt", times=2)
+    assert detector.detect(CLOUD, CAR)[0].velocities.tolist() == [[1.0, 1.0]]
+    with pytest.raises(InvalidInput, match="unknown field 'time'"):
+        make_detector("torchscript", HEIGHT, **asked | {"fields": "x,time"})

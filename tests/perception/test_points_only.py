@@ -65,14 +65,17 @@ def test_a_real_detector_is_handed_points_and_a_height_and_no_more():
     assert height == HEIGHT
 
 
-def test_one_that_wants_times_gets_them_as_the_last_column():
+def test_it_gets_the_fields_that_it_asks_for_in_their_order():
     real = Says(detections())
-    real.wants_times = True
-    times = np.linspace(-0.45, 0.0, len(SCENE))
-    for shown, wanted in ((SCENE, np.zeros(len(SCENE))), (replace(SCENE, times=times), times)):
+    real.fields = ("time_lag", "x", "y", "z", "ring", "intensity")
+    zeros = np.zeros(len(SCENE))
+    times, rings, strengths = (np.linspace(*ends, len(SCENE)) for ends in ((-1, 0), (0, 9), (0, 1)))
+    told = replace(SCENE, times=times, rings=rings.astype(int), intensities=strengths)
+    for shown, own in ((SCENE, [zeros] * 3), (told, [-times, rings.astype(int), strengths])):
         PointsOnly("mine", real, HEIGHT).detect(shown, OBJECTS)
         points, _ = real.given
-        assert np.array_equal(points, np.column_stack([SCENE.points, wanted]))
+        lag, ring, strength = own
+        assert np.array_equal(points, np.column_stack([lag, SCENE.points, ring, strength]))
 
 
 def test_its_points_are_its_own_to_change_and_lead_nowhere():

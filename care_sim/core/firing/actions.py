@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.core.allocation import allocate, fill_worlds
+from care_sim.core.allocation import allocate, fill_worlds, halves_up
 from care_sim.core.arrays import Integers
 from care_sim.core.cells.sets import CellSets, WorldSets
 from care_sim.core.grid import Cells
@@ -90,7 +90,7 @@ class Allocator:
         sets = CellSets.joined([stage.sets for stage in stages])
         counts = np.stack([stage.counts for stage in stages], axis=1)
         limits = np.repeat(budgets[:, None], len(stages), axis=1)
-        limits[:, 0] = np.rint((1 - self._rig.reserve_fraction) * budgets)
+        limits[:, 0] = halves_up((1 - self._rig.reserve_fraction) * budgets)
         scores = self._scores.reshape(len(self._scores), -1)
         fill_worlds(sets.cells, sets.sizes, counts, limits, self._chosen, self._counts, scores)
         shown = self._scores.view()

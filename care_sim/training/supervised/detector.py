@@ -11,13 +11,11 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
 from contextlib import contextmanager
-from dataclasses import dataclass
 from itertools import islice
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from care_sim.base.checks import bounded
 from care_sim.base.errors import print_lines
 from care_sim.base.extras import import_torch
 from care_sim.base.files import ZIP, check_output
@@ -39,7 +37,8 @@ from care_sim.training.supervised.detector_data import (
     targets_of,
     turned_example,
 )
-from care_sim.training.supervised.fit import FitConfig, fit, print_end
+from care_sim.training.supervised.fit import fit, print_end
+from care_sim.training.supervised.options import DetectorConfig
 
 if TYPE_CHECKING:
     from care_sim.training.supervised.detector_network import Learning
@@ -75,17 +74,6 @@ CALIBRATING = range(VALIDATION, VALIDATION + 24)
 HELD_OUT = range(VALIDATION + 24, VALIDATION + 48)
 """Seeds of plays that nothing is learned from: those that scores are fitted to, and those by which
 the card tells what was reached."""
-
-
-@dataclass(frozen=True)
-class DetectorConfig(FitConfig):
-    """Train the detector `pillars` on generated streets and drives.
-
-    It writes a file of weights; needs the extra `rl`.
-    """
-
-    steps: int = bounded(10_000, 1, 1_000_000)
-    """Batches of four scans that are learned from."""
 
 
 def train_pillars(config: DetectorConfig) -> int:

@@ -6,13 +6,11 @@ import shlex
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
-from care_sim.base.checks import LARGEST_INTEGER, bounded, check_fields
 from care_sim.base.errors import InvalidInput, print_lines
 from care_sim.base.extras import import_torch
 from care_sim.core.grid import AngularGrid
@@ -28,19 +26,6 @@ LEARNING_RATE = 3e-3
 """Of Adam, at the first step."""
 LATELY = 250
 """Steps whose mean loss is shown."""
-
-
-@dataclass(frozen=True)
-class FitConfig:
-    """Options of every training on truth."""
-
-    out: Path
-    """File to write."""
-    seed: int = bounded(0, 0, LARGEST_INTEGER)
-    """Seed of the first weights and the order of the examples."""
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
 
 def adam(parameters: Iterable[Any], steps: int) -> tuple[Any, Any]:

@@ -4,8 +4,6 @@ calibration's streets.
 
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,14 +19,7 @@ from care_sim.policies.paper.blind import Full
 from care_sim.sources.street_films import street_film
 from care_sim.streets.street import CALIBRATION_SEEDS
 from care_sim.training.supervised.fit import card_of, one_by_one, print_end
-
-
-@dataclass(frozen=True)
-class PlaceConfig:
-    """Make the map of `place` from the 20 calibration streets and write it."""
-
-    out: Path
-    """File to write."""
+from care_sim.training.supervised.options import PlaceConfig
 
 
 def train_place(config: PlaceConfig) -> int:

@@ -34,7 +34,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.array_files import Arrays
-from care_sim.base.checks import LARGEST_INTEGER, bounded
 from care_sim.base.extras import import_torch
 from care_sim.base.files import ZIP, check_output
 from care_sim.base.limits import one_thread
@@ -53,7 +52,8 @@ from care_sim.policies.learned.weights import save_weights
 from care_sim.policies.paper.tracks import History
 from care_sim.sources.street_films import street_film
 from care_sim.streets.street import CALIBRATION_SEEDS
-from care_sim.training.supervised.fit import FitConfig, adam, card_of, fit, one_by_one, print_end
+from care_sim.training.supervised.fit import adam, card_of, fit, one_by_one, print_end
+from care_sim.training.supervised.options import ScorerConfig
 from care_sim.training.supervised.worlds import (
     LEAST_BUDGET,
     MOST_BUDGET,
@@ -73,20 +73,6 @@ loop.
 """
 OTHER_CELLS = 200
 """Cells drawn per keyframe; those that are not positive are kept as examples."""
-
-
-@dataclass(frozen=True)
-class ScorerConfig(FitConfig):
-    """Train `learned-scorer` on the 20 calibration streets, or in worlds that differ.
-
-    It writes a file of weights; needs the extra `rl`.
-    """
-
-    steps: int = bounded(4000, 1, LARGEST_INTEGER)
-    """Batches that are learned from."""
-    drawn: bool = False
-    """Learn from drives, tests of Euro NCAP and streets of training seeds, with budgets and faults
-    of the camera drawn for every play, instead of from the calibration streets."""
 
 
 @dataclass(frozen=True)

@@ -30,14 +30,12 @@ form of any other, and acts as such.
 import sys
 import time
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any
 
 import numpy as np
 
 from care_sim.base.array_files import Arrays
-from care_sim.base.checks import LARGEST_INTEGER, bounded, check_known
 from care_sim.base.errors import print_lines
 from care_sim.base.extras import import_torch
 from care_sim.base.files import ZIP, check_output
@@ -47,11 +45,11 @@ from care_sim.core.rig import Rig
 from care_sim.policies.learned.learned_sets import STEPS, LearnedSets
 from care_sim.policies.learned.set_items import ITEM_INPUTS, MIRRORED, STRIP_INPUTS, ItemReader
 from care_sim.policies.learned.weights import Card, save_weights
-from care_sim.training.supervised.fit import FitConfig, adam, card_of, fit, print_end
+from care_sim.training.supervised.fit import adam, card_of, fit, print_end
+from care_sim.training.supervised.options import SetsConfig
 from care_sim.training.supervised.sets_data import Example, play
 from care_sim.training.supervised.worlds import SCENARIOS, seeds_of_worlds
 
-Part = Literal["attention", "inputs", "place", "faults"]
 KIND = ("is a camera box", "explained")
 """The inputs that tell an item's kind."""
 UNITS, WIDTH, STRIP_UNITS = 48, 16, 16
@@ -66,25 +64,6 @@ ROUNDS: tuple[Mapping[str, int], ...] = (
 """How many worlds of each kind are played in each round."""
 HELD_OUT: Mapping[str, int] = {"drive": 4, "ncap": 8, "street": 2}
 """Worlds of validation seeds, played as in the second round; the card tells the loss on them."""
-
-
-@dataclass(frozen=True)
-class SetsConfig(FitConfig):
-    """Train `learned-sets` on drives, Euro NCAP tests and streets of training seeds.
-
-    It writes a file of weights, also at the end of the first round; needs the extra `rl`.
-    """
-
-    steps: int = bounded(3000, 1, LARGEST_INTEGER)
-    """Batches that are learned from in each round."""
-    without: tuple[Part, ...] = ()
-    """What to leave out, to see what it is worth: what an item is told of the others; all that is
-    told of it but its kind; the map of places; faults of the camera."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        for part in self.without:
-            check_known("part to be without", part, get_args(Part))
 
 
 def train_sets(config: SetsConfig) -> int:

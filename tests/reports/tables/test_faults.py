@@ -68,7 +68,13 @@ def test_every_fault_of_the_sensing_grows_from_none_in_some_panel():
     varied = {name for fault in FAULTS for level in fault.levels for name in level.changes}
     faults = set(Sensing.__dataclass_fields__) - {"engine", "min_returns", "camera_confidence"}
     # The vehicle study varies the pose; returns, the camera's profile and seconds have pages.
-    elsewhere = {*LOCALISATION, *RETURN_SETTINGS, "camera_profile", "camera_latency_s"}
+    elsewhere = {
+        *LOCALISATION,
+        *RETURN_SETTINGS,
+        "camera_profile",
+        "camera_latency_s",
+        "sweep_mask",
+    }
     assert varied == faults - elsewhere
     for fault in FAULTS:
         values = [float(level.label) for level in fault.levels]

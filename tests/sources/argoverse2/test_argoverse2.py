@@ -194,13 +194,19 @@ def test_the_first_keyframe_knows_the_motion_of_the_poses_before_it(tmp_path):
 ON_THE_CAR, BESIDE_IT = (13.5, 0.2, 0.6), (13.5, 5.0, 0.6)
 
 
+def of_lasers(count):
+    return {"intensity": np.uint8([51] * count), "laser_number": np.uint8([7] * count)}
+
+
 def swept(log, *points, keyframes=(0, 5, 10)):
     """Write a sweep of these points, in the car's frame, for every keyframe."""
     folder = log / "sensors" / "lidar"
     folder.mkdir(parents=True)
     columns = dict(zip("xyz", np.array(points, np.float16).T, strict=True))
     for number in keyframes:
-        feather.write_feather(pa.table(columns), folder / f"{stamp(number)}.feather")
+        feather.write_feather(
+            pa.table(columns | of_lasers(len(points))), folder / f"{stamp(number)}.feather"
+        )
     return log
 
 
@@ -210,6 +216,8 @@ def test_recorded_sweeps_are_what_returns(tmp_path):
         ours = dict(zip(shot.cloud.objects.tolist(), shot.cloud.points, strict=True))
         assert ours[0] == pytest.approx(np.subtract(ON_THE_CAR, UP_LIDAR), abs=0.01)
         assert ours[NO_OBJECT] == pytest.approx(np.subtract(BESIDE_IT, UP_LIDAR), abs=0.01)
+        assert shot.cloud.intensities == pytest.approx([0.2, 0.2])
+        assert shot.cloud.rings.tolist() == [7, 7]
         assert shot.seen.objects.tolist() == [0], "pictures are those of the boxes"
 
 
@@ -228,7 +236,7 @@ def test_a_sweep_that_changes_plays_again_and_one_that_nothing_reads_does_not(tm
     assert source.row(scene) == before
     sweep = log / "sensors" / "lidar" / f"{stamp(5)}.feather"
     feather.write_feather(
-        pa.table(dict(zip("xyz", np.float16([[9], [0], [0]]), strict=True))), sweep
+        pa.table(dict(zip("xyz", np.float16([[9], [0], [0]]), strict=True)) | of_lasers(1)), sweep
     )
     assert source.row(scene) != before
 
@@ -243,7 +251,8 @@ def test_a_sweep_that_changes_plays_again_and_one_that_nothing_reads_does_not(tm
 )
 def test_a_damaged_sweep_is_named(tmp_path, columns, told):
     log = swept(parked(tmp_path / "log", CAR_AHEAD, sweeps=11), ON_THE_CAR)
-    feather.write_feather(pa.table(columns), log / "sensors" / "lidar" / f"{stamp(5)}.feather")
+    damaged = pa.table(columns | of_lasers(1))
+    feather.write_feather(damaged, log / "sensors" / "lidar" / f"{stamp(5)}.feather")
     with pytest.raises(InvalidInput, match=f"{stamp(5)}.feather: .*{told}"):
         argoverse2_film(log)
 
@@ -266,7 +275,7 @@ def test_a_real_sweep_has_as_many_points_in_every_box_as_are_annotated(recorded)
     everything = annotations_of(
         [replace(body, label="car") for body in _bodies(boxes, int(sweep.stem))[0]]
     )
-    found = owners(read_points(sweep) - UP_LIDAR, everything, Frame(0.0, 0.0, 0.0, 0.0))
+    found = owners(read_points(sweep)[:, :3] - UP_LIDAR, everything, Frame(0.0, 0.0, 0.0, 0.0))
     counts = [(found == number).sum() for number in everything.objects]
     assert np.array_equal(
         counts, boxes["num_interior_pts"][boxes["timestamp_ns"] == int(sweep.stem)]

@@ -89,8 +89,14 @@ OWN = {"sample_data_token": "t", "bbox_corners": [0, 0, 5, 5], "category_name": 
         (COCO | {"bbox": [0, 0, 5, 1e308]}, r"a box beyond 100000 pixels: \[0, 0, 5, 1e\+308\]"),
         (OWN | {"bbox_corners": [-2e5, 0, 5, 5]}, "a box beyond 100000 pixels"),
         (COCO | {"bbox": "0055"}, "no box of four numbers: '0055'"),
-        (COCO | {"category_id": 0}, "category_id must be a whole number >= 1 and <= 90, got 0"),
-        (COCO | {"category_id": 91}, "category_id must be a whole number >= 1 and <= 90, got 91"),
+        (
+            COCO | {"category_id": 0},
+            "category_id 0 is none of the categories coco: 1 person, 2",
+        ),
+        (
+            COCO | {"category_id": 91},
+            "category_id 91 is none of the categories coco: 1 person, 2",
+        ),
         (OWN | {"bbox_corners": [0, 0, 5, float("nan")]}, "no box of four numbers"),
         (
             OWN | {"category_name": "vehicle.carr"},

@@ -202,7 +202,10 @@ def test_splits_choose_scenes(tmp_path):
 def sweep(recorded):
     (path,) = (recorded / "nuscenes").glob("*.pcd.bin")
     rings = np.fromfile(path, "<f4").reshape(-1, 5)[:, 4].astype(int)
-    return read_points(path), rings
+    points = read_points(path)
+    assert np.array_equal(points[:, 4], rings)
+    assert points[:, 3].max() == 1.0
+    return points[:, :3], rings
 
 
 def test_real_rings_are_rows_one_to_one(sweep):

@@ -102,7 +102,7 @@ def test_every_form_of_file_holds_the_same_points(tmp_path, folder, form):
 def film_of_points(folder):
     from care_sim.sources.sweeps.logs import log_of_folder
 
-    return log_of_folder(folder).points_of(7)
+    return log_of_folder(folder).points_of(7)[:, :3]
 
 
 def test_a_lidar_that_is_turned_on_its_mount(tmp_path, film):
@@ -243,7 +243,7 @@ def misfit(foggy, yaw_deg):
     for first in (10, 25, 40):
         world = []
         for number in (first, first + 5):
-            points = log.points_of(number)
+            points = log.points_of(number)[:, :3]
             ranges = np.hypot(*points[:, :2].T)
             x, y, z = points[(ranges > 6) & (ranges < 40) & (points[:, 2] > -1.2)].T
             (car,) = log.cars(log.times_s[[number]])
