@@ -169,7 +169,8 @@ def half_up(number: float) -> int:
 
 def halves_up(numbers: NDArray[np.floating]) -> Integers:
     """`half_up` of every number (n,)."""
-    return np.floor(numbers + 0.5).astype(np.int64)
+    whole: Integers = np.floor(numbers + 0.5).astype(np.int64)
+    return whole
 
 
 def budget_cells(budget: float, cells: int, unit: str = "cell") -> int:

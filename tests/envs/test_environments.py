@@ -193,7 +193,7 @@ def test_an_episode_is_cut_off_at_its_duration_and_not_a_step_later(duration, ke
         ({"vehicles": 99}, "vehicles of dense must be a whole number >= 0 and <= 12"),
         (
             {"weather": "rain"},
-            "unknown argument of DenseEnv 'weather'; known: .*budget, .*, secret, sensor, .*vehicles",
+            "unknown argument of DenseEnv 'weather'; known: .*budget, .*, secret, .*, vehicles",
         ),
         ({"vehicle": 3}, "the nearest is vehicles; known: "),
         ({"camera_latncy": 1}, "the nearest is camera_latency; known: "),
