@@ -10,8 +10,7 @@ from care_sim.base.checks import LARGEST_INTEGER, bounded, check_fields, check_k
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.seeds import TRAINING, VALIDATION
 from care_sim.core.cells.rays import MOST_COLUMNS, MOST_ROWS
-from care_sim.core.defaults import HEAVIEST
-from care_sim.core.wrapping import Wrapping
+from care_sim.core.defaults import HEAVIEST, Wrapping
 from care_sim.study.rows.parameters import parameters
 
 Part = Literal["pictures", "place", "tracks", "faults"]

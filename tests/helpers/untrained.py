@@ -4,8 +4,8 @@ detector `pillars`.
 
 import numpy as np
 
+from care_sim.core.defaults import Wrapping
 from care_sim.core.grid import AngularGrid
-from care_sim.core.wrapping import Wrapping
 from care_sim.perception.pillars.detector import CALIBRATION, array_shapes, save_detector
 from care_sim.policies.learned.grid_features import CHANNELS, EGO_INPUTS
 from care_sim.policies.learned.ppo import BLOCK_MARGIN

@@ -16,7 +16,7 @@ from care_sim.base.errors import InvalidInput, MissingExtra
 from care_sim.base.seeds import TRAINING, VALIDATION
 from care_sim.cli import main, parsed_command
 from care_sim.commands.train import end_of_training
-from care_sim.core.wrapping import Wrapping
+from care_sim.core.defaults import Wrapping
 from care_sim.policies.learned.weights import load_weights
 from care_sim.training.config import PpoConfig, SacConfig
 from care_sim.training.environments import plain, training

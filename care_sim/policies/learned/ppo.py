@@ -23,8 +23,8 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.belief import Observation
 from care_sim.core.beliefs import Beliefs
 from care_sim.core.cells.sets import WorldSets
+from care_sim.core.defaults import Wrapping
 from care_sim.core.rig import Rig
-from care_sim.core.wrapping import Wrapping
 from care_sim.policies.base import RowPolicy
 from care_sim.policies.learned.grid_features import CHANNELS, EGO_INPUTS, GridFeatures
 from care_sim.policies.learned.sectors import SectorChoice, Tiling

@@ -17,9 +17,9 @@ from care_sim.base.checks import is_number
 from care_sim.base.errors import InvalidInput
 from care_sim.base.files import parsed_json
 from care_sim.core.cells.stack import Grid, GridStack
+from care_sim.core.defaults import Wrapping, wrapping_of_line
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
-from care_sim.core.wrapping import Wrapping, wrapping_of_line
 
 FORMAT = "care-sim weights 1"
 
