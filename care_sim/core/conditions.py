@@ -402,6 +402,7 @@ UNUSED_BY_FULL_SCAN = (
     "elevation_margin",
     "cell_order",
     "firing",
+    "sweep_mask",
 )
 """Conditions that change nothing for a scan of every cell: it asks neither the camera nor the
 allocator."""

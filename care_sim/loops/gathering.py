@@ -1,5 +1,6 @@
-"""What a detector is given of several sweeps: each with its time, all in the sensor frame of the
-keyframe. The motion of the car is undone as far as the car knows it, that of others is not.
+"""Several sweeps as one cloud for a detector: each return with its time, all in the sensor frame of
+the keyframe. The motion of the car is undone, in the closed loop as far as the car knows it, in a
+film by its poses; that of others is not.
 """
 
 from collections import deque
@@ -13,6 +14,14 @@ from care_sim.core.types import Detections
 from care_sim.loops.film import Shot
 from care_sim.sensors.annotated import AT_KEYFRAME, Cloud, SweepPose, joined
 from care_sim.sensors.lidar import RecordedLidar
+
+
+def whole_scan(shot: Shot) -> Cloud:
+    """All that a keyframe of a film and the sweeps before it returned."""
+    earlier = [
+        (shot.time_s - sweep.time_s, sweep.sensor, sweep.cloud.to_shots()) for sweep in shot.sweeps
+    ]
+    return _together(shot.cloud.to_shots(), shot.sensor, earlier)
 
 
 def with_sweeps(returned: Cloud, lidar: RecordedLidar, mask: Cells, shot: Shot) -> Cloud:
@@ -64,7 +73,7 @@ def _moved(cloud: Cloud, sensor: Frame, to: Frame, ago_s: float) -> Cloud:
     return replace(
         cloud,
         points=cloud.points if sensor is to else to.points_of(sensor, cloud.points),
-        times=np.full(len(cloud), -ago_s),
+        times=(0.0 if cloud.times is None else cloud.times) + np.full(len(cloud), -ago_s),
         far=None if cloud.far is None else _moved(cloud.far, sensor, to, ago_s),
     )
 

@@ -1,5 +1,5 @@
-"""Detectors that run a network: what a network of anybody's needs around it, and two that run one
-from a file, TorchScript or ONNX.
+"""Detectors that run a network: the conventions of its inputs and outputs, and two that run one from
+a file, TorchScript or ONNX.
 """
 
 from collections.abc import Sequence
@@ -43,6 +43,8 @@ class NetworkDetector:
         check_known("axes", axes, AXES)
         check_number("full_intensity", full_intensity, 0)
         self.fields = _listed(fields)
+        if self.fields[:3] != FIELDS[:3]:
+            raise InvalidInput(f"fields must begin with x,y,z, got {','.join(self.fields)}")
         for field in self.fields:
             check_known("field", field, FIELDS)
         self._axes = axes

@@ -1,10 +1,9 @@
-"""What a detector is. Real detectors are handed points, and no truth.
+"""Detectors: the interface of a real one, which is handed points and no truth.
 
 `PointsOnly` is the one place where a film meets a real detector. Whatever is installed or loaded
 goes through it.
 """
 
-from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -14,7 +13,7 @@ from care_sim.base.errors import InvalidInput, MissingExtra, error_line
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.frames import turned
 from care_sim.core.types import CLASSES, Detections
-from care_sim.sensors.annotated import AT_KEYFRAME, NO_OBJECT, Annotations, Cloud, joined
+from care_sim.sensors.annotated import AT_KEYFRAME, NO_OBJECT, Annotations, Cloud, SweepPose
 
 
 class Detector(Protocol):
@@ -127,13 +126,15 @@ class PointsOnly:
 
         Raises BrokenDetector where it fails or returns what is no detections.
         """
-        if cloud.far is not None and self._far:
-            cloud = joined([replace(cloud, far=None), cloud.far])
+        poses = cloud.poses or (AT_KEYFRAME,)
+        if self._far:
+            cloud = cloud.whole
         # A copy: what the detector does to its points must not reach the film, which is shared.
         points = np.column_stack([_column(cloud, field) for field in self._fields]).astype(float)
-        poses = {"poses": cloud.poses or (AT_KEYFRAME,)} if self._wants_poses else {}
+        own = [SweepPose(lag_s, matrix.copy()) for lag_s, matrix in poses]
+        told = {"poses": own} if self._wants_poses else {}
         try:
-            found = self._detector.detect(points, self._sensor_height_m, **poses)
+            found = self._detector.detect(points, self._sensor_height_m, **told)
         except (KeyboardInterrupt, MissingExtra):
             raise
         except BaseException as error:

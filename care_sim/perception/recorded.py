@@ -1,14 +1,16 @@
-"""What a real detector reported of full scans, played back: an upper bound of what it would report
-of the scans that a policy fires.
+"""Played-back results of a real detector on full scans: an upper bound of what it would report of
+the scans that a policy fires.
 """
 
 import os
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from care_sim.base.checks import check_number, check_whole
+from care_sim.base.checks import check_number, check_path, check_whole
+from care_sim.base.digests import Stamp, file_stamp
 from care_sim.base.errors import InvalidInput
 from care_sim.base.files import parsed_json
 from care_sim.core.arrays import Integers
@@ -39,8 +41,9 @@ class RecordedDetector:
         check_number("track_score", track_score, 0, 1)
         self.track_score = float(track_score)
         self._least_returns = least_returns
+        check_path("file", file)
         self._file = Path(file)
-        self._results = _results(self._file)
+        self._results = _results(self._file, file_stamp(self._file))
         self._here: tuple[str, Frame] | None = None
 
     def at(self, token: str, sensor: Frame) -> None:
@@ -58,6 +61,7 @@ class RecordedDetector:
         if self._here is None:
             raise InvalidInput("the detector recorded plays films of nuScenes alone")
         token, sensor = self._here
+        cloud = cloud.whole
         reported = _detections(self._file, token, self._results[token], sensor)
         grown = reported.boxes.copy()
         grown[:, 3:6] += 2 * _MARGIN_M
@@ -74,7 +78,8 @@ class RecordedDetector:
         return found, objects_behind(grown[kept], cloud)
 
 
-def _results(path: Path) -> dict[str, list[Any]]:
+@lru_cache(maxsize=2)
+def _results(path: Path, _stamp: Stamp) -> dict[str, list[Any]]:
     try:
         content = parsed_json(path.read_bytes())
     except (OSError, ValueError) as error:
@@ -99,10 +104,12 @@ def _detections(path: Path, token: str, rows: list[Any], sensor: Frame) -> Detec
             w, x, y, z = row["rotation"]
             yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
             box = [*row["translation"], length, width, height, yaw]
-            told = [*box, row["detection_score"], *(row.get("velocity") or (0.0, 0.0))]
-            numbers = np.array(told, dtype=float)
-            if numbers.shape != (10,) or not (np.abs(numbers) <= FARTHEST_M).all():
+            numbers = np.array([*box, row["detection_score"]], dtype=float)
+            if numbers.shape != (8,) or not (np.abs(numbers) <= FARTHEST_M).all():
                 raise ValueError("not the numbers of a box")
+            velocity = np.array(row.get("velocity") or (np.nan, np.nan), dtype=float)
+            if velocity.shape != (2,):
+                raise ValueError("a velocity must be two numbers")
             if not (numbers[3:6] > 0).all() or not 0 <= numbers[7] <= 1:
                 raise ValueError("sizes must be above 0 and scores from 0 to 1")
         except (KeyError, TypeError, ValueError) as error:
@@ -110,17 +117,19 @@ def _detections(path: Path, token: str, rows: list[Any], sensor: Frame) -> Detec
                 f"{path}: box {number} of {token!r} cannot be read ({error})"
             ) from error
         boxes.append(numbers[:7])
-        velocities.append(numbers[8:])
+        velocities.append(velocity)
         attribute = str(row.get("attribute_name", ""))
         kept.append((CLASSES.index(row["detection_name"]), numbers[7], attribute))
     world = np.array(velocities).reshape(-1, 2)
-    moves = sensor.vectors_to_local(np.column_stack([world, np.zeros(len(world))]))
+    moves = sensor.vectors_to_local(np.column_stack([world, np.zeros(len(world))]))[:, :2]
+    # Where the detector told no velocity, those of the tracks count.
+    known = bool((np.abs(world) <= FARTHEST_M).all())
     classes, scores, attributes = zip(*kept, strict=True) if kept else ((), (), ())
     return Detections(
         np.array(classes, np.int64),
         sensor.boxes_to_local(np.array(boxes).reshape(-1, 7)),
         np.zeros(len(kept), np.int64),
         np.array(scores, float),
-        moves[:, :2],
+        moves if known else None,
         [one if one in ATTRIBUTES else "" for one in attributes],
     )

@@ -87,6 +87,11 @@ class Cloud:
             return self
         return self.take(self.shots <= (1 if fired is None else fired[self.cells]))
 
+    @property
+    def whole(self) -> "Cloud":
+        """The returns near and far together."""
+        return self if self.far is None else joined([replace(self, far=None), self.far])
+
     def of_cells(self, answering: Mask) -> "Cloud":
         """The returns, near and far, of the cells that are `answering` (N,)."""
         own = self.take(answering[self.cells])

@@ -136,7 +136,7 @@ class Crosstalk:
             None if cloud.times is None else self._sweep.seconds(cells),
             rings=None if cloud.rings is None else rings_of(cells, self._grid),
         )
-        return joined([cloud.take(~ghosts[cloud.cells]), feigned])
+        return joined([cloud.of_cells(~ghosts), feigned])
 
     def _draw(self) -> tuple[Mask, Floats]:
         """(N,) which cells have a ghost at this keyframe, and (N,) how far off it seems."""

@@ -13,6 +13,8 @@ from care_sim.envs.sensing import detector_of
 from care_sim.evaluation.detector_quality import SceneBoxes, scene_boxes
 from care_sim.evaluation.sightings import RANGE_M
 from care_sim.loops.film import Film
+from care_sim.loops.gathering import whole_scan
+from care_sim.perception.recorded import RecordedDetector
 from care_sim.sensors.annotated import Annotations
 from care_sim.sources.nuscenes.detections import result_boxes
 from care_sim.sources.nuscenes.table_files import JsonRow
@@ -45,28 +47,31 @@ def judge_scene(configs: Sequence[PlayConfig]) -> list[JudgedScene]:
     Raises InvalidInput where the film of the scene cannot be made.
     """
     film = configs[0].film()
-    true = _in_range(film, [_as_detections(shot.annotations) for shot in film.shots])
+    there = [_as_detections(shot.annotations) for shot in film.shots]
+    true = _in_range(film, there, [np.zeros((len(one), 2)) for one in there])
     judged = []
     for config in configs:
         record = play_through_film(config, film)
-        reports = [keyframe.detections for keyframe in record.keyframes]
+        # The unsure ones count too: precision is a curve over scores.
+        reports = [keyframe.reported for keyframe in record.keyframes]
+        velocities = [keyframe.velocities for keyframe in record.keyframes]
         judged.append(
             JudgedScene(
                 scene_boxes(record.score.sightings, reports),
                 _scan_ms(config, film),
-                _in_range(film, reports),
+                _in_range(film, reports, velocities),
                 true,
             )
         )
     return judged
 
 
-def _in_range(film: Film, reports: Sequence[Detections]) -> Samples:
-    """By keyframe, the boxes that the scoring asks for. Their speeds are not told: 0."""
+def _in_range(film: Film, reports: Sequence[Detections], velocities: Sequence[Floats]) -> Samples:
+    """By keyframe, the boxes that the scoring asks for; no speed of what is true is told: 0."""
     made = {}
-    for shot, report in zip(film.shots, reports, strict=True):
-        near = report.take(planar_ranges(report.boxes) <= RANGE_M)
-        made[shot.token] = result_boxes(shot, near, np.zeros((len(near), 2)))
+    for shot, report, speeds in zip(film.shots, reports, velocities, strict=True):
+        near = planar_ranges(report.boxes) <= RANGE_M
+        made[shot.token] = result_boxes(shot, report.take(near), speeds[near])
     return made
 
 
@@ -83,7 +88,9 @@ def _scan_ms(config: PlayConfig, film: Film) -> Floats:
     # The first scans find caches cold that a drive would keep warm.
     times = []
     for shot in film.shots[: 2 * TIMED_SCANS]:
-        cloud = shot.cloud.to_shots()
+        cloud = whole_scan(shot)
+        if isinstance(detector, RecordedDetector):
+            detector.at(shot.token, shot.sensor)
         started = time.thread_time()
         detector.detect(cloud, shot.annotations)
         times.append(1e3 * (time.thread_time() - started))

@@ -2,7 +2,7 @@
 are checked, and what is missing or broken is named in one line.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -28,10 +28,13 @@ Columns = dict[str, NDArray[Any]]
 
 
 def read_columns(
-    path: Path, kinds: Mapping[str, type], ranges: Mapping[str, ValueRange]
+    path: Path,
+    kinds: Mapping[str, type],
+    ranges: Mapping[str, ValueRange],
+    optional: Collection[str] = (),
 ) -> Columns:
     """The named columns of a Feather file as arrays of the given kinds, int, float or str; numbers
-    lie in their ranges.
+    lie in their ranges. `optional` ones are left out where the file lacks them.
 
     Raises InvalidInput for a file that is missing or truncated, lacks a column, holds another kind
     in it, or has an empty or infinite value, or one beyond its range.
@@ -46,6 +49,8 @@ def read_columns(
         raise InvalidInput(f"{path}: no such file") from None
     except (OSError, pyarrow.ArrowException, UnicodeDecodeError) as error:
         raise InvalidInput(f"{path}: no readable Feather file ({_first_line(error)})") from error
+    kinds = {n: kind for n, kind in kinds.items() if n in names or n not in optional}
+    ranges = {n: ends for n, ends in ranges.items() if n in kinds}
     for name in kinds:
         count = names.count(name)
         if count != 1:
@@ -236,9 +241,12 @@ def read_points(path: Path) -> Floats:
     """
     places = ("x", "y", "z")
     reaches = dict.fromkeys(places, REACH_M) | dict.fromkeys(_OF_LASERS, (0, 255))
-    names = (*places, *_OF_LASERS)
-    columns = read_columns(path, dict.fromkeys(names, float), reaches)
-    return table(columns | {"intensity": columns["intensity"] / 255}, names)
+    kinds = dict.fromkeys((*places, *_OF_LASERS), float)
+    columns = read_columns(path, kinds, reaches, optional=_OF_LASERS)
+    unknown = np.full(len(columns["x"]), np.nan)
+    intensities = columns.get("intensity", unknown) / 255
+    lasers = columns.get("laser_number", unknown)
+    return np.column_stack([table(columns, places), intensities, lasers])
 
 
 def _seen(boxes: Columns, row: int) -> str:

@@ -18,6 +18,7 @@ from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.core.types import CLASSES, Detections, ImageDetections
 from care_sim.loops.film import Film, Shot
+from care_sim.loops.gathering import acted_on
 from care_sim.perception.cluster.points import SETTLING_M
 from care_sim.perception.detectors import CLUSTER, PRIVILEGED, check_detector, make_detector
 from care_sim.perception.tracker import MemoryRules, TrackMemory
@@ -70,9 +71,9 @@ def reference(
     found: list[Detections] = []
     tracks: list[Integers] = []
     for points, sensor in zip(sweeps, sensors, strict=True):
-        detections, _ = made.detect(
-            recorded_cloud(points, grid, NO_ANNOTATIONS, sensor), NO_ANNOTATIONS
-        )
+        cloud = recorded_cloud(points, grid, NO_ANNOTATIONS, sensor)
+        reported, _ = made.detect(cloud, NO_ANNOTATIONS)
+        detections = reported.take(acted_on(reported, made.track_score))
         alike = replace(detections, classes=np.zeros(len(detections), np.int64))
         found.append(detections)
         tracks.append(memory.update(alike, sensor))

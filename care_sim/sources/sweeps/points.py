@@ -98,7 +98,7 @@ def _full(points: Floats) -> Floats:
     full = np.full((len(points), len(COLUMNS)), np.nan)
     full[:, : points.shape[1]] = points[:, : len(COLUMNS)]
     if np.nanmax(full[:, 3], initial=0) > 1:
-        full[:, 3] /= FULL_INTENSITY
+        full[:, 3] = np.clip(full[:, 3] / FULL_INTENSITY, 0, 1)
     return full
 
 
