@@ -103,8 +103,14 @@ def _hashed(path: Path, _stamp: Stamp) -> str:
 
 def files_below(folder: Path) -> Iterator[Path]:
     """The regular files below a folder, in order of name within each folder, behind links too."""
-    # The system follows some 40 links of a path, so that a link which leads back has an end.
+    seen = set()
     for place, folders, names in os.walk(folder, followlinks=True):
+        # A link may lead back to a folder above, or into the system's views of itself.
+        real = os.path.realpath(place)
+        if real in seen or f"{real}/".startswith(_VIEWS):
+            folders.clear()
+            continue
+        seen.add(real)
         folders.sort()
         paths = (os.path.join(place, name) for name in sorted(names))
         yield from map(Path, filter(os.path.isfile, paths))
@@ -140,6 +146,8 @@ def entry_files(entry: EntryPoint) -> dict[str, Path] | None:
         return None
     # A namespace package has several places, a module one. In a zip archive none of them is a file.
     places = (spec.submodule_search_locations or [spec.origin or ""]) if spec else []
+    if not all(place and os.path.exists(place) for place in places):
+        return None
     files = {
         f"{root.name}/{file.relative_to(root if root.is_dir() else root.parent)}": file
         for root in map(Path, places)

@@ -13,8 +13,9 @@ import os
 import re
 import shutil
 import stat
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +41,7 @@ MOST_CHARACTERS = 2**18
 _CHUNK = 2**21
 _OPENED = re.compile(r"[ \t\n\r]*\[[ \t\n\r]*(\][ \t\n\r]*)?")
 _VALUE_ENDED = re.compile(r"[ \t\n\r]*([,\]])[ \t\n\r]*")
+_WAITS_S = (0.05, 0.1, 0.2)
 _MORE_BYTES = 2**16
 
 
@@ -137,10 +139,7 @@ def _beside(path: Path) -> Iterator[Path]:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with _locked(unfinished, path):
-            try:
-                yield unfinished
-            finally:
-                unfinished.unlink(missing_ok=True)
+            yield unfinished
     except OSError as error:
         raise _named(error, path, unfinished) from error
 
@@ -148,17 +147,29 @@ def _beside(path: Path) -> Iterator[Path]:
 @contextmanager
 def _locked(unfinished: Path, path: Path) -> Iterator[None]:
     """Make a file, or empty it, and keep other writers away from it."""
-    # Anybody who may write to the folder can guess the name: no link there is followed.
-    if unfinished.is_symlink():
+    # Anybody who may write to the folder can guess the name: no link there is followed, and no file
+    # with another name is emptied.
+    if unfinished.is_symlink() or (unfinished.exists() and unfinished.stat().st_nlink > 1):
         unfinished.unlink()
     flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW
-    with os.fdopen(os.open(unfinished, flags, 0o666), "r+b") as file:
-        if not _is_locked(file.fileno(), unfinished):
-            raise InvalidInput(
-                f"{path} is being written already: close what writes it, or name another file"
-            )
-        file.truncate()
-        yield
+    # Another writer may only look whether the file can be written, which takes a moment.
+    for wait_s in (*_WAITS_S, None):
+        with os.fdopen(os.open(unfinished, flags, 0o666), "r+b") as file:
+            if _is_locked(file.fileno(), unfinished):
+                file.truncate()
+                try:
+                    yield
+                finally:
+                    # Once it has been moved, the name may be another writer's.
+                    with suppress(FileNotFoundError):
+                        if os.path.samestat(os.fstat(file.fileno()), unfinished.stat()):
+                            unfinished.unlink()
+                return
+        if wait_s is not None:
+            time.sleep(wait_s)
+    raise InvalidInput(
+        f"{path} is being written already: close what writes it, or name another file"
+    )
 
 
 def _is_locked(handle: int, unfinished: Path) -> bool:

@@ -8,7 +8,10 @@ of its imports on.
 import os
 import signal
 import sys
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
 from typing import Any
 
 DONE = 0
@@ -27,9 +30,9 @@ SIGNALS = tuple(
     if hasattr(signal, name)
 )
 """All end a command in the same way."""
-_SOON_S = 0.02
-"""Seconds after which an interrupt that nobody could catch is raised again."""
-_heard: list[int] = []
+_HEARD = (*SIGNALS, signal.SIGALRM)
+SOON_S = 0.02
+"""Seconds after which an interrupt that came at a bad moment is raised again."""
 
 
 def end_at_once() -> None:
@@ -38,8 +41,9 @@ def end_at_once() -> None:
 
 
 def raise_them() -> None:
-    """From now on an interrupt is a KeyboardInterrupt; one that falls into code whose errors nobody
-    can catch (finalisers, callbacks) comes again.
+    """From now on an interrupt is a KeyboardInterrupt, raised where it is not lost: one that falls
+    into an import, which may turn it into another error, comes after it, or with the next one; one
+    that falls into code whose errors nobody can catch (finalisers, callbacks) comes again.
     """
     _listen(_raise)
     signal.signal(signal.SIGALRM, _raise)
@@ -54,11 +58,39 @@ def end_in_silence() -> None:
     _listen(signal.SIG_DFL)
 
 
-def was_interrupted(error: BaseException) -> bool:
-    """Whether an error is an interrupt, or came after one: code that is interrupted in the middle,
-    such as an import, may raise an error of its own.
-    """
-    return bool(_heard) or isinstance(error, KeyboardInterrupt)
+@contextmanager
+def held_back() -> Iterator[None]:
+    """Interrupts wait for the end of the block, for what must not be left half done."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    # Only handlers of Python can wait in a list. What is ignored, or the system's, stays so.
+    waiting: list[int] = []
+    with _deaf():
+        handlers = {number: signal.getsignal(number) for number in _HEARD}
+        before = {number: handler for number, handler in handlers.items() if callable(handler)}
+        for number in before:
+            signal.signal(number, lambda number, _: waiting.append(number))
+    try:
+        yield
+    finally:
+        with _deaf():
+            for number, handler in before.items():
+                signal.signal(number, handler)
+        # One is enough: all end a command in the same way. It is raised when the handlers are back.
+        for number in waiting[:1]:
+            signal.raise_signal(number)
+
+
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """What comes meanwhile is handled at the end, so that handlers change all at once."""
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, ())
+    try:
+        signal.pthread_sigmask(signal.SIG_BLOCK, _HEARD)
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
 
 
 def _listen(handler: Callable[[int, Any], Any] | signal.Handlers) -> None:
@@ -74,15 +106,32 @@ def _end(*_: object) -> None:
     os._exit(INTERRUPTED)
 
 
-def _raise(number: int, _: object) -> None:
-    _heard.append(number)
-    raise KeyboardInterrupt
+def _raise(number: int, frame: FrameType | None) -> None:
+    # An import may catch what is raised within it and raise an error of its own. So an interrupt
+    # that falls into an import is put off: an alarm calls this handler again, until the import has
+    # ended. If a second interrupt comes while the alarm is set, it is raised at once.
+    is_alarm = number == signal.SIGALRM
+    one_waits = signal.getitimer(signal.ITIMER_REAL)[0] > 0
+    is_second = one_waits and not is_alarm
+    if _imports(frame) and not is_second:
+        signal.setitimer(signal.ITIMER_REAL, SOON_S)
+    else:
+        raise KeyboardInterrupt
+
+
+def _imports(frame: FrameType | None) -> bool:
+    """Whether an import is going on: its machinery is among the callers."""
+    while frame is not None:
+        if frame.f_code.co_filename == "<frozen importlib._bootstrap>":
+            return True
+        frame = frame.f_back
+    return False
 
 
 def _come_again(lost: "sys.UnraisableHookArgs") -> None:
     """Have an interrupt that nobody could catch raised once more, a moment later."""
     if issubclass(lost.exc_type, KeyboardInterrupt):
-        signal.setitimer(signal.ITIMER_REAL, _SOON_S)
+        signal.setitimer(signal.ITIMER_REAL, SOON_S)
     else:
         sys.__unraisablehook__(lost)
 

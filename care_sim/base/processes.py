@@ -13,7 +13,7 @@ from contextlib import contextmanager, suppress
 from multiprocessing import resource_tracker, util
 from typing import TypeVar
 
-from care_sim.base.interrupts import SIGNALS
+from care_sim.base.interrupts import SIGNALS, held_back
 
 _T = TypeVar("_T")
 
@@ -39,16 +39,17 @@ def starting() -> Iterator[None]:
     They search for modules where this one does: no file of the current folder stands for a library.
     """
     _shorten_socket_folder()
-    # Blocked signals stay blocked over fork and exec: a new process is deaf before it runs a line.
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, UNHEARD)
-    try:
-        with _safe_path():
+    with held_back(), _safe_path():
+        # Blocked signals stay blocked over fork and exec: a new process is deaf before it runs a
+        # line.
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, UNHEARD)
+        try:
             # It outlives the processes whose leavings it clears away; starting it unblocks SIGINT.
             resource_tracker.ensure_running()
             signal.pthread_sigmask(signal.SIG_BLOCK, UNHEARD)
             yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextmanager

@@ -1,5 +1,5 @@
-"""Detectors that run a network: the conventions of its inputs and outputs, and two that run one from
-a file, TorchScript or ONNX.
+"""Detectors that run a network: the conventions of its inputs and outputs, and two that run a file,
+TorchScript or ONNX.
 """
 
 from collections.abc import Sequence

@@ -5,6 +5,7 @@ import sys
 
 import pytest
 
+from care_sim.base import interrupts
 from tests.helpers.descendants import Marked
 
 AT_AN_IMPORT = """
@@ -64,6 +65,60 @@ def test_an_interrupt_within_an_import_of_the_command_is_one_line(module, end):
 def test_an_interrupt_that_a_finaliser_swallows_comes_again():
     with Marked([sys.executable, "-c", IN_A_FINALISER]) as started:
         assert started.process.communicate(timeout=60) == ("heard\n", "")
+
+
+IN_A_LONG_IMPORT = """
+import os, signal, sys
+from importlib.abc import MetaPathFinder
+from care_sim.base import interrupts
+
+class Interrupts(MetaPathFinder):
+    def find_spec(self, name, path, target=None):
+        for _ in range(2):
+            os.kill(os.getpid(), signal.SIGTERM)
+            sum(range(1000))
+        print("deaf")
+
+interrupts.raise_them()
+sys.meta_path.insert(0, Interrupts())
+try:
+    import colorsys
+except KeyboardInterrupt:
+    print("heard")
+"""
+
+
+def test_a_second_interrupt_ends_an_import_that_takes_long():
+    with Marked([sys.executable, "-c", IN_A_LONG_IMPORT]) as started:
+        assert started.process.communicate(timeout=60) == ("heard\n", "")
+
+
+@pytest.mark.parametrize("moment", range(4))
+def test_an_interrupt_finds_all_handlers_changed_or_none(moment, monkeypatch):
+    heard = []
+    kept = {
+        number: signal.signal(number, lambda *_: heard.append(1))
+        for number in (signal.SIGINT, signal.SIGTERM)
+    }
+    ours = {number: signal.getsignal(number) for number in kept}
+    change, changes = signal.signal, []
+
+    def interrupted(number, handler):
+        if len(changes) == moment:
+            signal.raise_signal(signal.SIGINT)
+        changes.append(number)
+        return change(number, handler)
+
+    monkeypatch.setattr(signal, "signal", interrupted)
+    try:
+        with interrupts.held_back():
+            assert not heard
+        assert (len(changes), heard) == (4, [1])
+        assert {number: signal.getsignal(number) for number in kept} == ours
+    finally:
+        monkeypatch.undo()
+        for number, handler in kept.items():
+            signal.signal(number, handler)
 
 
 def test_a_library_does_not_touch_the_handlers_of_its_user():

@@ -186,4 +186,4 @@ def test_a_torchscript_file_is_given_the_fields_that_it_asks_for(tmp_path):
     ]
     assert detector.detect(CLOUD, CAR)[0].velocities.tolist() == [[1.0, 1.0]]
     with pytest.raises(InvalidInput, match="unknown field 'time'"):
-        make_detector("torchscript", HEIGHT, **asked | {"fields": "x,time"})
+        make_detector("torchscript", HEIGHT, **asked | {"fields": "x,y,z,time"})

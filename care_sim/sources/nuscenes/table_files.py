@@ -7,6 +7,7 @@ import hashlib
 import json
 import os
 import sqlite3
+import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
@@ -147,8 +148,18 @@ CREATE TABLE sample_data (token, sample, filename, is_key, pose, content);
 CREATE TABLE sample_annotation (token, sample, content);
 CREATE TABLE ego_pose (token, content);
 """
+_UNUSED_S = 7 * 24 * 3600.0
 TablePath = Callable[[str], Path]
 """The file of a table by its name."""
+
+
+def _remove_unused(folder: Path, database: str) -> None:
+    """Remove stores of other versions of a database that nobody has read for a week: another
+    machine that shares the folder may read them now.
+    """
+    for old in folder.glob(f"{database}-*"):
+        if time.time() - old.stat().st_atime > _UNUSED_S:
+            old.unlink(missing_ok=True)
 
 
 class SampleStore:
@@ -182,7 +193,8 @@ class SampleStore:
         stamps = [file_stamp(file)[1:] for file in files if file.is_file()]
         folder = os.fsencode(files[0].parent.resolve())
         parts = (hashlib.sha256(one).hexdigest()[:16] for one in (folder, repr(stamps).encode()))
-        self._file = self._kept(FORM, *parts)
+        self._key = (FORM, *parts)
+        self._file = self._kept(*self._key)
 
     def boxes(self, sample: str) -> list[JsonRow]:
         """The boxes of a sample, in the order of `sample_annotation`."""
@@ -208,28 +220,50 @@ class SampleStore:
     def _asked(self, query: str, *values: str) -> list[tuple[Any, ...]]:
         # Opened each time: a connection must not be taken into another process or thread.
         try:
-            with closing(sqlite3.connect(f"{self._file.as_uri()}?immutable=1", uri=True)) as store:
-                return store.execute(query, values).fetchall()
+            return self._read(query, *values)
+        except sqlite3.DatabaseError:
+            # Somebody may have deleted the file, or it is damaged: it is made again, once.
+            self._file.unlink(missing_ok=True)
+            self._file = self._kept(*self._key)
+        try:
+            return self._read(query, *values)
         except sqlite3.DatabaseError as error:
-            raise InvalidInput(f"{self._file}: delete it, it is damaged ({error})") from error
+            raise InvalidInput(f"{self._file}: cannot be read ({error})") from error
+
+    def _read(self, query: str, *values: str) -> list[tuple[Any, ...]]:
+        place = f"{self._file.as_uri()}?mode=ro&immutable=1"
+        with closing(sqlite3.connect(place, uri=True)) as store:
+            return store.execute(query, values).fetchall()
 
     def _kept(self, form: str, database: str, stamp: str) -> Path:
         """The file of the store, made if it is not there."""
         name = f"{database}-{form}-{stamp}.sqlite"
-        caches = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+        caches = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache").absolute()
         folder = caches / "care-sim" / "nuscenes"
         # Nothing may be written there, or the disk is full.
         with suppress(OSError, sqlite3.OperationalError):
-            folder.mkdir(parents=True, exist_ok=True)
-            with _alone(folder):
+            if (folder / name).exists():
+                return folder / name
+            (folder / database).mkdir(parents=True, exist_ok=True)
+            # Each database has a lock of its own. Without locks two makers have two files.
+            part = folder / f"{name}.{os.getpid()}.part"
+            with _alone(folder / database):
                 if not (folder / name).exists():
-                    for old in folder.glob(f"{database}-*"):
-                        old.unlink()
-                    self._make(folder / f"{name}.part")
-                    os.replace(folder / f"{name}.part", folder / name)
+                    _remove_unused(folder, database)
+                    try:
+                        self._make(part)
+                        os.replace(part, folder / name)
+                    finally:
+                        part.unlink(missing_ok=True)
             return folder / name
         self._temporary = TemporaryDirectory()
-        self._make(Path(self._temporary.name) / name)
+        try:
+            self._make(Path(self._temporary.name) / name)
+        except sqlite3.OperationalError as error:
+            raise InvalidInput(
+                f"{folder} and {self._temporary.name}: no room for the tables ({error}); all of "
+                "nuScenes needs about a gigabyte"
+            ) from error
         return Path(self._temporary.name) / name
 
     def _make(self, file: Path) -> None:

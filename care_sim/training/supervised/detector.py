@@ -9,16 +9,17 @@ import sys
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor
+from concurrent.futures import BrokenExecutor, Executor
 from contextlib import contextmanager
 from itertools import islice
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from care_sim.base.errors import print_lines
+from care_sim.base.errors import print_lines, report_problems
 from care_sim.base.extras import import_torch
 from care_sim.base.files import ZIP, check_output
+from care_sim.base.interrupts import FAILED
 from care_sim.base.limits import one_thread
 from care_sim.base.seeds import TRAINING, VALIDATION
 from care_sim.core.arrays import Floats, Mask
@@ -29,6 +30,7 @@ from care_sim.perception.pillars.detector import CALIBRATION, LEAST_SCORE, save_
 from care_sim.sensors.annotated import Annotations
 from care_sim.study.executors import Processes, processes
 from care_sim.study.provenance import machine_line, package_versions
+from care_sim.study.runner import DIED
 from care_sim.training.supervised.detector_data import (
     Example,
     Targets,
@@ -92,12 +94,38 @@ def train_pillars(config: DetectorConfig) -> int:
         arrays = network.arrays() | {CALIBRATION: calibration.astype(np.float32)}
         save_detector(config.out, arrays, _card(config, network, losses, result))
 
+    kept = 0
+
     def keep(losses: list[float]) -> None:
+        nonlocal kept
         # Whatever ends the learning, or the check of it, what was learned until then is kept.
         if len(losses) % CURVE_STEPS == 0 or len(losses) == config.steps:
             save(losses)
+            kept = len(losses)
 
-    with one_thread(torch), _player() as executor:
+    try:
+        losses, calibration, result = _learned(config, network, keep)
+    except BaseException as error:
+        if kept:
+            told = f"{config.out} holds what {kept} steps have taught, not checked"
+            print_lines(told, file=sys.stderr)
+        if isinstance(error, BrokenExecutor):
+            report_problems([f"{DIED} that plays what is learned from"])
+            return FAILED
+        raise
+    save(losses, calibration, result)
+    play_with = ("street", "--detector", "pillars", "--detector-parameters", f"file={config.out}")
+    print_end(config.out, started, result, *play_with)
+    return 0
+
+
+def _learned(
+    config: DetectorConfig, network: "Learning", keep: Callable[[list[float]], None]
+) -> tuple[list[float], Floats, dict[str, float]]:
+    """Let the network learn and check it: its losses, its calibration, and what it reaches on plays
+    apart.
+    """
+    with one_thread(import_torch()), _player() as executor:
         print_lines(f"playing {SHUFFLED} scans before the first step", file=sys.stderr)
         batches = _batches(played(executor, TRAINING), np.random.default_rng(config.seed))
         losses = train_detector(network, batches, config.steps, keep)
@@ -110,10 +138,7 @@ def train_pillars(config: DetectorConfig) -> int:
         )
         calibration = calibration_of(scores_by_scan(network, fitted))
         result = judged(scores_by_scan(network, apart, calibration))
-    save(losses, calibration, result)
-    play_with = ("street", "--detector", "pillars", "--detector-parameters", f"file={config.out}")
-    print_end(config.out, started, result, *play_with)
-    return 0
+        return losses, calibration, result
 
 
 def train_detector(
