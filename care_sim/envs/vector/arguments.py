@@ -14,7 +14,14 @@ from numpy.typing import NDArray
 from care_sim.base.checks import as_array, check_seed
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.arrays import Mask
-from care_sim.core.conditions import CAMERA_FAULTS, DEFAULTS, IDEAL_CAMERA
+from care_sim.core.conditions import (
+    CAMERA_FAULTS,
+    DEFAULTS,
+    FIXED,
+    IDEAL_CAMERA,
+    ClosedLoopConditions,
+)
+from care_sim.core.defaults import CELLS
 from care_sim.core.grid import AngularGrid
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.envs.scenarios import CutInEnv, DartoutEnv, DenseEnv, R157Env, ScenarioEnv
@@ -134,13 +141,22 @@ def why_separate(env: ClosedLoopEnv) -> str | None:
     if type(env) not in PLAIN:
         return f"the class {type(env).__name__}"
     reasons = {
-        "the engine": conditions.engine != "fast",
         "the detector": not env.detects_by_returns,
-        "the driver": conditions.driver != "fixed",
-        "the hardware": rig.firing != "cells",
+        "the hardware": rig.firing != CELLS,
         "the LiDAR": not isinstance(rig.grid, AngularGrid)
         or rig.grid.is_tilted
         or bool(rig.sensor_y_m),
+    }
+    own = next((name for name, holds in reasons.items() if holds), None)
+    return own or why_conditions_separate(conditions)
+
+
+def why_conditions_separate(conditions: ClosedLoopConditions) -> str | None:
+    """Which conditions have worlds played one after the other, None if none does."""
+    reasons = {
+        "the engine": conditions.engine != "fast",
+        "the driver": conditions.driver != FIXED,
+        "the hardware": conditions.firing != CELLS,
         "beams": conditions.shapes_beams,
         "faults of the LiDAR": bool(
             conditions.lidar_range_sigma

@@ -207,7 +207,10 @@ def replayed(
     check_salt(result, salt)
     tasks = {row: _task(result, row, salt) for row in _drawn(result, rng)}
     false = [*_false_tags(result), *(_false_worlds(result, worlds) if salt else ())]
-    rows = player.rows([task.config for task in tasks.values()])
+    configs = [task.config for task in tasks.values()]
+    for config in configs[:1]:
+        config.try_out()
+    rows = player.rows(configs)
     others = {
         told: again
         for (told, task), row in zip(tasks.items(), rows, strict=True)

@@ -10,7 +10,7 @@ from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.envs import CLOSED_LOOP
 from care_sim.envs.scenarios import DartoutEnv
-from care_sim.envs.vector.arguments import why_separate
+from care_sim.envs.vector.arguments import why_conditions_separate
 from care_sim.envs.vector.env import ClosedLoopVectorEnv
 from tests.helpers.vectors import MODES, native, played_alike
 
@@ -94,7 +94,7 @@ def test_conditions(conditions):
 def test_every_condition_is_played_here_or_apart():
     """One that `batch` does not know and nobody played here would be lost without a word."""
     played = {name for own in (*CONDITIONS.values(), *OWN.values()) for name in own}
-    apart = getsource(why_separate)
+    apart = getsource(why_conditions_separate)
     of_beams = {*RETURN_SETTINGS}
     unheard = {n for n in DEFAULTS if n not in played | of_beams and n not in apart}
     # The first says how long errors last that are played apart; the second is of films.
