@@ -184,6 +184,17 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
             raise InvalidInput(f"call reads attributes of many worlds; for a method {_SINGLE}")
         return values
 
+    def set_attr(self, name: str, values: Any) -> None:
+        """Raise InvalidInput: what is fixed about the worlds stays so."""
+        raise InvalidInput(
+            f"many worlds keep their {shown(name)}: make the vector anew with the value, or "
+            f"{_SINGLE}"
+        )
+
+    def render(self) -> None:
+        """Raise InvalidInput: many worlds draw no pictures."""
+        raise InvalidInput(f"many worlds draw no pictures: {_SINGLE}, with a render_mode")
+
     def reset(
         self,
         *,

@@ -8,8 +8,15 @@ from care_sim.base.errors import InvalidInput, shown
 CLASS_OF_NAME = {
     "person": "pedestrian",
     "pedestrian": "pedestrian",
+    "human.pedestrian.adult": "pedestrian",
     "bicycle": "bicycle",
     "bike": "bicycle",
+    "cyclist": "bicycle",
+    "vehicle.bicycle": "bicycle",
+    "vehicle.car": "car",
+    "vehicle.truck": "truck",
+    "vehicle.bus.rigid": "bus",
+    "vehicle.bus.bendy": "bus",
     "car": "car",
     "bus": "bus",
     "truck": "truck",
@@ -57,6 +64,11 @@ class Categories:
             except (KeyError, TypeError, ValueError) as error:
                 raise InvalidInput(f"categories must be a list of id and name ({error})") from error
             self._called = "of the file"
+            if not any(map(self.class_of, self._names)):
+                named = ", ".join(filter(None, self._names.values()))
+                raise InvalidInput(
+                    f"categories must name one of {', '.join(CLASS_OF_NAME)}, got {named[:200]}"
+                )
 
     def class_of(self, number: object) -> str | None:
         """The class of a category, None outside the five. Raises ValueError with the whole map for
@@ -69,3 +81,8 @@ class Categories:
             )
         name = self._names[number]
         return CLASS_OF_NAME.get(name.lower()) if name else None
+
+    @property
+    def left_out(self) -> list[str]:
+        """Names that are none of the five classes."""
+        return [name for name in self._names.values() if name and name.lower() not in CLASS_OF_NAME]

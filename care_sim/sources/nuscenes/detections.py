@@ -18,6 +18,7 @@ from care_sim.core.frames import turned
 from care_sim.core.types import CLASSES, Detections, ImageDetections
 from care_sim.loops.film import Shot
 from care_sim.sensors.annotated import NO_OBJECT, Annotations, IdentifiedDetections
+from care_sim.sources.film_checks import report_once
 from care_sim.sources.nuscenes.camera_categories import Categories
 from care_sim.sources.nuscenes.cameras import (
     RecordedCamera,
@@ -123,6 +124,8 @@ def _parts(path: Path) -> tuple[list[JsonRow], dict[int, str], Categories]:
     except (KeyError, TypeError, ValueError) as error:
         told = f"images must be rows with id and file_name ({error})"
         raise InvalidInput(f"{path}: {told}") from error
+    if categories.left_out:
+        report_once(f"{path}: categories left out: {', '.join(categories.left_out)}")
     return _rows(path, content["annotations"]), images, categories
 
 

@@ -40,7 +40,7 @@ def read_points(path: Path) -> Floats:
     from 0 to 1, and ring. In the file x is right, y forward, and intensities go to 255.
 
     Raises InvalidInput for a file that is missing, truncated or larger than `MOST_SWEEP_BYTES`, for
-    a place that is not finite,
+    a place that is not finite, and for a file of another form.
     """
     if not os.path.isfile(path):
         raise InvalidInput(f"{path}: no such file")

@@ -216,3 +216,12 @@ def test_what_is_closed_says_so(vector):
         vector.reset(seed=0)
     with pytest.raises(gymnasium.error.ClosedEnvironmentError):
         vector.step(zeros(vector))
+
+
+def test_what_many_worlds_cannot_do_is_one_line():
+    env = native("CARE-CutIn-v0", 2)
+    with pytest.raises(InvalidInput, match="many worlds keep their 'budget'"):
+        env.set_attr("budget", 0.2)
+    with pytest.raises(InvalidInput, match="many worlds draw no pictures"):
+        env.render()
+    env.close()
