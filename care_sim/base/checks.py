@@ -1,9 +1,9 @@
 """Checks of values from outside: each raises one line that names the value and what is allowed.
 
-What a field of a dataclass may be is stated beside its default, checked when the dataclass is made,
-and told by lists. The kind follows from the default: a flag, text, a whole number, a number, or,
-where it is bounded, a range of numbers (low, high). A field whose default is None may stay None.
-Numbers of any type become Python's own, so that equal configurations are written alike.
+The limits of a field of a dataclass stand beside its default, are checked when the dataclass is
+made, and are told by lists. The kind follows from the default: a flag, text, a whole number, a
+number, or, where it is bounded, a range of numbers (low, high). A field whose default is None may
+stay None. Numbers of any type become Python's own, so that equal configurations are written alike.
 """
 
 import math
@@ -182,7 +182,7 @@ def allowed(one: Field[Any]) -> str:
     if _BOUNDS not in one.metadata:
         return ""
     least, most = one.metadata[_BOUNDS]
-    # What is only a limit of the computer's tells nobody anything.
+    # A limit of the computer alone tells nobody anything.
     return f"{least:g} or more" if most == LARGEST_INTEGER else f"{least:g} to {most:,.10g}"
 
 

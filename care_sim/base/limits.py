@@ -1,4 +1,4 @@
-"""What the machine allows this process: cores, memory, processes, a folder for caches.
+"""Limits that the machine sets this process: cores, memory, processes, a folder for caches.
 
 The command `care-sim` checks the limits that a shell, a batch system or a container sets before it
 imports its libraries, which end a process in their own words where they find too little. So this

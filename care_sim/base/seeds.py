@@ -7,7 +7,7 @@ study of several seeds takes them of one split; one episode, of a command or of 
 is reset by hand, takes any. Where episodes differ by the recording and not by the seed
 (`CARE-Replay-v0`), hold out recordings.
 
-Whoever holds this package can draw the episodes of a public seed, and find the seed of an episode
+Anybody with this package can draw the episodes of a public seed, and find the seed of an episode
 by what it begins with. A secret enters everything that is drawn: no observation then tells the
 seed, nor a seed the episode, but what a guess among all that the ranges of a scenario allow tells.
 NumPy's generators are not made for cryptography; to tell from the first numbers that a stream gave

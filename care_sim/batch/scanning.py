@@ -1,4 +1,4 @@
-"""What the actions of all worlds fire, their scans, and what the paper's proxy finds in them.
+"""Firing, scans and the paper's proxy of all worlds.
 
 Cells are chosen as `care_sim.core.firing.base` does, each world with its own shared floor.
 The rays are those of the engine `fast` (`care_sim.sensors.engines.ray_kernels`), and the proxy is
@@ -86,7 +86,7 @@ def _fire(
         if live[world]:
             count = choose_demanded(scores[world], budget, chosen)
             if has_floor and count < budget:
-                # Those that nobody spent are drawn as well: no action moves the later ones.
+                # Unspent ones are drawn as well: no action moves the later ones.
                 for _ in range(drawn[world], keyframes[world]):
                     draw_floor(streams, world, floor)
                 drawn[world] = keyframes[world]

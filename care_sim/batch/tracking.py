@@ -160,7 +160,7 @@ _YAW = Tracks.YAW
 
 
 class Drivers(NamedTuple):
-    """Of each world, (W,): its brake, `since_s` and `free_s`, as in
+    """Columns (W,) of the worlds: the brake, `since_s` and `free_s`, as in
     `care_sim.driving.braking.Brake`; the speed at which it cruises, and whether it brakes
     for who comes towards it.
     """

@@ -48,7 +48,7 @@ def write_drive(folder: Path) -> str:
 
 
 def _boxes(sweep: int) -> list[dict[str, Any]]:
-    """What stands and moves at a sweep, in the frame of the car."""
+    """The bodies at a sweep, in the frame of the car."""
     # The car drives 0.5 m per sweep, so that what stands still comes nearer by as much.
     ahead = 30.0 - 0.5 * sweep
     bus_ahead = ahead + 25.0 - 0.6 * sweep

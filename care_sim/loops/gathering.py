@@ -4,34 +4,24 @@ film by its poses; that of others is not.
 """
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from care_sim.core.frames import Frame
-from care_sim.core.grid import Cells
 from care_sim.core.types import Detections
 from care_sim.loops.film import Shot
 from care_sim.sensors.annotated import AT_KEYFRAME, Cloud, SweepPose, joined
-from care_sim.sensors.lidar import RecordedLidar
 
 
-def whole_scan(shot: Shot) -> Cloud:
-    """All that a keyframe of a film and the sweeps before it returned."""
-    earlier = [
-        (shot.time_s - sweep.time_s, sweep.sensor, sweep.cloud.to_shots()) for sweep in shot.sweeps
-    ]
-    return _together(shot.cloud.to_shots(), shot.sensor, earlier)
-
-
-def with_sweeps(returned: Cloud, lidar: RecordedLidar, mask: Cells, shot: Shot) -> Cloud:
-    """The returns of a keyframe of a film, and those of the sweeps before it, which fired the cells
-    of `mask`. Without sweeps the returns of the keyframe are as they were.
+def with_sweeps(returned: Cloud, fire: Callable[[Cloud], Cloud], shot: Shot) -> Cloud:
+    """The returns of a keyframe of a film, and what `fire` takes of the sweeps before it. Without
+    sweeps the returns of the keyframe are as they were.
     """
     # Cells are those of the sensor as it stood then; faults are drawn for every sweep.
     earlier = [
-        (shot.time_s - sweep.time_s, sweep.sensor, lidar.fire(mask, sweep.cloud))
-        for sweep in shot.sweeps
+        (shot.time_s - sweep.time_s, sweep.sensor, fire(sweep.cloud)) for sweep in shot.sweeps
     ]
     return _together(returned, shot.sensor, earlier)
 

@@ -3,6 +3,7 @@ react.
 """
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,6 @@ from care_sim.loops.gathering import acted_on, with_sweeps
 from care_sim.loops.observation_limits import Limits
 from care_sim.loops.truth import Told, TrackObjects, told_by
 from care_sim.perception.points_only import Detector
-from care_sim.perception.recorded import RecordedDetector
 from care_sim.perception.tracker import TrackMemory
 from care_sim.sensors.annotated import Cloud
 from care_sim.sensors.camera import CameraDetector
@@ -115,10 +115,9 @@ class OpenLoop:
         cloud = self._lidar.fire(fired, shot.cloud)
         self.told = told_by(fired, cloud.cells, cloud.intensities, cloud.times)
         mask = fired if self._sweep_mask == COMING else self._held
-        gathered = with_sweeps(cloud, self._lidar, mask, shot)
+        gathered = with_sweeps(cloud, partial(self._lidar.fire, mask), shot)
         self._held = fired
-        if isinstance(self._detector, RecordedDetector):
-            self._detector.at(shot.token, shot.sensor)
+        self._detector.at(shot.token, shot.sensor)
         reported, objects = self._detector.detect(gathered, shot.annotations)
         sure = acted_on(reported, self._detector.track_score)
         detections = reported if sure.all() else reported.take(sure)

@@ -5,6 +5,7 @@ TorchScript or ONNX.
 from collections.abc import Sequence
 from os import PathLike, fspath
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
@@ -23,7 +24,7 @@ Names = str | Sequence[str]
 
 
 class NetworkDetector:
-    """The conventions of a network, for a detector built around one (`docs/write/detector.md`).
+    """The conventions of a network, for a detector around it (`docs/write/your-detector.md`).
 
     - `fields`: the columns that it was trained with, of `care_sim.perception.points_only.FIELDS`.
     - `axes`: `forward` or `right` (`AXES`).
@@ -96,14 +97,13 @@ class NetworkDetector:
         return Detections(self._labels[labels][kept], own, held, np.asarray(scores)[kept], moves)
 
 
-class TorchScriptDetector(NetworkDetector):
-    """Runs a TorchScript module: `forward(points, sensor_height_m) -> (classes, boxes, scores)`.
-
-    `points` is a float32 tensor (P, k) with the `fields`, `sensor_height_m` a float; `classes`
-    (n,), `boxes` (n, 7), `scores` (n,) and, as a fourth output, `velocities` (n, 2) are those of
-    `NetworkDetector.detections`. It runs on `device`: cpu, cuda, cuda:1. Needs torch. Raises
-    MissingExtra without it, InvalidInput for a file that is no TorchScript module.
+class NetworkFile(NetworkDetector):
+    """A network in a `file`, which runs on a `device`. Raises InvalidInput for a file that is
+    missing or holds no such network, MissingExtra without its library.
     """
+
+    allowed: ClassVar[str]
+    """A file of this kind, as a refusal names it."""
 
     def __init__(
         self,
@@ -115,11 +115,32 @@ class TorchScriptDetector(NetworkDetector):
         classes: Names = CLASSES,
     ):
         super().__init__(fields, axes, full_intensity, classes)
+        self._open(fspath(file), device)
+
+    def _open(self, file: str, device: str) -> None:
+        raise NotImplementedError
+
+    def _check_file(self, file: str) -> None:
+        if not Path(file).is_file():
+            raise InvalidInput(f"{file}: no such file; allowed is {self.allowed}")
+
+
+class TorchScriptDetector(NetworkFile):
+    """Runs a TorchScript module: `forward(points, sensor_height_m) -> (classes, boxes, scores)`.
+
+    `points` is a float32 tensor (P, k) with the `fields`, `sensor_height_m` a float; `classes`
+    (n,), `boxes` (n, 7), `scores` (n,) and, as a fourth output, `velocities` (n, 2) are those of
+    `NetworkDetector.detections`. `device`: cpu, cuda, cuda:1. Needs torch.
+    """
+
+    allowed = "a TorchScript module (torch.jit.save)"
+
+    def _open(self, file: str, device: str) -> None:
         self._torch = import_torch()
         self._device = device
-        _check_file(file, "a TorchScript module (torch.jit.save)")
+        self._check_file(file)
         try:
-            self._module = self._torch.jit.load(fspath(file), map_location=device).eval()
+            self._module = self._torch.jit.load(file, map_location=device).eval()
         except RuntimeError as error:
             raise InvalidInput(f"{file}: no TorchScript module for {device}") from error
 
@@ -132,28 +153,20 @@ class TorchScriptDetector(NetworkDetector):
         return self.detections(points, *(output.cpu().numpy() for output in outputs))
 
 
-class OnnxDetector(NetworkDetector):
+class OnnxDetector(NetworkFile):
     """Runs an ONNX file: inputs `points` (P, k) float32 and, if the network has it,
     `sensor_height_m` (1,) float32; outputs in the order classes, boxes, scores, and velocities if
     it has them, as of `TorchScriptDetector`.
 
-    `device`: cpu or cuda, for which ONNX Runtime needs its own package. Needs onnxruntime. Raises
-    MissingExtra without it, InvalidInput for a file that is no such network.
+    `device`: cpu or cuda, for which ONNX Runtime needs its own package. Needs onnxruntime.
     """
 
-    def __init__(
-        self,
-        file: str | PathLike[str],
-        device: str = "cpu",
-        fields: Names = FIELDS[:3],
-        axes: str = FORWARD,
-        full_intensity: float = 1.0,
-        classes: Names = CLASSES,
-    ):
-        super().__init__(fields, axes, full_intensity, classes)
+    allowed = "an ONNX network"
+
+    def _open(self, file: str, device: str) -> None:
         check_known("device", device, ("cpu", "cuda"))
         runtime = import_extra("onnxruntime", "ONNX Runtime", "onnx")
-        _check_file(file, "an ONNX network")
+        self._check_file(file)
         options = runtime.SessionOptions()
         # Workers share the cores already.
         options.intra_op_num_threads = 1
@@ -161,7 +174,7 @@ class OnnxDetector(NetworkDetector):
         if provider not in runtime.get_available_providers():
             raise InvalidInput(f"onnxruntime has no {provider} here: install onnxruntime-gpu")
         try:
-            self._session = runtime.InferenceSession(fspath(file), options, providers=[provider])
+            self._session = runtime.InferenceSession(file, options, providers=[provider])
         except Exception as error:
             told = " ".join(str(error).split())[:200]
             raise InvalidInput(f"{file}: no ONNX network ({told})") from error
@@ -184,8 +197,3 @@ class OnnxDetector(NetworkDetector):
 
 def _listed(names: Names) -> tuple[str, ...]:
     return tuple(names.split(",")) if isinstance(names, str) else tuple(names)
-
-
-def _check_file(file: str | PathLike[str], allowed: str) -> None:
-    if not Path(file).is_file():
-        raise InvalidInput(f"{fspath(file)}: no such file; allowed is {allowed}")

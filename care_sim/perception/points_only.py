@@ -4,6 +4,7 @@
 goes through it.
 """
 
+from abc import ABC, abstractmethod
 from typing import Any, Protocol
 
 import numpy as np
@@ -11,29 +12,31 @@ import numpy as np
 from care_sim.base.checks import check_known, check_number, check_whole
 from care_sim.base.errors import InvalidInput, MissingExtra, error_line
 from care_sim.core.arrays import Floats, Integers, Mask
-from care_sim.core.frames import turned
+from care_sim.core.frames import Frame, turned
 from care_sim.core.types import CLASSES, Detections
 from care_sim.sensors.annotated import AT_KEYFRAME, NO_OBJECT, Annotations, Cloud, SweepPose
 
 
-class Detector(Protocol):
-    """What a loop calls at every keyframe.
+class Detector(ABC):
+    """A loop calls it at every keyframe.
 
     `gathers`: how many sweeps it is given at once in the closed loop, its own keyframe's among
     them. `track_score`: the least score of a detection that becomes a track.
     """
 
-    gathers: int
-    track_score: float
+    gathers: int = 1
+    track_score: float = 0.0
 
+    def at(self, token: str, sensor: Frame) -> None:
+        """Hear which keyframe of a film comes next, and where its sensor is."""
+
+    @abstractmethod
     def detect(self, cloud: Cloud, annotations: Annotations) -> tuple[Detections, Integers]:
         """Detections in the sensor frame from the returns of the fired cells, and (n,) the
         annotated object behind each, or NO_OBJECT, for privileged policies and the scoring.
         """
 
 
-FARTHEST_M = 1e7
-"""Beyond this no map goes, metres."""
 MOST_SWEEPS = 100
 """Sweeps that a detector may gather: five seconds of a LiDAR that turns 20 times a second."""
 MOST_DETECTIONS = 500
@@ -89,7 +92,7 @@ class PointDetector(Protocol):
         """
 
 
-class PointsOnly:
+class PointsOnly(Detector):
     """Makes a `PointDetector` a `care_sim.perception.points_only.Detector`.
 
     The detector gets a copy of the points: neither objects nor boxes nor unfired cells can be

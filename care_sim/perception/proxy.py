@@ -14,6 +14,7 @@ from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.conditions import MIN_RETURNS
 from care_sim.core.types import CLASSES, Detections
+from care_sim.perception.points_only import Detector
 from care_sim.sensors.annotated import Annotations, Cloud
 
 _WIDEST = 4096
@@ -95,16 +96,13 @@ def _count_among(bodies: Integers, hit: int, counts: Integers) -> None:
         counts[low] += 1
 
 
-class ReturnsProxy:
+class ReturnsProxy(Detector):
     """The paper's proxy detector: an object is detected when enough fired rays hit it.
 
     `ReturnsRule` over a film: every annotated object with `min_returns` of the cloud's returns on
     it is detected with its true box. Raises InvalidInput unless `min_returns` is a whole
     number of 1 or more.
     """
-
-    gathers = 1
-    track_score = 0.0
 
     def __init__(self, min_returns: int = MIN_RETURNS):
         check_whole("min_returns", min_returns, 1)
@@ -143,7 +141,7 @@ def chance(name: str, returns: Integers) -> Floats:
     return np.asarray(np.interp(known, np.log(numbers), shares))
 
 
-class GradedProxy:
+class GradedProxy(Detector):
     """A proxy that is the surer the more rays hit an object, as a real detector is.
 
     Every object is detected with its true box, by chance: the more returns, the more probably.
@@ -159,9 +157,6 @@ class GradedProxy:
     anything moves it is drawn anew at every keyframe; what stands before a car that stands keeps
     its luck.
     """
-
-    gathers = 1
-    track_score = 0.0
 
     def detect(self, cloud: Cloud, annotations: Annotations) -> tuple[Detections, Integers]:
         """See `care_sim.perception.points_only.Detector`."""

@@ -16,14 +16,16 @@ from care_sim.base.files import parsed_json
 from care_sim.core.arrays import Integers
 from care_sim.core.frames import Frame
 from care_sim.core.types import CLASSES, Detections
-from care_sim.perception.points_only import ATTRIBUTES, FARTHEST_M, inside, objects_behind
+from care_sim.perception.points_only import ATTRIBUTES, Detector, inside, objects_behind
 from care_sim.sensors.annotated import Annotations, Cloud
 
+FARTHEST_M = 1e7
+"""Beyond this no map goes, metres."""
 _MARGIN_M = 0.2
 """Reported boxes are off by a few centimetres, and returns lie on the surface of the object."""
 
 
-class RecordedDetector:
+class RecordedDetector(Detector):
     """Plays back what a detector reported of full scans: an upper bound, not a detector.
 
     `file` holds results in the official form of the nuScenes detection task, whose samples are the
@@ -31,8 +33,6 @@ class RecordedDetector:
     lie in it. The detector saw the full scan, so it might have missed the object in fewer. What
     scores below `track_score` becomes no track.
     """
-
-    gathers = 1
 
     def __init__(
         self, file: str | os.PathLike[str], least_returns: int = 1, track_score: float = 0.0
@@ -47,9 +47,7 @@ class RecordedDetector:
         self._here: tuple[str, Frame] | None = None
 
     def at(self, token: str, sensor: Frame) -> None:
-        """The keyframe that is detected next, and where its sensor is. Raises InvalidInput for a
-        keyframe that the file lacks.
-        """
+        """See `Detector`. Raises InvalidInput for a keyframe that the file lacks."""
         if token not in self._results:
             raise InvalidInput(f"{self._file}: has no results of the keyframe {token!r}")
         self._here = token, sensor

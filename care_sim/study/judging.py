@@ -13,9 +13,8 @@ from care_sim.envs.sensing import detector_of
 from care_sim.evaluation.detector_quality import SceneBoxes, scene_boxes
 from care_sim.evaluation.sightings import RANGE_M
 from care_sim.loops.film import Film
-from care_sim.loops.gathering import whole_scan
-from care_sim.perception.recorded import RecordedDetector
-from care_sim.sensors.annotated import Annotations
+from care_sim.loops.gathering import with_sweeps
+from care_sim.sensors.annotated import Annotations, Cloud
 from care_sim.sources.nuscenes.detections import result_boxes
 from care_sim.sources.nuscenes.table_files import JsonRow
 from care_sim.study.play_config import PlayConfig
@@ -88,9 +87,8 @@ def _scan_ms(config: PlayConfig, film: Film) -> Floats:
     # The first scans find caches cold that a drive would keep warm.
     times = []
     for shot in film.shots[: 2 * TIMED_SCANS]:
-        cloud = whole_scan(shot)
-        if isinstance(detector, RecordedDetector):
-            detector.at(shot.token, shot.sensor)
+        cloud = with_sweeps(shot.cloud.to_shots(), Cloud.to_shots, shot)
+        detector.at(shot.token, shot.sensor)
         started = time.thread_time()
         detector.detect(cloud, shot.annotations)
         times.append(1e3 * (time.thread_time() - started))

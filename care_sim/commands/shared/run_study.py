@@ -54,8 +54,9 @@ def play_study(
     exit code.
     """
     study = STUDIES[name]
-    # What no environment or policy accepts is told once, before anything is played.
-    for config in {_trial(config): config for config in configs}.values():
+    # A refusal by environment or policy comes once, before anything is played; weights may be of
+    # one budget.
+    for config in {(each.policy, each.budget): each for each in configs}.values():
         config.try_out()
     make_executor = executors.cluster(options.cluster) if options.cluster else executors.processes
     usual = Path("runs", folder) if options.force else None
@@ -70,15 +71,6 @@ def play_study(
     lines = [f"failed: {line}" for line in by_reason(failures, study.results.unit)]
     report_problems([*lines, *left_out])
     return FAILED if failures or left_out else DONE
-
-
-def _trial(config: RunConfig) -> tuple[object, ...]:
-    """What decides whether a policy can be made: weights may be of one budget or one grid."""
-    place = getattr(config, "source", None) or config
-    return tuple(
-        str(getattr(of, name, None))
-        for of, name in ((config, "policy"), (config, "budget"), (place, "sensor"))
-    )
 
 
 _MANY = 1000

@@ -154,7 +154,7 @@ class RandomFloor:
 
     def at(self, keyframe: int) -> FloorCells:
         """The floor of a keyframe, counted from 0, that is not before the last one asked for."""
-        # Those that nobody spent are drawn all the same, so that no action moves the later ones.
+        # Unspent ones are drawn all the same, so that no action moves the later ones.
         if self._keyframe < keyframe:
             self._floor = np.empty_like(self._floor)
         for _ in range(self._keyframe, keyframe):

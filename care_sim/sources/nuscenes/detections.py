@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from care_sim.base.checks import check_number
-from care_sim.base.errors import InvalidInput, unknown
+from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.conditions import MIN_RETURNS
 from care_sim.core.forgetting import ForgettingRules
@@ -19,11 +19,11 @@ from care_sim.core.types import CLASSES, Detections, ImageDetections
 from care_sim.loops.film import Shot
 from care_sim.sensors.annotated import NO_OBJECT, Annotations, IdentifiedDetections
 from care_sim.sources.film_checks import report_once
-from care_sim.sources.nuscenes.camera_categories import Categories
 from care_sim.sources.nuscenes.cameras import (
     RecordedCamera,
     projected,
 )
+from care_sim.sources.nuscenes.categories import Categories, class_of
 from care_sim.sources.nuscenes.table_files import JsonRow, read_json
 from care_sim.sources.nuscenes.tables import Database
 
@@ -48,7 +48,7 @@ class DetectionFile:
 
     Numbers of other pictures and categories are told by a map with the COCO rows as `annotations`,
     `images` (rows with `id` and `file_name`), and `categories`: a name of
-    `care_sim.sources.nuscenes.camera_categories.CATEGORY_MAPS`, or rows with `id` and `name`.
+    `care_sim.sources.nuscenes.categories.CATEGORY_MAPS`, or rows with `id` and `name`.
     Known categories outside the five classes are left out.
     """
 
@@ -291,64 +291,3 @@ def _result_box(name: str, box: Floats, velocity: Floats, score: float, told: st
         "detection_score": score,
         "attribute_name": attribute(name, float(np.hypot(*velocity)), told),
     }
-
-
-NUSCENES_CATEGORIES: dict[str, str | None] = {
-    "human.pedestrian.adult": "pedestrian",
-    "human.pedestrian.child": "pedestrian",
-    "human.pedestrian.construction_worker": "pedestrian",
-    "human.pedestrian.police_officer": "pedestrian",
-    "vehicle.bicycle": "bicycle",
-    "vehicle.bus.bendy": "bus",
-    "vehicle.bus.rigid": "bus",
-    "vehicle.car": "car",
-    "vehicle.truck": "truck",
-    # Outside the five classes.
-    "animal": None,
-    "human.pedestrian.personal_mobility": None,
-    "human.pedestrian.stroller": None,
-    "human.pedestrian.wheelchair": None,
-    "movable_object.barrier": None,
-    "movable_object.debris": None,
-    "movable_object.pushable_pullable": None,
-    "movable_object.trafficcone": None,
-    "static_object.bicycle_rack": None,
-    "vehicle.construction": None,
-    "vehicle.emergency.ambulance": None,
-    "vehicle.emergency.police": None,
-    "vehicle.motorcycle": None,
-    "vehicle.trailer": None,
-    # What nuScenes-lidarseg adds to the table.
-    "flat.driveable_surface": None,
-    "flat.other": None,
-    "flat.sidewalk": None,
-    "flat.terrain": None,
-    "noise": None,
-    "static.manmade": None,
-    "static.other": None,
-    "static.vegetation": None,
-    "vehicle.ego": None,
-}
-"""The class of every category, None outside the five: as the official detection task maps them."""
-
-
-DETECTION_NAMES: dict[str, str | None] = {
-    **{name: name for name in ("bicycle", "bus", "car", "pedestrian", "truck")},
-    **dict.fromkeys(("barrier", "construction_vehicle", "motorcycle", "traffic_cone", "trailer")),
-}
-"""The same for the names of the official detection task."""
-
-
-class UnknownCategory(InvalidInput):
-    """A name that is neither a category of nuScenes nor one of its detection task."""
-
-
-def class_of(name: str) -> str | None:
-    """The class of a category or of a name of the detection task, None outside the five.
-
-    Raises UnknownCategory for any other name.
-    """
-    known = NUSCENES_CATEGORIES | DETECTION_NAMES
-    if name not in known:
-        raise UnknownCategory(str(unknown("category", name, known)))
-    return known[name]

@@ -40,7 +40,8 @@ from care_sim.sources.nuscenes.cameras import (
     pictures_of,
     projected_detections,
 )
-from care_sim.sources.nuscenes.detections import DetectionFile, UnknownCategory, class_of
+from care_sim.sources.nuscenes.categories import UnknownCategory, class_of
+from care_sim.sources.nuscenes.detections import DetectionFile
 from care_sim.sources.nuscenes.sweeps import (
     earlier,
     read_points,

@@ -221,9 +221,11 @@ class SampleStore:
         # Opened each time: a connection must not be taken into another process or thread.
         try:
             return self._read(query, *values)
-        except sqlite3.DatabaseError:
-            # Somebody may have deleted the file, or it is damaged: it is made again, once.
-            self._file.unlink(missing_ok=True)
+        except sqlite3.DatabaseError as error:
+            # What cannot be opened may have been deleted; what can and cannot be read is damaged.
+            # It is made again, once.
+            if not isinstance(error, sqlite3.OperationalError):
+                self._file.unlink(missing_ok=True)
             self._file = self._kept(*self._key)
         try:
             return self._read(query, *values)

@@ -6,7 +6,7 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.types import CLASSES
-from care_sim.sources.nuscenes.camera_categories import CATEGORY_MAPS, Categories
+from care_sim.sources.nuscenes.categories import CATEGORY_MAPS, Categories
 from care_sim.sources.nuscenes.detections import DetectionFile
 
 IMAGES = [{"id": 7, "file_name": "samples/CAM_FRONT/seven.jpg"}]
@@ -30,6 +30,7 @@ def read(tmp_path, content):
         ("nuimages", 7, "pedestrian"),
         ("bdd100k", 8, "bicycle"),
         ([{"id": 3, "name": "Person"}], 3, "pedestrian"),
+        ([{"id": 0, "name": "human.pedestrian.child"}], 0, "pedestrian"),
         ("bdd100k", 2, None),
         ("nuimages", 2, None),
     ],
@@ -54,8 +55,10 @@ def test_every_map_holds_each_of_the_five_classes_once(name):
     [
         ({"annotations": [row(category_id=11)], "images": IMAGES, "categories": "bdd100k"},
          "11 is none of the categories bdd100k: 1 pedestrian, 2 rider, 3 car"),
-        ({"annotations": [row()], "categories": "kitti"}, "unknown categories 'kitti'; known are"),
+        ({"annotations": [row()], "categories": "kitti"}, "unknown map of categories 'kitti'"),
         ({"annotations": [row()], "categories": [{"id": 1}]}, "must be a list of id and name"),
+        ({"annotations": [row()], "categories": [{"id": 1, "name": "Fussgaenger"}]},
+         "categories must name one of car, truck"),
         ({"annotations": [row()], "images": [{"id": 7}]}, "images must be rows with id"),
         ([row()], "image_id 7 is none of the 0 images told"),
     ],
