@@ -5,8 +5,8 @@ without an annotation at a keyframe is not there, and a return in no box is one 
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property, partial
+from dataclasses import dataclass, field
+from functools import partial
 from itertools import count
 from typing import Any
 from zlib import crc32
@@ -29,9 +29,10 @@ SCENES_KEPT = 50
 
 @dataclass(frozen=True)
 class Scenes:
-    """The scenes of a `source` by name of the part: `learned` from, and `held_out`. `splits` name
-    the splits of both, where the source has some, and `play` are the words of the command that
-    plays what is held out.
+    """The scenes of a `source` that are `learned` from, and those that are `held_out`. `splits`
+    name the splits of both, where the source has some, and `play` are the words of the command
+    that plays the weights on what is held out. `told` is what a card says of the data: which
+    scenes, and a digest of the files of each part.
     """
 
     source: Source
@@ -39,6 +40,11 @@ class Scenes:
     held_out: tuple[Scene, ...]
     splits: tuple[str, str] = ("", "")
     play: tuple[str, ...] = ()
+    told: dict[str, Any] = field(init=False)
+
+    def __post_init__(self) -> None:
+        # Before anything is learned: a file that is missing is told at once.
+        object.__setattr__(self, "told", self._told())
 
     def worlds(self, part: Sequence[Scene], turn: int = 0) -> list[World]:
         """A world of every scene of a part. Another `turn` plays the scenes in another way."""
@@ -53,9 +59,7 @@ class Scenes:
             for row in np.random.default_rng(turn).permutation(len(self.learned)).tolist():
                 yield self._world(self.learned[row], turn)
 
-    @cached_property
-    def told(self) -> dict[str, Any]:
-        """What a card says of the data: which scenes, and a digest of the files of each part."""
+    def _told(self) -> dict[str, Any]:
         parts = [
             f"{len(part)} scene{'s' * (len(part) > 1)} {doing}{split and f', split {split}'}"
             f"{self._digest(part)}"
