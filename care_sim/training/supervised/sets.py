@@ -251,6 +251,7 @@ def _card(
         sensor=scenes.source.sensor if scenes else DEFAULT_SETUP,
         scenario=REPLAY if scenes else SCENARIOS,
         data=f"{items} boxes and tracks of {len(examples)} keyframes; {told['data']}"
+        + ("; played twice" if scenes and rounds > 1 else "")
         + (", the second time mostly by itself" if rounds > 1 else "")
         + (f"; without {' and '.join(made.without)}" if made.without else "")
         + (scenes.terms if scenes else ""),

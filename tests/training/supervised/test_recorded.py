@@ -20,8 +20,15 @@ from care_sim.perception.pillars.detector import load_detector
 from care_sim.policies.learned.weights import load_weights
 from care_sim.sources.named import source_of
 from care_sim.sources.recordings import Recordings
-from care_sim.sources.scenes import Scene
-from care_sim.training.supervised import detector, detector_data, scorer, sets_data, worlds
+from care_sim.sources.scenes import Scene, film_of
+from care_sim.training.supervised import (
+    detector,
+    detector_data,
+    recorded,
+    scorer,
+    sets_data,
+    worlds,
+)
 from care_sim.training.supervised.recorded import MOST_HELD_OUT, SCENES_KEPT, Scenes, parted
 from care_sim.training.supervised.scorer import OTHER_CELLS
 from tests.helpers.commands import run
@@ -190,8 +197,18 @@ def trained(monkeypatch, capsys, kind, out, *words):
 def test_nuscenes_teaches_and_the_card_says_what_it_was(kind, tmp_path, monkeypatch, capsys):
     root, out = write_drive(tmp_path / "nuscenes"), tmp_path / "w.npz"
     words = ("--source", f"nuscenes:{root}", "--split", "val")
+    played = []
+
+    def watched(source, scene):
+        played.append(scene.name)
+        return film_of(source, scene)
+
+    monkeypatch.setattr(recorded, "film_of", watched)
     code, told, complaints = trained(monkeypatch, capsys, kind, out, *words)
     assert code == 0, complaints
+    # First what is learned from alone, then what is held out alone.
+    assert [*dict.fromkeys(played)] == ["scene-0103", "scene-0916"]
+    assert played == sorted(played)
     assert "the split val of nuscenes is the one of published tables" in complaints
     card = card_of(kind, out)
     assert "nuscenes, 1 scene learned from, split val, digest " in card["data"]
@@ -206,10 +223,10 @@ def test_nuscenes_teaches_and_the_card_says_what_it_was(kind, tmp_path, monkeypa
     assert all(np.isfinite(value) for value in card["result"].values())
     # The line at the end plays the weights on the scene that was held out.
     (line,) = (one for one in told.splitlines() if one.startswith("play it: care-sim "))
-    _, played = parsed_command(shlex.split(line)[3:])
-    assert played.source == f"nuscenes:{root}"
-    assert (played.split, played.scenes) == ("val", ("scene-0916",))
-    assert str(out) in f"{played.policy_parameters} {played.detector_parameters}"
+    _, play = parsed_command(shlex.split(line)[3:])
+    assert play.source == f"nuscenes:{root}"
+    assert (play.split, play.scenes) == ("val", ("scene-0916",))
+    assert str(out) in f"{play.policy_parameters} {play.detector_parameters}"
 
 
 def test_other_files_have_another_digest_wherever_they_lie(tmp_path):
