@@ -7,12 +7,9 @@ from dataclasses import fields, replace
 from typing import Any
 
 from care_sim.base.errors import report_problems
-from care_sim.commands.options.learning import (
-    LessonOptions,
-    TrainDetector,
-    TrainScorer,
-    TrainSets,
-)
+from care_sim.base.extras import import_torch
+from care_sim.base.files import ZIP, check_output
+from care_sim.commands.options.learning import TrainDetector, TrainScorer, TrainSets
 from care_sim.commands.options.shared import SourceOptions
 from care_sim.commands.options.studies import Protocol
 from care_sim.commands.shared.command_line import command_line
@@ -24,6 +21,7 @@ from care_sim.training.supervised.recorded import Scenes, parted
 from care_sim.training.supervised.scorer import train_learned_scorer
 from care_sim.training.supervised.sets import train_sets as train_learned_sets
 
+Trained = TrainScorer | TrainSets | TrainDetector
 PUBLISHED = ("evaluation", "val", "mini_val")
 """Splits on which tables are published."""
 
@@ -44,7 +42,7 @@ def train_detector(options: TrainDetector) -> int:
     return train_pillars(options, scenes_of(options, played))
 
 
-def scenes_of(options: LessonOptions, played: dict[str, Any]) -> Scenes | None:
+def scenes_of(options: Trained, played: dict[str, Any]) -> Scenes | None:
     """The scenes that are named, None for generated worlds. `played` are the options of `protocol`
     that play the weights.
 
@@ -54,6 +52,9 @@ def scenes_of(options: LessonOptions, played: dict[str, Any]) -> Scenes | None:
     options.check_source()
     if options.source is None:
         return None
+    # Before files are hashed, which takes a minute for a large source.
+    import_torch()
+    check_output(options.out, ZIP)
     source = source_named(options, options.source)
     scenes = chosen_scenes(source.scenes(), options.scenes)
     apart = None
