@@ -149,7 +149,7 @@ def _examples(
             break
 
 
-_Look = Callable[[AnyEnv, Any, Annotations, bool], Example]
+_Look = Callable[[Any, Any, Annotations, bool], Example]
 """Makes an example of an environment after a step: of its observation, what was present, and
 whether every cell fired."""
 
