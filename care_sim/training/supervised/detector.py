@@ -28,6 +28,7 @@ from care_sim.perception.matching import UNSERVED, served_by
 from care_sim.perception.pillars.decoding import Peaks, peaks_of
 from care_sim.perception.pillars.detector import CALIBRATION, LEAST_SCORE, save_detector
 from care_sim.sensors.annotated import Annotations
+from care_sim.sources.scenes import Scene
 from care_sim.study.executors import Processes, processes
 from care_sim.study.provenance import machine_line, package_versions
 from care_sim.study.runner import DIED
@@ -78,6 +79,8 @@ CALIBRATING = range(VALIDATION, VALIDATION + 24)
 HELD_OUT = range(VALIDATION + 24, VALIDATION + 48)
 """Seeds of plays that nothing is learned from: those that scores are fitted to, and those by which
 the card tells what was reached."""
+LEAST_CHECKED = 8
+"""Scenes of a source that are played for either, the same again where there are fewer: 24 plays."""
 
 
 def train_pillars(config: DetectorConfig, scenes: Scenes | None = None) -> int:
@@ -149,11 +152,19 @@ def _learned(
 
 
 def _held_out(scenes: Scenes | None) -> tuple[Sequence[int | World], Sequence[int | World]]:
-    """Plays that scores are fitted to, and those that are judged. A single scene is both."""
+    """Plays that scores are fitted to, and those that are judged. A single scene is both, in other
+    plays.
+    """
     if scenes is None:
         return CALIBRATING, HELD_OUT
-    held_out = scenes.held_out
-    return scenes.worlds(held_out[::2]), scenes.worlds(held_out[1::2] or held_out, turn=1)
+    fitted, apart = scenes.held_out[::2], scenes.held_out[1::2] or scenes.held_out
+    return _repeated(scenes, fitted, 0), _repeated(scenes, apart, LEAST_CHECKED)
+
+
+def _repeated(scenes: Scenes, part: Sequence[Scene], first: int) -> list[World]:
+    """The worlds of a part, played in as many turns as make enough of them."""
+    turns = range(first, first - (-LEAST_CHECKED // len(part)))
+    return [world for turn in turns for world in scenes.worlds(part, turn)]
 
 
 def train_detector(

@@ -229,6 +229,15 @@ def test_nuscenes_teaches_and_the_card_says_what_it_was(kind, tmp_path, monkeypa
     assert str(out) in f"{play.policy_parameters} {play.detector_parameters}"
 
 
+def test_few_held_out_scenes_are_played_often_and_no_play_is_fitted_and_judged(source):
+    for held_out in (source.scenes()[:1], source.scenes()):
+        fitted, judged = detector._held_out(Scenes(source, (source.scenes()[0],), (*held_out,)))
+        assert len(fitted) == len(judged) == detector.LEAST_CHECKED
+        assert len({world.seed for world in (*fitted, *judged)}) == 2 * detector.LEAST_CHECKED
+        assert {*names(fitted)} == {"flat"}
+        assert {*names(judged)} == {held_out[-1].name}
+
+
 def test_other_files_have_another_digest_wherever_they_lie(tmp_path):
     told = []
     for folder in ("one", "same", "other"):
