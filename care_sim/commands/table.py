@@ -39,11 +39,6 @@ def _study(options: str, run: str, about: str) -> Command:
     return _own(f"studies:{options}", f"studies:{run}", about)
 
 
-def _weights(options: str, run: str, about: str) -> Command:
-    """A trainer of `training.supervised`."""
-    return Command(f"training.supervised.options:{options}", f"training.supervised.{run}", about)
-
-
 GROUPS: dict[str, dict[str, Command]] = {
     "Play and watch": {
         "run": _own("watching:Run", "run:run", "Play one episode; also a trained agent."),
@@ -158,15 +153,21 @@ GROUPS: dict[str, dict[str, Command]] = {
             "train:train",
             "Train an allocator with a memory (an LSTM).",
         ),
-        "train learned-scorer": _weights(
-            "ScorerConfig", "scorer:train_learned_scorer", "Train `learned-scorer`."
+        "train learned-scorer": _own(
+            "learning:TrainScorer", "train_on_films:train_scorer", "Train `learned-scorer`."
         ),
-        "train learned-sets": _weights("SetsConfig", "sets:train_sets", "Train `learned-sets`."),
-        "train place": _weights(
-            "PlaceConfig", "place:train_place", "Make the map of the control `place`."
+        "train learned-sets": _own(
+            "learning:TrainSets", "train_on_films:train_sets", "Train `learned-sets`."
         ),
-        "train detector": _weights(
-            "DetectorConfig", "detector:train_pillars", "Train the detector `pillars`."
+        "train place": Command(
+            "training.supervised.options:PlaceConfig",
+            "training.supervised.place:train_place",
+            "Make the map of the control `place`.",
+        ),
+        "train detector": _own(
+            "learning:TrainDetector",
+            "train_on_films:train_detector",
+            "Train the detector `pillars`.",
         ),
         "train curves": _own(
             "learning:Curves", "train:curves", "Draw the learning curves of training runs."

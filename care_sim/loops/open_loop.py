@@ -59,6 +59,8 @@ class OpenLoop:
     """All that a policy may know when it chooses the cells."""
     told: Told
     """What the returns of the last keyframe told besides their ranges."""
+    handed: Cloud
+    """The returns that the detector was given at the last keyframe, once there was one."""
     last_ranges: NDArray[np.float32]
     """(E, A) the scan of the last keyframe in metres: 0 not fired, maximum range without a return.
     """
@@ -115,10 +117,10 @@ class OpenLoop:
         cloud = self._lidar.fire(fired, shot.cloud)
         self.told = told_by(fired, cloud.cells, cloud.intensities, cloud.times)
         mask = fired if self._sweep_mask == COMING else self._held
-        gathered = with_sweeps(cloud, partial(self._lidar.fire, mask), shot)
+        self.handed = with_sweeps(cloud, partial(self._lidar.fire, mask), shot)
         self._held = fired
         self._detector.at(shot.token, shot.sensor)
-        reported, objects = self._detector.detect(gathered, shot.annotations)
+        reported, objects = self._detector.detect(self.handed, shot.annotations)
         sure = acted_on(reported, self._detector.track_score)
         detections = reported if sure.all() else reported.take(sure)
         taken_for = self._localisation.taken_for(shot.sensor)

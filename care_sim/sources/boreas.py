@@ -43,6 +43,7 @@ class Boreas(Recordings):
     """
 
     kind = "boreas"
+    licence = "CC BY 4.0"
     shipped = Path(__file__).parent / "shipped"
     sensor: str | SensorSetup = DEFAULT_SETUP
 

@@ -72,6 +72,7 @@ class Kitti(Recordings):
     """
 
     kind = "kitti"
+    licence = "CC BY-NC-SA 3.0, not for commercial use"
     sensor: str | SensorSetup = KITTI_SETUP
 
     def __post_init__(self) -> None:

@@ -22,6 +22,8 @@ class Recordings(ABC):
     """The folder of recordings that come with the package, which are called by their kind alone."""
     suffixes: ClassVar[tuple[str, ...]] = ()
     """Ends of files that may stand for the folder."""
+    licence: ClassVar[str] = ""
+    """The licence of the recordings, as a card of weights tells it."""
     folder: Path
 
     @abstractmethod

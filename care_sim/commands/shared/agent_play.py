@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
+from care_sim.base.errors import InvalidInput
 from care_sim.base.plugins import scenario_of
 from care_sim.commands.options.shared import EpisodeOptions
 from care_sim.commands.options.studies import Protocol, Sweep
@@ -53,7 +54,12 @@ class AgentPlay:
         if self.agent.env == _STREET:
             return "street"
         if self.agent.env == _REPLAY:
-            return str(self._given.get("source", ""))
+            if "source" not in self._given:
+                raise InvalidInput(
+                    f"weights {self.agent.path} learned from recordings: name a source by "
+                    "--scenario, such as nuscenes:FOLDER"
+                )
+            return str(self._given["source"])
         return scenario_of(self.agent.env)
 
     @property

@@ -243,6 +243,7 @@ class Argoverse2(Recordings):
     """
 
     kind = "argoverse2"
+    licence = "CC BY-NC-SA 4.0, not for commercial use"
     split: str | None = None
     empty_boxes: bool = False
 

@@ -34,6 +34,7 @@ class NuScenes(Recordings):
     """
 
     kind = "nuscenes"
+    licence = "CC BY-NC-SA 4.0, not for commercial use"
     split: str = "val"
     version: str | None = None
     camera_detections: Path | None = None

@@ -8,10 +8,10 @@ makes the same bytes.
 import sys
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor
 from contextlib import contextmanager
-from itertools import islice
+from itertools import count, islice
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -28,6 +28,7 @@ from care_sim.perception.matching import UNSERVED, served_by
 from care_sim.perception.pillars.decoding import Peaks, peaks_of
 from care_sim.perception.pillars.detector import CALIBRATION, LEAST_SCORE, save_detector
 from care_sim.sensors.annotated import Annotations
+from care_sim.sources.scenes import Scene
 from care_sim.study.executors import Processes, processes
 from care_sim.study.provenance import machine_line, package_versions
 from care_sim.study.runner import DIED
@@ -41,6 +42,8 @@ from care_sim.training.supervised.detector_data import (
 )
 from care_sim.training.supervised.fit import fit, print_end
 from care_sim.training.supervised.options import DetectorConfig
+from care_sim.training.supervised.recorded import Scenes
+from care_sim.training.supervised.worlds import World
 
 if TYPE_CHECKING:
     from care_sim.training.supervised.detector_network import Learning
@@ -76,10 +79,14 @@ CALIBRATING = range(VALIDATION, VALIDATION + 24)
 HELD_OUT = range(VALIDATION + 24, VALIDATION + 48)
 """Seeds of plays that nothing is learned from: those that scores are fitted to, and those by which
 the card tells what was reached."""
+LEAST_CHECKED = 8
+"""Scenes of a source that are played for either, the same again where there are fewer: 24 plays."""
 
 
-def train_pillars(config: DetectorConfig) -> int:
-    """Train the detector and write its weights; returns the exit code of the command."""
+def train_pillars(config: DetectorConfig, scenes: Scenes | None = None) -> int:
+    """Train the detector, on `scenes` if there are some, and write its weights; returns the exit
+    code of the command.
+    """
     torch = import_torch()
     from care_sim.training.supervised.detector_network import Learning
 
@@ -92,7 +99,7 @@ def train_pillars(config: DetectorConfig) -> int:
         losses: list[float], calibration: Floats = PLAIN, result: dict[str, float] | None = None
     ) -> None:
         arrays = network.arrays() | {CALIBRATION: calibration.astype(np.float32)}
-        save_detector(config.out, arrays, _card(config, network, losses, result))
+        save_detector(config.out, arrays, _card(config, scenes, network, losses, result))
 
     kept = 0
 
@@ -104,7 +111,7 @@ def train_pillars(config: DetectorConfig) -> int:
             kept = len(losses)
 
     try:
-        losses, calibration, result = _learned(config, network, keep)
+        losses, calibration, result = _learned(config, scenes, network, keep)
     except BaseException as error:
         if kept:
             told = f"{config.out} holds what {kept} steps have taught, not checked"
@@ -114,31 +121,50 @@ def train_pillars(config: DetectorConfig) -> int:
             return FAILED
         raise
     save(losses, calibration, result)
-    play_with = ("street", "--detector", "pillars", "--detector-parameters", f"file={config.out}")
-    print_end(config.out, started, result, *play_with)
+    shown = ("--detector", "pillars", "--detector-parameters", f"file={config.out}")
+    print_end(config.out, started, result, *(scenes.play if scenes else ("run", "street", *shown)))
     return 0
 
 
 def _learned(
-    config: DetectorConfig, network: "Learning", keep: Callable[[list[float]], None]
+    config: DetectorConfig,
+    scenes: Scenes | None,
+    network: "Learning",
+    keep: Callable[[list[float]], None],
 ) -> tuple[list[float], Floats, dict[str, float]]:
     """Let the network learn and check it: its losses, its calibration, and what it reaches on plays
     apart.
     """
     with one_thread(import_torch()), _player() as executor:
         print_lines(f"playing {SHUFFLED} scans before the first step", file=sys.stderr)
-        batches = _batches(played(executor, TRAINING), np.random.default_rng(config.seed))
+        learned = scenes.endless() if scenes else count(TRAINING)
+        batches = _batches(played(executor, learned), np.random.default_rng(config.seed))
         losses = train_detector(network, batches, config.steps, keep)
         network.eval()
-        count = len(CALIBRATING) + len(HELD_OUT)
-        print_lines(f"checking {config.out} on {count} further plays", file=sys.stderr)
+        print_lines(f"checking {config.out} on plays that are held out", file=sys.stderr)
         fitted, apart = (
-            [example for examples in executor.map(play, seeds) for example in examples]
-            for seeds in (CALIBRATING, HELD_OUT)
+            [example for examples in executor.map(play, lessons) for example in examples]
+            for lessons in _held_out(scenes)
         )
         calibration = calibration_of(scores_by_scan(network, fitted))
         result = judged(scores_by_scan(network, apart, calibration))
         return losses, calibration, result
+
+
+def _held_out(scenes: Scenes | None) -> tuple[Sequence[int | World], Sequence[int | World]]:
+    """Plays that scores are fitted to, and those that are judged. A single scene is both, in other
+    plays.
+    """
+    if scenes is None:
+        return CALIBRATING, HELD_OUT
+    fitted, apart = scenes.held_out[::2], scenes.held_out[1::2] or scenes.held_out
+    return _repeated(scenes, fitted, 0), _repeated(scenes, apart, LEAST_CHECKED)
+
+
+def _repeated(scenes: Scenes, part: Sequence[Scene], first: int) -> list[World]:
+    """The worlds of a part, played in as many turns as make enough of them."""
+    turns = range(first, first - (-LEAST_CHECKED // len(part)))
+    return [world for turn in turns for world in scenes.worlds(part, turn)]
 
 
 def train_detector(
@@ -169,13 +195,12 @@ def train_detector(
     return fit(off, batches, steps, (optimizer, schedule), after)
 
 
-def played(executor: Executor, first: int) -> Iterator[Example]:
-    """The examples of the plays of seeds from `first` on, in order, without end."""
-    under_way = deque(executor.submit(play, first + number) for number in range(AHEAD))
-    while True:
-        first += 1
+def played(executor: Executor, lessons: Iterator[int | World]) -> Iterator[Example]:
+    """The examples of the plays of endless `lessons`, in order."""
+    under_way = deque(executor.submit(play, one) for one in islice(lessons, AHEAD))
+    for lesson in lessons:
         examples = under_way.popleft().result()
-        under_way.append(executor.submit(play, first + AHEAD - 1))
+        under_way.append(executor.submit(play, lesson))
         yield from examples
 
 
@@ -206,6 +231,7 @@ def _batches(examples: Iterator[Example], rng: np.random.Generator) -> Iterator[
 
 def _card(
     made: DetectorConfig,
+    scenes: Scenes | None,
     network: "Learning",
     losses: list[float],
     result: dict[str, float] | None,
@@ -213,17 +239,14 @@ def _card(
     """What the file says of itself; without a `result` nobody has checked the weights."""
     numbers = sum(array.size for array in network.arrays().values())
     parts = [losses[n : n + CURVE_STEPS] for n in range(0, len(losses), CURVE_STEPS)]
+    told = scenes.told if scenes else _generated()
     return {
         "kind": "pillars",
         "network": f"{numbers} numbers",
-        "data": f"{len(losses) * BATCH} scans of generated streets and drives, of every budget, by "
-        "the policies that know any grid; see care_sim.training.supervised.detector_data",
-        "seeds": {
-            "training from": TRAINING,
-            "calibration of scores": [CALIBRATING[0], CALIBRATING[-1]],
-            "held out": [HELD_OUT[0], HELD_OUT[-1]],
-            "training": made.seed,
-        },
+        "data": f"{len(losses) * BATCH} scans of {told['data']}, of every budget, by the policies "
+        "that know any grid; see care_sim.training.supervised.detector_data"
+        + (scenes.terms if scenes else ""),
+        "seeds": told["seeds"] | {"training": made.seed},
         "steps": len(losses),
         "steps asked for": made.steps,
         "batch": BATCH,
@@ -233,6 +256,18 @@ def _card(
         else {name: round(value, 4) for name, value in result.items()},
         "machine": machine_line(),
         "versions": package_versions("care-sim", "numpy", "torch"),
+    }
+
+
+def _generated() -> dict[str, Any]:
+    """What the card says of generated worlds."""
+    return {
+        "data": "generated streets and drives",
+        "seeds": {
+            "training from": TRAINING,
+            "calibration of scores": [CALIBRATING[0], CALIBRATING[-1]],
+            "held out": [HELD_OUT[0], HELD_OUT[-1]],
+        },
     }
 
 

@@ -1,5 +1,5 @@
-"""What the learned detector learns from: scans of generated streets and drives, and what stood in
-them.
+"""What the learned detector learns from: scans of generated streets and drives, or of the scenes of
+a source, and what stood in them.
 
 Truth is used here, at training, and nowhere else.
 
@@ -12,6 +12,9 @@ Truth is used here, at training, and nowhere else.
   a film casts every cell of every keyframe; of drives half have another one.
 - Policies track what they find by the paper's proxy. So what they aim at does not hang on a
   detector that is still to be trained.
+- Of a source every play is one of its scenes. An example is then the points that `pillars` would
+  be handed: recorded ones where they were measured, up to the reach of the grid; without recorded
+  sweeps those of rays cast at the boxes.
 - An object counts from one return on. What has none cannot be told from nothing.
 
 What the network should answer, and by how much its answer is off, follows CenterPoint (Yin, Zhou,
@@ -19,7 +22,7 @@ Kraehenbuehl 2021, Sec. 4): a focal loss that forgives answers near a centre, an
 differences of what is told of the box.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -31,9 +34,9 @@ from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.belief import Belief
 from care_sim.core.cells.stack import Grid
 from care_sim.core.types import CLASSES
-from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.envs.open_loop import FilmEnv
 from care_sim.envs.scenarios import DriveEnv
+from care_sim.loops.film import Film
 from care_sim.perception.pillars.decoding import points_within
 from care_sim.perception.pillars.network import BOX_OUTPUTS, CELL_M, CELLS, REACH_M
 from care_sim.policies import make_policy
@@ -41,6 +44,7 @@ from care_sim.sensors.annotated import Annotations
 from care_sim.sensors.setups import DEFAULT_SETUP
 from care_sim.sources.street_films import record
 from care_sim.streets.street import make_street
+from care_sim.training.supervised.worlds import AnyEnv, World
 
 POLICIES = (
     "random", "history", "history-uniform", "uncertainty", "beam-reduce", "all-camera", "care",
@@ -85,20 +89,26 @@ class Example:
     full: bool = False
 
 
-def play(seed: int) -> list[Example]:
-    """The examples of the street or the drive of a seed."""
+def play(lesson: int | World) -> list[Example]:
+    """The examples of the street or the drive of a seed, or of the scene of a source."""
+    seed = lesson if isinstance(lesson, int) else lesson.seed
     rng = np.random.default_rng([seed, 21])
+    if isinstance(lesson, World) and lesson.film:
+        return [*_film(lesson.film(), seed, rng, _handed)]
     # Drawn, since the layouts of streets come in turn.
     return [*(_street if rng.random() < 0.5 else _drive)(seed, rng)]
 
 
 def _street(seed: int, rng: np.random.Generator) -> Iterator[Example]:
-    film = record(make_street(seed))
+    return _film(record(make_street(seed)), seed, rng, _by_ranges)
+
+
+def _film(film: Film, seed: int, rng: np.random.Generator, look: "_Look") -> Iterator[Example]:
     # After the last keyframe nobody looks, so its ranges are in no observation.
     keyframes = len(film.shots) - 1
     for _ in range(PLAYS_OF_FILM):
         with closing(FilmEnv(film, **_conditions(rng))) as env:
-            yield from _examples(env, seed, rng, keyframes)
+            yield from _examples(env, seed, rng, keyframes, look)
 
 
 def _drive(seed: int, rng: np.random.Generator) -> Iterator[Example]:
@@ -107,7 +117,7 @@ def _drive(seed: int, rng: np.random.Generator) -> Iterator[Example]:
     told: dict[str, Any] = {"sensor": sensor, "keyframe_s": DRIVE_KEYFRAME_S}
     with closing(DriveEnv(**told, **_conditions(rng))) as env:
         keyframes = round(env.scenario.duration_s / DRIVE_KEYFRAME_S)
-        yield from _examples(env, seed, rng, keyframes)
+        yield from _examples(env, seed, rng, keyframes, _by_ranges)
 
 
 def _conditions(rng: np.random.Generator) -> dict[str, Any]:
@@ -122,7 +132,7 @@ def _conditions(rng: np.random.Generator) -> dict[str, Any]:
 
 
 def _examples(
-    env: FilmEnv | ClosedLoopEnv, seed: int, rng: np.random.Generator, keyframes: int
+    env: AnyEnv, seed: int, rng: np.random.Generator, keyframes: int, look: "_Look"
 ) -> Iterator[Example]:
     full = env.rig.budget == env.rig.grid.size
     policy = make_policy("full" if full else str(rng.choice(POLICIES)), env)
@@ -132,16 +142,35 @@ def _examples(
         # The truth of the scan is that of the time before the step, which moves the world on.
         present = _present(env)
         observation, _, terminated, truncated, _ = env.step(policy(observation))
-        ranges = Belief.from_observation(observation).ranges
-        points = scanned(env.rig.grid, ranges)
-        example = _example(points, env.rig.sensor_height_m, present, full)
+        example = look(env, observation, present, full)
         if rng.random() < SHARE_KEPT or np.isin(RARE, example.classes).any():
             yield example
         if terminated or truncated:
             break
 
 
-def _present(env: FilmEnv | ClosedLoopEnv) -> Annotations:
+_Look = Callable[[Any, Any, Annotations, bool], Example]
+"""Makes an example of an environment after a step: of its observation, what was present, and
+whether every cell fired."""
+
+
+def _by_ranges(env: AnyEnv, observation: Any, present: Annotations, full: bool) -> Example:
+    points = scanned(env.rig.grid, Belief.from_observation(observation).ranges)
+    return _example(points, env.rig.sensor_height_m, present, full)
+
+
+def _handed(env: FilmEnv, _: Any, present: Annotations, full: bool) -> Example:
+    """What the detector was handed: points where they were measured, of all sweeps that the source
+    gathers. The source says on whom they lie: a real road is not level.
+    """
+    cloud = env.loop.handed
+    seen = np.isin(present.objects, cloud.objects) & within_plan(present.boxes)
+    points = cloud.points.astype(np.float32)
+    height_m = env.rig.sensor_height_m
+    return Example(points, height_m, present.classes[seen], present.boxes[seen], full)
+
+
+def _present(env: AnyEnv) -> Annotations:
     """Everything that perception reports, at the coming keyframe."""
     if isinstance(env, FilmEnv):
         return env.loop.shot.annotations

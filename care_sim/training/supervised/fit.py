@@ -13,9 +13,8 @@ import numpy as np
 
 from care_sim.base.errors import InvalidInput, print_lines
 from care_sim.base.extras import import_torch
-from care_sim.core.grid import AngularGrid
 from care_sim.policies.learned.weights import Card
-from care_sim.sensors.setups import DEFAULT_SETUP, sensor_setup
+from care_sim.sensors.setups import DEFAULT_SETUP, Sensor, sensor_setup
 from care_sim.study.progress import rounded_duration, shown_progress
 from care_sim.study.provenance import machine_line, package_versions
 
@@ -79,12 +78,15 @@ def one_by_one(things: Sequence[_Thing], what: str) -> Iterator[_Thing]:
         yield thing
 
 
-def card_of(kind: str, library: str = "torch", **told: Any) -> Card:
-    """The card of a file for the paper's grid and sensor set-up, made here and now."""
+def card_of(kind: str, library: str = "torch", sensor: Sensor = DEFAULT_SETUP, **told: Any) -> Card:
+    """The card of a file for the grid of a sensor set-up, the paper's unless given, made here and
+    now.
+    """
+    setup = sensor_setup(sensor)
     return Card(
         kind,
-        AngularGrid(),
-        setup=sensor_setup(DEFAULT_SETUP).label,
+        setup.grid,
+        setup=setup.label,
         machine=machine_line(),
         versions=package_versions("care-sim", "numpy", library),
         **told,
@@ -92,9 +94,9 @@ def card_of(kind: str, library: str = "torch", **told: Any) -> Card:
 
 
 def print_end(out: Path, started: float, result: Mapping[str, float], *play: str) -> None:
-    """Print what was reached since `started`, and the words of the command that plays it."""
+    """Print what was reached since `started`, and the command that plays it, by its words."""
     told = ", ".join(f"{name} {value:.4g}" for name, value in result.items())
     print_lines(
         f"{out}: {told}; {time.perf_counter() - started:.0f} s",
-        f"play it: {shlex.join(['care-sim', 'run', *play])}",
+        f"play it: {shlex.join(['care-sim', *play])}",
     )

@@ -42,7 +42,8 @@ class ScorerConfig(FitConfig):
     """Batches that are learned from."""
     drawn: bool = False
     """Learn from drives, tests of Euro NCAP and streets of training seeds, with budgets and faults
-    of the camera drawn for every play, instead of from the calibration streets."""
+    of the camera drawn for every play, instead of from the calibration streets. With --source, draw
+    budgets and faults for its scenes."""
 
 
 @dataclass(frozen=True)

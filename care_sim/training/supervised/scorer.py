@@ -50,21 +50,25 @@ from care_sim.loops.open_loop import OpenLoop
 from care_sim.policies.learned.cell_inputs import CellInputs, Float32s
 from care_sim.policies.learned.weights import save_weights
 from care_sim.policies.paper.tracks import History
+from care_sim.sensors.setups import DEFAULT_SETUP
 from care_sim.sources.street_films import street_film
 from care_sim.streets.street import CALIBRATION_SEEDS
 from care_sim.training.supervised.fit import adam, card_of, fit, one_by_one, print_end
 from care_sim.training.supervised.options import ScorerConfig
+from care_sim.training.supervised.recorded import Scenes
 from care_sim.training.supervised.worlds import (
     LEAST_BUDGET,
     MOST_BUDGET,
+    REPLAY,
     SCENARIOS,
     AnyEnv,
-    front_alone,
+    World,
+    generated_worlds,
     kept,
     keyframes,
     plays,
     present,
-    seeds_of_worlds,
+    views_of,
 )
 
 SCORER_BUDGETS = (0.03, 0.10, 0.35)
@@ -90,19 +94,20 @@ class Examples:
         return len(self.positive)
 
 
-def examples(seed: int) -> Iterator[Examples]:
-    """The examples of the street of a seed, one play at a time."""
-    film = street_film(seed)
-    for number, (shown, budget) in enumerate(product((film, front_alone(film)), SCORER_BUDGETS)):
-        rng = np.random.default_rng([seed, number])
-        yield _joined([*_play(FilmEnv(shown, budget=budget), seed, rng)])
+def examples(world: World) -> Iterator[Examples]:
+    """The examples of the street of a seed, or of the scene of a source, one play at a time."""
+    film = world.film() if world.film else street_film(world.seed)
+    for number, (shown, budget) in enumerate(product(views_of(film), SCORER_BUDGETS)):
+        rng = np.random.default_rng([world.seed, number])
+        if parts := [*_play(FilmEnv(shown, budget=budget), world, rng)]:
+            yield _joined(parts)
 
 
-def drawn_examples(kind: str, seed: int) -> Iterator[Examples]:
-    """The examples of the street, the drive or the test of a seed, one keyframe at a time."""
-    rng = np.random.default_rng([seed, len(kind)])
-    for env in plays(kind, seed, rng):
-        yield from _play(env, seed, rng, thinned=True)
+def drawn_examples(world: World) -> Iterator[Examples]:
+    """The examples of a world under drawn budgets and faults, one keyframe at a time."""
+    rng = np.random.default_rng([world.seed, len(world.kind)])
+    for env in plays(world, rng):
+        yield from _play(env, world, rng, thinned=True)
 
 
 def balanced(parts: Iterable[Examples]) -> Examples:
@@ -135,12 +140,16 @@ def untracked_cells(loop: OpenLoop | ClosedLoop) -> tuple[Cells, Float32s]:
 
 
 def _play(
-    env: AnyEnv, seed: int, rng: np.random.Generator, thinned: bool = False
+    env: AnyEnv, world: World, rng: np.random.Generator, thinned: bool = False
 ) -> Iterator[Examples]:
     inputs = CellInputs(env.rig)
-    for belief in keyframes(env, History(env.rig), seed):
-        if not thinned or kept(env, rng):
+    for belief in keyframes(env, History(env.rig), world.seed):
+        if kept(env, rng, world.share) if thinned else _in_share(world, rng):
             yield _keyframe(env.loop, belief, inputs, rng)
+
+
+def _in_share(world: World, rng: np.random.Generator) -> bool:
+    return world.share == 1 or bool(rng.random() < world.share)
 
 
 def _keyframe(
@@ -188,25 +197,34 @@ from, 2,560 of them of streets.
 """
 
 
-def train_learned_scorer(config: ScorerConfig) -> int:
-    """Train the policy and write its weights; returns the exit code of the command."""
+def train_learned_scorer(config: ScorerConfig, scenes: Scenes | None = None) -> int:
+    """Train the policy, on `scenes` if there are some, and write its weights; returns the exit code
+    of the command.
+    """
     import_torch()
     check_output(config.out, ZIP)
     started = time.perf_counter()
-    data, told = _drawn_lessons() if config.drawn else _street_lessons()
+    if scenes:
+        data, told = _scene_lessons(scenes, config.drawn)
+    else:
+        data, told = _drawn_lessons() if config.drawn else _street_lessons()
     arrays, losses = train_scorer(data, config.seed, config.steps)
     learned = next(iter(data.values()))
     cells = f"{len(learned)} cells, {int(learned.positive.sum())} of them positive, of "
     card = card_of(
         "learned-scorer",
+        sensor=scenes.source.sensor if scenes else DEFAULT_SETUP,
         scenario=told["scenario"],
-        data=f"{cells}{told['data']}; {OTHER_CELLS} others per keyframe",
+        data=f"{cells}{told['data']}; {OTHER_CELLS} others per keyframe"
+        + (scenes.terms if scenes else ""),
         seeds=told["seeds"] | {"training": config.seed},
         steps=config.steps,
         result={f"loss {name}": round(loss, 5) for name, loss in losses.items()},
     )
     save_weights(config.out, arrays, card)
-    print_end(config.out, started, card.result, str(config.out))
+    print_end(
+        config.out, started, card.result, *(scenes.play if scenes else ("run", str(config.out)))
+    )
     return 0
 
 
@@ -263,19 +281,40 @@ def _loss(network: Any, data: Examples, rows: NDArray[np.int64]) -> Any:
     return torch.nn.functional.binary_cross_entropy_with_logits(scores, positive.float(), weights)
 
 
+_PLAYED = f"under history at {', '.join(f'{one:g}' for one in SCORER_BUDGETS)} of the cells"
+_DRAWN_PLAYED = (
+    f"under history at {LEAST_BUDGET:g} to {MOST_BUDGET:g} of the cells, with faults of the camera"
+)
+
+
+def _scene_lessons(scenes: Scenes, drawn: bool) -> tuple[dict[str, Examples], dict[str, Any]]:
+    """The examples of the scenes of a source, and what the card says of them."""
+    made = drawn_examples if drawn else examples
+    data = {
+        name: balanced(
+            part
+            for world in one_by_one(scenes.worlds(part_of), f"{name} scene")
+            for part in made(world)
+        )
+        for name, part_of in (("learned", scenes.learned), ("held out", scenes.held_out))
+    }
+    played = _DRAWN_PLAYED if drawn else _PLAYED
+    return data, scenes.told | {"scenario": REPLAY, "data": f"{scenes.told['data']}; {played}"}
+
+
 def _street_lessons() -> tuple[dict[str, Examples], dict[str, Any]]:
     """The examples of streets by name, and what the card says of them."""
     data = {
         name: balanced(
-            part for seed in one_by_one(seeds, f"{name} street") for part in examples(seed)
+            part
+            for seed in one_by_one(seeds, f"{name} street")
+            for part in examples(World("street", seed))
         )
         for name, seeds in STREETS.items()
     }
-    budgets = ", ".join(f"{budget:g}" for budget in SCORER_BUDGETS)
     return data, {
         "scenario": "CARE-Street-v0",
-        "data": f"generated streets under history at {budgets} of the cells, with six cameras and "
-        "with the front one",
+        "data": f"generated streets {_PLAYED}, with six cameras and with the front one",
         "seeds": {name: list(seeds) for name, seeds in STREETS.items()},
     }
 
@@ -285,16 +324,16 @@ def _drawn_lessons() -> tuple[dict[str, Examples], dict[str, Any]]:
     data = {
         name: balanced(
             part
-            for kind, seed in seeds_of_worlds(worlds, first)
-            for part in drawn_examples(kind, seed)
+            for world in one_by_one(generated_worlds(worlds, first), f"{name} world")
+            for part in drawn_examples(world)
         )
         for name, (first, worlds) in DRAWN.items()
     }
     learned = ", ".join(f"{count} of {kind}" for kind, count in DRAWN["learned"][1].items())
     return data, {
         "scenario": SCENARIOS,
-        "data": f"worlds {learned} under history at {LEAST_BUDGET:g} to {MOST_BUDGET:g} of the "
-        "cells, with faults of the camera, streets with six cameras and with the front one",
+        "data": f"worlds {learned} {_DRAWN_PLAYED}, streets with six cameras and with the front "
+        "one",
         "seeds": {
             name: [first, first + max(worlds.values()) - 1]
             for name, (first, worlds) in DRAWN.items()

@@ -30,6 +30,7 @@ form of any other, and acts as such.
 import sys
 import time
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
@@ -45,10 +46,12 @@ from care_sim.core.rig import Rig
 from care_sim.policies.learned.learned_sets import STEPS, LearnedSets
 from care_sim.policies.learned.set_items import ITEM_INPUTS, MIRRORED, STRIP_INPUTS, ItemReader
 from care_sim.policies.learned.weights import Card, save_weights
-from care_sim.training.supervised.fit import adam, card_of, fit, print_end
+from care_sim.sensors.setups import DEFAULT_SETUP, sensor_setup
+from care_sim.training.supervised.fit import adam, card_of, fit, one_by_one, print_end
 from care_sim.training.supervised.options import SetsConfig
+from care_sim.training.supervised.recorded import Scenes
 from care_sim.training.supervised.sets_data import Example, play
-from care_sim.training.supervised.worlds import SCENARIOS, seeds_of_worlds
+from care_sim.training.supervised.worlds import REPLAY, SCENARIOS, World, generated_worlds
 
 KIND = ("is a camera box", "explained")
 """The inputs that tell an item's kind."""
@@ -66,41 +69,50 @@ HELD_OUT: Mapping[str, int] = {"drive": 4, "ncap": 8, "street": 2}
 """Worlds of validation seeds, played as in the second round; the card tells the loss on them."""
 
 
-def train_sets(config: SetsConfig) -> int:
-    """Train the policy and write its weights; returns the exit code of the command."""
+def train_sets(config: SetsConfig, scenes: Scenes | None = None) -> int:
+    """Train the policy, on `scenes` if there are some, and write its weights; returns the exit code
+    of the command.
+    """
     import_torch()
     check_output(config.out, ZIP)
     started = time.perf_counter()
-    places = int(ItemReader(Rig(), 1).places.max()) + 1
+    rig = Rig(sensor_setup(scenes.source.sensor).grid) if scenes else Rig()
+    places = int(ItemReader(rig, 1).places.max()) + 1
+    rounds, apart = _worlds(scenes)
     examples: list[Example] = []
-    first = TRAINING
-    for number, worlds in enumerate(ROUNDS, 1):
+    for number, worlds in enumerate(rounds, 1):
         own = config.out if number > 1 else None
-        examples += gathered(worlds, first, own, "faults" not in config.without)
-        first += max(worlds.values())
+        examples += gathered(worlds, own, "faults" not in config.without)
         arrays = learn(examples, places, config.seed, config.steps, config.without)
-        save_weights(config.out, arrays, _card(config, examples, ROUNDS[:number]))
+        save_weights(config.out, arrays, _card(config, scenes, examples, number))
         told = f"{config.out} holds what {number} of {len(ROUNDS)} rounds have taught"
         print_lines(told, file=sys.stderr)
-    held_out = gathered(HELD_OUT, VALIDATION, config.out)
+    held_out = gathered(apart, config.out)
     losses = {
         f"loss per {what}, {name}": round(loss, 5)
         for name, data in (("learned", examples), ("held out", held_out))
         for what, loss in losses_of(arrays, data).items()
     }
-    save_weights(config.out, arrays, _card(config, examples, ROUNDS, losses))
-    print_end(config.out, started, losses, str(config.out))
+    save_weights(config.out, arrays, _card(config, scenes, examples, len(ROUNDS), losses))
+    print_end(config.out, started, losses, *(scenes.play if scenes else ("run", str(config.out))))
     return 0
 
 
-def gathered(
-    worlds: Mapping[str, int], first: int, own: Path | None, faulty: bool = True
-) -> list[Example]:
-    """The keyframes of so many worlds of each kind, with seeds from the first on."""
+def _worlds(scenes: Scenes | None) -> tuple[list[list[World]], list[World]]:
+    """The worlds of every round, and those that are held out. No generated world comes twice;
+    scenes do, under other budgets, faults and policies.
+    """
+    if scenes:
+        return [scenes.worlds(scenes.learned)] * len(ROUNDS), scenes.worlds(scenes.held_out)
+    firsts = accumulate((max(worlds.values()) for worlds in ROUNDS[:-1]), initial=TRAINING)
+    rounds = [generated_worlds(*one) for one in zip(ROUNDS, firsts, strict=True)]
+    return rounds, generated_worlds(HELD_OUT, VALIDATION)
+
+
+def gathered(worlds: Sequence[World], own: Path | None, faulty: bool = True) -> list[Example]:
+    """The keyframes of worlds."""
     return [
-        example
-        for kind, seed in seeds_of_worlds(worlds, first)
-        for example in play(kind, seed, own, faulty)
+        example for world in one_by_one(worlds, "world") for example in play(world, own, faulty)
     ]
 
 
@@ -226,22 +238,33 @@ def _losses(
 
 def _card(
     made: SetsConfig,
+    scenes: Scenes | None,
     examples: Sequence[Example],
-    rounds: Sequence[Mapping[str, int]],
+    rounds: int,
     losses: Mapping[str, float] | None = None,
 ) -> Card:
-    played = ", then ".join(
-        ", ".join(f"{count} of {kind}" for kind, count in worlds.items()) for worlds in rounds
-    )
+    """The card after so many rounds."""
     items = sum(len(one.answers) for one in examples)
-    last = TRAINING + sum(max(worlds.values()) for worlds in rounds) - 1
+    told = scenes.told if scenes else _generated(ROUNDS[:rounds])
     return card_of(
         LearnedSets.name,
-        scenario=SCENARIOS,
-        data=f"{items} boxes and tracks of {len(examples)} keyframes; worlds {played}"
-        + (", the second time mostly by itself" if len(rounds) > 1 else "")
-        + (f"; without {' and '.join(made.without)}" if made.without else ""),
-        seeds={"worlds": [TRAINING, last], "training": made.seed},
+        sensor=scenes.source.sensor if scenes else DEFAULT_SETUP,
+        scenario=REPLAY if scenes else SCENARIOS,
+        data=f"{items} boxes and tracks of {len(examples)} keyframes; {told['data']}"
+        + ("; played twice" if scenes and rounds > 1 else "")
+        + (", the second time mostly by itself" if rounds > 1 else "")
+        + (f"; without {' and '.join(made.without)}" if made.without else "")
+        + (scenes.terms if scenes else ""),
+        seeds=told["seeds"] | {"training": made.seed},
         steps=made.steps,
         result=losses or {},
     )
+
+
+def _generated(rounds: Sequence[Mapping[str, int]]) -> dict[str, Any]:
+    """What a card says of generated worlds."""
+    played = ", then ".join(
+        ", ".join(f"{count} of {kind}" for kind, count in worlds.items()) for worlds in rounds
+    )
+    last = TRAINING + sum(max(worlds.values()) for worlds in rounds) - 1
+    return {"data": f"worlds {played}", "seeds": {"worlds": [TRAINING, last]}}

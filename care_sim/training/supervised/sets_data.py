@@ -1,11 +1,12 @@
-"""What the sets learn from: keyframes of drives, of tests of Euro NCAP and of generated streets.
+"""What the sets learn from: keyframes of drives, of tests of Euro NCAP and of generated streets, or
+of the scenes of a source.
 
 Truth is used here, at training, and nowhere else.
 
-- Worlds, budgets and faults of the camera are those of `care_sim.training.supervised.worlds`, under
-  training seeds. What aims is drawn, too: somebody else's policy, or, in later rounds, this one
-  with the weights of the round before, so that it learns from what its own choice leads to (DAgger:
-  Ross, Gordon and Bagnell, A reduction of imitation learning, 2011).
+- Worlds, budgets and faults of the camera are those of `care_sim.training.supervised.worlds`, of
+  training seeds or of scenes. What aims is drawn, too: somebody else's policy, or, in later rounds,
+  this one with the weights of the round before, so that it learns from what its own choice leads to
+  (DAgger: Ross, Gordon and Bagnell, A reduction of imitation learning, 2011).
 - Of an item the label says after how many of its cells, in its order, an object in range has
   returned three times: of a track its own object, of a camera box an object that has no track. An
   object that shows in several boxes is that of the one which finds it with the fewest cells.
@@ -29,7 +30,7 @@ from care_sim.policies.base import Policy
 from care_sim.policies.learned.learned_sets import LEARNED_RETURNS, STEPS, LearnedSets
 from care_sim.policies.learned.set_items import ItemReader, Items
 from care_sim.policies.learned.set_kernels import Numbers, needed_cells
-from care_sim.training.supervised.worlds import AnyEnv, kept, keyframes, plays, present
+from care_sim.training.supervised.worlds import AnyEnv, World, kept, keyframes, plays, present
 
 OTHERS = ("care-spread", "care", "care-sightlines", "care-sector", "all-camera", "history-rows")
 """Policies that are played besides this one."""
@@ -55,24 +56,24 @@ class Example:
     weights: Numbers
 
 
-def play(kind: str, seed: int, own: Path | None, faulty: bool = True) -> list[Example]:
-    """The examples of the street, the drive or the test of a seed. `own` are this policy's weights,
-    of the round before, None in the first. Without `faulty` the camera has no fault.
+def play(world: World, own: Path | None, faulty: bool = True) -> list[Example]:
+    """The examples of a world. `own` are this policy's weights, of the round before, None in the
+    first. Without `faulty` the camera has no fault.
     """
-    rng = np.random.default_rng([seed, len(kind), own is not None])
+    rng = np.random.default_rng([world.seed, len(world.kind), own is not None])
     examples: list[Example] = []
-    for env in plays(kind, seed, rng, faulty):
-        examples += _examples(env, seed, rng, own)
+    for env in plays(world, rng, faulty):
+        examples += _examples(env, world, rng, own)
     return examples
 
 
 def _examples(
-    env: AnyEnv, seed: int, rng: np.random.Generator, own: Path | None
+    env: AnyEnv, world: World, rng: np.random.Generator, own: Path | None
 ) -> Iterator[Example]:
     policy = _player(env, rng, own)
     reader = ItemReader(env.rig, STEPS[-1])
-    for belief in keyframes(env, policy, seed):
-        if kept(env, rng):
+    for belief in keyframes(env, policy, world.seed):
+        if kept(env, rng, world.share):
             yield _example(env, reader, reader.of(belief), rng)
 
 

@@ -2,13 +2,14 @@
 
 Truth is used here, at training, and nowhere else.
 
-A play is one street, drive or test of Euro NCAP under a seed. Its budget is drawn between 0.5 and
-20%, evenly by its logarithm, then the faults of its camera: blind in 12% of the plays, faultless in
-40%, else it misses, invents or is late. Keyframes of a drive or a test come 0.1 to 0.5 s apart. A
-street is played with all cameras and with the front one alone: the closed loop has no other.
+A play is one street, drive or test of Euro NCAP under a seed, or one scene of a source. Its budget
+is drawn between 0.5 and 20%, evenly by its logarithm, then the faults of its camera: blind in 12%
+of the plays, faultless in 40%, else it misses, invents or is late. Keyframes of a drive or a test
+come 0.1 to 0.5 s apart. A film is played with all cameras and with the front one alone: the closed
+loop has no other.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import fields, replace
 from typing import Any, NamedTuple
@@ -27,9 +28,9 @@ from care_sim.loops.open_loop import OpenLoop
 from care_sim.policies.base import Policy
 from care_sim.sources.street_films import record
 from care_sim.streets.street import make_street
-from care_sim.training.supervised.fit import one_by_one
 
 SCENARIOS = "CARE-Drive-v0, CARE-NCAP-v0 and CARE-Street-v0"
+REPLAY = "CARE-Replay-v0"
 LEAST_BUDGET, MOST_BUDGET = 0.005, 0.2
 PLAYS_OF_FILM = 8
 """Plays for which a film is made once."""
@@ -55,20 +56,31 @@ class Present(NamedTuple):
     """(m,) the object that each is of, below 0 for none."""
 
 
-def seeds_of_worlds(worlds: Mapping[str, int], first: int) -> Iterator[tuple[str, int]]:
-    """The kind and the seed of so many worlds of each kind, with seeds from the first on."""
-    for kind, count in worlds.items():
-        for seed in one_by_one(range(first, first + count), kind):
-            yield kind, seed
-
-
-def plays(
-    kind: str, seed: int, rng: np.random.Generator, faulty: bool = True
-) -> Iterator[FilmEnv | ClosedLoopEnv]:
-    """The plays of the street, the drive or the test of a seed, one open at a time, not yet reset.
-    Without `faulty` the camera has no fault.
+class World(NamedTuple):
+    """What is played to learn from it: the street, drive or test of a seed, or with a `film` what
+    that makes, the scene of a source. A `share` of its keyframes can become examples.
     """
-    return _PLAYS[kind](seed, rng, faulty)
+
+    kind: str
+    seed: int
+    film: Callable[[], Film] | None = None
+    share: float = 1.0
+
+
+def generated_worlds(worlds: Mapping[str, int], first: int) -> list[World]:
+    """So many worlds of each kind, with seeds from the first on."""
+    return [
+        World(kind, seed) for kind, count in worlds.items() for seed in range(first, first + count)
+    ]
+
+
+def plays(world: World, rng: np.random.Generator, faulty: bool = True) -> Iterator[AnyEnv]:
+    """The plays of a world, one open at a time, not yet reset. Without `faulty` the camera has no
+    fault.
+    """
+    if world.film:
+        return _film(world.film(), rng, faulty)
+    return _PLAYS[world.kind](world.seed, rng, faulty)
 
 
 def keyframes(env: AnyEnv, policy: Policy, seed: int) -> Iterator[Belief]:
@@ -84,9 +96,9 @@ def keyframes(env: AnyEnv, policy: Policy, seed: int) -> Iterator[Belief]:
         over = terminated or truncated
 
 
-def kept(env: AnyEnv, rng: np.random.Generator) -> bool:
+def kept(env: AnyEnv, rng: np.random.Generator, share: float = 1.0) -> bool:
     """Whether a keyframe becomes an example."""
-    return bool(rng.random() < KEPT_PER_S * env.rig.keyframe_s)
+    return bool(rng.random() < KEPT_PER_S * env.rig.keyframe_s * share)
 
 
 def present(loop: OpenLoop | ClosedLoop) -> Present:
@@ -105,9 +117,17 @@ def front_alone(film: Film) -> Film:
     return replace(film, cameras=film.cameras[:1], shots=tuple(map(_first_camera, film.shots)))
 
 
+def views_of(film: Film) -> tuple[Film, ...]:
+    """The film, and where it has several cameras that of the first one alone."""
+    return (film, front_alone(film)) if len(film.cameras) > 1 else (film,)
+
+
 def _street(seed: int, rng: np.random.Generator, faulty: bool) -> Iterator[AnyEnv]:
-    film = record(make_street(seed))
-    for shown in (film, front_alone(film)):
+    return _film(record(make_street(seed)), rng, faulty)
+
+
+def _film(film: Film, rng: np.random.Generator, faulty: bool) -> Iterator[AnyEnv]:
+    for shown in views_of(film):
         for _ in range(PLAYS_OF_FILM // 2):
             with closing(FilmEnv(shown, **_conditions(rng, faulty))) as env:
                 yield env

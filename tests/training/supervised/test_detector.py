@@ -1,7 +1,7 @@
 """The training of the learned detector: it learns, and makes the same bytes again."""
 
 from concurrent.futures import ThreadPoolExecutor
-from itertools import repeat
+from itertools import count, repeat
 
 import numpy as np
 import pytest
@@ -125,7 +125,7 @@ def test_any_number_of_steps_has_a_rate_of_learning(monkeypatch, steps):
 def test_plays_come_in_order_whatever_they_take(monkeypatch):
     monkeypatch.setattr(detector, "play", street)
     with ThreadPoolExecutor(3) as executor:
-        examples = detector.played(executor, 7)
+        examples = detector.played(executor, count(7))
         taken = [next(examples) for _ in range(9)]
     for one, seed in zip(taken, range(7, 16), strict=True):
         assert np.array_equal(one.boxes, street(seed)[0].boxes)

@@ -24,7 +24,7 @@ from care_sim.training.supervised.scorer import (
     drawn_examples,
     untracked_cells,
 )
-from care_sim.training.supervised.worlds import front_alone
+from care_sim.training.supervised.worlds import World, front_alone
 
 
 @pytest.fixture(scope="module")
@@ -135,7 +135,9 @@ def test_a_drawn_play_gives_the_same_examples_again_at_its_own_budget(monkeypatc
 
     conditions = worlds._conditions
     monkeypatch.setattr(worlds, "_conditions", watched)
-    once, again, other = ([*drawn_examples("ncap", seed)] for seed in (10_002, 10_002, 10_003))
+    once, again, other = (
+        [*drawn_examples(World("ncap", seed))] for seed in (10_002, 10_002, 10_003)
+    )
     assert once
     for one, same in zip(once, again, strict=True):
         assert np.array_equal(one.inputs, same.inputs)
@@ -212,7 +214,7 @@ def test_training_does_not_depend_on_the_threads_and_gives_them_back():
 
 def trained(path, monkeypatch, *options):
     monkeypatch.setattr(scorer, "STREETS", {"calibration": (2000,), "held out": (2001,)})
-    monkeypatch.setattr(scorer, "examples", lambda seed: [drawn(seed)])
+    monkeypatch.setattr(scorer, "examples", lambda world: [drawn(world.seed)])
     with pytest.raises(SystemExit) as end:
         main(["train", "learned-scorer", "--out", str(path), *options])
     return end.value.code
@@ -236,9 +238,9 @@ def test_worlds_that_differ_give_weights_that_play_and_a_card_that_says_so(tmp_p
     """Real tests of Euro NCAP, two to learn from and one held out."""
     played = []
 
-    def watched(kind, seed):
-        played.append((kind, seed))
-        return drawn_examples(kind, seed)
+    def watched(world):
+        played.append((world.kind, world.seed))
+        return drawn_examples(world)
 
     counts = {"learned": (TRAINING, {"ncap": 2}), "held out": (VALIDATION, {"ncap": 1})}
     monkeypatch.setattr(scorer, "DRAWN", counts)

@@ -17,6 +17,7 @@ from care_sim.policies.learned.set_items import ITEM_INPUTS, STRIP_INPUTS, ItemR
 from care_sim.policies.learned.weights import Card, load_weights, save_weights
 from care_sim.training.supervised import sets, sets_data, worlds
 from care_sim.training.supervised.sets_data import Example
+from care_sim.training.supervised.worlds import World
 
 torch = pytest.importorskip("torch")
 PLACES = 13 * 32
@@ -120,18 +121,19 @@ def test_constants_are_the_shares_of_each_kind(tmp_path):
 def test_an_interrupt_keeps_what_the_first_round_has_taught(tmp_path, monkeypatch, capsys):
     asked = []
 
-    def interrupted(worlds, first, own, *_):
-        asked.append((first, max(worlds.values())))
+    def interrupted(worlds, own, *_):
+        asked.append({*worlds})
         if own is not None:
             raise KeyboardInterrupt
-        return [*drawn(first, 20)]
+        return [*drawn(0, 20)]
 
     monkeypatch.setattr(sets, "gathered", interrupted)
     with pytest.raises(SystemExit):
         main(["train", "learned-sets", "--out", str(tmp_path / "w.npz"), "--steps", "5"])
     # No world comes twice.
-    assert asked[0][0] == TRAINING
-    assert asked[1][0] == sum(asked[0])
+    assert min(world.seed for world in asked[0]) == TRAINING
+    assert [len(worlds) for worlds in asked] == [82, 164]
+    assert not asked[0] & asked[1]
     assert "w.npz holds what 1 of 2 rounds have taught" in capsys.readouterr().err
     card = load_weights(tmp_path / "w.npz").card
     assert "10 of street" in card.data
@@ -146,7 +148,7 @@ def test_without_faults_the_camera_has_none(monkeypatch):
     assert [one["budget"] for one in told] == [one["budget"] for one in faulty]
     asked = []
     monkeypatch.setattr(sets, "play", lambda *which: asked.append(which[-1]) or [])
-    sets.gathered({"drive": 2}, 10_000, None, False)
+    sets.gathered([World("drive", 10_000), World("drive", 10_001)], None, False)
     assert asked == [False, False]
 
 
@@ -205,7 +207,7 @@ def test_a_strip_is_found_by_its_returns_and_an_object_once():
 
 
 def trained(path, monkeypatch, *options):
-    monkeypatch.setattr(sets, "gathered", lambda worlds, first, *_: [*drawn(first, 20)])
+    monkeypatch.setattr(sets, "gathered", lambda worlds, *_: [*drawn(worlds[0].seed, 20)])
     with pytest.raises(SystemExit) as end:
         main(["train", "learned-sets", "--out", str(path), *options])
     return end.value.code
