@@ -1,4 +1,4 @@
-"""150 short scenes as a nuScenes database, which the network of `tests/helpers/pcdet` understands.
+"""Short scenes as a nuScenes database, which the network of `tests/helpers/pcdet` understands.
 
 Every object returns a few points near its middle, whose intensity numbers class and object. Four
 sweeps per keyframe show it moving. One object comes within range after the first keyframe.
@@ -24,10 +24,10 @@ NEAR_M, FAR_M = 8.0, 40.0
 COCO80 = {"pedestrian": 0, "bicycle": 1, "car": 2, "bus": 5, "truck": 7}
 
 
-def write_movers(folder):
-    """The database `DATA` and the results `yolox.json` of a camera detector in `folder`."""
+def write_movers(folder, count):
+    """`count` scenes: the database `DATA` and the results `yolox.json` of a camera detector in `folder`."""
     rng = np.random.default_rng(0)
-    scenes = {name: _scene(rng) for name in OFFICIAL["val"]}
+    scenes = {name: _scene(rng) for name in OFFICIAL["val"][:count]}
     write_swept(folder / "DATA", {name: samples for name, (samples, _) in scenes.items()})
     images, found = [], []
     for name, (_, pictures) in scenes.items():

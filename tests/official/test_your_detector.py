@@ -37,7 +37,7 @@ def commands():
 def folder(tmp_path_factory):
     """What an owner of nuScenes has there: data, weights, the adapter, camera boxes, a clone."""
     made = tmp_path_factory.mktemp("mine")
-    write_movers(made)
+    write_movers(made, SCENES)
     shutil.copy(EXAMPLES / "openpcdet_detector.py", made)
     (made / "pcdet").mkdir()
     shutil.copy(ROOT / "tests" / "helpers" / "pcdet_standin.py", made / "pcdet" / "__init__.py")
