@@ -25,7 +25,7 @@ COCO80 = {"pedestrian": 0, "bicycle": 1, "car": 2, "bus": 5, "truck": 7}
 
 
 def write_movers(folder, count):
-    """`count` scenes: the database `DATA` and the results `yolox.json` of a camera detector in `folder`."""
+    """`count` scenes in `folder`: the database `DATA`, and `yolox.json` of a camera detector."""
     rng = np.random.default_rng(0)
     scenes = {name: _scene(rng) for name in OFFICIAL["val"][:count]}
     write_swept(folder / "DATA", {name: samples for name, (samples, _) in scenes.items()})
