@@ -79,7 +79,7 @@ def _show(options: Leaderboard, results: Sequence[BenchmarkResult]) -> None:
     told = told_if_replaced(page)
     first = next(iter(sets.values()))
     if options.chart:
-        check_figure(options.chart)
+        check_figure(options.chart.with_suffix(""))
         save(score_chart(first), options.chart.with_suffix(""))
     save(leaderboard_figure(first), folder / LEADERBOARD_FIGURE)
     tables = [leaderboard_table(own, options.minus) for own in sets.values()]

@@ -70,9 +70,10 @@ def curves(options: Curves) -> int:
             "curves needs the folder of a training run, the --out of `care-sim train`"
         )
     groups = grouped_runs(map(read_run, options.folders))
-    check_figure(options.out)
+    stem = options.out.with_suffix("")
+    check_figure(stem)
     told = told_if_replaced(options.out.with_suffix(".png"))
-    save(curves_figure(groups), options.out)
+    save(curves_figure(groups), stem)
     TableConsole().print(curves_table(groups).rich())
     print_lines(f"Figure: {told}")
     return 0

@@ -2,7 +2,7 @@
 recorded. And what goes wrong with either: noise, lost returns, dead rows, crosstalk.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -38,7 +38,10 @@ class CellFaults:
         self._grid = grid
         self._faults = faults
         self._noise = np.random.default_rng(seed)
-        self._dropout = np.random.default_rng(seed.spawn(1)[0])
+        dropout = seed.spawn(1)[0]
+        self._dropout = np.random.default_rng(dropout)
+        # A stream of its own: a recording draws the same for the others, with far returns or not.
+        self._far_noise = np.random.default_rng(dropout.spawn(1)[0])
 
     def draw_noisy(self, ranges: Floats, cells: Cells, shots: Integers | None = None) -> Floats:
         """(n,) the `ranges` (n,) of `cells` (n,) as they are measured at this keyframe, metres.
@@ -46,15 +49,25 @@ class CellFaults:
         `shots` (N,) says how often every cell fires, once unless given: the mean over n shots errs
         by the root of n less.
         """
-        sigma = self._faults.lidar_range_sigma
-        errors = sigma * self._noise.standard_normal(self._grid.size)[cells]
-        if shots is not None:
-            errors /= np.sqrt(shots[cells])
+        errors = self._errors(self._noise, cells, shots)
         # No return stays no return: noise is that of a measured range.
         (hit,) = np.isfinite(ranges).nonzero()
         measured = ranges.copy()
         measured[hit] = noisy(ranges[hit], errors[hit], self._grid.reach_of(cells[hit]))
         return measured
+
+    def draw_noisy_far(self, ranges: Floats, cells: Cells, shots: Integers | None = None) -> Floats:
+        """`draw_noisy` of returns from beyond the reach, which stay there: noise is folded back at
+        it.
+        """
+        reach = self._grid.reach_of(cells)
+        return reach + np.abs(ranges + self._errors(self._far_noise, cells, shots) - reach)
+
+    def _errors(self, stream: np.random.Generator, cells: Cells, shots: Integers | None) -> Floats:
+        """(n,) metres."""
+        sigma = self._faults.lidar_range_sigma
+        errors: Floats = sigma * stream.standard_normal(self._grid.size)[cells]
+        return errors if shots is None else errors / np.sqrt(shots[cells])
 
     def draw_lost(self, cells: Cells) -> Mask:
         """(n,) which of `cells` (n,) return nothing at this keyframe, dead or dropped."""
@@ -260,7 +273,10 @@ class RecordedLidar:
         answering[cells] = ~self._faults.draw_lost(cells)
         returned = cloud.of_cells(answering).to_shots(shots)
         if self._faults.is_noisy:
-            returned = self._noisy(returned, shots)
+            returned = self._moved(returned, self._faults.draw_noisy, shots)
+            if returned.far is not None:
+                far = self._moved(returned.far, self._faults.draw_noisy_far, shots)
+                returned = replace(returned, far=far)
         return self._crosstalk.over_cloud(returned, answering) if self._crosstalk else returned
 
     def peek(self, cloud: Cloud) -> Cloud:
@@ -278,8 +294,14 @@ class RecordedLidar:
         nearest[cells] = np.minimum.reduceat(ranges, starts)
         return nearest
 
-    def _noisy(self, cloud: Cloud, shots: Integers | None) -> Cloud:
+    def _moved(
+        self,
+        cloud: Cloud,
+        draw: Callable[[Floats, Cells, Integers | None], Floats],
+        shots: Integers | None,
+    ) -> Cloud:
+        """The returns at the ranges that `draw` makes of theirs."""
         # Noise is along the ray: a point moves with its range, and stays in its cell.
         ranges = self.grid.ranges_to(cloud.cells, cloud.points)
-        moved = self._faults.draw_noisy(ranges, cloud.cells, shots) / ranges
+        moved = draw(ranges, cloud.cells, shots) / ranges
         return replace(cloud, points=self.grid.stretched(cloud.cells, cloud.points, moved))

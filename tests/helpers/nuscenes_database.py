@@ -41,6 +41,7 @@ ATTRIBUTES = (
     "vehicle.parked",
     "vehicle.moving",
     "cycle.without_rider",
+    "cycle.with_rider",
     "pedestrian.standing",
     "pedestrian.moving",
 )

@@ -1,5 +1,7 @@
 """The LiDAR whose full scan was recorded: five returns made by hand, two of them in one cell."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -186,6 +188,31 @@ def test_every_choice_of_cells_meets_the_same_noise_and_dropout(grid):
     whole, part = first.fire(everything(grid), full(grid)), second.fire(some, full(grid))
     assert part.cells.tolist() == np.intersect1d(whole.cells, some).tolist()
     assert np.array_equal(part.points, whole.take(np.isin(whole.cells, some)).points)
+
+
+def test_far_returns_have_the_same_faults_and_leave_the_near_ones_as_they_are(grid):
+    """At the second keyframe too: noise of their own, folded back at the reach, and the dropout of
+    their cell.
+    """
+    near = full(grid)
+    far = replace(full(grid, 90.0), objects=np.full(grid.size, NO_OBJECT))
+    edge = replace(far, points=grid.directions * 50.1)
+    faults = {"lidar_range_sigma": 0.2, "lidar_dropout": 0.3, "lidar_crosstalk": 0.1}
+    alone, both, folded = (
+        [lidar.fire(everything(grid), cloud) for _ in range(2)][1]
+        for lidar, cloud in (
+            (recorded(grid, **faults), cloud)
+            for cloud in (near, replace(near, far=far), replace(near, far=edge))
+        )
+    )
+    assert np.array_equal(alone.points, both.points)
+    own = both.objects != NO_OBJECT
+    assert np.array_equal(both.far.cells, both.cells[own])
+    ranges = np.linalg.norm(both.far.points, axis=1)
+    assert (ranges.mean(), ranges.std()) == pytest.approx((90.0, 0.2), rel=0.03)
+    errors = np.linalg.norm(both.points[own], axis=1) - 20.0
+    assert abs(np.corrcoef(errors, ranges)[0, 1]) < 0.05
+    assert np.linalg.norm(folded.far.points, axis=1).min() >= grid.range_m
 
 
 def crosstalk(grid, rate, seed=0):

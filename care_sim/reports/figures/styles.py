@@ -159,9 +159,9 @@ def save(figure: Figure, stem: Path) -> None:
     """
     drawing = svg_text(figure, stem.name)
     with default_style(), texts_as_they_are(figure):
-        with replacing(stem.with_suffix(".png")) as unfinished:
+        with replacing(stem.with_name(f"{stem.name}.png")) as unfinished:
             figure.savefig(unfinished, dpi=200)
-        with replacing(stem.with_suffix(".svg")) as unfinished:
+        with replacing(stem.with_name(f"{stem.name}.svg")) as unfinished:
             unfinished.write_text(drawing, encoding="utf-8")
 
 
@@ -195,8 +195,8 @@ def texts_as_they_are(figure: Figure) -> Iterator[None]:
 
 def check_figure(stem: Path) -> None:
     """Raise what `care_sim.base.files.check_output` does where `save` could not write a figure."""
-    check_output(stem.with_suffix(".png"), PNG)
-    check_output(stem.with_suffix(".svg"), SVG)
+    check_output(stem.with_name(f"{stem.name}.png"), PNG)
+    check_output(stem.with_name(f"{stem.name}.svg"), SVG)
 
 
 def remove_others(folder: Path, names: Iterable[str], kept: Container[str]) -> None:

@@ -42,6 +42,15 @@ def test_figures_are_written_the_same_every_time(tmp_path):
     assert drawing == svg_text(sweep_figures(SWEEP)[name], name)
 
 
+def test_a_figure_keeps_a_name_with_dots(tmp_path):
+    """As of `--detector-parameters file=net.pt` or `--false-negative-rate 0.2`."""
+    (figure,) = sweep_figures(SWEEP).values()
+    name = "levels-streets-torchscript-file-net.pt-false-negative-rate-0.2"
+    report = StudyReport({}, {name: figure})
+    report.write(tmp_path)
+    assert {path.name for path in tmp_path.iterdir()} == {f"{name}.png", f"{name}.svg"}
+
+
 def test_texts_are_texts_of_anybody_on_a_transparent_ground():
     evil = [each | {"policy": "<b> $x^$ \x1b"} for each in SWEEP if each["policy"] == "history"]
     drawing = svg_text(sweep_figures([*SWEEP, *evil])["dense-budget"], "dense-budget")
