@@ -6,7 +6,7 @@ a built-in name is taken.
 """
 
 import inspect
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from typing import Any
 
@@ -92,6 +92,12 @@ def make_detector(name: str, sensor_height_m: float, /, **parameters: object) ->
     detector = kept_or_made(make, own, partial(_point_detector, name, make, own))
     again = partial(make_detector, name, sensor_height_m, **parameters)
     return PointsOnly(name, detector, sensor_height_m, **fed, again=again)
+
+
+def sweeps_wanted(name: str, parameters: Mapping[str, object]) -> int:
+    """How many sweeps a detector asks for at a keyframe. Raises as `make_detector` does."""
+    # Nobody detects with it, so any height will do.
+    return 1 if name in PRIVILEGED else make_detector(name, 1.0, **parameters).gathers
 
 
 def detector_lines() -> list[str]:
