@@ -70,3 +70,22 @@ def mean_onnx(path):
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)], ir_version=9)
     onnx.save(model, path)
     return path
+
+
+def counting_script(path):
+    """A module that remembers how often it was called, which moves its one person."""
+    import torch
+
+    class Counting(torch.nn.Module):
+        def __init__(self):
+            super().__init__()
+            self.register_buffer("calls", torch.zeros(1))
+
+        def forward(self, points: torch.Tensor, sensor_height_m: float):
+            self.calls += 1
+            box = torch.tensor([[5.0, 0.0, -1.0, 4.0, 4.0, 4.0, 0.0]])
+            box[0, 0] += self.calls[0]
+            return torch.tensor([4]), box, torch.ones(1)
+
+    torch.jit.script(Counting()).save(str(path))
+    return path
