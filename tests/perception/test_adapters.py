@@ -241,8 +241,9 @@ def test_shuffled_points_are_shuffled_alike_and_leave_the_generator_of_others(co
     points = np.random.default_rng(0).uniform(-9, 0, (50, 5))
     np.random.seed(7)  # noqa: NPY002 (whom others may use)
     first = np.random.random()  # noqa: NPY002
+    places = [made.detect(points, 1.8).boxes.tolist()]
     np.random.seed(7)  # noqa: NPY002
-    places = [made.detect(points, 1.8).boxes.tolist() for _ in range(2)]
+    places.append(made.detect(points, 1.8).boxes.tolist())
     assert places[0] == places[1]
     assert np.random.random() == first  # noqa: NPY002
 
