@@ -127,7 +127,7 @@ class PointsOnly(Detector):
         sensor_height_m: float,
         sweeps: int | None = None,
         track_score: float | None = None,
-        again: Callable[[], "PointsOnly"] | None = None,
+        again: Callable[[], Detector] | None = None,
     ):
         self._name = name
         self._detector = detector
@@ -148,7 +148,7 @@ class PointsOnly(Detector):
         check_number(f"track_score of detector {name}", least, 0, 1)
         self.track_score = float(least)
 
-    def for_play(self) -> "PointsOnly":
+    def for_play(self) -> Detector:
         """See `Detector`. A detector that is not stateless is made anew after its first play."""
         if is_stateless(self._detector) or self._again is None or not self._has_played:
             return self

@@ -4,6 +4,7 @@ as the detector asks for.
 
 from collections.abc import Mapping
 from dataclasses import fields, replace
+from typing import Any
 
 from care_sim.perception.detectors import sweeps_wanted
 from care_sim.sources.film_checks import report_once
@@ -36,15 +37,16 @@ def source_for(source: Source, detector: str, parameters: Mapping[str, object]) 
 def with_sweeps(source: Source, sweeps: int) -> Source | None:
     """Return the source with so many sweeps per keyframe, None for a kind without the option."""
     if isinstance(source, Recorded) and _has_option(type(source.recordings)):
-        return Recorded(replace(source.recordings, **{_OPTION: sweeps}))
+        fed: dict[str, Any] = {_OPTION: sweeps}
+        return Recorded(replace(source.recordings, **fed))
     if isinstance(source, Installed) and _has_option(SOURCES.maker(source.name)):
         others = tuple(pair for pair in source.options if pair[0] != _OPTION)
         return replace(source, options=(*others, (_OPTION, sweeps)))
     return None
 
 
-def _has_option(kind: object) -> bool:
-    return any(field.name == _OPTION for field in fields(kind))  # type: ignore[arg-type]
+def _has_option(kind: Any) -> bool:
+    return any(field.name == _OPTION for field in fields(kind))
 
 
 def _has_more(fed: Source, source: Source) -> bool:
