@@ -20,6 +20,7 @@ from care_sim.policies.isolation import isolated_policies
 from care_sim.reports.detectors import Judged, detector_tables
 from care_sim.reports.figures.detectors import DETECTORS_FIGURE, detectors_figure
 from care_sim.reports.figures.styles import check_figure, save
+from care_sim.sources.feeding import source_for
 from care_sim.sources.scenes import Scene, Source, chosen_scenes
 from care_sim.study.episode_play import result_or_reason
 from care_sim.study.executors import processes
@@ -69,7 +70,7 @@ def judge(options: Judge) -> int:
         problems.append(f"{DIED} that judges")
     finally:
         if judged[names[0]]:
-            _tell(options, judged, plays[0][0])
+            _tell(options, judged, plays[0])
     report_problems(problems)
     return FAILED if problems else DONE
 
@@ -95,8 +96,10 @@ def _plays(
     floors = [common.pop("floor_seed")]
     made = []
     for name in names:
-        own = common | {"detector": name, "detector_parameters": _parameters(options, name)}
-        plays = play_grid(source, scenes, [options.policy], [options.budget], floors, **own)
+        given = _parameters(options, name)
+        own = common | {"detector": name, "detector_parameters": given}
+        fed = source if options.sweeps else source_for(source, name, dict(given))
+        plays = play_grid(fed, scenes, [options.policy], [options.budget], floors, **own)
         plays[0].try_out()
         made.append(plays)
     return [list(plays) for plays in zip(*made, strict=True)]
@@ -117,14 +120,18 @@ def _parameters(options: Judge, detector: str) -> Parameters:
 
 
 def _tell(
-    options: Judge, judged: Mapping[str, Mapping[str, JudgedScene]], play: PlayConfig
+    options: Judge,
+    judged: Mapping[str, Mapping[str, JudgedScene]],
+    plays: Sequence[PlayConfig],
 ) -> None:
-    """Write tables, figure and numbers, and with --official all boxes; print the tables."""
+    """Write tables, figure and numbers, and with --official all boxes; print the tables. `plays`
+    are those of one scene.
+    """
     scenes = {name: [*own.values()] for name, own in judged.items()}
     first = next(iter(judged.values()))
     boxes = {name: [one.boxes for one in own] for name, own in scenes.items()}
     tables = detector_tables(scenes, options.least_scores, options.against)
-    told = _report(options, [*first], scenes, play)
+    told = _report(options, [*first], scenes, plays)
     write_text(options.out / _FIGURES, json.dumps(told, indent=1) + "\n")
     write_text(options.out / _TABLES, "\n".join(table.markdown() for table in tables))
     save(detectors_figure(boxes), options.out / DETECTORS_FIGURE)
@@ -144,13 +151,18 @@ def _tell(
 
 
 def _report(
-    options: Judge, names: Sequence[str], judged: Judged, play: PlayConfig
+    options: Judge, names: Sequence[str], judged: Judged, plays: Sequence[PlayConfig]
 ) -> dict[str, Any]:
     """Everything that the tables and the figure show, and what was played, as plain values."""
-    row = play.row()
+    rows = {play.detector: play.row() for play in plays}
+    row = rows[plays[0].detector]
+    # A detector may be fed other sweeps than another, which are other files of the recording.
+    shared = {n for n in row if all(other.get(n) == row[n] for other in rows.values())}
     return {
         "scenes": [*names],
-        "conditions": {n: row[n] for n in row if not n.startswith(("scene", "detector"))},
+        "conditions": {
+            n: row[n] for n in row if n in shared and not n.startswith(("scene", "detector"))
+        },
         "detector_parameters": [list(pair) for pair in parameters(options.detector_parameters)],
         "least_scores": list(options.least_scores),
         "versions": versions(),
@@ -158,6 +170,7 @@ def _report(
         "detectors": {
             name: _numbers(options, [one.boxes for one in own])
             | {"scan_ms": float(np.median(np.concatenate([one.scan_ms for one in own])))}
+            | {"sweeps": rows[name].get("sweeps", 1)}
             for name, own in judged.items()
         },
     }

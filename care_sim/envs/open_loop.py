@@ -147,6 +147,7 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         self.keyframes = []
         self._masks = []
         seeds = SensorSeeds(camera, lidar, odometry)
+        self._detector = self._detector.for_play()
         loop = OpenLoop(film, self.rig, self.conditions, seeds, self._detector)
         info = {"seed": seed, "scene": film.name} if self.scoring_info else {}
         return self._begin(loop, floor), info

@@ -1,14 +1,16 @@
 """The environments of the open loop by id: generated streets and recorded scenes."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from typing import Any
 
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.envs.open_loop import FilmEnv, OpenLoopEnv, check_film_arguments
 from care_sim.envs.sensing import Observed
+from care_sim.perception.detectors import PROXY
 from care_sim.sensors.setups import DEFAULT_SETUP, Sensor, sensor_setup
 from care_sim.sensors.surround import SURROUND_CAMERAS
+from care_sim.sources.feeding import source_for
 from care_sim.sources.named import replayed_source
 from care_sim.sources.scenes import Scene, film_of
 from care_sim.sources.street_films import check_filmed, street_film
@@ -53,7 +55,8 @@ class ReplayEnv(FilmEnv):
     own (`care_sim.sources.named`), and `scene` one of their scenes by name; the first, unless
     given.
     `split`, `version`, `camera_detections`, `sweeps`, `camera_times` and `empty_boxes` are those of
-    `care_sim.sources.nuscenes.recordings.NuScenes`. `sensor` is the set-up that sees the boxes of
+    `care_sim.sources.nuscenes.recordings.NuScenes`; without `sweeps` the detector gets as many as
+    it asks for. `sensor` is the set-up that sees the boxes of
     Boreas and KITTI, or that recorded the sweeps; `reference` and `topics` are those of
     `care_sim.sources.sweeps.recordings.Sweeps`. A file that is missing or damaged, or a token that
     points nowhere, raises `care_sim.InvalidInput` with its name. The seed of `reset` draws faults,
@@ -94,6 +97,10 @@ class ReplayEnv(FilmEnv):
             reference=reference,
             topics=topics,
         )
+        told = parameters.get("detector_parameters") or {}
+        # Other parameters than a map are refused below.
+        if sweeps is None and isinstance(told, Mapping):
+            recorded = source_for(recorded, parameters.get("detector", PROXY), told)
         scenes = recorded.scenes()
         # The source refuses a name that it does not have.
         named = (each for each in scenes if each.name == scene)

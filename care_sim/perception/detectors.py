@@ -6,13 +6,15 @@ a built-in name is taken.
 """
 
 import inspect
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from typing import Any
 
 from care_sim.base.checks import check_known
 from care_sim.base.errors import InvalidInput, MissingExtra, error_line, printable, shown
 from care_sim.base.plugins import Plugins
 from care_sim.perception.cluster.detector import ClusterDetector
+from care_sim.perception.lifetimes import kept_or_made
 from care_sim.perception.network_detectors import OnnxDetector, TorchScriptDetector
 from care_sim.perception.pillars.detector import PillarsDetector
 from care_sim.perception.points_only import (
@@ -75,8 +77,8 @@ def make_detector(name: str, sensor_height_m: float, /, **parameters: object) ->
     """The detector for a film whose LiDAR is `sensor_height_m` above the road.
 
     All but the proxies are handed points alone, whoever wrote them; of these the parameters
-    `sweeps` and `track_score` say how they are fed
-    (`care_sim.perception.points_only.PointDetector`). Raises InvalidInput for an
+    `sweeps` and `track_score` say how they are fed, and equal parameters give the same stateless
+    detector (`care_sim.perception.points_only.PointDetector`). Raises InvalidInput for an
     unknown name or parameter, or a value that is not allowed; BrokenDetector for one that cannot be
     loaded or made; MissingExtra for one whose library is not installed.
     """
@@ -87,7 +89,15 @@ def make_detector(name: str, sensor_height_m: float, /, **parameters: object) ->
     if name in PRIVILEGED:
         proxy: Detector = make(**own)
         return proxy
-    return PointsOnly(name, _point_detector(name, make, own), sensor_height_m, **fed)
+    detector = kept_or_made(make, own, partial(_point_detector, name, make, own))
+    again = partial(make_detector, name, sensor_height_m, **parameters)
+    return PointsOnly(name, detector, sensor_height_m, **fed, again=again)
+
+
+def sweeps_wanted(name: str, parameters: Mapping[str, object]) -> int:
+    """How many sweeps a detector asks for at a keyframe. Raises as `make_detector` does."""
+    # Nobody detects with it, so any height will do.
+    return 1 if name in PRIVILEGED else make_detector(name, 1.0, **parameters).gathers
 
 
 def detector_lines() -> list[str]:

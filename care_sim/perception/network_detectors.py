@@ -3,9 +3,10 @@ TorchScript or ONNX.
 """
 
 from collections.abc import Sequence
+from io import BytesIO
 from os import PathLike, fspath
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -130,27 +131,43 @@ class TorchScriptDetector(NetworkFile):
 
     `points` is a float32 tensor (P, k) with the `fields`, `sensor_height_m` a float; `classes`
     (n,), `boxes` (n, 7), `scores` (n,) and, as a fourth output, `velocities` (n, 2) are those of
-    `NetworkDetector.detections`. `device`: cpu, cuda, cuda:1. Needs torch.
+    `NetworkDetector.detections`. `device`: cpu, cuda, cuda:1. Stateless unless `forward` writes to
+    the module. Needs torch.
     """
 
     allowed = "a TorchScript module (torch.jit.save)"
 
     def _open(self, file: str, device: str) -> None:
-        self._torch = import_torch()
+        torch = import_torch()
         self._device = device
         self._check_file(file)
         try:
-            self._module = self._torch.jit.load(file, map_location=device).eval()
+            self._module = torch.jit.load(file, map_location=device).eval()
+            # In a frozen copy all is constant that no method writes.
+            frozen = torch.jit.freeze(self._module)
         except RuntimeError as error:
             raise InvalidInput(f"{file}: no TorchScript module for {device}") from error
+        self.stateless = not frozen.graph.findAllNodes("prim::GetAttr")
 
     def detect(self, points: Floats, sensor_height_m: float) -> Detections:
         """See `care_sim.perception.points_only.PointDetector`."""
+        torch = import_torch()
         # Nothing is learned here, so no gradients are kept.
-        with self._torch.inference_mode():
-            given = self._torch.from_numpy(self.points_for(points)).to(self._device)
+        with torch.inference_mode():
+            given = torch.from_numpy(self.points_for(points)).to(self._device)
             outputs = self._module(given, float(sensor_height_m))
         return self.detections(points, *(output.cpu().numpy() for output in outputs))
+
+    def __getstate__(self) -> dict[str, Any]:
+        # A module that writes to itself: the file has what it held at first.
+        written = BytesIO()
+        import_torch().jit.save(self._module, written)
+        return vars(self) | {"_module": written.getvalue()}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        written = BytesIO(state["_module"])
+        self._module = import_torch().jit.load(written, map_location=self._device)
 
 
 class OnnxDetector(NetworkFile):
@@ -162,6 +179,7 @@ class OnnxDetector(NetworkFile):
     """
 
     allowed = "an ONNX network"
+    stateless = True
 
     def _open(self, file: str, device: str) -> None:
         check_known("device", device, ("cpu", "cuda"))

@@ -4,8 +4,11 @@
 goes through it.
 """
 
+import pickle
 from abc import ABC, abstractmethod
-from typing import Any, Protocol
+from collections.abc import Callable
+from copy import deepcopy
+from typing import Any, Protocol, Self, SupportsIndex
 
 import numpy as np
 
@@ -26,6 +29,10 @@ class Detector(ABC):
 
     gathers: int = 1
     track_score: float = 0.0
+
+    def for_play(self) -> "Detector":
+        """Return the detector for a play that begins: this one, if it remembers no other play."""
+        return self
 
     def at(self, token: str, sensor: Frame) -> None:
         """Hear which keyframe of a film comes next, and where its sensor is."""
@@ -65,13 +72,19 @@ seconds since the point was measured, 0 or more, as CenterPoint counts.
 
 
 class PointDetector(Protocol):
-    """What a real detector is: sees the points of one keyframe, and remembers nothing of the one
-    before.
+    """A real detector: returns boxes from the points of one keyframe.
 
-    A class may say by attributes what it is fed; all of them are optional:
+    A detector is made anew for every play, so that it carries nothing from one play to the next.
+    Set `stateless = True` where an answer depends on the arguments of `detect` alone: not on
+    earlier calls, nor on random numbers of the process. A stateless detector is made once per
+    process and set of parameters, serves all plays there, and may be called by two threads at once.
+    A copy of an environment shares a stateless detector, and a pickle makes it again from its
+    parameters. Any other detector is copied and pickled with what it remembers.
+
+    Further attributes say what a detector is fed. All of them are optional:
 
     - `fields`: columns of the points, of `FIELDS`; x, y and z without it.
-    - `sweeps`: how many sweeps the closed loop gathers for it (1). A film has those of its source.
+    - `sweeps`: how many sweeps it is fed at a keyframe (1). In films, `--sweeps` counts before it.
     - `track_score`: the least score of a detection that becomes a track (0). All are exported.
     - `far`: whether it gets points beyond the reach of the grid, which a recorded LiDAR has (True).
     - `wants_poses`: whether `detect` gets the `poses` of the sweeps (False).
@@ -92,11 +105,19 @@ class PointDetector(Protocol):
         """
 
 
+def is_stateless(detector: object) -> bool:
+    """Whether a detector promises that its answers depend on what it is handed alone."""
+    return getattr(detector, "stateless", False) is True
+
+
 class PointsOnly(Detector):
     """Makes a `PointDetector` a `care_sim.perception.points_only.Detector`.
 
     The detector gets a copy of the points: neither objects nor boxes nor unfired cells can be
     reached from it. What it returns is copied and checked; only then the objects are named.
+
+    `again` makes the same once more, for another play or in another process. Without it one
+    detector serves all plays, and a pickle holds it whole.
     """
 
     def __init__(
@@ -106,9 +127,12 @@ class PointsOnly(Detector):
         sensor_height_m: float,
         sweeps: int | None = None,
         track_score: float | None = None,
+        again: Callable[[], Detector] | None = None,
     ):
         self._name = name
         self._detector = detector
+        self._again = again
+        self._has_played = False
         self._sensor_height_m = sensor_height_m
         self._fields = tuple(getattr(detector, "fields", FIELDS[:3]))
         for field in self._fields:
@@ -124,11 +148,18 @@ class PointsOnly(Detector):
         check_number(f"track_score of detector {name}", least, 0, 1)
         self.track_score = float(least)
 
+    def for_play(self) -> Detector:
+        """See `Detector`. A detector that is not stateless is made anew after its first play."""
+        if is_stateless(self._detector) or self._again is None or not self._has_played:
+            return self
+        return self._again()
+
     def detect(self, cloud: Cloud, annotations: Annotations) -> tuple[Detections, Integers]:
         """See `care_sim.perception.points_only.Detector`.
 
         Raises BrokenDetector where it fails or returns what is no detections.
         """
+        self._has_played = True
         poses = cloud.poses or (AT_KEYFRAME,)
         if self._far:
             cloud = cloud.whole
@@ -146,6 +177,32 @@ class PointsOnly(Detector):
             ) from error
         detections = checked(self._name, found, len(cloud))
         return detections, objects_behind(detections.boxes, cloud)
+
+    def __deepcopy__(self, copied: dict[int, Any]) -> Self:
+        # Within a process the weights are shared.
+        if is_stateless(self._detector):
+            return self
+        other = object.__new__(type(self))
+        copied[id(self)] = other
+        vars(other).update(vars(self) | {"_detector": self._copied(deepcopy, copied)})
+        return other
+
+    def __reduce_ex__(self, protocol: SupportsIndex) -> Any:
+        if is_stateless(self._detector) and self._again is not None:
+            return self._again, ()
+        # Once in vain, for a line that names the detector.
+        self._copied(pickle.dumps, protocol)
+        return super().__reduce_ex__(protocol)
+
+    def _copied(self, copy: Callable[..., Any], *how: object) -> Any:
+        """Copy the detector. Raises BrokenDetector where its class does not allow that."""
+        try:
+            return copy(self._detector, *how)
+        except Exception as error:
+            raise BrokenDetector(
+                f"detector {self._name} cannot be copied: {error_line(error)}; one with "
+                "`stateless = True` need not be"
+            ) from error
 
 
 def _column(cloud: Cloud, field: str) -> Floats | Integers:

@@ -45,11 +45,14 @@ def judge_scene(configs: Sequence[PlayConfig]) -> list[JudgedScene]:
 
     Raises InvalidInput where the film of the scene cannot be made.
     """
-    film = configs[0].film()
+    film, source = configs[0].film(), configs[0].source
     there = [_as_detections(shot.annotations) for shot in film.shots]
     true = _in_range(film, there, [np.zeros((len(one), 2)) for one in there])
     judged = []
     for config in configs:
+        # A detector may ask for more sweeps than another.
+        if config.source != source:
+            film, source = config.film(), config.source
         record = play_through_film(config, film)
         # The unsure ones count too: precision is a curve over scores.
         reports = [keyframe.reported for keyframe in record.keyframes]

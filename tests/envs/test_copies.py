@@ -10,7 +10,9 @@ import pytest
 import care_sim
 from care_sim.base.errors import InvalidInput
 from care_sim.envs.scenarios import ScenarioEnv
+from care_sim.perception import lifetimes
 from care_sim.scenarios.dartout import Dartout
+from tests.helpers.network_files import counting_script, mean_onnx, middle_script
 from tests.helpers.short_streets import few_and_short
 from tests.helpers.vectors import difference
 
@@ -44,24 +46,109 @@ def play(env, policy, observation, steps):
     return observation, dict(enumerate(told))
 
 
+def plays_on(name, policy, arguments):
+    """Return where two copies and their original first differ from a play that nobody copied."""
+    found = []
+    for copies in (False, True):
+        env = gymnasium.make(name, disable_env_checker=True, budget=0.05, **arguments)
+        both = env, care_sim.make_policy(policy, env)
+        observation, _ = env.reset(seed=3)
+        both[1].reset()
+        middle, _ = play(*both, observation, 3)
+        takes = (copy.deepcopy(both), pickle.loads(pickle.dumps(both))) if copies else ()
+        # The copies first: the original must not feel them.
+        for one in (*takes, both):
+            found.append(play(*one, middle, 5)[1])
+            one[0].close()
+    return [difference(one, found[0]) for one in found[1:]]
+
+
 @pytest.mark.parametrize(("name", "policy", "arguments"), CASES, ids=[name for name, *_ in CASES])
 def test_a_copy_and_the_original_play_on_as_if_alone(name, policy, arguments, drive):
     if name == "CARE-Replay-v0":
         arguments = arguments | {"source": f"argoverse2:{drive}"}
     with few_and_short():
-        found = []
-        for copies in (False, True):
-            env = gymnasium.make(name, disable_env_checker=True, budget=0.05, **arguments)
-            both = env, care_sim.make_policy(policy, env)
-            observation, _ = env.reset(seed=3)
-            both[1].reset()
-            middle, _ = play(*both, observation, 3)
-            takes = (copy.deepcopy(both), pickle.loads(pickle.dumps(both))) if copies else ()
-            # The copies first: the original must not feel them.
-            for one in (*takes, both):
-                found.append(play(*one, middle, 5)[1])
-                one[0].close()
-    assert [difference(one, found[0]) for one in found[1:]] == [None] * 3
+        assert plays_on(name, policy, arguments) == [None] * 3
+
+
+def torchscript(tmp_path):
+    return {"detector": "torchscript"} | given(middle_script(tmp_path / "middle.pt"))
+
+
+def torchscript_that_counts(tmp_path):
+    return {"detector": "torchscript"} | given(counting_script(tmp_path / "counting.pt"))
+
+
+def onnx(tmp_path):
+    pytest.importorskip("onnx")
+    file = mean_onnx(tmp_path / "mean.onnx")
+    return {"detector": "onnx"} | given(file, fields="x,y,z,intensity")
+
+
+def a_class_that_counts(_tmp_path):
+    return {"detector": "tests.perception.test_lifetimes:Counting"}
+
+
+def given(file, **others):
+    return {"detector_parameters": {"file": file} | others}
+
+
+NETWORKS = [torchscript, torchscript_that_counts, onnx, a_class_that_counts]
+
+
+@pytest.mark.filterwarnings("ignore:.*torch.jit.*:DeprecationWarning")
+@pytest.mark.parametrize("made", NETWORKS)
+@pytest.mark.parametrize("name", ["CARE-Dartout-v0", "CARE-Street-v0"])
+def test_a_detector_is_copied_with_what_it_remembers(name, made, tmp_path):
+    pytest.importorskip("torch")
+    with few_and_short():
+        assert plays_on(name, "care", made(tmp_path)) == [None] * 3
+
+
+@pytest.mark.parametrize("made", [torchscript, onnx])
+@pytest.mark.filterwarnings("ignore:.*torch.jit.*:DeprecationWarning")
+def test_copies_share_the_weights_and_a_pickle_opens_the_file_again(made, tmp_path):
+    pytest.importorskip("torch")
+    arguments = made(tmp_path)
+    with gymnasium.make("CARE-Dartout-v0", **arguments) as env:
+        network = env.unwrapped._detector._detector
+        assert copy.deepcopy(env).unwrapped._detector._detector is network
+        packed = pickle.dumps(env)
+    assert pickle.loads(packed).unwrapped._detector._detector is network
+    lifetimes._KEPT.clear()
+    again = pickle.loads(packed).unwrapped._detector._detector
+    assert (type(again), again is network) == (type(network), False)
+    # In processes of their own, which have no network of their parent.
+    worlds = gymnasium.make_vec(
+        "CARE-Dartout-v0", 2, vectorization_mode="async", disable_env_checker=True, **arguments
+    )
+    worlds.reset(seed=[0, 0])
+    first, second = worlds.step(worlds.action_space.low)[0]["tracks"]
+    assert first[0, 0] >= 0
+    assert (first == second).all()
+    worlds.close()
+
+
+class Closed:
+    """A detector that holds what nobody can copy."""
+
+    def __init__(self):
+        self._file = open(__file__)  # noqa: SIM115
+
+    def detect(self, points, sensor_height_m):
+        raise NotImplementedError
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, pickle.dumps])
+def test_a_detector_that_cannot_be_copied_is_named_in_one_line(copied):
+    with gymnasium.make("CARE-Dartout-v0", detector=f"{__name__}:Closed") as env:
+        with pytest.raises(InvalidInput) as refused:
+            copied(env)
+        env.unwrapped._detector._detector._file.close()
+    assert str(refused.value) == (
+        f"detector {__name__}:Closed cannot be copied: TypeError: cannot pickle "
+        "'_io.TextIOWrapper' object; one with `stateless = True` need not be"
+    )
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,8 @@ neither OpenPCDet nor mmdetection3d can be installed where these tests run.
 """
 
 import sys
+from contextlib import contextmanager
+from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
 import numpy as np
@@ -15,7 +17,10 @@ from tests.helpers.places import EXAMPLES, loaded
 
 torch = pytest.importorskip("torch")
 
+yaml = pytest.importorskip("yaml")
+
 NAMES = ["car", "truck", "barrier", "pedestrian"]
+RANGE = [-51.2, -51.2, -5.0, 51.2, 51.2, 3.0]
 CLOUD = Cloud(
     np.array([3, 4]),
     np.array([[10.0, 2.0, -1.0], [10.2, 2.0, -1.0]]),
@@ -49,54 +54,80 @@ def modules(monkeypatch, **contents):
             monkeypatch.setattr(sys.modules[".".join(parts)], key, value, raising=False)
 
 
-def pcdet(monkeypatch):
+class Settings(dict):
+    """Of the interface of EasyDict."""
+
+    def __getattr__(self, name):
+        if name in self:
+            return self[name]
+        raise AttributeError(name)
+
+
+def merged(config, new_config):
+    """A base comes from the current folder."""
+    if "_BASE_CONFIG_" in new_config:
+        config.update(yaml.safe_load(Path(new_config["_BASE_CONFIG_"]).read_text()))
+    for key, value in new_config.items():
+        if isinstance(value, dict):
+            config[key] = merged(config.get(key, Settings()), value)
+        else:
+            config[key] = value
+    return config
+
+
+def pcdet(monkeypatch, answers=answer):
     class Network(torch.nn.Module):
         def load_params_from_file(self, checkpoint, logger, to_cpu):
             assert (checkpoint, to_cpu) == ("net.pth", True)
 
         def forward(self, batch):
-            boxes = answer(batch["points"][:, 1:], -1.0)
+            assert batch["batch_size"] == 1
+            boxes = answers(batch["points"][:, 1:], -1.0)
             labels, scores = torch.tensor([4, 3]), torch.tensor([0.9, 0.8])
             return [{"pred_boxes": boxes, "pred_labels": labels, "pred_scores": scores}], {}
 
     class Data:
         def __init__(self, config, names, training, logger):
             assert (names, training) == (NAMES, False)
+            self.point_cloud_range = np.array(config["POINT_CLOUD_RANGE"], np.float32)
 
         def prepare_data(self, given):
-            return given
+            points = given["points"]
+            assert (np.abs(points[:, :2]) < 51.2).any()
+            return given | {"points": points[np.random.permutation(len(points))]}  # noqa: NPY002
 
         def collate_batch(self, given):
             (one,) = given
             points = one["points"]
-            return {"points": np.column_stack([np.zeros(len(points)), points]), "batch_size": 1}
+            return {
+                "points": np.column_stack([np.zeros(len(points)), points]),
+                "frame_id": np.array([0]),
+                "batch_size": 1,
+            }
 
-    def to_gpu(batch):
-        batch["points"] = torch.from_numpy(batch["points"]).float()
-
-    settings = SimpleNamespace(CLASS_NAMES=NAMES, DATA_CONFIG={}, MODEL={})
     modules(
         monkeypatch,
-        pcdet__config={"cfg": None, "cfg_from_yaml_file": lambda file, cfg: settings},
+        pcdet__config={"cfg": Settings(ROOT_DIR=Path("nowhere")), "merge_new_config": merged},
         pcdet__datasets={"DatasetTemplate": Data},
-        pcdet__models={"build_network": lambda *_, **__: Network(), "load_data_to_gpu": to_gpu},
+        pcdet__models={"build_network": lambda *_, **__: Network()},
         pcdet__utils__common_utils={"create_logger": lambda: None},
     )
     monkeypatch.setattr(
         sys.modules["pcdet.utils"], "common_utils", sys.modules["pcdet.utils.common_utils"],
         raising=False,
     )  # fmt: skip
-    return loaded(EXAMPLES / "openpcdet_detector.py").OpenPCDet("net.yaml", "net.pth", "cpu")
+    return loaded(EXAMPLES / "openpcdet_detector.py").OpenPCDet
 
 
-def mmdet3d(monkeypatch):
+def mmdet3d(monkeypatch, answers=answer):
     class Network:
         dataset_meta = {"classes": tuple(NAMES)}  # noqa: RUF012 (as the framework has it)
+        data_preprocessor = SimpleNamespace(voxel_layer=SimpleNamespace(point_cloud_range=RANGE))
 
         def test_step(self, data):
             (points,), (sample,) = data["inputs"]["points"], data["data_samples"]
             assert sample.metainfo == {"box_type_3d": "boxes"}
-            boxes = answer(points, -1.9)
+            boxes = answers(points, -1.9)
             found = SimpleNamespace(
                 bboxes_3d=SimpleNamespace(tensor=boxes),
                 labels_3d=torch.tensor([3, 2]),
@@ -112,12 +143,29 @@ def mmdet3d(monkeypatch):
             "LiDARInstance3DBoxes": "boxes",
         },
     )
-    return loaded(EXAMPLES / "mmdet3d_detector.py").MMDet3D("net.py", "net.pth", "cpu")
+    return loaded(EXAMPLES / "mmdet3d_detector.py").MMDet3D
 
 
-@pytest.mark.parametrize("made", [pcdet, mmdet3d])
-def test_a_framework_gets_its_columns_and_its_boxes_come_back(made, monkeypatch):
-    detector = PointsOnly("theirs", made(monkeypatch), 1.84)
+FRAMEWORKS = [pcdet, mmdet3d]
+
+
+@pytest.fixture
+def config(tmp_path):
+    """Of a network, in a folder as that of OpenPCDet."""
+    base = tmp_path / "tools" / "cfgs" / "dataset_configs" / "nuscenes.yaml"
+    own = tmp_path / "tools" / "cfgs" / "models" / "net.yaml"
+    for file in (base, own):
+        file.parent.mkdir(parents=True)
+    base.write_text(yaml.safe_dump({"POINT_CLOUD_RANGE": RANGE}))
+    named = {"DATA_CONFIG": {"_BASE_CONFIG_": "cfgs/dataset_configs/nuscenes.yaml"}}
+    own.write_text(yaml.safe_dump({"CLASS_NAMES": NAMES, "MODEL": {}} | named))
+    return str(own)
+
+
+@pytest.mark.parametrize("framework", FRAMEWORKS)
+def test_a_framework_gets_its_columns_and_its_boxes_come_back(framework, config, monkeypatch):
+    made = framework(monkeypatch)(config, "net.pth", "cpu")
+    detector = PointsOnly("theirs", made, 1.84)
     assert (detector.gathers, detector.track_score) == (10, 0.3)
     found, objects = detector.detect(CLOUD, NO_ANNOTATIONS)
     assert [CLASSES[label] for label in found.classes] == ["pedestrian"]
@@ -126,3 +174,89 @@ def test_a_framework_gets_its_columns_and_its_boxes_come_back(made, monkeypatch)
     assert found.velocities[0] == pytest.approx([1.5, 0.0], abs=1e-6)
     assert found.scores.tolist() == pytest.approx([0.9])
     assert objects.tolist() == [7]
+
+
+def first_point(points, z):
+    """A box of the size of the first point's place, and another."""
+    seen.append(points.clone())
+    x, y, *_ = points[0].tolist()
+    return torch.tensor([[x, y, z, 0.6, 0.6, 1.8, 0.0], [0, 0, 0, 1, 1, 1, 0]])
+
+
+seen = []
+
+
+@pytest.mark.parametrize("framework", FRAMEWORKS)
+def test_a_network_may_have_columns_and_axes_of_its_own(framework, config, monkeypatch):
+    kind = framework(monkeypatch, first_point)
+    own = {"fields": "x,y,z,intensity", "axes": "forward", "full_intensity": 1}
+    made = kind(config, "net.pth", "cpu", **own)
+    PointsOnly("theirs", made, 1.84).detect(CLOUD, NO_ANNOTATIONS)
+    assert sorted(seen[-1].tolist()) == [
+        pytest.approx([10.0, 2.0, -1.0, 0.5]),
+        pytest.approx([10.2, 2.0, -1.0, 0.5]),
+    ]
+
+
+@pytest.mark.parametrize("framework", FRAMEWORKS)
+@pytest.mark.parametrize("places", [[], [[80.0, 0.0, -1.0]], [[10.0, 0.0, 9.0]]])
+def test_a_scan_without_a_point_in_reach_asks_nobody(framework, places, config, monkeypatch):
+    made = framework(monkeypatch, None)(config, "net.pth", "cpu")
+    cells = np.arange(len(places))
+    cloud = Cloud(cells, np.array(places).reshape(-1, 3), cells)
+    found, _ = PointsOnly("theirs", made, 1.84).detect(cloud, NO_ANNOTATIONS)
+    assert len(found) == 0
+
+
+@pytest.mark.parametrize("framework", FRAMEWORKS)
+def test_a_second_device_is_used_for_everything(framework, config, monkeypatch):
+    current, used = ["cuda:0"], []
+
+    @contextmanager
+    def device(of):
+        current.append(str(of))
+        yield
+        current.pop()
+
+    def answers(points, z):
+        used.append(current[-1])
+        return first_point(points, z)
+
+    def moved(own, to):
+        used.append(str(to))
+        return own
+
+    kind = framework(monkeypatch, answers)
+    for part in (torch.nn.Module, torch.Tensor):
+        monkeypatch.setattr(part, "to", moved)
+    monkeypatch.setattr(torch.cuda, "device", device)
+    made = kind(config, "net.pth", "cuda:1")
+    PointsOnly("theirs", made, 1.84).detect(CLOUD, NO_ANNOTATIONS)
+    assert {*used} == {"cuda:1"}
+    assert current == ["cuda:0"]
+
+
+def test_shuffled_points_are_shuffled_alike_and_leave_the_generator_of_others(config, monkeypatch):
+    made = pcdet(monkeypatch, first_point)(config, "net.pth", "cpu")
+    points = np.random.default_rng(0).uniform(-9, 0, (50, 5))
+    np.random.seed(7)  # noqa: NPY002 (whom others may use)
+    first = np.random.random()  # noqa: NPY002
+    places = [made.detect(points, 1.8).boxes.tolist()]
+    np.random.seed(7)  # noqa: NPY002
+    places.append(made.detect(points, 1.8).boxes.tolist())
+    assert places[0] == places[1]
+    assert np.random.random() == first  # noqa: NPY002
+
+
+def test_two_configs_in_a_process_do_not_mix(config, monkeypatch):
+    kind = pcdet(monkeypatch, first_point)
+    first = kind(config, "net.pth", "cpu")
+    small = Path(config).with_name("small.yaml")
+    told = yaml.safe_load(Path(config).read_text()) | {
+        "DATA_CONFIG": {"POINT_CLOUD_RANGE": [-5, -5, -5, 5, 5, 5]}
+    }
+    small.write_text(yaml.safe_dump(told))
+    second = kind(str(small), "net.pth", "cpu")
+    points = np.array([[10.0, 2.0, -1.0, 0.5, 0.0]])
+    assert [len(each.detect(points, 1.8)) for each in (first, second)] == [1, 0]
+    assert [*sys.modules["pcdet.config"].cfg] == ["ROOT_DIR"]

@@ -12,6 +12,7 @@ from care_sim.perception.detectors import DETECTORS, detector_names, make_detect
 from care_sim.perception.points_only import BrokenDetector, PointsOnly
 from care_sim.sensors.annotated import Annotations, Cloud
 from tests.helpers.made_points import HEIGHT, shell
+from tests.helpers.network_files import middle_script
 
 POINTS = shell(8, 6, 0.4, 4.61, 1.95, 1.72)
 CLOUD = Cloud(np.arange(len(POINTS)), POINTS, np.full(len(POINTS), 3))
@@ -135,29 +136,10 @@ def test_names_and_parameters_are_checked(name, parameters, line):
         make_detector(name, HEIGHT, **parameters)
 
 
-def scripted(torch, path):
-    """A module that sees one person amid the points, or none where there are no points; in training
-    it is unsure.
-    """
-
-    class Middle(torch.nn.Module):
-        def forward(self, points: torch.Tensor, sensor_height_m: float):
-            assert points.dtype == torch.float32
-            if points.shape[0] == 0:
-                return torch.zeros(0, dtype=torch.int64), torch.zeros(0, 7), torch.zeros(0)
-            x, y = points[:, 0].mean(), points[:, 1].mean()
-            rest = torch.tensor([0.9 - sensor_height_m, 4.0, 4.0, 4.0, 0.0])
-            boxes = torch.cat([torch.stack([x, y]), rest]).unsqueeze(0)
-            return torch.tensor([4]), boxes, torch.tensor([0.0 if self.training else 0.75])
-
-    torch.jit.script(Middle()).save(str(path))
-    return path
-
-
 @pytest.mark.filterwarnings("ignore:.*torch.jit.*:DeprecationWarning")
 def test_a_torchscript_file_detects(tmp_path):
-    torch = pytest.importorskip("torch")
-    detector = make_detector("torchscript", HEIGHT, file=scripted(torch, tmp_path / "middle.pt"))
+    pytest.importorskip("torch")
+    detector = make_detector("torchscript", HEIGHT, file=middle_script(tmp_path / "middle.pt"))
     found, objects = detector.detect(CLOUD, CAR)
     assert (found.classes.tolist(), found.scores.tolist(), objects.tolist()) == ([4], [0.75], [3])
     assert found.boxes[0, :3] == pytest.approx([*POINTS.mean(axis=0)[:2], 0.9 - HEIGHT], abs=1e-5)

@@ -5,7 +5,10 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.types import CLASSES
+from care_sim.perception.detectors import make_detector
 from care_sim.perception.network_detectors import NetworkDetector
+from care_sim.sensors.annotated import NO_ANNOTATIONS, NO_OBJECT, Cloud
+from tests.helpers.places import ROOT, fenced, loaded
 
 NUSCENES = "car,truck,construction_vehicle,bus,trailer,barrier,motorcycle,bicycle,pedestrian"
 POINTS = np.array([[10.0, 2.0, -1.0, 0.5, 0.1], [10.5, 2.0, -1.0, 0.25, 0.2]])
@@ -63,3 +66,20 @@ def test_a_label_beyond_the_classes_is_named():
         InvalidInput, match="answers the labels 9 to 9, and its classes have 0 to 8"
     ):
         network().detections(POINTS, [9], np.ones((1, 7)), [1.0])
+
+
+@pytest.mark.filterwarnings("ignore:.*torch.jit.*:DeprecationWarning")
+def test_the_network_of_the_page_is_a_detector(tmp_path, monkeypatch):
+    pytest.importorskip("torch")
+    block, *_ = fenced(ROOT / "docs" / "write" / "your-detector.md", "py")
+    (tmp_path / "export.py").write_text(block)
+    monkeypatch.chdir(tmp_path)
+    loaded(tmp_path / "export.py")
+    detector = make_detector("torchscript", 1.8, file="net.pt")
+    road, high = [4.0, 0.0, -1.8], [10.2, 2.6, -0.5]
+    cloud = Cloud(np.arange(3), np.array([road, high, high]), np.full(3, NO_OBJECT))
+    found, _ = detector.detect(cloud, NO_ANNOTATIONS)
+    assert [CLASSES[label] for label in found.classes] == ["pedestrian"]
+    assert found.boxes[0] == pytest.approx([10.5, 2.5, -0.9, 0.7, 0.7, 1.8, 0.0])
+    assert found.scores == pytest.approx([0.1])
+    assert len(detector.detect(cloud.take(np.zeros(3, bool)), NO_ANNOTATIONS)[0]) == 0

@@ -124,8 +124,9 @@ class SourceOptions(RecordingOptions):
     """For nuScenes: a file with the boxes of a camera detector, in nuScenes or COCO results
     form."""
     sweeps: int | None = None
-    """For nuScenes: sweeps that a detector gets at a keyframe, 1 unless given. 2 adds the sweep
-    before, fired by the mask of the keyframe before."""
+    """For nuScenes: sweeps per keyframe that a detector gets; without this option as many as the
+    detector asks for, mostly 1. 2 adds the sweep before, fired by the mask of the keyframe before.
+    """
     camera_times: str | None = None
     """For nuScenes: own (the default: each camera at the time of its picture) or sweep (all at the
     time of the sweep)."""

@@ -16,6 +16,7 @@ from care_sim.commands.shared.selection import arguments_of
 from care_sim.core.conditions import DEFAULTS, OF_BOTH_LOOPS, ClosedLoopConditions
 from care_sim.reports.episodes.clips import Clip
 from care_sim.sensors.setups import DEFAULT_SETUP
+from care_sim.sources.feeding import source_for
 from care_sim.sources.installed import SOURCES, means_source
 from care_sim.sources.named import source_name, source_of
 from care_sim.sources.recordings import Recordings
@@ -61,6 +62,7 @@ def maker_of(
         if field.name not in OF_BOTH_LOOPS and given.pop(field.name) != DEFAULTS[field.name]:
             option = field.name.replace("_", "-")
             raise InvalidInput(f"--{option} has no meaning in the open loop")
+    source = source_for(source, options.detector, dict(given["detector_parameters"]))
     floors, scene = [given.pop("floor_seed")], scene_of(options, source)
     return lambda names: play_grid(source, [scene], names, [budget], floors, **given)
 

@@ -14,7 +14,12 @@ from care_sim.base.errors import (
     report_problems,
 )
 from care_sim.base.plugins import scenario_of
-from care_sim.commands.options.shared import EpisodeOptions, PlayOptions, SourceOptions
+from care_sim.commands.options.shared import (
+    DetectorOptions,
+    EpisodeOptions,
+    PlayOptions,
+    SourceOptions,
+)
 from care_sim.core.conditions import DEFAULTS
 from care_sim.policies import check_policy, contenders
 from care_sim.scenarios import PLUGINS, SCENARIOS, make_scenario, scenario_names
@@ -153,15 +158,22 @@ def common_of(options: PlayOptions, policies: Sequence[str]) -> dict[str, Any]:
 
 
 def source_named(options: SourceOptions, text: str) -> "Source":
-    """The source that a text and the options name. Raises InvalidInput if there is none."""
+    """The source that a text and the options name. Without --sweeps a detector that they name is
+    fed as many as it asks for. Raises InvalidInput if there is no such source.
+    """
     # Imported here because the kinds of recordings load SciPy and PyArrow.
+    from care_sim.sources.feeding import source_for
     from care_sim.sources.installed import SOURCES
     from care_sim.sources.named import source_of
 
     # If two sources have one name, a line says which plays.
     kind = text.partition(":")[0]
     report_problems([line for one, line in SOURCES.refusals() if one.name == kind])
-    return source_of(text, **{name: getattr(options, name) for name in options.source_options()})
+    given = {name: getattr(options, name) for name in options.source_options()}
+    source = source_of(text, **given)
+    if not isinstance(options, DetectorOptions) or "sweeps" in given:
+        return source
+    return source_for(source, options.detector, dict(parameters(options.detector_parameters)))
 
 
 def named_after(command: str, played: str) -> str:

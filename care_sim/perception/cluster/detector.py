@@ -55,6 +55,7 @@ class ClusterDetector:
     """
 
     far = False
+    stateless = True
 
     def __init__(self, grid: AngularGrid = _GRID):
         self._grid = grid

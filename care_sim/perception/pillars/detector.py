@@ -85,6 +85,7 @@ class PillarsDetector:
     """
 
     far = False
+    stateless = True
 
     def __init__(self, file: str | PathLike[str] | None = None, least_score: float = LEAST_SCORE):
         check_number("least_score", least_score, 0.0, 1.0)

@@ -4,6 +4,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import OF_BOTH_LOOPS
 from care_sim.envs.open_loop import UNFILMED
 from care_sim.sensors.setups import setup_of_columns
+from care_sim.sources.feeding import with_sweeps
 from care_sim.sources.installed import RECORDING_KINDS
 from care_sim.sources.named import source_of
 from care_sim.sources.scenes import SPLITS, Scene, Source, Streets
@@ -38,6 +39,9 @@ def play_config_of(row: Row, source: Source | None) -> PlayConfig:
     the row names. Raises InvalidInput, too, where the scene is not found there, or is another.
     """
     own = _source(row) if source is None or source.kind != row["source"] else source
+    # The row knows how many sweeps a detector asked for.
+    if sweeps := row.get("sweeps"):
+        own = with_sweeps(own, sweeps) or own
     scene = _scene(row, own)
     for name, value in own.row(scene).items():
         if row.get(name) != value:
