@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from care_sim.core.types import CLASSES
-from care_sim.sensors.kitti.draws import Renewals
 from care_sim.sensors.kitti.detector import Draws, report
 from care_sim.sensors.kitti.inventions import MOST, PAIRS, Chance
 from care_sim.sensors.kitti.labels import KINDS, Labels, covered
