@@ -121,7 +121,7 @@ def overlaps(ours, theirs):
 
 
 def matched(told, found, excused=True):
-    """(m,) the label of each box, -1 of false ones and -2 of those that an unmeasured label excuses.
+    """(m,) the label of each box, -1 of false ones, -2 of those that an unmeasured label excuses.
 
     The surest box first takes the label of its class that it overlaps most, from 0.5.
     """

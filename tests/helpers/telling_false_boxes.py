@@ -6,7 +6,15 @@ import numpy as np
 from sklearn.ensemble import HistGradientBoostingClassifier
 from sklearn.metrics import roc_auc_score
 
+from care_sim.core.types import ImageDetections
+from care_sim.envs.open_loop import FilmEnv
+from care_sim.sensors.annotated import NO_OBJECT
+from care_sim.sources.street_films import record
+from care_sim.streets.street import make_street
 from tests.helpers.kitti_object import overlaps
+
+VERTICAL = (3, 5, 9, 11)
+"""Columns of `visible` that tell how high in the picture a box is."""
 
 
 def visible(rows):
@@ -35,9 +43,11 @@ def visible(rows):
     return np.column_stack([label, logit, rows[:, 2:6], size, parts, among])
 
 
-def area_under_the_curve(rows, false, half):
-    """Mean over both ways: learned from one `half` (n,) 0 or 1 of the boxes, asked of the other."""
-    seen = visible(rows)
+def area_under_the_curve(rows, false, half, left_out=()):
+    """Mean over both ways: learned from one `half` (n,) 0 or 1 of the boxes, asked of the other.
+    The columns `left_out` are not shown.
+    """
+    seen = np.delete(visible(rows), left_out, axis=1)
     areas = []
     for part in (0, 1):
         model = HistGradientBoostingClassifier(
@@ -51,3 +61,32 @@ def area_under_the_curve(rows, false, half):
         chances = model.predict_proba(seen[half == part])[:, 1]
         areas.append(roc_auc_score(false[half == part], chances))
     return float(np.mean(areas))
+
+
+def boxes_of_streets(seeds, episodes, profile="kitti"):
+    """All boxes (n, 7) that observations of streets show, which are false, and the street of each
+    from 0.
+    """
+    parts = [_boxes_of_street(seed, episodes, profile) for seed in seeds]
+    streets = np.repeat(np.arange(len(parts)), [len(rows) for rows, _ in parts])
+    pictures = np.cumsum([0, *(rows[:, 6].max() + 1 for rows, _ in parts)])
+    rows = np.concatenate([rows for rows, _ in parts])
+    rows[:, 6] += pictures[streets]
+    return rows, np.concatenate([false for _, false in parts]), streets
+
+
+def _boxes_of_street(seed, episodes, profile):
+    env = FilmEnv(record(make_street(seed)), budget=0.01, camera_profile=profile)
+    rows, false = [], []
+    for episode in range(episodes):
+        observation, _ = env.reset(seed=episode)
+        over = False
+        while not over:
+            shown = observation["detections"][observation["detections"][:, 0] >= 0].astype(float)
+            behind = env.unwrapped.loop.true_detected_objects()
+            pictures = shown[:, ImageDetections.CAMERA] + 6 * len(rows)
+            rows.append(np.column_stack([shown[:, :6], pictures]))
+            false.append(behind == NO_OBJECT)
+            observation, _, ended, cut, _ = env.step(np.zeros(env.action_space.shape, np.float32))
+            over = ended or cut
+    return np.concatenate(rows), np.concatenate(false)

@@ -1,4 +1,4 @@
-"""Chance of the profile `kitti`: how long it lasts, and that hashes are as good as drawn numbers."""
+"""Chance of the profile `kitti`: how long it lasts, and that hashes are even and normal."""
 
 import numpy as np
 import pytest

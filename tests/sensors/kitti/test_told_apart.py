@@ -5,12 +5,7 @@ detector, no better and no worse, by a gradient-boosted classifier on all that i
 import numpy as np
 import pytest
 
-from care_sim.core.types import ImageDetections
-from care_sim.envs.open_loop import FilmEnv
-from care_sim.sensors.annotated import NO_OBJECT
 from care_sim.sensors.kitti.numbers import measured
-from care_sim.sources.street_films import record
-from care_sim.streets.street import make_street
 from tests.helpers.kitti_object import kitti_pictures, matched, needs_kitti, simulated
 
 CONFIDENCE = 0.25
@@ -67,30 +62,9 @@ def test_on_kittis_pictures_they_are_told_as_well_as_the_real_ones(area):
     assert by_pictures(area, mixed, kinds) < REAL - POINTS
 
 
-def shown_boxes(seed, episodes):
-    """All boxes (n, 7) that observations of a street show, and which are false."""
-    env = FilmEnv(record(make_street(seed)), budget=0.01, camera_profile="kitti")
-    rows, false = [], []
-    for episode in range(episodes):
-        observation, _ = env.reset(seed=episode)
-        over = False
-        while not over:
-            shown = observation["detections"][observation["detections"][:, 0] >= 0].astype(float)
-            behind = env.unwrapped.loop.true_detected_objects()
-            pictures = shown[:, ImageDetections.CAMERA] + 6 * len(rows)
-            rows.append(np.column_stack([shown[:, :6], pictures]))
-            false.append(behind == NO_OBJECT)
-            observation, _, ended, cut, _ = env.step(np.zeros(env.action_space.shape, np.float32))
-            over = ended or cut
-    return np.concatenate(rows), np.concatenate(false)
-
-
 def test_on_rendered_streets_they_are_told_as_published(area):
     """Streets that the classifier has not seen."""
-    parts = [shown_boxes(seed, episodes=3) for seed in range(3000, 3006)]
-    streets = np.repeat(np.arange(len(parts)), [len(rows) for rows, _ in parts])
-    pictures = np.cumsum([0, *(rows[:, 6].max() + 1 for rows, _ in parts)])
-    rows = np.concatenate([rows for rows, _ in parts])
-    rows[:, 6] += pictures[streets]
-    found = area(rows, np.concatenate([false for _, false in parts]), streets % 2)
-    assert found == pytest.approx(STREETS, abs=0.01)
+    from tests.helpers.telling_false_boxes import boxes_of_streets
+
+    rows, false, streets = boxes_of_streets(range(3000, 3004), episodes=3)
+    assert area(rows, false, streets % 2) == pytest.approx(STREETS, abs=0.012)
