@@ -34,7 +34,7 @@ from care_sim.sensors.kitti.inventions import (
     add_scene,
 )
 from care_sim.sensors.kitti.labels import Labels, labels_of, pictures_of
-from care_sim.sensors.kitti.numbers import Numbers, measured
+from care_sim.sensors.kitti.numbers import FOCAL_PX, Numbers, measured
 from care_sim.sensors.kitti.recall import features, score_logits, score_of
 
 EDGES = 4
@@ -66,11 +66,11 @@ class KittiDetector:
         seeds: Sequence[np.random.SeedSequence],
     ):
         luck, edges, false, key = (np.random.default_rng(seed) for seed in seeds)
-        self._focal_px, self._numbers, times = measured()
+        self._numbers, times = measured()
         self._objects = objects
         self._order = np.argsort(objects)
         self._cameras = cameras
-        self._pictures = pictures_of(cameras, self._focal_px)
+        self._pictures = pictures_of(cameras, FOCAL_PX)
         self._luck = PersistentNormals(
             len(objects), [0.0], [times.luck_share], [times.luck_s], keyframe_s, luck
         )
@@ -107,8 +107,8 @@ class KittiDetector:
         draws = Draws(luck, edges, key, false)
 
         places = self._order[np.searchsorted(self._objects, seen.objects, sorter=self._order)]
-        labels = labels_of(seen, boxes[places], places, self._cameras, self._focal_px)
-        scales = np.array([self._focal_px / camera.focal for camera in self._cameras])
+        labels = labels_of(seen, boxes[places], places, self._cameras, FOCAL_PX)
+        scales = np.array([FOCAL_PX / camera.focal for camera in self._cameras])
         cameras = lent[:, ImageDetections.CAMERA].astype(np.int64)
         edges_lent = lent[:, ImageDetections.BOX] * scales[cameras][:, None]
         others = lent[:, ImageDetections.CLASS].astype(np.int64), edges_lent, cameras

@@ -16,7 +16,7 @@ from care_sim.core.arrays import Floats, Integers
 from care_sim.sensors.kitti.draws import key_of, normal, uniform
 from care_sim.sensors.kitti.errors import copy_box, iou, lay_clipped, lay_erring, resembles
 from care_sim.sensors.kitti.labels import KINDS, Labels
-from care_sim.sensors.kitti.numbers import CAR, CLASS_OF, Numbers
+from care_sim.sensors.kitti.numbers import CAR, CLASS_OF, FOCAL_PX, Numbers
 
 MOST = 3
 """False boxes of one kind beside an object, and of the background of a picture."""
@@ -37,7 +37,6 @@ EDGE_PX = 20.0, 36.0, 23.0
 FITTED_HALF_PX, FITTED_BELOW_PX = 621.0, 202.1
 """Half the width of KITTI's pictures, and how far they reach below the horizon."""
 
-_FOCAL_PX = 721.5
 _KINDS = tuple(KINDS.tolist())
 
 
@@ -229,7 +228,7 @@ def _place_scene(
         high = 50 * math.exp(drawn[0])
         # Cut boxes lie at the edges: their places are relative to the picture's.
         ahead = picture[0] / 2 / FITTED_HALF_PX if cut else 1.0
-        middle = picture[2] + _FOCAL_PX * drawn[3] * ahead
+        middle = picture[2] + FOCAL_PX * drawn[3] * ahead
         foot = picture[3] + drawn[2] * (100.0 if cut else high)
         box = into.edges[at]
         _lay(middle, foot, (high * math.exp(drawn[1]), high), picture, box)
@@ -303,7 +302,7 @@ def _reach_edges(box: Floats, foot: float, picture: Floats) -> bool:
         box[2] = picture[0]
     if box[3] > picture[1] - below:
         box[3] = picture[1]
-    return near_left or near_right or foot > picture[3] + FITTED_BELOW_PX - below
+    return bool(near_left or near_right or foot > picture[3] + FITTED_BELOW_PX - below)
 
 
 @compiled()
@@ -343,9 +342,11 @@ def _likely(mixture: Floats, last: float) -> Floats:
         spread = mixture[n, 2 * columns]
         away = (last - mixture[n, columns]) / spread
         weights[n] = mixture[n, 0] * math.exp(-away * away / 2) / spread
-    if weights.sum() <= 0:
-        return mixture[:, 0].copy()
-    return weights / weights.sum()
+    total = weights.sum()
+    # So far from all components that nothing is likely: as if nothing were known.
+    for n in range(len(weights)):
+        weights[n] = weights[n] / total if total > 0 else mixture[n, 0]
+    return weights
 
 
 @compiled()

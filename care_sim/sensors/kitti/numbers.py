@@ -10,6 +10,8 @@ import numpy as np
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.types import CLASSES
 
+FOCAL_PX = 721.5
+"""Focal length of KITTI's pictures: all lengths are in pixels of it."""
 CAR, PERSON, CYCLIST = range(3)
 """The kinds of objects that were measured, in the order of `measured.json`."""
 KIND_OF = {"car": CAR, "truck": CAR, "bus": CAR, "bicycle": CYCLIST, "pedestrian": PERSON}
@@ -96,7 +98,6 @@ class Times(NamedTuple):
 class Measured(NamedTuple):
     """What `measured.json` holds."""
 
-    focal_px: float
     numbers: Numbers
     times: Times
 
@@ -140,7 +141,7 @@ def read_measured(told: dict[str, Any]) -> Measured:
         score_shares=np.array(told["score_shares"], float),
         suppression_iou=told["suppression_iou"],
     )
-    return Measured(told["focal_px"], numbers, times)
+    return Measured(numbers, times)
 
 
 def _coefficients(fitted: dict[str, Any]) -> Floats:

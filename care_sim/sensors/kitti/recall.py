@@ -11,12 +11,11 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from care_sim.base.checks import shown
 from care_sim.base.compiled import compiled
-from care_sim.base.errors import InvalidInput
+from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.arrays import Floats
 from care_sim.core.types import CLASSES
-from care_sim.sensors.kitti.numbers import CAR, FEATURES, KIND_OF, Numbers, measured
+from care_sim.sensors.kitti.numbers import CAR, FEATURES, FOCAL_PX, KIND_OF, Numbers, measured
 
 USUAL_SHAPE = (0.5, -0.85, -0.1)
 """Logarithms of width over height of the three kinds, about which their shape is counted."""
@@ -25,7 +24,6 @@ USUAL_METRES = 1.55
 LEVELS = 4
 """KITTI's levels of occlusion: 0 not, 1 partly, 2 largely occluded, 3 unknown."""
 _COUNT = len(FEATURES)
-_FOCAL_PX = 721.5
 
 
 def recall(
@@ -45,8 +43,12 @@ def recall(
     whole box in pixels of KITTI's focal length (721.5), cut at the picture's edges; KITTI's level
     of `occlusion`, 0 to 3; the share of the box beyond the picture (`truncation`); planar distance
     in metres; the share of the box that nearer boxes `cover`. Without a distance or a width the
-    object has the usual ones for its height. Raises InvalidInput for other classes and levels.
+    object has the usual ones for its height. Beyond confidences of 0.05 and 0.9997 the chance
+    stays. Raises InvalidInput for other classes and levels, and confidences that are not between 0
+    and 1.
     """
+    if not 0 < confidence < 1:
+        raise InvalidInput(f"confidence must be between 0 and 1, got {shown(confidence)}")
     if label not in KIND_OF:
         raise InvalidInput(f"label must be one of {', '.join(CLASSES)}, got {shown(label)}")
     levels = np.asarray(occlusion)
@@ -100,7 +102,7 @@ def features(
         row[11 + level] = math.log(min(max(height, least), most) / 40)
         row[15 + level] = shape
     if metres > 0:
-        apparent = min(max(metres * height / _FOCAL_PX, 0.4), 3.0)
+        apparent = min(max(metres * height / FOCAL_PX, 0.4), 3.0)
         row[18] = math.log(apparent / USUAL_METRES)
         row[19] = row[18] * row[18]
     return row
@@ -108,11 +110,11 @@ def features(
 
 @compiled()
 def _last(knots: Floats) -> float:
-    last = knots[0]
-    for knot in knots:
-        if knot < math.inf:
-            last = knot
-    return last
+    last = 0
+    for n in range(len(knots)):
+        if knots[n] < math.inf:
+            last = n
+    return float(knots[last])
 
 
 @compiled()

@@ -5,6 +5,7 @@ from itertools import pairwise
 import gymnasium
 import numpy as np
 import pytest
+from scipy.stats import norm, rankdata
 
 import care_sim
 from care_sim.core.conditions import Sensing
@@ -133,6 +134,20 @@ def test_all_boxes_true_and_false_end_on_whole_pixels_of_kitti(lent):
     units = boxes * SCALE
     assert units == pytest.approx(np.rint(units), abs=1e-6)
     assert ((boxes >= 0) & (boxes <= [320, 180, 320, 180])).all()
+
+
+def test_luck_lasts():
+    """Scores of a car that stands still, as normal scores: correlated as stated."""
+    scores = np.array(
+        [
+            [one.detections.confidences[one.objects == 0].max(initial=0.0) for one in episode]
+            for episode in alone(CAR, 40.0, keyframes=40, seeds=80)
+        ]
+    )
+    luck = norm.ppf((rankdata(scores) - 0.5) / scores.size).reshape(scores.shape)
+    for lag in (1, 5, 20):
+        correlation = np.mean(luck[:, lag:] * luck[:, :-lag])
+        assert correlation == pytest.approx(0.76 * np.exp(-0.1 * lag / 1.29), abs=0.1)
 
 
 def test_errors_of_boxes_last():

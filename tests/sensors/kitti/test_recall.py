@@ -65,11 +65,13 @@ def test_trucks_and_buses_are_found_as_a_usual_car_of_their_height(label):
     [
         (("lorry", 40.0), "label must be one of car, truck, bus, bicycle, pedestrian, got 'lorry'"),
         (("car", 40.0, 4), "occlusion must be 0, 1, 2 or 3, got 4"),
+        (("car", 40.0, 0, 0.0, 20.0, 25.0), "confidence must be between 0 and 1, got 25.0"),
     ],
 )
 def test_what_was_not_measured_is_named(look, message):
+    places, confidence = look[:5], dict(zip(("confidence",), look[5:], strict=False))
     with pytest.raises(InvalidInput, match=message):
-        recall(*look)
+        recall(*places, **confidence)
 
 
 HEIGHTS = {
@@ -128,4 +130,3 @@ def test_recall_is_predicted_as_well_as_one_half_of_the_pictures_predicts_the_ot
     assert len(errors) > 80
     rms_error, rms_halves = (np.sqrt(np.mean(np.square(own))) for own in (errors, halves))
     assert rms_error <= rms_halves
-    print(len(errors), rms_error, rms_halves)

@@ -15,9 +15,9 @@ pictures, 0.02 between splits.
 """
 POINTS = 0.03
 """Three points, for real and simulated boxes on the same pictures."""
-STREETS = 0.974
-"""On rendered streets. Their roads are flat: without the upper and lower edges it is 0.945 there,
-and 0.940 on the real boxes (`docs/camera.md`).
+STREETS = 0.973
+"""On rendered streets. Their roads are flat: without upper and lower edges it is 0.940, as it is on
+the real boxes (`docs/camera.md`).
 """
 
 
