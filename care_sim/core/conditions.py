@@ -175,8 +175,8 @@ MIN_RETURNS = 3
 """Fired rays that must hit an object. The fewest that span a surface."""
 BEFORE, COMING = SWEEP_MASKS = "before", "coming"
 """Which mask the sweeps between two keyframes fire."""
-IDEAL_CAMERA, YOLOX_CAMERA = CAMERA_PROFILES = "ideal", "yolox"
-"""The camera that reports whatever shows enough pixels, and the one that errs as measured."""
+IDEAL_CAMERA, YOLOX_CAMERA, KITTI_CAMERA = CAMERA_PROFILES = "ideal", "yolox", "kitti"
+"""The camera that reports whatever shows enough pixels, and two that err as measured."""
 CAMERA_CONFIDENCE = 0.25
 """The public confidence threshold of the paper's camera detector (Remark 2)."""
 MOST_FALSE_BOXES = 64
@@ -197,8 +197,9 @@ class CameraFaults:
     """What the camera gets wrong."""
 
     camera_profile: str = one_of(IDEAL_CAMERA, CAMERA_PROFILES)
-    """The detector that the camera is like (`care_sim.sensors.camera_profiles`): `ideal`, or
-    `yolox`, which misses, confuses and invents objects as measured. The faults below come on top.
+    """The detector that the camera is like: `ideal`, or `yolox`
+    (`care_sim.sensors.camera_profiles`) or `kitti` (`care_sim.sensors.kitti`), which miss, confuse
+    and invent objects as two detectors were measured to. The faults below come on top.
     """
     false_negative_rate: float = bounded(0.0, 0, 1)
     """Share of the objects in a picture that the camera misses, 0 to 1."""

@@ -10,13 +10,14 @@ import numpy as np
 from care_sim.base.times import LAST_BITS_S
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.cells.boxes import planar_ranges
-from care_sim.core.conditions import CameraFaults, Sensing
+from care_sim.core.conditions import KITTI_CAMERA, YOLOX_CAMERA, CameraFaults, Sensing
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import ImageDetections
 from care_sim.sensors.annotated import NO_OBJECT, IdentifiedDetections
 from care_sim.sensors.camera_errors import ProfiledDetector
-from care_sim.sensors.camera_profiles import PROFILES
+from care_sim.sensors.camera_profiles import YOLOX
 from care_sim.sensors.false_boxes import EMPTY_POOL, NO_ROWS, BoxPool, FalseBoxes
+from care_sim.sensors.kitti.detector import KittiDetector
 from care_sim.sensors.pictures import surest_first
 
 
@@ -214,12 +215,13 @@ class CameraDetector:
         self._delay = Delay(self.timing, sensing.camera_jitter, keyframe_s, delay)
         self.mounted = tuple(mounted(camera, sensing, mount) for camera in cameras)
         """The cameras as they really stand."""
-        self._profiled: ProfiledDetector | None = None
-        profile = PROFILES[sensing.camera_profile]
-        if profile is not None:
-            seeds = errors, jitter, confusion, ghosts
-            told = profile, self._objects, self.mounted, keyframe_s, pool, seeds
-            self._profiled = ProfiledDetector(*told)
+        self._measured: ProfiledDetector | KittiDetector | None = None
+        seeds = errors, jitter, confusion, ghosts
+        objects_seen = self._objects, self.mounted, keyframe_s
+        if sensing.camera_profile == YOLOX_CAMERA:
+            self._measured = ProfiledDetector(YOLOX, *objects_seen, pool, seeds)
+        elif sensing.camera_profile == KITTI_CAMERA:
+            self._measured = KittiDetector(*objects_seen, seeds)
 
     def detect(
         self, seen: IdentifiedDetections, heading: float, boxes: Floats, time_s: float
@@ -245,10 +247,8 @@ class CameraDetector:
         objects = seen.objects
         missed = self._misses.draw(planar_ranges(boxes))
         false = self._false_boxes.draw(rows, time_s) if self._false_boxes else NO_ROWS
-        if self._profiled is not None:
-            ghosts = self._profiled.ghosts.draw(np.concatenate([rows, false]), time_s)
-            false = np.concatenate([false, ghosts])
-            rows, objects = self._profiled.report(seen, boxes)
+        if self._measured is not None:
+            rows, objects, false = self._measured.detect(seen, boxes, false, time_s)
         if missed.any():
             left = ~np.isin(objects, self._objects[missed])
             rows = rows[left]
@@ -258,6 +258,9 @@ class CameraDetector:
                 cameras = false[:, ImageDetections.CAMERA].astype(np.int64)
                 false[:, ImageDetections.TIMING] = seen.pictures[cameras]
             rows, objects = _with_false_boxes(rows, objects, false)
+        # Edges of `yolox` and of plain false boxes are whole on false boxes alone, which published
+        # episodes hold. The next version of the benchmark rounds all of them in this line:
+        # rows[:, ImageDetections.BOX] = np.trunc(rows[:, ImageDetections.BOX])
 
         # In the dark nothing is reported, false boxes included; delays go on.
         if self._sensing.black_at(time_s):

@@ -255,7 +255,7 @@ class ProfiledDetector:
         self._confusion = PersistentDraws(
             len(objects), [profile.confusion_time_s], keyframe_s, confusion
         )
-        self.ghosts = Ghosts(
+        self._ghosts = Ghosts(
             pool,
             profile.ghosts_per_picture,
             profile.ghost_time_s,
@@ -264,12 +264,19 @@ class ProfiledDetector:
             ghosts,
         )
 
-    def report(self, seen: IdentifiedDetections, boxes: Floats) -> tuple[Floats, Integers]:
+    def detect(
+        self, seen: IdentifiedDetections, boxes: Floats, false: Floats, time_s: float
+    ) -> tuple[Floats, Integers, Floats]:
         """What is reported of the faultless detections `seen` (m,): rows (k, 9) as
-        `ImageDetections.rows`, and (k,) the object behind each.
+        `ImageDetections.rows`, (k,) the object behind each, and the rows (j, 9) of false boxes.
 
-        `boxes` (n, 7) are the 3D boxes of all objects in the sensor frame.
+        `boxes` (n, 7) are the 3D boxes of all objects in the sensor frame, `false` (l, 9) the false
+        boxes that no ghost may lie on.
         """
+        ghosts = self._ghosts.draw(np.concatenate([seen.detections.rows(), false]), time_s)
+        return *self._report(seen, boxes), np.concatenate([false, ghosts])
+
+    def _report(self, seen: IdentifiedDetections, boxes: Floats) -> tuple[Floats, Integers]:
         # Where the detections' objects stand among all.
         places = self._order[np.searchsorted(self._objects, seen.objects, sorter=self._order)]
         # All numbers are drawn at every keyframe, whatever is there.

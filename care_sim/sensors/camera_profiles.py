@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from care_sim.core.arrays import Floats, Integers
-from care_sim.core.conditions import IDEAL_CAMERA, YOLOX_CAMERA, CameraFaults
+from care_sim.core.conditions import YOLOX_CAMERA, CameraFaults
 from care_sim.core.types import CLASSES
 
 
@@ -140,11 +140,7 @@ YOLOX = CameraProfile(
     ghost_time_s=0.14,
 )
 
-PROFILES: dict[str, CameraProfile | None] = {IDEAL_CAMERA: None, YOLOX_CAMERA: YOLOX}
-"""By name. The ideal camera reports whatever shows enough pixels."""
-
 
 def invents_boxes(faults: CameraFaults) -> bool:
-    """Whether the camera reports false boxes, or ghosts, which need a pool to be made from."""
-    profile = PROFILES[faults.camera_profile]
-    return faults.false_positive_rate > 0 or profile is not None
+    """Whether the camera reports false boxes, or ghosts, that need a pool to be made from."""
+    return faults.false_positive_rate > 0 or faults.camera_profile == YOLOX_CAMERA

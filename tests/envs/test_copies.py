@@ -27,6 +27,7 @@ FAULTS = {
 CASES = [
     ("CARE-Dense-v0", "care", FAULTS | {"lidar_sweep_s": 0.1}),
     ("CARE-Dartout-v0", "random", {"engine": "bullet", "camera_profile": "yolox"}),
+    ("CARE-Dense-v0", "care", {"camera_profile": "kitti", "false_positive_rate": 0.5}),
     ("CARE-CutIn-v0", "history", {"detector": "cluster", "firing": "azimuth-window"}),
     ("CARE-R157-v0", "learned-sets", {"driver": "careful-human"}),
     ("CARE-NCAP-v0", "care-sector", {"test": "CPTAns-50", "speed_kph": 10.0}),

@@ -11,7 +11,7 @@ from tests.helpers.av2_log import CAR_AHEAD, at, box, write
 from tests.helpers.episodes import played
 
 FAULTS = {
-    "camera_profile": st.sampled_from(["ideal", "yolox"]),
+    "camera_profile": st.sampled_from(["ideal", "yolox", "kitti"]),
     "false_negative_rate": st.floats(0, 1),
     "false_negative_per_m": st.floats(0, 1),
     "false_negative_burst": st.integers(1, 1000),

@@ -65,7 +65,7 @@ OWN = {
     "budgets without scoring": OWN_BUDGETS | {"scoring_info": False},
     # These are played one after the other.
     "budgets of noisy worlds": OWN_BUDGETS | {"lidar_dropout": 0.2},
-    "one profile of a detector": {"camera_profile": ["ideal", "yolox", "ideal"]},
+    "one profile of a detector": {"camera_profile": ["kitti", "yolox", "ideal"]},
 }
 
 

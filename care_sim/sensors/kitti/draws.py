@@ -1,0 +1,106 @@
+"""Chance that depends on the seed, the object and the time alone, so that all policies meet the
+same.
+
+Numbers that change gradually are drawn for every object at every keyframe (`PersistentNormals`).
+Numbers that few objects ever need are hashes of a key (`uniform`, `normal`): whether one is used
+changes no other.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from care_sim.base.compiled import compiled
+from care_sim.core.arrays import Floats, Integers
+
+_GOLDEN = np.uint64(0x9E3779B97F4A7C15)
+_FIRST = np.uint64(0xBF58476D1CE4E5B9)
+_SECOND = np.uint64(0x94D049BB133111EB)
+_ONE, _THIRTY, _27, _31, _ELEVEN = (np.uint64(number) for number in (1, 30, 27, 31, 11))
+
+
+class PersistentNormals:
+    """Standard normal numbers (n, k), k of each of n objects.
+
+    At a distance of t seconds column j has the correlation
+    `lasting[j]` + `shares[j]` exp(-t / `times_s[j]`), and 1 at t = 0.
+    """
+
+    def __init__(
+        self,
+        objects: int,
+        lasting: ArrayLike,
+        shares: ArrayLike,
+        times_s: ArrayLike,
+        keyframe_s: float,
+        rng: np.random.Generator,
+    ):
+        lasting, shares = np.asarray(lasting, float), np.asarray(shares, float)
+        self._kept = np.exp(-keyframe_s / np.asarray(times_s, float))
+        self._share, self._fresh = np.sqrt(shares), np.sqrt(1 - lasting - shares)
+        self._rng = rng
+        always, self._slow = rng.standard_normal((2, objects, len(shares)))
+        self._always = np.sqrt(lasting) * always
+        self._started = False
+
+    def next(self) -> Floats:
+        """(n, k) the numbers of the next keyframe."""
+        moves, fresh = self._rng.standard_normal((2, *self._slow.shape))
+        if self._started:
+            self._slow = self._kept * self._slow + np.sqrt(1 - self._kept**2) * moves
+        self._started = True
+        numbers: Floats = self._always + self._share * self._slow + self._fresh * fresh
+        return numbers
+
+
+class Renewals:
+    """The keyframe (...) since which each of many states lasts, in an array of any `shape`.
+
+    From one keyframe to the next a state stays with the chance exp(-keyframe / `time_s`), and else
+    begins anew.
+    """
+
+    def __init__(
+        self, shape: tuple[int, ...], time_s: float, keyframe_s: float, rng: np.random.Generator
+    ):
+        self._stays = math.exp(-keyframe_s / time_s)
+        self._rng = rng
+        self._begun = np.zeros(shape, np.int64)
+        self._keyframe = 0
+
+    def next(self) -> Integers:
+        """(...) the beginnings at the next keyframe."""
+        self._keyframe += 1
+        anew = self._rng.random(self._begun.shape) >= self._stays
+        self._begun = np.where(anew, self._keyframe, self._begun)
+        return self._begun
+
+
+@compiled()
+def key_of(key: np.uint64, one: int, two: int, three: int) -> np.uint64:
+    """A key of its own for every three numbers from 0 up, below a key."""
+    mixed = _mixed(key, np.uint64(one))
+    return _mixed(_mixed(mixed, np.uint64(two)), np.uint64(three))
+
+
+@compiled()
+def uniform(key: np.uint64, number: int) -> float:
+    """Hash a key and a number evenly between 0 and 1, both excluded."""
+    return (float(_mixed(key, np.uint64(number)) >> _ELEVEN) + 0.5) / 2.0**53
+
+
+@compiled()
+def normal(key: np.uint64, number: int) -> float:
+    """Hash a key and a number to a standard normal number (Box and Muller 1958)."""
+    radius = math.sqrt(-2 * math.log(uniform(key, 2 * number)))
+    return radius * math.cos(2 * math.pi * uniform(key, 2 * number + 1))
+
+
+@compiled()
+def _mixed(key: np.uint64, number: np.uint64) -> np.uint64:
+    """The generator SplitMix64 at its step `number` (Steele, Lea and Flood 2014)."""
+    mixed = key + (number + _ONE) * _GOLDEN
+    mixed = (mixed ^ (mixed >> _THIRTY)) * _FIRST
+    mixed = (mixed ^ (mixed >> _27)) * _SECOND
+    return mixed ^ (mixed >> _31)
