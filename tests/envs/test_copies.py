@@ -26,7 +26,7 @@ CASES = [
     ("CARE-Dense-v0", "care", FAULTS | {"lidar_sweep_s": 0.1}),
     ("CARE-Dartout-v0", "random", {"engine": "bullet", "camera_profile": "yolox"}),
     ("CARE-CutIn-v0", "history", {"detector": "cluster", "firing": "azimuth-window"}),
-    ("CARE-R157-v0", "learned-sets", {"driver": "careful-human"}),
+    ("CARE-R157-v0", "learned-sets", {"driver": "careful-human", "detector": "centerpoint"}),
     ("CARE-NCAP-v0", "care-sector", {"test": "CPTAns-50", "speed_kph": 10.0}),
     ("CARE-Drive-v0", "care-sightlines", FAULTS),
     ("CARE-Street-v0", "care", FAULTS | {"lidar_sweep_s": 0.1}),
