@@ -12,7 +12,7 @@ from care_sim.sensors.annotated import NO_ANNOTATIONS, NO_OBJECT, Annotations, C
 from tests.perception.measured.test_measured_detector import begun, rig
 
 ALL = Cloud(np.arange(16384), np.zeros((16384, 3)), np.full(16384, NO_OBJECT))
-STANDING = Frame(5.0, -3.0, 1.84, 0.7)
+STANDING = Frame(500.0, -300.0, 1.84, 0.7)
 
 
 def reported(name, keyframes=600, sensor=lambda _: STANDING, cloud=ALL, present=NO_ANNOTATIONS):

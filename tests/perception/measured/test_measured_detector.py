@@ -68,6 +68,15 @@ def test_in_a_film_the_share_detected_is_that_of_the_formula(name, kind, before,
     assert found == pytest.approx(expected[0], abs=0.03)
 
 
+def test_who_was_away_for_a_keyframe_is_a_newcomer_again():
+    detector, present = begun("centerpoint", **WORTH_ONE), crowd()
+    share(detector, present, 6, 6)
+    detector.detect(cloud([], 0), present.take(np.arange(0)))
+    assert share(detector, present, 6) == pytest.approx(
+        recall("centerpoint", "car", 6, 0)[0], abs=0.03
+    )
+
+
 @pytest.mark.parametrize("keyframes", [1, 4, 10, 15])
 def test_in_the_closed_loop_the_last_ten_keyframes_count(keyframes):
     """Of a newcomer a part of ten sweeps: its disadvantage follows."""
