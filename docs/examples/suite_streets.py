@@ -1,7 +1,7 @@
 """The first 20 streets of the benchmark's suite as a source: no policy was tried on them before.
 
-    cd docs/examples
-    care-sim protocol --source suite_streets:SuiteStreets --budgets 0.01 --detector centerpoint
+cd docs/examples
+care-sim protocol --source suite_streets:SuiteStreets --budgets 0.01 --detector centerpoint
 """
 
 from dataclasses import dataclass

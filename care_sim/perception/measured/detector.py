@@ -50,8 +50,8 @@ class MeasuredDetector(Detector):
     where all were fired by the coming one. The closed loop does not need it: there the last ten
     sweeps are known. `worth` are the returns of the detector's own sensor that one return is worth,
     measured by class unless given; on sweeps that this sensor recorded it is 1. What scores below
-    `track_score` becomes no track; it is given in the detector's own scale. `false_boxes` switches
-    those on. Raises InvalidInput for a value out of its bounds.
+    `track_score` becomes no track; it is given in the detector's own scale. `false_boxes` and
+    `box_errors` switch these on. Raises InvalidInput for a value out of its bounds.
     """
 
     name: ClassVar[str]
@@ -62,18 +62,21 @@ class MeasuredDetector(Detector):
         worth: float | None = None,
         track_score: float | None = None,
         false_boxes: bool = True,
+        box_errors: bool = True,
     ):
         self.measured = measured = measurement(self.name)
         least = measured.track_score if track_score is None else track_score
         check_number("first_hit", first_hit, 0, 1)
         check_number("track_score", least, measured.least_score, measured.most_score)
         check_flag("false_boxes", false_boxes)
+        check_flag("box_errors", box_errors)
         if worth is not None:
             check_number("worth", worth, 0.001, 1000)
         self.first_hit = float(first_hit)
         self.worth = worth
         self.least_tracked = float(least)
         self.false_boxes = false_boxes
+        self.errors = measured.errors if box_errors else measured.errors.without()
         self.track_score = float(measured.reported(np.array(least)))
 
     def begin(self, seed: np.random.SeedSequence, rig: Rig, is_filmed: bool) -> Detector:
@@ -115,6 +118,7 @@ class MeasuredEpisode(Detector):
         measured = rules.measured
         self.track_score = rules.track_score
         self._measured = measured
+        self._errors = rules.errors
         # The closed loop drops what becomes no track, so that it need not be made.
         self._least = measured.least_score if is_filmed else rules.least_tracked
         self._table = measured.recall._replace(worth=_worth(measured, rules.worth, rig))
@@ -153,7 +157,7 @@ class MeasuredEpisode(Detector):
             self._weights,
             self._table,
             self._measured.luck,
-            self._measured.errors,
+            self._errors,
             (self._least, self._measured.most_score),
         )
         classes, objects = annotations.classes[rows], annotations.objects[rows]

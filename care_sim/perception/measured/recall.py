@@ -67,7 +67,8 @@ def score_of(latent: float, label: int, table: Recall, most: float) -> float:
         place += 1
     # Beyond the last cut scores go on as between the last two.
     share = (latent - cuts[place]) / (cuts[place + 1] - cuts[place])
-    return min(scores[place] + share * (scores[place + 1] - scores[place]), most)
+    score: float = scores[place] + share * (scores[place + 1] - scores[place])
+    return min(score, most)
 
 
 @compiled()

@@ -72,6 +72,11 @@ class Errors(NamedTuple):
     powers: Floats
     turned_below: Floats
 
+    def without(self) -> "Errors":
+        """The table by which every box is true."""
+        nobody = np.full_like(self.turned_below, -np.inf)
+        return self._replace(quantiles=np.zeros_like(self.quantiles), turned_below=nobody)
+
 
 class FalseBoxes(NamedTuple):
     """False boxes of one class: `rates` (k, 2) score and boxes per keyframe within 50 m from it on,

@@ -216,6 +216,15 @@ def test_errors_of_boxes_are_those_of_the_table_and_last():
     assert lower == pytest.approx(present.boxes[0, 2] - present.boxes[0, 5] / 2)
 
 
+def test_box_errors_can_be_switched_off():
+    present = crowd(100)
+    report, objects = begun("megvii", box_errors=False, **WORTH_ONE).detect(
+        cloud(present.objects, 9), present
+    )
+    rows = [present.objects.tolist().index(number) for number in objects]
+    assert report.boxes == pytest.approx(present.boxes[rows])
+
+
 def test_what_is_reported_matches_its_own_object():
     """So the closed loop need not match places again."""
     present = crowd(300)
