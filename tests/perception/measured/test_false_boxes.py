@@ -15,7 +15,7 @@ ALL = Cloud(np.arange(16384), np.zeros((16384, 3)), np.full(16384, NO_OBJECT))
 STANDING = Frame(500.0, -300.0, 1.84, 0.7)
 
 
-def reported(name, keyframes=600, sensor=lambda _: STANDING, cloud=ALL, present=NO_ANNOTATIONS):
+def reported(name, keyframes=400, sensor=lambda _: STANDING, cloud=ALL, present=NO_ANNOTATIONS):
     """World boxes, classes and scores at each keyframe, 0.5 s apart."""
     detector = begun(name)
     for number in range(keyframes):
