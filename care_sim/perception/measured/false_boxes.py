@@ -49,7 +49,7 @@ def score_at(rates: Floats, share: Floats) -> Floats:
     scores, logs = rates[::-1, 0], np.log(rates[::-1, 1])
     wanted = np.log(np.maximum(share, 1e-12)) + logs[-1]
     beyond = scores[0] + (wanted - logs[0]) * (scores[1] - scores[0]) / (logs[1] - logs[0])
-    return np.where(wanted < logs[0], beyond, np.interp(wanted, logs, scores))
+    return np.asarray(np.where(wanted < logs[0], beyond, np.interp(wanted, logs, scores)))
 
 
 class FalseBoxPopulation:
