@@ -20,7 +20,7 @@ from care_sim.sensors.annotated import Annotations
 from care_sim.world.bullet import BulletWorld
 from tests.helpers.av2_log import at, box, write
 from tests.helpers.misbehaving import ENTRY_POINTS, THIRD_PARTY
-from tests.helpers.places import PUBLISHED
+from tests.helpers.places import PUBLISHED, ROOT
 from tests.helpers.short_streets import few_and_short
 
 SLOW = {*(Path(__file__).with_name("slow.txt").read_text().split())}
@@ -51,6 +51,15 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 @pytest.fixture(scope="session")
 def grid():
     return AngularGrid()
+
+
+@pytest.fixture(scope="session")
+def recorded():
+    """The folder with recorded data of development; the test is skipped where it is absent."""
+    for folder in (ROOT / "shared" / "data", ROOT.parent / "shared" / "data"):
+        if folder.is_dir():
+            return folder
+    pytest.skip("no recorded data in shared/data")
 
 
 @pytest.fixture(scope="module")

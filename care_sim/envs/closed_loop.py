@@ -22,7 +22,6 @@ from care_sim.loops.episode import Episode, EpisodeSeeds
 from care_sim.loops.false_box_pools import pool_of_another_drive
 from care_sim.loops.records import Keyframe, Outcome, Records
 from care_sim.perception.detectors import PROXY
-from care_sim.perception.points_only import Detector
 from care_sim.scenarios import make_scenario, scenario_class
 from care_sim.scenarios.base import Scenario
 from care_sim.sensors.camera_profiles import invents_boxes
@@ -214,8 +213,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         world, seeds, floor = self.episode(entropy)
         self._reward = rewards.EpisodeReward(self.reward_weights)
         self.keyframes = []
-        detector = self._detector_for_play()
-        loop = ClosedLoop(world, self.rig, self.conditions, seeds, pool, detector)
+        loop = ClosedLoop(world, self.rig, self.conditions, seeds, pool, self._detector)
         return self._begin(loop, floor), self.first_info(entropy, world)
 
     def episode(self, entropy: int) -> Episode:
@@ -295,12 +293,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         seeds = EpisodeSeeds.of(entropy, self._secret)
         world = scenario.make_world(np.random.default_rng(seeds.another))
         drive = world, scenario.duration_s, rig, conditions, seeds.sensors
-        return pool_of_another_drive(*drive, self._detector_for_play())
-
-    def _detector_for_play(self) -> Detector | None:
-        if self._detector is not None:
-            self._detector = self._detector.for_play()
-        return self._detector
+        return pool_of_another_drive(*drive, self._detector)
 
     def _outcome(self) -> Outcome:
         """The result of the episode."""

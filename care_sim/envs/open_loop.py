@@ -142,12 +142,12 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
                 "camera_profile must be ideal where the camera's detections come from a file: "
                 "a detector made them, with its own errors"
             )
-        camera, lidar, floor, odometry = streams((seed, crc32(film.name.encode())), 4, self._secret)
+        entropy = seed, crc32(film.name.encode())
+        camera, lidar, floor, odometry, luck = streams(entropy, 5, self._secret)
         self._sightings = _sightings(film, self.presence)
         self.keyframes = []
         self._masks = []
-        seeds = SensorSeeds(camera, lidar, odometry)
-        self._detector = self._detector.for_play()
+        seeds = SensorSeeds(camera, lidar, odometry, luck)
         loop = OpenLoop(film, self.rig, self.conditions, seeds, self._detector)
         info = {"seed": seed, "scene": film.name} if self.scoring_info else {}
         return self._begin(loop, floor), info

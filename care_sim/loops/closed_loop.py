@@ -27,7 +27,13 @@ from care_sim.perception.matching import found_objects
 from care_sim.perception.points_only import Detector
 from care_sim.perception.proxy import ReturnsRule
 from care_sim.perception.tracker import TrackMemory
-from care_sim.sensors.annotated import NO_OBJECT, Annotations, IdentifiedDetections, cloud_of
+from care_sim.sensors.annotated import (
+    NO_OBJECT,
+    Annotations,
+    IdentifiedDetections,
+    cloud_of,
+    pointless_cloud,
+)
 from care_sim.sensors.beams import Beams
 from care_sim.sensors.camera import CameraDetector
 from care_sim.sensors.engines import Engine, make_engine
@@ -165,8 +171,14 @@ class ClosedLoop:
         labels = world.labels()
         self._reported = np.array([*labels], np.int64)
         self._classes = np.array([*labels.values()], np.int64)
+        # By number of a body: itself, or NO_OBJECT for what is not reported. The last place is that
+        # of NO_BODY, the one before stands for all higher numbers.
+        self._named = np.full(int(self._reported.max(initial=0)) + 3, NO_OBJECT)
+        self._named[self._reported] = self._reported
         self._returns_rule = ReturnsRule(labels, conditions.min_returns)
-        self._detector = detector
+        self._detector = (
+            None if detector is None else detector.begin(seeds.detector, rig, is_filmed=False)
+        )
         self._gathering = (
             Gathering(detector.gathers, rig.keyframe_s)
             if detector and detector.gathers > 1
@@ -328,17 +340,25 @@ class ClosedLoop:
         if self._detector is None:
             detections, detected = self._returns_rule.detections(bodies, self._local_boxes)
             return detections, detected, detected
-        objects = np.where(np.isin(bodies, self._reported), bodies, NO_OBJECT)
-        cloud = cloud_of(scan, objects, self.rig.grid)
+        objects = self._named[np.minimum(bodies, len(self._named) - 2)]
+        cloud = (
+            cloud_of(scan, objects, self.rig.grid)
+            if self._detector.wants_points
+            else pointless_cloud(scan, objects)
+        )
         boxes = self._local_boxes(self._reported)
         present = Annotations(self._reported, self._classes, boxes)
         if self._gathering is not None:
             cloud = self._gathering.add(cloud, self._localisation.taken_for(self.sensor))
+        self._detector.at(None, self.sensor)
         detections, behind = self._detector.detect(cloud, present)
         if self._detector.track_score:
             sure = acted_on(detections, self._detector.track_score)
-            detections, behind = detections.take(sure), behind[sure]
-        hit = np.isin(present.objects, behind)
+            if not sure.all():
+                detections, behind = detections.take(sure), behind[sure]
+        if self._detector.is_matched:
+            return detections, behind, behind[behind != NO_OBJECT]
+        hit = (present.objects[:, None] == behind).any(axis=1)
         candidates = Annotations(present.objects[hit], present.classes[hit], present.boxes[hit])
         found = found_objects(candidates, detections)
         return detections, behind, candidates.objects[found]

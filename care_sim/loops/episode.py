@@ -16,6 +16,7 @@ class SensorSeeds(NamedTuple):
     camera: SeedSequence
     lidar: SeedSequence
     odometry: SeedSequence
+    detector: SeedSequence
 
 
 class EpisodeSeeds(NamedTuple):
@@ -33,8 +34,8 @@ class EpisodeSeeds(NamedTuple):
     def of(cls, entropy: int, secret: str = "") -> "EpisodeSeeds":
         """Those of a seed; see `care_sim.base.seeds`."""
         # Their order is a part of what a seed means.
-        scenario, camera, lidar, floor, odometry, another = streams((entropy,), 6, secret)
-        return cls(scenario, SensorSeeds(camera, lidar, odometry), floor, another)
+        scenario, camera, lidar, floor, odometry, another, detector = streams((entropy,), 7, secret)
+        return cls(scenario, SensorSeeds(camera, lidar, odometry, detector), floor, another)
 
 
 class Episode(NamedTuple):

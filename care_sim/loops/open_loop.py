@@ -87,7 +87,7 @@ class OpenLoop:
         )
         self._odometry = Odometry(sensing.ego_speed_sigma, seeds.odometry)
         self._localisation = Localisation(sensing, film.keyframe_s, seeds.odometry)
-        self._detector = detector
+        self._detector = detector.begin(seeds.detector, rig, is_filmed=True)
         self._limits = Limits(rig)
         self._memory = TrackMemory(film.keyframe_s)
         self._track_objects = TrackObjects()

@@ -15,6 +15,8 @@ from care_sim.base.errors import InvalidInput, MissingExtra, error_line, printab
 from care_sim.base.plugins import Plugins
 from care_sim.perception.cluster.detector import ClusterDetector
 from care_sim.perception.lifetimes import kept_or_made
+from care_sim.perception.measured.detector import CenterPoint, Megvii, PointRCNN
+from care_sim.perception.measured.tables import MEASURED
 from care_sim.perception.network_detectors import OnnxDetector, TorchScriptDetector
 from care_sim.perception.pillars.detector import PillarsDetector
 from care_sim.perception.points_only import (
@@ -36,7 +38,7 @@ PILLARS = "pillars"
 """The learned one."""
 RECORDED = "recorded"
 """The upper bound: what a real detector reported of full scans."""
-PRIVILEGED = (PROXY, GRADED, RECORDED)
+PRIVILEGED = (PROXY, GRADED, *MEASURED, RECORDED)
 """Those that read more than points; all others are `PointDetector`s."""
 
 
@@ -51,6 +53,9 @@ DETECTORS: Plugins[Any] = Plugins(
     built_in={
         PROXY: ReturnsProxy,
         GRADED: GradedProxy,
+        CenterPoint.name: CenterPoint,
+        Megvii.name: Megvii,
+        PointRCNN.name: PointRCNN,
         CLUSTER: ClusterDetector,
         PILLARS: PillarsDetector,
         RECORDED: RecordedDetector,

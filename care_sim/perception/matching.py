@@ -2,8 +2,11 @@
 1).
 """
 
+import math
+
 import numpy as np
 
+from care_sim.base.compiled import compiled
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.types import Detections
@@ -38,8 +41,16 @@ def served_by(annotations: Annotations, detections: Detections) -> Integers:
     """
     _check(detections)
     scores = detections.scores
-    distances = _distances(annotations, detections)
-    objects, servers = _optimal(distances) if scores is None else _by_score(distances, scores)
+    if scores is not None:
+        # Stable, so that of equally sure detections the first reported chooses first.
+        return _by_score(
+            np.ascontiguousarray(annotations.boxes, float),
+            annotations.classes,
+            np.ascontiguousarray(detections.boxes, float),
+            detections.classes,
+            np.argsort(-scores, kind="stable"),
+        )
+    objects, servers = _optimal(_distances(annotations, detections))
     result = np.full(len(annotations), UNSERVED)
     result[objects] = servers
     return result
@@ -72,20 +83,27 @@ def _optimal(distances: Floats) -> tuple[Integers, Integers]:
     return rows[served[matched]], columns[by[matched]]
 
 
-def _by_score(distances: Floats, scores: Floats) -> tuple[list[int], list[int]]:
-    """Objects, and the detections that serve them."""
-    # Stable, so that of equally sure detections the first reported chooses first.
-    free = distances.copy()
-    served: list[int] = []
-    servers: list[int] = []
-    for detection in np.argsort(-scores, kind="stable") if len(distances) else ():
-        nearest = int(free[:, detection].argmin())
-        if np.isfinite(free[nearest, detection]):
-            # An object that is served is as far as can be from every later detection.
-            served.append(nearest)
-            servers.append(int(detection))
-            free[nearest] = np.inf
-    return served, servers
+@compiled()
+def _by_score(
+    objects: Floats, classes: Integers, boxes: Floats, reported: Integers, order: Integers
+) -> Integers:
+    """(n,) the detection that serves each of `objects` (n, 7) of `classes` (n,), or UNSERVED;
+    `boxes` (m, 7) of the classes `reported` (m,) choose in this `order` (m,).
+    """
+    result = np.full(len(objects), UNSERVED)
+    for detection in order:
+        chosen, least = UNSERVED, MATCH_M
+        for row in range(len(objects)):
+            if result[row] == UNSERVED and classes[row] == reported[detection]:
+                x = objects[row, 0] - boxes[detection, 0]
+                y = objects[row, 1] - boxes[detection, 1]
+                away = math.sqrt(x * x + y * y)
+                # Of equally near ones it takes the first.
+                if away < least or (away == least and chosen == UNSERVED):
+                    chosen, least = row, away
+        if chosen != UNSERVED:
+            result[chosen] = detection
+    return result
 
 
 def _check(detections: Detections) -> None:

@@ -16,6 +16,7 @@ from care_sim.base.checks import check_known, check_number, check_whole
 from care_sim.base.errors import InvalidInput, MissingExtra, error_line
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.frames import Frame, turned
+from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES, Detections
 from care_sim.sensors.annotated import AT_KEYFRAME, NO_OBJECT, Annotations, Cloud, SweepPose
 
@@ -24,18 +25,27 @@ class Detector(ABC):
     """A loop calls it at every keyframe.
 
     `gathers`: how many sweeps it is given at once in the closed loop, its own keyframe's among
-    them. `track_score`: the least score of a detection that becomes a track.
+    them. `track_score`: the least score of a detection that becomes a track. `wants_points`:
+    whether it reads more of a cloud than cells and objects. `is_matched`: whether each detection is
+    of the object behind it, so that the scoring need not match their places.
     """
 
     gathers: int = 1
+    wants_points: bool = True
+    is_matched: bool = False
     track_score: float = 0.0
 
-    def for_play(self) -> "Detector":
-        """Return the detector for a play that begins: this one, if it remembers no other play."""
+    def begin(self, seed: np.random.SeedSequence, rig: Rig, is_filmed: bool) -> "Detector":
+        """Return the detector of an episode with this `seed`: itself where it remembers nothing of
+        another one. `is_filmed` says whether a film is played, whose keyframes may be several
+        sweeps apart.
+        """
         return self
 
-    def at(self, token: str, sensor: Frame) -> None:
-        """Hear which keyframe of a film comes next, and where its sensor is."""
+    def at(self, token: str | None, sensor: Frame) -> None:
+        """Take note of the coming keyframe: its name in a film, None in the closed loop, and where
+        the sensor is.
+        """
 
     @abstractmethod
     def detect(self, cloud: Cloud, annotations: Annotations) -> tuple[Detections, Integers]:
@@ -148,8 +158,8 @@ class PointsOnly(Detector):
         check_number(f"track_score of detector {name}", least, 0, 1)
         self.track_score = float(least)
 
-    def for_play(self) -> Detector:
-        """See `Detector`. A detector that is not stateless is made anew after its first play."""
+    def begin(self, seed: np.random.SeedSequence, rig: Rig, is_filmed: bool) -> Detector:
+        """See `Detector`. A detector that is not stateless is made anew after its first episode."""
         if is_stateless(self._detector) or self._again is None or not self._has_played:
             return self
         return self._again()

@@ -46,8 +46,10 @@ class RecordedDetector(Detector):
         self._results = _results(self._file, file_stamp(self._file))
         self._here: tuple[str, Frame] | None = None
 
-    def at(self, token: str, sensor: Frame) -> None:
+    def at(self, token: str | None, sensor: Frame) -> None:
         """See `Detector`. Raises InvalidInput for a keyframe that the file lacks."""
+        if token is None:
+            return
         if token not in self._results:
             raise InvalidInput(f"{self._file}: has no results of the keyframe {token!r}")
         self._here = token, sensor

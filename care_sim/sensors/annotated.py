@@ -151,6 +151,12 @@ def cloud_of(scan: Scan, objects: Integers, grid: Grid) -> Cloud:
     return Cloud(scan.cells, points, objects, *columns, rings=rings).take(returned)
 
 
+def pointless_cloud(scan: Scan, objects: Integers) -> Cloud:
+    """As `cloud_of`, with cells and objects alone: `points` is empty."""
+    (rows,) = np.nonzero(np.isfinite(scan.ranges))
+    return Cloud(scan.cells[rows], np.empty((0, 3)), objects[rows])
+
+
 def rings_of(cells: Cells, grid: Grid) -> Integers:
     """(n,) the lasers that fire the cells: its rows, 0 the lowest, as nuScenes counts."""
     return grid.rows - 1 - cells // grid.columns

@@ -29,7 +29,7 @@ CASES = [
     ("CARE-Dartout-v0", "random", {"engine": "bullet", "camera_profile": "yolox"}),
     ("CARE-Dense-v0", "care", {"camera_profile": "kitti", "false_positive_rate": 0.5}),
     ("CARE-CutIn-v0", "history", {"detector": "cluster", "firing": "azimuth-window"}),
-    ("CARE-R157-v0", "learned-sets", {"driver": "careful-human"}),
+    ("CARE-R157-v0", "learned-sets", {"driver": "careful-human", "detector": "centerpoint"}),
     ("CARE-NCAP-v0", "care-sector", {"test": "CPTAns-50", "speed_kph": 10.0}),
     ("CARE-Drive-v0", "care-sightlines", FAULTS),
     ("CARE-Street-v0", "care", FAULTS | {"lidar_sweep_s": 0.1}),

@@ -56,7 +56,7 @@ def loop_in(world, seeds=(0, 1, 2), **conditions):
         world,
         RIG,
         ClosedLoopConditions(**conditions),
-        SensorSeeds(*(np.random.SeedSequence(seed) for seed in seeds)),
+        SensorSeeds(*(np.random.SeedSequence(seed) for seed in (*seeds, 3))),
     )
 
 

@@ -21,6 +21,6 @@ def test_an_episode_ends_with_the_keyframe_that_fills_its_time(steps, duration_s
 def test_the_streams_of_an_episode_have_their_places_in_its_seed():
     seeds = EpisodeSeeds.of(7)
     told = [seeds.scenario, *seeds.sensors, seeds.floor, seeds.another]
-    assert [one.spawn_key for one in told] == [(0,), (1,), (2,), (4,), (3,), (5,)]
+    assert [one.spawn_key for one in told] == [(0,), (1,), (2,), (4,), (6,), (3,), (5,)]
     assert {one.entropy for one in told} == {(7,)}
     assert EpisodeSeeds.of(7, "a secret of sixteen bytes").floor.entropy != (7,)

@@ -15,7 +15,7 @@ RIG = Rig(cameras=(FRONT_CAMERA,))
 
 def lent(**returns):
     conditions = ClosedLoopConditions(camera_profile="yolox", **returns)
-    seeds = SensorSeeds(*map(np.random.SeedSequence, range(3)))
+    seeds = SensorSeeds(*map(np.random.SeedSequence, range(4)))
     scenario = SCENARIOS["dense"]()
     world = scenario.build(np.random.default_rng(0))
     return pool_of_another_drive(world, scenario.duration_s, RIG, conditions, seeds)

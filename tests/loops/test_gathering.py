@@ -63,7 +63,7 @@ def swept_film():
 
 
 def loop_of(film, detector, **sensing):
-    seeds = SensorSeeds(*map(np.random.SeedSequence, range(3)))
+    seeds = SensorSeeds(*map(np.random.SeedSequence, range(4)))
     rig = Rig(cameras=SURROUND_CAMERAS, keyframe_s=0.5)
     return OpenLoop(film, rig, Sensing(**sensing), seeds, PointsOnly("mine", detector, HEIGHT))
 

@@ -55,7 +55,7 @@ def film(*, annotated=(True, True, True, True), speed=0.0, bend=0.0):
 
 
 def loop_of(film, detector=None, seeds=(0, 1, 2), **sensing):
-    children = SensorSeeds(*(np.random.SeedSequence(seed) for seed in seeds))
+    children = SensorSeeds(*(np.random.SeedSequence(seed) for seed in (*seeds, 3)))
     return OpenLoop(film, RIG, Sensing(**sensing), children, detector or ReturnsProxy())
 
 

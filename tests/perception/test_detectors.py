@@ -74,7 +74,7 @@ def installed(install):
 
 
 def test_an_installed_detector_is_listed_made_and_handed_points_only(installed):
-    assert detector_names()[7:] == [
+    assert detector_names()[10:] == [
         "blind",
         "listed",
         "loose",
@@ -117,8 +117,8 @@ def test_a_broken_one_gets_one_line(installed, name, line):
         (
             "yolo",
             {},
-            "unknown detector 'yolo'; known: cluster, graded, onnx, pillars, recorded, returns, "
-            "torchscript; "
+            "unknown detector 'yolo'; known: centerpoint, cluster, graded, megvii, onnx, pillars, "
+            "pointrcnn, recorded, returns, torchscript; "
             "`care-sim list detectors` tells what each is",
         ),
         (

@@ -89,10 +89,11 @@ def test_any_other_is_made_anew(tmp_path):
     for _ in range(2):
         places = [each.detect(CLOUD, NO_ANNOTATIONS)[0].boxes[0, 0] for each in (one, two)]
     assert places == [7.0, 7.0]
-    # Before its first play it need not be.
-    assert one.for_play().detect(CLOUD, NO_ANNOTATIONS)[0].boxes[0, 0] == 6.0
-    three = one.for_play()
-    assert three.for_play() is three
+    rig = gymnasium.make("care_sim:CARE-Dartout-v0").unwrapped.rig
+    seed = np.random.SeedSequence(0)
+    fresh = one.begin(seed, rig, is_filmed=True)
+    assert fresh.begin(seed, rig, is_filmed=True) is fresh
+    assert fresh.detect(CLOUD, NO_ANNOTATIONS)[0].boxes[0, 0] == 6.0
 
 
 @pytest.mark.filterwarnings("ignore:.*torch.jit.*:DeprecationWarning")

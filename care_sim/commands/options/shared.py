@@ -57,8 +57,9 @@ class DetectorOptions:
     """Which detector looks at the points."""
 
     detector: str = "returns"
-    """returns (the paper's proxy), graded (the surer the more returns), cluster (a real one),
-    pillars (a learned one), torchscript, the name of an installed one, or MODULE:CLASS."""
+    """returns (the paper's proxy), graded (the surer the more returns), centerpoint, megvii and
+    pointrcnn (as measured on real data), cluster (a real one), pillars (a learned one),
+    torchscript, the name of an installed one, or MODULE:CLASS."""
     detector_parameters: tuple[str, ...] = ()
     """Parameters of the detector as NAME=VALUE, for example file=model.pt for torchscript."""
 

@@ -43,6 +43,7 @@ CONDITIONS = {
     # These are played one after the other.
     "noisy": {"lidar_range_sigma": 0.05, "lidar_dropout": 0.2},
     "by tiles": {"firing": "tiles:4x8"},
+    "a measured detector": {"detector": "centerpoint"},
 }
 
 OWN_BUDGETS = {"budget": [0.01, 0.2, 0.03]}

@@ -1,0 +1,310 @@
+"""Detectors that report objects as CenterPoint, Megvii and PointRCNN did on real data."""
+
+import math
+from typing import ClassVar
+
+import numpy as np
+
+from care_sim.base.checks import check_flag, check_number
+from care_sim.base.compiled import compiled
+from care_sim.base.errors import InvalidInput
+from care_sim.core.arrays import Floats, Integers
+from care_sim.core.frames import Frame
+from care_sim.core.grid import AngularGrid
+from care_sim.core.rig import Rig
+from care_sim.core.types import Detections
+from care_sim.perception.matching import MATCH_M
+from care_sim.perception.measured.false_boxes import FalseBoxPopulation
+from care_sim.perception.measured.luck import CHANNELS, FIRST_ERROR, TURNED, advance
+from care_sim.perception.measured.recall import (
+    FIRST_HIT,
+    effective_returns,
+    latent_score,
+    score_of,
+)
+from care_sim.perception.measured.tables import (
+    ERRORS,
+    NORMALS,
+    WIDEST_NORMAL,
+    Errors,
+    Luck,
+    Measurement,
+    Recall,
+    measurement,
+)
+from care_sim.perception.points_only import Detector
+from care_sim.perception.proxy import count_hits
+from care_sim.sensors.annotated import NO_OBJECT, Annotations, Cloud
+
+GATHERED_S = 1.0
+"""In the closed loop a detector that gathers ten sweeps has those of the last ten keyframes, of
+0.1 s each. Of longer keyframes it has as many as fit in this time."""
+_RADIAL, _TANGENTIAL, _LENGTH, _WIDTH, _HEIGHT, _YAW = range(len(ERRORS))
+
+
+class MeasuredDetector(Detector):
+    """A detector as it was measured: it reports an object by chance, the surer the more returns.
+
+    `first_hit` is what a return counts in a film that was not there a keyframe ago: 0.55, as with
+    ten equal sweeps since then; 0.1 where nine of ten sweeps were fired by the mask before, 1.0
+    where all were fired by the coming one. The closed loop does not need it: there the last ten
+    sweeps are known. `worth` are the returns of the detector's own sensor that one return is worth,
+    measured by class unless given; on sweeps that this sensor recorded it is 1. What scores below
+    `track_score` becomes no track; it is given in the detector's own scale. `false_boxes` and
+    `box_errors` switch these on. Raises InvalidInput for a value out of its bounds.
+    """
+
+    name: ClassVar[str]
+
+    def __init__(
+        self,
+        first_hit: float = FIRST_HIT,
+        worth: float | None = None,
+        track_score: float | None = None,
+        false_boxes: bool = True,
+        box_errors: bool = True,
+    ):
+        self.measured = measured = measurement(self.name)
+        least = measured.track_score if track_score is None else track_score
+        check_number("first_hit", first_hit, 0, 1)
+        check_number("track_score", least, measured.least_score, measured.most_score)
+        check_flag("false_boxes", false_boxes)
+        check_flag("box_errors", box_errors)
+        if worth is not None:
+            check_number("worth", worth, 0.001, 1000)
+        self.first_hit = float(first_hit)
+        self.worth = worth
+        self.least_tracked = float(least)
+        self.false_boxes = false_boxes
+        self.errors = measured.errors if box_errors else measured.errors.without()
+        self.track_score = float(measured.reported(np.array(least)))
+
+    def begin(self, seed: np.random.SeedSequence, rig: Rig, is_filmed: bool) -> Detector:
+        """See `care_sim.perception.points_only.Detector`."""
+        return MeasuredEpisode(self, seed, rig, is_filmed)
+
+    def detect(self, cloud: Cloud, annotations: Annotations) -> tuple[Detections, Integers]:
+        """Raises InvalidInput: luck belongs to an episode, which `begin` begins."""
+        raise InvalidInput(f"detector {self.name} needs an episode: call begin before detect")
+
+
+class CenterPoint(MeasuredDetector):
+    """CenterPoint as measured on nuScenes, by returns: recall, luck, scores, false boxes."""
+
+    name = "centerpoint"
+
+
+class Megvii(MeasuredDetector):
+    """Megvii (CBGS) as measured on nuScenes, by returns: as centerpoint, with its own numbers."""
+
+    name = "megvii"
+
+
+class PointRCNN(MeasuredDetector):
+    """PointRCNN as measured on KITTI, by returns: the harsh one; no trucks and no buses."""
+
+    name = "pointrcnn"
+
+
+class MeasuredEpisode(Detector):
+    """A measured detector over the keyframes of one episode; `detect` is called once for each."""
+
+    wants_points = False
+    is_matched = True
+
+    def __init__(
+        self, rules: MeasuredDetector, seed: np.random.SeedSequence, rig: Rig, is_filmed: bool
+    ):
+        measured = rules.measured
+        self.track_score = rules.track_score
+        self._measured = measured
+        self._errors = rules.errors
+        # The closed loop drops what becomes no track, so that it need not be made.
+        self._least = measured.least_score if is_filmed else rules.least_tracked
+        self._table = measured.recall._replace(worth=_worth(measured, rules.worth, rig))
+        self._weights = _weights(measured.sweeps, rules.first_hit, rig.keyframe_s, is_filmed)
+        self._seed = seed.generate_state(1, np.uint64)[0]
+        self._keyframe_s = rig.keyframe_s
+        self._false = (
+            FalseBoxPopulation(
+                measured, self._least, rig.grid, rig.sensor_height_m, rig.keyframe_s, seed
+            )
+            if rules.false_boxes
+            else None
+        )
+        self._sensor = Frame(0.0, 0.0, rig.sensor_height_m, 0.0)
+        self._keyframe = 0
+        self._rows: dict[int, int] = {}
+        none = np.empty(0, np.int64)
+        self._objects, self._places, self._ascending, self._ranks = none, none, none, none
+        self._last = none
+        self._processes = np.empty((0, CHANNELS))
+        self._counts = np.empty((0, len(self._weights)))
+
+    def at(self, token: str | None, sensor: Frame) -> None:
+        """See `care_sim.perception.points_only.Detector`."""
+        self._sensor = sensor
+
+    def detect(self, cloud: Cloud, annotations: Annotations) -> tuple[Detections, Integers]:
+        """See `care_sim.perception.points_only.Detector`."""
+        self._meet(annotations.objects)
+        rows, boxes, scores, returns = _detected(
+            (self._seed, self._keyframe, self._keyframe_s, self._measured.flash_s),
+            (annotations.objects, annotations.classes, self._places),
+            np.ascontiguousarray(annotations.boxes, float),
+            (cloud.objects, self._ascending, self._ranks, max(len(cloud.poses), 1)),
+            (self._last, self._processes, self._counts),
+            self._weights,
+            self._table,
+            self._measured.luck,
+            self._errors,
+            (self._least, self._measured.most_score),
+        )
+        classes, objects = annotations.classes[rows], annotations.objects[rows]
+        if self._false is not None:
+            false = self._false.draw(self._keyframe, self._sensor, cloud, annotations)
+            classes = np.concatenate([classes, false.classes])
+            boxes = np.concatenate([boxes, false.boxes])
+            scores = np.concatenate([scores, false.scores])
+            returns = np.concatenate([returns, false.returns])
+            objects = np.concatenate([objects, np.full(len(false.classes), NO_OBJECT)])
+        self._keyframe += 1
+        return Detections(classes, boxes, returns, self._measured.reported(scores)), objects
+
+    def _meet(self, objects: Integers) -> None:
+        """Find the rows of this keyframe's `objects` (n,), and make those of new ones."""
+        # The closed loop reports the same bodies at every keyframe.
+        if objects is self._objects:
+            return
+        known = self._rows
+        self._places = np.array(
+            [known.setdefault(one, len(known)) for one in objects.tolist()], int
+        )
+        order = np.argsort(objects)
+        self._objects, self._ascending = objects, objects[order]
+        self._ranks = np.argsort(order)
+        if (new := len(known) - len(self._last)) > 0:
+            self._last = np.concatenate([self._last, np.full(new, -1)])
+            self._processes = np.concatenate([self._processes, np.zeros((new, CHANNELS))])
+            self._counts = np.concatenate([self._counts, np.zeros((new, self._counts.shape[1]))])
+
+
+def _weights(sweeps: int, first_hit: float, keyframe_s: float, is_filmed: bool) -> Floats:
+    """(k,) the weights of this keyframe's returns and of those before, newest first."""
+    if sweeps == 1:
+        return np.ones(1)
+    if is_filmed:
+        return np.array([first_hit, 1 - first_hit])
+    return np.ones(min(sweeps, max(1, math.floor(GATHERED_S / keyframe_s + 1e-9))))
+
+
+def _worth(measured: Measurement, worth: float | None, rig: Rig) -> Floats:
+    """(classes,) the returns of the detector's sensor that a return of this set-up is worth."""
+    if worth is not None:
+        return np.full(len(measured.recall.worth), float(worth))
+    # Measured for the default grid: of denser rays each is worth less.
+    density = sum(1 / (head.grid.column_width * head.grid.row_height) for head in rig.grid.heads)
+    usual = AngularGrid()
+    return measured.recall.worth / (density * usual.column_width * usual.row_height)
+
+
+Clock = tuple[np.uint64, int, float, float]
+"""The episode's seed, the keyframe, seconds between keyframes, and `flash_s`."""
+
+
+@compiled()
+def _detected(
+    clock: Clock,
+    present: tuple[Integers, Integers, Integers],
+    boxes: Floats,
+    returned: tuple[Integers, Integers, Integers, int],
+    memory: tuple[Integers, Floats, Floats],
+    weights: Floats,
+    table: Recall,
+    lasting: Luck,
+    errors: Errors,
+    bounds: tuple[float, float],
+) -> tuple[Integers, Floats, Floats, Integers]:
+    """The rows (k,) of the `present` objects that are reported, their boxes (k, 7) with errors,
+    their scores (k,) within `bounds` and their returns (k,).
+
+    `present` are numbers, classes and rows of memory (n,) of objects with `boxes` (n, 7);
+    `returned` the objects of all returns (P,), the present ones in ascending order, the place of
+    each in it, and how many sweeps the returns are of. The `memory` (m,) is the last keyframe of
+    each object, its processes (m, CHANNELS), and its returns (m, k) at the last keyframes, in the
+    column of the keyframe modulo k; they have the `weights` (k,), newest first.
+    """
+    objects, classes, places = present
+    hits, ascending, ranks, sweeps = returned
+    last, processes, counts = memory
+    luck = advance(clock, objects, classes, places, last, processes, lasting)
+    kept, keyframe = len(weights), clock[1]
+    by_rank = count_hits(ascending, hits)
+    counts[:, keyframe % kept] = 0.0
+    rows = np.empty(len(objects), np.int64)
+    seen, scores = np.empty((len(objects), 7)), np.empty(len(objects))
+    returns = np.empty(len(objects), np.int64)
+    count = 0
+    for n in range(len(objects)):
+        label, place = classes[n], places[n]
+        now = by_rank[ranks[n]] / sweeps
+        counts[place, keyframe % kept] = now
+        average = now if sweeps > 1 else _average(counts[place], weights, keyframe)
+        # Nothing comes from nothing, though the fitted curve has a share at 0.
+        if not table.known[label] or now + average <= 0:
+            continue
+        worth = table.worth[label]
+        effective = effective_returns(
+            now * worth, average * worth, table.fall[label], table.most[label]
+        )
+        latent = latent_score(effective, label, table)
+        score = score_of(latent.mean + latent.spread * luck[n], label, table, bounds[1])
+        if score < bounds[0]:
+            continue
+        rows[count], scores[count], returns[count] = n, score, by_rank[ranks[n]]
+        seen[count] = boxes[n]
+        _misplace(seen[count], label, max(now * worth, 1.0), processes[place], errors)
+        count += 1
+    return rows[:count], seen[:count], scores[:count], returns[:count]
+
+
+@compiled()
+def _average(counts: Floats, weights: Floats, keyframe: int) -> float:
+    """The returns of an object per sweep. At the start there are fewer sweeps than the detector
+    gathers; detectors fill up with those that there are.
+    """
+    total, weight = 0.0, 0.0
+    for age in range(min(len(weights), keyframe + 1)):
+        total += weights[age] * counts[(keyframe - age) % len(weights)]
+        weight += weights[age]
+    return total / weight if weight > 0 else counts[keyframe % len(weights)]
+
+
+@compiled()
+def _misplace(box: Floats, label: int, returns: float, processes: Floats, table: Errors) -> None:
+    """Give a box (7,) of an object with so many `returns` the errors that its `processes` have."""
+    errors = np.empty(len(ERRORS))
+    for place in range(len(ERRORS)):
+        normal = min(max(processes[FIRST_ERROR + place], -WIDEST_NORMAL), WIDEST_NORMAL)
+        errors[place] = np.interp(normal, NORMALS, table.quantiles[label, place])
+
+    # Errors were measured of boxes within 2 m of their objects.
+    radial = errors[_RADIAL] * returns ** table.powers[label, 0]
+    across = errors[_TANGENTIAL] * returns ** table.powers[label, 1]
+    size = math.hypot(radial, across)
+    if size > MATCH_M:
+        radial, across = radial * MATCH_M / size, across * MATCH_M / size
+    away = max(math.hypot(box[0], box[1]), 1e-6)
+    cos, sin = box[0] / away, box[1] / away
+    box[0] += cos * radial - sin * across
+    box[1] += sin * radial + cos * across
+
+    # A box keeps standing on the ground.
+    box[2] -= box[5] / 2
+    box[3] *= math.exp(errors[_LENGTH])
+    box[4] *= math.exp(errors[_WIDTH])
+    box[5] *= math.exp(errors[_HEIGHT])
+    box[2] += box[5] / 2
+    box[6] += min(max(errors[_YAW], -math.pi / 2), math.pi / 2)
+    if processes[TURNED] < table.turned_below[label]:
+        box[6] += math.pi

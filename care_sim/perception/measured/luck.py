@@ -1,0 +1,94 @@
+"""The luck of objects at a measured detector, and the errors of their boxes.
+
+Both are made of standard normals that depend on the episode's seed, the object and the keyframe
+alone: every policy meets the same, whatever it fires, in whatever order objects are asked for. Each
+follows an autoregressive process of first order, which is advanced at every keyframe at which the
+object is annotated, detected or not. The luck is
+
+    sqrt(stays) * constant + sqrt(decays) * slow + sqrt(1 - stays - decays) * quick,
+
+where `slow` decays in the measured time and `quick` in `flash_s`.
+"""
+
+import math
+
+import numpy as np
+
+from care_sim.base.compiled import compiled
+from care_sim.core.arrays import Floats, Integers
+from care_sim.perception.measured.tables import ERRORS, Luck
+
+SLOW, QUICK, TURNED, FIRST_ERROR = range(4)
+CHANNELS = FIRST_ERROR + len(ERRORS)
+"""Processes of each object: slow luck, quick luck, whether its box is turned about, its errors."""
+_CONSTANT = 2**20
+"""A keyframe that no episode reaches, whose normals are those that stay."""
+_YAW = ERRORS.index("yaw")
+
+
+@compiled()
+def _mixed(number: np.uint64) -> np.uint64:
+    """The finaliser of SplitMix64 (Steele, Lea and Flood 2014), which leaves no trace of its
+    input.
+    """
+    number = (number ^ (number >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    number = (number ^ (number >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return number ^ (number >> np.uint64(31))
+
+
+@compiled()
+def normal_of(seed: np.uint64, number: int, keyframe: int, channel: int) -> float:
+    """The standard normal of an object at a keyframe, by the method of Box and Muller."""
+    state = _mixed(seed ^ np.uint64(number) * np.uint64(0x9E3779B97F4A7C15))
+    state = _mixed(state + np.uint64(keyframe) * np.uint64(0xD1B54A32D192ED03))
+    state = _mixed(state + np.uint64(channel) * np.uint64(0x9E3779B97F4A7C15))
+    # From above 0 to 1: its logarithm is finite.
+    first = (np.float64(state >> np.uint64(11)) + 1.0) / 2.0**53
+    second = np.float64(_mixed(state + np.uint64(1)) >> np.uint64(11)) / 2.0**53
+    return math.sqrt(-2.0 * math.log(first)) * math.cos(2.0 * math.pi * second)
+
+
+@compiled()
+def advance(
+    clock: tuple[np.uint64, int, float, float],
+    objects: Integers,
+    classes: Integers,
+    rows: Integers,
+    last: Integers,
+    processes: Floats,
+    table: Luck,
+) -> Floats:
+    """(n,) the luck of annotated `objects` (n,) of `classes` (n,) at a keyframe. The `clock` holds
+    the episode's seed, the keyframe, seconds between keyframes, and seconds of quick luck.
+
+    `rows` (n,) are their places in `last` (m,), the keyframe at which each was annotated before or
+    -1, and in `processes` (m, CHANNELS), which are advanced.
+    """
+    seed, keyframe, keyframe_s, flash_s = clock
+    luck = np.empty(len(objects))
+    for n in range(len(objects)):
+        row, label = rows[n], classes[n]
+        begins = last[row] < 0
+        elapsed_s = (keyframe - last[row]) * keyframe_s
+        for channel in range(CHANNELS):
+            fresh = normal_of(seed, objects[n], keyframe, channel)
+            if channel == SLOW:
+                kept = math.exp(-elapsed_s / table.decay_s[label])
+            elif channel == QUICK:
+                kept = math.exp(-elapsed_s / flash_s) if flash_s else 0.0
+            else:
+                error = _YAW if channel == TURNED else channel - FIRST_ERROR
+                kept = table.errors_last[label, error] ** elapsed_s
+            if begins:
+                kept = 0.0
+            processes[row, channel] = (
+                kept * processes[row, channel] + math.sqrt(1.0 - kept * kept) * fresh
+            )
+        last[row] = keyframe
+        stays, decays = table.stays[label], table.decays[label]
+        luck[n] = (
+            math.sqrt(stays) * normal_of(seed, objects[n], _CONSTANT, SLOW)
+            + math.sqrt(decays) * processes[row, SLOW]
+            + math.sqrt(max(1.0 - stays - decays, 0.0)) * processes[row, QUICK]
+        )
+    return luck
