@@ -8,9 +8,10 @@ quarter of each object's returns that lies nearest to its middle, the ground in 
 """
 
 import argparse
+from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.figure import Figure
 
 from care_sim.core.types import CLASSES
 from care_sim.perception.detectors import make_detector
@@ -18,6 +19,7 @@ from care_sim.perception.matching import found_objects
 from care_sim.perception.measured.recall import FIRST_HIT, recall
 from care_sim.perception.measured.tables import MEASURED, measurement
 from care_sim.perception.proxy import chance
+from care_sim.reports.figures.styles import BLUE, GREEN, INK, ORANGE, default_style, svg_text
 from care_sim.sensors.annotated import NO_OBJECT
 from care_sim.sources.street_films import street_film
 
@@ -27,6 +29,7 @@ FIRST_STREET, EVERY = 1000, 4
 """The streets are those of the calibration, of every fourth keyframe."""
 REACH_M = 50.0
 POINTS = ("cluster", "pillars")
+TICKS = (1, 2, 3, 5, 10, 20, 50)
 
 
 def whole(cloud, _, __):
@@ -89,35 +92,38 @@ def half(name, kind, share):
     return returns[found.argmax()] / worth / share if found.any() else np.inf
 
 
+@default_style()
 def draw(rows, path):
     """Draw the recall of all by the returns of our full scan."""
     returns = np.arange(1, 65)
-    _, panels = plt.subplots(1, 2, figsize=(9.5, 4), sharey=True)
-    for panel, (title, kind) in zip(panels, KINDS.items(), strict=True):
-        panel.step([1, 3, 3, 64], [0, 0, 100, 100], "k-", label="returns (proxy)")
-        panel.plot(returns, 100 * chance(kind, returns), "k--", label="graded")
-        for name in MEASURED:
+    colours = dict(zip(MEASURED, (BLUE, ORANGE, GREEN), strict=True))
+    figure = Figure(figsize=(9.2, 3.6), layout="constrained")
+    for axes, (title, kind) in zip(figure.subplots(1, 2, sharey=True), KINDS.items(), strict=True):
+        axes.step([1, 3, 3, 64], [0, 0, 100, 100], color=INK, label="returns, the proxy")
+        axes.plot(returns, 100 * chance(kind, returns), "--", color=INK, label="graded")
+        for name, colour in colours.items():
             worth = measurement(name).recall.worth[CLASSES.index(kind)]
-            (line,) = panel.plot(returns, 100 * recall(name, kind, worth * returns), label=name)
+            axes.plot(returns, 100 * recall(name, kind, worth * returns), color=colour, label=name)
             if measurement(name).sweeps > 1:
-                new = recall(name, kind, worth * returns, 0)
-                panel.plot(returns, 100 * new, ":", color=line.get_color())
+                axes.plot(returns, 100 * recall(name, kind, worth * returns, 0), ":", color=colour)
         places = [np.sqrt(least * min(most, 64)) for least, most in BINS]
         for name, marker in zip(POINTS, "o^", strict=True):
-            panel.plot(places, by_returns(rows[name, "full"], kind)[:, 0], marker, label=name)
-        panel.set(title=title, xscale="log", xlabel="returns of the full scan", ylim=(-3, 103))
-        panel.grid(alpha=0.3)
-    panels[0].set_ylabel("detected, percent")
-    panels[1].legend(fontsize=8)
-    plt.tight_layout()
-    plt.savefig(path)
+            found = by_returns(rows[name, "full"], kind)[:, 0]
+            axes.plot(places, found, marker, color=INK, markersize=5, label=name)
+        axes.set(title=title, xscale="log", xlabel="returns of the full scan", ylim=(0, 102))
+        axes.set_xticks(TICKS, [str(tick) for tick in TICKS])
+        axes.minorticks_off()
+    figure.axes[0].set_ylabel("detected, percent")
+    figure.axes[1].plot([], [], ":", color=INK, label="newcomers")
+    figure.legend(*figure.axes[1].get_legend_handles_labels(), loc="outside right center")
+    path.write_text(svg_text(figure, path.stem), encoding="utf-8")
 
 
 def main():
     """Measure, print and draw."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--streets", type=int, default=4)
-    parser.add_argument("--out", default="proxy-recall.svg")
+    parser.add_argument("--out", type=Path, default=Path("proxy-recall.svg"))
     options = parser.parse_args()
     rows = measure(options.streets)
     for title, kind in KINDS.items():
