@@ -11,7 +11,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor
 from contextlib import contextmanager
-from itertools import islice
+from itertools import islice, repeat
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -26,7 +26,12 @@ from care_sim.core.arrays import Floats, Mask
 from care_sim.core.types import CLASSES, Detections
 from care_sim.perception.matching import UNSERVED, served_by
 from care_sim.perception.pillars.decoding import Peaks, peaks_of
-from care_sim.perception.pillars.detector import CALIBRATION, LEAST_SCORE, save_detector
+from care_sim.perception.pillars.detector import (
+    CALIBRATION,
+    LEAST_SCORE,
+    load_detector,
+    save_detector,
+)
 from care_sim.sensors.annotated import Annotations
 from care_sim.study.executors import Processes, processes
 from care_sim.study.provenance import machine_line, package_versions
@@ -65,6 +70,8 @@ STEEPEST = 10.0
 SHUFFLED = 512
 """Examples from which a batch is drawn: those of some twenty plays, so that a batch holds several
 streets."""
+FIRST_BATCHES = 4
+"""Over which layers are normalised that learn on from weights."""
 AHEAD = 4
 """Plays that are under way before they are needed."""
 RISING = 0.05
@@ -125,15 +132,26 @@ def _learned(
     """Let the network learn and check it: its losses, its calibration, and what it reaches on plays
     apart.
     """
+    start = None if config.start is None else load_detector(config.start)[0]
     with one_thread(import_torch()), _player() as executor:
         print_lines(f"playing {SHUFFLED} scans before the first step", file=sys.stderr)
-        batches = _batches(played(executor, TRAINING), np.random.default_rng(config.seed))
+        batches = _batches(
+            played(executor, TRAINING, config.clutter), np.random.default_rng(config.seed)
+        )
+        if start is not None:
+            network.begin_at(
+                start, [one for batch in islice(batches, FIRST_BATCHES) for one in batch]
+            )
         losses = train_detector(network, batches, config.steps, keep)
         network.eval()
         count = len(CALIBRATING) + len(HELD_OUT)
         print_lines(f"checking {config.out} on {count} further plays", file=sys.stderr)
         fitted, apart = (
-            [example for examples in executor.map(play, seeds) for example in examples]
+            [
+                example
+                for examples in executor.map(play, seeds, repeat(config.clutter))
+                for example in examples
+            ]
             for seeds in (CALIBRATING, HELD_OUT)
         )
         calibration = calibration_of(scores_by_scan(network, fitted))
@@ -169,13 +187,13 @@ def train_detector(
     return fit(off, batches, steps, (optimizer, schedule), after)
 
 
-def played(executor: Executor, first: int) -> Iterator[Example]:
+def played(executor: Executor, first: int, clutter: bool = False) -> Iterator[Example]:
     """The examples of the plays of seeds from `first` on, in order, without end."""
-    under_way = deque(executor.submit(play, first + number) for number in range(AHEAD))
+    under_way = deque(executor.submit(play, first + number, clutter) for number in range(AHEAD))
     while True:
         first += 1
         examples = under_way.popleft().result()
-        under_way.append(executor.submit(play, first + AHEAD - 1))
+        under_way.append(executor.submit(play, first + AHEAD - 1, clutter))
         yield from examples
 
 
@@ -212,18 +230,20 @@ def _card(
 ) -> dict[str, Any]:
     """What the file says of itself; without a `result` nobody has checked the weights."""
     numbers = sum(array.size for array in network.arrays().values())
+    worlds = "cluttered streets" if made.clutter else "generated streets and drives"
     parts = [losses[n : n + CURVE_STEPS] for n in range(0, len(losses), CURVE_STEPS)]
     return {
         "kind": "pillars",
         "network": f"{numbers} numbers",
-        "data": f"{len(losses) * BATCH} scans of generated streets and drives, of every budget, by "
-        "the policies that know any grid; see care_sim.training.supervised.detector_data",
+        "data": f"{len(losses) * BATCH} scans of {worlds}, of every budget, by the policies that "
+        "know any grid; see care_sim.training.supervised.detector_data",
         "seeds": {
             "training from": TRAINING,
             "calibration of scores": [CALIBRATING[0], CALIBRATING[-1]],
             "held out": [HELD_OUT[0], HELD_OUT[-1]],
             "training": made.seed,
         },
+        "begun at": "drawn weights" if made.start is None else made.start.name,
         "steps": len(losses),
         "steps asked for": made.steps,
         "batch": BATCH,
