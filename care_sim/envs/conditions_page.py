@@ -85,5 +85,5 @@ more of each. Faults are off by default and drawn by the seed.
 (3) `care_sim.core.firing`; B is then the cells of the units that the budget buys. (4)
 `care_sim.driving.braking` and `care_sim.driving.drivers`. Only `fixed` has the settings
 that begin with `brake_`. (5) `care_sim.core.conditions`; at 0 all that is in reach
-returns. (6) `docs/streets.md`.
+returns. (6) `docs/clutter.md`.
 """

@@ -83,6 +83,8 @@ CALIBRATING = range(VALIDATION, VALIDATION + 24)
 HELD_OUT = range(VALIDATION + 24, VALIDATION + 48)
 """Seeds of plays that nothing is learned from: those that scores are fitted to, and those by which
 the card tells what was reached."""
+CHECKED_CLUTTERED = 8
+"""Plays of cluttered streets of either kind: each has three times the examples of others."""
 
 
 def train_pillars(config: DetectorConfig) -> int:
@@ -144,19 +146,26 @@ def _learned(
             )
         losses = train_detector(network, batches, config.steps, keep)
         network.eval()
-        count = len(CALIBRATING) + len(HELD_OUT)
+        seeds = _checked(config)
+        count = sum(map(len, seeds))
         print_lines(f"checking {config.out} on {count} further plays", file=sys.stderr)
         fitted, apart = (
             [
                 example
-                for examples in executor.map(play, seeds, repeat(config.clutter))
+                for examples in executor.map(play, own, repeat(config.clutter))
                 for example in examples
             ]
-            for seeds in (CALIBRATING, HELD_OUT)
+            for own in seeds
         )
         calibration = calibration_of(scores_by_scan(network, fitted))
         result = judged(scores_by_scan(network, apart, calibration))
         return losses, calibration, result
+
+
+def _checked(config: DetectorConfig) -> tuple[range, range]:
+    """Seeds of the plays that scores are fitted to, and of those held out."""
+    many = CHECKED_CLUTTERED if config.clutter else len(CALIBRATING)
+    return CALIBRATING[:many], HELD_OUT[:many]
 
 
 def train_detector(
@@ -230,6 +239,7 @@ def _card(
 ) -> dict[str, Any]:
     """What the file says of itself; without a `result` nobody has checked the weights."""
     numbers = sum(array.size for array in network.arrays().values())
+    fitted, apart = _checked(made)
     worlds = "cluttered streets" if made.clutter else "generated streets and drives"
     parts = [losses[n : n + CURVE_STEPS] for n in range(0, len(losses), CURVE_STEPS)]
     return {
@@ -239,8 +249,8 @@ def _card(
         "know any grid; see care_sim.training.supervised.detector_data",
         "seeds": {
             "training from": TRAINING,
-            "calibration of scores": [CALIBRATING[0], CALIBRATING[-1]],
-            "held out": [HELD_OUT[0], HELD_OUT[-1]],
+            "calibration of scores": [fitted[0], fitted[-1]],
+            "held out": [apart[0], apart[-1]],
             "training": made.seed,
         },
         "begun at": "drawn weights" if made.start is None else made.start.name,
