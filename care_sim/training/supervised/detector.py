@@ -11,7 +11,8 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor
 from contextlib import contextmanager
-from itertools import islice, repeat
+from functools import partial
+from itertools import islice
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -152,7 +153,7 @@ def _learned(
         fitted, apart = (
             [
                 example
-                for examples in executor.map(play, own, repeat(config.clutter))
+                for examples in executor.map(_plays(config.clutter), own)
                 for example in examples
             ]
             for own in seeds
@@ -198,12 +199,18 @@ def train_detector(
 
 def played(executor: Executor, first: int, clutter: bool = False) -> Iterator[Example]:
     """The examples of the plays of seeds from `first` on, in order, without end."""
-    under_way = deque(executor.submit(play, first + number, clutter) for number in range(AHEAD))
+    own = _plays(clutter)
+    under_way = deque(executor.submit(own, first + number) for number in range(AHEAD))
     while True:
         first += 1
         examples = under_way.popleft().result()
-        under_way.append(executor.submit(play, first + AHEAD - 1, clutter))
+        under_way.append(executor.submit(own, first + AHEAD - 1))
         yield from examples
+
+
+def _plays(clutter: bool) -> Callable[[int], list[Example]]:
+    """What gives the examples of a seed."""
+    return partial(play, clutter=True) if clutter else play
 
 
 @contextmanager
