@@ -59,12 +59,15 @@ HEIGHTS_M = (-9.0, 0.25, 0.75, 1.25, 2.0, 3.0, 4.5, 99.0)
 
 
 class Sweep(NamedTuple):
-    """A recorded sweep: `points` (P, 3) in the sensor frame, and what is annotated, if anything."""
+    """A recorded sweep: `points` (P, 3) in the sensor frame, what is annotated, if anything, and
+    the row of the grid (P,) that each point was fired in, where it has the same rows.
+    """
 
     name: str
     points: np.ndarray
     height_m: float
-    there: Annotations | None
+    there: Annotations | None = None
+    rows: np.ndarray | None = None
 
 
 def recorded(data: Path) -> Iterator[Sweep]:
@@ -74,9 +77,10 @@ def recorded(data: Path) -> Iterator[Sweep]:
         there = annotations_at(path.parents[2], int(path.stem))
         yield Sweep("Argoverse 2", points, ARGOVERSE2_SENSOR_HEIGHT_M, there)
     for path in sorted(data.glob("nuscenes/*.pcd.bin")):
-        points = nuscenes_points(path)[:, :3]
-        near = np.linalg.norm(points, axis=1) <= OWN_CAR_M
-        yield Sweep("nuScenes", points[~near], NUSCENES_HEIGHT_M, None)
+        points = nuscenes_points(path)
+        points = points[np.linalg.norm(points[:, :3], axis=1) > OWN_CAR_M]
+        rows = GRID.rows - 1 - points[:, 4].astype(int)
+        yield Sweep("nuScenes", points[:, :3], NUSCENES_HEIGHT_M, rows=rows)
 
 
 def generated(clutter: bool) -> list[Shot]:
@@ -105,13 +109,9 @@ def thinned(sweep: Sweep) -> Sweep:
     return sweep._replace(name=name, points=sweep.points[kept[firsts]])
 
 
-def silent_rows(points: np.ndarray, columns: int) -> np.ndarray:
+def silent_rows(rows: np.ndarray, columns: int) -> np.ndarray:
     """(rows,) the share of the firings of each row without a return within reach."""
-    ranges = np.linalg.norm(points, axis=1)
-    elevations = np.arcsin(points[:, 2] / ranges)
-    rows = np.round((GRID.top - elevations) / GRID.row_height).astype(int)
-    inside = (rows >= 0) & (rows < GRID.rows) & (ranges <= GRID.range_m)
-    return 1 - np.bincount(rows[inside], minlength=GRID.rows) / columns
+    return 1 - np.bincount(rows, minlength=GRID.rows) / columns
 
 
 def heights(points: np.ndarray, height_m: float) -> np.ndarray:
@@ -237,14 +237,16 @@ def main(data: Path, out: Path, *weights: str) -> None:
     silent, profiles, counts, slopes = {}, {}, {}, []
     for name, shots in streets.items():
         clouds = [shot.cloud.points for shot in shots]
-        silent[name] = np.mean([silent_rows(one, GRID.columns) for one in clouds], axis=0)
+        rows = [shot.cloud.cells // GRID.columns for shot in shots]
+        silent[name] = np.mean([silent_rows(one, GRID.columns) for one in rows], axis=0)
         profiles[name] = profile(np.concatenate([heights(one, GRID_HEIGHT_M) for one in clouds]))
         steep = [slope(one, GRID_HEIGHT_M) for one in clouds]
         slopes.append((name, f"{np.median(steep):.1f}", f"{max(steep):.1f}"))
         counts[name] = of_shots(shots)
     for sweep in sweeps:
-        if sweep.there is None:
-            silent[sweep.name] = silent_rows(sweep.points, NUSCENES_COLUMNS)
+        if sweep.rows is not None:
+            within = np.linalg.norm(sweep.points, axis=1) <= GRID.range_m
+            silent[sweep.name] = silent_rows(sweep.rows[within], NUSCENES_COLUMNS)
         profiles[sweep.name] = profile(heights(sweep.points, sweep.height_m))
         slopes.append((sweep.name, f"{slope(sweep.points, sweep.height_m):.1f}", ""))
     if (tables := data / "nuscenes-mini" / "v1.0-mini").is_dir():
