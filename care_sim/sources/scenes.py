@@ -89,9 +89,8 @@ class Generated(ABC):
 
     def cluttered(self, seed: int) -> Street:
         """The street of a seed with clutter. Raises InvalidInput where a source has none."""
-        raise InvalidInput(
-            f"clutter cannot be switched on: {type(self).__name__} has no `cluttered`"
-        )
+        source = type(self).__name__
+        raise InvalidInput(f"clutter cannot be switched on: source {source} has no `cluttered`")
 
     def name(self, seed: int) -> str:
         """What the scene of a seed is called."""
