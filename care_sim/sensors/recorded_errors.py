@@ -16,6 +16,7 @@ from care_sim.core.arrays import Floats, Integers
 from care_sim.core.cells.stack import Grid
 from care_sim.core.types import CLASSES
 from care_sim.sensors.annotated import NO_OBJECT, Cloud
+from care_sim.sensors.lidar import noisy
 
 LOST_NEAR, LOST_FAR = 0.02, 0.13
 """Shares of returns that are lost up to the first and from the second of LOST_RANGES_M on; between
@@ -88,9 +89,7 @@ def as_recorded(
     kept = np.flatnonzero(luck[cloud.cells] >= 1 - (1 - lost) * (1 - own))
 
     cloud, ranges, away = cloud.ordered(kept), ranges[kept], away[kept]
-    shift = errors[cloud.cells] * (SIGMA_M + SIGMA_PER_M * ranges)
-    # A cell stays the one that its point lies in: the error is along the ray, and within reach.
-    reach = np.broadcast_to(grid.reach_of(cloud.cells), ranges.shape)
-    shift = np.minimum(shift, reach - ranges)
-    points: Floats = cloud.points + away * (shift / ranges)[:, None]
+    erring = errors[cloud.cells] * (SIGMA_M + SIGMA_PER_M * ranges)
+    measured = noisy(ranges, erring, grid.reach_of(cloud.cells))
+    points: Floats = cloud.points + away * (measured / ranges - 1)[:, None]
     return replace(cloud, points=points)
