@@ -156,19 +156,22 @@ RETURN_SETTINGS: dict[str, Any] = {field.name: field.default for field in fields
 @dataclass(frozen=True, kw_only=True)
 class FilmedReturns(ReturnSettings):
     """How pulses return in a film, without crosstalk, which is drawn when it is played. It holds
-    what returns to a cell that is fired up to `most_shots` times.
+    what returns to a cell that is fired up to `most_shots` times. With `clutter` its street is less
+    clean.
     """
 
     most_shots: int = 1
+    clutter: bool = False
 
 
 RAYS = FilmedReturns()
 """All switches off."""
 
 
-def changed_settings(settings: ReturnSettings, usual: ReturnSettings) -> list[str]:
-    """The names of those in which two differ."""
-    return [name for name in RETURN_SETTINGS if getattr(settings, name) != getattr(usual, name)]
+def changed_settings(settings: FilmedReturns, usual: FilmedReturns) -> list[str]:
+    """The names of the conditions in which two differ."""
+    names = (*RETURN_SETTINGS, "clutter")
+    return [name for name in names if getattr(settings, name) != getattr(usual, name)]
 
 
 MIN_RETURNS = 3
@@ -301,6 +304,12 @@ class Sensing(CameraFaults, LidarFaults, ReturnSettings):
     `before`, the only one that was chosen then, or those of the `coming` keyframe, as where all
     sweeps of a keyframe are masked alike.
     """
+    clutter: bool = False
+    """Whether a generated street is less clean: kerbs, verges, vegetation, poles, uneven fronts,
+    bicycles in racks and people in groups (`care_sim.streets.clutter`), a road that slopes, and
+    returns that are lost and err as in recorded sweeps (`care_sim.sensors.recorded_errors`). Films
+    of streets alone have it.
+    """
     camera_confidence: float = bounded(CAMERA_CONFIDENCE, 0, 1)
     """Least confidence of a camera detection, 0 to 1; visible pixels decide, and the least box has
     0.25 (`care_sim.sensors.pictures`).
@@ -360,13 +369,13 @@ class Conditions(Sensing):
         told["lidar_crosstalk"] = RETURN_SETTINGS["lidar_crosstalk"]
         # Without strength, more shots return nothing else.
         shots = most_shots(self.firing) if self.lidar_stated_range_m else 1
-        return FilmedReturns(**told, most_shots=shots)
+        return FilmedReturns(**told, most_shots=shots, clutter=self.clutter)
 
 
 @dataclass(frozen=True, kw_only=True)
 class ClosedLoopConditions(DriverSettings, Conditions):
     """All conditions: those of both loops, and the driver, whom only the closed loop has. Raises
-    InvalidInput for a `sweep_mask`, which films alone have.
+    InvalidInput for a `sweep_mask` and for `clutter`, which films alone have.
     """
 
     def __post_init__(self) -> None:
@@ -376,6 +385,8 @@ class ClosedLoopConditions(DriverSettings, Conditions):
                 "sweep_mask is of films: a keyframe of the closed loop is one sweep, fired by its "
                 "own mask"
             )
+        if self.clutter:
+            raise InvalidInput("clutter is of films of generated streets: no other world has it")
 
 
 DEFAULTS = {field.name: field.default for field in fields(ClosedLoopConditions)}
@@ -389,6 +400,7 @@ COLUMNS_WHERE_CHANGED = (
     "camera_profile",
     "camera_latency_s",
     "sweep_mask",
+    "clutter",
 )
 """Conditions that are a column of results only where they are not the default: so rows, and the
 digests made of them, stay as they were before there was a choice."""

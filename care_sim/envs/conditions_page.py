@@ -18,6 +18,7 @@ _ROWS = (
     ("min_returns", "LiDAR detector", "fired rays that must hit an object"),
     ("camera_confidence", "camera detector", "least confidence of a detection"),
     ("sweep_mask", "open loop", "which mask the sweeps between keyframes fire"),
+    ("clutter", "streets of the open loop", "whether they are less clean (6)"),
     ("camera_profile", "camera", "the detector that it is like"),
     ("false_negative_rate", "camera", "share of the objects that it misses"),
     ("false_negative_per_m", "camera", "growth of that share with distance, 1/m"),
@@ -84,5 +85,5 @@ more of each. Faults are off by default and drawn by the seed.
 (3) `care_sim.core.firing`; B is then the cells of the units that the budget buys. (4)
 `care_sim.driving.braking` and `care_sim.driving.drivers`. Only `fixed` has the settings
 that begin with `brake_`. (5) `care_sim.core.conditions`; at 0 all that is in reach
-returns.
+returns. (6) `docs/clutter.md`.
 """

@@ -16,7 +16,7 @@ from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid, Cells, Head
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.sensors.annotated import NO_OBJECT, Cloud, IdentifiedDetections, rings_of
-from care_sim.sensors.engines.picture_kernels import boxes_of_window
+from care_sim.sensors.engines import Engine
 from care_sim.sensors.pictures import (
     CAMERA_FROM_LIDAR,
     CAMERA_HEIGHT,
@@ -61,7 +61,7 @@ class View(NamedTuple):
 
 
 def surround_detections(
-    world: BulletWorld,
+    engine: Engine,
     views: Sequence[View],
     sensor: Frame,
     labels: Mapping[int, int],
@@ -74,8 +74,7 @@ def surround_detections(
     tables = []
     for view in views:
         window = view.window_on(view.sensor.boxes_of(sensor, boxes))
-        ids = world.body_ids(view.camera, view.sensor, window)
-        tables.append(boxes_of_window(ids, window))
+        tables.append(engine.visible_boxes(view.camera, view.sensor, window))
     return faultless_detections(tables, class_table(labels))
 
 

@@ -19,6 +19,7 @@ from care_sim.core.sensor_setup import SensorSetup
 from care_sim.core.types import CLASSES, Ego
 from care_sim.loops.film import Film, Shot
 from care_sim.sensors.annotated import Annotations, Cloud, IdentifiedDetections
+from care_sim.sensors.engines import make_engine
 from care_sim.sensors.setups import DEFAULT_SETUP, sensor_setup
 from care_sim.sensors.surround import (
     SURROUND_CAMERAS,
@@ -137,7 +138,7 @@ def sense(
         # A recorded sensor leans, and an upright box does not hold the body that leans back in it.
         shown = annotations.boxes if views is None else _table([one.bounds for one in reported])
         views = [View(camera, sensor) for camera in cameras] if views is None else views
-        seen = surround_detections(world, views, sensor, labels, shown)
+        seen = surround_detections(make_engine("bullet", world, grid), views, sensor, labels, shown)
         bounds = _table([one.bounds for one in annotated])
         swept = full_sweep(world, grid, sensor, bounds, height_m, up)
     identified = IdentifiedDetections(seen.detections, numbers_of(seen.objects, numbers))

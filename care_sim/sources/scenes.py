@@ -87,6 +87,11 @@ class Generated(ABC):
     def street(self, seed: int) -> Street:
         """The street of a seed, whatever its name."""
 
+    def cluttered(self, seed: int) -> Street:
+        """The street of a seed with clutter. Raises InvalidInput where a source has none."""
+        source = type(self).__name__
+        raise InvalidInput(f"clutter cannot be switched on: source {source} has no `cluttered`")
+
     def name(self, seed: int) -> str:
         """What the scene of a seed is called."""
         return f"{type(self).__name__.lower()}-{seed:04d}"
@@ -97,7 +102,7 @@ class Generated(ABC):
 
     def film(self, scene: Scene, returns: FilmedReturns = RAYS) -> Film:
         """The street of the seed, under the name of the scene."""
-        street = self.street(scene.seed)
+        street = self.cluttered(scene.seed) if returns.clutter else self.street(scene.seed)
         if not isinstance(street, Street):
             raise InvalidInput(f"street must return a Street, got {type(street).__name__}")
         film = record(replace(street, name=scene.name), sensor_setup(self.sensor), returns)
@@ -131,6 +136,10 @@ class Streets(Generated):
     def street(self, seed: int) -> Street:
         """See `care_sim.streets.street`."""
         return make_street(seed)
+
+    def cluttered(self, seed: int) -> Street:
+        """See `care_sim.streets.clutter`."""
+        return make_street(seed, clutter=True)
 
     def name(self, seed: int) -> str:
         """With its layout."""

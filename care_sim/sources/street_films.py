@@ -16,10 +16,12 @@ from care_sim.core.conditions import RAYS, STRONGEST, FilmedReturns
 from care_sim.core.frames import Frame
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.sensor_setup import SensorSetup
-from care_sim.core.types import CLASSES
+from care_sim.core.types import CLASSES, Scan
 from care_sim.loops.film import Film, Shot
 from care_sim.sensors.annotated import Annotations, Cloud, IdentifiedDetections, cloud_of
 from care_sim.sensors.beams import Beams
+from care_sim.sensors.engines import make_engine
+from care_sim.sensors.recorded_errors import as_recorded, slopes
 from care_sim.sensors.setups import DEFAULT_SETUP, sensor_setup
 from care_sim.sensors.signal import Signal
 from care_sim.sensors.surround import (
@@ -33,6 +35,7 @@ from care_sim.streets.draft import STREET_KEYFRAME_S
 from care_sim.streets.street import Street, make_street
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.bullet import BulletWorld
+from care_sim.world.bullet_bodies import MOST_PARTS
 from care_sim.world.motions import LinearMotion, rates_between
 
 SIGHT_M = 60.0
@@ -43,6 +46,9 @@ about 50 m."""
 _DEFAULT = sensor_setup(DEFAULT_SETUP)
 _ENGINE = "bullet"
 """What casts the rays of every film, so that films of all settings differ by these alone."""
+_CLUTTER_ENGINE = "fast"
+"""That of cluttered streets: their thousands of parts take Bullet and its pictures ten times as
+long. Both engines agree (`make parity`)."""
 _NO_CLASS = -1
 """The class of a body that the five classes do not hold."""
 
@@ -106,8 +112,8 @@ def street_film(
 @lru_cache(maxsize=1)
 def _street_film(seed: int, secret: str, setup: SensorSetup, returns: FilmedReturns) -> Film:
     if not secret:
-        return record(make_street(seed), setup, returns)
-    street = make_street(secret_entropy("street", (seed,), secret))
+        return record(make_street(seed, returns.clutter), setup, returns)
+    street = make_street(secret_entropy("street", (seed,), secret), returns.clutter)
     return record(replace(street, name=f"street-{seed:04d}-secret"), setup, returns)
 
 
@@ -132,29 +138,43 @@ class _StreetBodies:
             [_NO_CLASS if label is None else CLASSES.index(label) for label in labels], np.int64
         )
         self._bodies: dict[int, int] = {}
+        engine = _CLUTTER_ENGINE if returns.clutter else _ENGINE
+        self._engine = make_engine(engine, world, setup.grid)
+        self._clutter = [*street.clutter]
+        # Nothing but the street decides, so that every policy meets the same losses.
+        self._rng = np.random.default_rng(int(street.digest()[:16], 16))
+        self._bright = self._rng.uniform(-1.0, 1.0, len(street.kinds))
+        level = np.zeros((len(street.ego), 2))
+        self._slopes = slopes(street.ego, self._rng) if returns.clutter else level
 
     def shot(self, keyframe: int, cameras: tuple[PinholeCamera, ...]) -> tuple[Shot, Annotations]:
         """Everything that can be seen at a keyframe, and who is near and cannot."""
         street = self._street
         x, y, yaw = street.ego[keyframe].tolist()
+        pitch, roll = self._slopes[keyframe].tolist()
         sensor = Frame.mounted((x, y, yaw), self._setup.position)
+        sensor = replace(sensor, pitch=pitch, roll=roll)
         near = self._set_up(keyframe, sensor)
         # Everything near may hide something; what has a class is reported and annotated.
         everything = sensor.boxes_to_local(self._boxes(keyframe, near))
         reported = self._classes[near] != _NO_CLASS
         labelled = near[reported]
         boxes = everything[reported]
+        self._strew(sensor)
         numbers = {self._bodies[number]: number for number in labelled.tolist()}
         labels = {body: int(self._classes[number]) for body, number in numbers.items()}
         views = [View(camera, sensor) for camera in cameras]
-        seen = surround_detections(self._world, views, sensor, labels, boxes)
-        swept = full_sweep(self._world, self._setup.grid, sensor, everything, sensor.z)
+        seen = surround_detections(self._engine, views, sensor, labels, boxes)
+        swept = self._swept(sensor, everything)
         identified = IdentifiedDetections(seen.detections, numbers_of(seen.objects, numbers))
         cloud = replace(swept, objects=numbers_of(swept.objects, numbers))
         # Seen by the full sweep or by a camera, whatever a policy will fire later.
         shown = np.isin(labelled, np.concatenate([cloud.objects, identified.objects]))
         if self._returns.shapes_beams:
             cloud = self._returned(keyframe, sensor, numbers)
+        if self._returns.clutter:
+            objects = self._classes, self._bright
+            cloud = as_recorded(cloud, self._setup.grid, objects, self._rng)
         annotations, hidden = (
             Annotations(labelled[kept], self._classes[labelled[kept]], boxes[kept])
             for kept in (shown, ~shown)
@@ -165,10 +185,21 @@ class _StreetBodies:
             keyframe * STREET_KEYFRAME_S, token, sensor, motion, annotations, identified, cloud
         ), hidden
 
+    def _swept(self, sensor: Frame, boxes: Floats) -> Cloud:
+        """What plain rays meet, by body; `boxes` (n, 7) hold all bodies but clutter."""
+        grid = self._setup.grid
+        if not self._returns.clutter:
+            return full_sweep(self._world, grid, sensor, boxes, sensor.z)
+        # Clutter is everywhere, and the road slopes: every ray is cast, at the road too.
+        cells = np.arange(grid.size)
+        ranges, bodies = self._engine.cast(sensor, cells)
+        return cloud_of(Scan(cells, ranges), bodies, grid)
+
     def _returned(self, keyframe: int, sensor: Frame, numbers: Mapping[int, int]) -> Cloud:
         """The returns of every cell; `numbers` are those of the bodies that are reported."""
         grid = self._setup.grid
-        beams = Beams(self._world, grid, self._returns, _ENGINE, partial(self._motion, keyframe))
+        engine = _CLUTTER_ENGINE if self._returns.clutter else _ENGINE
+        beams = Beams(self._world, grid, self._returns, engine, partial(self._motion, keyframe))
         most = self._returns.most_shots
         scan, bodies = beams.cast(sensor, np.arange(grid.size), np.full(grid.size, most))
         told = beams.compensated(scan, sensor)
@@ -211,6 +242,19 @@ class _StreetBodies:
                 CATALOGUE[self._street.kinds[number]], (x, y, yaw)
             )
         return near
+
+    def _strew(self, sensor: Frame) -> None:
+        """Let clutter in that has come near. What was near once stays."""
+        waiting = []
+        for kind, pose in self._clutter:
+            x, y, _ = pose
+            if np.hypot(x - sensor.x, y - sensor.y) > self._sight_m:
+                waiting.append((kind, pose))
+                continue
+            for start in range(0, len(kind.parts), MOST_PARTS):
+                some = replace(kind, parts=kind.parts[start : start + MOST_PARTS])
+                self._world.add(some, pose)
+        self._clutter = waiting
 
     def _boxes(self, keyframe: int, numbers: Integers) -> Floats:
         """(n, 7) world boxes of bodies by number."""

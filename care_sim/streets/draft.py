@@ -177,14 +177,29 @@ class Draft:
         kept = self._reserved, self._fixed, self._moving
         return not any(bodies.meets(way, size) for bodies in kept)
 
-    def stand(self, kind: str, pose: Floats) -> bool:
-        """Put a body at a pose (3,) if there is room. Says whether there was."""
+    def is_ground(self, pose: Floats, size: Footprint) -> bool:
+        """Whether nothing must stay free in a rectangle at a pose (3,): there may be a kerb."""
+        return not self._reserved.meets(pose.reshape(1, 3), size)
+
+    def is_way(self, pose: Floats, size: Footprint) -> bool:
+        """Whether a rectangle at a pose (3,) must stay free or anybody ever comes through it."""
         way = pose.reshape(1, 3)
-        size = _footprint(kind)
+        return self._reserved.meets(way, size) or self._moving.meets(way, size)
+
+    def occupy(self, pose: Floats, size: Footprint) -> bool:
+        """Take a rectangle at a pose (3,) for something that stands, if there is room. Says whether
+        there was.
+        """
         if not self.has_room(pose, size):
             return False
-        self._fixed.add(way, size, TOUCH_M)
-        self._keep(kind, np.repeat(way, len(self.times), axis=0))
+        self._fixed.add(pose.reshape(1, 3), size, TOUCH_M)
+        return True
+
+    def stand(self, kind: str, pose: Floats) -> bool:
+        """Put a body at a pose (3,) if there is room. Says whether there was."""
+        if not self.occupy(pose, _footprint(kind)):
+            return False
+        self._keep(kind, np.repeat(pose.reshape(1, 3), len(self.times), axis=0))
         return True
 
     def move(self, kind: str, way: Floats, berth: float) -> bool:

@@ -16,6 +16,7 @@ import numpy as np
 
 from care_sim.core.arrays import Floats
 from care_sim.core.types import Ego
+from care_sim.streets.clutter import Placed, strew
 from care_sim.streets.draft import STEP_S, STREET_KEYFRAME_S, Draft
 from care_sim.streets.drivers import BEYOND_M, drive_joining, drive_main
 from care_sim.streets.furniture import JOINING_M, furnish
@@ -34,7 +35,8 @@ neither list grows into the other."""
 @dataclass(frozen=True)
 class Street:
     """Bodies by `kinds` (n,) of the catalogue, with world `poses` (k, n, 3) at every keyframe; the
-    ego's `ego` poses (k, 3) and `motion` (k,).
+    ego's `ego` poses (k, 3) and `motion` (k,). `clutter` is what stands beside and has no class:
+    bodies with their poses.
     """
 
     name: str
@@ -42,15 +44,23 @@ class Street:
     poses: Floats
     ego: Floats
     motion: tuple[Ego, ...]
+    clutter: tuple[Placed, ...] = ()
 
     def digest(self) -> str:
         """SHA-256 over the kinds and over all poses in whole millimetres and milliradians, ego
-        first: the same on every machine whose arithmetic agrees that far.
+        first, then the clutter: the same on every machine whose arithmetic agrees that far.
         """
         content = hashlib.sha256(",".join(self.kinds).encode())
         for poses in (self.ego, self.poses):
             whole = np.round(np.ascontiguousarray(poses) * 1000).astype("<i8")
             content.update(whole.tobytes())
+        for kind, pose in self.clutter:
+            sizes = [
+                kind.size,
+                pose,
+                *(number for part in kind.parts for number in (part.size, part.centre)),
+            ]
+            content.update(np.round(1000 * np.array(sizes)).astype("<i8").tobytes())
         return content.hexdigest()
 
 
@@ -59,16 +69,16 @@ def street_name(seed: int) -> str:
     return f"street-{seed:04d}-{_layout(seed)}"
 
 
-def make_street(seed: int) -> Street:
+def make_street(seed: int, clutter: bool = False) -> Street:
     """The street of a seed. Layouts come in turn, everything else is drawn. Nothing outside the
-    seed enters.
+    seed enters. With `clutter` (`care_sim.streets.clutter`) the same street has more in it.
     """
     layout = _layout(seed)
     # Each part has a stream of its own, so that a change in one does not draw the others anew. What
     # drives comes before what stands and who walks: they find room round the traffic, not it round
     # them.
-    plans, traffic, furniture, people = (
-        np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(4)
+    plans, traffic, furniture, people, strewing = (
+        np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(5)
     )
     plan = LAYOUTS[layout](plans)
     draft = Draft(traffic)
@@ -80,19 +90,27 @@ def make_street(seed: int) -> Street:
     furnish(draft, plan, span)
     draft.rng = people
     cross_and_emerge(draft, plan.main, (5.0, float(drive.along[-1]) + BEYOND_M / 2))
-    for road, reach in (
+    roads = [
         (plan.main, span),
         *(
             (joining.road, (plan.main.side(joining.sign).front_m, JOINING_M))
             for joining in plan.joinings
         ),
-    ):
+    ]
+    for road, reach in roads:
         populate(draft, road, reach)
+    draft.rng = strewing
+    strewn = strew(draft, roads) if clutter else ()
     # Ways are sampled more often than keyframes come, for the tests of room.
     every = round(STREET_KEYFRAME_S / STEP_S)
     poses = np.stack(draft.ways, axis=1)[::every]
     return Street(
-        street_name(seed), tuple(draft.kinds), poses, drive.poses[::every], drive.motion[::every]
+        street_name(seed),
+        tuple(draft.kinds),
+        poses,
+        drive.poses[::every],
+        drive.motion[::every],
+        strewn,
     )
 
 

@@ -154,7 +154,7 @@ def owners_of(bodies: Sequence[OwnParts]) -> Integers:
     )
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=1024)
 def _columns(parts: tuple[Part, ...]) -> tuple[Integers, Floats, Floats]:
     """Shapes, half extents and offsets of a body's parts, as in `Primitives.tables`."""
     shapes = np.array([SHAPES.index(part.shape) for part in parts], np.int64)
@@ -222,7 +222,7 @@ def _joined_meshes(bodies: tuple[OwnParts, ...]) -> Tables:
     return corners, faces, edges, starts, owners_of(bodies), reaches
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=1024)
 def _body(parts: tuple[Part, ...]) -> tuple[Floats, Floats, Integers, Integers, Floats]:
     """Corners, faces and edges of a body's k parts, one after the other; (k, 3) how many there are
     of each in every part, and (k,) their reaches, as in `Polyhedra.tables`.

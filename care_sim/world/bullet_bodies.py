@@ -13,7 +13,7 @@ from care_sim.world.bodies import Part
 with silenced(STANDARD_ERROR):  # where it prints its build time
     import pybullet
 
-__all__ = ["LentClient", "borrow", "give_back", "leave", "pybullet"]
+__all__ = ["MOST_PARTS", "LentClient", "borrow", "give_back", "leave", "pybullet"]
 
 MOST_FREE = 4
 """Clients kept for whoever borrows next. Each holds 28 MB, and another one takes 14 ms."""
@@ -103,6 +103,9 @@ NO_BODY = -1
 """The id where there is no body, ours and PyBullet's."""
 OPAQUE, TRANSPARENT = 1, 2
 """Groups of bodies that rays hit, and that they pass."""
+
+MOST_PARTS = 16
+"""Of one body: PyBullet crashes on more (`MAX_COMPOUND_COLLISION_SHAPES`)."""
 
 _SHAPES = {
     "box": pybullet.GEOM_BOX,

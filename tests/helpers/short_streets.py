@@ -41,9 +41,9 @@ def few_and_short(keyframes=KEYFRAMES):
 
 
 @cache
-def _short_street(seed, keyframes):
+def _short_street(seed, clutter=False, *, keyframes):
     # Layouts take turns by seed, so this one has the layout of the street that it stands for.
-    return part_of(make_street(seed % len(LAYOUTS)), slice(keyframes))
+    return part_of(make_street(seed % len(LAYOUTS), clutter), slice(keyframes))
 
 
 def _filmed(street, *taken):

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from care_sim.core.frames import Frame
+from care_sim.core.grid import AngularGrid
 from care_sim.sensors.annotated import NO_OBJECT
+from care_sim.sensors.engines import Bullet
 from care_sim.sensors.surround import (
     SURROUND_CAMERAS,
     View,
@@ -85,10 +87,13 @@ def test_cameras_report_labelled_bodies_alone(bullet):
         )
     )
     views = [View(camera, SENSOR) for camera in SURROUND_CAMERAS]
-    identified = surround_detections(bullet, views, SENSOR, {bus: 2}, boxes)
+    engine = Bullet(bullet, AngularGrid())
+    identified = surround_detections(engine, views, SENSOR, {bus: 2}, boxes)
     assert set(identified.objects.tolist()) == {bus}
     assert set(identified.detections.classes.tolist()) == {2}
-    both = surround_detections(bullet, views, SENSOR, {bus: 2, van: 1}, boxes)
+    both = surround_detections(
+        Bullet(bullet, AngularGrid()), views, SENSOR, {bus: 2, van: 1}, boxes
+    )
     assert set(both.objects.tolist()) == {bus, van}
     assert numbers_of(both.objects, {bus: 7}).tolist() == [
         7 if b == bus else NO_OBJECT for b in both.objects

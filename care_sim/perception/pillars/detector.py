@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.array_files import Arrays, read_arrays, write_arrays
-from care_sim.base.checks import check_number
+from care_sim.base.checks import check_known, check_number
 from care_sim.base.errors import InvalidInput
 from care_sim.base.extras import import_torch
 from care_sim.base.files import parsed_json
@@ -25,6 +25,9 @@ from care_sim.perception.pillars.network import Fixed, answers, on_plan, place_p
 FORMAT = "care-sim pillars 1"
 """It goes up when the layers or what they are told change."""
 SHIPPED = Path(__file__).parent / "shipped" / "pillars.npz"
+STREETS, CLUTTER = "streets", "clutter"
+WEIGHTS = {STREETS: SHIPPED, CLUTTER: SHIPPED.with_name("pillars-clutter.npz")}
+"""The shipped weights by what they learned from: clean streets and drives, or cluttered streets."""
 CALIBRATION = "calibration"
 """(classes, 2) slope and offset from the logit of a peak to that of its score."""
 COMMAND = "care-sim train detector"
@@ -75,8 +78,8 @@ LEAST_SCORE = 0.3
 
 
 class PillarsDetector:
-    """The learned detector. `file` holds weights that `care-sim train detector` wrote; without it
-    the shipped ones act.
+    """The learned detector. `weights` are shipped ones, `streets` or `clutter`, after what they
+    learned from; `file` holds others that `care-sim train detector` wrote, in their place.
 
     What it reports has a score of `least_score` or more. A score is the share of such boxes that
     lie within 2 m of an object of their class, in scenes apart from those of the training. Runs on
@@ -87,11 +90,19 @@ class PillarsDetector:
     far = False
     stateless = True
 
-    def __init__(self, file: str | PathLike[str] | None = None, least_score: float = LEAST_SCORE):
+    def __init__(
+        self,
+        file: str | PathLike[str] | None = None,
+        least_score: float = LEAST_SCORE,
+        weights: str = STREETS,
+    ):
         check_number("least_score", least_score, 0.0, 1.0)
+        check_known("weights of detector pillars", weights, WEIGHTS)
+        if file is not None and weights != STREETS:
+            raise InvalidInput("give file or weights of detector pillars, not both")
         self._torch = import_torch()
-        self._file = SHIPPED if file is None else file
-        arrays, self.card = load_detector(file)
+        self._file = WEIGHTS[weights] if file is None else file
+        arrays, self.card = load_detector(self._file)
         self._network = Fixed(self._torch, arrays)
         self._places = place_planes(self._torch)
         self._calibration = arrays[CALIBRATION].astype(np.float64)

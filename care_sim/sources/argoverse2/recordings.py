@@ -140,6 +140,16 @@ def argoverse2_film(log: Path, grid: AngularGrid | None = None, empty_boxes: boo
     )
 
 
+def annotations_at(log: Path, sweep: int) -> Annotations:
+    """What is annotated of a log at the timestamp of a sweep and holds a recorded point, in the
+    frame of the LiDAR. Raises InvalidInput for tables that cannot be read.
+    """
+    _, boxes, _ = _tables(log)
+    bodies, holds = _bodies(boxes, sweep)
+    kept = zip(bodies, holds, strict=True)
+    return annotations_of([body for body, held in kept if held and body.label is not None])
+
+
 def sweep_files(log: Path) -> list[Path]:
     """Return the recorded sweeps that the film of a log is made of; none unless every keyframe has
     one. Raises InvalidInput for tables that cannot be read.

@@ -11,12 +11,13 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor
 from contextlib import contextmanager
+from functools import partial
 from itertools import count, islice
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from care_sim.base.errors import print_lines, report_problems
+from care_sim.base.errors import InvalidInput, print_lines, report_problems
 from care_sim.base.extras import import_torch
 from care_sim.base.files import ZIP, check_output
 from care_sim.base.interrupts import FAILED
@@ -26,7 +27,12 @@ from care_sim.core.arrays import Floats, Mask
 from care_sim.core.types import CLASSES, Detections
 from care_sim.perception.matching import UNSERVED, served_by
 from care_sim.perception.pillars.decoding import Peaks, peaks_of
-from care_sim.perception.pillars.detector import CALIBRATION, LEAST_SCORE, save_detector
+from care_sim.perception.pillars.detector import (
+    CALIBRATION,
+    LEAST_SCORE,
+    load_detector,
+    save_detector,
+)
 from care_sim.sensors.annotated import Annotations
 from care_sim.sources.scenes import Scene
 from care_sim.study.executors import Processes, processes
@@ -68,6 +74,8 @@ STEEPEST = 10.0
 SHUFFLED = 512
 """Examples from which a batch is drawn: those of some twenty plays, so that a batch holds several
 streets."""
+FIRST_BATCHES = 4
+"""Over which layers are normalised that learn on from weights."""
 AHEAD = 4
 """Plays that are under way before they are needed."""
 RISING = 0.05
@@ -81,6 +89,8 @@ HELD_OUT = range(VALIDATION + 24, VALIDATION + 48)
 the card tells what was reached."""
 LEAST_CHECKED = 8
 """Scenes of a source that are played for either, the same again where there are fewer: 24 plays."""
+CHECKED_CLUTTERED = 8
+"""Plays of cluttered streets of either kind: each has three times the examples of others."""
 
 
 def train_pillars(config: DetectorConfig, scenes: Scenes | None = None) -> int:
@@ -91,6 +101,8 @@ def train_pillars(config: DetectorConfig, scenes: Scenes | None = None) -> int:
     from care_sim.training.supervised.detector_network import Learning
 
     check_output(config.out, ZIP)
+    if scenes and config.clutter:
+        raise InvalidInput("clutter belongs to generated streets: leave out --source or --clutter")
     started = time.perf_counter()
     torch.manual_seed(config.seed)
     network = Learning()
@@ -135,30 +147,46 @@ def _learned(
     """Let the network learn and check it: its losses, its calibration, and what it reaches on plays
     apart.
     """
+    start = None if config.start is None else load_detector(config.start)[0]
     with one_thread(import_torch()), _player() as executor:
         print_lines(f"playing {SHUFFLED} scans before the first step", file=sys.stderr)
         learned = scenes.endless() if scenes else count(TRAINING)
-        batches = _batches(played(executor, learned), np.random.default_rng(config.seed))
+        batches = _batches(
+            played(executor, learned, config.clutter), np.random.default_rng(config.seed)
+        )
+        if start is not None:
+            network.begin_at(
+                start, [one for batch in islice(batches, FIRST_BATCHES) for one in batch]
+            )
         losses = train_detector(network, batches, config.steps, keep)
         network.eval()
         print_lines(f"checking {config.out} on plays that are held out", file=sys.stderr)
+        playing = partial(play, clutter=config.clutter)
         fitted, apart = (
-            [example for examples in executor.map(play, lessons) for example in examples]
-            for lessons in _held_out(scenes)
+            [example for examples in executor.map(playing, lessons) for example in examples]
+            for lessons in _held_out(config, scenes)
         )
         calibration = calibration_of(scores_by_scan(network, fitted))
         result = judged(scores_by_scan(network, apart, calibration))
         return losses, calibration, result
 
 
-def _held_out(scenes: Scenes | None) -> tuple[Sequence[int | World], Sequence[int | World]]:
+def _held_out(
+    config: DetectorConfig, scenes: Scenes | None
+) -> tuple[Sequence[int | World], Sequence[int | World]]:
     """Plays that scores are fitted to, and those that are judged. A single scene is both, in other
     plays.
     """
     if scenes is None:
-        return CALIBRATING, HELD_OUT
+        return _checked(config)
     fitted, apart = scenes.held_out[::2], scenes.held_out[1::2] or scenes.held_out
     return _repeated(scenes, fitted, 0), _repeated(scenes, apart, LEAST_CHECKED)
+
+
+def _checked(config: DetectorConfig) -> tuple[range, range]:
+    """Seeds of the generated plays that scores are fitted to, and of those held out."""
+    many = CHECKED_CLUTTERED if config.clutter else len(CALIBRATING)
+    return CALIBRATING[:many], HELD_OUT[:many]
 
 
 def _repeated(scenes: Scenes, part: Sequence[Scene], first: int) -> list[World]:
@@ -195,12 +223,15 @@ def train_detector(
     return fit(off, batches, steps, (optimizer, schedule), after)
 
 
-def played(executor: Executor, lessons: Iterator[int | World]) -> Iterator[Example]:
+def played(
+    executor: Executor, lessons: Iterator[int | World], clutter: bool = False
+) -> Iterator[Example]:
     """The examples of the plays of endless `lessons`, in order."""
-    under_way = deque(executor.submit(play, one) for one in islice(lessons, AHEAD))
+    playing = partial(play, clutter=clutter)
+    under_way = deque(executor.submit(playing, one) for one in islice(lessons, AHEAD))
     for lesson in lessons:
         examples = under_way.popleft().result()
-        under_way.append(executor.submit(play, lesson))
+        under_way.append(executor.submit(playing, lesson))
         yield from examples
 
 
@@ -239,7 +270,7 @@ def _card(
     """What the file says of itself; without a `result` nobody has checked the weights."""
     numbers = sum(array.size for array in network.arrays().values())
     parts = [losses[n : n + CURVE_STEPS] for n in range(0, len(losses), CURVE_STEPS)]
-    told = scenes.told if scenes else _generated()
+    told = scenes.told if scenes else _generated(made)
     return {
         "kind": "pillars",
         "network": f"{numbers} numbers",
@@ -247,6 +278,7 @@ def _card(
         "that know any grid; see care_sim.training.supervised.detector_data"
         + (scenes.terms if scenes else ""),
         "seeds": told["seeds"] | {"training": made.seed},
+        "begun at": "drawn weights" if made.start is None else made.start.name,
         "steps": len(losses),
         "steps asked for": made.steps,
         "batch": BATCH,
@@ -259,14 +291,15 @@ def _card(
     }
 
 
-def _generated() -> dict[str, Any]:
+def _generated(made: DetectorConfig) -> dict[str, Any]:
     """What the card says of generated worlds."""
+    fitted, apart = _checked(made)
     return {
-        "data": "generated streets and drives",
+        "data": "cluttered streets" if made.clutter else "generated streets and drives",
         "seeds": {
             "training from": TRAINING,
-            "calibration of scores": [CALIBRATING[0], CALIBRATING[-1]],
-            "held out": [HELD_OUT[0], HELD_OUT[-1]],
+            "calibration of scores": [fitted[0], fitted[-1]],
+            "held out": [apart[0], apart[-1]],
         },
     }
 

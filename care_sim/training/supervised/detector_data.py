@@ -33,6 +33,7 @@ from numpy.typing import NDArray
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.belief import Belief
 from care_sim.core.cells.stack import Grid
+from care_sim.core.conditions import FilmedReturns
 from care_sim.core.types import CLASSES
 from care_sim.envs.open_loop import FilmEnv
 from care_sim.envs.scenarios import DriveEnv
@@ -41,7 +42,7 @@ from care_sim.perception.pillars.decoding import points_within
 from care_sim.perception.pillars.network import BOX_OUTPUTS, CELL_M, CELLS, REACH_M
 from care_sim.policies import make_policy
 from care_sim.sensors.annotated import Annotations
-from care_sim.sensors.setups import DEFAULT_SETUP
+from care_sim.sensors.setups import DEFAULT_SETUP, sensor_setup
 from care_sim.sources.street_films import record
 from care_sim.streets.street import make_street
 from care_sim.training.supervised.worlds import AnyEnv, World
@@ -53,8 +54,10 @@ POLICIES = (
 )  # fmt: skip
 """Those that come with the package and know any grid."""
 LEAST_BUDGET, MOST_BUDGET = 0.01, 0.6
-FULL_SHARE = 0.25
-"""Of plays in which every cell fires."""
+FULL_SHARE, FULL_SHARE_CLUTTERED = 0.25, 0.5
+"""Of plays in which every cell fires. Those of cluttered streets are for recorded sweeps, too,
+which are full.
+"""
 RANGE_SIGMAS_M = (0.0, 0.02, 0.05)
 DROPOUTS = (0.0, 0.05, 0.2)
 OTHER_SETUPS = ("m1-forward", "os1-64", "paper-vehicle", "roof-and-corners")
@@ -89,39 +92,50 @@ class Example:
     full: bool = False
 
 
-def play(lesson: int | World) -> list[Example]:
-    """The examples of the street or the drive of a seed, or of the scene of a source."""
+def play(lesson: int | World, clutter: bool = False) -> list[Example]:
+    """The examples of the street or the drive of a seed, or of the scene of a source; with
+    `clutter` those of a cluttered street.
+    """
     seed = lesson if isinstance(lesson, int) else lesson.seed
     rng = np.random.default_rng([seed, 21])
     if isinstance(lesson, World) and lesson.film:
         return [*_film(lesson.film(), seed, rng, _handed)]
+    if clutter:
+        return [*_street(seed, rng, clutter)]
     # Drawn, since the layouts of streets come in turn.
     return [*(_street if rng.random() < 0.5 else _drive)(seed, rng)]
 
 
-def _street(seed: int, rng: np.random.Generator) -> Iterator[Example]:
-    return _film(record(make_street(seed)), seed, rng, _by_ranges)
+def _street(seed: int, rng: np.random.Generator, clutter: bool = False) -> Iterator[Example]:
+    setup = sensor_setup(_sensor(rng) if clutter else DEFAULT_SETUP)
+    film = record(make_street(seed, clutter), setup, FilmedReturns(clutter=clutter))
+    return _film(film, seed, rng, _by_ranges, clutter)
 
 
-def _film(film: Film, seed: int, rng: np.random.Generator, look: "_Look") -> Iterator[Example]:
+def _film(
+    film: Film, seed: int, rng: np.random.Generator, look: "_Look", clutter: bool = False
+) -> Iterator[Example]:
     # After the last keyframe nobody looks, so its ranges are in no observation.
     keyframes = len(film.shots) - 1
     for _ in range(PLAYS_OF_FILM):
-        with closing(FilmEnv(film, **_conditions(rng))) as env:
+        with closing(FilmEnv(film, clutter=clutter, **_conditions(rng, clutter))) as env:
             yield from _examples(env, seed, rng, keyframes, look)
 
 
 def _drive(seed: int, rng: np.random.Generator) -> Iterator[Example]:
-    other = rng.random() < 0.5
-    sensor = str(rng.choice(OTHER_SETUPS)) if other else DEFAULT_SETUP
-    told: dict[str, Any] = {"sensor": sensor, "keyframe_s": DRIVE_KEYFRAME_S}
+    told: dict[str, Any] = {"sensor": _sensor(rng), "keyframe_s": DRIVE_KEYFRAME_S}
     with closing(DriveEnv(**told, **_conditions(rng))) as env:
         keyframes = round(env.scenario.duration_s / DRIVE_KEYFRAME_S)
         yield from _examples(env, seed, rng, keyframes, _by_ranges)
 
 
-def _conditions(rng: np.random.Generator) -> dict[str, Any]:
-    full = rng.random() < FULL_SHARE
+def _sensor(rng: np.random.Generator) -> str:
+    other = rng.random() < 0.5
+    return str(rng.choice(OTHER_SETUPS)) if other else DEFAULT_SETUP
+
+
+def _conditions(rng: np.random.Generator, clutter: bool = False) -> dict[str, Any]:
+    full = rng.random() < (FULL_SHARE_CLUTTERED if clutter else FULL_SHARE)
     low, high = np.log([LEAST_BUDGET, MOST_BUDGET])
     drawn = float(np.exp(rng.uniform(low, high)))
     return {
@@ -194,10 +208,9 @@ def scanned(grid: Grid, ranges: NDArray[np.float32]) -> Floats:
 
 def _example(points: Floats, sensor_height_m: float, present: Annotations, full: bool) -> Example:
     boxes = present.boxes
-    larger = boxes + 2 * _ROUND_BOX_M * np.isin(np.arange(7), (3, 4, 5))
-    # The road beneath a body is no return of it.
-    standing = points[points[:, 2] > _ROUND_BOX_M - sensor_height_m]
-    returns = points_within(np.ascontiguousarray(standing), larger)
+    # Lifted, too: the road beneath a body, or a pavement, is no return of it.
+    round_it = _ROUND_BOX_M * np.array([0.0, 0.0, 1.0, 2.0, 2.0, 0.0, 0.0])
+    returns = points_within(np.ascontiguousarray(points), boxes + round_it)
     seen = (returns > 0) & within_plan(boxes)
     return Example(
         points.astype(np.float32), sensor_height_m, present.classes[seen], boxes[seen], full

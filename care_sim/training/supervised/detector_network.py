@@ -47,6 +47,28 @@ class Learning(nn.Module):
         )
         return told
 
+    def begin_at(self, arrays: Arrays, examples: list[Example]) -> None:
+        """Act as weights that were learned before, to learn on. Each layer is normalised over some
+        `examples`: scale and offset then undo it, so that on these the answers are the same.
+        """
+        hooks = []
+        with torch.no_grad():
+            for name in LAYERS:
+                module: Any = self.layers[name]
+                first = module[0]
+                weight, bias = (
+                    torch.from_numpy(arrays[f"{name}.{of}"]) for of in ("weight", "bias")
+                )
+                first.weight.copy_(weight.reshape(first.weight.shape))
+                if first.bias is not None:
+                    first.bias.copy_(bias)
+                else:
+                    hooks.append(first.register_forward_hook(_undone(module[1], bias)))
+            self.train()
+            self.forward(examples)
+        for hook in hooks:
+            hook.remove()
+
     def arrays(self) -> Arrays:
         """The numbers as they act once nothing is learned any more."""
         made: Arrays = {}
@@ -72,6 +94,19 @@ def _module(layer: Layer) -> nn.Sequential:
     return nn.Sequential(
         nn.Conv2d(*planes, bias=False), nn.BatchNorm2d(layer.outputs), nn.ReLU(inplace=True)
     )
+
+
+def _undone(normal: Any, bias: Tensor) -> Any:
+    """A hook that lets a normalisation leave what comes to it as it is, but for a `bias`."""
+
+    def set_up(_module: Any, _given: Any, planes: Tensor) -> None:
+        mean, variance = planes.mean((0, 2, 3)), planes.var((0, 2, 3), unbiased=False)
+        normal.weight.copy_(torch.sqrt(variance + normal.eps))
+        normal.bias.copy_(bias + mean)
+        normal.running_mean.copy_(mean)
+        normal.running_var.copy_(variance)
+
+    return set_up
 
 
 def _fixed(module: Any) -> tuple[Tensor, Tensor]:

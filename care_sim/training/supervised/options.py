@@ -74,3 +74,8 @@ class DetectorConfig(FitConfig):
 
     steps: int = bounded(10_000, 1, 1_000_000)
     """Batches of four scans that are learned from."""
+    clutter: bool = False
+    """Learn from cluttered streets alone, seen by several set-ups, and not from clean streets and
+    drives."""
+    start: Path | None = None
+    """File of weights to learn on from; without it the first ones are drawn."""

@@ -98,8 +98,8 @@ def test_every_condition_is_played_here_or_apart():
     apart = getsource(why_conditions_separate)
     of_beams = {*RETURN_SETTINGS}
     unheard = {n for n in DEFAULTS if n not in played | of_beams and n not in apart}
-    # The first says how long errors last that are played apart; the second is of films.
-    assert unheard == {"ego_pose_correlation_s", "sweep_mask"}
+    # The first says how long errors last that are played apart; the others are of films.
+    assert unheard == {"ego_pose_correlation_s", "sweep_mask", "clutter"}
 
 
 @pytest.mark.parametrize("own", OWN.values(), ids=OWN)

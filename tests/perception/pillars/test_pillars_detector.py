@@ -127,14 +127,24 @@ def test_the_shipped_detector_finds_most_of_a_street():
     assert found > 0.75 * seen > 20
 
 
-def test_the_shipped_card_says_what_the_readme_does():
-    made = PillarsDetector()
-    told = (pillars.SHIPPED.parent / "README.md").read_text()
+@pytest.mark.parametrize(("weights", "steps"), [("streets", 10_000), ("clutter", 600)])
+def test_the_shipped_card_says_what_the_readme_does(weights, steps):
+    made = PillarsDetector(weights=weights)
+    both = (pillars.SHIPPED.parent / "README.md").read_text().partition("## `pillars-clutter.npz`")
+    told = both[0] if weights == "streets" else both[2]
     result = made.card["result"]
     for name in ("recall, all scans", "recall, full scans", "precision, all scans"):
         assert f"{100 * result[name]:.1f}" in told
     assert f"{result['calibration error']:.3f}" in told
-    assert made.card["steps"] == made.card["steps asked for"] == 10_000
+    assert made.card["steps"] == made.card["steps asked for"] == steps
+
+
+def test_shipped_weights_are_known_by_what_they_learned_from(file):
+    assert PillarsDetector(weights="clutter").card["data"].startswith("2400 scans of cluttered")
+    with pytest.raises(InvalidInput, match=r"unknown weights of detector pillars 'roads'"):
+        PillarsDetector(weights="roads")
+    with pytest.raises(InvalidInput, match="give file or weights of detector pillars, not both"):
+        PillarsDetector(file, weights="clutter")
 
 
 def test_weights_whose_answer_is_no_number_are_told_of(tmp_path):

@@ -74,6 +74,7 @@ def test_every_fault_of_the_sensing_grows_from_none_in_some_panel():
         "camera_profile",
         "camera_latency_s",
         "sweep_mask",
+        "clutter",
     }
     assert varied == faults - elsewhere
     for fault in FAULTS:

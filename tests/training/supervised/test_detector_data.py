@@ -50,6 +50,13 @@ def test_a_play_is_the_same_again_and_another_seed_plays_another(examples):
     assert not np.array_equal(examples[0].boxes, examples[-1].boxes)
 
 
+def test_a_play_of_a_cluttered_street_has_slopes_and_parked_bicycles():
+    (own, *_), (again, *_) = (play(10_004, clutter=True) for _ in range(2))
+    assert np.array_equal(own.points, again.points)
+    # Boxes stand on a road that leans.
+    assert np.ptp(own.boxes[:, 2] - own.boxes[:, 5] / 2) > 0.1
+
+
 def test_the_points_of_a_range_image_are_those_that_were_fired_and_returned():
     film = street_film(1000)
     with closing(FilmEnv(film, budget=1.0)) as env:
