@@ -18,7 +18,7 @@ torch = pytest.importorskip("torch")
 from care_sim.training.supervised.detector_network import Learning  # noqa: E402 (it needs PyTorch)
 
 
-def street(seed):
+def street(seed, clutter=False):
     """Two cars on a road."""
     rng = np.random.default_rng(seed)
     places = [
