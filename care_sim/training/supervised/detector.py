@@ -164,21 +164,17 @@ def _learned(
         playing = partial(play, clutter=config.clutter)
         fitted, apart = (
             [example for examples in executor.map(playing, lessons) for example in examples]
-            for lessons in _held_out(config, scenes)
+            for lessons in (_held_out(scenes) if scenes else _checked(config))
         )
         calibration = calibration_of(scores_by_scan(network, fitted))
         result = judged(scores_by_scan(network, apart, calibration))
         return losses, calibration, result
 
 
-def _held_out(
-    config: DetectorConfig, scenes: Scenes | None
-) -> tuple[Sequence[int | World], Sequence[int | World]]:
+def _held_out(scenes: Scenes) -> tuple[Sequence[World], Sequence[World]]:
     """Plays that scores are fitted to, and those that are judged. A single scene is both, in other
     plays.
     """
-    if scenes is None:
-        return _checked(config)
     fitted, apart = scenes.held_out[::2], scenes.held_out[1::2] or scenes.held_out
     return _repeated(scenes, fitted, 0), _repeated(scenes, apart, LEAST_CHECKED)
 

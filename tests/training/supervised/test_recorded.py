@@ -149,7 +149,7 @@ def test_the_detector_learns_from_the_points_that_it_would_be_handed(source, sce
     """Recorded points stay where they were measured, and who has one is an object, also where the
     road falls.
     """
-    monkeypatch.setattr(detector_data, "_conditions", lambda rng: {"budget": 1.0})
+    monkeypatch.setattr(detector_data, "_conditions", lambda rng, clutter: {"budget": 1.0})
     monkeypatch.setattr(detector_data, "SHARE_KEPT", 1)
     (at,) = (row for row, one in enumerate(source.scenes()) if one.name == scene)
     world = Scenes(source, *[source.scenes()] * 2).worlds(source.scenes())[at]
