@@ -8,6 +8,7 @@ import pickle
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from copy import deepcopy
+from pathlib import Path
 from typing import Any, Protocol, Self, SupportsIndex
 
 import numpy as np
@@ -24,11 +25,13 @@ class Detector(ABC):
     """A loop calls it at every keyframe.
 
     `gathers`: how many sweeps it is given at once in the closed loop, its own keyframe's among
-    them. `track_score`: the least score of a detection that becomes a track.
+    them. `track_score`: the least score of a detection that becomes a track. `files`: what else it
+    reads than the files that its parameters and its entry point name.
     """
 
     gathers: int = 1
     track_score: float = 0.0
+    files: tuple[Path, ...] = ()
 
     def for_play(self) -> "Detector":
         """Return the detector for a play that begins: this one, if it remembers no other play."""
@@ -89,6 +92,10 @@ class PointDetector(Protocol):
     - `far`: whether it gets points beyond the reach of the grid, which a recorded LiDAR has (True).
     - `wants_poses`: whether `detect` gets the `poses` of the sweeps (False).
 
+    A detector whose files name further files, such as the base of a config, sets `files` to their
+    paths when it is made. They belong to the hash of a row, and a detector is made anew after one
+    of them has changed.
+
     `sweeps` and `track_score` are also parameters of every detector by name.
     """
 
@@ -108,6 +115,14 @@ class PointDetector(Protocol):
 def is_stateless(detector: object) -> bool:
     """Whether a detector promises that its answers depend on what it is handed alone."""
     return getattr(detector, "stateless", False) is True
+
+
+def files_of(detector: object) -> tuple[Path, ...]:
+    """The files that a detector said it reads when it was made; those of its class are of its entry
+    point.
+    """
+    files = getattr(detector, "files", None)
+    return () if files is getattr(type(detector), "files", None) else tuple(map(Path, files or ()))
 
 
 class PointsOnly(Detector):
@@ -132,6 +147,7 @@ class PointsOnly(Detector):
         self._name = name
         self._detector = detector
         self._again = again
+        self.files = files_of(detector)
         self._has_played = False
         self._sensor_height_m = sensor_height_m
         self._fields = tuple(getattr(detector, "fields", FIELDS[:3]))
@@ -200,9 +216,14 @@ class PointsOnly(Detector):
             return copy(self._detector, *how)
         except Exception as error:
             raise BrokenDetector(
-                f"detector {self._name} cannot be copied: {error_line(error)}; one with "
-                "`stateless = True` need not be"
+                f"detector {self._name} cannot be copied: {error_line(error)}; {self._mend()}"
             ) from error
+
+    def _mend(self) -> str:
+        """What makes a copy possible."""
+        if is_stateless(self._detector):
+            return "make it by name (`care_sim.perception.detectors.make_detector`)"
+        return "set `stateless = True` if its answers depend on the arguments of `detect` alone"
 
 
 def _column(cloud: Cloud, field: str) -> Floats | Integers:
