@@ -69,8 +69,9 @@ class BrokenDetector(InvalidInput):
 
 FIELDS = ("x", "y", "z", "intensity", "ring", "time_lag")
 """What a detector may ask of every point. Places in the sensor frame, metres. `intensity` from 0 to
-1, 0 where nothing measured it. `ring`: the laser, 0 the lowest, as nuScenes counts. `time_lag`:
-seconds since the point was measured, 0 or more, as CenterPoint counts.
+1, 0 where nothing measured it, as in generated worlds without `lidar_stated_range_m`. `ring`: the
+laser, 0 the lowest, as nuScenes counts. `time_lag`: seconds since the point was measured, 0 or
+more, as CenterPoint counts.
 """
 
 
