@@ -155,7 +155,7 @@ def entry_files(entry: EntryPoint) -> dict[str, Path] | None:
     }
     if not 0 < len(files) <= MOST_FILES:
         return None
-    return files | {f"declared {number}": path for number, path in enumerate(_declared(entry))}
+    return files | {f"declared {number}": path for number, path in enumerate(declared_files(entry))}
 
 
 def _code_of(root: Path) -> Iterator[Path]:
@@ -169,7 +169,7 @@ def _code_of(root: Path) -> Iterator[Path]:
         yield from (file for file in beside if file.suffix in CODE and file.is_file())
 
 
-def _declared(entry: EntryPoint) -> list[Path]:
+def declared_files(entry: EntryPoint) -> list[Path]:
     """The files that an entry declares; relative names count from its module. Nothing of code that
     cannot be loaded.
     """

@@ -98,7 +98,7 @@ def _plays(
     for name in names:
         given = _parameters(options, name)
         own = common | {"detector": name, "detector_parameters": given}
-        fed = source if options.sweeps else source_for(source, name, dict(given))
+        fed = source_for(source, name, given, options.sweeps)
         plays = play_grid(fed, scenes, [options.policy], [options.budget], floors, **own)
         plays[0].try_out()
         made.append(plays)

@@ -99,8 +99,8 @@ class ReplayEnv(FilmEnv):
         )
         told = parameters.get("detector_parameters") or {}
         # Other parameters than a map are refused below.
-        if sweeps is None and isinstance(told, Mapping):
-            recorded = source_for(recorded, parameters.get("detector", PROXY), told)
+        if isinstance(told, Mapping):
+            recorded = source_for(recorded, parameters.get("detector", PROXY), told, sweeps)
         scenes = recorded.scenes()
         # The source refuses a name that it does not have.
         named = (each for each in scenes if each.name == scene)

@@ -15,7 +15,7 @@ from care_sim.loops.film import Shot
 from care_sim.sensors.annotated import AT_KEYFRAME, Cloud, SweepPose, joined
 
 
-def with_sweeps(returned: Cloud, fire: Callable[[Cloud], Cloud], shot: Shot) -> Cloud:
+def gather_sweeps(returned: Cloud, fire: Callable[[Cloud], Cloud], shot: Shot) -> Cloud:
     """The returns of a keyframe of a film, and what `fire` takes of the sweeps before it. Without
     sweeps the returns of the keyframe are as they were.
     """

@@ -4,6 +4,7 @@ react.
 
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,12 +19,12 @@ from care_sim.driving.localisation import Localisation, Odometry
 from care_sim.loops.episode import SensorSeeds
 from care_sim.loops.false_box_pools import pool_of_film
 from care_sim.loops.film import Film, Shot
-from care_sim.loops.gathering import acted_on, with_sweeps
+from care_sim.loops.gathering import acted_on, gather_sweeps
 from care_sim.loops.observation_limits import Limits
 from care_sim.loops.truth import Told, TrackObjects, told_by
 from care_sim.perception.points_only import Detector
 from care_sim.perception.tracker import TrackMemory
-from care_sim.sensors.annotated import Cloud
+from care_sim.sensors.annotated import NO_RETURNS, Cloud
 from care_sim.sensors.camera import CameraDetector
 from care_sim.sensors.camera_profiles import invents_boxes
 from care_sim.sensors.false_boxes import EMPTY_POOL
@@ -60,7 +61,9 @@ class OpenLoop:
     told: Told
     """What the returns of the last keyframe told besides their ranges."""
     handed: Cloud
-    """The returns that the detector was given at the last keyframe, once there was one."""
+    """The returns that the detector was given at the last keyframe. None before the first one, and
+    none in a copy: sweeps are large, and a copy plays on without them.
+    """
     last_ranges: NDArray[np.float32]
     """(E, A) the scan of the last keyframe in metres: 0 not fired, maximum range without a return.
     """
@@ -95,8 +98,12 @@ class OpenLoop:
         self._held: Cells = np.empty(0, np.int64)
         self.index = 0
         self.told = {}
+        self.handed = NO_RETURNS
         self.last_ranges = np.zeros(rig.grid.shape, np.float32)
         self._look(self.last_ranges)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return vars(self) | {"handed": NO_RETURNS}
 
     @property
     def over(self) -> bool:
@@ -117,7 +124,7 @@ class OpenLoop:
         cloud = self._lidar.fire(fired, shot.cloud)
         self.told = told_by(fired, cloud.cells, cloud.intensities, cloud.times)
         mask = fired if self._sweep_mask == COMING else self._held
-        self.handed = with_sweeps(cloud, partial(self._lidar.fire, mask), shot)
+        self.handed = gather_sweeps(cloud, partial(self._lidar.fire, mask), shot)
         self._held = fired
         self._detector.at(shot.token, shot.sensor)
         reported, objects = self._detector.detect(self.handed, shot.annotations)

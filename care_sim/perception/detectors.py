@@ -8,9 +8,11 @@ a built-in name is taken.
 import inspect
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from care_sim.base.checks import check_known
+from care_sim.base.digests import declared_files
 from care_sim.base.errors import InvalidInput, MissingExtra, error_line, printable, shown
 from care_sim.base.plugins import Plugins
 from care_sim.perception.cluster.detector import ClusterDetector
@@ -94,7 +96,8 @@ def make_detector(name: str, sensor_height_m: float, /, **parameters: object) ->
     if name in PRIVILEGED:
         proxy: Detector = make(**own)
         return proxy
-    detector = kept_or_made(make, own, partial(_point_detector, name, make, own))
+    declared = () if name in DETECTORS.built_in else declared_files(DETECTORS.entry(name))
+    detector = kept_or_made(make, own, partial(_point_detector, name, make, own), declared)
     again = partial(make_detector, name, sensor_height_m, **parameters)
     return PointsOnly(name, detector, sensor_height_m, **fed, again=again)
 
@@ -103,6 +106,11 @@ def sweeps_wanted(name: str, parameters: Mapping[str, object]) -> int:
     """How many sweeps a detector asks for at a keyframe. Raises as `make_detector` does."""
     # Nobody detects with it, so any height will do.
     return 1 if name in PRIVILEGED else make_detector(name, 1.0, **parameters).gathers
+
+
+def files_read(name: str, parameters: Mapping[str, object]) -> tuple[Path, ...]:
+    """The files that a detector says it reads (`PointDetector`). Raises as `make_detector` does."""
+    return () if name in PRIVILEGED else make_detector(name, 1.0, **parameters).files
 
 
 def detector_lines() -> list[str]:

@@ -3,50 +3,75 @@ loaded once. Any other detector is made anew for every play, so no play depends 
 """
 
 import os
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Mapping
+from pathlib import Path
 from threading import RLock
 
-from care_sim.base.digests import file_stamp, paths_in
-from care_sim.perception.points_only import PointDetector, is_stateless
+from care_sim.base.digests import file_digest, paths_in
+from care_sim.perception.points_only import PointDetector, files_of, is_stateless
 
 MOST_KEPT = 8
 """Stateless detectors that a process keeps: the last ones that it asked for."""
-_KEPT: dict[Hashable, PointDetector] = {}
+_KEPT: dict[Hashable, tuple[PointDetector, list[str | None]]] = {}
+"""Each with the hashes of the files that it read."""
 _LOCK = RLock()
-# A session or a device of a parent does not work in a forked child, which opens its own.
-os.register_at_fork(after_in_child=_KEPT.clear)
+
+
+def _forget() -> None:
+    """A session or a device of a parent does not work in a forked child, which opens its own. A
+    thread of the parent that held the lock is not there to release it.
+    """
+    global _LOCK
+    _LOCK = RLock()
+    _KEPT.clear()
+
+
+os.register_at_fork(after_in_child=_forget)
 
 
 def kept_or_made(
     make: Callable[..., object],
     parameters: Mapping[str, object],
     made: Callable[[], PointDetector],
+    declared: Iterable[Path] = (),
 ) -> PointDetector:
     """Return the stateless detector that `make` made of equal `parameters`, or else what `made`
     returns, and keep it if it is stateless.
 
-    A detector is made again after a file that a parameter names has changed.
+    A detector is made again after a file has changed that a parameter names, its entry point
+    `declared`, or the detector itself names in `files`.
     """
-    key = _key(make, parameters)
+    key = _key(make, parameters, declared)
     # Two threads that ask for one network load it once.
     with _LOCK:
-        detector = _KEPT.pop(key) if key in _KEPT else made()
-        if key is not None and is_stateless(detector):
-            _KEPT[key] = detector
+        detector, read = _KEPT.pop(key, (None, []))
+        if detector is None or read != _hashes(files_of(detector)):
+            detector = made()
+        read = _hashes(files_of(detector))
+        if key is not None and None not in read and is_stateless(detector):
+            _KEPT[key] = detector, read
         while len(_KEPT) > MOST_KEPT:
             del _KEPT[next(iter(_KEPT))]
     return detector
 
 
-def _key(make: Callable[..., object], parameters: Mapping[str, object]) -> Hashable:
-    """A key of a detector, None where a parameter cannot be compared."""
+def _hashes(files: Iterable[Path]) -> list[str | None]:
+    return [file_digest(file) for file in files]
+
+
+def _key(
+    make: Callable[..., object], parameters: Mapping[str, object], declared: Iterable[Path]
+) -> Hashable:
+    """A key of a detector, None where a parameter cannot be compared, or a folder not be read."""
     told: list[Hashable] = [make]
+    hashes = _hashes(declared)
     for name, given in sorted(parameters.items()):
         value = tuple(given) if isinstance(given, list) else given
         # Both: 1 equals True, and an array writes itself in part.
-        told += [name, repr(value), value, *map(file_stamp, paths_in(value))]
+        told += [name, repr(value), value]
+        hashes += _hashes(paths_in(value))
     try:
-        hash(key := tuple(told))
+        hash(key := (*told, *hashes))
     except TypeError:
         return None
-    return key
+    return None if None in hashes else key

@@ -2,10 +2,13 @@
 TorchScript or ONNX.
 """
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from io import BytesIO
 from os import PathLike, fspath
 from pathlib import Path
+from threading import Lock
 from typing import Any, ClassVar
 
 import numpy as np
@@ -22,6 +25,13 @@ FORWARD, RIGHT = AXES = "forward", "right"
 sweeps of nuScenes; y is left of it.
 """
 Names = str | Sequence[str]
+_DRAWING = Lock()
+"""Held while a network draws random numbers: all threads share the generator of PyTorch."""
+_ONNX_DRAWS = rb"(?:RandomNormal|RandomUniform|Multinomial|Bernoulli)"
+# The wire format of ONNX: field 4 of a node, its type, and an entry "location" of external data.
+# In both a length of one byte comes before the name.
+_ONNX_TYPE = re.compile(rb'"[\x09-\x11](' + _ONNX_DRAWS + rb"(?:Like)?)")
+_ONNX_LOCATION = re.compile(rb"\x0a\x08location\x12([\x01-\x7f])")
 
 
 class NetworkDetector:
@@ -132,7 +142,8 @@ class TorchScriptDetector(NetworkFile):
     `points` is a float32 tensor (P, k) with the `fields`, `sensor_height_m` a float; `classes`
     (n,), `boxes` (n, 7), `scores` (n,) and, as a fourth output, `velocities` (n, 2) are those of
     `NetworkDetector.detections`. `device`: cpu, cuda, cuda:1. Stateless unless `forward` writes to
-    the module. Needs torch.
+    the module, or cannot be shown not to. A module that draws random numbers draws the same ones in
+    every call. Needs torch.
     """
 
     allowed = "a TorchScript module (torch.jit.save)"
@@ -143,17 +154,29 @@ class TorchScriptDetector(NetworkFile):
         self._check_file(file)
         try:
             self._module = torch.jit.load(file, map_location=device).eval()
-            # In a frozen copy all is constant that no method writes.
-            frozen = torch.jit.freeze(self._module)
         except RuntimeError as error:
             raise InvalidInput(f"{file}: no TorchScript module for {device}") from error
-        self.stateless = not frozen.graph.findAllNodes("prim::GetAttr")
+        if not hasattr(self._module, "forward"):
+            raise InvalidInput(f"{file}: the module has no method forward(points, sensor_height_m)")
+        try:
+            # In a frozen copy all is constant that no method writes.
+            graph = torch.jit.freeze(self._module, optimize_numerics=False).graph
+        except RuntimeError:
+            # Some modules that run cannot be frozen, so nothing is known of them.
+            self.stateless, self._draws = False, True
+            return
+        nodes = [*_nodes(graph)]
+        kinds = {node.kind() for node in nodes}
+        # What a fork runs is not among the nodes.
+        self.stateless = kinds.isdisjoint(("prim::GetAttr", "prim::fork"))
+        self._draws = "prim::fork" in kinds or any(node.isNondeterministic() for node in nodes)
 
     def detect(self, points: Floats, sensor_height_m: float) -> Detections:
         """See `care_sim.perception.points_only.PointDetector`."""
         torch = import_torch()
+        draws = _same_draws(torch, self._device) if self._draws else nullcontext()
         # Nothing is learned here, so no gradients are kept.
-        with torch.inference_mode():
+        with torch.inference_mode(), draws:
             given = torch.from_numpy(self.points_for(points)).to(self._device)
             outputs = self._module(given, float(sensor_height_m))
         return self.detections(points, *(output.cpu().numpy() for output in outputs))
@@ -170,12 +193,29 @@ class TorchScriptDetector(NetworkFile):
         self._module = import_torch().jit.load(written, map_location=self._device)
 
 
+def _nodes(block: Any) -> Iterator[Any]:
+    """The nodes of a TorchScript graph, those of its branches and loops too."""
+    for node in block.nodes():
+        yield node
+        for inner in node.blocks():
+            yield from _nodes(inner)
+
+
+@contextmanager
+def _same_draws(torch: Any, device: str) -> Iterator[None]:
+    """Random numbers of PyTorch begin anew, and go on afterwards as if none had been drawn."""
+    with _DRAWING, torch.random.fork_rng([device] if device.startswith("cuda") else []):
+        torch.manual_seed(0)
+        yield
+
+
 class OnnxDetector(NetworkFile):
     """Runs an ONNX file: inputs `points` (P, k) float32 and, if the network has it,
     `sensor_height_m` (1,) float32; outputs in the order classes, boxes, scores, and velocities if
     it has them, as of `TorchScriptDetector`.
 
-    `device`: cpu or cuda, for which ONNX Runtime needs its own package. Needs onnxruntime.
+    `device`: cpu or cuda, for which ONNX Runtime needs its own package. A network that draws random
+    numbers raises InvalidInput: they depend on all earlier calls. Needs onnxruntime.
     """
 
     allowed = "an ONNX network"
@@ -196,6 +236,12 @@ class OnnxDetector(NetworkFile):
         except Exception as error:
             told = " ".join(str(error).split())[:200]
             raise InvalidInput(f"{file}: no ONNX network ({told})") from error
+        content = Path(file).read_bytes()
+        if drawing := _ONNX_TYPE.search(content):
+            raise InvalidInput(
+                f"{file}: {drawing[1].decode()} draws random numbers; export the network without"
+            )
+        self.files = tuple(_external_data(Path(file), content))
         self._inputs = [each.name for each in self._session.get_inputs()]
         if "points" not in self._inputs or {*self._inputs} - {"points", "sensor_height_m"}:
             raise InvalidInput(
@@ -211,6 +257,21 @@ class OnnxDetector(NetworkFile):
         }
         outputs = self._session.run(None, {name: known[name] for name in self._inputs})
         return self.detections(points, *outputs)
+
+
+def _external_data(file: Path, content: bytes) -> Iterator[str]:
+    """The files beside an ONNX file that hold its larger weights."""
+    ends = ((found.end(), found[1][0]) for found in _ONNX_LOCATION.finditer(content))
+    for name in {content[end : end + length] for end, length in ends}:
+        yield str(file.absolute().parent / name.decode())
+
+
+def has_point_in(limits: Sequence[float], points: np.ndarray) -> bool:
+    """Whether one of `points` (P, k) lies within `limits`, the least x, y, z and the most: without
+    one a network of voxels fails.
+    """
+    low, high = np.split(np.asarray(limits, float), 2)
+    return bool(np.all((points[:, :3] >= low) & (points[:, :3] < high), axis=1).any())
 
 
 def _listed(names: Names) -> tuple[str, ...]:

@@ -8,6 +8,7 @@ import pickle
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from copy import deepcopy
+from pathlib import Path
 from typing import Any, Protocol, Self, SupportsIndex
 
 import numpy as np
@@ -25,15 +26,17 @@ class Detector(ABC):
     """A loop calls it at every keyframe.
 
     `gathers`: how many sweeps it is given at once in the closed loop, its own keyframe's among
-    them. `track_score`: the least score of a detection that becomes a track. `wants_points`:
-    whether it reads more of a cloud than cells and objects. `is_matched`: whether each detection is
-    of the object behind it, so that the scoring need not match their places.
+    them. `track_score`: the least score of a detection that becomes a track. `files`: what else it
+    reads than the files that its parameters and its entry point name. `wants_points`: whether it
+    reads more of a cloud than cells and objects. `is_matched`: whether each detection is of the
+    object behind it, so that the scoring need not match their places.
     """
 
     gathers: int = 1
     wants_points: bool = True
     is_matched: bool = False
     track_score: float = 0.0
+    files: tuple[Path, ...] = ()
 
     def begin(self, seed: np.random.SeedSequence, rig: Rig, is_filmed: bool) -> "Detector":
         """Return the detector of an episode with this `seed`: itself where it remembers nothing of
@@ -76,8 +79,9 @@ class BrokenDetector(InvalidInput):
 
 FIELDS = ("x", "y", "z", "intensity", "ring", "time_lag")
 """What a detector may ask of every point. Places in the sensor frame, metres. `intensity` from 0 to
-1, 0 where nothing measured it. `ring`: the laser, 0 the lowest, as nuScenes counts. `time_lag`:
-seconds since the point was measured, 0 or more, as CenterPoint counts.
+1, 0 where nothing measured it, as in generated worlds without `lidar_stated_range_m`. `ring`: the
+laser, 0 the lowest, as nuScenes counts. `time_lag`: seconds since the point was measured, 0 or
+more, as CenterPoint counts.
 """
 
 
@@ -99,6 +103,10 @@ class PointDetector(Protocol):
     - `far`: whether it gets points beyond the reach of the grid, which a recorded LiDAR has (True).
     - `wants_poses`: whether `detect` gets the `poses` of the sweeps (False).
 
+    A detector whose files name further files, such as the base of a config, sets `files` to their
+    paths when it is made. They belong to the hash of a row, and a detector is made anew after one
+    of them has changed.
+
     `sweeps` and `track_score` are also parameters of every detector by name.
     """
 
@@ -118,6 +126,14 @@ class PointDetector(Protocol):
 def is_stateless(detector: object) -> bool:
     """Whether a detector promises that its answers depend on what it is handed alone."""
     return getattr(detector, "stateless", False) is True
+
+
+def files_of(detector: object) -> tuple[Path, ...]:
+    """The files that a detector said it reads when it was made; those of its class are of its entry
+    point.
+    """
+    files = getattr(detector, "files", None)
+    return () if files is getattr(type(detector), "files", None) else tuple(map(Path, files or ()))
 
 
 class PointsOnly(Detector):
@@ -142,6 +158,7 @@ class PointsOnly(Detector):
         self._name = name
         self._detector = detector
         self._again = again
+        self.files = files_of(detector)
         self._has_played = False
         self._sensor_height_m = sensor_height_m
         self._fields = tuple(getattr(detector, "fields", FIELDS[:3]))
@@ -210,9 +227,14 @@ class PointsOnly(Detector):
             return copy(self._detector, *how)
         except Exception as error:
             raise BrokenDetector(
-                f"detector {self._name} cannot be copied: {error_line(error)}; one with "
-                "`stateless = True` need not be"
+                f"detector {self._name} cannot be copied: {error_line(error)}; {self._mend()}"
             ) from error
+
+    def _mend(self) -> str:
+        """What makes a copy possible."""
+        if is_stateless(self._detector):
+            return "make it by name (`care_sim.perception.detectors.make_detector`)"
+        return "set `stateless = True` if its answers depend on the arguments of `detect` alone"
 
 
 def _column(cloud: Cloud, field: str) -> Floats | Integers:

@@ -116,6 +116,9 @@ class Cloud:
         )
 
 
+NO_RETURNS = Cloud(np.empty(0, np.int64), np.empty((0, 3)), np.empty(0, np.int64))
+
+
 def joined(clouds: Sequence[Cloud]) -> Cloud:
     """The returns of clouds in the order of their cells, with the columns that all of them have;
     those from far away joined in the same way.

@@ -2,7 +2,6 @@
 as the detector asks for.
 """
 
-from collections.abc import Mapping
 from dataclasses import fields, replace
 from typing import Any
 
@@ -15,13 +14,14 @@ _OPTION = "sweeps"
 """The option of sources that serve the sweeps between keyframes."""
 
 
-def source_for(source: Source, detector: str, parameters: Mapping[str, object]) -> Source:
-    """Return the source with as many sweeps per keyframe as a detector asks for. Where the source
-    has no sweeps between its keyframes, return it as it is, and print one line.
+def source_for(source: Source, detector: str, parameters: Any, sweeps: int | None = None) -> Source:
+    """Return the source with as many sweeps per keyframe as a detector with some `parameters` asks
+    for, or as it is where the user named a number of `sweeps`. Where the source has no sweeps
+    between its keyframes, print one line.
 
     Raises as `care_sim.perception.detectors.make_detector` does.
     """
-    wanted = sweeps_wanted(detector, parameters)
+    wanted = 1 if sweeps else sweeps_wanted(detector, dict(parameters))
     if wanted == 1:
         return source
     fed = with_sweeps(source, wanted)

@@ -19,7 +19,7 @@ from care_sim.perception.detectors import PROXY
 from care_sim.policies import tags_of
 from care_sim.scenarios import SCENARIOS, make_scenario
 from care_sim.sensors.setups import DEFAULT_SETUP, sensor_columns, sensor_setup
-from care_sim.study.provenance import detector_digest, scenario_digest
+from care_sim.study.provenance import detector_digest, detector_files, scenario_digest
 from care_sim.study.rows.parameters import Parameters
 from care_sim.study.run_config import (
     Row,
@@ -98,11 +98,13 @@ class EpisodeConfig(ClosedLoopConditions, RunConfig):
 
     def installed(self) -> list[str | None]:
         """Those of the base; of another detector than the default, and of a scenario that is not
-        built in, its hash and those of the files that its parameters name.
+        built in, its hash and those of the files that its parameters name; and of the files that
+        the detector says it reads.
         """
         own = super().installed()
         if self.detector != PROXY:
             own += [detector_digest(self.detector), *files_in(self.detector_parameters)]
+            own += detector_files(self.detector, self.detector_parameters)
         if self.scenario not in SCENARIOS:
             own += [scenario_digest(self.scenario), *files_in(self.scenario_parameters)]
         return own

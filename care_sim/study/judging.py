@@ -13,7 +13,7 @@ from care_sim.envs.sensing import detector_of
 from care_sim.evaluation.detector_quality import SceneBoxes, scene_boxes
 from care_sim.evaluation.sightings import RANGE_M
 from care_sim.loops.film import Film
-from care_sim.loops.gathering import with_sweeps
+from care_sim.loops.gathering import gather_sweeps
 from care_sim.sensors.annotated import Annotations, Cloud
 from care_sim.sources.nuscenes.detections import result_boxes
 from care_sim.sources.nuscenes.table_files import JsonRow
@@ -90,7 +90,7 @@ def _scan_ms(config: PlayConfig, film: Film) -> Floats:
     # The first scans find caches cold that a drive would keep warm.
     times = []
     for shot in film.shots[: 2 * TIMED_SCANS]:
-        cloud = with_sweeps(shot.cloud.to_shots(), Cloud.to_shots, shot)
+        cloud = gather_sweeps(shot.cloud.to_shots(), Cloud.to_shots, shot)
         detector.at(shot.token, shot.sensor)
         started = time.thread_time()
         detector.detect(cloud, shot.annotations)

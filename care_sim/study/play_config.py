@@ -17,7 +17,7 @@ from care_sim.perception.detectors import PROXY
 from care_sim.policies import check_policy
 from care_sim.sensors.setups import sensor_setup
 from care_sim.sources.scenes import Scene, Source
-from care_sim.study.provenance import detector_digest, source_digests
+from care_sim.study.provenance import detector_digest, detector_files, source_digests
 from care_sim.study.rows.parameters import Parameters
 from care_sim.study.run_config import (
     FULL,
@@ -98,13 +98,14 @@ class PlayConfig(Conditions, RunConfig):
         return self.source.row(self.scene) | {"scene": self.scene.name}
 
     def installed(self) -> list[str | None]:
-        """Those of the base, the hash of the detector, those of the files that its parameters name,
-        and those of a source that is not built in.
+        """Those of the base, the hash of the detector, those of the files that its parameters name
+        and that it reads, and those of a source that is not built in.
         """
         return [
             *super().installed(),
             detector_digest(self.detector),
             *files_in(self.detector_parameters),
+            *detector_files(self.detector, self.detector_parameters),
             *source_digests(self.source),
         ]
 

@@ -2,7 +2,7 @@
 
 import json
 import platform
-from functools import cache
+from functools import cache, lru_cache
 from importlib import metadata
 from importlib.metadata import EntryPoint
 from pathlib import Path
@@ -17,12 +17,14 @@ from care_sim.base.digests import (
     file_digest,
     paths_in,
 )
+from care_sim.base.errors import InvalidInput, MissingExtra
 from care_sim.base.limits import CORES
-from care_sim.perception.detectors import DETECTORS
+from care_sim.perception.detectors import DETECTORS, files_read
 from care_sim.policies import POLICIES
 from care_sim.policies.isolation import are_isolated, policy_process
 from care_sim.scenarios import PLUGINS as SCENARIO_PLUGINS
 from care_sim.sources.scenes import Source
+from care_sim.study.rows.parameters import Parameters
 
 _LIBRARIES = (
     "gymnasium",
@@ -72,6 +74,24 @@ def policy_digest(policy: str) -> str | None:
 def detector_digest(detector: str) -> str | None:
     """The same as `policy_digest`, of a detector."""
     return "" if detector in DETECTORS.built_in else _entry_digest(DETECTORS.entry(detector))
+
+
+def detector_files(detector: str, parameters: Parameters) -> list[str | None]:
+    """Hashes of the files that a detector says it reads, besides those that its parameters name."""
+    named = [file_digest(path) for _, value in parameters for path in paths_in(value)]
+    return [*map(file_digest, _files_read(detector, parameters, tuple(named)))]
+
+
+# The detector is made to hear of its files: once, not for each of many plays.
+@lru_cache
+def _files_read(
+    detector: str, parameters: Parameters, _named: tuple[str | None, ...]
+) -> tuple[Path, ...]:
+    try:
+        return files_read(detector, dict(parameters))
+    # Nothing is played with a detector that cannot be made here.
+    except (InvalidInput, MissingExtra):
+        return ()
 
 
 def scenario_digest(scenario: str) -> str | None:

@@ -11,23 +11,27 @@ from threading import Lock
 
 import numpy as np
 
-from care_sim.perception.network_detectors import NetworkDetector
+from care_sim.perception.network_detectors import NetworkDetector, has_point_in
 
 
 class OpenPCDet(NetworkDetector):
-    """Runs a network of OpenPCDet on the device `device`. `fields`, `axes` and `full_intensity` are
-    those of `NetworkDetector`, and as in training on nuScenes unless given.
+    """Runs a network of OpenPCDet.
+
+    Unless given, `device` is cuda:0 where there is one, else cpu, and `fields`, `axes` and
+    `full_intensity`, those of `NetworkDetector`, are as in training on nuScenes.
     """
 
     sweeps = 10  # for a network of fewer: --detector-parameters sweeps=1
     track_score = 0.3
     stateless = True
+    # One for all detectors, which share the generator of NumPy.
+    _lock = Lock()
 
     def __init__(
         self,
         config: str,
         checkpoint: str,
-        device: str = "cuda:0",
+        device: str = "",
         fields: str = "x,y,z,intensity,time_lag",
         # OpenPCDet turns the sweeps of nuScenes neither for training nor for tests: x is right.
         axes: str = "right",
@@ -38,11 +42,12 @@ class OpenPCDet(NetworkDetector):
         from pcdet.models import build_network
         from pcdet.utils import common_utils
 
-        settings = settings_of(config)
+        device = device or ("cuda:0" if torch.cuda.is_available() else "cpu")
+        settings, self.files = settings_of(config)
         names = settings.CLASS_NAMES
         super().__init__(fields, axes, full_intensity, names)
         logger = common_utils.create_logger()
-        self._torch, self._device, self._lock = torch, torch.device(device), Lock()
+        self._torch, self._device = torch, torch.device(device)
         self._data = DatasetTemplate(settings.DATA_CONFIG, names, training=False, logger=logger)
         # Its layers put tables on the current device.
         with self._on_device():
@@ -53,8 +58,7 @@ class OpenPCDet(NetworkDetector):
     def detect(self, points, sensor_height_m):
         """See `care_sim.perception.points_only.PointDetector`."""
         own = self.points_for(points)
-        low, high = np.split(np.asarray(self._data.point_cloud_range), 2)
-        if not np.all((own[:, :3] >= low) & (own[:, :3] < high), axis=1).any():
+        if not has_point_in(self._data.point_cloud_range, own):
             return self.detections(points, [], [], [])  # no voxel holds a point
         # Layers keep what they computed last, and the device is that of the thread.
         with self._lock, self._on_device(), self._torch.inference_mode():
@@ -89,9 +93,10 @@ class OpenPCDet(NetworkDetector):
 
 
 def settings_of(config):
-    """The settings of a file. OpenPCDet looks for a `_BASE_CONFIG_` in its folder tools, where its
-    own programs run; here it is looked for in the current folder, in those above the file, and in
-    tools.
+    """The settings of a file, and the files that it is built upon.
+
+    OpenPCDet looks for a `_BASE_CONFIG_` in its folder tools, where its own programs run. Here it
+    is looked for in the current folder, in those above the file, and in tools.
     """
     import yaml
     from pcdet.config import cfg, merge_new_config
@@ -99,14 +104,17 @@ def settings_of(config):
     path = Path(config).resolve()
     folders = [Path.cwd(), *path.parents, Path(cfg.ROOT_DIR) / "tools"]
 
+    bases = []
+
     def placed(told):
         if not isinstance(told, dict):
             return told
         own = {key: placed(value) for key, value in told.items()}
         if base := own.get("_BASE_CONFIG_"):
             found = (folder / base for folder in folders if (folder / base).is_file())
-            own["_BASE_CONFIG_"] = str(next(found, base))
+            bases.append(next(found, Path(base)))
+            own["_BASE_CONFIG_"] = str(bases[-1])
         return own
 
     # A copy: two detectors of a process may have two configs.
-    return merge_new_config(deepcopy(cfg), placed(yaml.safe_load(path.read_text())))
+    return merge_new_config(deepcopy(cfg), placed(yaml.safe_load(path.read_text()))), bases

@@ -5,12 +5,15 @@ import pickle
 from dataclasses import dataclass
 
 import gymnasium
+import numpy as np
 import pytest
 
 import care_sim
 from care_sim.base.errors import InvalidInput
 from care_sim.envs.scenarios import ScenarioEnv
 from care_sim.perception import lifetimes
+from care_sim.perception.network_detectors import OnnxDetector
+from care_sim.perception.points_only import PointsOnly
 from care_sim.scenarios.dartout import Dartout
 from tests.helpers.network_files import counting_script, mean_onnx, middle_script
 from tests.helpers.short_streets import few_and_short
@@ -73,15 +76,18 @@ def test_a_copy_and_the_original_play_on_as_if_alone(name, policy, arguments, dr
 
 
 def torchscript(tmp_path):
+    pytest.importorskip("torch")
     return {"detector": "torchscript"} | given(middle_script(tmp_path / "middle.pt"))
 
 
 def torchscript_that_counts(tmp_path):
+    pytest.importorskip("torch")
     return {"detector": "torchscript"} | given(counting_script(tmp_path / "counting.pt"))
 
 
 def onnx(tmp_path):
     pytest.importorskip("onnx")
+    pytest.importorskip("onnxruntime")
     file = mean_onnx(tmp_path / "mean.onnx")
     return {"detector": "onnx"} | given(file, fields="x,y,z,intensity")
 
@@ -94,22 +100,36 @@ def given(file, **others):
     return {"detector_parameters": {"file": file} | others}
 
 
-NETWORKS = [torchscript, torchscript_that_counts, onnx, a_class_that_counts]
+STATELESS = [torchscript, onnx]
+REMEMBERING = [torchscript_that_counts, a_class_that_counts]
 
 
 @pytest.mark.filterwarnings("ignore:.*torch.jit.*:DeprecationWarning")
-@pytest.mark.parametrize("made", NETWORKS)
+@pytest.mark.parametrize("made", STATELESS + REMEMBERING)
 @pytest.mark.parametrize("name", ["CARE-Dartout-v0", "CARE-Street-v0"])
-def test_a_detector_is_copied_with_what_it_remembers(name, made, tmp_path):
-    pytest.importorskip("torch")
+def test_copies_and_the_original_detect_as_if_alone(name, made, tmp_path):
     with few_and_short():
         assert plays_on(name, "care", made(tmp_path)) == [None] * 3
 
 
-@pytest.mark.parametrize("made", [torchscript, onnx])
+@pytest.mark.filterwarnings("ignore:.*torch.jit.*:DeprecationWarning")
+@pytest.mark.parametrize("made", REMEMBERING)
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
+def test_a_detector_is_copied_with_what_it_remembers(copied, made, tmp_path):
+    with few_and_short(), gymnasium.make("CARE-Street-v0", **made(tmp_path)) as env:
+        env.reset(seed=3)
+        env.step(env.action_space.low)
+        one, two = env, copied(env)
+        last = [each.unwrapped.loop.keyframe(np.arange(16384)).reported for each in (one, one, two)]
+        places = [each.boxes[0, 0] for each in last]
+        assert places[1] > places[0] == places[2]
+        # What is only of the last keyframe stays behind.
+        assert len(one.unwrapped.loop.handed) > len(copied(one).unwrapped.loop.handed) == 0
+
+
+@pytest.mark.parametrize("made", STATELESS)
 @pytest.mark.filterwarnings("ignore:.*torch.jit.*:DeprecationWarning")
 def test_copies_share_the_weights_and_a_pickle_opens_the_file_again(made, tmp_path):
-    pytest.importorskip("torch")
     arguments = made(tmp_path)
     with gymnasium.make("CARE-Dartout-v0", **arguments) as env:
         network = env.unwrapped._detector._detector
@@ -148,8 +168,16 @@ def test_a_detector_that_cannot_be_copied_is_named_in_one_line(copied):
         env.unwrapped._detector._detector._file.close()
     assert str(refused.value) == (
         f"detector {__name__}:Closed cannot be copied: TypeError: cannot pickle "
-        "'_io.TextIOWrapper' object; one with `stateless = True` need not be"
+        "'_io.TextIOWrapper' object; set `stateless = True` if its answers depend on the arguments "
+        "of `detect` alone"
     )
+
+
+@pytest.mark.filterwarnings("ignore:.*torch.jit.*:DeprecationWarning")
+def test_a_stateless_one_that_cannot_be_pickled_is_made_by_name(tmp_path):
+    detector = PointsOnly("mine", OnnxDetector(**onnx(tmp_path)["detector_parameters"]), 1.8)
+    with pytest.raises(InvalidInput, match=r"mine cannot be copied: .*; make it by name"):
+        pickle.dumps(detector)
 
 
 @dataclass(frozen=True)

@@ -89,3 +89,52 @@ def counting_script(path):
 
     torch.jit.script(Counting()).save(str(path))
     return path
+
+
+def drawing_script(path, forked):
+    """A module that puts its person at a random place, drawn in a task of its own or not."""
+    import torch
+
+    class Drawing(torch.nn.Module):
+        def __init__(self, forked: bool):
+            super().__init__()
+            self.forked = forked
+
+        def forward(self, points: torch.Tensor, sensor_height_m: float):
+            x = torch.zeros(1)
+            if self.forked:
+                x += torch.jit.wait(torch.jit.fork(torch.rand, 1))
+            elif points.shape[0] > 0:
+                x += torch.rand(1)
+            rest = torch.tensor([0.0, -1.0, 4.0, 4.0, 4.0, 0.0])
+            return torch.tensor([4]), torch.cat([x, rest]).unsqueeze(0), torch.ones(1)
+
+    torch.jit.script(Drawing(forked)).save(str(path))
+    return path
+
+
+def interface_script(path):
+    """A module that chooses one of its layers by number, which PyTorch cannot freeze."""
+    import torch
+
+    @torch.jit.interface
+    class Layer(torch.nn.Module):
+        def forward(self, x: torch.Tensor) -> torch.Tensor:
+            pass
+
+    class Same(torch.nn.Module):
+        def forward(self, x: torch.Tensor) -> torch.Tensor:
+            return x
+
+    class Chosen(torch.nn.Module):
+        def __init__(self):
+            super().__init__()
+            self.layers = torch.nn.ModuleList([Same(), Same()])
+
+        def forward(self, points: torch.Tensor, sensor_height_m: float):
+            layer: Layer = self.layers[int(sensor_height_m)]
+            box = torch.cat([layer.forward(points)[0, :3], torch.ones(4)]).unsqueeze(0)
+            return torch.tensor([4]), box, torch.ones(1)
+
+    torch.jit.script(Chosen()).save(str(path))
+    return path

@@ -1,85 +1,70 @@
-"""The four commands of the page "Your detector", as it prints them, on 150 scenes: from tables to
-the paper's Table 1, Figure 2 and Table 2.
+"""The page "Your detector" walked as it stands: from a file to a table of first sightings, and from
+nuScenes to the paper's Table 1, Figure 2 and Table 2, on 150 scenes.
 """
 
 import json
-import os
 import re
-import shutil
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tests.helpers.nuscenes_movers import KEYFRAMES, write_movers
-from tests.helpers.places import EXAMPLES, ROOT
+from tests.helpers.places import ROOT, fenced
 
 pytest.importorskip("torch")
-pytestmark = [
-    pytest.mark.official,
-    pytest.mark.skipif(
-        not (ROOT / ".venv-official" / ".installed").exists(), reason="run by make test-official"
-    ),
-]
-SCENES = 150
+pytest.importorskip("yaml")
+from tests.helpers.detector_page import PAGE, commands, typed, write_belongings
+from tests.helpers.nuscenes_movers import KEYFRAMES
 
-
-def commands():
-    """Those of the first block of the page, each in one line."""
-    page = (ROOT / "docs" / "write" / "your-detector.md").read_text()
-    block = re.search(r"^## Four commands.*?^```\n(.*?)^```$", page, re.S | re.M)[1]
-    return re.sub(r"\\\n\s*", "", block).splitlines()
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """What an owner of nuScenes has there: data, weights, the adapter, camera boxes, a clone."""
-    made = tmp_path_factory.mktemp("mine")
-    write_movers(made, SCENES)
-    shutil.copy(EXAMPLES / "openpcdet_detector.py", made)
-    (made / "pcdet").mkdir()
-    shutil.copy(ROOT / "tests" / "helpers" / "pcdet_standin.py", made / "pcdet" / "__init__.py")
-    for name in ("net.yaml", "net.pth"):
-        (made / name).touch()
-    for name in ("Makefile", ".venv-official", "constraints-official.txt"):
-        (made / name).symlink_to(ROOT / name)
-    return made
-
-
-def run(command, folder):
-    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-    done = subprocess.run(
-        command, shell=True, cwd=folder, env=os.environ | {"PATH": path}, capture_output=True,
-        text=True, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, f"{command}\n{done.stdout}{done.stderr}"
-    return done.stdout
+pytestmark = pytest.mark.official
+SCENES = [3, 150]
+"""Those of the paper, and before them some that show a fault soon."""
 
 
 def scored(folder, results):
     return json.loads((folder / f"{results}-official" / "metrics_summary.json").read_text())
 
 
-def test_four_commands_go_from_tables_to_the_papers_tables(folder):
-    judge, protocol, export, official = commands()
-    assert re.search(r"OpenPCDet +0\.3 +100\.0 +100\.0 +100\.0 ", run(judge, folder))
+def rows_of(tables, title):
+    """The cells behind each first one, of a measure of the table `care minus each policy`."""
+    part = re.search(r"care minus each policy\n(.*?)^## ", tables, re.S | re.M)[1]
+    own = re.search(rf"^\| \*{title}\*.*?\n(.*?)(?=^\| \*|^$)", part, re.S | re.M)[1]
+    return {cells[1]: cells[2:-1] for cells in (re.split(r" *\| *", row) for row in own.split("\n"))
+            if len(cells) > 1}  # fmt: skip
 
-    assert f"in {SCENES * KEYFRAMES} samples of {SCENES} scenes" in run(export, folder)
-    run(official, folder)
-    good = scored(folder, "care")
+
+def test_a_file_has_a_table_of_first_sightings(tmp_path):
+    (tmp_path / "export.py").write_text(fenced(PAGE, "py")[0])
+    typed("python export.py", tmp_path)
+    judge, play = commands("First table from a file")
+    assert re.search(r"^torchscript +0\.3 ", typed(judge, tmp_path), re.M)
+    typed(play, tmp_path)
+    tables = (tmp_path / "runs" / "streets" / "tables.md").read_text()
+    assert {"all-camera", "history"} < rows_of(tables, "First sightings").keys()
+
+
+@pytest.mark.skipif(
+    not (ROOT / ".venv-official" / ".installed").exists(), reason="run by make test-official"
+)
+@pytest.mark.parametrize("scenes", SCENES)
+def test_four_commands_go_from_tables_to_the_papers_tables(scenes, tmp_path):
+    write_belongings(tmp_path, scenes)
+    judge, protocol, export, official = commands("Four commands on nuScenes")
+    assert re.search(r"OpenPCDet +0\.3 +100\.0 +100\.0 +100\.0 ", typed(judge, tmp_path))
+
+    assert f"in {scenes * KEYFRAMES} samples of {scenes} scenes" in typed(export, tmp_path)
+    typed(official, tmp_path)
+    good = scored(tmp_path, "care")
     assert good["mean_ap"] > 0.4
     assert good["meta"]["care_sim"]["sweeps"] == 10
 
     # Velocities are those of the network: the same boxes, driving the other way, score less.
-    content = json.loads((folder / "care.json").read_text())
+    content = json.loads((tmp_path / "care.json").read_text())
     for boxes in content["results"].values():
         for box in boxes:
             box["velocity"] = np.negative(box["velocity"]).tolist()
-    (folder / "wrong.json").write_text(json.dumps(content))
-    run(official.replace("care.json", "wrong.json"), folder)
-    wrong = scored(folder, "wrong")
+    (tmp_path / "wrong.json").write_text(json.dumps(content))
+    typed(official.replace("care.json", "wrong.json"), tmp_path)
+    wrong = scored(tmp_path, "wrong")
     assert wrong["mean_ap"] == good["mean_ap"]
     assert wrong["nd_score"] < good["nd_score"]
     assert (
@@ -87,7 +72,18 @@ def test_four_commands_go_from_tables_to_the_papers_tables(folder):
     )
 
     # The longest comes last.
-    assert f"Scenes: {SCENES}, with {SCENES} first sightings" in run(protocol, folder)
-    tables = (folder / "runs" / "mine" / "tables.md").read_text()
-    assert "care minus each policy" in tables
-    assert [*(folder / "runs" / "mine").glob("levels-*.svg")]
+    assert f"Scenes: {scenes}, with {scenes} first sightings" in typed(protocol, tmp_path)
+    tables = (tmp_path / "runs" / "mine" / "tables.md").read_text()
+    assert "| care minus | 10% | 20% | 35% |" in tables
+    # The newcomer drives where no track is, so only a camera or chance leads to it.
+    for title, sign in (("First sightings", 1), ("Censored TTFD", -1)):
+        rows = rows_of(tables, title)
+        gains = [float(cell.split()[0]) * sign for cell in rows["history"]]
+        assert len(gains) == 3
+        assert min(gains) > 0
+        assert rows.keys() > {"history-uniform", "all-camera", "uncertainty", "random"}
+    (figure,) = (tmp_path / "runs" / "mine").glob("levels-nuscenes-*.svg")
+    drawn = figure.read_text()
+    assert all(
+        f">{name}</text>" in drawn for name in ("care", "history", "all-camera", "full scan")
+    )

@@ -3,7 +3,8 @@ neither OpenPCDet nor mmdetection3d can be installed where these tests run.
 """
 
 import sys
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
@@ -13,7 +14,7 @@ import pytest
 from care_sim.core.types import CLASSES
 from care_sim.perception.points_only import PointsOnly
 from care_sim.sensors.annotated import NO_ANNOTATIONS, Cloud
-from tests.helpers.places import EXAMPLES, loaded
+from tests.helpers.places import EXAMPLES, ROOT, loaded
 
 torch = pytest.importorskip("torch")
 
@@ -54,68 +55,13 @@ def modules(monkeypatch, **contents):
             monkeypatch.setattr(sys.modules[".".join(parts)], key, value, raising=False)
 
 
-class Settings(dict):
-    """Of the interface of EasyDict."""
-
-    def __getattr__(self, name):
-        if name in self:
-            return self[name]
-        raise AttributeError(name)
-
-
-def merged(config, new_config):
-    """A base comes from the current folder."""
-    if "_BASE_CONFIG_" in new_config:
-        config.update(yaml.safe_load(Path(new_config["_BASE_CONFIG_"]).read_text()))
-    for key, value in new_config.items():
-        if isinstance(value, dict):
-            config[key] = merged(config.get(key, Settings()), value)
-        else:
-            config[key] = value
-    return config
-
-
 def pcdet(monkeypatch, answers=answer):
-    class Network(torch.nn.Module):
-        def load_params_from_file(self, checkpoint, logger, to_cpu):
-            assert (checkpoint, to_cpu) == ("net.pth", True)
-
-        def forward(self, batch):
-            assert batch["batch_size"] == 1
-            boxes = answers(batch["points"][:, 1:], -1.0)
-            labels, scores = torch.tensor([4, 3]), torch.tensor([0.9, 0.8])
-            return [{"pred_boxes": boxes, "pred_labels": labels, "pred_scores": scores}], {}
-
-    class Data:
-        def __init__(self, config, names, training, logger):
-            assert (names, training) == (NAMES, False)
-            self.point_cloud_range = np.array(config["POINT_CLOUD_RANGE"], np.float32)
-
-        def prepare_data(self, given):
-            points = given["points"]
-            assert (np.abs(points[:, :2]) < 51.2).any()
-            return given | {"points": points[np.random.permutation(len(points))]}  # noqa: NPY002
-
-        def collate_batch(self, given):
-            (one,) = given
-            points = one["points"]
-            return {
-                "points": np.column_stack([np.zeros(len(points)), points]),
-                "frame_id": np.array([0]),
-                "batch_size": 1,
-            }
-
-    modules(
-        monkeypatch,
-        pcdet__config={"cfg": Settings(ROOT_DIR=Path("nowhere")), "merge_new_config": merged},
-        pcdet__datasets={"DatasetTemplate": Data},
-        pcdet__models={"build_network": lambda *_, **__: Network()},
-        pcdet__utils__common_utils={"create_logger": lambda: None},
-    )
-    monkeypatch.setattr(
-        sys.modules["pcdet.utils"], "common_utils", sys.modules["pcdet.utils.common_utils"],
-        raising=False,
-    )  # fmt: skip
+    place = spec_from_file_location("pcdet", ROOT / "tests" / "helpers" / "pcdet_standin.py")
+    standin = module_from_spec(place)
+    monkeypatch.setitem(sys.modules, "pcdet", standin)
+    place.loader.exec_module(standin)
+    labels, scores = torch.tensor([4, 3]), torch.tensor([0.9, 0.8])
+    standin.answer = lambda points: (answers(points, -1.0), labels, scores)
     return loaded(EXAMPLES / "openpcdet_detector.py").OpenPCDet
 
 
@@ -147,18 +93,21 @@ def mmdet3d(monkeypatch, answers=answer):
 
 
 FRAMEWORKS = [pcdet, mmdet3d]
+BASE = "cfgs/dataset_configs/nuscenes.yaml"
 
 
 @pytest.fixture
-def config(tmp_path):
-    """Of a network, in a folder as that of OpenPCDet."""
-    base = tmp_path / "tools" / "cfgs" / "dataset_configs" / "nuscenes.yaml"
+def config(tmp_path, monkeypatch):
+    """Of a network, in a folder as that of OpenPCDet, with the weights in the current folder."""
+    monkeypatch.chdir(tmp_path)
+    Path("net.pth").touch()
+    base = tmp_path / "tools" / BASE
     own = tmp_path / "tools" / "cfgs" / "models" / "net.yaml"
     for file in (base, own):
         file.parent.mkdir(parents=True)
     base.write_text(yaml.safe_dump({"POINT_CLOUD_RANGE": RANGE}))
-    named = {"DATA_CONFIG": {"_BASE_CONFIG_": "cfgs/dataset_configs/nuscenes.yaml"}}
-    own.write_text(yaml.safe_dump({"CLASS_NAMES": NAMES, "MODEL": {}} | named))
+    told = {"CLASS_NAMES": NAMES, "DATA_CONFIG": {"_BASE_CONFIG_": BASE}, "MODEL": {}}
+    own.write_text(yaml.safe_dump(told))
     return str(own)
 
 
@@ -206,6 +155,29 @@ def test_a_scan_without_a_point_in_reach_asks_nobody(framework, places, config, 
     cloud = Cloud(cells, np.array(places).reshape(-1, 3), cells)
     found, _ = PointsOnly("theirs", made, 1.84).detect(cloud, NO_ANNOTATIONS)
     assert len(found) == 0
+
+
+@pytest.mark.parametrize("framework", FRAMEWORKS)
+@pytest.mark.parametrize("there_is_one", [True, False])
+def test_the_device_is_a_gpu_where_there_is_one(framework, there_is_one, config, monkeypatch):
+    kind = framework(monkeypatch)
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: there_is_one)
+    monkeypatch.setattr(torch.cuda, "device", lambda _: nullcontext())
+    monkeypatch.setattr(torch.nn.Module, "to", lambda self, _: self)
+    made = kind(config, "net.pth")
+    assert str(made._device) == ("cuda:0" if there_is_one else "cpu")
+
+
+def test_adapters_say_what_their_configs_are_built_upon(config, monkeypatch, tmp_path):
+    made = pcdet(monkeypatch)(config, "net.pth", "cpu")
+    assert made.files == [tmp_path / "tools" / BASE]
+    first, second = tmp_path / "one.py", tmp_path / "two.py"
+    first.write_text("_base_ = ['./two.py', 'mmdet3d::three.py']")
+    second.write_text("_base_ = '../four.py'")
+    (tmp_path.parent / "four.py").write_text("model = dict()")
+    made = mmdet3d(monkeypatch)(str(first), "net.pth", "cpu")
+    named = [path.resolve() for path in made.files]
+    assert named == [second, tmp_path.parent / "four.py"]
 
 
 @pytest.mark.parametrize("framework", FRAMEWORKS)

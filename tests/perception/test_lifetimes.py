@@ -1,7 +1,9 @@
 """How long detectors live: a stateless one as long as its process, any other for one play."""
 
 import os
+import signal
 from concurrent.futures import ThreadPoolExecutor
+from threading import Event, Thread
 
 import gymnasium
 import numpy as np
@@ -12,6 +14,8 @@ from care_sim.perception import lifetimes
 from care_sim.perception.detectors import make_detector
 from care_sim.sensors.annotated import NO_ANNOTATIONS, NO_OBJECT, Cloud
 from care_sim.sources.named import source_of
+from care_sim.sources.scenes import Streets
+from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.executors import processes
 from care_sim.study.play_config import play_grid
 from care_sim.study.scene_play import play_scene
@@ -75,13 +79,70 @@ def test_a_stateless_detector_is_made_once_per_set_of_parameters(tmp_path):
     assert len(lifetimes._KEPT) == lifetimes.MOST_KEPT
 
 
-def test_a_forked_child_makes_its_own():
+def test_a_change_of_any_file_that_it_reads_makes_it_anew(tmp_path):
+    folder, declared, base = tmp_path / "weights", tmp_path / "declared", tmp_path / "base"
+    folder.mkdir()
+    for file in (folder / "w", declared, base):
+        file.write_text("one")
+
+    def made():
+        detector = Shared()
+        detector.files = [base]
+        return detector
+
+    def kept():
+        return lifetimes.kept_or_made(Shared, {"file": folder}, made, [declared])
+
+    for file in (folder / "w", declared, base):
+        first = kept()
+        assert kept() is first
+        file.write_text("another")
+        assert kept() is not first
+
+
+def test_a_row_has_another_hash_after_a_file_of_its_detector_changed(tmp_path):
+    file = tmp_path / "base.txt"
+    parameters = {"detector": f"{HERE}:Based", "detector_parameters": (("base", str(file)[:-4]),)}
+    found = set()
+    for text in ("one", "another", "one"):
+        file.write_text(text)
+        (play,) = play_grid(Streets(), Streets().scenes()[:1], ["care"], [0.1], **parameters)
+        found.add(play.digest())
+        found.add(EpisodeConfig("dartout", "care", 0.1, 0, **parameters).digest())
+    assert len(found) == 4
+
+
+class Based(Shared):
+    """Reads a file whose name no parameter has."""
+
+    def __init__(self, base):
+        super().__init__()
+        self.files = (f"{base}.txt",)
+
+
+def test_a_forked_child_makes_its_own_whatever_its_parent_did():
     shared()
+    held, done = Event(), Event()
+
+    def hold():
+        with lifetimes._LOCK:
+            held.set()
+            done.wait()
+
+    thread = Thread(target=hold)
+    thread.start()
+    held.wait()
     child = os.fork()
     if not child:
-        os._exit(len(lifetimes._KEPT))
+        # A child that waits for a lock of its parent ends by this.
+        signal.alarm(5)
+        Shared.made = 0
+        shared()
+        os._exit(Shared.made)
+    done.set()
+    thread.join()
     _, status = os.waitpid(child, 0)
-    assert os.waitstatus_to_exitcode(status) == 0
+    assert os.waitstatus_to_exitcode(status) == 1
 
 
 def test_any_other_is_made_anew(tmp_path):

@@ -6,8 +6,9 @@ import pytest
 from care_sim.base.errors import InvalidInput
 from care_sim.core.types import CLASSES
 from care_sim.perception.detectors import make_detector
-from care_sim.perception.network_detectors import NetworkDetector
+from care_sim.perception.network_detectors import NetworkDetector, TorchScriptDetector
 from care_sim.sensors.annotated import NO_ANNOTATIONS, NO_OBJECT, Cloud
+from tests.helpers.network_files import drawing_script, interface_script
 from tests.helpers.places import ROOT, fenced, loaded
 
 NUSCENES = "car,truck,construction_vehicle,bus,trailer,barrier,motorcycle,bicycle,pedestrian"
@@ -66,6 +67,37 @@ def test_a_label_beyond_the_classes_is_named():
         InvalidInput, match="answers the labels 9 to 9, and its classes have 0 to 8"
     ):
         network().detections(POINTS, [9], np.ones((1, 7)), [1.0])
+
+
+@pytest.mark.filterwarnings("ignore:.*torch.jit.*:DeprecationWarning")
+def test_a_module_that_cannot_be_frozen_runs_and_is_not_shared(tmp_path):
+    pytest.importorskip("torch")
+    detector = TorchScriptDetector(interface_script(tmp_path / "net.pt"))
+    assert not detector.stateless
+    assert detector.detect(POINTS[:, :3], 1.0).boxes[0, 0] == 10.0
+
+
+@pytest.mark.filterwarnings("ignore:.*torch.jit.*:DeprecationWarning")
+@pytest.mark.parametrize("forked", [False, True])
+def test_a_module_that_draws_draws_the_same_and_disturbs_nobody(forked, tmp_path):
+    torch = pytest.importorskip("torch")
+    detector = TorchScriptDetector(drawing_script(tmp_path / "net.pt", forked))
+    assert detector.stateless != forked
+    torch.manual_seed(7)
+    places = [detector.detect(POINTS[:, :3], 1.0).boxes[0, 0]]
+    drawn = torch.rand(1)
+    torch.manual_seed(7)
+    assert torch.rand(1) == drawn
+    places.append(detector.detect(POINTS[:, :3], 1.0).boxes[0, 0])
+    assert places[0] == places[1] != 0
+
+
+@pytest.mark.filterwarnings("ignore:.*torch.jit.*:DeprecationWarning")
+def test_a_module_without_forward_is_named_in_one_line(tmp_path):
+    torch = pytest.importorskip("torch")
+    torch.jit.script(torch.nn.Module()).save(str(tmp_path / "net.pt"))
+    with pytest.raises(InvalidInput, match=r"net\.pt: the module has no method forward\("):
+        TorchScriptDetector(tmp_path / "net.pt")
 
 
 @pytest.mark.filterwarnings("ignore:.*torch.jit.*:DeprecationWarning")

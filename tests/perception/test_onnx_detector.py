@@ -5,10 +5,11 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.perception.detectors import make_detector
+from care_sim.perception.network_detectors import OnnxDetector
 from care_sim.sensors.annotated import NO_ANNOTATIONS, NO_OBJECT, Cloud
 from tests.helpers.network_files import mean_onnx
 
-pytest.importorskip("onnx")
+onnx = pytest.importorskip("onnx")
 pytest.importorskip("onnxruntime")
 
 
@@ -41,3 +42,21 @@ def test_a_file_that_is_no_network_is_named(tmp_path):
         make_detector("onnx", 1.84, file=path)
     with pytest.raises(InvalidInput, match="unknown device 'tpu'"):
         make_detector("onnx", 1.84, file=path, device="tpu")
+
+
+def test_weights_in_a_file_beside_are_known(mean_point, tmp_path):
+    assert OnnxDetector(mean_point).files == ()
+    network = onnx.load(mean_point)
+    large = onnx.numpy_helper.from_array(np.zeros(999, np.float32), "large")
+    network.graph.initializer.append(large)
+    onnx.save(network, mean_point, save_as_external_data=True, location="w.data")
+    assert OnnxDetector(mean_point).files == (str(tmp_path / "w.data"),)
+
+
+def test_a_network_that_draws_random_numbers_is_refused(mean_point):
+    network = onnx.load(mean_point)
+    drawing = onnx.helper.make_node("RandomUniform", [], ["drawn"], shape=[1])
+    network.graph.node.append(drawing)
+    onnx.save(network, mean_point)
+    with pytest.raises(InvalidInput, match=r"mean\.onnx: RandomUniform draws random numbers"):
+        OnnxDetector(mean_point)

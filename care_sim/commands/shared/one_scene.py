@@ -62,7 +62,7 @@ def maker_of(
         if field.name not in OF_BOTH_LOOPS and given.pop(field.name) != DEFAULTS[field.name]:
             option = field.name.replace("_", "-")
             raise InvalidInput(f"--{option} has no meaning in the open loop")
-    source = source_for(source, options.detector, dict(given["detector_parameters"]))
+    source = source_for(source, options.detector, given["detector_parameters"])
     floors, scene = [given.pop("floor_seed")], scene_of(options, source)
     return lambda names: play_grid(source, [scene], names, [budget], floors, **given)
 

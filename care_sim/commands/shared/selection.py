@@ -171,9 +171,10 @@ def source_named(options: SourceOptions, text: str) -> "Source":
     report_problems([line for one, line in SOURCES.refusals() if one.name == kind])
     given = {name: getattr(options, name) for name in options.source_options()}
     source = source_of(text, **given)
-    if not isinstance(options, DetectorOptions) or "sweeps" in given:
+    if not isinstance(options, DetectorOptions):
         return source
-    return source_for(source, options.detector, dict(parameters(options.detector_parameters)))
+    own = parameters(options.detector_parameters)
+    return source_for(source, options.detector, own, options.sweeps)
 
 
 def named_after(command: str, played: str) -> str:
