@@ -18,7 +18,6 @@ import numpy as np
 
 from care_sim.base.errors import print_lines, report_problems
 from care_sim.base.extras import import_torch
-from care_sim.base.files import ZIP, check_output
 from care_sim.base.interrupts import FAILED
 from care_sim.base.limits import one_thread
 from care_sim.base.seeds import TRAINING, VALIDATION
@@ -90,7 +89,6 @@ def train_pillars(config: DetectorConfig, scenes: Scenes | None = None) -> int:
     torch = import_torch()
     from care_sim.training.supervised.detector_network import Learning
 
-    check_output(config.out, ZIP)
     started = time.perf_counter()
     torch.manual_seed(config.seed)
     network = Learning()
@@ -122,7 +120,7 @@ def train_pillars(config: DetectorConfig, scenes: Scenes | None = None) -> int:
         raise
     save(losses, calibration, result)
     shown = ("--detector", "pillars", "--detector-parameters", f"file={config.out}")
-    print_end(config.out, started, result, *(scenes.play if scenes else ("run", "street", *shown)))
+    print_end(config.out, started, result, scenes, "run", "street", *shown)
     return 0
 
 
@@ -244,8 +242,7 @@ def _card(
         "kind": "pillars",
         "network": f"{numbers} numbers",
         "data": f"{len(losses) * BATCH} scans of {told['data']}, of every budget, by the policies "
-        "that know any grid; see care_sim.training.supervised.detector_data"
-        + (scenes.terms if scenes else ""),
+        "that know any grid; see care_sim.training.supervised.detector_data" + told["terms"],
         "seeds": told["seeds"] | {"training": made.seed},
         "steps": len(losses),
         "steps asked for": made.steps,
@@ -263,6 +260,7 @@ def _generated() -> dict[str, Any]:
     """What the card says of generated worlds."""
     return {
         "data": "generated streets and drives",
+        "terms": "",
         "seeds": {
             "training from": TRAINING,
             "calibration of scores": [CALIBRATING[0], CALIBRATING[-1]],
