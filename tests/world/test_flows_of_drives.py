@@ -1,7 +1,7 @@
 """The traffic of drives, as they are played, beside vehicles of highway-env itself.
 
 All bits agree but the last ones: highway-env subtracts two products, `a * free - a * ratio`, where
-a flow has one, `a * (free - ratio)`. And a driver of a flow does not roll back when it comes to rest.
+a flow has one, `a * (free - ratio)`. And a driver of a flow who comes to rest stays there.
 """
 
 import gymnasium
@@ -91,8 +91,8 @@ class Beside(StreetTraffic):
         self.steps += 1
 
     def same_but_for_the_last_bits(self, theirs, places, speeds, accelerations, others):
-        """In highway-env's order of operations the compiled model gives its bits, where the limit of
-        braking cuts nothing off.
+        """In highway-env's order of operations the compiled model gives its bits, where the limit
+        of braking cuts nothing off.
         """
         free = 1 - (speeds / theirs.wanted) ** EXPONENT
         ahead = np.array(others, float).reshape(-1, 2)
@@ -107,8 +107,8 @@ class Beside(StreetTraffic):
 
 @pytest.mark.parametrize("seed", [5, 13, 18, 28])
 def test_drivers_of_a_drive_move_as_those_of_highway_env(seed, monkeypatch):
-    """The ego, which detects everything, brakes for people who come out. Drivers brake behind it, behind
-    each other and before side streets.
+    """The ego, which detects everything, brakes for people who come out. Drivers brake behind it,
+    behind each other and before side streets.
     """
     monkeypatch.setattr(drive, "StreetTraffic", Beside)
     Beside.made.clear()
