@@ -6,7 +6,7 @@ import shlex
 from dataclasses import fields, replace
 from typing import Any
 
-from care_sim.base.errors import report_problems
+from care_sim.base.errors import InvalidInput, report_problems
 from care_sim.base.extras import import_torch
 from care_sim.base.files import ZIP, check_output
 from care_sim.commands.options.learning import TrainDetector, TrainScorer, TrainSets
@@ -22,8 +22,17 @@ from care_sim.training.supervised.scorer import train_learned_scorer
 from care_sim.training.supervised.sets import train_sets as train_learned_sets
 
 Trained = TrainScorer | TrainSets | TrainDetector
-PUBLISHED = ("evaluation", "val", "mini_val")
-"""Splits on which tables are published."""
+PUBLISHED = {
+    ("streets", "evaluation"): "the tables of generated streets",
+    ("nuscenes", "val"): "the paper's tables and for detection scores",
+    ("nuscenes", "mini_val"): "the tables of recorded drives",
+    ("nuscenes", "all"): "the tables of recorded drives and for detection scores, in a part",
+    ("argoverse2", ""): "the tables of recorded drives, in a part",
+    ("kitti", ""): "the tables of recorded drives",
+}
+"""What the scenes of a built-in source are published for, by its kind and split. Without a split,
+the line holds for all splits.
+"""
 
 
 def train_scorer(options: TrainScorer) -> int:
@@ -43,33 +52,34 @@ def train_detector(options: TrainDetector) -> int:
 
 
 def scenes_of(options: Trained, played: dict[str, Any]) -> Scenes | None:
-    """The scenes that are named, None for generated worlds. `played` are the options of `protocol`
-    that play the weights.
+    """Return the scenes that the options name, None for generated worlds. `played` are the options
+    of `protocol` that play the weights.
 
-    Raises InvalidInput where a source cannot be read or has too few scenes, for a scene that is in
-    both parts, and for options of sources without one.
+    First check what every training needs: PyTorch and a file to write. Raises InvalidInput where a
+    source cannot be read, lacks a split or has too few scenes, for a scene that is in both parts,
+    and for options of sources without one.
     """
     options.check_source()
-    if options.source is None:
-        return None
-    # Before files are hashed, which takes a minute for a large source.
+    # Before a source is hashed or a world is played: both take minutes.
     import_torch()
     check_output(options.out, ZIP)
+    if options.source is None:
+        return None
     source = source_named(options, options.source)
+    if options.split is None and getattr(SOURCES.maker(source.kind), "split", None):
+        raise InvalidInput(
+            f"source {source.kind} has several splits: pass --split with the one to learn from"
+        )
+    split = options.split or ""
     scenes = chosen_scenes(source.scenes(), options.scenes)
     apart = None
     if options.validation_split is not None:
         held_out = replace(options, split=options.validation_split)
         apart = source_named(held_out, options.source).scenes()
-    usual = getattr(SOURCES.maker(source.kind), "split", None)
-    split = options.split or usual or ""
-    if split in PUBLISHED:
-        report_problems(
-            [
-                f"the split {split} of {source.kind} is the one of published tables: play these "
-                "weights on other scenes"
-            ]
-        )
+    published = PUBLISHED.get((source.kind, split)) or PUBLISHED.get((source.kind, ""))
+    if published:
+        which = f"the split {split} of {source.kind}" if split else f"source {source.kind}"
+        report_problems([f"{which} is published for {published}: play the weights on other scenes"])
     learned, held = parted(source, scenes, apart)
     own = {each.name: getattr(options, each.name) for each in fields(SourceOptions)}
     own |= {"split": options.validation_split or options.split}

@@ -177,6 +177,11 @@ class Installed:
         with self._blamed(f"names no files of {scene.name}"):
             return [Path(path) for path in self._made().files(scene)]
 
+    def log(self, scene: Scene) -> str:
+        """Return the drive that its class names."""
+        with self._blamed(f"names no log of {scene.name}"):
+            return self._made().log(scene)
+
     def row(self, scene: Scene) -> dict[str, Any]:
         """That of its kind, under its own name."""
         with self._blamed(f"names no files of {scene.name}"):

@@ -40,6 +40,12 @@ class Recordings(ABC):
         """
         return [self.folder]
 
+    def log(self, scene: str) -> str:
+        """Name the drive that a scene was cut from, by default the scene itself. Training holds out
+        whole drives.
+        """
+        return scene
+
     @property
     def setup(self) -> str | SensorSetup:
         """The set-up, its name or its file, whose grid the films hold."""

@@ -61,6 +61,9 @@ class Source(Protocol):
     def files(self, scene: Scene) -> list[Path]:
         """Return the files and folders that a scene is read from."""
 
+    def log(self, scene: Scene) -> str:
+        """Name the drive that a scene was cut from."""
+
     def row(self, scene: Scene) -> dict[str, Any]:
         """Columns that tell where a scene comes from: the kind of the source, and of recordings a
         hash of the files that it is read from, wherever they lie.
@@ -116,6 +119,10 @@ class Generated(ABC):
     def files(self, scene: Scene) -> list[Path]:
         """Return none: code makes a street."""
         return []
+
+    def log(self, scene: Scene) -> str:
+        """Return the scene itself: every street is a place of its own."""
+        return scene.name
 
     def row(self, scene: Scene) -> dict[str, Any]:
         """The name of a street says all but the sensor."""
@@ -186,6 +193,10 @@ class Recorded:
     def files(self, scene: Scene) -> list[Path]:
         """Return those of the recorded scene."""
         return self.recordings.files(scene.name)
+
+    def log(self, scene: Scene) -> str:
+        """Return that of the recorded scene."""
+        return self.recordings.log(scene.name)
 
     def row(self, scene: Scene) -> dict[str, Any]:
         """The kind, the hash of the scene's files, and how they are read."""

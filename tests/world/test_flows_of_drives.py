@@ -1,7 +1,7 @@
 """The traffic of drives, as they are played, beside vehicles of highway-env itself.
 
 All bits agree but the last ones: highway-env subtracts two products, `a * free - a * ratio`, where
-a flow has one, `a * (free - ratio)`. And a driver of a flow who comes to rest does not roll back.
+a flow has one, `a * (free - ratio)`. And a driver of a flow who comes to rest stays there.
 """
 
 import gymnasium
@@ -31,7 +31,7 @@ class EndlessLane(StraightLane):
 
 
 class Driver(IDMVehicle):
-    """Who comes to rest stays there: highway-env's roll back, at up to 2 cm/s on these drives."""
+    """A driver who stays where it comes to rest. highway-env's roll back, at up to 2 cm/s here."""
 
     def step(self, dt):
         super().step(dt)
@@ -91,10 +91,12 @@ class Beside(StreetTraffic):
         self.steps += 1
 
     def same_but_for_the_last_bits(self, theirs, places, speeds, accelerations, others):
-        """In the order of highway-env, the compiled model gives its bits."""
+        """In highway-env's order of operations the compiled model gives its bits, where the limit
+        of braking cuts nothing off.
+        """
         free = 1 - (speeds / theirs.wanted) ** EXPONENT
         ahead = np.array(others, float).reshape(-1, 2)
-        # Of a driver who is free to 0 the ratio alone is left, as long as it is not cut off.
+        # With `free` 0 the ratio alone is left. A ratio that is cut off cannot be compared.
         following = _following(np.zeros(len(free)), places, speeds, ahead)
         whole = following > -MOST_MPS2
         wished = np.clip(GAINING_MPS2 * free + following, -MOST_MPS2, MOST_MPS2)
@@ -105,8 +107,8 @@ class Beside(StreetTraffic):
 
 @pytest.mark.parametrize("seed", [5, 13, 18, 28])
 def test_drivers_of_a_drive_move_as_those_of_highway_env(seed, monkeypatch):
-    """The ego, which detects everything, brakes for who comes out. Drivers brake behind it, behind
-    each other and before side streets.
+    """The ego, which detects everything, brakes for people who come out. Drivers brake behind it,
+    behind each other and before side streets.
     """
     monkeypatch.setattr(drive, "StreetTraffic", Beside)
     Beside.made.clear()

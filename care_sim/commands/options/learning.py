@@ -55,7 +55,7 @@ class TrainRecurrentPpo(RecurrentPpoConfig, Learner):
 
 @dataclass(frozen=True, kw_only=True)
 class LessonOptions(SourceOptions):
-    """What the trainings on truth learn from, where it is not what they generate."""
+    """Scenes of a source to learn from, instead of generated worlds."""
 
     source: str | None = None
     """Learn from the scenes of nuscenes:FOLDER, argoverse2:FOLDER, kitti:FOLDER, sweeps:FOLDER,
@@ -64,8 +64,8 @@ class LessonOptions(SourceOptions):
     """With --source. One number: that many scenes, from the first. Otherwise names of scenes.
     Without this option, all scenes of the split."""
     validation_split: str | None = None
-    """With --source: the split that is held out and says what was reached. Without it, one scene in
-    five of --split is."""
+    """With --source: the split that is held out and says what was reached. Without this option,
+    whole logs of --split are held out, one scene in five."""
 
     def check_source(self) -> None:
         """Raise InvalidInput for an option of sources where none is named."""

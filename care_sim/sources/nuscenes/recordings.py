@@ -72,6 +72,10 @@ class NuScenes(Recordings):
         tables, sweeps = _tables(self.folder, self.version), self._sweep_files(scene)
         return [*tables, *sweeps, *filter(None, [self.camera_detections])]
 
+    def log(self, scene: str) -> str:
+        """Return the token of the scene's log, which most scenes share with others."""
+        return _logs(_database(self.folder, self.version))[scene]
+
     def columns(self) -> dict[str, Any]:
         """The hash of the camera detections where there are some, and each option that is not at
         its default.
@@ -126,6 +130,13 @@ def _read_database(root: Path, version: str | None, _stamps: tuple[Stamp, ...]) 
 def _sweep_files(database: Database, scene: str, sweeps: int) -> tuple[Path, ...]:
     rows = {row["name"]: row for row in database.rows("scene").values()}
     return tuple(sweep_files(database, rows[scene], sweeps)) if scene in rows else ()
+
+
+@lru_cache(maxsize=1)
+def _logs(database: Database) -> dict[str, str]:
+    """The log of every scene. Converted tables may lack logs: each scene is then its own."""
+    rows = read_json(database.path("scene"))
+    return {row["name"]: str(row.get("log_token", row["name"])) for row in rows}
 
 
 def _detections(path: Path) -> DetectionFile:

@@ -19,7 +19,6 @@ import numpy as np
 
 from care_sim.base.errors import InvalidInput, print_lines, report_problems
 from care_sim.base.extras import import_torch
-from care_sim.base.files import ZIP, check_output
 from care_sim.base.interrupts import FAILED
 from care_sim.base.limits import one_thread
 from care_sim.base.seeds import TRAINING, VALIDATION
@@ -100,7 +99,6 @@ def train_pillars(config: DetectorConfig, scenes: Scenes | None = None) -> int:
     torch = import_torch()
     from care_sim.training.supervised.detector_network import Learning
 
-    check_output(config.out, ZIP)
     if scenes and config.clutter:
         raise InvalidInput("clutter belongs to generated streets: leave out --source or --clutter")
     started = time.perf_counter()
@@ -134,7 +132,7 @@ def train_pillars(config: DetectorConfig, scenes: Scenes | None = None) -> int:
         raise
     save(losses, calibration, result)
     shown = ("--detector", "pillars", "--detector-parameters", f"file={config.out}")
-    print_end(config.out, started, result, *(scenes.play if scenes else ("run", "street", *shown)))
+    print_end(config.out, started, result, scenes, "run", "street", *shown)
     return 0
 
 
@@ -271,8 +269,7 @@ def _card(
         "kind": "pillars",
         "network": f"{numbers} numbers",
         "data": f"{len(losses) * BATCH} scans of {told['data']}, of every budget, by the policies "
-        "that know any grid; see care_sim.training.supervised.detector_data"
-        + (scenes.terms if scenes else ""),
+        "that know any grid; see care_sim.training.supervised.detector_data" + told["terms"],
         "seeds": told["seeds"] | {"training": made.seed},
         "begun at": "drawn weights" if made.start is None else made.start.name,
         "steps": len(losses),
@@ -292,6 +289,7 @@ def _generated(made: DetectorConfig) -> dict[str, Any]:
     fitted, apart = _checked(made)
     return {
         "data": "cluttered streets" if made.clutter else "generated streets and drives",
+        "terms": "",
         "seeds": {
             "training from": TRAINING,
             "calibration of scores": [fitted[0], fitted[-1]],

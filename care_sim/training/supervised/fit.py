@@ -17,6 +17,7 @@ from care_sim.policies.learned.weights import Card
 from care_sim.sensors.setups import DEFAULT_SETUP, Sensor, sensor_setup
 from care_sim.study.progress import rounded_duration, shown_progress
 from care_sim.study.provenance import machine_line, package_versions
+from care_sim.training.supervised.recorded import Scenes
 
 _Batch = TypeVar("_Batch")
 _Thing = TypeVar("_Thing")
@@ -93,10 +94,14 @@ def card_of(kind: str, library: str = "torch", sensor: Sensor = DEFAULT_SETUP, *
     )
 
 
-def print_end(out: Path, started: float, result: Mapping[str, float], *play: str) -> None:
-    """Print what was reached since `started`, and the command that plays it, by its words."""
+def print_end(
+    out: Path, started: float, result: Mapping[str, float], scenes: Scenes | None, *play: str
+) -> None:
+    """Print what was reached since `started`, and the command that plays it: that of the `scenes`,
+    or else of the words `play`.
+    """
     told = ", ".join(f"{name} {value:.4g}" for name, value in result.items())
     print_lines(
         f"{out}: {told}; {time.perf_counter() - started:.0f} s",
-        f"play it: {shlex.join(['care-sim', *play])}",
+        f"play it: {shlex.join(['care-sim', *(scenes.play if scenes else play)])}",
     )

@@ -36,7 +36,7 @@ def train_place(config: PlaceConfig) -> int:
         seeds={"calibration": list(CALIBRATION_SEEDS)},
     )
     save_weights(config.out, {"sightings": sighting_map(found, AngularGrid())}, card)
-    print_end(config.out, started, {"first sightings": len(found)}, "run", str(config.out))
+    print_end(config.out, started, {"first sightings": len(found)}, None, "run", str(config.out))
     return 0
 
 

@@ -14,25 +14,29 @@ from zlib import crc32
 import numpy as np
 
 from care_sim.base.digests import combined_digest
-from care_sim.base.errors import InvalidInput, shown
+from care_sim.base.errors import InvalidInput, report_problems, shown
+from care_sim.envs import OPEN_LOOP
 from care_sim.sources.installed import SOURCES
-from care_sim.sources.scenes import Scene, Source, film_of
+from care_sim.sources.scenes import Scene, Source, Streets, film_of
 from care_sim.training.supervised.worlds import World
 
+_STREET, _REPLAY = OPEN_LOOP
 HELD_OUT_EVERY = 5
-"""Of so many scenes one is held out, where no split of its own is."""
+"""One scene in five is held out, where no validation split is named."""
 MOST_HELD_OUT = 48
-"""Scenes that are played to say what was reached; of more, so many are taken at equal steps."""
+"""Scenes that are played to say what was reached. More scenes are thinned at equal steps."""
 SCENES_KEPT = 50
-"""So many scenes give all their keyframes. Of more a share is drawn, which takes no more memory."""
+"""Up to 50 scenes give all their keyframes. More scenes give a share, so that memory stays the
+same.
+"""
 
 
 @dataclass(frozen=True)
 class Scenes:
     """The scenes of a `source` that are `learned` from, and those that are `held_out`. `splits`
     name the splits of both, where the source has some, and `play` are the words of the command
-    that plays the weights on what is held out. `told` is what a card says of the data: which
-    scenes, and a digest of the files of each part.
+    that plays the weights on what is held out. `told` is what a card says of them: sensor,
+    scenario, which scenes, a digest of the files of each part, and the terms of the recordings.
     """
 
     source: Source
@@ -68,24 +72,22 @@ class Scenes:
                 (self.held_out, self.splits[1], "held out"),
             )
         ]
+        licence = getattr(SOURCES.maker(self.source.kind), "licence", "")
         return {
+            "sensor": self.source.sensor,
+            "scenario": _STREET if self.source.kind == Streets.kind else _REPLAY,
             "data": f"{self.source.kind}, {'; '.join(parts)}{self._reading}",
+            "terms": f"; these weights are under the licence of the recordings: {licence}"
+            if licence
+            else "",
             "seeds": {
                 "scenes learned from": [scene.name for scene in self.learned],
                 "scenes held out": [scene.name for scene in self.held_out],
             },
         }
 
-    @property
-    def terms(self) -> str:
-        """The end of what a card says: the licence of the recordings."""
-        licence = getattr(SOURCES.maker(self.source.kind), "licence", "")
-        return (
-            f"; these weights are under the licence of the recordings: {licence}" if licence else ""
-        )
-
     def _world(self, scene: Scene, turn: int, share: float = 1.0) -> World:
-        # Scenes of recordings share one seed, so what is drawn hangs on the name.
+        # Scenes of recordings share one seed, so the name decides what is drawn.
         seed = crc32(f"{scene.name} {turn}".encode())
         return World("scene", seed, partial(film_of, self.source, scene), share)
 
@@ -105,10 +107,11 @@ class Scenes:
 def parted(
     source: Source, scenes: Sequence[Scene], apart: Sequence[Scene] | None = None
 ) -> tuple[tuple[Scene, ...], tuple[Scene, ...]]:
-    """The scenes to learn from, and those that are held out: the scenes `apart`, or else one in
-    `HELD_OUT_EVERY` of all, from the last on.
+    """Part scenes into those to learn from and those that are held out: the scenes `apart`, or else
+    whole logs with one scene in `HELD_OUT_EVERY`.
 
     Raises InvalidInput where a scene is in both, and for a single one without another to hold out.
+    Reports a log that is in both.
     """
     if apart is None:
         if len(scenes) < 2:
@@ -116,14 +119,38 @@ def parted(
                 f"source {source.kind} has one scene here, {shown(scenes[0].name)}; training needs "
                 "two: one to learn from, one held out"
             )
-        apart = _thinned(scenes[::-1][::HELD_OUT_EVERY][::-1])
-        return tuple(scene for scene in scenes if scene not in apart), tuple(apart)
-    if both := {scene.name for scene in scenes} & {scene.name for scene in apart}:
+        apart = _whole_logs(source, scenes)
+    elif both := {scene.name for scene in scenes} & {scene.name for scene in apart}:
         raise InvalidInput(
             f"{len(both)} scenes are learned from and held out, {shown(min(both))} is one; the "
             "splits must share none"
         )
-    return tuple(scenes), tuple(_thinned(apart))
+    learned = tuple(scene for scene in scenes if scene not in apart)
+    if shared := {*map(source.log, learned)} & {*map(source.log, apart)}:
+        report_problems(
+            [
+                f"logs with scenes in both parts: {len(shared)}, such as {shown(min(shared))}: "
+                "other streets may show less"
+            ]
+        )
+    return learned, tuple(_thinned(apart))
+
+
+def _whole_logs(source: Source, scenes: Sequence[Scene]) -> list[Scene]:
+    """The scenes of the shortest logs, of equally long ones the last: many logs show many streets.
+    Of a single log the last scenes, which adjoin the others in one place alone.
+    """
+    by_log: dict[str, list[Scene]] = {}
+    for scene in scenes:
+        by_log.setdefault(source.log(scene), []).append(scene)
+    logs = [*by_log.values()] if len(by_log) > 1 else [[scene] for scene in scenes]
+    wanted = min(-(-len(scenes) // HELD_OUT_EVERY), MOST_HELD_OUT)
+    apart: set[Scene] = set()
+    # From the shortest to the second longest: something is left to learn from.
+    for log in sorted(logs, key=len, reverse=True)[:0:-1]:
+        if len(apart) < wanted:
+            apart.update(log)
+    return [scene for scene in scenes if scene in apart]
 
 
 def _thinned(scenes: Sequence[Scene]) -> list[Scene]:

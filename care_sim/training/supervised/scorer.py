@@ -35,7 +35,6 @@ from numpy.typing import NDArray
 
 from care_sim.base.array_files import Arrays
 from care_sim.base.extras import import_torch
-from care_sim.base.files import ZIP, check_output
 from care_sim.base.limits import one_thread
 from care_sim.base.seeds import TRAINING, VALIDATION
 from care_sim.core.arrays import Mask
@@ -59,7 +58,6 @@ from care_sim.training.supervised.recorded import Scenes
 from care_sim.training.supervised.worlds import (
     LEAST_BUDGET,
     MOST_BUDGET,
-    REPLAY,
     SCENARIOS,
     AnyEnv,
     World,
@@ -201,30 +199,27 @@ def train_learned_scorer(config: ScorerConfig, scenes: Scenes | None = None) -> 
     """Train the policy, on `scenes` if there are some, and write its weights; returns the exit code
     of the command.
     """
-    import_torch()
-    check_output(config.out, ZIP)
     started = time.perf_counter()
-    if scenes:
-        data, told = _scene_lessons(scenes, config.drawn)
-    else:
-        data, told = _drawn_lessons() if config.drawn else _street_lessons()
+    worlds, told = _lessons(config.drawn, scenes)
+    made = drawn_examples if config.drawn else examples
+    data = {
+        name: balanced(part for world in one_by_one(own, f"{name} world") for part in made(world))
+        for name, own in worlds.items()
+    }
     arrays, losses = train_scorer(data, config.seed, config.steps)
     learned = next(iter(data.values()))
     cells = f"{len(learned)} cells, {int(learned.positive.sum())} of them positive, of "
     card = card_of(
         "learned-scorer",
-        sensor=scenes.source.sensor if scenes else DEFAULT_SETUP,
+        sensor=told["sensor"],
         scenario=told["scenario"],
-        data=f"{cells}{told['data']}; {OTHER_CELLS} others per keyframe"
-        + (scenes.terms if scenes else ""),
+        data=f"{cells}{told['data']}; {OTHER_CELLS} others per keyframe{told['terms']}",
         seeds=told["seeds"] | {"training": config.seed},
         steps=config.steps,
         result={f"loss {name}": round(loss, 5) for name, loss in losses.items()},
     )
     save_weights(config.out, arrays, card)
-    print_end(
-        config.out, started, card.result, *(scenes.play if scenes else ("run", str(config.out)))
-    )
+    print_end(config.out, started, card.result, scenes, "run", str(config.out))
     return 0
 
 
@@ -287,55 +282,33 @@ _DRAWN_PLAYED = (
 )
 
 
-def _scene_lessons(scenes: Scenes, drawn: bool) -> tuple[dict[str, Examples], dict[str, Any]]:
-    """The examples of the scenes of a source, and what the card says of them."""
-    made = drawn_examples if drawn else examples
-    data = {
-        name: balanced(
-            part
-            for world in one_by_one(scenes.worlds(part_of), f"{name} scene")
-            for part in made(world)
-        )
-        for name, part_of in (("learned", scenes.learned), ("held out", scenes.held_out))
-    }
-    played = _DRAWN_PLAYED if drawn else _PLAYED
-    return data, scenes.told | {"scenario": REPLAY, "data": f"{scenes.told['data']}; {played}"}
-
-
-def _street_lessons() -> tuple[dict[str, Examples], dict[str, Any]]:
-    """The examples of streets by name, and what the card says of them."""
-    data = {
-        name: balanced(
-            part
-            for seed in one_by_one(seeds, f"{name} street")
-            for part in examples(World("street", seed))
-        )
-        for name, seeds in STREETS.items()
-    }
-    return data, {
-        "scenario": "CARE-Street-v0",
-        "data": f"generated streets {_PLAYED}, with six cameras and with the front one",
-        "seeds": {name: list(seeds) for name, seeds in STREETS.items()},
-    }
-
-
-def _drawn_lessons() -> tuple[dict[str, Examples], dict[str, Any]]:
-    """The same of worlds that differ."""
-    data = {
-        name: balanced(
-            part
-            for world in one_by_one(generated_worlds(worlds, first), f"{name} world")
-            for part in drawn_examples(world)
-        )
-        for name, (first, worlds) in DRAWN.items()
-    }
+def _lessons(drawn: bool, scenes: Scenes | None) -> tuple[dict[str, list[World]], dict[str, Any]]:
+    """The worlds to learn from and those that are held out, by the name of the part, and what the
+    card says of them.
+    """
+    if scenes:
+        worlds = {
+            "learned": scenes.worlds(scenes.learned),
+            "held out": scenes.worlds(scenes.held_out),
+        }
+        told = scenes.told["data"] + "; " + (_DRAWN_PLAYED if drawn else _PLAYED)
+        return worlds, scenes.told | {"data": told}
+    generated = {"sensor": DEFAULT_SETUP, "terms": ""}
+    if not drawn:
+        worlds = {name: [World("street", seed) for seed in own] for name, own in STREETS.items()}
+        return worlds, generated | {
+            "scenario": "CARE-Street-v0",
+            "data": f"generated streets {_PLAYED}, with six cameras and with the front one",
+            "seeds": {name: list(seeds) for name, seeds in STREETS.items()},
+        }
     learned = ", ".join(f"{count} of {kind}" for kind, count in DRAWN["learned"][1].items())
-    return data, {
+    worlds = {name: generated_worlds(own, first) for name, (first, own) in DRAWN.items()}
+    return worlds, generated | {
         "scenario": SCENARIOS,
         "data": f"worlds {learned} {_DRAWN_PLAYED}, streets with six cameras and with the front "
         "one",
         "seeds": {
-            name: [first, first + max(worlds.values()) - 1]
-            for name, (first, worlds) in DRAWN.items()
+            name: [first, first + max(counts.values()) - 1]
+            for name, (first, counts) in DRAWN.items()
         },
     }

@@ -39,7 +39,6 @@ import numpy as np
 from care_sim.base.array_files import Arrays
 from care_sim.base.errors import print_lines
 from care_sim.base.extras import import_torch
-from care_sim.base.files import ZIP, check_output
 from care_sim.base.limits import one_thread
 from care_sim.base.seeds import TRAINING, VALIDATION
 from care_sim.core.rig import Rig
@@ -51,7 +50,7 @@ from care_sim.training.supervised.fit import adam, card_of, fit, one_by_one, pri
 from care_sim.training.supervised.options import SetsConfig
 from care_sim.training.supervised.recorded import Scenes
 from care_sim.training.supervised.sets_data import Example, play
-from care_sim.training.supervised.worlds import REPLAY, SCENARIOS, World, generated_worlds
+from care_sim.training.supervised.worlds import SCENARIOS, World, generated_worlds
 
 KIND = ("is a camera box", "explained")
 """The inputs that tell an item's kind."""
@@ -73,8 +72,6 @@ def train_sets(config: SetsConfig, scenes: Scenes | None = None) -> int:
     """Train the policy, on `scenes` if there are some, and write its weights; returns the exit code
     of the command.
     """
-    import_torch()
-    check_output(config.out, ZIP)
     started = time.perf_counter()
     rig = Rig(sensor_setup(scenes.source.sensor).grid) if scenes else Rig()
     places = int(ItemReader(rig, 1).places.max()) + 1
@@ -94,7 +91,7 @@ def train_sets(config: SetsConfig, scenes: Scenes | None = None) -> int:
         for what, loss in losses_of(arrays, data).items()
     }
     save_weights(config.out, arrays, _card(config, scenes, examples, len(ROUNDS), losses))
-    print_end(config.out, started, losses, *(scenes.play if scenes else ("run", str(config.out))))
+    print_end(config.out, started, losses, scenes, "run", str(config.out))
     return 0
 
 
@@ -248,13 +245,13 @@ def _card(
     told = scenes.told if scenes else _generated(ROUNDS[:rounds])
     return card_of(
         LearnedSets.name,
-        sensor=scenes.source.sensor if scenes else DEFAULT_SETUP,
-        scenario=REPLAY if scenes else SCENARIOS,
+        sensor=told["sensor"],
+        scenario=told["scenario"],
         data=f"{items} boxes and tracks of {len(examples)} keyframes; {told['data']}"
         + ("; played twice" if scenes and rounds > 1 else "")
         + (", the second time mostly by itself" if rounds > 1 else "")
         + (f"; without {' and '.join(made.without)}" if made.without else "")
-        + (scenes.terms if scenes else ""),
+        + told["terms"],
         seeds=told["seeds"] | {"training": made.seed},
         steps=made.steps,
         result=losses or {},
@@ -267,4 +264,10 @@ def _generated(rounds: Sequence[Mapping[str, int]]) -> dict[str, Any]:
         ", ".join(f"{count} of {kind}" for kind, count in worlds.items()) for worlds in rounds
     )
     last = TRAINING + sum(max(worlds.values()) for worlds in rounds) - 1
-    return {"data": f"worlds {played}", "seeds": {"worlds": [TRAINING, last]}}
+    return {
+        "sensor": DEFAULT_SETUP,
+        "scenario": SCENARIOS,
+        "data": f"worlds {played}",
+        "seeds": {"worlds": [TRAINING, last]},
+        "terms": "",
+    }

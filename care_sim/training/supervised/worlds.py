@@ -30,7 +30,6 @@ from care_sim.sources.street_films import record
 from care_sim.streets.street import make_street
 
 SCENARIOS = "CARE-Drive-v0, CARE-NCAP-v0 and CARE-Street-v0"
-REPLAY = "CARE-Replay-v0"
 LEAST_BUDGET, MOST_BUDGET = 0.005, 0.2
 PLAYS_OF_FILM = 8
 """Plays for which a film is made once."""

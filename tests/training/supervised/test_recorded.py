@@ -9,7 +9,7 @@ from itertools import islice
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
@@ -69,13 +69,18 @@ def names(of):
 
 
 class Numbered:
-    """A source of so many scenes; `parted` asks it for nothing else."""
+    """A source of numbered scenes, each its own log or one of `logs`."""
 
-    kind = "streets"
+    kind, sensor = "streets", "hdl-32e"
 
-    @staticmethod
-    def row(scene):
+    def __init__(self, logs=None):
+        self.logs = logs or {}
+
+    def row(self, scene):
         return {}
+
+    def log(self, scene):
+        return self.logs.get(scene.name, scene.name)
 
 
 def scenes_of(numbers):
@@ -85,11 +90,10 @@ def scenes_of(numbers):
 @given(st.integers(2, 900))
 def test_no_scene_is_learned_from_and_held_out_and_none_is_lost(count):
     every = scenes_of(range(count))
-    learned, held_out = parted(Numbered, every)
-    assert {*learned} | {*held_out} == {*every}
-    assert not {*learned} & {*held_out}
-    assert 1 <= len(held_out) <= min(MOST_HELD_OUT, -(-count // 5))
-    parts = Scenes(Numbered, learned, held_out)
+    learned, held_out = parted(Numbered(), every)
+    assert [*learned, *held_out] == every
+    assert len(held_out) == min(MOST_HELD_OUT, -(-count // 5))
+    parts = Scenes(Numbered(), learned, held_out)
     turns = names(islice(parts.endless(), 2 * len(learned)))
     for turn in (turns[: len(learned)], turns[len(learned) :]):
         assert sorted(turn) == [scene.name for scene in learned]
@@ -99,14 +103,47 @@ def test_no_scene_is_learned_from_and_held_out_and_none_is_lost(count):
     assert len({world.seed for world in made}) == len(made)
 
 
+@example([0] + 9 * [1])
+@given(st.lists(st.integers(0, 30), min_size=2, max_size=300))
+def test_no_log_is_learned_from_and_held_out(logs):
+    every = scenes_of(range(len(logs)))
+    log_of = {scene.name: str(log) for scene, log in zip(every, logs, strict=True)}
+    learned, held_out = parted(Numbered(log_of), every)
+    assert learned
+    assert 1 <= len(held_out) <= MOST_HELD_OUT
+    if len({*logs}) > 1:
+        assert not {log_of[scene.name] for scene in learned} & {
+            log_of[scene.name] for scene in held_out
+        }
+    else:
+        assert [*learned, *held_out] == every
+
+
+def test_a_log_in_both_parts_is_told(tmp_path, capsys):
+    root = write_drive(tmp_path / "nuscenes")
+    source = source_of(f"nuscenes:{root}")
+    first, second = source.scenes()
+    for named in ([[first, second]], [[first], [second]]):
+        assert parted(source, *named) == ((first,), (second,))
+        assert "logs with scenes in both parts: 1, such as 'log'" in capsys.readouterr().err
+    (table,) = root.glob("*/scene.json")
+    rows = json.loads(table.read_text())
+    rows[0]["log_token"] = "another"
+    del rows[1]["log_token"]
+    table.write_text(json.dumps(rows))
+    assert [source.log(scene) for scene in (first, second)] == ["another", "scene-0916"]
+    parted(source, [first, second])
+    assert not capsys.readouterr().err
+
+
 @given(st.sets(st.integers(0, 60), min_size=1), st.sets(st.integers(0, 60), min_size=1))
 def test_two_splits_must_share_no_scene(one, other):
     first, second = scenes_of(sorted(one)), scenes_of(sorted(other))
     if one & other:
         with pytest.raises(InvalidInput, match="must share none"):
-            parted(Numbered, first, second)
+            parted(Numbered(), first, second)
         return
-    learned, held_out = parted(Numbered, first, second)
+    learned, held_out = parted(Numbered(), first, second)
     assert [*learned] == first
     assert {*held_out} <= {*second}
     assert (held_out[0], held_out[-1]) == (second[0], second[-1])
@@ -115,7 +152,7 @@ def test_two_splits_must_share_no_scene(one, other):
 def test_the_scorer_learns_what_stands_in_the_scenes(source):
     """At the first keyframe the car ahead is new, and the bus still farther than 50 m."""
     scenes = Scenes(source, *[source.scenes()] * 2)
-    assert scenes.terms.endswith("licence of the recordings: for tests alone")
+    assert scenes.told["terms"].endswith("licence of the recordings: for tests alone")
     (world, _) = scenes.worlds(source.scenes())
     plays = [*scorer.examples(world)]
     # Three budgets with all cameras, and with the front one.
@@ -209,7 +246,7 @@ def test_nuscenes_teaches_and_the_card_says_what_it_was(kind, tmp_path, monkeypa
     # First what is learned from alone, then what is held out alone.
     assert [*dict.fromkeys(played)] == ["scene-0103", "scene-0916"]
     assert played == sorted(played)
-    assert "the split val of nuscenes is the one of published tables" in complaints
+    assert "the split val of nuscenes is published for the paper's tables" in complaints
     card = card_of(kind, out)
     assert "nuscenes, 1 scene learned from, split val, digest " in card["data"]
     assert "1 scene held out, split val" in card["data"]
@@ -258,9 +295,17 @@ def test_other_files_have_another_digest_wherever_they_lie(tmp_path):
         ("--source boreas", "boreas has one scene here, 'boreas-objects-v1'; training needs two"),
         ("--source boreas --split train", "split has no meaning for boreas recordings"),
         ("--source nuscenes:ROOT --split train", "holds no scene of the split 'train'"),
-        ("--source nuscenes:ROOT --scenes 1", "has one scene here, 'scene-0103'"),
-        ("--source nuscenes:ROOT --validation-split all", "2 scenes are learned from and held out"),
-        ("--source nuscenes:ROOT --validation-split mini_vla", "unknown split 'mini_vla'"),
+        ("--source nuscenes:ROOT --split val --scenes 1", "has one scene here, 'scene-0103'"),
+        (
+            "--source nuscenes:ROOT --split val --validation-split all",
+            "2 scenes are learned from and held out",
+        ),
+        (
+            "--source nuscenes:ROOT --split val --validation-split mini_vla",
+            "unknown split 'mini_vla'",
+        ),
+        ("--source nuscenes:ROOT", "source nuscenes has several splits: pass --split"),
+        ("--source streets", "source streets has several splits: pass --split"),
         ("--source nuscene:ROOT", "unknown source"),
     ],
 )
@@ -275,8 +320,18 @@ def test_what_cannot_be_learned_from_is_refused_in_a_line(words, complaint, tmp_
 
 def test_weights_of_recordings_say_that_they_need_a_source(tmp_path, monkeypatch, capsys):
     root, out = write_drive(tmp_path / "nuscenes"), tmp_path / "w.npz"
-    trained(monkeypatch, capsys, "learned-scorer", out, "--source", f"nuscenes:{root}")
+    source = "--source", f"nuscenes:{root}", "--split", "val"
+    trained(monkeypatch, capsys, "learned-scorer", out, *source)
     code, _, err = run(capsys, "run", out)
     assert code == 2
     assert "learned from recordings: name a source by --scenario" in err
     assert run(capsys, "run", out, "--scenario", f"nuscenes:{root}")[0] == 0
+
+
+def test_weights_of_streets_play_on_streets(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(scorer, "SCORER_BUDGETS", (0.1,))
+    out, words = tmp_path / "w.npz", ("--source", "streets", "--split", "evaluation")
+    code, _, told = trained(monkeypatch, capsys, "learned-scorer", out, *words, "--scenes", 2)
+    assert code == 0, told
+    assert "the split evaluation of streets is published for" in told
+    assert run(capsys, "run", out)[0] == 0
