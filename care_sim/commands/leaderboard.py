@@ -26,7 +26,7 @@ from care_sim.reports.figures.leaderboard import (
     leaderboard_figure,
     score_chart,
 )
-from care_sim.reports.figures.styles import FORMATS, check_figure, save
+from care_sim.reports.figures.styles import FORMATS, check_figure, save, stem_of
 from care_sim.reports.leaderboard import CONTROL, leaderboard_table, leads_table, names_in
 from care_sim.study.benchmark.play import Player, player_in, replayed, screened_worlds
 from care_sim.study.benchmark.result import (
@@ -79,8 +79,8 @@ def _show(options: Leaderboard, results: Sequence[BenchmarkResult]) -> None:
     told = told_if_replaced(page)
     first = next(iter(sets.values()))
     if options.chart:
-        check_figure(options.chart.with_suffix(""))
-        save(score_chart(first), options.chart.with_suffix(""))
+        check_figure(stem_of(options.chart))
+        save(score_chart(first), stem_of(options.chart))
     save(leaderboard_figure(first), folder / LEADERBOARD_FIGURE)
     tables = [leaderboard_table(own, options.minus) for own in sets.values()]
     by_part = [leads_table(own, options.minus) for own in sets.values()]

@@ -61,7 +61,7 @@ def end_of_training(config: AgentConfig) -> Iterator[str]:
 def curves(options: Curves) -> int:
     """Draw learning curves, and print their table."""
     # Imported here because training draws nothing.
-    from care_sim.reports.figures.styles import check_figure, save
+    from care_sim.reports.figures.styles import check_figure, save, stem_of
     from care_sim.training.curves import curves_table, grouped_runs, read_run
     from care_sim.training.curves_figure import curves_figure
 
@@ -70,9 +70,9 @@ def curves(options: Curves) -> int:
             "curves needs the folder of a training run, the --out of `care-sim train`"
         )
     groups = grouped_runs(map(read_run, options.folders))
-    stem = options.out.with_suffix("")
+    stem = stem_of(options.out)
     check_figure(stem)
-    told = told_if_replaced(options.out.with_suffix(".png"))
+    told = told_if_replaced(stem.with_name(f"{stem.name}.png"))
     save(curves_figure(groups), stem)
     TableConsole().print(curves_table(groups).rich())
     print_lines(f"Figure: {told}")

@@ -193,6 +193,11 @@ def texts_as_they_are(figure: Figure) -> Iterator[None]:
         yield
 
 
+def stem_of(path: Path) -> Path:
+    """The path of a figure without the ending of one of its files, if it has one."""
+    return path.with_suffix("") if path.suffix in FORMATS else path
+
+
 def check_figure(stem: Path) -> None:
     """Raise what `care_sim.base.files.check_output` does where `save` could not write a figure."""
     check_output(stem.with_name(f"{stem.name}.png"), PNG)

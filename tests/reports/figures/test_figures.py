@@ -1,5 +1,7 @@
 """Files of figures, and the figures of the closed loop's studies on rows made by hand."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from matplotlib import rc_context
@@ -16,7 +18,7 @@ from care_sim.reports.figures.study_maps import (
     crowding_figures,
     open_ablation_figures,
 )
-from care_sim.reports.figures.styles import remove_others, save, svg_text
+from care_sim.reports.figures.styles import remove_others, save, stem_of, svg_text
 from care_sim.reports.report import StudyReport
 from care_sim.reports.studies import STUDIES
 from care_sim.study.designs.ablations import ablation_study
@@ -32,6 +34,11 @@ SWEEP = [
     *rows("history", [None, None, None, 8.0, 9.0], budget=0.1),
     *rows("care", [15.0] * 5, budget=0.1),
 ]
+
+
+def test_a_dot_in_the_name_of_a_figure_is_no_ending():
+    assert stem_of(Path("curves-0.1")) == Path("curves-0.1")
+    assert stem_of(Path("curves-0.1.svg")) == stem_of(Path("curves-0.1.png")) == Path("curves-0.1")
 
 
 def test_figures_are_written_the_same_every_time(tmp_path):
