@@ -56,6 +56,7 @@ LEFT_OUT = {
     "camera_latency_s": "begins with the next list: one more choice changes every episode of this",
     "camera_profile": "begins with the next list, too",
     "sweep_mask": "of films with sweeps between their keyframes",
+    "velocity_keyframes": "smooths the errors of measured detectors, which the list has not",
     "sweeps": "of nuScenes",
     "camera_times": "of nuScenes",
     "empty_boxes": "of nuScenes and Argoverse 2",
