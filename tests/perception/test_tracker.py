@@ -194,8 +194,8 @@ def smoothing(keyframes):
 
 
 def test_an_error_that_alternates_leaves_the_velocity_of_least_squares():
-    """Of errors +-0.1 m at four keyframes a line's slope is off by -0.04 m per keyframe: (-1.5, -.5,
-    .5, 1.5) times (.1, -.1, .1, -.1), over 5. Two keyframes are off by -0.2 m.
+    """Of errors +-0.1 m at four keyframes a line's slope is off by -0.04 m per keyframe: (-1.5,
+    -.5, .5, 1.5) times (.1, -.1, .1, -.1), over 5. Two keyframes are off by -0.2 m.
     """
     frames = [[("car", 10 + 0.8 * t + 0.1 * (-1) ** t, 2)] for t in range(4)]
     assert follow(TrackMemory(DT), frames)[-1].velocities[0] == pytest.approx([8 - 2, 0])
@@ -208,7 +208,7 @@ def test_place_and_velocity_are_a_line_through_the_detections(keyframes, missed)
     """With keyframes missed before the last one, too. Height, size and yaw are as detected."""
     draw = np.random.default_rng(keyframes)
     times = [*range(keyframes - 1), keyframes - 1 + missed]
-    seen = {t: (10 + 0.8 * t, 2 - 0.3 * t) + draw.normal(scale=0.1, size=2) for t in times}
+    seen = {t: draw.normal((10 + 0.8 * t, 2 - 0.3 * t), 0.1) for t in times}
     memory = smoothing(10)
     for t in range(times[-1] + 1):
         memory.predict()
