@@ -150,7 +150,7 @@ class BatchLoop:
         self._scanning = Scanning(rig, common)
         # Its tables are of other sizes than those of what is fired, so that it has its own.
         self._asking = Scanning(rig, common)
-        self._tracking = Tracking(rig.keyframe_s)
+        self._tracking = Tracking(rig.keyframe_s, common.velocity_keyframes)
         self._braking = Braking(rig, common, worlds)
         self._exact = exact
         self.motion = Motion(worlds, steps_of(duration_s, rig.keyframe_s))

@@ -30,6 +30,7 @@ from care_sim.perception.tracker import (
     possible_pairs,
     seen_nearest_first,
 )
+from care_sim.perception.tracker import Rules as LifeRules
 from care_sim.world.bodies import CATALOGUE
 
 _BOX, _BOX_END = Tracks.BOX.start, Tracks.BOX.stop
@@ -38,9 +39,9 @@ _BOX, _BOX_END = Tracks.BOX.start, Tracks.BOX.stop
 class Tracking:
     """The track memories of all worlds. What `seen` returns it fills anew at the next call."""
 
-    def __init__(self, keyframe_s: float):
+    def __init__(self, keyframe_s: float, velocity_keyframes: int = 2):
         self._keyframe_s = float(keyframe_s)
-        self._life = MemoryRules().life(keyframe_s)
+        self._life = MemoryRules(velocity_keyframes=velocity_keyframes).life(keyframe_s)
         self._seen = np.empty((0, 0, len(Tracks.COLUMNS)))
 
     def update(self, state: BatchState, found: Found) -> None:
@@ -86,7 +87,7 @@ def _update(
     reported: Reported,
     sensors: Sensors,
     tracks: TrackTables,
-    life: tuple[float, float, float, float],
+    life: LifeRules,
     crowded: Mask,
 ) -> None:
     """See `Tracking.update`; worlds that are `crowded` (W,) it tells, and leaves alone."""
@@ -126,7 +127,7 @@ def _keep(
     classes: Integers,
     boxes: Floats,
     pairs: tuple[Integers, Integers],
-    life: tuple[float, float, float, float],
+    life: LifeRules,
 ) -> None:
     """Let the tracks of a world live on."""
     table = tracks.rows[w, : tracks.counts[w]]

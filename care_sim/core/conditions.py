@@ -191,6 +191,9 @@ LONGEST_LATENCY_S = 60.0
 LONGEST_BLACKOUT_S = 3600.0
 """Latest begin and longest time of a blackout: far beyond the end of any episode or scene."""
 
+MOST_VELOCITY_KEYFRAMES = 20
+"""Two seconds of the closed loop: nobody in traffic keeps a velocity for longer."""
+
 LONGEST_CORRELATION_S = 1e6
 """Longer than any drive: over a minute such an error walks by 1% of its spread."""
 
@@ -299,6 +302,12 @@ class Sensing(CameraFaults, LidarFaults, ReturnSettings):
     """
     min_returns: int = bounded(MIN_RETURNS, 1, LARGEST_INTEGER)
     """Fired rays that must hit an object for it to be detected."""
+    velocity_keyframes: int = bounded(2, 2, MOST_VELOCITY_KEYFRAMES)
+    """Detections through which the tracker lays a straight line of least squares, for place and
+    velocity of a track (`care_sim.perception.tracker`). 2 takes both as detected. More smooth the
+    errors of a measured detector, and follow later who starts or brakes: with 10 the car hits a
+    leading car that brakes (`results/proxy.md`).
+    """
     sweep_mask: str = one_of(BEFORE, SWEEP_MASKS)
     """Which cells the sweeps between two keyframes fire, of a film that has them: those of the mask
     `before`, the only one that was chosen then, or those of the `coming` keyframe, as where all
@@ -401,6 +410,7 @@ COLUMNS_WHERE_CHANGED = (
     "camera_latency_s",
     "sweep_mask",
     "clutter",
+    "velocity_keyframes",
 )
 """Conditions that are a column of results only where they are not the default: so rows, and the
 digests made of them, stay as they were before there was a choice."""

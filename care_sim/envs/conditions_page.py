@@ -16,6 +16,7 @@ _ROWS = (
     ("firing", "LiDAR", 'what fires as a whole, "cells", "tiles:4x8", ... (3)'),
     ("engine", "sensors", 'what casts the rays, "fast" or "bullet"'),
     ("min_returns", "LiDAR detector", "fired rays that must hit an object"),
+    ("velocity_keyframes", "tracker", "detections that make the velocity of a track"),
     ("camera_confidence", "camera detector", "least confidence of a detection"),
     ("sweep_mask", "open loop", "which mask the sweeps between keyframes fire"),
     ("clutter", "streets of the open loop", "whether they are less clean (6)"),

@@ -26,7 +26,7 @@ from care_sim.loops.truth import Told, TrackObjects, told_by
 from care_sim.perception.matching import found_objects
 from care_sim.perception.points_only import Detector
 from care_sim.perception.proxy import ReturnsRule
-from care_sim.perception.tracker import TrackMemory
+from care_sim.perception.tracker import MemoryRules, TrackMemory
 from care_sim.sensors.annotated import (
     NO_OBJECT,
     Annotations,
@@ -186,7 +186,8 @@ class ClosedLoop:
         )
         self._min_returns = conditions.min_returns
         self._limits = Limits(rig)
-        self._memory = TrackMemory(rig.keyframe_s)
+        followed = MemoryRules(velocity_keyframes=conditions.velocity_keyframes)
+        self._memory = TrackMemory(rig.keyframe_s, followed)
         self._track_objects = TrackObjects()
         # The driver reckons from where the sensor stands along the car: the front bumper is farther
         # from a sensor behind the middle than half a length.

@@ -23,7 +23,7 @@ from care_sim.loops.gathering import acted_on, gather_sweeps
 from care_sim.loops.observation_limits import Limits
 from care_sim.loops.truth import Told, TrackObjects, told_by
 from care_sim.perception.points_only import Detector
-from care_sim.perception.tracker import TrackMemory
+from care_sim.perception.tracker import MemoryRules, TrackMemory
 from care_sim.sensors.annotated import NO_RETURNS, Cloud
 from care_sim.sensors.camera import CameraDetector
 from care_sim.sensors.camera_profiles import invents_boxes
@@ -92,7 +92,8 @@ class OpenLoop:
         self._localisation = Localisation(sensing, film.keyframe_s, seeds.odometry)
         self._detector = detector.begin(seeds.detector, rig, is_filmed=True)
         self._limits = Limits(rig)
-        self._memory = TrackMemory(film.keyframe_s)
+        followed = MemoryRules(velocity_keyframes=sensing.velocity_keyframes)
+        self._memory = TrackMemory(film.keyframe_s, followed)
         self._track_objects = TrackObjects()
         self._sweep_mask = sensing.sweep_mask
         self._held: Cells = np.empty(0, np.int64)

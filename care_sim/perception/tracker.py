@@ -1,7 +1,12 @@
-"""Track memory: assignment by position, velocity from two keyframes, coasting, forecasts.
+"""Track memory: assignment by position, velocity from the last keyframes, coasting, forecasts.
 
 Tracks are a table (m, 13) in the order of `Tracks.COLUMNS`, by ascending id, in the world frame.
 Detections are their `classes` (n,) and their boxes `seen` (n, 7), in the world frame, too.
+
+A track follows its detections by the straight line of least squares, in recursive form (the
+expanding-memory polynomial filter of degree 1; Morrison 1969, "Introduction to Sequential Smoothing
+and Prediction"; Brookner 1998, "Tracking and Kalman Filtering Made Easy"). A line through two
+detections meets both: then place and velocity are as detected.
 """
 
 import math
@@ -23,7 +28,7 @@ _BOX, _BOX_WIDTH = Tracks.BOX.start, Tracks.BOX.stop - Tracks.BOX.start
 _MISSES, _HITS = Tracks.MISSES, Tracks.HITS
 
 
-Rules = tuple[float, float, float, float]
+Rules = tuple[float, float, float, float, float]
 """The fields of `Life`."""
 Pairs = tuple[Integers, Integers]
 """The rows (k,) of tracks, and of the detections that belong to them."""
@@ -36,6 +41,7 @@ class Life(NamedTuple):
     gate_m: float
     first_speed_mps: float
     coast_s: float
+    velocity_keyframes: float
 
 
 @compiled()
@@ -140,7 +146,7 @@ def lived_on(
         _copy_row(tracks, m, result, count)
         result[count, _MISSES] += 1
         if n >= 0:
-            _follow(result[count], seen[n], elapsed)
+            _follow(result[count], seen[n], elapsed, life)
             ids[n] = int(tracks[m, _ID])
         count += 1
     for n in range(len(seen)):
@@ -153,15 +159,44 @@ def lived_on(
 
 
 @compiled()
-def _follow(track: Floats, box: Floats, elapsed: float) -> None:
-    """Set a track to the `box` (7,) on which it is detected, `elapsed` seconds after the last."""
-    # A forecast moved at constant velocity; moved back, it is where the object was last seen. The
-    # velocity is the way from there over the time since, however many keyframes that is.
-    track[_VX] = (box[0] - (track[_X] - track[_VX] * elapsed)) / elapsed
-    track[_VY] = (box[1] - (track[_Y] - track[_VY] * elapsed)) / elapsed
+def _follow(track: Floats, box: Floats, elapsed: float, life: Life) -> None:
+    """Let a track follow the `box` (7,) on which it is detected, `elapsed` seconds after the last:
+    size, height and yaw are those of the box.
+    """
+    before = min(track[_HITS], life.velocity_keyframes - 1)
+    if before < 2:
+        # A forecast moved at constant velocity; moved back, it is where the object was last seen.
+        # The velocity is the way from there over the time since, however many keyframes that is.
+        track[_VX] = (box[0] - (track[_X] - track[_VX] * elapsed)) / elapsed
+        track[_VY] = (box[1] - (track[_Y] - track[_VY] * elapsed)) / elapsed
+        _put_box(track, box)
+    else:
+        place, velocity = _gains(before, elapsed / life.keyframe_s)
+        x, y = track[_X], track[_Y]
+        off_x, off_y = box[0] - x, box[1] - y
+        track[_VX] += velocity * off_x / life.keyframe_s
+        track[_VY] += velocity * off_y / life.keyframe_s
+        _put_box(track, box)
+        track[_X], track[_Y] = x + place * off_x, y + place * off_y
     track[_MISSES] = 0.0
     track[_HITS] += 1
-    _put_box(track, box)
+
+
+@compiled()
+def _gains(before: float, steps: float) -> tuple[float, float]:
+    """What part of the way from a forecast to its detection is added to the place, and, per
+    keyframe, to the velocity.
+
+    The forecast is `steps` keyframes ahead of a line through `before` detections, one a keyframe
+    and all with errors of variance 1. With 1 step and n = before + 1 they are the usual alpha =
+    2 (2n - 1) / (n (n + 1)) and beta = 6 / (n (n + 1)).
+    """
+    # Variance of the place at the end of such a line, of its velocity, and of both together.
+    ends = 2 * (2 * before - 1) / (before * (before + 1))
+    both = 6 / (before * (before + 1))
+    slope = 12 / (before * (before * before - 1))
+    spread = ends + 2 * steps * both + steps * steps * slope
+    return spread / (spread + 1), (both + steps * slope) / (spread + 1)
 
 
 @compiled()
@@ -201,6 +236,10 @@ class MemoryRules:
     """An undetected track is forecast this long, then dropped: for 15 keyframes of the closed loop,
     for 3 of the open one (CenterPoint's tracker: 3 frames at 2 Hz).
     """
+    velocity_keyframes: int = 2
+    """Place and velocity are a line through so many detections. From there on the gains are held:
+    the filter forgets older ones little by little.
+    """
 
     def life(self, keyframe_s: float) -> Rules:
         """These rules where keyframes are `keyframe_s` seconds apart, as compiled code takes
@@ -212,6 +251,7 @@ class MemoryRules:
             float(self.gate_m),
             float(self.first_speed_mps),
             float(self.coast_s),
+            float(self.velocity_keyframes),
         )
 
 

@@ -8,18 +8,21 @@ from care_sim.batch.state import BatchState, filled
 from care_sim.batch.tracking import Tracking
 from care_sim.core.frames import Frame
 from care_sim.core.types import Detections
-from care_sim.perception.tracker import TrackMemory
+from care_sim.perception.tracker import MemoryRules, TrackMemory
 
 DT = 0.1
 
 
-@pytest.mark.parametrize(("people", "spread"), [(12, 4.0), (40, 200.0), (300, 500.0)])
-def test_crowds_are_tracked_as_in_a_single_world(people, spread):
+@pytest.mark.parametrize(
+    ("people", "spread", "line"), [(12, 4.0, 2), (12, 4.0, 5), (40, 200.0, 3), (300, 500.0, 2)]
+)
+def test_crowds_are_tracked_as_in_a_single_world(people, spread, line):
     """Of 300 that are new at every keyframe there are soon more than a table has rows."""
     worlds, keyframes = 3, 8
     draw = np.random.default_rng(people)
     state = BatchState(worlds)
-    memories, tracking = [TrackMemory(DT) for _ in range(worlds)], Tracking(DT)
+    rules, tracking = MemoryRules(velocity_keyframes=line), Tracking(DT, line)
+    memories = [TrackMemory(DT, rules) for _ in range(worlds)]
     state.live[:] = True, True, False
     boxes = draw.normal(size=(worlds, people, 7)) * spread
     boxes[:, :, 3:6] = 1.0

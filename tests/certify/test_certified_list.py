@@ -57,6 +57,7 @@ LEFT_OUT = {
     "camera_profile": "begins with the next list, too",
     "sweep_mask": "of films with sweeps between their keyframes",
     "clutter": "begins with the next list: fitted numbers may still move",
+    "velocity_keyframes": "smooths the errors of measured detectors, which the list has not",
     "sweeps": "of nuScenes",
     "camera_times": "of nuScenes",
     "empty_boxes": "of nuScenes and Argoverse 2",

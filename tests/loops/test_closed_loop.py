@@ -118,6 +118,17 @@ def test_the_next_belief_forecasts_a_moving_body_where_the_sensor_then_is(street
     assert twice.boxes[0, :2] == pytest.approx(start + velocity * 0.2 - sensor)
 
 
+@pytest.mark.parametrize(("keyframes", "mps"), [(2, 1.5), (3, 1.0)])
+def test_a_velocity_is_of_as_many_keyframes_as_are_asked_for(street, keyframes, mps):
+    """A car that gains 10 m/s^2 is 0, 5 and 20 cm on its way: 0.15 m a keyframe, or 0.1 m."""
+    world = street()
+    world.add("car", "car", lambda time: (20.0, 6.0 + 5 * time**2, 0.0))
+    loop = loop_in(world, velocity_keyframes=keyframes)
+    for _ in range(3):
+        loop.keyframe(EVERYTHING)
+    assert loop.belief.tracks.velocities[0] == pytest.approx([0, mps])
+
+
 @pytest.mark.parametrize(("x", "in_view"), [(12.0, True), (20.0, False)])
 def test_the_first_sighting_is_in_view_before_a_hoarding_and_not_behind_it(street, x, in_view):
     world = street()

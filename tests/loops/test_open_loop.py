@@ -158,6 +158,17 @@ def test_a_wrong_pose_moves_the_forecast_of_what_stands():
     assert off == pytest.approx(2 * e1 - e0 - e2)
 
 
+def test_of_three_keyframes_the_forecast_is_on_their_line():
+    """It leads on from e0, e1 and e2 to (4 e2 + e1 - 2 e0) / 3."""
+    spread = {"ego_position_sigma_m": 0.2}
+    loop = loop_of(film(), velocity_keyframes=3, **spread)
+    for _ in range(3):
+        loop.keyframe(on_the_car(loop))
+    e0, e1, e2, e3 = errors_of(5, **spread)[1:, :2]
+    off = loop.belief.tracks.boxes[0, :2] - loop.shot.annotations.boxes[0, :2]
+    assert off == pytest.approx((4 * e2 + e1 - 2 * e0) / 3 - e3)
+
+
 def test_a_full_scan_is_read_without_a_draw():
     loop, other = loop_of(film(), lidar_dropout=0.5), loop_of(film(), lidar_dropout=0.5)
     scan = loop.full_scan()

@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from care_sim.core.frames import Frame
-from care_sim.core.types import CLASSES, Detections
+from care_sim.core.types import CLASSES, Detections, Tracks
 from care_sim.perception import tracker
 from care_sim.perception.tracker import MemoryRules, TrackMemory
 
@@ -187,6 +187,66 @@ def test_velocities_are_over_ground_in_sensor_axes():
     tracks = follow(TrackMemory(DT), moving("car", 10, 10, 8, 0, 2), left)[-1]
     assert tracks.velocities[0] == pytest.approx([0, -8])
     assert tracks.boxes[0, :2] == pytest.approx([10, -5.8])
+
+
+def smoothing(keyframes):
+    return TrackMemory(DT, MemoryRules(velocity_keyframes=keyframes))
+
+
+def test_an_error_that_alternates_leaves_the_velocity_of_least_squares():
+    """Of errors +-0.1 m at four keyframes a line's slope is off by -0.04 m per keyframe: (-1.5,
+    -.5, .5, 1.5) times (.1, -.1, .1, -.1), over 5. Two keyframes are off by -0.2 m.
+    """
+    frames = [[("car", 10 + 0.8 * t + 0.1 * (-1) ** t, 2)] for t in range(4)]
+    assert follow(TrackMemory(DT), frames)[-1].velocities[0] == pytest.approx([8 - 2, 0])
+    assert follow(smoothing(4), frames)[-1].velocities[0] == pytest.approx([8 - 0.4, 0])
+
+
+@pytest.mark.parametrize("missed", [0, 1, 5])
+@pytest.mark.parametrize("keyframes", [3, 5, 10])
+def test_place_and_velocity_are_a_line_through_the_detections(keyframes, missed):
+    """With keyframes missed before the last one, too. Height, size and yaw are as detected."""
+    draw = np.random.default_rng(keyframes)
+    times = [*range(keyframes - 1), keyframes - 1 + missed]
+    seen = {t: draw.normal((10 + 0.8 * t, 2 - 0.3 * t), 0.1) for t in times}
+    memory = smoothing(10)
+    for t in range(times[-1] + 1):
+        memory.predict()
+        boxes = [[*seen[t], t, 4 + t, 2 + t, 1 + t, 0.1 * t]] if t in seen else []
+        found = Detections([0] * len(boxes), np.reshape(boxes, (-1, 7)), [5] * len(boxes))
+        memory.update(found, Frame(0.0, 0.0, 0.0, 0.0))
+    tracks = memory.tracks(Frame(0.0, 0.0, 0.0, 0.0))
+    slope, start = np.polyfit(times, [*seen.values()], 1)
+    assert tracks.velocities[0] == pytest.approx(slope / DT)
+    assert tracks.boxes[0, :2] == pytest.approx(start + slope * times[-1])
+    assert tracks.boxes[0, 2:] == pytest.approx(boxes[0][2:])
+
+
+def test_older_detections_than_are_asked_for_fade():
+    """What stood for 10 keyframes and is 0.6 m on moves by alpha = 5/6 and beta = 1/2 of that."""
+    (*_, tracks) = follow(smoothing(3), [*[[("car", 10, 0)]] * 10, [("car", 10.6, 0)]])
+    assert tracks.velocities[0] == pytest.approx([0.5 * 0.6 / DT, 0])
+    assert tracks.boxes[0, :2] == pytest.approx([10.5, 0])
+
+
+@settings(deadline=None)
+@given(st.lists(st.none() | st.floats(-1.0, 1.0), min_size=2, max_size=14))
+def test_with_two_keyframes_a_track_is_where_it_is_detected(steps):
+    """To the last bit: its velocity is the way from the last detection over the time since."""
+    memory = TrackMemory(DT, MemoryRules(gate_m=1000.0))
+    follow(memory, [[("car", 10, 2.0)]])
+    place, velocity, missed = 2.0, 0.0, 0
+    for step in steps:
+        follow(memory, [[] if step is None else [("car", 10, 2.0 + step)]])
+        place += velocity * DT
+        missed += 1
+        if step is not None:
+            elapsed = missed * DT
+            velocity = (2.0 + step - (place - velocity * elapsed)) / elapsed
+            place, missed = 2.0 + step, 0
+        (row,) = memory._table
+        assert row[Tracks.CENTRE].tolist() == [10.0, place, 0.9]
+        assert row[Tracks.VELOCITY].tolist() == [0.0, velocity]
 
 
 NEAR = st.floats(-4.0, 4.0)

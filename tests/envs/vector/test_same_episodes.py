@@ -25,6 +25,7 @@ CONDITIONS = {
     "listed otherwise": {"cell_order": "core-spread", "reserve_fraction": 0.5, "floor_seed": 2},
     "without a floor": {"floor": False, "budget": 0.2},
     "half a cell": {"floor": False, "budget": 53 / 16384, "reserve_fraction": 0.5},
+    "smoothed": {"velocity_keyframes": 5},
     "wide margins": {"azimuth_margin": 4, "elevation_margin": 3},
     "thorough": {"min_returns": 8, "brake_for_oncoming": True, "brake_side_margin_m": 1.0},
     "another brake": {

@@ -67,7 +67,8 @@ def test_a_further_policy_is_ordered_and_shown(rows):
 def test_every_fault_of_the_sensing_grows_from_none_in_some_panel():
     varied = {name for fault in FAULTS for level in fault.levels for name in level.changes}
     faults = set(Sensing.__dataclass_fields__) - {"engine", "min_returns", "camera_confidence"}
-    # The vehicle study varies the pose; returns, the camera's profile and seconds have pages.
+    # The vehicle study varies the pose; returns, the camera's profile and seconds, the tracker
+    # have pages.
     elsewhere = {
         *LOCALISATION,
         *RETURN_SETTINGS,
@@ -75,6 +76,7 @@ def test_every_fault_of_the_sensing_grows_from_none_in_some_panel():
         "camera_latency_s",
         "sweep_mask",
         "clutter",
+        "velocity_keyframes",
     }
     assert varied == faults - elsewhere
     for fault in FAULTS:
