@@ -2,9 +2,9 @@
 LiDARs have it, one of an HDL-32E (nuScenes) and one of two VLP-32C (Argoverse 2).
 
 Shares of lost returns are by row, of rows that look at the road, so that the range of each is known
-(`docs/examples/real_sweeps.py` prints them): 2% where the road is within 12 m, 6% at 18 m, 11 to
-13% from 21 to 38 m, in both sweeps. Errors are those of consecutive returns about the smooth line
-through them: 0.5 cm on the road up to 11 m, 0.8 cm at 17 m and on walls at 25 m. Beyond that,
+(`docs/examples/sweeps/real_sweeps.py` prints them): 2% where the road is within 12 m, 6% at 18 m,
+11 to 13% from 21 to 38 m, in both sweeps. Errors are those of consecutive returns about the smooth
+line through them: 0.5 cm on the road up to 11 m, 0.8 cm at 17 m and on walls at 25 m. Beyond that,
 surfaces are no longer smooth and errors cannot be told from them.
 """
 
@@ -45,8 +45,8 @@ PASSED = {"car": 0.65, "truck": 0.39, "bus": 0.39, "bicycle": 0.87, "pedestrian"
 that its box has and it has not, between legs, through a window. The rest returns nothing. Of the
 rays of the upper VLP-32C of Argoverse 2 through labelled boxes within 50 m, 58% return from the box
 and 27% from behind it for 15 cars, 38 and 54% for five people, 90 and 4% for a bus
-(`docs/examples/real_sweeps.py` prints them). A truck has the figure of the bus, a bicycle that of
-people (choice)."""
+(`docs/examples/sweeps/real_sweeps.py` prints them). A truck has the figure of the bus, a bicycle
+that of people (choice)."""
 _PASSED = np.array([PASSED[name] for name in CLASSES])
 OWN_CAR_SHARES = 0.82, 0.47, 0.26, 0.12, 0.0
 OWN_CAR_DEG = -30.7, -25.3, -24.0, -22.7, -21.3

@@ -1,7 +1,7 @@
 """Which part of the clutter misleads a detector: full scans of held-out streets with one part of it
 at a time.
 
-    python docs/examples/clutter_by_part.py out.md [WEIGHTS.npz ...]
+    python docs/examples/sweeps/clutter_by_part.py out.md [WEIGHTS.npz ...]
 
 WEIGHTS are files that `care-sim train detector` wrote.
 """

@@ -1,6 +1,6 @@
 """Generated streets beside recorded sweeps, before and after `clutter`; then detectors on these.
 
-    python docs/examples/real_sweeps.py DATA out [WEIGHTS.npz ...]
+    python docs/examples/sweeps/real_sweeps.py DATA out [WEIGHTS.npz ...]
 
 DATA holds what was recorded; what is absent is left out:
     nuscenes/*.pcd.bin                      a sweep of an HDL-32E
