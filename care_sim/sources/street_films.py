@@ -14,11 +14,12 @@ from care_sim.base.seeds import secret_entropy
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.conditions import RAYS, STRONGEST, FilmedReturns
 from care_sim.core.frames import Frame
+from care_sim.core.grid import Cells
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.core.types import CLASSES, Scan
 from care_sim.loops.film import Film, Shot
-from care_sim.sensors.annotated import Annotations, Cloud, IdentifiedDetections, cloud_of
+from care_sim.sensors.annotated import NO_OBJECT, Annotations, Cloud, IdentifiedDetections, cloud_of
 from care_sim.sensors.beams import Beams
 from care_sim.sensors.engines import make_engine
 from care_sim.sensors.recorded_errors import as_recorded, slopes
@@ -49,6 +50,8 @@ _ENGINE = "bullet"
 _CLUTTER_ENGINE = "fast"
 """That of cluttered streets: their thousands of parts take Bullet and its pictures ten times as
 long. Both engines agree (`make parity`)."""
+SUNK_M = 1000.0
+"""How far below the road bodies are while rays pass by them: no LiDAR reaches there."""
 _NO_CLASS = -1
 """The class of a body that the five classes do not hold."""
 
@@ -171,10 +174,12 @@ class _StreetBodies:
         # Seen by the full sweep or by a camera, whatever a policy will fire later.
         shown = np.isin(labelled, np.concatenate([cloud.objects, identified.objects]))
         if self._returns.shapes_beams:
-            cloud = self._returned(keyframe, sensor, numbers)
+            every = np.arange(self._setup.grid.size)
+            cloud = self._returned(keyframe, sensor, every, numbers)
         if self._returns.clutter:
             objects = self._classes, self._bright
-            cloud = as_recorded(cloud, self._setup.grid, objects, self._rng)
+            behind = partial(self._behind, keyframe, sensor, numbers)
+            cloud = as_recorded(cloud, self._setup.grid, objects, behind, self._rng)
         annotations, hidden = (
             Annotations(labelled[kept], self._classes[labelled[kept]], boxes[kept])
             for kept in (shown, ~shown)
@@ -195,13 +200,28 @@ class _StreetBodies:
         ranges, bodies = self._engine.cast(sensor, cells)
         return cloud_of(Scan(cells, ranges), bodies, grid)
 
-    def _returned(self, keyframe: int, sensor: Frame, numbers: Mapping[int, int]) -> Cloud:
-        """The returns of every cell; `numbers` are those of the bodies that are reported."""
+    def _behind(
+        self, keyframe: int, sensor: Frame, numbers: Mapping[int, int], cells: Cells
+    ) -> Cloud:
+        """What cells return that pass by the bodies that are reported, those of `numbers`."""
+        poses = self._world.primitives.poses.copy()
+        poses[[*numbers], 2] -= SUNK_M
+        with self._world.placed(poses):
+            if self._returns.shapes_beams:
+                return self._returned(keyframe, sensor, cells, numbers)
+            ranges, _ = self._engine.cast(sensor, cells)
+        nobody = np.full(len(cells), NO_OBJECT)
+        return cloud_of(Scan(cells, ranges), nobody, self._setup.grid)
+
+    def _returned(
+        self, keyframe: int, sensor: Frame, cells: Cells, numbers: Mapping[int, int]
+    ) -> Cloud:
+        """The returns of cells; `numbers` are those of the bodies that are reported."""
         grid = self._setup.grid
         engine = _CLUTTER_ENGINE if self._returns.clutter else _ENGINE
         beams = Beams(self._world, grid, self._returns, engine, partial(self._motion, keyframe))
         most = self._returns.most_shots
-        scan, bodies = beams.cast(sensor, np.arange(grid.size), np.full(grid.size, most))
+        scan, bodies = beams.cast(sensor, cells, np.full(grid.size, most))
         told = beams.compensated(scan, sensor)
         cloud = cloud_of(told, numbers_of(bodies, numbers), grid)
         if most == 1 or scan.intensities is None:

@@ -43,12 +43,21 @@ CLUMP_M: Range = (0.15, 0.5)
 """Side of a clump of leaves in a bush (choice)."""
 TRUNK_M: Range = (0.15, 0.5)
 """Across: from a planted street tree (16 to 18 cm round is the least, FLL) to a grown one."""
-CROWN_FROM_M: Range = (2.5, 4.5)
-"""Least heights that stay clear above pavements and carriageways (RASt 06)."""
+CROWN_FROM_M: Range = (1.5, 4.5)
+"""Above a carriageway 4.5 m stay clear, above a pavement 2.5 m (RASt 06), but nobody cuts every
+tree: over the pavement of the sweep of Argoverse 2 a crown hangs to 1.6 m."""
 CROWN_RADIUS_M: Range = (1.2, 3.2)
 CROWN_CLUMP_M: Range = (0.3, 0.9)
 CROWN_CLUMPS = 40
 """Fills a fifth of a middling crown, so that rays pass (choice)."""
+
+BED_CHANCE = 0.5
+BED_M: Range = (2.0, 4.0)
+BED_WIDTH_M: Range = (0.6, 1.1)
+BED_HEIGHT_M: Range = (0.3, 0.9)
+"""Plants at the foot of every second tree (choice). Open ground of 6 m^2 about a street tree is
+asked for (FLL); the tree of the sweep of Argoverse 2 stands in plants 3 m long and 0.9 m high."""
+BED_CLUMPS = 6
 
 LAMP_M: Range = (0.12, 0.2)
 SIGN_POST_M = 0.076
@@ -95,7 +104,7 @@ def bush(rng: np.random.Generator) -> BodyKind:
 
 
 def tree(rng: np.random.Generator) -> BodyKind:
-    """A trunk, and a crown that lets rays through."""
+    """A trunk, and a crown that lets rays through; at its foot a bed of plants or none."""
     across, base, radius = draw(rng, TRUNK_M), draw(rng, CROWN_FROM_M), draw(rng, CROWN_RADIUS_M)
     high = radius * draw(rng, (0.8, 1.4))
     trunk = Part(
@@ -103,6 +112,10 @@ def tree(rng: np.random.Generator) -> BodyKind:
     )
     spread = (radius, radius, high)
     crown = _leaves(rng, CROWN_CLUMPS, CROWN_CLUMP_M, (0.0, 0.0, base + high), spread)
+    if rng.random() < BED_CHANCE:
+        length, width = draw(rng, BED_M), draw(rng, BED_WIDTH_M)
+        bed = _plants(rng, length, width, draw(rng, BED_HEIGHT_M))
+        return _body("tree", trunk, *crown, *bed, footprint=(length, width))
     return _body("tree", trunk, *crown, footprint=(across, across))
 
 
@@ -174,6 +187,17 @@ def _leaves(
     for (x, y, z), (length, width, height) in zip(places.tolist(), sides.tolist(), strict=True):
         low = max(z - height / 2, 0.0)
         parts.append(_box((x, y), (length, width), (low, low + height), GREEN, LEAVES))
+    return parts
+
+
+def _plants(rng: np.random.Generator, length: float, width: float, height: float) -> list[Part]:
+    """A bed of plants along x, up to so high."""
+    step = length / BED_CLUMPS
+    parts = []
+    for n in range(BED_CLUMPS):
+        size = step, width * draw(rng, (0.6, 1.0))
+        middle = (n + 0.5) * step - length / 2, 0.0
+        parts.append(_box(middle, size, (0.0, height * draw(rng, (0.5, 1.0))), GREEN, LEAVES))
     return parts
 
 

@@ -6,7 +6,7 @@ import pytest
 from care_sim.core.grid import AngularGrid
 from care_sim.core.types import CLASSES
 from care_sim.sensors.annotated import NO_OBJECT, Cloud
-from care_sim.sensors.recorded_errors import MOST_SIGMAS, SLOPE, as_recorded, slopes
+from care_sim.sensors.recorded_errors import MOST_SIGMAS, PASSED, SLOPE, as_recorded, slopes
 
 GRID = AngularGrid()
 NOBODY = np.empty(0, np.int64), np.empty(0)
@@ -19,8 +19,12 @@ def ball(range_m, objects=NO_OBJECT):
     return Cloud(cells, points, np.full(len(cells), objects))
 
 
-def worn(cloud, objects=NOBODY, seed=0):
-    return as_recorded(cloud, GRID, objects, np.random.default_rng(seed))
+def nothing(cells):
+    return ball(1.0).take(np.zeros(len(ball(1.0)), bool))
+
+
+def worn(cloud, objects=NOBODY, behind=nothing):
+    return as_recorded(cloud, GRID, objects, behind, np.random.default_rng(0))
 
 
 @pytest.mark.parametrize(("range_m", "lost"), [(8.0, 0.02), (18.5, 0.075), (40.0, 0.13)])
@@ -44,6 +48,22 @@ def test_an_object_loses_what_its_class_and_its_surface_make_it_lose():
     for bright, kept in ((0.0, 0.53), (1.0, 0.78), (-1.0, 0.28)):
         objects = np.array([label]), np.array([bright])
         assert len(worn(cloud, objects)) / len(cloud) == pytest.approx(kept, abs=0.02)
+
+
+def test_of_the_rays_that_an_object_does_not_return_its_share_returns_from_behind():
+    def wall(cells):
+        assert (np.diff(cells) > 0).all()
+        return Cloud(cells, GRID.points(cells, np.full(len(cells), 30.0)), NO_OBJECT * cells**0)
+
+    for name, kept in (("car", 0.53), ("pedestrian", 0.54)):
+        cloud = ball(15.0, objects=0)
+        made = worn(cloud, (np.array([CLASSES.index(name)]), np.zeros(1)), wall)
+        ranges = np.linalg.norm(made.points, axis=1)
+        assert (np.diff(made.cells) > 0).all()
+        assert np.array_equal(made.objects == NO_OBJECT, ranges > 29)
+        shares = np.mean(ranges < 16), np.mean(ranges > 29)
+        expected = np.array([kept, (1 - kept) * PASSED[name]]) * len(cloud) / len(made)
+        assert shares == pytest.approx(expected, abs=0.02)
 
 
 def test_luck_is_that_of_the_cell_whatever_else_returns():

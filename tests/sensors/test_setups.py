@@ -74,6 +74,7 @@ def test_the_default_is_what_was_mounted_before_there_was_a_choice():
         ("m1-forward", (126, 600), 120, (12.5, -12.5), 150, (0.6, 0.0, 1.5)),
         ("paper-vehicle", (32, 512), 360, (10.67, -30.67), 50, LIDAR_POSITION),
         ("hdl-64e", (64, 2083), 360, (2.0, -24.33), 120, (-0.445, 0.0, 1.73)),
+        ("nuscenes", (32, 1084), 360, (10.67, -30.67), 100, LIDAR_POSITION),
         ("kitti", (32, 512), 360, (10.67, -30.67), 50, (-0.445, 0.0, 1.73)),
     ],
 )
@@ -88,6 +89,14 @@ def test_what_comes_with_the_package_is_as_its_data_sheet_says(
     assert setup.grid.range_m == range_m
     assert setup.position == position
     assert any(line.startswith(name) for line in setup_lines())
+
+
+def test_the_lower_lidar_of_argoverse_2_hangs_upside_down():
+    setup = sensor_setup("argoverse-2")
+    upper, lower = (head.grid for head in setup.grid.heads)
+    assert setup.grid.shape == (64, 1800)
+    assert np.rad2deg(upper.elevations[[0, -1]]) == pytest.approx([15.0, -25.0])
+    assert lower.elevations == pytest.approx(-upper.elevations[::-1], abs=1e-9)
 
 
 def test_a_file_is_read_in_metres_and_degrees_of_the_car(written):

@@ -209,6 +209,24 @@ def test_clutter_hides_and_slopes_and_the_film_is_the_same_again(cluttered):
         assert 0.03 < lost < 0.4
 
 
+def test_rays_past_a_body_return_what_stands_behind_it_and_the_body_stays(cluttered):
+    shot = record(cluttered, returns=CLUTTERED).shots[-1]
+    cloud, there = shot.cloud, shot.annotations
+    ranges = np.linalg.norm(cloud.points, axis=1)
+    car = np.argmax([(cloud.objects == one).sum() for one in there.objects])
+    (own,) = np.nonzero(cloud.objects == there.objects[car])
+    # Between the returns of a row that lie on the body others lie behind it, and are of nobody.
+    low, high = cloud.cells[own].min() // 512, cloud.cells[own].max() // 512
+    behind = []
+    for row in range(low, high + 1):
+        cells = cloud.cells[own[cloud.cells[own] // 512 == row]]
+        if len(cells) > 2 and np.ptp(cells) < 256:
+            among = (cloud.cells > cells[0]) & (cloud.cells < cells[-1])
+            behind += [*np.flatnonzero(among & (ranges > ranges[own].max() + 0.5))]
+    assert len(behind) > 0.1 * len(own)
+    assert (cloud.objects[behind] == NO_OBJECT).all()
+
+
 def test_a_rolling_beam_and_clutter_go_together(cluttered):
     settings = FilmedReturns(clutter=True, lidar_stated_range_m=100.0, lidar_sweep_s=0.1)
     cloud = record(part_of(cluttered, slice(2)), returns=settings).shots[0].cloud

@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from care_sim.core.frames import turned
-from care_sim.streets.clutter_bodies import CROWN_FROM_M, LOWERED_M, tree, variants, verge
+from care_sim.streets.clutter_bodies import (
+    BED_HEIGHT_M,
+    CROWN_CLUMPS,
+    CROWN_FROM_M,
+    LOWERED_M,
+    tree,
+    variants,
+    verge,
+)
 from care_sim.streets.draft import footprints_meet
 from care_sim.streets.layouts import LAYOUTS
 from care_sim.streets.street import make_street
@@ -112,11 +120,17 @@ def test_a_verge_rises_outwards_and_a_crown_hangs_above_heads_with_gaps():
     assert np.all(np.diff(tops) > 0)
     assert tops[0] == pytest.approx(0.14, abs=0.01)
     assert verge(4.0, 3.0, 0.05, -0.05).parts[-1].size[2] == LOWERED_M
-    filled = []
+    filled, beds = [], 0
     for one in variants(tree):
-        _, *crown = one.parts
+        crown, bed = one.parts[1 : CROWN_CLUMPS + 1], one.parts[CROWN_CLUMPS + 1 :]
         assert min(part.centre[2] for part in crown) > CROWN_FROM_M[0]
         assert {part.material for part in one.parts} <= {*REFLECTANCES}
+        # A bed is low, and room is asked for all of it.
+        beds += len(bed) > 0
+        for part in bed:
+            assert part.size[2] <= BED_HEIGHT_M[1]
+            reach = np.abs(part.centre[:2]) + np.array(part.size[:2]) / 2
+            assert (reach <= np.array(one.size[:2]) / 2 + 1e-9).all()
         low, high = (
             np.array([np.add(part.centre, way * np.array(part.size) / 2) for part in crown])
             for way in (-1, 1)
@@ -124,3 +138,4 @@ def test_a_verge_rises_outwards_and_a_crown_hangs_above_heads_with_gaps():
         whole = np.prod(high.max(axis=0) - low.min(axis=0)) * np.pi / 6
         filled.append(sum(np.prod(part.size) for part in crown) / whole)
     assert 0.1 < np.median(filled) < 0.3
+    assert 6 < beds < 18

@@ -127,7 +127,7 @@ def test_the_shipped_detector_finds_most_of_a_street():
     assert found > 0.75 * seen > 20
 
 
-@pytest.mark.parametrize(("weights", "steps"), [("streets", 10_000), ("clutter", 600)])
+@pytest.mark.parametrize(("weights", "steps"), [("streets", 10_000), ("clutter", 400)])
 def test_the_shipped_card_says_what_the_readme_does(weights, steps):
     made = PillarsDetector(weights=weights)
     both = (pillars.SHIPPED.parent / "README.md").read_text().partition("## `pillars-clutter.npz`")
@@ -140,7 +140,7 @@ def test_the_shipped_card_says_what_the_readme_does(weights, steps):
 
 
 def test_shipped_weights_are_known_by_what_they_learned_from(file):
-    assert PillarsDetector(weights="clutter").card["data"].startswith("2400 scans of cluttered")
+    assert PillarsDetector(weights="clutter").card["data"].startswith("1600 scans of cluttered")
     with pytest.raises(InvalidInput, match=r"unknown weights of detector pillars 'roads'"):
         PillarsDetector(weights="roads")
     with pytest.raises(InvalidInput, match="give file or weights of detector pillars, not both"):

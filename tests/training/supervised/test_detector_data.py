@@ -15,6 +15,7 @@ from care_sim.sources.street_films import street_film
 from care_sim.training.supervised.detector_data import (
     OTHER_SETUPS,
     POLICIES,
+    RECORDED_SETUPS,
     Example,
     Targets,
     loss,
@@ -74,7 +75,7 @@ def test_policies_and_set_ups_are_known_and_none_was_learned():
     for name in POLICIES:
         maker(name)
         assert not {"learned", "privileged", "non-causal"} & set(tags_of(name))
-    assert set(OTHER_SETUPS) < set(setup_names())
+    assert {*OTHER_SETUPS, *RECORDED_SETUPS} < set(setup_names())
 
 
 torch = pytest.importorskip("torch")

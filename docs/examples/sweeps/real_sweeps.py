@@ -1,6 +1,6 @@
 """Generated streets beside recorded sweeps, before and after `clutter`; then detectors on these.
 
-    python docs/examples/real_sweeps.py DATA out [WEIGHTS.npz ...]
+    python docs/examples/sweeps/real_sweeps.py DATA out [WEIGHTS.npz ...]
 
 DATA holds what was recorded; what is absent is left out:
     nuscenes/*.pcd.bin                      a sweep of an HDL-32E
@@ -34,6 +34,7 @@ from care_sim.perception.pillars.detector import LEAST_SCORE, PillarsDetector
 from care_sim.reports.figures.styles import colours, default_style, save
 from care_sim.reports.table import Table
 from care_sim.sensors.annotated import Annotations
+from care_sim.sensors.setups import sensor_setup
 from care_sim.sources.argoverse2.recordings import (
     ARGOVERSE2_SENSOR_HEIGHT_M,
     UP_LIDAR,
@@ -55,6 +56,9 @@ GRID_HEIGHT_M = LIDAR_POSITION[2]
 CLEAN, CLUTTERED = "clean streets", "cluttered streets"
 RANGES_M = (0, 10, 20, 30, 50)
 SUSPECTED = 0.02
+SWEEPS_ARGOVERSE2 = "argoverse2/*/sensors/lidar/*.feather"
+EDGE_M = 0.15
+UPPER_LASERS = 32
 HEIGHTS_M = (-9.0, 0.25, 0.75, 1.25, 2.0, 3.0, 4.5, 99.0)
 
 
@@ -72,7 +76,7 @@ class Sweep(NamedTuple):
 
 def recorded(data: Path) -> Iterator[Sweep]:
     """The sweeps in a folder."""
-    for path in sorted(data.glob("argoverse2/*/sensors/lidar/*.feather")):
+    for path in sorted(data.glob(SWEEPS_ARGOVERSE2)):
         points = argoverse2_points(path)[:, :3] - UP_LIDAR
         there = annotations_at(path.parents[2], int(path.stem))
         yield Sweep("Argoverse 2", points, ARGOVERSE2_SENSOR_HEIGHT_M, there)
@@ -81,6 +85,51 @@ def recorded(data: Path) -> Iterator[Sweep]:
         points = points[np.linalg.norm(points[:, :3], axis=1) > OWN_CAR_M]
         rows = GRID.rows - 1 - points[:, 4].astype(int)
         yield Sweep("nuScenes", points[:, :3], NUSCENES_HEIGHT_M, rows=rows)
+
+
+def past_boxes(path: Path) -> Table:
+    """What the rays of the upper LiDAR return that meet a labelled box within range first: on it,
+    up to EDGE_M off it; from behind; from before it, where something hides it; or nothing. The
+    rays are those of the grid, which has as many as the LiDAR.
+    """
+    read = argoverse2_points(path)
+    points = read[read[:, 4] < UPPER_LASERS, :3] - UP_LIDAR
+    there = annotations_at(path.parents[2], int(path.stem))
+    there = there.take(np.hypot(*there.boxes[:, :2].T) <= RANGE_M)
+    grid = sensor_setup("argoverse-2").grid.heads[0].grid
+    ranges = np.linalg.norm(points, axis=1)
+    _, _, cast = met_boxes(grid.directions, there.boxes)
+    near, far, returned = met_boxes(points / ranges[:, None], there.boxes)
+    rows = []
+    for label in np.unique(there.classes):
+        (own,) = np.nonzero(there.classes == label)
+        rays, on = np.isin(cast, own).sum(), np.isin(returned, own)
+        before = (on & (ranges < near - EDGE_M)).sum()
+        behind = (on & (ranges > far + EDGE_M)).sum()
+        shares = [on.sum() - before - behind, behind, rays - on.sum()]
+        told = (f"{100 * one / (rays - before):.0f}" for one in shares)
+        rows.append((CLASSES[label], str(len(own)), str(rays), str(before), *told))
+    columns = "class", "objects", "rays", "before", "in the box, %", "behind, %", "nothing, %"
+    return Table("Rays of the upper LiDAR of Argoverse 2 through labelled boxes", columns, (*rows,))
+
+
+def met_boxes(ways: np.ndarray, boxes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where rays along unit vectors (n, 3) enter (n,) and leave (n,) the first of boxes (m, 7) that
+    they meet, and which it is (n,), -1 for none.
+    """
+    near, far = np.full(len(ways), np.inf), np.zeros(len(ways))
+    which = np.full(len(ways), -1)
+    for number, (*centre, length, width, height, yaw) in enumerate(boxes.tolist()):
+        cos, sin = np.cos(yaw), np.sin(yaw)
+        axes = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
+        along, middle = ways @ axes.T, axes @ centre
+        half = np.array([length, width, height]) / 2
+        with np.errstate(divide="ignore"):
+            sides = np.stack([(middle - half) / along, (middle + half) / along])
+        enters, leaves = sides.min(axis=0).max(axis=1), sides.max(axis=0).min(axis=1)
+        first = (enters <= leaves) & (enters > 0) & (enters < near)
+        near[first], far[first], which[first] = enters[first], leaves[first], number
+    return near, far, which
 
 
 def generated(clutter: bool) -> list[Shot]:
@@ -265,6 +314,7 @@ def main(data: Path, out: Path, *weights: str) -> None:
             names=2,
         ),
     ]
+    told += map(past_boxes, sorted(data.glob(SWEEPS_ARGOVERSE2)))
     detectors: dict[str, ClusterDetector | PillarsDetector] = {
         "cluster": ClusterDetector(),
         "pillars": PillarsDetector(least_score=SUSPECTED),
