@@ -15,7 +15,7 @@ from care_sim.core.rig import Rig
 from care_sim.core.types import Detections
 from care_sim.perception.matching import MATCH_M
 from care_sim.perception.measured.false_boxes import FalseBoxPopulation
-from care_sim.perception.measured.luck import CHANNELS, FIRST_ERROR, TURNED, advance
+from care_sim.perception.measured.luck import CHANNELS, FIRST_ERROR, LUCK, TURNED, advance
 from care_sim.perception.measured.recall import (
     FIRST_HIT,
     effective_returns,
@@ -37,8 +37,11 @@ from care_sim.perception.proxy import count_hits
 from care_sim.sensors.annotated import NO_OBJECT, Annotations, Cloud
 
 GATHERED_S = 1.0
-"""In the closed loop a detector that gathers ten sweeps has those of the last ten keyframes, of
-0.1 s each. Of longer keyframes it has as many as fit in this time."""
+"""In the closed loop, and in films with short keyframes, a detector that gathers ten sweeps has
+those of the last ten keyframes, of 0.1 s each. Of longer ones it has as many as fit in this time.
+"""
+_WIDEST_M = MATCH_M * (1 - 1e-9)
+"""An error is at most as wide: rounded, a box at just MATCH_M lies beyond."""
 _RADIAL, _TANGENTIAL, _LENGTH, _WIDTH, _HEIGHT, _YAW = range(len(ERRORS))
 
 
@@ -47,11 +50,12 @@ class MeasuredDetector(Detector):
 
     `first_hit` is what a return counts in a film that was not there a keyframe ago: 0.55, as with
     ten equal sweeps since then; 0.1 where nine of ten sweeps were fired by the mask before, 1.0
-    where all were fired by the coming one. The closed loop does not need it: there the last ten
-    sweeps are known. `worth` are the returns of the detector's own sensor that one return is worth,
-    measured by class unless given; on sweeps that this sensor recorded it is 1. What scores below
-    `track_score` becomes no track; it is given in the detector's own scale. `false_boxes` and
-    `box_errors` switch these on. Raises InvalidInput for a value out of its bounds.
+    where all were fired by the coming one. It changes nothing in the closed loop, nor in films with
+    keyframes of less than 0.5 s, where the sweeps before are known. `worth` are the returns of the
+    detector's own sensor that one return is worth, measured by class and divided by the density of
+    rays unless given; on sweeps that this sensor recorded it is 1. What scores below `track_score`
+    becomes no track; it is given in the detector's own scale. `false_boxes` and `box_errors` switch
+    these on. Raises InvalidInput for a value out of its bounds.
     """
 
     name: ClassVar[str]
@@ -121,8 +125,13 @@ class MeasuredEpisode(Detector):
         self._errors = rules.errors
         # The closed loop drops what becomes no track, so that it need not be made.
         self._least = measured.least_score if is_filmed else rules.least_tracked
-        self._table = measured.recall._replace(worth=_worth(measured, rules.worth, rig))
-        self._weights = _weights(measured.sweeps, rules.first_hit, rig.keyframe_s, is_filmed)
+        worth = measured.recall.worth
+        if rules.worth is not None:
+            worth = np.full(len(worth), float(rules.worth))
+        self._table = measured.recall._replace(worth=worth)
+        self._heads = [head.first for head in rig.grid.heads]
+        self._angles = _angles(rig) if rules.worth is None else np.ones(len(self._heads))
+        self._weights = _weights(measured, rules.first_hit, rig.keyframe_s, is_filmed)
         self._seed = seed.generate_state(1, np.uint64)[0]
         self._keyframe_s = rig.keyframe_s
         self._false = (
@@ -153,6 +162,7 @@ class MeasuredEpisode(Detector):
             (annotations.objects, annotations.classes, self._places),
             np.ascontiguousarray(annotations.boxes, float),
             (cloud.objects, self._ascending, self._ranks, max(len(cloud.poses), 1)),
+            (np.append(np.searchsorted(cloud.cells, self._heads), len(cloud)), self._angles),
             (self._last, self._processes, self._counts),
             self._weights,
             self._table,
@@ -189,23 +199,22 @@ class MeasuredEpisode(Detector):
             self._counts = np.concatenate([self._counts, np.zeros((new, self._counts.shape[1]))])
 
 
-def _weights(sweeps: int, first_hit: float, keyframe_s: float, is_filmed: bool) -> Floats:
+def _weights(measured: Measurement, first_hit: float, keyframe_s: float, is_filmed: bool) -> Floats:
     """(k,) the weights of this keyframe's returns and of those before, newest first."""
-    if sweeps == 1:
+    if measured.sweeps == 1:
         return np.ones(1)
-    if is_filmed:
+    if is_filmed and keyframe_s > measured.step_s - 1e-9:
         return np.array([first_hit, 1 - first_hit])
-    return np.ones(min(sweeps, max(1, math.floor(GATHERED_S / keyframe_s + 1e-9))))
+    return np.ones(min(measured.sweeps, max(1, math.floor(GATHERED_S / keyframe_s + 1e-9))))
 
 
-def _worth(measured: Measurement, worth: float | None, rig: Rig) -> Floats:
-    """(classes,) the returns of the detector's sensor that a return of this set-up is worth."""
-    if worth is not None:
-        return np.full(len(measured.recall.worth), float(worth))
-    # Measured for the default grid: of denser rays each is worth less.
-    density = sum(1 / (head.grid.column_width * head.grid.row_height) for head in rig.grid.heads)
+def _angles(rig: Rig) -> Floats:
+    """(k,) the solid angle of a cell of each LiDAR, in cells of the default grid, for which the
+    worth of a return was measured: of denser rays each is worth less.
+    """
     usual = AngularGrid()
-    return measured.recall.worth / (density * usual.column_width * usual.row_height)
+    angles = [head.grid.column_width * head.grid.row_height for head in rig.grid.heads]
+    return np.array(angles) / (usual.column_width * usual.row_height)
 
 
 Clock = tuple[np.uint64, int, float, float]
@@ -218,6 +227,7 @@ def _detected(
     present: tuple[Integers, Integers, Integers],
     boxes: Floats,
     returned: tuple[Integers, Integers, Integers, int],
+    heads: tuple[Integers, Floats],
     memory: tuple[Integers, Floats, Floats],
     weights: Floats,
     table: Recall,
@@ -230,16 +240,21 @@ def _detected(
 
     `present` are numbers, classes and rows of memory (n,) of objects with `boxes` (n, 7);
     `returned` the objects of all returns (P,), the present ones in ascending order, the place of
-    each in it, and how many sweeps the returns are of. The `memory` (m,) is the last keyframe of
-    each object, its processes (m, CHANNELS), and its returns (m, k) at the last keyframes, in the
-    column of the keyframe modulo k; they have the `weights` (k,), newest first.
+    each in it, and how many sweeps the returns are of. Of the `heads` (h,), bounds (h + 1,) say
+    which returns are whose, and angles (h,) what each counts. The `memory` (m,) is the last
+    keyframe of each object, its processes (m, CHANNELS), and its returns (m, k) at the last
+    keyframes, in the column of the keyframe modulo k; they have the `weights` (k,), newest first.
     """
     objects, classes, places = present
     hits, ascending, ranks, sweeps = returned
     last, processes, counts = memory
-    luck = advance(clock, objects, classes, places, last, processes, lasting)
+    signals = advance(clock, objects, classes, places, last, processes, lasting)
     kept, keyframe = len(weights), clock[1]
-    by_rank = count_hits(ascending, hits)
+    by_rank, usual = np.zeros(len(ascending), np.int64), np.zeros(len(ascending))
+    for head, angle in enumerate(heads[1]):
+        own = count_hits(ascending, hits[heads[0][head] : heads[0][head + 1]])
+        by_rank += own
+        usual += angle * own
     counts[:, keyframe % kept] = 0.0
     rows = np.empty(len(objects), np.int64)
     seen, scores = np.empty((len(objects), 7)), np.empty(len(objects))
@@ -247,7 +262,7 @@ def _detected(
     count = 0
     for n in range(len(objects)):
         label, place = classes[n], places[n]
-        now = by_rank[ranks[n]] / sweeps
+        now = usual[ranks[n]] / sweeps
         counts[place, keyframe % kept] = now
         average = now if sweeps > 1 else _average(counts[place], weights, keyframe)
         # Nothing comes from nothing, though the fitted curve has a share at 0.
@@ -258,12 +273,12 @@ def _detected(
             now * worth, average * worth, table.fall[label], table.most[label]
         )
         latent = latent_score(effective, label, table)
-        score = score_of(latent.mean + latent.spread * luck[n], label, table, bounds[1])
+        score = score_of(latent.mean + latent.spread * signals[n, LUCK], label, table, bounds[1])
         if score < bounds[0]:
             continue
         rows[count], scores[count], returns[count] = n, score, by_rank[ranks[n]]
         seen[count] = boxes[n]
-        _misplace(seen[count], label, max(now * worth, 1.0), processes[place], errors)
+        _misplace(seen[count], label, max(average * worth, 1.0), signals[n], errors)
         count += 1
     return rows[:count], seen[:count], scores[:count], returns[:count]
 
@@ -281,19 +296,19 @@ def _average(counts: Floats, weights: Floats, keyframe: int) -> float:
 
 
 @compiled()
-def _misplace(box: Floats, label: int, returns: float, processes: Floats, table: Errors) -> None:
-    """Give a box (7,) of an object with so many `returns` the errors that its `processes` have."""
+def _misplace(box: Floats, label: int, returns: float, signals: Floats, table: Errors) -> None:
+    """Give a box (7,) of an object with so many `returns` the errors that its `signals` have."""
     errors = np.empty(len(ERRORS))
     for place in range(len(ERRORS)):
-        normal = min(max(processes[FIRST_ERROR + place], -WIDEST_NORMAL), WIDEST_NORMAL)
+        normal = min(max(signals[FIRST_ERROR + place], -WIDEST_NORMAL), WIDEST_NORMAL)
         errors[place] = np.interp(normal, NORMALS, table.quantiles[label, place])
 
     # Errors were measured of boxes within 2 m of their objects.
     radial = errors[_RADIAL] * returns ** table.powers[label, 0]
     across = errors[_TANGENTIAL] * returns ** table.powers[label, 1]
     size = math.hypot(radial, across)
-    if size > MATCH_M:
-        radial, across = radial * MATCH_M / size, across * MATCH_M / size
+    if size > _WIDEST_M:
+        radial, across = radial * _WIDEST_M / size, across * _WIDEST_M / size
     away = max(math.hypot(box[0], box[1]), 1e-6)
     cos, sin = box[0] / away, box[1] / away
     box[0] += cos * radial - sin * across
@@ -306,5 +321,5 @@ def _misplace(box: Floats, label: int, returns: float, processes: Floats, table:
     box[5] *= math.exp(errors[_HEIGHT])
     box[2] += box[5] / 2
     box[6] += min(max(errors[_YAW], -math.pi / 2), math.pi / 2)
-    if processes[TURNED] < table.turned_below[label]:
+    if signals[TURNED] < table.turned_below[label]:
         box[6] += math.pi

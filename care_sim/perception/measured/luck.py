@@ -2,12 +2,13 @@
 
 Both are made of standard normals that depend on the episode's seed, the object and the keyframe
 alone: every policy meets the same, whatever it fires, in whatever order objects are asked for. Each
-follows an autoregressive process of first order, which is advanced at every keyframe at which the
-object is annotated, detected or not. The luck is
+of `care_sim.perception.measured.tables.SIGNALS` is
 
     sqrt(stays) * constant + sqrt(decays) * slow + sqrt(1 - stays - decays) * quick,
 
-where `slow` decays in the measured time and `quick` in `flash_s`.
+where `slow` decays in the measured time and `quick` in `flash_s`. Both follow an autoregressive
+process of first order, which is advanced at every keyframe at which the object is annotated,
+detected or not.
 """
 
 import math
@@ -16,14 +17,14 @@ import numpy as np
 
 from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers
-from care_sim.perception.measured.tables import ERRORS, Luck
+from care_sim.perception.measured.tables import SIGNALS, Luck
 
-SLOW, QUICK, TURNED, FIRST_ERROR = range(4)
-CHANNELS = FIRST_ERROR + len(ERRORS)
-"""Processes of each object: slow luck, quick luck, whether its box is turned about, its errors."""
+LUCK, TURNED, FIRST_ERROR = range(3)
+"""Places in `SIGNALS`."""
+CHANNELS = 2 * len(SIGNALS)
+"""Processes of each object: of every signal the slow one and the quick one."""
 _CONSTANT = 2**20
 """A keyframe that no episode reaches, whose normals are those that stay."""
-_YAW = ERRORS.index("yaw")
 
 
 @compiled()
@@ -58,37 +59,32 @@ def advance(
     processes: Floats,
     table: Luck,
 ) -> Floats:
-    """(n,) the luck of annotated `objects` (n,) of `classes` (n,) at a keyframe. The `clock` holds
-    the episode's seed, the keyframe, seconds between keyframes, and seconds of quick luck.
+    """(n, 8) the `SIGNALS` of annotated `objects` (n,) of `classes` (n,) at a keyframe, standard
+    normals. The `clock` holds the episode's seed, the keyframe, seconds between keyframes, and
+    seconds of the quick ones.
 
     `rows` (n,) are their places in `last` (m,), the keyframe at which each was annotated before or
     -1, and in `processes` (m, CHANNELS), which are advanced.
     """
     seed, keyframe, keyframe_s, flash_s = clock
-    luck = np.empty(len(objects))
+    signals = np.empty((len(objects), len(SIGNALS)))
     for n in range(len(objects)):
         row, label = rows[n], classes[n]
         begins = last[row] < 0
         elapsed_s = (keyframe - last[row]) * keyframe_s
-        for channel in range(CHANNELS):
-            fresh = normal_of(seed, objects[n], keyframe, channel)
-            if channel == SLOW:
-                kept = math.exp(-elapsed_s / table.decay_s[label])
-            elif channel == QUICK:
-                kept = math.exp(-elapsed_s / flash_s) if flash_s else 0.0
-            else:
-                error = _YAW if channel == TURNED else channel - FIRST_ERROR
-                kept = table.errors_last[label, error] ** elapsed_s
-            if begins:
-                kept = 0.0
-            processes[row, channel] = (
-                kept * processes[row, channel] + math.sqrt(1.0 - kept * kept) * fresh
+        for signal in range(len(SIGNALS)):
+            slow, quick = 2 * signal, 2 * signal + 1
+            for channel in (slow, quick):
+                lasts_s = table.decay_s[label, signal] if channel == slow else flash_s
+                kept = 0.0 if begins or lasts_s <= 0 else math.exp(-elapsed_s / lasts_s)
+                processes[row, channel] = kept * processes[row, channel] + math.sqrt(
+                    1.0 - kept * kept
+                ) * normal_of(seed, objects[n], keyframe, channel)
+            stays, decays = table.stays[label, signal], table.decays[label, signal]
+            signals[n, signal] = (
+                math.sqrt(stays) * normal_of(seed, objects[n], _CONSTANT, slow)
+                + math.sqrt(decays) * processes[row, slow]
+                + math.sqrt(max(1.0 - stays - decays, 0.0)) * processes[row, quick]
             )
         last[row] = keyframe
-        stays, decays = table.stays[label], table.decays[label]
-        luck[n] = (
-            math.sqrt(stays) * normal_of(seed, objects[n], _CONSTANT, SLOW)
-            + math.sqrt(decays) * processes[row, SLOW]
-            + math.sqrt(max(1.0 - stays - decays, 0.0)) * processes[row, QUICK]
-        )
-    return luck
+    return signals

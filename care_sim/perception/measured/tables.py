@@ -21,6 +21,8 @@ SIDES = ("length", "width", "height")
 CENTRE = ("radial", "tangential")
 ERRORS = (*CENTRE, *SIDES, "yaw")
 """The channels of a box error, in the order of all tables."""
+SIGNALS = ("luck", "turned", *ERRORS)
+"""What lasts of an object: its luck, whether its box is turned about, and the errors of its box."""
 WIDEST_NORMAL = 4.0
 _STEPS = 161
 NORMALS = np.linspace(-WIDEST_NORMAL, WIDEST_NORMAL, _STEPS)
@@ -52,14 +54,13 @@ class Recall(NamedTuple):
 
 
 class Luck(NamedTuple):
-    """How long luck and errors last, by class: shares of the luck that stay and that decay, the
-    time of the decay in seconds, and (classes, 6) what is left of each error after a second.
+    """How long each of `SIGNALS` lasts, all (classes, 8): the shares that stay and that decay, and
+    the time of the decay in seconds.
     """
 
     stays: Floats
     decays: Floats
     decay_s: Floats
-    errors_last: Floats
 
 
 class Errors(NamedTuple):
@@ -106,7 +107,8 @@ class Measurement:
     most_score: float
     track_score: float
     flash_s: float
-    """How long luck and false boxes last that are new at every measured keyframe: assumed."""
+    """How long luck, errors and false boxes last that are new at every measured keyframe: assumed.
+    """
     view_deg: float
     """The horizontal field of view in which false boxes were counted."""
     kept_ahead: float
@@ -132,7 +134,7 @@ def measurement(name: str) -> Measurement:
     return Measurement(
         **plain,
         recall=_recall(classes),
-        luck=_luck(classes, errors, table["step_s"]),
+        luck=_luck(classes, errors),
         errors=_errors(errors),
         false_boxes=tuple(_false(*item) for item in table["false_boxes"].items()),
     )
@@ -169,12 +171,16 @@ def _recall(rows: dict[str, Any]) -> Recall:
     )
 
 
-def _luck(rows: dict[str, Any], errors: dict[str, Any], step_s: float) -> Luck:
-    last = np.zeros((len(CLASSES), len(ERRORS)))
-    for name, row in errors.items():
-        last[CLASSES.index(name)] = [row[error]["lasts"] ** (1 / step_s) for error in ERRORS]
+def _luck(rows: dict[str, Any], errors: dict[str, Any]) -> Luck:
+    # Whether a box is turned about lasts as its yaw does.
+    parts = [rows] + [
+        {name: row[error] for name, row in errors.items()} for error in ("yaw", *ERRORS)
+    ]
     return Luck(
-        _by_class(rows, "stays"), _by_class(rows, "decays"), _by_class(rows, "decay_s", 1.0), last
+        *(
+            np.column_stack([_by_class(part, key, missing) for part in parts])
+            for key, missing in (("stays", 0.0), ("decays", 0.0), ("decay_s", 1.0))
+        )
     )
 
 

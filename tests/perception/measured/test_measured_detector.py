@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from care_sim.base.errors import InvalidInput
+from care_sim.core.cells.stack import GridStack
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
@@ -88,6 +89,12 @@ def test_in_the_closed_loop_the_last_ten_keyframes_count(keyframes):
     )
 
 
+def test_in_a_film_with_short_keyframes_sweeps_count_as_in_the_closed_loop():
+    counts, present = [*[0] * 12, 8, 8, 8], crowd()
+    short = share(begun("centerpoint", 0.1, first_hit=1.0, **WORTH_ONE), present, *counts)
+    assert short == pytest.approx(recall("centerpoint", "car", 0.8 * 3)[0], abs=0.03)
+
+
 @pytest.mark.parametrize("first_hit", [0.1, 1.0])
 def test_what_a_first_hit_counts_is_a_parameter(first_hit):
     detector = begun("centerpoint", first_hit=first_hit, **WORTH_ONE)
@@ -102,6 +109,27 @@ def test_a_return_is_worth_what_its_solid_angle_says():
     made = make_detector("megvii", 1.84, false_boxes=False)
     found = share(made.begin(np.random.SeedSequence(0), dense, True), crowd(), 8, 8)
     assert found == pytest.approx(usual, abs=0.01)
+
+
+def test_a_return_is_worth_what_the_solid_angle_of_its_own_lidar_says():
+    usual, dense = AngularGrid(), AngularGrid(columns=512, rows=64)
+    ratio = usual.row_height / dense.row_height
+    both = Rig(
+        GridStack((usual, dense), ((0, 0, 0), (1, 0, 0))), (FRONT_CAMERA,), 1638, keyframe_s=0.5
+    )
+    present = crowd()
+    for first, counts, returns in (
+        (0, (4, 4), 4),
+        (usual.size, (8, 8), 8 / ratio),
+    ):
+        made = make_detector("centerpoint", 1.84, false_boxes=False)
+        detector = made.begin(np.random.SeedSequence(0), both, True)
+        for count in counts:
+            hit = np.repeat(present.objects, count)
+            cells = np.full(len(hit), first)
+            report, _ = detector.detect(Cloud(cells, np.empty((0, 3)), hit), present)
+        found = (report.scores >= 0.5).sum() / MANY
+        assert found == pytest.approx(recall("centerpoint", "car", 1.25 * returns)[0], abs=0.03)
 
 
 @pytest.mark.parametrize("name", MEASURED)
@@ -177,10 +205,10 @@ def test_misses_last_as_measured(name, kind):
     luck = measured.luck
     for later in (1, 4):
         t = later * measured.step_s
-        expected = luck.stays[label] + luck.decays[label] * np.exp(-t / luck.decay_s[label])
+        stays, decays, decay_s = (table[label, 0] for table in luck)
+        expected = stays + decays * np.exp(-t / decay_s)
         if measured.flash_s:
-            rest = 1 - luck.stays[label] - luck.decays[label]
-            expected += rest * np.exp(-t / measured.flash_s)
+            expected += (1 - stays - decays) * np.exp(-t / measured.flash_s)
         both = (hits[0] & hits[later]).mean()
         assert both == pytest.approx(_both_below(margin, expected), abs=0.025)
 
@@ -197,23 +225,54 @@ def _both_below(margin, correlation):
     return multivariate_normal(cov=[[1, correlation], [correlation, 1]]).cdf([margin, margin])
 
 
-def test_errors_of_boxes_are_those_of_the_table_and_last():
-    detector = begun("centerpoint", **WORTH_ONE)
-    present = crowd()
-    first, second = played(detector, present, np.ones((2, MANY), np.int64))
-    kept = [n for n in first if n in second]
+def centre_errors(present, *rows):
+    """(k, n, 2) radial and tangential errors at the keyframes of `rows`, of objects in all."""
+    kept = [n for n in rows[0] if all(n in row for row in rows)]
     true = dict(zip(present.objects.tolist(), present.boxes, strict=True))
-    moved = np.array([[one[n][1:3] - true[n][:2] for n in kept] for one in (first, second)])
+    moved = np.array([[row[n][1:3] - true[n][:2] for n in kept] for row in rows])
     away = np.array([true[n][:2] / np.hypot(*true[n][:2]) for n in kept])
-    radial = (moved * away).sum(axis=2)
-    assert np.median(np.abs(radial[0])) == pytest.approx(0.187, abs=0.02)
-    ranks = np.argsort(np.argsort(radial, axis=1), axis=1)
-    assert np.corrcoef(ranks)[0, 1] == pytest.approx(0.68, abs=0.05)
-    assert np.hypot(*moved[0].T).max() <= 2.0 + 1e-9
-    turned = np.abs(np.array([first[n][7] - true[n][6] for n in kept])) > np.pi / 2
+    across = np.column_stack([-away[:, 1], away[:, 0]])
+    return np.stack([(moved * away).sum(axis=2), (moved * across).sum(axis=2)], axis=2)
+
+
+def test_errors_of_boxes_are_those_of_the_table():
+    present = crowd()
+    (first,) = played(begun("centerpoint", **WORTH_ONE), present, np.ones((1, MANY), np.int64))
+    errors = centre_errors(present, first)[0]
+    assert np.median(np.abs(errors[:, 0])) == pytest.approx(0.187, abs=0.02)
+    assert np.hypot(*errors.T).max() <= 2.0 + 1e-9
+    true = dict(zip(present.objects.tolist(), present.boxes, strict=True))
+    turned = np.abs(np.array([first[n][7] - true[n][6] for n in first])) > np.pi / 2
     assert turned.mean() == pytest.approx(0.072, abs=0.015)
-    lower = np.array([first[n][3] - first[n][6] / 2 for n in kept])
+    lower = np.array([first[n][3] - first[n][6] / 2 for n in first])
     assert lower == pytest.approx(present.boxes[0, 2] - present.boxes[0, 5] / 2)
+
+
+@pytest.mark.parametrize(
+    ("name", "lags", "radial", "tangential"),
+    # Rank correlations of the centres of the same cars, as measured after so many keyframes.
+    [
+        ("centerpoint", (1, 2, 3, 6), (0.68, 0.60, 0.55, 0.41), (0.66, 0.51, 0.42, 0.15)),
+        ("pointrcnn", (1, 5, 10, 20), (0.66, 0.51, 0.42, 0.36), (0.55, 0.35, 0.26, 0.21)),
+    ],
+)
+def test_errors_last_as_measured_at_all_lags(name, lags, radial, tangential):
+    detector = begun(name, measurement(name).step_s, **WORTH_ONE)
+    rows = played(detector, present := crowd(2500), np.full((lags[-1] + 1, 2500), 300))
+    for lag, *measured in zip(lags, radial, tangential, strict=True):
+        errors = centre_errors(present, rows[0], rows[lag])
+        ranks = np.argsort(np.argsort(errors, axis=1), axis=1)
+        for part, expected in enumerate(measured):
+            found = np.corrcoef(ranks[:, :, part])[0, 1]
+            assert found == pytest.approx(expected, abs=0.06), (lag, part)
+
+
+def test_errors_shrink_with_gathered_returns_and_do_not_jump_with_the_mask():
+    detector, present = begun("centerpoint", 0.1, False, **WORTH_ONE), crowd()
+    rows = played(detector, present, np.tile([[20], [1]], (6, MANY)))
+    many, few = np.median(np.abs(centre_errors(present, *rows[-2:])[:, :, 0]), axis=1)
+    assert few == pytest.approx(many, rel=0.05)
+    assert few == pytest.approx(0.187 * 10.5**-0.189, rel=0.1)
 
 
 def test_box_errors_can_be_switched_off():
