@@ -19,8 +19,10 @@ PAGE = ROOT / "docs" / "write" / "your-detector.md"
 def commands(title):
     """The commands below a title of the page, each in one line."""
     part = re.search(rf"^## {title}\n(.*?)^## ", PAGE.read_text(), re.S | re.M)[1]
-    blocks = re.findall(r"^```\n(.*?)^```$", part, re.S | re.M)
-    return re.sub(r"\\\n\s*", "", "".join(blocks)).splitlines()
+    # Blocks of a language are no commands.
+    blocks = re.findall(r"^```(\w*)\n(.*?)^```$", part, re.S | re.M)
+    typed = "".join(text for language, text in blocks if not language)
+    return re.sub(r"\\\n\s*", "", typed).splitlines()
 
 
 def write_belongings(folder, scenes):
