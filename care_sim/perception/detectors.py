@@ -43,6 +43,9 @@ RECORDED = "recorded"
 PRIVILEGED = (PROXY, GRADED, *MEASURED, RECORDED)
 """Those that read more than points; all others are `PointDetector`s."""
 
+FED = ("sweeps", "track_score")
+"""Parameters of every `PointDetector`, which say how it is fed."""
+
 
 def _faults(made: Any) -> Iterator[str]:
     if not callable(made):
@@ -133,7 +136,7 @@ def _fed(make: Callable[..., Any], parameters: dict[str, object]) -> dict[str, A
         own = inspect.signature(make).parameters
     except (TypeError, ValueError):
         return {}
-    return {n: parameters[n] for n in ("sweeps", "track_score") if n in parameters and n not in own}
+    return {n: parameters[n] for n in FED if n in parameters and n not in own}
 
 
 def _point_detector(
@@ -165,8 +168,9 @@ def _check_parameters(
     accepted = signature.parameters.values()
     if any(parameter.kind is parameter.VAR_KEYWORD for parameter in accepted):
         return
+    known = [*signature.parameters, *(() if name in PRIVILEGED else FED)]
     for given in parameters:
-        check_known(f"parameter of detector {name}", given, signature.parameters)
+        check_known(f"parameter of detector {name}", given, known)
     for parameter in accepted:
         needed = (
             parameter.default is parameter.empty and parameter.kind is not parameter.VAR_POSITIONAL

@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from care_sim.base.checks import check_known, check_number
-from care_sim.base.errors import InvalidInput
+from care_sim.base.errors import InvalidInput, error_line
 from care_sim.base.extras import import_extra, import_torch
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.types import CLASSES, Detections
@@ -153,9 +153,16 @@ class TorchScriptDetector(NetworkFile):
         self._device = device
         self._check_file(file)
         try:
+            torch.empty(0, device=device)
+        # A PyTorch without CUDA asserts.
+        except (RuntimeError, AssertionError) as error:
+            raise InvalidInput(f"device {device} is not here ({error_line(error)})") from error
+        try:
             self._module = torch.jit.load(file, map_location=device).eval()
         except RuntimeError as error:
-            raise InvalidInput(f"{file}: no TorchScript module for {device}") from error
+            raise InvalidInput(
+                f"{file}: no TorchScript module; allowed is {self.allowed}"
+            ) from error
         if not hasattr(self._module, "forward"):
             raise InvalidInput(f"{file}: the module has no method forward(points, sensor_height_m)")
         try:
@@ -175,11 +182,11 @@ class TorchScriptDetector(NetworkFile):
         """See `care_sim.perception.points_only.PointDetector`."""
         torch = import_torch()
         draws = _same_draws(torch, self._device) if self._draws else nullcontext()
-        # Nothing is learned here, so no gradients are kept.
         with torch.inference_mode(), draws:
             given = torch.from_numpy(self.points_for(points)).to(self._device)
             outputs = self._module(given, float(sensor_height_m))
-        return self.detections(points, *(output.cpu().numpy() for output in outputs))
+        # A view of a parameter keeps its gradient even here.
+        return self.detections(points, *(output.detach().cpu().numpy() for output in outputs))
 
     def __getstate__(self) -> dict[str, Any]:
         # A module that writes to itself: the file has what it held at first.

@@ -12,6 +12,10 @@ def middle_script(path):
     import torch
 
     class Middle(torch.nn.Module):
+        def __init__(self):
+            super().__init__()
+            self.sure = torch.nn.Parameter(torch.tensor([0.75]))
+
         def forward(self, points: torch.Tensor, sensor_height_m: float):
             assert points.dtype == torch.float32
             if points.shape[0] == 0:
@@ -19,7 +23,8 @@ def middle_script(path):
             x, y = points[:, 0].mean(), points[:, 1].mean()
             rest = torch.tensor([0.9 - sensor_height_m, 4.0, 4.0, 4.0, 0.0])
             boxes = torch.cat([torch.stack([x, y]), rest]).unsqueeze(0)
-            return torch.tensor([4]), boxes, torch.tensor([0.0 if self.training else 0.75])
+            scores = torch.zeros(1) if self.training else self.sure.expand(1)
+            return torch.tensor([4]), boxes, scores
 
     torch.jit.script(Middle()).save(str(path))
     return path

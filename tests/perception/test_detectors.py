@@ -127,7 +127,12 @@ def test_a_broken_one_gets_one_line(installed, name, line):
             "unknown parameter of detector returns 'least'; known: min_returns",
         ),
         ("returns", {"min_returns": 0}, "min_returns must be a whole number >= 1, got 0"),
-        ("cluster", {"eps": 1}, "unknown parameter of detector cluster 'eps'; known: grid"),
+        (
+            "cluster",
+            {"eps": 1},
+            "unknown parameter of detector cluster 'eps'; the nearest is sweeps; "
+            "known: grid, sweeps, track_score",
+        ),
         ("torchscript", {}, "detector torchscript needs the parameter file"),
     ],
 )

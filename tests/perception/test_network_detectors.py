@@ -98,6 +98,13 @@ def test_a_module_without_forward_is_named_in_one_line(tmp_path):
     torch.jit.script(torch.nn.Module()).save(str(tmp_path / "net.pt"))
     with pytest.raises(InvalidInput, match=r"net\.pt: the module has no method forward\("):
         TorchScriptDetector(tmp_path / "net.pt")
+    with pytest.raises(InvalidInput, match="device gpu is not here"):
+        TorchScriptDetector(tmp_path / "net.pt", device="gpu")
+
+
+def test_what_says_how_a_network_is_fed_is_among_what_is_known():
+    with pytest.raises(InvalidInput, match=r"track_scor'.*sweeps, track_score"):
+        make_detector("torchscript", 1.8, file="net.pt", track_scor=0.3)
 
 
 @pytest.mark.filterwarnings("ignore:.*torch.jit.*:DeprecationWarning")
