@@ -230,7 +230,7 @@ def rows(path):
 def figure(path):
     drawn = Figure()
     drawn.subplots().imshow(RNG.random((99, 99)))
-    save(drawn, path)
+    save(drawn, path.with_suffix(""))
 
 
 @contextmanager
