@@ -30,8 +30,8 @@ PUBLISHED = {
     ("argoverse2", ""): "the tables of recorded drives, in a part",
     ("kitti", ""): "the tables of recorded drives",
 }
-"""What the scenes of a built-in source are published for, by its kind and split. Without a split,
-the line holds for all splits.
+"""Purposes that the scenes of a built-in source are published for, by its kind and split. A line
+without a split holds for all splits.
 """
 
 

@@ -98,7 +98,7 @@ def _by_score(
                 x = objects[row, 0] - boxes[detection, 0]
                 y = objects[row, 1] - boxes[detection, 1]
                 away = math.sqrt(x * x + y * y)
-                # Of equally near ones it takes the first.
+                # It takes the first of equally near ones.
                 if away < least or (away == least and chosen == UNSERVED):
                     chosen, least = row, away
         if chosen != UNSERVED:

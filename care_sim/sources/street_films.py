@@ -141,8 +141,8 @@ class _StreetBodies:
             [_NO_CLASS if label is None else CLASSES.index(label) for label in labels], np.int64
         )
         self._bodies: dict[int, int] = {}
-        engine = _CLUTTER_ENGINE if returns.clutter else _ENGINE
-        self._engine = make_engine(engine, world, setup.grid)
+        self._engine_name = _CLUTTER_ENGINE if returns.clutter else _ENGINE
+        self._engine = make_engine(self._engine_name, world, setup.grid)
         self._clutter = [*street.clutter]
         # Nothing but the street decides, so that every policy meets the same losses.
         self._rng = np.random.default_rng(int(street.digest()[:16], 16))
@@ -218,8 +218,8 @@ class _StreetBodies:
     ) -> Cloud:
         """The returns of cells; `numbers` are those of the bodies that are reported."""
         grid = self._setup.grid
-        engine = _CLUTTER_ENGINE if self._returns.clutter else _ENGINE
-        beams = Beams(self._world, grid, self._returns, engine, partial(self._motion, keyframe))
+        moving = partial(self._motion, keyframe)
+        beams = Beams(self._world, grid, self._returns, self._engine_name, moving)
         most = self._returns.most_shots
         scan, bodies = beams.cast(sensor, cells, np.full(grid.size, most))
         told = beams.compensated(scan, sensor)

@@ -16,36 +16,28 @@ import math
 import numpy as np
 
 from care_sim.base.compiled import compiled
+from care_sim.base.hashing import finalised
 from care_sim.core.arrays import Floats, Integers
 from care_sim.perception.measured.tables import SIGNALS, Luck
 
 LUCK, TURNED, FIRST_ERROR = range(3)
 """Places in `SIGNALS`."""
-CHANNELS = 2 * len(SIGNALS)
-"""Processes of each object: of every signal the slow one and the quick one."""
+CHANNELS = 3 * len(SIGNALS)
+"""Numbers of each object: of every signal the slow process and the quick one, then the constants.
+"""
 _CONSTANT = 2**20
 """A keyframe that no episode reaches, whose normals are those that stay."""
 
 
 @compiled()
-def _mixed(number: np.uint64) -> np.uint64:
-    """The finaliser of SplitMix64 (Steele, Lea and Flood 2014), which leaves no trace of its
-    input.
-    """
-    number = (number ^ (number >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    number = (number ^ (number >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return number ^ (number >> np.uint64(31))
-
-
-@compiled()
 def normal_of(seed: np.uint64, number: int, keyframe: int, channel: int) -> float:
     """The standard normal of an object at a keyframe, by the method of Box and Muller."""
-    state = _mixed(seed ^ np.uint64(number) * np.uint64(0x9E3779B97F4A7C15))
-    state = _mixed(state + np.uint64(keyframe) * np.uint64(0xD1B54A32D192ED03))
-    state = _mixed(state + np.uint64(channel) * np.uint64(0x9E3779B97F4A7C15))
+    state = finalised(seed ^ np.uint64(number) * np.uint64(0x9E3779B97F4A7C15))
+    state = finalised(state + np.uint64(keyframe) * np.uint64(0xD1B54A32D192ED03))
+    state = finalised(state + np.uint64(channel) * np.uint64(0x9E3779B97F4A7C15))
     # From above 0 to 1: its logarithm is finite.
     first = (np.float64(state >> np.uint64(11)) + 1.0) / 2.0**53
-    second = np.float64(_mixed(state + np.uint64(1)) >> np.uint64(11)) / 2.0**53
+    second = np.float64(finalised(state + np.uint64(1)) >> np.uint64(11)) / 2.0**53
     return math.sqrt(-2.0 * math.log(first)) * math.cos(2.0 * math.pi * second)
 
 
@@ -80,9 +72,12 @@ def advance(
                 processes[row, channel] = kept * processes[row, channel] + math.sqrt(
                     1.0 - kept * kept
                 ) * normal_of(seed, objects[n], keyframe, channel)
+            constant = 2 * len(SIGNALS) + signal
+            if begins:
+                processes[row, constant] = normal_of(seed, objects[n], _CONSTANT, slow)
             stays, decays = table.stays[label, signal], table.decays[label, signal]
             signals[n, signal] = (
-                math.sqrt(stays) * normal_of(seed, objects[n], _CONSTANT, slow)
+                math.sqrt(stays) * processes[row, constant]
                 + math.sqrt(decays) * processes[row, slow]
                 + math.sqrt(max(1.0 - stays - decays, 0.0)) * processes[row, quick]
             )

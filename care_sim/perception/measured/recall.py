@@ -28,7 +28,7 @@ from care_sim.core.types import CLASSES
 from care_sim.perception.measured.tables import Recall, measurement
 
 FIRST_HIT = 0.55
-"""What a return of this keyframe counts that was not there a keyframe ago: ten equal sweeps, of
+"""Weight of a return of this keyframe that was not there a keyframe ago: ten equal sweeps, of
 which the newest is the keyframe's own, have on average 0.55 of it. The data say 0.35 to 0.55."""
 
 

@@ -22,7 +22,7 @@ CENTRE = ("radial", "tangential")
 ERRORS = (*CENTRE, *SIDES, "yaw")
 """The channels of a box error, in the order of all tables."""
 SIGNALS = ("luck", "turned", *ERRORS)
-"""What lasts of an object: its luck, whether its box is turned about, and the errors of its box."""
+"""Numbers of an object that last: its luck, whether its box is turned about, errors of its box."""
 WIDEST_NORMAL = 4.0
 _STEPS = 161
 NORMALS = np.linspace(-WIDEST_NORMAL, WIDEST_NORMAL, _STEPS)
@@ -43,7 +43,7 @@ class Recall(NamedTuple):
     spread_slope: Floats
     spread_at: Floats
     fall: Floats
-    """What a return counts that was there a keyframe ago and is not now."""
+    """Weight of a return that was there a keyframe ago and is not now."""
     most: Floats
     """Effective returns above this count as this."""
     shift: Floats
@@ -126,7 +126,7 @@ class Measurement:
 
 @cache
 def measurement(name: str) -> Measurement:
-    """What was measured of a detector. Raises InvalidInput for another name."""
+    """Read the measurement of a detector. Raises InvalidInput for another name."""
     check_known("measured detector", name, MEASURED)
     table = json.loads((SHIPPED / f"{name}.json").read_text())
     classes, errors = (_lent(table[part]) for part in ("classes", "errors"))

@@ -12,12 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from care_sim.base.compiled import compiled
+from care_sim.base.hashing import finalised
 from care_sim.core.arrays import Floats, Integers
 
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
-_FIRST = np.uint64(0xBF58476D1CE4E5B9)
-_SECOND = np.uint64(0x94D049BB133111EB)
-_ONE, _THIRTY, _27, _31, _ELEVEN = (np.uint64(number) for number in (1, 30, 27, 31, 11))
+_ONE, _ELEVEN = np.uint64(1), np.uint64(11)
 
 
 class PersistentNormals:
@@ -99,8 +98,5 @@ def normal(key: np.uint64, number: int) -> float:
 
 @compiled()
 def _mixed(key: np.uint64, number: np.uint64) -> np.uint64:
-    """The generator SplitMix64 at its step `number` (Steele, Lea and Flood 2014)."""
-    mixed = key + (number + _ONE) * _GOLDEN
-    mixed = (mixed ^ (mixed >> _THIRTY)) * _FIRST
-    mixed = (mixed ^ (mixed >> _27)) * _SECOND
-    return mixed ^ (mixed >> _31)
+    """The generator SplitMix64 at its step `number`."""
+    return finalised(key + (number + _ONE) * _GOLDEN)

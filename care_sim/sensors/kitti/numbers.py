@@ -47,7 +47,9 @@ class Numbers(NamedTuple):
     edge_means: Floats
     """(3, 4) mean errors of left, top, right and bottom, relative to the size."""
     edge_spreads: Floats
-    """(3, 4, 6) their logarithmic spreads: coefficients of `errors.spread_features`."""
+    """(3, 4, 6) their logarithmic spreads: coefficients of
+    `care_sim.sensors.kitti.errors._spread`.
+    """
     edge_roots: Floats
     """(3, 4, 4) lower Cholesky factors of the correlations between edges."""
     cut_errors: Floats
@@ -60,7 +62,7 @@ class Numbers(NamedTuple):
     """(5, 2) the kind of an object and that of the false box beside it."""
     pair_rates: Floats
     """(5, 8) logarithmic numbers of false boxes per object: coefficients of
-    `false_boxes.rate_features`.
+    `care_sim.sensors.kitti.inventions._rate`.
     """
     pair_mixtures: Floats
     """(5, 10, 13) components: weight, six means, six spreads; weight 0 pads."""

@@ -8,10 +8,9 @@ makes the same bytes.
 import sys
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor
 from contextlib import contextmanager
-from functools import partial
 from itertools import count, islice
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -38,6 +37,8 @@ from care_sim.study.executors import Processes, processes
 from care_sim.study.provenance import machine_line, package_versions
 from care_sim.study.runner import DIED
 from care_sim.training.supervised.detector_data import (
+    CLUTTERED,
+    EITHER,
     Example,
     Targets,
     loss,
@@ -148,10 +149,8 @@ def _learned(
     start = None if config.start is None else load_detector(config.start)[0]
     with one_thread(import_torch()), _player() as executor:
         print_lines(f"playing {SHUFFLED} scans before the first step", file=sys.stderr)
-        learned = scenes.endless() if scenes else count(TRAINING)
-        batches = _batches(
-            played(executor, learned, config.clutter), np.random.default_rng(config.seed)
-        )
+        learned = scenes.endless() if scenes else _generated_worlds(config, count(TRAINING))
+        batches = _batches(played(executor, learned), np.random.default_rng(config.seed))
         if start is not None:
             network.begin_at(
                 start, [one for batch in islice(batches, FIRST_BATCHES) for one in batch]
@@ -159,14 +158,23 @@ def _learned(
         losses = train_detector(network, batches, config.steps, keep)
         network.eval()
         print_lines(f"checking {config.out} on plays that are held out", file=sys.stderr)
-        playing = partial(play, clutter=config.clutter)
+        checked = (
+            _held_out(scenes)
+            if scenes
+            else [_generated_worlds(config, seeds) for seeds in _checked(config)]
+        )
         fitted, apart = (
-            [example for examples in executor.map(playing, lessons) for example in examples]
-            for lessons in (_held_out(scenes) if scenes else _checked(config))
+            [example for examples in executor.map(play, worlds) for example in examples]
+            for worlds in checked
         )
         calibration = calibration_of(scores_by_scan(network, fitted))
         result = judged(scores_by_scan(network, apart, calibration))
         return losses, calibration, result
+
+
+def _generated_worlds(config: DetectorConfig, seeds: Iterable[int]) -> Iterator[World]:
+    kind = CLUTTERED if config.clutter else EITHER
+    return (World(kind, seed) for seed in seeds)
 
 
 def _held_out(scenes: Scenes) -> tuple[Sequence[World], Sequence[World]]:
@@ -217,15 +225,12 @@ def train_detector(
     return fit(off, batches, steps, (optimizer, schedule), after)
 
 
-def played(
-    executor: Executor, lessons: Iterator[int | World], clutter: bool = False
-) -> Iterator[Example]:
-    """The examples of the plays of endless `lessons`, in order."""
-    playing = partial(play, clutter=clutter)
-    under_way = deque(executor.submit(playing, one) for one in islice(lessons, AHEAD))
-    for lesson in lessons:
+def played(executor: Executor, worlds: Iterator[World]) -> Iterator[Example]:
+    """The examples of the plays of endless `worlds`, in order."""
+    under_way = deque(executor.submit(play, one) for one in islice(worlds, AHEAD))
+    for world in worlds:
         examples = under_way.popleft().result()
-        under_way.append(executor.submit(playing, lesson))
+        under_way.append(executor.submit(play, world))
         yield from examples
 
 

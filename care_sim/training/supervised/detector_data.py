@@ -53,6 +53,8 @@ POLICIES = (
     "rows", "fan", "stride", "sweep", "history-rows",
 )  # fmt: skip
 """Those that come with the package and know any grid."""
+EITHER, CLUTTERED = "street or drive", "cluttered street"
+"""Kinds of generated worlds."""
 LEAST_BUDGET, MOST_BUDGET = 0.01, 0.6
 FULL_SHARE, FULL_SHARE_CLUTTERED = 0.25, 0.5
 """Of plays in which every cell fires. Those of cluttered streets are for recorded sweeps, too,
@@ -95,18 +97,17 @@ class Example:
     full: bool = False
 
 
-def play(lesson: int | World, clutter: bool = False) -> list[Example]:
-    """The examples of the street or the drive of a seed, or of the scene of a source; with
-    `clutter` those of a cluttered street.
+def play(world: World) -> list[Example]:
+    """The examples of a world: of a `CLUTTERED` street, of `EITHER` a street or a drive, as the
+    seed draws it, or of the scene of a source.
     """
-    seed = lesson if isinstance(lesson, int) else lesson.seed
-    rng = np.random.default_rng([seed, 21])
-    if isinstance(lesson, World) and lesson.film:
-        return [*_film(lesson.film(), seed, rng, _handed)]
-    if clutter:
-        return [*_street(seed, rng, clutter)]
+    rng = np.random.default_rng([world.seed, 21])
+    if world.film:
+        return [*_film(world.film(), world.seed, rng, _handed)]
+    if world.kind == CLUTTERED:
+        return [*_street(world.seed, rng, clutter=True)]
     # Drawn, since the layouts of streets come in turn.
-    return [*(_street if rng.random() < 0.5 else _drive)(seed, rng)]
+    return [*(_street if rng.random() < 0.5 else _drive)(world.seed, rng)]
 
 
 def _street(seed: int, rng: np.random.Generator, clutter: bool = False) -> Iterator[Example]:

@@ -12,13 +12,14 @@ from care_sim.perception.pillars.network import REACH_M, Fixed, answers, on_plan
 from care_sim.training.supervised import detector
 from care_sim.training.supervised.detector import PLAIN, Judged, Peaks, calibration_of, right
 from care_sim.training.supervised.detector_data import Example, targets_of, turned_example
+from care_sim.training.supervised.worlds import World
 from tests.helpers.made_points import HEIGHT, road, shell
 
 torch = pytest.importorskip("torch")
 from care_sim.training.supervised.detector_network import Learning  # noqa: E402 (it needs PyTorch)
 
 
-def street(seed, clutter=False):
+def street(seed):
     """Two cars on a road."""
     rng = np.random.default_rng(seed)
     places = [
@@ -79,7 +80,11 @@ def test_learning_goes_on_where_weights_ended():
     assert first < drawn / 2
 
 
-def trained(path, monkeypatch, *options, play=street):
+def played_street(world):
+    return street(world.seed)
+
+
+def trained(path, monkeypatch, *options, play=played_street):
     monkeypatch.setattr(detector, "processes", ThreadPoolExecutor)
     monkeypatch.setattr(detector, "play", play)
     monkeypatch.setattr(detector, "SHUFFLED", 6)
@@ -142,9 +147,9 @@ def test_any_number_of_steps_has_a_rate_of_learning(monkeypatch, steps):
 
 
 def test_plays_come_in_order_whatever_they_take(monkeypatch):
-    monkeypatch.setattr(detector, "play", street)
+    monkeypatch.setattr(detector, "play", played_street)
     with ThreadPoolExecutor(3) as executor:
-        examples = detector.played(executor, count(7))
+        examples = detector.played(executor, (World("any", seed) for seed in count(7)))
         taken = [next(examples) for _ in range(9)]
     for one, seed in zip(taken, range(7, 16), strict=True):
         assert np.array_equal(one.boxes, street(seed)[0].boxes)
