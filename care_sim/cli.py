@@ -26,7 +26,7 @@ from care_sim.base.errors import (
     unknown,
 )
 from care_sim.base.interrupts import BAD_INPUT, FAILED, INTERRUPTED, UNEXPECTED, UNREAD
-from care_sim.base.limits import causes, limit_in
+from care_sim.base.limits import is_interrupt, limit_in
 from care_sim.commands.table import COMMANDS, FAMILIES, GROUPS, MOVED, RENAMED, Command
 
 _DEBUG = "--debug"
@@ -80,7 +80,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         raise
     # Foreign code may raise anything.
     except BaseException as error:
-        if not _is_interrupt(error):
+        if not is_interrupt(error):
             _end_with(error, trace=_DEBUG in given or bool(os.environ.get("CARE_SIM_DEBUG")))
         if alone:
             interrupts.end_in_silence()
@@ -90,14 +90,6 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     finally:
         if alone:
             interrupts.end_in_silence()
-
-
-def _is_interrupt(error: BaseException) -> bool:
-    """Whether an error is an interrupt, or what an import has made of one."""
-    # A compiled module that is interrupted while it is imported raises ImportError or SystemError,
-    # and keeps the interrupt as the cause.
-    links = causes(error) if isinstance(error, ImportError | SystemError) else [error]
-    return any(isinstance(link, KeyboardInterrupt) for link in links)
 
 
 def _end_with(error: BaseException, trace: bool) -> NoReturn:

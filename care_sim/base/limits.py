@@ -118,6 +118,14 @@ def causes(error: BaseException | None) -> Iterator[BaseException]:
         error = error.__cause__ if is_hidden else error.__context__
 
 
+def is_interrupt(error: BaseException) -> bool:
+    """Whether an error is an interrupt, or what compiled code has made of one."""
+    # A compiled module that is interrupted while it is imported raises ImportError or SystemError, a
+    # compiled function SystemError. Both keep the interrupt as the cause.
+    links = causes(error) if isinstance(error, ImportError | SystemError) else [error]
+    return any(isinstance(link, KeyboardInterrupt) for link in links)
+
+
 def limit_in(error: BaseException) -> str:
     """Say in one line which limit an error or one of its causes ran into; empty for another one."""
     for link in causes(error):

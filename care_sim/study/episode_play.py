@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 import care_sim
 from care_sim.base.digests import Content, portable_bytes
 from care_sim.base.errors import InvalidInput, failure_line
+from care_sim.base.limits import is_interrupt
 from care_sim.base.times import LAST_BITS_S
 from care_sim.core.arrays import Floats
 from care_sim.core.conditions import DriverSettings
@@ -78,10 +79,10 @@ def result_or_reason(play: Callable[..., _Result], *arguments: object) -> _Resul
     """
     try:
         return play(*arguments)
-    except KeyboardInterrupt:
-        raise
     # A policy that calls sys.exit ends its episode, not the worker.
     except BaseException as error:
+        if is_interrupt(error):
+            raise KeyboardInterrupt from error
         return failure_line(error)
 
 

@@ -19,6 +19,7 @@ from care_sim.study.episode_play import (
     peak_rss_mb,
     play_episodes,
     play_together,
+    result_or_reason,
     run_episode,
 )
 from care_sim.study.journal import JOURNAL, Journal
@@ -168,3 +169,16 @@ def test_one_that_kills_its_worker_costs_only_itself(third_party, tmp_path):
     assert {failure.reason for failure in failures} == {"the worker process died"}
     assert len(failed) == 1
     assert kept == {*configs} - failed
+
+
+@pytest.mark.parametrize("outer", [KeyboardInterrupt, SystemError, ValueError])
+def test_an_interrupt_is_no_reason_why_an_episode_gave_nothing(outer):
+    def play():
+        # Compiled code that is interrupted raises SystemError from the interrupt.
+        raise outer from KeyboardInterrupt()
+
+    if outer is ValueError:
+        assert "ValueError" in result_or_reason(play)
+    else:
+        with pytest.raises(KeyboardInterrupt):
+            result_or_reason(play)

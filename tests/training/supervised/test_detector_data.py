@@ -13,6 +13,8 @@ from care_sim.policies import maker, tags_of
 from care_sim.sensors.setups import setup_names
 from care_sim.sources.street_films import street_film
 from care_sim.training.supervised.detector_data import (
+    CLUTTERED,
+    EITHER,
     OTHER_SETUPS,
     POLICIES,
     RECORDED_SETUPS,
@@ -23,8 +25,9 @@ from care_sim.training.supervised.detector_data import (
     scanned,
     targets_of,
 )
+from care_sim.training.supervised.worlds import World
 
-DRIVE = 10_003
+DRIVE = World(EITHER, 10_003)
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +55,7 @@ def test_a_play_is_the_same_again_and_another_seed_plays_another(examples):
 
 
 def test_a_play_of_a_cluttered_street_has_slopes_and_parked_bicycles():
-    (own, *_), (again, *_) = (play(10_004, clutter=True) for _ in range(2))
+    (own, *_), (again, *_) = (play(World(CLUTTERED, 10_004)) for _ in range(2))
     assert np.array_equal(own.points, again.points)
     # Boxes stand on a road that leans.
     assert np.ptp(own.boxes[:, 2] - own.boxes[:, 5] / 2) > 0.1
