@@ -83,6 +83,9 @@ class Command:
 
         def limited():
             listen_to_interrupts()
+            # Its memory is watched (`wait`). The limit of a case counts from what the server had
+            # imported, which may be less than a command reserves.
+            resource.setrlimit(resource.RLIMIT_DATA, (resource.RLIM_INFINITY,) * 2)
             if file_bytes is not None:
                 resource.setrlimit(resource.RLIMIT_FSIZE, (file_bytes, file_bytes))
             if tasks is not None:
