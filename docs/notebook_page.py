@@ -4,6 +4,7 @@ out.
 
 from base64 import b64decode
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import nbformat
 from mkdocs.config.defaults import MkDocsConfig
@@ -12,8 +13,6 @@ from nbclient import NotebookClient
 from traitlets.config import Config
 
 NOTEBOOK = "quickstart"
-_PRIVATE = Config({"KernelManager": {"transport": "ipc"}})
-"""Over TCP the kernel warns that everybody on the machine may listen."""
 _TIMEOUT_S = 600
 """For a cell; the first one compiles on a machine that has not done so yet."""
 
@@ -21,7 +20,11 @@ _TIMEOUT_S = 600
 def on_files(files: Files, *, config: MkDocsConfig) -> Files:
     """The files of the site, with the notebook's page and pictures."""
     book = nbformat.read(Path(config.docs_dir) / f"{NOTEBOOK}.ipynb", as_version=4)
-    NotebookClient(book, timeout=_TIMEOUT_S, kernel_name="python3", config=_PRIVATE).execute()
+    with TemporaryDirectory() as folder:
+        # Over TCP the kernel warns that everybody on the machine may listen. Sockets whose place is
+        # not named lie in the working folder, where two sites that are built at once share them.
+        private = Config({"KernelManager": {"transport": "ipc", "ip": f"{folder}/kernel"}})
+        NotebookClient(book, timeout=_TIMEOUT_S, kernel_name="python3", config=private).execute()
     parts: list[str] = []
     for cell in book.cells:
         parts.append(
