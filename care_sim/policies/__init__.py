@@ -33,6 +33,9 @@ from care_sim.policies.own.care_units import CareUnits
 from care_sim.policies.paper.blind import BeamReduce, FarthestPoints, Full, Random, RandomPoints
 from care_sim.policies.paper.reserves import AllCamera, Care, CarePriority, CareSbf
 from care_sim.policies.paper.tracks import History, HistoryOracle, HistoryUniform, Uncertainty
+from care_sim.policies.peers.ensemble_variance import AfterGofer
+from care_sim.policies.peers.light_curtains import AfterAncha
+from care_sim.policies.peers.predicted_regions import AfterShoouri
 from care_sim.policies.vector import VectorPolicy, policy_of_rigs
 
 refuse_link(__name__)
@@ -75,6 +78,9 @@ BUILT_IN: dict[str, PolicyMaker | EntryPoint] = {
         CareSightlines,
         CareSector,
         CareUnits,
+        AfterShoouri,
+        AfterAncha,
+        AfterGofer,
         Rows,
         Fan,
         Stride,
