@@ -289,7 +289,7 @@ def test_parameters_of_forgetting_reach_the_rules(environment, belief_of, car):
         (
             "clairvoyant",
             {},
-            r"policy 'clairvoyant'; known: all-camera, beam-reduce, care, care-priority",
+            r"policy 'clairvoyant'; known: after-ancha, after-gofer, after-shoouri, all-camera",
         ),
         ("care", {"boldness": 2}, "boldness"),
         ("care-sbf", {"k_save": 2}, r"'k_save'.*k_safe"),

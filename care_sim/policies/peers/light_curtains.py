@@ -45,7 +45,7 @@ class AfterAncha(Policy):
 
     def __init__(self, rig: Rig):
         super().__init__(rig)
-        self._places: Floats = (np.arange(PLACES) + 0.5) * (rig.grid.range_m / PLACES)
+        self._places = (np.arange(PLACES) + 0.5).astype(np.float64) * (rig.grid.range_m / PLACES)
         self._passed = [self._passed_by(head) for head in rig.grid.heads]
         self.reset()
 
