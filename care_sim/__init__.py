@@ -84,8 +84,8 @@ _NAMES = {
 
 
 def names(kind: str) -> list[str]:
-    """What can be named: policies, scenarios, sensors, detectors, sources, engines or agents, the
-    built-in ones and those of installed packages. Raises InvalidInput for another kind.
+    """Return the names of a kind: policies, scenarios, sensors, detectors, sources, engines or
+    agents, the built-in ones and those of installed packages. Raises InvalidInput for another kind.
 
     `care-sim list KIND` shows what each is.
     """

@@ -195,7 +195,7 @@ def parsed_command(arguments: Sequence[str]) -> tuple[Command, Any]:
 
 
 def _told(first: str, rest: Sequence[str]) -> str | None:
-    """What is printed where no command runs; None where one does."""
+    """Return the text that is printed where no command runs; None where one does."""
     if first in ("-h", "--help"):
         return _overview()
     if first == "--version":

@@ -1,3 +1,3 @@
-"""What every room stands on: errors, bounds, files, processes, random streams. Nothing here knows
+"""Foundations of every room: errors, bounds, files, processes, random streams. Nothing here knows
 LiDAR.
 """

@@ -136,7 +136,7 @@ def check_path(name: str, value: object) -> None:
 
 
 def _wrong_path(path: bytes) -> str:
-    """What makes a path impossible; empty where nothing does."""
+    """Say why a path is impossible; empty for a possible one."""
     if not path:
         return "empty"
     names = path.split(b"/")

@@ -1,6 +1,4 @@
-"""What a user is told when something is wrong: errors of one line that name the thing and what is
-allowed, and text made fit to be shown.
-"""
+"""Errors of one line that name the thing and what is allowed, and text made fit to be shown."""
 
 import inspect
 import site

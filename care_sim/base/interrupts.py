@@ -1,5 +1,5 @@
-"""What ends a command from outside: an interrupt or a quit typed, a terminal that closes, a request
-to end; and the exit codes of commands.
+"""Events that end a command from outside (an interrupt or a quit typed, a terminal that closes, a
+request to end), and the exit codes of commands.
 
 It imports nothing that takes time: the command `care-sim` is interrupted in one line from the first
 of its imports on.
@@ -84,7 +84,7 @@ def held_back() -> Iterator[None]:
 
 @contextmanager
 def _deaf() -> Iterator[None]:
-    """What comes meanwhile is handled at the end, so that handlers change all at once."""
+    """Handle signals that come meanwhile at the end, so that handlers change all at once."""
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, ())
     try:
         signal.pthread_sigmask(signal.SIG_BLOCK, _HEARD)
@@ -94,7 +94,7 @@ def _deaf() -> Iterator[None]:
 
 
 def _listen(handler: Callable[[int, Any], Any] | signal.Handlers) -> None:
-    """What a shell or nohup has told this process to ignore stays ignored."""
+    """Set the handler of all signals but those that a shell or nohup made this process ignore."""
     for number in SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, handler)

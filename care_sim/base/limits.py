@@ -120,8 +120,8 @@ def causes(error: BaseException | None) -> Iterator[BaseException]:
 
 def is_interrupt(error: BaseException) -> bool:
     """Whether an error is an interrupt, or what compiled code has made of one."""
-    # A compiled module that is interrupted while it is imported raises ImportError or SystemError, a
-    # compiled function SystemError. Both keep the interrupt as the cause.
+    # A compiled module that is interrupted while it is imported raises ImportError or SystemError,
+    # a compiled function SystemError. Both keep the interrupt as the cause.
     links = causes(error) if isinstance(error, ImportError | SystemError) else [error]
     return any(isinstance(link, KeyboardInterrupt) for link in links)
 

@@ -96,7 +96,7 @@ class Plugins(Generic[Made]):
         return f"a {self.kind} in a file is MODULE:CLASS, as {place}"
 
     def maker(self, name: str) -> Callable[..., Made]:
-        """What makes the thing.
+        """Return what makes the thing.
 
         Raises InvalidInput with the reason for one that cannot be loaded, and for an unknown name.
         """
@@ -141,8 +141,8 @@ class Plugins(Generic[Made]):
             yield entry, line
 
     def load(self, entry: EntryPoint) -> Callable[..., Made]:
-        """What an entry names. Raises InvalidInput with the reason, in one line, when it is of no
-        use.
+        """Load the object that an entry names. Raises InvalidInput with the reason, in one line,
+        when it is of no use.
         """
         if is_place(entry.name):
             _look_here()

@@ -92,7 +92,7 @@ def end_with_parent() -> None:
 
 
 def following(make: Callable[[], _T]) -> _T:
-    """What `make` makes, in a process that ends with its parent."""
+    """Return what `make` makes, in a process that ends with its parent."""
     end_with_parent()
     return make()
 

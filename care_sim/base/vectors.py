@@ -1,4 +1,4 @@
-"""What is fixed about the worlds of a vector environment."""
+"""Settings that the worlds of a vector environment share."""
 
 from typing import Any
 

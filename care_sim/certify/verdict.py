@@ -34,7 +34,7 @@ class Verdict:
         return combined(trails) if len(trails) == len(self.found) else None
 
     def lines(self) -> Iterator[str]:
-        """What is printed."""
+        """Yield the lines that are printed."""
         fewer = f"{len(self.found):,} of " if len(self.found) < self.asked else ""
         counted = f"{fewer}{self.asked:,} episodes" if self.asked > 1 else "1 episode"
         if self.as_published:

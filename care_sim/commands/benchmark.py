@@ -63,7 +63,7 @@ def _published(options: Benchmark) -> Sequence[World]:
 
 
 def _entries(options: Benchmark) -> tuple[list[Entry], list[str]]:
-    """What takes part, and a line for each policy that cannot be made."""
+    """Return the entries, and a line for each policy that cannot be made."""
     given = policy_parameters(options.policy_parameters, options.policy)
 
     def entry(name: str) -> Entry:

@@ -65,7 +65,9 @@ def _configs(options: ExportNuScenes) -> list[PlayConfig]:
 
 
 def _meta(options: ExportNuScenes, config: PlayConfig) -> dict[str, Any]:
-    """What the form asks about the origin of results, and under `care_sim` what made them."""
+    """Return the origin of the results as the form wants it, and under `care_sim` what made
+    them.
+    """
     # The scene is left out: this is said once of all scenes.
     own = {"version": care_sim.__version__, "split": options.split or "val", **config.row()}
     del own["scene"]

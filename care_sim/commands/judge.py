@@ -91,7 +91,7 @@ def _check_folder(options: Judge) -> None:
 def _plays(
     options: Judge, names: Sequence[str], source: Source, scenes: Sequence[Scene]
 ) -> list[list[PlayConfig]]:
-    """Those of every scene, one a detector."""
+    """Return the plays of every scene, one per detector."""
     common = common_of(options, [options.policy])
     floors = [common.pop("floor_seed")]
     made = []

@@ -194,7 +194,9 @@ def _files(places: Sequence[Path]) -> Iterator[Path]:
 def _of_whole(
     found: dict[Path, BenchmarkResult], quick: bool
 ) -> tuple[list[BenchmarkResult], list[str]]:
-    """Those that belong in tables, each entry once, and a line for each of the others."""
+    """Return the results that belong in tables, each entry once, and a line for each of the
+    others.
+    """
     kept: dict[tuple[object, ...], tuple[Path, BenchmarkResult]] = {}
     first_of: dict[str | None, tuple[Path, BenchmarkResult]] = {}
     problems = []

@@ -78,7 +78,7 @@ def _merge(options: Report) -> int:
 
 
 def _doubts(whole: Merged) -> Iterator[str]:
-    """What whoever reads the tables should know."""
+    """Yield warnings for readers of the tables."""
     for folder in whole.apart:
         yield (
             f"nothing shows that the worlds of {folder} are those of the others: other code played "

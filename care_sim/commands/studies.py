@@ -203,7 +203,7 @@ _Configurations = Callable[[Sequence[int], Sequence[str]], Sequence[EpisodeConfi
 
 
 def further_policies(options: FixedStudy) -> tuple[list[str], list[str]]:
-    """Those that can be played, and a line for each that cannot."""
+    """Return the policies that can be played, and a line for each that cannot."""
     # It is tried on one task in every scenario.
     named = CONTROLS if options.also is None else options.also
     return playable(named, lambda name: grid(ENVIRONMENT_IDS, [name], [0.1], [0]), 0)

@@ -21,7 +21,7 @@ class Command(NamedTuple):
         return _loaded(self.options)
 
     def function(self) -> Any:
-        """What runs the options and returns an exit code."""
+        """Return the function that runs the options and returns an exit code."""
         return _loaded(self.run)
 
 

@@ -44,9 +44,9 @@ Rules = tuple[float, float, float, float, float, float, float, float, float]
 
 
 class BrakingRules(NamedTuple):
-    """What of `care_sim.core.conditions.DriverSettings` the decision follows, in its units;
-    where the strip that is guarded begins, `front_m`, and its reach to either side, `reach_m`; and
-    the time between keyframes.
+    """Rules of the braking decision: those settings of `care_sim.core.conditions.DriverSettings`
+    that it uses, in its units; where the guarded strip begins, `front_m`, and its reach to either
+    side, `reach_m`; and the time between keyframes.
     """
 
     front_m: float

@@ -1,4 +1,4 @@
-"""What the car's software takes its own pose and motion to be."""
+"""Pose and motion of the car as its own software believes them."""
 
 import math
 from dataclasses import replace
@@ -62,7 +62,7 @@ class Odometry:
         self._rng = np.random.default_rng(seed)
 
     def reading(self, motion: Ego) -> Ego:
-        """What is read of the car's true `motion` now."""
+        """Return the reading of the car's true `motion` now."""
         if not self._speed_sigma:
             return motion
         # Noise is folded back at 0. If it were cut there, half the readings of a standing car would

@@ -129,7 +129,9 @@ def check_policy(name: str) -> None:
 
 
 def tags_of(name: str) -> tuple[str, ...]:
-    """What the policy is, of `care_sim.policies.base.TAGS`; empty for one that cannot be loaded."""
+    """Return the tags of a policy, from `care_sim.policies.base.TAGS`; empty for one that cannot be
+    loaded.
+    """
     try:
         return tags_of_maker(maker(name))
     except InvalidInput:
@@ -207,7 +209,7 @@ def _check_unwrapped(name: str, env: _AnyEnv) -> None:
 
 
 def _of_environment(name: str, env: _AnyEnv, attribute: str) -> list[Any]:
-    """That of an environment, or those of the worlds of a vector."""
+    """Return the attribute of an environment, or those of the worlds of a vector."""
     try:
         if isinstance(env, gymnasium.vector.VectorEnv):
             return attribute_of_each(env, attribute)

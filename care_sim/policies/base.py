@@ -1,5 +1,5 @@
-"""What a policy is: a Belief in, a Demand out; the shared allocator does the rest. A privileged one
-is handed the truth as well, through a door of its own.
+"""Base classes of policies: a Belief in, a Demand out; the shared allocator does the rest. A
+privileged one also gets the truth, through a door of its own.
 """
 
 from abc import ABC, abstractmethod
@@ -71,8 +71,8 @@ class Policy(ABC):
 
     @abstractmethod
     def demand(self, belief: Belief) -> Demand:
-        """What to ask of the allocator at this keyframe: the sets and layers of Algorithm 1. It
-        follows from the belief and from what was remembered: asked again, it is the same.
+        """Return the demand on the allocator at this keyframe: the sets and layers of Algorithm 1.
+        It follows from the belief and from what was remembered: called again, it is the same.
         """
 
     def __call__(self, observation: Observation) -> Action:
@@ -136,7 +136,7 @@ class FixedPolicy(Policy):
 
     @abstractmethod
     def fixed(self, budget: int) -> Demand:
-        """What it asks for with a budget of so many cells."""
+        """Return the demand for a budget of so many cells."""
 
     def demand(self, belief: Belief) -> Demand:
         """The same at every keyframe."""

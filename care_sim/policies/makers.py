@@ -1,4 +1,4 @@
-"""What makes a policy: a `Policy` subclass, or another callable that takes a `Rig` and parameters.
+"""Makers of policies: a `Policy` subclass, or another callable that takes a `Rig` and parameters.
 
 The functions here tell which of its arguments a user may set and which come from the environment,
 and what is wrong with an entry of the group `care_sim.policies` that makes no policy.

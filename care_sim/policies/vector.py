@@ -72,7 +72,7 @@ class VectorPolicy(ABC):
 
 
 def vector_policy(make: Callable[[], Policy], worlds: int) -> VectorPolicy:
-    """What plays so many worlds, each as a policy that `make` makes would play it alone."""
+    """Return what plays so many worlds, each as a policy that `make` makes would play it alone."""
     first = make()
     if isinstance(first, RowPolicy) and _asks_as(first, RowPolicy):
         return _ByRows(first, worlds)
@@ -177,8 +177,8 @@ def _world(observation: Observation, world: int) -> Observation:
 
 
 def policy_of_rigs(makers: Sequence[Callable[[], Policy]], rigs: Sequence[Rig]) -> VectorPolicy:
-    """What plays W worlds, each as the policy that its one of the `makers` (W,) makes for its one
-    of the `rigs` (W,) would play it alone.
+    """Return what plays W worlds, each as the policy that its one of the `makers` (W,) makes for
+    its one of the `rigs` (W,) would play it alone.
     """
     groups: list[list[int]] = []
     for world, rig in enumerate(rigs):
@@ -192,7 +192,9 @@ def policy_of_rigs(makers: Sequence[Callable[[], Policy]], rigs: Sequence[Rig]) 
 
 
 class _ByRig(VectorPolicy):
-    """Of the worlds at each of the `places` one of the `policies`; `rig` is that of the first."""
+    """Worlds by rig: the worlds at each of the `places` have one of the `policies`; `rig` is that
+    of the first.
+    """
 
     def __init__(self, policies: Sequence[VectorPolicy], places: Sequence[Integers]):
         super().__init__(policies[0].rig, sum(map(len, places)))

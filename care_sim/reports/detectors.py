@@ -29,7 +29,7 @@ _NOTES = (
 
 
 def detector_tables(judged: Judged, least_scores: Sequence[float], against: str) -> list[Table]:
-    """Of every detector what it finds and how much of it is right, from every one of the
+    """Return tables of what every detector finds and how much of it is right, from each of the
     `least_scores` on and where it is as precise as all that the detector `against` reports; then
     class by class.
     """

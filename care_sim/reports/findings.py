@@ -1,4 +1,4 @@
-"""What a study finds, in short: the best policy against the best control at every budget of either
+"""Findings of a study in short: the best policy against the best control at every budget of either
 loop, the table of levels that ends a study on a terminal, and the sentences after its tables.
 """
 
@@ -40,7 +40,7 @@ _OTHERS = 2
 
 @dataclass(frozen=True)
 class Lead:
-    """What one policy has over another in a setting at a budget. `measure` carries its unit;
+    """Lead of one policy over another in a setting at a budget. `measure` carries its unit;
     `difference` is `first` minus `second`, None without a `second`, and matters from `gate` on.
     """
 
@@ -185,7 +185,7 @@ def shared_conditions(rows: Sequence[Row]) -> list[str]:
 
 
 def _named(measure: Measure | Recall) -> tuple[str, float]:
-    """What a lead says of a measure: its name with its unit, and the gate."""
+    """Return the name of a measure with its unit, and the gate of a lead."""
     if isinstance(measure, Recall):
         return f"{measure.heading.lower()}, points", GATE_POINTS
     # Whether a full scan was played changes the collisions that count, and not the name.

@@ -27,7 +27,7 @@ def marked(policy: str, tags: tuple[str, ...]) -> str:
 
 
 def tag_notes(tags: Iterable[tuple[str, ...]]) -> tuple[str, ...]:
-    """What the marks of policies with these tags mean."""
+    """Return the notes that explain the marks of policies with these tags."""
     held = {tag for each in tags for tag in each}
     return tuple(meaning for tag, meaning in _MEANINGS.items() if tag in held)
 

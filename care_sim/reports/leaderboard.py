@@ -109,7 +109,7 @@ def _title(results: Sequence[BenchmarkResult]) -> str:
 
 
 def _notes(results: Sequence[BenchmarkResult]) -> tuple[str, ...]:
-    """Who vouches for the numbers, and what the marks mean."""
+    """Return notes on who vouches for the numbers, and on the marks."""
     codes = {*filter(None, map(code_of, results))}
     processors = {*filter(None, map(processor_of, results))}
     made = [f"by {len(codes)} versions of the code"] if len(codes) > 1 else []

@@ -78,7 +78,7 @@ class Merged:
 
 
 def merged(folders: Sequence[Path]) -> Merged:
-    """What several folders hold together, in their order.
+    """Return the rows of several folders together, in their order.
 
     Raises InvalidInput as `read_results` does; for folders of different studies; where one task
     came out differently in two of them, or one scene has two films; and for columns that cannot be
@@ -184,7 +184,7 @@ def _types_differ(what: str) -> InvalidInput:
 
 
 def _descriptions(folders: Sequence[Path]) -> dict[str, dict[str, Any]]:
-    """What every folder says of itself, by its name; nothing of a folder that says nothing."""
+    """Return the description of every folder, by its name; none for a folder without one."""
     told: dict[str, dict[str, Any]] = {}
     for folder in folders:
         name = folder.resolve().name

@@ -127,7 +127,7 @@ def read_results(folder: Path) -> tuple[list[Row], Study, list[str]]:
 
 
 def described(folder: Path) -> dict[str, Any]:
-    """What `config.json` says of the folder; nothing where it cannot be read."""
+    """Return the description of the folder in `config.json`; nothing if it cannot be read."""
     try:
         content = json_content(folder / CONFIG)
     except (OSError, ValueError):
@@ -137,7 +137,7 @@ def described(folder: Path) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class StudyReport:
-    """What a study makes of its rows: the texts of its files of tables by name, and its figures."""
+    """Report of a study: the texts of its files of tables by name, and its figures."""
 
     texts: Mapping[str, str]
     figures: Mapping[str, "Figure"]

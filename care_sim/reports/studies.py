@@ -72,7 +72,7 @@ def _drawn(place: str) -> _Figures:
 
 
 def _joined(*makers: Callable[[Sequence[Row]], list[_T]]) -> Callable[[Sequence[Row]], list[_T]]:
-    """What several functions make of the rows, one after the other."""
+    """Return a function that joins what several functions make of the rows, one after the other."""
     return lambda rows: [each for make in makers for each in make(rows)]
 
 

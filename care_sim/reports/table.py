@@ -106,7 +106,7 @@ class Table:
         return replace(self, columns=tuple(self.columns[n] for n in filled), rows=rows)
 
     def entries(self, column: int) -> list[str]:
-        """What stands in a column; headings of rows span them all."""
+        """Return the entries of a column; headings of rows span them all."""
         return [row[column] for row in self.rows if len(row) > 1]
 
     def _markdown_row(self, row: TableRow) -> TableRow:

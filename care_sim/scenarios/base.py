@@ -1,4 +1,4 @@
-"""What the scenarios share: what a scenario is, the street of the first three, its reflection."""
+"""Base of the scenarios: the class Scenario, the street of the first three, its reflection."""
 
 import inspect
 from abc import ABC, abstractmethod
@@ -72,8 +72,8 @@ class Scenario(ABC):
         """A fresh world at time zero. The caller closes it."""
 
     def make_world(self, rng: np.random.Generator) -> World:
-        """What `build` makes. Raises BrokenScenario, with the class's place, where that fails or is
-        no world to be played; InvalidInput as `build` does.
+        """Return the world that `build` makes. Raises BrokenScenario, with the class's place, where
+        that fails or is no world to be played; InvalidInput as `build` does.
         """
         own = f"scenario {type(self).__module__}:{type(self).__qualname__}"
         try:

@@ -155,7 +155,9 @@ def _drive_on(traffic: StreetTraffic, world: World) -> None:
 
 
 def _add_encounters(world: World, drive: Drive, traffic: StreetTraffic) -> None:
-    """Who comes out. The episode is about the first who would be hit, else the first of all."""
+    """Add the people who come out. The episode is about the first who would be hit, else the first
+    of all.
+    """
     for one in drive.encounters:
         free = _may_go(drive, traffic, CATALOGUE[one.who].size[:2])
         crosser = Crosser(one.walk, one.lead_s, free)

@@ -64,12 +64,12 @@ class CutInCase:
 
     @property
     def length_m(self) -> float:
-        """Of the vehicle that cuts in."""
+        """Return the length or width of the vehicle that cuts in."""
         return CATALOGUE[self.kind].size[0]
 
     @property
     def width_m(self) -> float:
-        """Of the vehicle that cuts in."""
+        """Return the length or width of the vehicle that cuts in."""
         return CATALOGUE[self.kind].size[1]
 
     @property
@@ -146,7 +146,7 @@ def verdicts(cases: Sequence[CutInCase]) -> list[str]:
 
 
 def preventable(cases: Sequence[CutInCase]) -> list[CutInCase]:
-    """Those of the cases that are preventable: they are what is scored."""
+    """Return the cases that are preventable: they are scored."""
     marked = zip(cases, verdicts(cases), strict=True)
     return [case for case, verdict in marked if verdict == PREVENTABLE]
 

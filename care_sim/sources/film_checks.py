@@ -1,4 +1,4 @@
-"""What a recording can hold, alike for every source, and what is told of a film.
+"""Bounds of what a recording can hold, alike for every source, and the description of a film.
 
 The ranges are wide. What lies beyond them is damage. Further on it would become infinities and NaN,
 or a body that ends Bullet (a round one without a radius does).

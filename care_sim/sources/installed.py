@@ -141,7 +141,7 @@ class Installed:
 
     @property
     def kind(self) -> str:
-        """What it was asked for by."""
+        """Return the name by which the source was chosen."""
         return self.name
 
     @property
@@ -183,7 +183,7 @@ class Installed:
             return self._made().log(scene)
 
     def row(self, scene: Scene) -> dict[str, Any]:
-        """That of its kind, under its own name."""
+        """Return the row of its kind, under its own name."""
         with self._blamed(f"names no files of {scene.name}"):
             return self._made().row(scene) | {"source": self.name}
 

@@ -44,7 +44,7 @@ class Source(Protocol):
 
     @property
     def kind(self) -> str:
-        """What the source is called."""
+        """Return the name of the source."""
 
     @property
     def sensor(self) -> str | SensorSetup:
@@ -84,7 +84,7 @@ class Generated(ABC):
 
     @abstractmethod
     def seeds(self) -> Sequence[int]:
-        """Those of all scenes, in order."""
+        """Return the seeds of all scenes, in order."""
 
     @abstractmethod
     def street(self, seed: int) -> Street:
@@ -96,7 +96,7 @@ class Generated(ABC):
         raise InvalidInput(f"clutter cannot be switched on: source {source} has no `cluttered`")
 
     def name(self, seed: int) -> str:
-        """What the scene of a seed is called."""
+        """Return the name of the scene of a seed."""
         return f"{type(self).__name__.lower()}-{seed:04d}"
 
     def scenes(self) -> list[Scene]:
@@ -137,7 +137,7 @@ class Streets(Generated):
     split: str = "evaluation"
 
     def seeds(self) -> Sequence[int]:
-        """Those of the split."""
+        """Return the seeds of the split."""
         return SPLITS[self.split]
 
     def street(self, seed: int) -> Street:

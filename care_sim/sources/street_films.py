@@ -191,7 +191,7 @@ class _StreetBodies:
         ), hidden
 
     def _swept(self, sensor: Frame, boxes: Floats) -> Cloud:
-        """What plain rays meet, by body; `boxes` (n, 7) hold all bodies but clutter."""
+        """Return what plain rays meet, by body; `boxes` (n, 7) hold all bodies but clutter."""
         grid = self._setup.grid
         if not self._returns.clutter:
             return full_sweep(self._world, grid, sensor, boxes, sensor.z)
@@ -203,7 +203,7 @@ class _StreetBodies:
     def _behind(
         self, keyframe: int, sensor: Frame, numbers: Mapping[int, int], cells: Cells
     ) -> Cloud:
-        """What cells return that pass by the bodies that are reported, those of `numbers`."""
+        """Return the cloud of the cells that pass by the reported bodies, those of `numbers`."""
         poses = self._world.primitives.poses.copy()
         poses[[*numbers], 2] -= SUNK_M
         with self._world.placed(poses):

@@ -161,7 +161,7 @@ class _Beside:
                 yield from self._put(self._one(make), s, away, draw(self._rng, (-0.2, 0.2)))
 
     def front(self) -> Iterator[Placed]:
-        """What juts out of the house fronts."""
+        """Yield what juts out of the house fronts."""
         s = self._span[0]
         while s < self._span[1]:
             kind = self._one(bodies.relief)

@@ -165,7 +165,7 @@ def column(rng: np.random.Generator) -> BodyKind:
 
 
 def relief(rng: np.random.Generator) -> BodyKind:
-    """What juts out of a front: a bay, a frame, a pilaster, a door with its step."""
+    """Return a part that juts out of a front: a bay, a frame, a pilaster, a door with its step."""
     width, deep = draw(rng, (0.3, 2.5)), draw(rng, (0.06, 0.45))
     low = draw(rng, (0.0, 1.2))
     high = low + draw(rng, (0.5, 4.0))

@@ -154,7 +154,7 @@ class Stretch:
 
 @dataclass(frozen=True)
 class Drive:
-    """What is drawn of a drive.
+    """Everything that is drawn for a drive.
 
     The ego goes `goal_m` along the route of its `plan`. `kinds` (n,) stand or walk on `ways`
     (n, t, 3), sampled every SAMPLE_S seconds. `encounters` are in the order of the route.
@@ -253,7 +253,7 @@ def _encounters(
     speed_plan: SpeedPlan,
     wanted: Wanted,
 ) -> tuple[Encounter, ...]:
-    """Who is met, in the order of the way."""
+    """Return the encounters, in the order of the way."""
     places = [
         place + draw(rng, SHIFT_M) for place in np.arange(FIRST_M, goal - SHIFT_M[1], APART_M)
     ]

@@ -1,4 +1,4 @@
-"""Who drives: the ego on its script, highway-env traffic on every road, and the flow that fills the
+"""Drivers: the ego on its script, highway-env traffic on every road, and the flow that fills the
 lanes.
 
 Each road has a traffic of its own, because highway-env's cost grows with the square of the vehicles
@@ -144,14 +144,14 @@ Driver = tuple[str, RoadVehicle]
 
 
 def _queue(draft: Draft, traffic: Traffic, reach: float) -> list[Driver]:
-    """Those who drive along with the ego, ahead of it and behind."""
+    """Return the vehicles that drive along with the ego, ahead of it and behind."""
     ahead = flow_places(draft.rng, FLOW_PER_H, draw(draft.rng, LEAD_M), reach + BEYOND_M)
     behind = [-s for s in flow_places(draft.rng, FLOW_PER_H, draw(draft.rng, LEAD_M), BEYOND_M)]
     return [_driver(draft, traffic, s, 0, SPEED_LIMIT_MPS) for s in ahead + behind]
 
 
 def _oncoming(draft: Draft, traffic: Traffic, reach: float) -> list[Driver]:
-    """Those who come towards the ego, from as far as they can still meet it."""
+    """Return the vehicles that come towards the ego, from as far as they can still meet it."""
     farthest = reach + BEYOND_M + SPEED_LIMIT_MPS * float(TIMES[-1])
     return [
         _driver(draft, traffic, s, 1)

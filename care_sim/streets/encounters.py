@@ -1,4 +1,5 @@
-"""Who comes out into the ego's way in a drive: planned encounters, drawn from stated ranges.
+"""Encounters in a drive: people and vehicles that come out into the ego's way, drawn from stated
+ranges.
 
 Each has a line across the road, a body that hides who waits there, and an outcome for an ego that
 drives on as it means to: a conflict, a near miss, or a stop at the edge of the carriageway. Who
@@ -168,7 +169,7 @@ far behind as of one.
 
 
 class Course(StrEnum):
-    """What comes of an encounter if the ego drives on as it means to."""
+    """Course of an encounter if the ego drives on as it means to."""
 
     CONFLICT = "conflict"
     NEAR_MISS = "near-miss"

@@ -1,4 +1,4 @@
-"""What stands beside a road: houses, hedges, parked vehicles, a bus at its stop."""
+"""Furniture beside a road: houses, hedges, parked vehicles, a bus at its stop."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,5 +1,5 @@
-"""Who walks and cycles: along the pavements, across the street in a gap of the traffic, out of a
-yard or a garden.
+"""People who walk and cycle: along the pavements, across the street in a gap of the traffic, out of
+a yard or a garden.
 """
 
 from collections.abc import Callable

@@ -133,7 +133,8 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True)
 class Sight:
-    """Who comes is in sight for `seconds` before an ego that drives on is where it would hit them.
+    """Time in sight: whoever comes is in sight for `seconds` before an ego that drives on is where
+    it would hit them.
 
     `spare_s` of these are more than an ego needs that brakes at once. `lines` of sight go from the
     LiDAR to who comes. `yaws` says whether the ego's heading changes meanwhile.

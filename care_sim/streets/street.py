@@ -65,7 +65,7 @@ class Street:
 
 
 def street_name(seed: int) -> str:
-    """What the street of a seed is called."""
+    """Return the name of the street of a seed."""
     return f"street-{seed:04d}-{_layout(seed)}"
 
 

@@ -97,9 +97,9 @@ class EpisodeConfig(ClosedLoopConditions, RunConfig):
         return sensor_columns(self.sensor)
 
     def installed(self) -> list[str | None]:
-        """Those of the base; of another detector than the default, and of a scenario that is not
-        built in, its hash and those of the files that its parameters name; and of the files that
-        the detector says it reads.
+        """Return the hashes of installed code: those of the base; of another detector than the
+        default, and of a scenario that is not built in, its hash and those of the files that its
+        parameters name; and of the files that the detector says it reads.
         """
         own = super().installed()
         if self.detector != PROXY:
@@ -189,5 +189,7 @@ def of_cases(configs: Sequence[EpisodeConfig], cases: Sequence[Parameters]) -> l
 
 
 def listed_episodes(configs: Sequence[EpisodeConfig]) -> dict[str, Any]:
-    """What `config.json` tells of the configurations, each once, with the list of its seeds."""
+    """Return the entry of the configurations in `config.json`, each once, with the list of its
+    seeds.
+    """
     return collected([asdict(config) for config in configs], "seed", "seeds")

@@ -56,8 +56,8 @@ def world_hash(env: ClosedLoopEnv, seed: int) -> str:
 
 
 def _told(world: World) -> Iterator[tuple[Content, ...]]:
-    """What is in a world before anything moves: the bodies with their parts, whom it is about, and
-    what its scenario says that it has drawn.
+    """Yield the content of a world before anything moves: the bodies with their parts, whom it is
+    about, and what its scenario has drawn.
     """
     for actor in world.actors:
         kind = actor.kind
@@ -74,8 +74,8 @@ _KIB_MB = 1024 / 1e6
 
 
 def result_or_reason(play: Callable[..., _Result], *arguments: object) -> _Result | str:
-    """What `play` returns, or in one line why it returns nothing. No exception leaves the worker,
-    which alone may know its class.
+    """Return what `play` returns, or in one line why it returns nothing. No exception leaves the
+    worker, which alone may know its class.
     """
     try:
         return play(*arguments)
@@ -142,8 +142,8 @@ def trace(
 
 
 class Played(NamedTuple):
-    """What an episode leaves behind: its parameters as they were `told` when it began, and the rest
-    of what `run_episode` names.
+    """Remains of an episode: its parameters as they were when it began, and the rest of what
+    `run_episode` names.
     """
 
     told: Row
@@ -212,8 +212,8 @@ would leave fewer whole pairs of policies.
 
 
 def play_episodes(batch: Sequence[EpisodeConfig]) -> list[Row | str]:
-    """What a worker does: play episodes, and give for each its row, or in one line why there is
-    none. Those of an `EpisodeConfig.batch` are played together.
+    """Play episodes in a worker, and return for each its row, or in one line why there is none.
+    Those of an `EpisodeConfig.batch` are played together.
     """
     if len(batch) > 1 and len({config.batch for config in batch}) == 1:
         rows = result_or_reason(play_together, batch)

@@ -127,7 +127,7 @@ class Journal:
 
 
 def read_journal(path: Path) -> Finished:
-    """What a journal holds, none where there is no file; another process may be adding lines."""
+    """Read a journal, empty if there is no file; another process may be adding lines."""
     if not path.is_file():
         return Finished([], set(), 0)
     _check_journal(path)

@@ -1,4 +1,4 @@
-"""What detectors make of the scans of a scene, and how long they take for it."""
+"""Detectors on the scans of a scene: their detections and times."""
 
 import time
 from collections.abc import Sequence
@@ -41,7 +41,7 @@ class JudgedScene:
 
 
 def judge_scene(configs: Sequence[PlayConfig]) -> list[JudgedScene]:
-    """What the detectors of these plays, all of one scene, make of it.
+    """Return the detections of these plays, all of one scene.
 
     Raises InvalidInput where the film of the scene cannot be made.
     """

@@ -143,7 +143,7 @@ def account_play(config: PlayConfig, film: Film, sightings: Sightings) -> Row:
 
 @dataclass
 class SharedBelief:
-    """What happened while one policy drove through a film.
+    """Events of one policy's drive through a film.
 
     `fired` are the cells of every keyframe by the name of the policy, `received` how many of them
     lie in the hull of each new object; `entries` are those objects, and `reserve` what the camera's
@@ -187,9 +187,7 @@ def share_belief(
 
 
 def play_mechanism(batch: Sequence[MechanismConfig]) -> list[Row | str]:
-    """What a worker does: the plays of one scene; of each its row, or in one line why there is
-    none.
-    """
+    """Play one scene in a worker; return per play its row, or in one line why there is none."""
     scene = result_or_reason(MechanismScene, batch)
     if isinstance(scene, str):
         return [scene] * len(batch)
@@ -241,8 +239,8 @@ class MechanismScene:
         return share_belief(driver, others, self._film, self._sightings)
 
     def _shared_columns(self, config: MechanismConfig) -> Row:
-        """What the policy would have done on the shared belief; of that belief itself, the driver's
-        row tells.
+        """Return the columns of what the policy would have done on the shared belief; the driver's
+        row describes that belief itself.
         """
         columns: Row = dict.fromkeys((*DIFFERING, RECEIVED, *BELIEF_SUMS, *BELIEF_MARKS))
         shared = self._shared

@@ -98,8 +98,8 @@ class PlayConfig(Conditions, RunConfig):
         return self.source.row(self.scene) | {"scene": self.scene.name}
 
     def installed(self) -> list[str | None]:
-        """Those of the base, the hash of the detector, those of the files that its parameters name
-        and that it reads, and those of a source that is not built in.
+        """Return the hashes of installed code: those of the base, of the detector, of the files
+        that its parameters name and that it reads, and of a source that is not built in.
         """
         return [
             *super().installed(),

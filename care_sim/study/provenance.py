@@ -170,7 +170,7 @@ def _is_installed(library: str) -> bool:
 
 
 def machine() -> dict[str, str | int]:
-    """What ran it: system, processor and cores; no host name."""
+    """Return the machine that ran it: system, processor and cores; no host name."""
     return {
         "system": f"{platform.system()} {platform.release()}",
         "processor": _processor(),

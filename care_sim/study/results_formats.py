@@ -73,7 +73,7 @@ class ResultsFormat:
 
     @property
     def unit(self) -> str:
-        """What its tasks are called."""
+        """Return the name of its tasks."""
         return f"{self.task}s"
 
 

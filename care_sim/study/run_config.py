@@ -1,5 +1,5 @@
-"""What a study hands to its workers: a policy with its parameters, and the world that it meets,
-named by a digest.
+"""Configuration that a study hands to its workers: a policy with its parameters, and its world,
+with a digest as its name.
 
 The configurations of the closed loop (`care_sim.study.episode_config`) and of the open loop
 (`care_sim.study.play_config`) have this base.
@@ -71,7 +71,7 @@ class RunConfig(ABC):
     @property
     @abstractmethod
     def name(self) -> str:
-        """What is told of every task to people."""
+        """Return the name of a task for people."""
 
     @property
     def order(self) -> int:

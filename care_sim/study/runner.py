@@ -42,7 +42,7 @@ class Failure:
 
 
 def by_reason(failures: Sequence[Failure], unit: str) -> list[str]:
-    """What failed, in a line for every reason."""
+    """Return the failures, one line per reason."""
     reasons: dict[str, list[Failure]] = {}
     for failure in failures:
         reasons.setdefault(failure.reason, []).append(failure)

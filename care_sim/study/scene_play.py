@@ -43,7 +43,7 @@ _NAMES = (
 
 
 def event_sightings(score: SceneScore) -> dict[str, list[Any]]:
-    """What is known of the events, as columns; metres and radians to three decimals."""
+    """Return the events as columns; metres and radians to three decimals."""
     # Three decimals are millimetres and milliradians, finer than any sensor here.
     rows = score.event_rows()
     columns = {name: [row[name] for row in rows] for name in _EVENT_COLUMNS}
@@ -72,9 +72,7 @@ SUMS = tuple(field.name for field in fields(Tally))
 
 
 def play_scene(batch: Sequence[PlayConfig]) -> list[Row | str]:
-    """What a worker does: the plays of one scene; of each its row, or in one line why there is
-    none.
-    """
+    """Play one scene in a worker; return per play its row, or in one line why there is none."""
     scene = result_or_reason(ScenePlayer, batch[0])
     if isinstance(scene, str):
         return [scene] * len(batch)
@@ -83,7 +81,7 @@ def play_scene(batch: Sequence[PlayConfig]) -> list[Row | str]:
 
 @dataclass(frozen=True)
 class PlayRecord:
-    """What happened in a play.
+    """Record of a play.
 
     `tracks`, `explained` and `released` are means per keyframe: tracks held, camera detections that
     a forecast explains, and cells of the full hulls that exploitation does not ask for; `released`

@@ -57,9 +57,7 @@ VEHICLE_MEASURES = (
 
 
 def play_vehicle(batch: Sequence[EpisodeConfig]) -> list[Row | str]:
-    """What a worker does: play episodes, and give for each its row, or in one line why there is
-    none.
-    """
+    """Play episodes in a worker, and return for each its row, or in one line why there is none."""
     return [result_or_reason(vehicle_row, config) for config in batch]
 
 
@@ -113,7 +111,7 @@ class VehicleWatch(gymnasium.Wrapper[Observed, Action, Observed, Action]):
         return result
 
     def columns(self) -> Row:
-        """What was noted, as columns of a row."""
+        """Return the notes as columns of a row."""
         errors, guards = self._errors_m, self._guards_m
         measures = {
             "apart_after_s": self._apart_after_s,

@@ -34,14 +34,16 @@ class Agent:
 
     @classmethod
     def of_run(cls, config: AgentConfig, weights: Path) -> "Agent":
-        """What a run has trained."""
+        """Return the agent that a run has trained."""
         env = config.env[0]
         given = tuple(config.arguments(env).items())
         return cls(config.algorithm, weights, env, config.budget[0], given)
 
     @classmethod
     def of_card(cls, policy: str, path: Path | None, card: Card) -> "Agent":
-        """What a card tells of. Raises InvalidInput for one that names no environment."""
+        """Return the agent that a card describes. Raises InvalidInput for one that names no
+        environment.
+        """
         if card.scenario is None:
             raise InvalidInput(f"weights {path}: the card names no environment")
         # A card of one budget tells its cells; of those that fit any, that of a user's own.
@@ -114,7 +116,7 @@ class ShippedAgent:
 
     @property
     def columns(self) -> dict[str, str]:
-        """What its card says, as people read it; empty where it says nothing."""
+        """Return the content of its card, as people read it; empty for an empty card."""
         card, config = self.card, _config(self.card)
         seconds = _SECONDS.search(card.machine)
         seed = card.seeds.get("learner", card.seeds.get("training"))
@@ -133,7 +135,7 @@ class ShippedAgent:
 
 
 def shipped_agents() -> list[ShippedAgent]:
-    """Those that come with the package, by name."""
+    """Return the agents that come with the package, by name."""
     # Weights are called as the policy that acts with them, unless it says otherwise.
     acting = {getattr(made, "weights", name): name for name, made in BUILT_IN.items()}
     files = sorted(shipped_weights("").parent.glob("*.npz"))

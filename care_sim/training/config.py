@@ -1,4 +1,4 @@
-"""What is trained, on what, and how long."""
+"""Configuration of a training: what is trained, on what, and how long."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -106,7 +106,9 @@ class AgentConfig:
         return Wrapping(self.action, self.azimuths, self.elevations, self.columns, self.rows)
 
     def arguments(self, env: str) -> dict[str, Any]:
-        """Of one of the environments, besides the budget: those of all, and its own."""
+        """Return the arguments of one of the environments, besides the budget: those of all, and
+        its own.
+        """
         for name, _ in parameters(self.env_parameters):
             whose, dot, _ = name.rpartition(".")
             if dot:
@@ -126,7 +128,7 @@ class AgentConfig:
 
     @property
     def recipe(self) -> dict[str, Any]:
-        """What decides the weights, as plain data: all but where and how long."""
+        """Return everything that decides the weights, as plain data: all but where and how long."""
         return {
             name: value
             for name, value in json.loads(self.to_json()).items()

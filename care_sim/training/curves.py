@@ -45,7 +45,7 @@ class TrainingRun:
 
     @property
     def recipe(self) -> str:
-        """What is the same in all runs of a panel: the configuration without seed and length."""
+        """Return what all runs of a panel share: the configuration without seed and length."""
         left_out = ("seed", *HOW_LONG)
         return json.dumps(
             {name: told for name, told in self.config.items() if name not in left_out},
@@ -59,7 +59,7 @@ class TrainingRun:
 
     @property
     def unit(self) -> str:
-        """Of the scores."""
+        """Return the unit of the scores."""
         if len(self.tasks) > 1:
             return f"score ({NOTHING} 0, {EVERYTHING} 1)"
         return "first detection (m; 0 if never)" if self.closed_loop else "return"
@@ -235,7 +235,9 @@ def _mean(scores: Floats) -> Floats:
 def _ends(
     table: Floats, statistic: Callable[[Floats], Floats]
 ) -> tuple[float, float] | tuple[None, None]:
-    """Of the interval of a statistic of all scores, which it takes along the last axis."""
+    """Return the ends of the interval of a statistic of all scores, which it takes along the last
+    axis.
+    """
     if len(table) < 2:
         return None, None
     interval = stats.bootstrap(
@@ -253,7 +255,7 @@ def _ends(
 
 
 def curves_table(groups: Sequence[Sequence[TrainingRun]]) -> Table:
-    """What every recipe reached, how soon, and in how long: a row per recipe."""
+    """Return what every recipe reached, how soon, and in how long: a row per recipe."""
     return Table(
         "Training runs",
         COLUMNS,

@@ -129,7 +129,7 @@ def _draw_profiles(axes: Axes, runs: Sequence[TrainingRun]) -> None:
 
 
 def _middle(scores: Floats) -> float:
-    """Of the tasks (n,) of one run, or of a rule."""
+    """Return the middle of the scores of the tasks (n,) of one run, or of a rule."""
     return interquartile_mean(scores[None]).value
 
 

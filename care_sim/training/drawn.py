@@ -69,8 +69,8 @@ class Draw:
 
 
 def drawn(seed: int, places: int, budgets: Sequence[float], faulty: bool = True) -> Draw:
-    """What the episode of a seed is made of. The same seed draws the same, and seed and street are
-    of one split.
+    """Draw the episode of a seed. The same seed draws the same, and seed and street are of one
+    split.
 
     `places` is the number of environments. Without `faulty` the camera has no fault and all else
     stays as it is. Raises InvalidInput for a seed of no split.
@@ -136,7 +136,7 @@ class DrawnEnv(gymnasium.Env[Any, Any]):
 
     @property
     def rig(self) -> Rig:
-        """That of the running episode."""
+        """Return the rig of the running episode."""
         return self.unwrapped.rig
 
     def reset(

@@ -1,4 +1,4 @@
-"""What a training run keeps in its folder.
+"""Files of a training run in its folder.
 
 | file | content |
 |---|---|
@@ -73,7 +73,9 @@ class Folder:
         write_text(self.path / CONFIG, self.config.to_json())
 
     def rules(self, play: Callable[[], dict[str, list[Row]]]) -> dict[str, ValidationScore]:
-        """What rules score: measured at the beginning of a run, read when it is resumed."""
+        """Return the scores of rules: measured at the beginning of a run, read when it is
+        resumed.
+        """
         if not self._episodes:
             for name, played in play().items():
                 self._add(name, 0, played)
@@ -165,7 +167,7 @@ class Folder:
 
 
 def rule_scores(episodes: Sequence[Row]) -> dict[str, ValidationScore]:
-    """What every rule scores, by name."""
+    """Return the score of every rule, by name."""
     played: dict[str, list[Row]] = {}
     for row in episodes:
         if row["policy"] != LEARNER:

@@ -33,7 +33,7 @@ class Hyperparameters:
     table: str | None
 
     def told(self, config: AgentConfig) -> str:
-        """What counts, options included, in a line."""
+        """Return the values that apply, options included, in a line."""
         if self.table is None:
             return f"hyperparameters: {self.path.name} has none for {' '.join(config.env)}"
         listed = ", ".join(f"{name} {getattr(config, name)}" for name in self.values)
@@ -53,10 +53,10 @@ def names_of(kind: type[AgentConfig]) -> list[str]:
 def read_hyperparameters(
     kind: type[AgentConfig], envs: Sequence[str], path: Path | None = None, drawn: bool = False
 ) -> Hyperparameters:
-    """What the file at `path`, or else the one that comes with the package, says of a learner in an
-    environment. Episodes that are `drawn` have the table DRAWN if there is one; several
-    environments without it have DEFAULT. The reward of drawn episodes has no term that `gain`
-    weighs, which then says nothing.
+    """Read the hyperparameters of a learner in an environment from the file at `path`, or else from
+    the one that comes with the package. Episodes that are `drawn` have the table DRAWN if there is
+    one; several environments without it have DEFAULT. The reward of drawn episodes has no term that
+    `gain` weighs, which then has no effect.
 
     Raises InvalidInput for a file that is missing, damaged or has another form, for a name that is
     no hyperparameter, and for a value that the learner does not take.

@@ -136,8 +136,8 @@ class GymnasiumVecEnv(VecEnv):
         return observation.copy()
 
     def _infos(self, told: dict[str, Any], over: NDArray[np.bool_]) -> Infos:
-        """What every world tells of the step. Of the episodes that begin in worlds that are `over`,
-        `reset_infos` tells.
+        """Return the infos of every world at the step. `reset_infos` are for the episodes that
+        begin in worlds that are `over`.
         """
         infos = info_of_each(told, self.num_envs)
         if over.any():

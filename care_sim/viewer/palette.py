@@ -45,7 +45,7 @@ SHARE_COLOURS = np.array(
 
 
 def found_colour(keyframe: SceneKeyframe, row: int) -> Colour:
-    """That of an annotated object, by how it stands with it."""
+    """Return the colour of an annotated object, by its state."""
     if keyframe.found[row]:
         return FOUND_COLOUR
     return NOT_FOUND_COLOUR if keyframe.scored[row] else UNSCORED_COLOUR

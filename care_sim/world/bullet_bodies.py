@@ -35,7 +35,7 @@ class LentClient:
 
     @property
     def number(self) -> int:
-        """What PyBullet calls it."""
+        """Return PyBullet's number of the shape."""
         if self._number is None:
             # Whoever does not close leaves the client to others when it is collected. At the end of
             # the process there are none.
@@ -115,7 +115,9 @@ _SHAPES = {
 
 
 class _Shape(NamedTuple):
-    """What PyBullet makes a body of: all its parts, those that cameras see, and its group."""
+    """Shape from which PyBullet makes a body: all its parts, those that cameras see, and its
+    group.
+    """
 
     parts: Sequence[Part]
     seen: Sequence[Part]

@@ -91,8 +91,8 @@ class Route:
 
     @cached_property
     def _columns(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """Of all legs the starts (legs, 3), and (legs, 1) what precedes them, their lengths and
-        their curvatures.
+        """Return of all legs the starts (legs, 3), and (legs, 1) what precedes them, their lengths
+        and their curvatures.
         """
         legs = self._legs
         begins = np.array([[leg.begins] for leg in legs])

@@ -124,8 +124,8 @@ class Traffic:
     def lane_keepers(
         self, vehicles: "Sequence[RoadVehicle]", seconds: float
     ) -> list[LaneKeeper] | None:
-        """What `vehicles` go by, if they are all that is on the road, in the order in which they
-        came there, and can do nothing for `seconds` but keep their lanes along x. Else None.
+        """Return what moves `vehicles`, if they are all that is on the road, in the order in which
+        they came there, and can do nothing for `seconds` but keep their lanes along x. Else None.
         """
         found = [vehicle.keeping_lane(seconds) for vehicle in vehicles]
         keepers = [keeper for keeper in found if keeper is not None]
@@ -191,7 +191,7 @@ class RoadVehicle:
         return self._vehicle is vehicle
 
     def keeping_lane(self, seconds: float) -> LaneKeeper | None:
-        """What it goes by if it can do nothing for `seconds` but keep its lane, else None."""
+        """Return what moves it if it can do nothing for `seconds` but keep its lane, else None."""
         from highway_env.utils import not_zero
 
         vehicle, lane = self._vehicle, self._vehicle.lane

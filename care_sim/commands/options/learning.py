@@ -14,7 +14,7 @@ from care_sim.training.supervised.options import DetectorConfig, ScorerConfig, S
 
 @dataclass(frozen=True, kw_only=True)
 class Recipe:
-    """What decides the defaults of a learner."""
+    """Options that decide the defaults of a learner."""
 
     env: tuple[str, ...] = AgentConfig.env
     drawn: bool = AgentConfig.drawn
@@ -23,7 +23,7 @@ class Recipe:
 
 @dataclass(frozen=True, kw_only=True)
 class Learner(AgentConfig):
-    """What the commands of learners take beside the configuration."""
+    """Options of the commands that train learners, beside the configuration."""
 
     kind: ClassVar[type[AgentConfig]]
 

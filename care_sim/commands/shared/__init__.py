@@ -1,1 +1,1 @@
-"""What several commands share: options, running a study, choosing policies."""
+"""Parts that several commands share: options, running a study, choosing policies."""

@@ -1,4 +1,4 @@
-"""What `run` and `compare` play: one episode per policy, or one scene of a source that is named in
+"""Plays of `run` and `compare`: one episode per policy, or one scene of a source that is named in
 the place of a scenario.
 """
 

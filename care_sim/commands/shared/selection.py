@@ -1,4 +1,4 @@
-"""What a command plays of what is named: scenarios, policies, sources, values of a condition."""
+"""Resolve names on a command line: scenarios, policies, sources, values of a condition."""
 
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import asdict

@@ -1,4 +1,4 @@
-"""What a policy can tell of every cell before it fires: the numbers that a learned scorer reads."""
+"""Features of every cell before it fires: the numbers that a learned scorer reads."""
 
 import math
 from collections.abc import Sequence
@@ -36,7 +36,7 @@ CellNumbers = NDArray[np.float32]
 
 
 class ScanRules(NamedTuple):
-    """What a return must be to stand above the road, and how far its surroundings reach."""
+    """Rules by which a return counts as above the road, and how far its surroundings reach."""
 
     reach_m: np.float32
     """The longest range; a ray that returns nothing reads it."""
@@ -49,7 +49,7 @@ class ScanRules(NamedTuple):
 
 
 class RigTerms(NamedTuple):
-    """What enters the network and stays the same while the rig does."""
+    """Inputs of the network that stay the same while the rig does."""
 
     hidden: CellNumbers
     """(N, h) what enters the hidden units."""
@@ -197,8 +197,8 @@ Float32s = NDArray[np.float32]
 
 
 class CellFeatures(NamedTuple):
-    """What is seen of all cells: `codes` (N,) of `CELL_MARKS`, `sizes` (N,) and `nearnesses` (N,)
-    as in `SCAN_INPUTS`.
+    """Features of all cells: `codes` (N,) of `CELL_MARKS`, `sizes` (N,) and `nearnesses` (N,) as in
+    `SCAN_INPUTS`.
     """
 
     codes: NDArray[np.uint8]
@@ -223,7 +223,7 @@ class CellInputs:
         self._heights = rig.grid.directions[:, 2].astype(np.float32)
 
     def of(self, belief: Belief, hulls: Sequence[Cells]) -> CellFeatures:
-        """What is seen of all cells at a keyframe, given the hulls of its forecasts."""
+        """Return the features of all cells at a keyframe, given the hulls of its forecasts."""
         rig = self.rig
         cells = self.rig.grid.size
         seen = CellFeatures(

@@ -1,4 +1,4 @@
-"""What a learned agent sees of a belief: coarse pictures of the angular grid, and its own motion.
+"""Observation of a learned agent: coarse pictures of the angular grid, and the car's own motion.
 
 The pictures hold values from 0 to 1, the motion values from -1 to 1.
 """
@@ -27,7 +27,9 @@ BlockPictures = NDArray[np.float32]
 
 
 class AboveRoad(NamedTuple):
-    """What tells how far above the road a ray ends, and between which heights a return stands."""
+    """Geometry that says how far above the road a ray ends, and between which heights a return
+    stands.
+    """
 
     rises: NDArray[np.float64]
     """(N,) how far each ray rises per metre of range."""

@@ -76,7 +76,7 @@ class Tiling:
         return pictured.swapaxes(1, 2).reshape(self.elevations * self.azimuths, rows * columns)
 
     def ranked(self, scores: NDArray[np.floating], enough: int) -> tuple[Integers, Integers]:
-        """Of the tiles of W pictures of `scores` (W, ...) the best (W, m), ties by ascending index,
+        """Return the best tiles (W, m) of W pictures of `scores` (W, ...), ties by ascending index,
         and how many (W,) of these have a strictly positive score; no more tiles than hold `enough`
         cells.
         """
@@ -129,8 +129,8 @@ class SectorChoice:
         return [WorldSets.nothing(len(scores)), self._best(scores, budgets)]
 
     def _best(self, scores: NDArray[np.floating], enough: Integers) -> WorldSets:
-        """Of each world one set, the cells of the sectors with a positive score, best first, up to
-        the one that makes them `enough` (W,). One set gives in turn what a layer for each sector
+        """Return one set per world, the cells of the sectors with a positive score, best first, up
+        to the one that makes them `enough` (W,). One set gives in turn what a layer per sector
         would.
         """
         tile = self._sectors.cells.shape[1]

@@ -1,5 +1,5 @@
-"""What a policy can tell of a keyframe as a set of items: every camera box, every track, and strips
-of cells that stand for whatever neither tells of.
+"""A keyframe as a set of items: every camera box, every track, and strips of cells for everything
+else.
 """
 
 from typing import NamedTuple

@@ -26,7 +26,7 @@ FORMAT = "care-sim weights 1"
 
 @dataclass(frozen=True)
 class Card:
-    """What a file of weights is, what it fits, and how it was made.
+    """Description of a file of weights: what it fits, and how it was made.
 
     `kind` names the policy. `grid` is the one that was trained on. `budget` is the number of cells
     per keyframe, None if any will do. `setup` is the sensor set-up that was trained with, as a

@@ -36,8 +36,8 @@ class Round(NamedTuple):
 
     @classmethod
     def of(cls, min_returns: int) -> "Round":
-        """That of a detector which needs so many returns. Raises InvalidInput unless they are a
-        whole number of at least 1.
+        """Return the round of a detector which needs so many returns. Raises InvalidInput unless
+        they are a whole number of at least 1.
         """
         check_whole("min_returns", min_returns, 1)
         return cls(HULL_CELLS_PER_RETURN * min_returns, WEDGE_CELLS_PER_RETURN * min_returns)

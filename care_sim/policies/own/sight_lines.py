@@ -87,7 +87,9 @@ class SightLines:
         self._watched = self._worth_a_look()
 
     def ahead(self) -> Cells:
-        """What is worth a look in the sector ahead, the nearest to straight ahead first."""
+        """Return the cells that are worth a look in the sector ahead, the nearest to straight ahead
+        first.
+        """
         return self._cells(self._sector[self._watched[self._sector]])
 
     def cells(self) -> Cells:

@@ -124,6 +124,6 @@ def contrast_of_rows(
 
 
 def _mean(readings: Sequence[Reading]) -> Reading:
-    """Of a mean with a censored value is known that the truth lies between 0 and this."""
+    """Return the reading of a mean with a censored value: the truth lies between 0 and this."""
     value = float(np.mean([reading.value for reading in readings]))
     return Reading(value, any(reading.censored for reading in readings))

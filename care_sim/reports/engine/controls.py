@@ -42,8 +42,8 @@ def best_of(measure: Measure | Recall, found: Mapping[str, Units]) -> str | None
 
 
 def shared_units(found: Mapping[str, Units]) -> dict[str, Units]:
-    """What was measured of each policy, over the units that all of them have; without those of
-    which nothing was measured.
+    """Return the measurements of each policy over the units that all of them have; without policies
+    that were not measured.
     """
     played = {policy: units for policy, units in found.items() if units}
     shared = set.intersection(*map(set, played.values())) if played else set()

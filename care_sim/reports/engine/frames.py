@@ -69,7 +69,7 @@ class Frame:
         return self._tallies[key, within]
 
     def units(self, measure: Measure | Recall, key: Key) -> Units:
-        """What was measured in a cell, by seed or by scene."""
+        """Return the measurements of a cell, by seed or by scene."""
         if isinstance(measure, Recall):
             return self.tallies(key, measure.within)
         return measure.units(self.of(key))
@@ -83,7 +83,7 @@ class Frame:
         return marked(policy, self.tags.get(policy, ()))
 
     def notes(self, policies: Iterable[str]) -> tuple[str, ...]:
-        """What the marks of these policies mean."""
+        """Return the notes that explain the marks of these policies."""
         return tag_notes(self.tags.get(policy, ()) for policy in policies)
 
 

@@ -1,4 +1,4 @@
-"""What is measured: in an episode of the closed loop, or in a scene of the open loop."""
+"""Measures of an episode of the closed loop, or of a scene of the open loop."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -55,7 +55,7 @@ class Measure:
         return f"{self.name}, {self.unit}"
 
     def units(self, rows: Iterable[Row]) -> dict[Any, Reading]:
-        """What was measured by seed. A seed fixes world, faults and floor (common random
+        """Return the measurements by seed. A seed fixes world, faults and floor (common random
         numbers).
         """
         found = ((row["seed"], self.read(row)) for row in rows)
@@ -128,7 +128,7 @@ AVOIDANCE = Measure("Avoided", "points", 0, GATE_POINTS, _avoided)
 
 
 class Loop(NamedTuple):
-    """What the studies of a loop show: its name, the units of levels and of differences, and the
+    """Description of a loop's studies: its name, the units of levels and of differences, and the
     measures.
     """
 

@@ -60,7 +60,7 @@ class OverControl(NamedTuple):
 
     @property
     def ratio(self) -> Ratio:
-        """That of a measure of the open loop."""
+        """Return the ratio of a measure of the open loop."""
         assert isinstance(self.measure, Recall)
         return self.measure.ratio
 
@@ -113,7 +113,7 @@ class Part:
         return self.frame.of(self.key(policy, budget))
 
     def units(self, measure: Measure | Recall, policy: str, budget: float) -> Units:
-        """What was measured in a cell, by seed or by scene."""
+        """Return the measurements of a cell, by seed or by scene."""
         return self.frame.units(measure, self.key(policy, budget))
 
     def contrast(

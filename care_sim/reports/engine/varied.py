@@ -45,7 +45,9 @@ class Varied:
         )
 
     def minus_usual(self, usual: str, unfelt: Collection[str] = ()) -> Table:
-        """What every condition adds to the usual one, but for policies by which it is unfelt."""
+        """Return what every condition adds to the usual one, without policies on which it has no
+        effect.
+        """
         base = self.frames.get(usual, Frame([]))
         return self._table(
             f"minus {usual}, {self.loop.difference_unit}",
@@ -58,7 +60,9 @@ class Varied:
         )
 
     def leads(self, policy: str) -> list[Table]:
-        """What a policy has over each other one at the same budget; none where it is alone."""
+        """Return the leads of a policy over each other one at the same budget; none where it is
+        alone.
+        """
         rivals = [key for key in self.keys if key[1] not in (policy, FULL)]
         if policy not in self.tags or not rivals:
             return []

@@ -32,7 +32,9 @@ _OUTCOME_TOP = 32
 def view_of(
     loop: ClosedLoop | OpenLoop, frames: Sequence[Any], watched: Watched | None = None
 ) -> View:
-    """What is shown after the keyframes `frames` of a loop, the last of which may be `watched`."""
+    """Return the view after the keyframes `frames` of a loop, the last of which may be
+    `watched`.
+    """
     if isinstance(loop, OpenLoop):
         return scene_view(loop, frames, watched)
     return episode_view(loop, frames)
@@ -60,7 +62,7 @@ class Clip:
             check_clip(path)
 
     def episode(self, name: str) -> Callable[[Any, Any], None]:
-        """What watches the next episode, of the policy `name`."""
+        """Return the watcher of the next episode, of the policy `name`."""
         frames: list[Keyframe | SceneKeyframe] = []
         film: list[Image.Image] = []
         self._films.append(film)

@@ -56,7 +56,7 @@ _Frame = TypeVar("_Frame")
 
 @dataclass(frozen=True)
 class Timeline:
-    """What is told of an episode: one of the `lines` per keyframe, None where some are left out,
+    """Timeline of an episode: one of the `lines` per keyframe, None where some are left out,
     `events`, and the outcome as people read it, by its labels. The last columns, `words` of them,
     hold words.
     """
@@ -90,7 +90,9 @@ class Timeline:
 
 
 def episode_timeline(config: EpisodeConfig, row: Row, keyframes: Sequence[Keyframe]) -> Timeline:
-    """That of an episode of the closed loop, where something changes in it."""
+    """Return the timeline of an episode of the closed loop, with the keyframes at which something
+    changes.
+    """
     states = [(f.in_view, f.detected, f.braking, f.impact_speed_mps is not None) for f in keyframes]
     # A change, and the keyframe before it.
     changes = [n for n in range(1, len(states)) if states[n] != states[n - 1]]
@@ -112,7 +114,7 @@ def episode_timeline(config: EpisodeConfig, row: Row, keyframes: Sequence[Keyfra
 
 
 def scene_timeline(config: PlayConfig, played: PlayedScene) -> Timeline:
-    """That of a play of the open loop, where somebody appears in it, and who was found when."""
+    """Return the timeline of a play of the open loop: who appears, and who was found when."""
     row, keyframes, score = played
     frames = with_gaps(keyframes, [n for n, frame in enumerate(keyframes) if frame.entries])
     return Timeline(
@@ -144,7 +146,7 @@ def with_gaps(keyframes: Sequence[_Frame], events: Iterable[int]) -> list[_Frame
 
 
 def encounter_text(encounter: Row, keyframes: Sequence[Keyframe]) -> str:
-    """Who came, from where, and what came of it. `encounter` holds the fields of
+    """Say who came, from where, and how it ended. `encounter` holds the fields of
     `care_sim.loops.records.EncounterOutcome`, times are those of the `keyframes`.
     """
     known = "reported" if encounter["occluder_reported"] else "unreported"

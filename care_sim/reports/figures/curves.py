@@ -49,7 +49,7 @@ class Point(NamedTuple):
 
     @property
     def drawn(self) -> float:
-        """What was not detected is drawn at 0."""
+        """Return the value that is drawn: 0 where nothing was detected."""
         return 0.0 if math.isnan(self.height) else self.height
 
 
@@ -173,7 +173,7 @@ def curves_figure(
 
 
 def _on_marks(panels: Sequence[Panel], tags: Tags) -> list[str]:
-    """What the marks of these panels mean."""
+    """Return the notes that explain the marks of these panels."""
     shown = [(name, panel.curves[name]) for panel in panels for name in panel.named(tags)]
     missed = any(each and math.isnan(each.height) for _, curve in shown for each in curve)
     return [

@@ -219,7 +219,7 @@ def _ablations(
 
 
 def realism_figures(rows: Sequence[Row]) -> dict[str, Figure]:
-    """What becomes of every headline order of the closed loop under every condition."""
+    """Draw how every headline order of the closed loop fares under every condition."""
     return _realism("realism", RealismStudy(rows))
 
 

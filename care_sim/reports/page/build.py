@@ -65,7 +65,7 @@ _NOT_KNOWN = "machine, versions and what was to be played are not known."
 
 @dataclass(frozen=True)
 class Provenance:
-    """What is known of where rows come from.
+    """Origin of the rows.
 
     `machine` and `versions` as the study wrote them. `settings` are the values of every parameter
     that is not the same in all rows, or not the default. `missing` are sentences about what is not
@@ -89,7 +89,7 @@ class Provenance:
 
 
 def provenance_of(folder: Path, rows: Sequence[Row], left_out: Sequence[str]) -> Provenance:
-    """What the folder of a study tells about its rows."""
+    """Return the origin of a study's rows, read from its folder."""
     description, trouble = description_in(folder)
     machine, versions = (
         found if isinstance(found := description.get(name), dict) else {}
@@ -140,7 +140,7 @@ _ASSETS = Path(__file__).with_name("assets")
 
 @dataclass(frozen=True)
 class Findings:
-    """What a study makes of its rows: the SVG of every figure by name, tables, sentences."""
+    """Findings from the rows of a study: the SVG of every figure by name, tables, sentences."""
 
     drawings: Mapping[str, str]
     tables: Sequence[Table]
@@ -158,7 +158,7 @@ class Findings:
 
 @dataclass(frozen=True)
 class Page:
-    """What a page shows of a study. `episodes` are those that were played again."""
+    """Content of a study's page. `episodes` are those that were played again."""
 
     name: str
     study: Study

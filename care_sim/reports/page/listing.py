@@ -21,7 +21,7 @@ from care_sim.study.run_config import Row
 
 
 class EpisodeEntry(NamedTuple):
-    """What an entry says of an episode; `number` is that of its replay in the page, None without
+    """Entry of an episode in the list; `number` is that of its replay in the page, None without
     one.
     """
 
@@ -59,7 +59,7 @@ def episode_groups(rows: Sequence[Row], episodes: Sequence[Episode]) -> list[Gro
 
 
 def replay_data(episodes: Sequence[Episode]) -> dict[str, Any]:
-    """What `play.js` plays: every replay, and the standing bodies that several share."""
+    """Return the data of `play.js`: every replay, and the standing bodies that several share."""
     # Policies meet the same world, whose standing bodies are then written once.
     standing: dict[str, Any] = {}
     worlds: dict[Any, int] = {}
@@ -123,7 +123,7 @@ def _policy(row: Row) -> str:
 
 
 def _column(row: Row) -> Any:
-    """What puts worlds into their order: the seed, of the open loop the scene and the floor."""
+    """Return the key that orders worlds: the seed, of the open loop the scene and the floor."""
     return (row["scene"], row["floor_seed"]) if in_open_loop(row) else row["seed"]
 
 
@@ -139,8 +139,8 @@ def _place(row: Row) -> tuple[Any, ...]:
 
 
 def _world(row: Row) -> tuple[Any, ...]:
-    """What two episodes share that can be watched side by side: scenario, physics, seed, or the
-    scene.
+    """Return the key that two episodes share which can be watched side by side: scenario, physics,
+    seed, or the scene.
     """
     if in_open_loop(row):
         return row["source"], row["scene"]

@@ -1,4 +1,4 @@
-"""What rows were played with: the configuration of an episode, or of a play of the open loop."""
+"""Configurations from rows: of an episode, or of a play of the open loop."""
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import OF_BOTH_LOOPS

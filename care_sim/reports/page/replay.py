@@ -90,7 +90,7 @@ class Recorder:
             self.before(loop)
 
     def story(self, bodies: Sequence[int], car_size: Sequence[float]) -> dict[str, Any]:
-        """What was recorded, one list per column, with a sign for each of the `bodies`."""
+        """Return the recording, one list per column, with a sign for each of the `bodies`."""
         rig = self.loop.rig
         ego = {
             "size": whole(car_size[:2], CENTI),
@@ -101,7 +101,7 @@ class Recorder:
         return {"ego": ego, "seen": seen, "tracked": self._tracked, **self._columns}
 
     def poses(self, body: int) -> list[list[int] | None]:
-        """That of a body at every moment, None where it is not there."""
+        """Return the pose of a body at every moment, None where it is not there."""
         return [poses.get(body) for poses in self._poses]
 
 
@@ -159,7 +159,7 @@ def replayed(config: EpisodeConfig | PlayConfig) -> Replay:
 
 
 def _told(loop: ClosedLoop, keyframes: Sequence[Keyframe]) -> dict[str, Any]:
-    """What the keyframes tell, one column for each thing, and whom the episode is about."""
+    """Return the keyframes as columns, and whom the episode is about."""
     world, about = loop.world, sought(loop.world)
 
     def flags(read: Callable[[Any], bool]) -> str:

@@ -1,4 +1,4 @@
-"""What the paper compares, measured on plays: two policies, or CARE less all-camera in scenes of
+"""Comparisons of the paper, measured on plays: two policies, or CARE less all-camera in scenes of
 little and of much traffic (Sec. 5.2).
 """
 
@@ -35,7 +35,7 @@ class PolicyPair:
 
     @property
     def measure(self) -> Recall:
-        """What is compared."""
+        """Return the measure that is compared."""
         return Recall(self.ratio, self.within, self.equal_scenes)
 
     @property
@@ -114,7 +114,7 @@ def reference_pairs(plays: SettingPlays, ratio: Ratio, within: str = "") -> list
 
 
 def means(plays: SettingPlays, column: str, budget: float) -> dict[str, float]:
-    """What CARE held in every scene (`tracks`, `explained`), averaged over floor seeds."""
+    """Return what CARE held in every scene (`tracks`, `explained`), averaged over floor seeds."""
     values: dict[str, list[float]] = {scene: [] for scene in plays.tallies(REFERENCE, budget)}
     for row in plays.rows(REFERENCE, budget):
         # A scene that not all floor seeds have played is in no tally, and is left out here too.

@@ -1,5 +1,5 @@
-"""What CARE gains in thirds of the scenes by traffic, how often allocations differ, and which
-events policies detect earlier than history.
+"""Gains of CARE in thirds of the scenes by traffic, how often allocations differ, and which events
+policies detect earlier than history.
 """
 
 from collections.abc import Iterator, Sequence

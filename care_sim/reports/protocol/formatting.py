@@ -50,7 +50,7 @@ def share_with_ends(found: SceneShare | None) -> str:
 
 
 def claims_of_paper(claims: Claims | None, budgets: Sequence[float]) -> tuple[str, ...]:
-    """What the paper says at each of these budgets; nothing at all where it speaks of none."""
+    """Return the paper's claims at each of these budgets; nothing at all if it makes none."""
     if claims is None or not claims.any_at(budgets):
         return ()
     return tuple(_claim(claims.at(budget)) for budget in budgets)

@@ -1,5 +1,5 @@
-"""What the paper says of its nuScenes evaluation (Secs. 5.2 to 5.4): differences and levels by
-budget, and the sentences that give them.
+"""The paper's nuScenes evaluation (Secs. 5.2 to 5.4): differences and levels by budget, and the
+sentences that give them.
 """
 
 from collections.abc import Iterable, Mapping
@@ -31,7 +31,7 @@ PAPER_BUDGETS = (0.10, 0.20, 0.35)
 
 @dataclass(frozen=True)
 class Claim:
-    """What the paper says of one difference at one budget, in the unit of the measure.
+    """Claim of the paper about one difference at one budget, in the unit of the measure.
 
     `sign`: 1 where the first named has more, -1 where it has less, 0 where the paper calls the two
     tied. All else is None where the paper does not tell it. `ends` are those of its 95% interval;
@@ -47,7 +47,9 @@ class Claim:
 
 @dataclass(frozen=True)
 class Claims:
-    """What the paper says of one difference by budget, and the sentence or table it stands in."""
+    """Claims of the paper about one difference by budget, and the sentence or table it stands
+    in.
+    """
 
     by_budget: Mapping[float, Claim]
     source: str
@@ -62,8 +64,8 @@ class Claims:
 
 
 class PublishedLevel(NamedTuple):
-    """What the paper says of one policy, None where nothing: recalls and their shares of the full
-    scan's in %, TTFD in keyframes.
+    """Levels of one policy in the paper, None where it gives none: recalls and their shares of the
+    full scan's in %, TTFD in keyframes.
     """
 
     first: float | None = None
@@ -194,8 +196,8 @@ def published_level(ratio: Ratio, policy: str, budget: float) -> float | None:
 
 
 def claims_about(setting: Setting) -> Mapping[Comparison, Claims]:
-    """What the paper says under these conditions, whatever the detector is; nothing of films of a
-    source of one's own.
+    """Return the paper's claims under these conditions, whatever the detector is; none for films of
+    a source of one's own.
     """
     if not setting.has_paper:
         return {}

@@ -48,7 +48,7 @@ def ablation_tables(rows: Sequence[Row]) -> list[Table]:
 
 
 def ceiling(rows: Sequence[Row]) -> list[str]:
-    """What the full scan finds of the films, in a sentence; nothing where it was not played."""
+    """Say in a sentence what the full scan finds of the films; nothing if it was not played."""
     study = AblationStudy(rows)
     key = USUAL_VARIANT.key(FilmPlace(study.source, 1.0), FULL)
     found = {
@@ -137,8 +137,8 @@ def _levels(
 def _changes(
     study: AblationStudy, ablation: Ablation, place: Place | FilmPlace, name: str
 ) -> Iterator[TableRow]:
-    """What the levels have over the usual level and over each reference, by one measure; under each
-    line what the paper says of it.
+    """Yield the differences of the levels from the usual level and from each reference, by one
+    measure; under each line the paper's claim.
     """
     frame, measure = study.frame, study.measures[name]
     usual = USUAL_VARIANT.key(place, ablation.policy)

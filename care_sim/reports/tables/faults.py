@@ -101,7 +101,7 @@ def _difference(
 
 
 def _blocks(fault: Fault, study: Frame) -> dict[str, list[TableRow]]:
-    """Of every place a block of policies for each measure, and one of paired differences."""
+    """Return per place a block of policies for each measure, and one of paired differences."""
     policies = policies_of(study)
     blocks: dict[str, list[TableRow]] = {}
     # All measures of a place before the next place: they are read together.

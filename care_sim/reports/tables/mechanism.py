@@ -113,7 +113,7 @@ def mechanism_closing(rows: Sequence[Row]) -> list[str]:
 
 
 def _belief(plays: _Plays) -> Table:
-    """What the driver's belief makes of the camera's boxes."""
+    """Return a table of the camera's boxes under the driver's belief."""
     keyframes, *sums = plays.sums(plays.driver, ("keyframes", *played.BELIEF_SUMS))
     filled, filled_rho, explained, untaken = sums
     pairs = [*plays.pairs(plays.driver, FULL)]

@@ -86,7 +86,7 @@ class NcapRows(PolicyRows):
         return sorted(self.tags, key=lambda name: name != FULL)
 
     def contender(self, policy: str, budget: float) -> Contender:
-        """What was played of a policy beside others at a budget: the full scan has one of its
+        """Return the rows of a policy beside others at a budget: the full scan has one of its
         own.
         """
         return policy, 1.0 if policy == FULL else budget
@@ -192,8 +192,8 @@ def _endings(results: NcapRows, tests: Mapping[str, Sequence[Line]]) -> Table:
 
 
 def _differences(results: NcapRows) -> list[Table]:
-    """What each policy scores more than CARE, and than the best control, in all; none without
-    either.
+    """Return tables of how much each policy scores above CARE, and above the best control, in all;
+    none without either.
     """
 
     def differences(held: Sequence[Line], against: Mapping[float, str | None]) -> list[TableRow]:

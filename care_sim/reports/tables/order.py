@@ -1,4 +1,4 @@
-"""What the order of cells inside a set does: the paper's statements and the levels of all policies,
+"""Tables of the order of cells inside a set: the paper's statements and the levels of all policies,
 order by order, in either loop.
 """
 
@@ -25,7 +25,7 @@ from care_sim.study.run_config import FULL, Row
 
 
 class _Verdict(NamedTuple):
-    """What was found about a statement, in a word, and what was measured."""
+    """Verdict on a statement in a word, and the measurement."""
 
     word: str = ""
     measured: str = ""

@@ -33,7 +33,7 @@ _AT = "dart-out 10%: "
 
 
 class Statement(NamedTuple):
-    """What the paper says, what was measured, and whether they agree."""
+    """Statement of the paper, its measurement here, and whether they agree."""
 
     text: str
     paper: str

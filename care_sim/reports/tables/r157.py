@@ -1,4 +1,4 @@
-"""What became of the preventable cut-ins of UN Regulation 157, by policy and budget."""
+"""Outcomes of the preventable cut-ins of UN Regulation 157, by policy and budget."""
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence

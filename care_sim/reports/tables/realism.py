@@ -28,7 +28,7 @@ _OF_THE_FILM = ("sensor", "sensor_hash", *READ_WITH)
 
 
 class Verdict(StrEnum):
-    """What a condition makes of an order: a lead that holds, is lost or flips; a tie that stays
+    """Verdict on an order under a condition: a lead that holds, is lost or flips; a tie that stays
     tied, or from which a lead arises.
     """
 
@@ -93,7 +93,7 @@ class _Block:
         self.label = percent(places[0].budget) if film else str(places[0])
 
     def units(self, policy: str, condition: Variant) -> Units:
-        """What was measured of a policy, by place, and by seed or scene."""
+        """Return the measurements of a policy, by place, and by seed or scene."""
         # The full scan is found from every setting, whatever it feels of it.
         keys = [(place.budget, condition.key(place, REFERENCE)[0]) for place in self.places]
         return {
@@ -107,7 +107,7 @@ class _Block:
         return level(self.measure, self.units(policy, condition))
 
     def change(self, policy: str, condition: Variant) -> str:
-        """What the condition adds to the figure of a policy."""
+        """Return the change that the condition makes to the figure of a policy."""
         return interval(self._contrast((policy, condition), (policy, IDEAL)))
 
     def order(self, pair: Pair, conditions: Sequence[Variant]) -> Order:

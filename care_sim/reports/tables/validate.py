@@ -48,7 +48,7 @@ _PAIRS = (
 
 @dataclass(frozen=True)
 class Lead:
-    """What one policy has over another on the test seeds: first detection in metres, and collisions
+    """Lead of one policy over another on the test seeds: first detection in metres, and collisions
     that a full scan prevents in points; None where they share no such seed.
     """
 
@@ -99,7 +99,7 @@ class WorldPlays(PolicyRows):
         return self._test.of(policy, budget) if policy else []
 
     def lead(self, ours: str, theirs: str, budget: float) -> Lead:
-        """What one policy has over another at a budget."""
+        """Return the lead of one policy over another at a budget."""
         a, b, full = (self.played(role, budget) for role in (ours, theirs, FULL))
         avoided = contrast_of_rows(AVOIDED, preventable(full, a), preventable(full, b))
         return Lead(contrast_of_rows(DETECTION, a, b), avoided)
@@ -262,7 +262,7 @@ def _share(which: Sequence[bool]) -> str:
 
 
 def _lead_table(world: WorldPlays) -> Table:
-    """What the answers rest on, budget by budget."""
+    """Return the evidence for the answers, budget by budget."""
     lines: list[TableRow] = []
     for question, ours, theirs in _PAIRS:
         leads = [world.lead(ours, theirs, budget) for budget in world.budgets]

@@ -172,7 +172,7 @@ def _fallback(study: VehicleRows) -> Table:
 
 
 def _cost(study: VehicleRows, group: Group, levels: Sequence[Variant]) -> Table:
-    """What it costs that the camera is away for a time, and throughout."""
+    """Return a table of the cost of losing the camera for a time, and throughout."""
     lines: list[TableRow] = []
     for policy in study.further(design.FALLBACK_POLICIES):
         cells = [study.of(group, level, policy) for level in levels]

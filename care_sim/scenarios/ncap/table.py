@@ -1,5 +1,4 @@
-"""What a Euro NCAP test is made of, who is met, on which way, and behind what; and the tests,
-number by number.
+"""Euro NCAP tests, number by number: who is met, on which way, and behind what.
 
 Pedestrians and bicyclists are those of the AEB/LSS VRU protocol v4.5.1 (implementation 2023), which
 gives the tests their names and has the turning ones; the car tests are those of the Crash Avoidance

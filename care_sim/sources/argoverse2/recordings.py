@@ -141,8 +141,8 @@ def argoverse2_film(log: Path, grid: AngularGrid | None = None, empty_boxes: boo
 
 
 def annotations_at(log: Path, sweep: int) -> Annotations:
-    """What is annotated of a log at the timestamp of a sweep and holds a recorded point, in the
-    frame of the LiDAR. Raises InvalidInput for tables that cannot be read.
+    """Return the annotations of a log at the timestamp of a sweep that hold a recorded point, in
+    the frame of the LiDAR. Raises InvalidInput for tables that cannot be read.
     """
     _, boxes, _ = _tables(log)
     bodies, holds = _bodies(boxes, sweep)

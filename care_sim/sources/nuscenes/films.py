@@ -217,8 +217,8 @@ def sweep_files(database: Database, scene: JsonRow, sweeps: int = 1) -> list[Pat
 
 @dataclass(frozen=True)
 class _SceneSetup:
-    """What holds for a whole scene: the LiDAR's frame in the car, the cameras, a number per
-    instance, and how it is filmed.
+    """Setup of a whole scene: the LiDAR's frame in the car, the cameras, a number per instance, and
+    how it is filmed.
     """
 
     database: Database

@@ -104,8 +104,8 @@ def cloud_of_points(cells: Cells, points: Floats, annotations: Annotations, sens
 
 
 def points_of_grid(points: Floats, grid: AngularGrid, beyond: bool = False) -> tuple[Cells, Floats]:
-    """Those of points (n, 3 or more) that a ray of `grid` could have returned, in the order of
-    their cells, and the cells first; or those `beyond` its reach.
+    """Return those of points (n, 3 or more) that a ray of `grid` could have returned, in the order
+    of their cells, and the cells first; or those `beyond` its reach.
     """
     ranges = np.linalg.norm(points[:, :3], axis=1)
     cells = grid.cells_of(points[:, :3])

@@ -1,4 +1,4 @@
-"""What a log holds: the times of its sweeps, and where the car was."""
+"""Logs: the times of their sweeps, and where the car was."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

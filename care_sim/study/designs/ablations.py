@@ -155,8 +155,8 @@ def ablation_plays(
 
 
 def _played(ablations: Sequence[Ablation], also: Sequence[str]) -> list[tuple[Variant, list[str]]]:
-    """What is played of each ablation: the policy itself at every level, and the others under the
-    conditions of the level, whose parameters they do not have.
+    """Return the variants and policies of each ablation: the policy itself at every level, and the
+    others under the conditions of the level, whose parameters they do not have.
     """
     played: list[tuple[Variant, list[str]]] = []
     for ablation in ablations:

@@ -36,8 +36,8 @@ class Fitting(NamedTuple):
 
 
 def fitting(sensor: str | SensorSetup, policies: Sequence[str] = FIRING_POLICIES) -> Fitting:
-    """What of the study fits a set-up: units that divide its grid and of which the least budget
-    buys one, and those of the `policies` that have no weights of another grid.
+    """Return the part of the study that fits a set-up: units that divide its grid and of which the
+    least budget buys one, and those of the `policies` that have no weights of another grid.
     """
 
     def tasks(policy: str, budget: float, firing: str = CELLS) -> list[EpisodeConfig]:

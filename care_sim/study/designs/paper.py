@@ -70,7 +70,7 @@ def paper_cells() -> frozenset[Key]:
 
 
 class DartoutResult(NamedTuple):
-    """What the paper reports of policies in the dart-out at 10%.
+    """Results of the paper for policies in the dart-out at 10%.
 
     First detection in metres; episodes of `PAPER_EPISODES` with braking; least distance of the
     centres in passing, in metres.
@@ -82,8 +82,8 @@ class DartoutResult(NamedTuple):
 
 
 class PublishedResult(NamedTuple):
-    """What the paper says of some cells of the study, and the sentence that says so; what it does
-    not tell is None.
+    """Results of the paper for some cells of the study, and the sentence that gives them; None
+    where the paper gives none.
 
     `detection_m` is the first detection in metres; in `braked` of `PAPER_EPISODES` the car braked;
     `relation` stands in the place of numbers. `faults`: the camera was impaired.
@@ -152,7 +152,7 @@ PUBLISHED_RESULTS = (
 def published_result(
     scenario: str, policy: str, budget: float, faults: bool
 ) -> PublishedResult | None:
-    """What the paper reports for a cell of its study, if anything."""
+    """Return the paper's result for a cell of its study, if any."""
     for result in PUBLISHED_RESULTS:
         about = (result.scenario, result.faults) == (scenario, faults)
         if about and policy in result.policies and budget in result.budgets:

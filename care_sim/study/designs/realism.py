@@ -102,7 +102,7 @@ class Headline(Group):
         return self.name.removesuffix("%").replace(", ", "-")
 
     def seeds(self, asked: Sequence[int]) -> list[int]:
-        """Those that it plays. Raises InvalidInput where they are of another split."""
+        """Return the seeds that it plays. Raises InvalidInput where they are of another split."""
         played = [seed + self.first_seed for seed in asked[: self.most_seeds]]
         split_of([*asked, *played])
         return played
@@ -189,7 +189,7 @@ def _fitting(
     place: Place | FilmPlace,
     tasks: Callable[[Variant], Sequence[RunConfig]],
 ) -> TriedOut[Variant]:
-    """Those of the `levels` whose `tasks` can begin. Raises InvalidInput where the ideal conditions
+    """Return the `levels` whose `tasks` can begin. Raises InvalidInput where the ideal conditions
     cannot be played.
     """
     for config in tasks(IDEAL):

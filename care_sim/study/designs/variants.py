@@ -1,4 +1,4 @@
-"""What a study varies: places, levels, and the keys of their rows. A design is a table of them."""
+"""Variants of a study: places, levels, and the keys of their rows. A design is a table of them."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -109,7 +109,7 @@ USUAL_VARIANT = Variant("usual")
 
 
 class TriedOut(NamedTuple, Generic[_Thing]):
-    """What can be played, and a line for each other thing."""
+    """Things that can be played, and a line for each other thing."""
 
     sound: list[_Thing]
     left_out: list[str]
@@ -121,8 +121,8 @@ def tried_out(
     where: str,
     label: Callable[[_Thing], str] = str,
 ) -> TriedOut[_Thing]:
-    """Those of the `things` whose `tasks` can begin: a budget may buy no unit of a hardware, a
-    set-up not be divided by it, a recording not tell what returned.
+    """Return the `things` whose `tasks` can begin: a budget may buy no unit of a hardware, a set-up
+    not be divided by it, a recording not say what returned.
     """
     found = TriedOut[_Thing]([], [])
     for thing in things:

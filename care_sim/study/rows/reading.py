@@ -1,4 +1,4 @@
-"""What rows say: their setting, their policy, and in the closed loop their first detection.
+"""Readings of rows: their setting, their policy, and in the closed loop their first detection.
 
 Rows of one world under the same conditions may be compared and form a `Setting`, in the closed and
 in the open loop; in it, the rows of a policy at a budget form a cell. Some columns are added when a
@@ -246,7 +246,7 @@ def detection(row: Row) -> Reading | None:
 
 
 def detections(rows: Sequence[Row]) -> list[Reading]:
-    """Those of all rows that have a first-sighting actor."""
+    """Return the first detections of all rows that have a first-sighting actor."""
     return [found for found in map(detection, rows) if found is not None]
 
 

@@ -1,4 +1,4 @@
-"""What the columns of results must be, so that every report can be made of them. They are checked
+"""Schema of the columns of results, so that every report can be made of them. Columns are checked
 when a file is opened.
 """
 
@@ -72,7 +72,7 @@ class Column:
         return _WRITTEN.get(self.kind, pa.float64())
 
     def faults(self, values: pa.ChunkedArray) -> Iterator[str]:
-        """What is wrong with the values of a file, if anything."""
+        """Yield the faults of a file's values."""
         if self.optional and values.null_count == len(values):
             # The type of an empty column carries no meaning: pandas and earlier versions write
             # numbers there.
@@ -149,7 +149,7 @@ class Schema:
     parts: Mapping[str, str] = field(default_factory=dict)
 
     def faults(self, table: pa.Table) -> Iterator[str]:
-        """What is wrong with a table, if anything."""
+        """Yield the faults of a table."""
         names = table.column_names
         if missing := sorted({*self.needed, *self._strata(names)} - {*names}):
             yield f"it lacks {', '.join(missing)}"
@@ -183,7 +183,7 @@ class Schema:
         return Schema({}, {**self.needed, **self.further})
 
     def column(self, name: str) -> Column:
-        """What a column must be; a sum of a stratum, where nothing else is said."""
+        """Return the rule for a column; a sum of a stratum, where nothing else is said."""
         if name.startswith(PARAMETERS):
             return {**self.further, **self.needed}.get(name, PARAMETER)
         return {**self.further, **self.needed}.get(name, TALLY)

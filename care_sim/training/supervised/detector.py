@@ -266,7 +266,7 @@ def _card(
     losses: list[float],
     result: dict[str, float] | None,
 ) -> dict[str, Any]:
-    """What the file says of itself; without a `result` nobody has checked the weights."""
+    """Return the card of the file; without a `result` nobody has checked the weights."""
     numbers = sum(array.size for array in network.arrays().values())
     parts = [losses[n : n + CURVE_STEPS] for n in range(0, len(losses), CURVE_STEPS)]
     told = scenes.told if scenes else _generated(made)
@@ -290,7 +290,7 @@ def _card(
 
 
 def _generated(made: DetectorConfig) -> dict[str, Any]:
-    """What the card says of generated worlds."""
+    """Return the part of the card about generated worlds."""
     fitted, apart = _checked(made)
     return {
         "data": "cluttered streets" if made.clutter else "generated streets and drives",
@@ -317,7 +317,7 @@ class Judged(NamedTuple):
 def scores_by_scan(
     network: "Learning", examples: list[Example], calibration: Floats = PLAIN
 ) -> list[Judged]:
-    """What the network makes of every example."""
+    """Return the network's detections in every example."""
     torch = import_torch()
     made = []
     for one in examples:

@@ -1,5 +1,5 @@
-"""What the learned detector learns from: scans of generated streets and drives, or of the scenes of
-a source, and what stood in them.
+"""Examples for the learned detector: scans of generated streets and drives, or of the scenes of a
+source, and the objects in them.
 
 Truth is used here, at training, and nowhere else.
 
@@ -182,8 +182,8 @@ def _by_ranges(env: AnyEnv, observation: Any, present: Annotations, full: bool) 
 
 
 def _handed(env: FilmEnv, _: Any, present: Annotations, full: bool) -> Example:
-    """What the detector was handed: points where they were measured, of all sweeps that the source
-    gathers. The source says on whom they lie: a real road is not level.
+    """Return what the detector received: points where they were measured, of all sweeps that the
+    source gathers. The source says on whom they lie: a real road is not level.
     """
     cloud = env.loop.handed
     seen = np.isin(present.objects, cloud.objects) & within_plan(present.boxes)
@@ -259,9 +259,9 @@ BOX_SHARE = 1.0
 
 
 class Targets(NamedTuple):
-    """Of s scans: `sure` (s, classes, CELLS, CELLS) bumps of height 1 at the centres, `boxes`
-    (s, BOX_OUTPUTS, CELLS, CELLS), and how much each cell's box counts, `weights` (s, 1, CELLS,
-    CELLS).
+    """Targets of s scans: `sure` (s, classes, CELLS, CELLS) bumps of height 1 at the centres,
+    `boxes` (s, BOX_OUTPUTS, CELLS, CELLS), and how much each cell's box counts, `weights` (s, 1,
+    CELLS, CELLS).
     """
 
     sure: NDArray[np.float32]
@@ -270,7 +270,7 @@ class Targets(NamedTuple):
 
 
 def targets_of(examples: list[Example]) -> Targets:
-    """What the network should answer."""
+    """Return the answers that the network should give."""
     s = len(examples)
     made = Targets(
         np.zeros((s, len(CLASSES), CELLS, CELLS), np.float32),

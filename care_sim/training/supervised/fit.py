@@ -1,5 +1,5 @@
-"""What every training on truth shares: its options, the loop over batches, the card and the last
-lines.
+"""Parts that every training on truth shares: its options, the loop over batches, the card and the
+last lines.
 """
 
 import shlex

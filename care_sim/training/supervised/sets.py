@@ -182,7 +182,7 @@ def _first_weights(torch: Any, places: int) -> dict[str, Any]:
 
 
 def _leave_out(torch: Any, arrays: dict[str, Any], without: Collection[str]) -> None:
-    """What is not kept becomes 0 and gets no gradient; a map without places is one number."""
+    """Set what is not kept to 0, without a gradient; a map without places is one number."""
     kept: Arrays = {}
     if "attention" in without:
         kept["value"] = np.zeros(1, np.float32)
@@ -259,7 +259,7 @@ def _card(
 
 
 def _generated(rounds: Sequence[Mapping[str, int]]) -> dict[str, Any]:
-    """What a card says of generated worlds."""
+    """Return the part of a card about generated worlds."""
     played = ", then ".join(
         ", ".join(f"{count} of {kind}" for kind, count in worlds.items()) for worlds in rounds
     )

@@ -1,5 +1,5 @@
-"""What the sets learn from: keyframes of drives, of tests of Euro NCAP and of generated streets, or
-of the scenes of a source.
+"""Examples for the sets: keyframes of drives, of tests of Euro NCAP and of generated streets, or of
+the scenes of a source.
 
 Truth is used here, at training, and nowhere else.
 

@@ -43,7 +43,7 @@ AnyEnv = FilmEnv | ClosedLoopEnv
 
 
 class Present(NamedTuple):
-    """What is there at the coming keyframe. Truth."""
+    """Objects at the coming keyframe. Truth."""
 
     objects: Integers
     """(n,) those that perception reports; in the closed loop an object is a body."""
@@ -56,8 +56,8 @@ class Present(NamedTuple):
 
 
 class World(NamedTuple):
-    """What is played to learn from it: the street, drive or test of a seed, or with a `film` what
-    that makes, the scene of a source. A `share` of its keyframes can become examples.
+    """World to learn from: the street, drive or test of a seed, or with a `film` the scene of a
+    source that it makes. A `share` of its keyframes can become examples.
     """
 
     kind: str
@@ -83,8 +83,8 @@ def plays(world: World, rng: np.random.Generator, faulty: bool = True) -> Iterat
 
 
 def keyframes(env: AnyEnv, policy: Policy, seed: int) -> Iterator[Belief]:
-    """What is known at every keyframe of a play, before its cells are chosen; `env` stands there
-    until the next one is asked for.
+    """Yield the belief at every keyframe of a play, before its cells are chosen; `env` stays there
+    until the next belief.
     """
     observation, _ = env.reset(seed=seed)
     policy.reset()
@@ -101,7 +101,7 @@ def kept(env: AnyEnv, rng: np.random.Generator, share: float = 1.0) -> bool:
 
 
 def present(loop: OpenLoop | ClosedLoop) -> Present:
-    """What is there at the coming keyframe. Truth."""
+    """Return the objects at the coming keyframe. Truth."""
     if isinstance(loop, OpenLoop):
         annotations, cloud = loop.shot.annotations, loop.shot.cloud.to_shots()
         return Present(annotations.objects, annotations.boxes, cloud.cells, cloud.objects)

@@ -43,7 +43,9 @@ def plate(
 
 
 def key(draw: ImageDraw.ImageDraw, at: tuple[int, int], colour: palette.Colour, words: str) -> int:
-    """What a colour means: a patch of it and words. Gives the column where the next may begin."""
+    """Draw the key of a colour: a patch of it and words. Returns the column where the next may
+    begin.
+    """
     x, y = at
     draw.rectangle((x, y, x + 14, y + 12), colour)
     write(draw, (x + 20, y - 2), words, 13, palette.FAINT_INK)

@@ -1,5 +1,5 @@
-"""What pictures show of the closed loop: the street from behind the car, with boxes, and what the
-cameras see.
+"""Pictures of the closed loop: the street from behind the car, with boxes, and the cameras'
+views.
 """
 
 from collections.abc import Sequence
@@ -39,7 +39,7 @@ _AHEAD_RAD = np.deg2rad(10.0)
 
 
 def cameras_picture(scene: BulletWorld, loop: ClosedLoop) -> Image.Image:
-    """What every camera sees, with its detections: those that a forecast explains in one colour,
+    """Draw every camera's view with its detections: those that a forecast explains in one colour,
     the others in another, and in a third, crossed out, those that show nothing.
 
     The picture of a single camera is as large as the camera's, within a picture of `BELOW_SIZE`,

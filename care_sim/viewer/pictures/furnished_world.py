@@ -59,7 +59,9 @@ def furnished(world: World) -> Iterator[BulletWorld]:
 
 
 def photograph(scene: BulletWorld, camera: PinholeCamera, sensor: Frame) -> Image.Image:
-    """What a camera on a sensor at the frame `sensor` sees, with sky and road behind it."""
+    """Return the picture of a camera on a sensor at the frame `sensor`, with sky and road behind
+    it.
+    """
     view = scene.colours(camera, sensor)
     empty = (view == _NOTHING).all(axis=2)
     return Image.fromarray(np.where(empty[..., None], backdrop(camera), view))

@@ -199,7 +199,9 @@ def draw_cells(
 
 
 def directions(grid: AngularGrid) -> list[tuple[float, str]]:
-    """What is named below the picture of a grid, at which share of its width."""
+    """Return the directions that are named below the picture of a grid, and at which share of its
+    width.
+    """
     # Left is left in the picture. Straight behind lies at both ends of a grid that goes all round.
     leftmost = grid.right + grid.field_of_view
     shares = [

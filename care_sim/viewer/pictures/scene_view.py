@@ -1,5 +1,5 @@
-"""What pictures show of the open loop: the scene from above, the car driving to the right, with who
-is found, and where it is known what the policy knew.
+"""Pictures of the open loop: the scene from above, the car driving to the right, with who is found,
+and if it is known what the policy knew.
 """
 
 from collections.abc import Sequence
@@ -195,7 +195,7 @@ class _Map:
             self.draw.ellipse(dot, None if misses else TRACK_COLOUR, TRACK_COLOUR)
 
     def name_sightings(self, situation: TrueSituation, keyframe: SceneKeyframe) -> None:
-        """Who appears, the nearest first, whose name keeps its place: a person is a few pixels
+        """Name whoever appears, the nearest first, at a place that stays: a person is a few pixels
         large. A film has no names: they hide who else is there.
         """
         labels = Labels(self.draw)

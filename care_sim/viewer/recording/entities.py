@@ -1,4 +1,4 @@
-"""What a recording holds: every entity with its content, unit and frame."""
+"""Entities of a recording: each with its content, unit and frame."""
 
 ABOUT_ENTITY = "about"
 """The page that says what a recording holds; every other entity is one of an episode."""

@@ -27,7 +27,7 @@ class Lane:
         self._counts: dict[str, int] = {}
 
     def at(self, keyframe: int, time_s: float) -> None:
-        """What is logged from now on belongs to this keyframe."""
+        """Log everything from now on at this keyframe."""
         self._stream.set_time(KEYFRAME, sequence=keyframe)
         self._stream.set_time(SECONDS, duration=time_s)
 

@@ -1,4 +1,4 @@
-"""What is logged as curves, states and words: the measures, the budget, what happened when."""
+"""Logs of curves, states and words: the measures, the budget, what happened when."""
 
 from collections.abc import Mapping
 from typing import Any

@@ -1,4 +1,4 @@
-"""What is logged in pictures: what the camera shows and detects, and the cells of the grid."""
+"""Logs of pictures: what the camera shows and detects, and the cells of the grid."""
 
 from collections.abc import Sequence
 from io import BytesIO

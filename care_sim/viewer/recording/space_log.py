@@ -1,4 +1,4 @@
-"""What is logged in space: bodies, the car and its path, returns, tracks, wedges."""
+"""Logs in space: bodies, the car and its path, returns, tracks, wedges."""
 
 import math
 
