@@ -164,6 +164,11 @@ GROUPS: dict[str, dict[str, Command]] = {
             "training.supervised.place:train_place",
             "Make the map of the control `place`.",
         ),
+        "train tuned-place": Command(
+            "training.supervised.options:TunedPlaceConfig",
+            "training.supervised.tuned_place:train_tuned_place",
+            "Make the map of the control `tuned-place`.",
+        ),
         "train detector": _own(
             "learning:TrainDetector",
             "train_on_films:train_detector",

@@ -14,7 +14,7 @@ from care_sim.base.errors import BrokenPolicy, InvalidInput, shown
 from care_sim.base.plugins import Plugins, refuse_link
 from care_sim.base.vectors import attribute_of_each, shared_attribute
 from care_sim.policies.base import Policy
-from care_sim.policies.controls.patterns import Fan, Place, Rows, Stride, Sweep
+from care_sim.policies.controls.patterns import Fan, Place, Rows, Stride, Sweep, TunedPlace
 from care_sim.policies.controls.patterns_and_tracks import HistoryPlace, HistoryRows, PlaceHulls
 from care_sim.policies.isolation import IsolatedMaker, are_isolated
 from care_sim.policies.learned.learned_scorer import LearnedScorer
@@ -86,6 +86,7 @@ BUILT_IN: dict[str, PolicyMaker | EntryPoint] = {
         Stride,
         Sweep,
         Place,
+        TunedPlace,
         HistoryRows,
         HistoryPlace,
         PlaceHulls,

@@ -54,6 +54,7 @@ UNFIT = {
 """What does not divide the grid."""
 OF_A_GRID = (
     "place",
+    "tuned-place",
     "place-hulls",
     "history-place",
     "learned-scorer",

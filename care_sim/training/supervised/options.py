@@ -32,6 +32,16 @@ class PlaceConfig:
 
 
 @dataclass(frozen=True)
+class TunedPlaceConfig:
+    """Make the map of `tuned-place` from streets of training seeds and write it."""
+
+    out: Path
+    """File to write."""
+    streets: int = bounded(60, 1, 10_000)
+    """Streets to tune it to."""
+
+
+@dataclass(frozen=True)
 class ScorerConfig(FitConfig):
     """Train `learned-scorer` on the 20 calibration streets, or in worlds that differ.
 

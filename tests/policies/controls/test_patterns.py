@@ -14,6 +14,7 @@ from care_sim.policies.controls.patterns import (
     Rows,
     Stride,
     Sweep,
+    TunedPlace,
     cells_by_row,
     entry_elevation_deg,
     likeliest_cells,
@@ -28,13 +29,14 @@ CONTROLS = [
     "stride",
     "sweep",
     "place",
+    "tuned-place",
     "history-rows",
     "history-place",
     "place-hulls",
     "learned-place",
     "history-learned-place",
 ]
-PATTERNS = [Rows, Fan, Stride, Sweep, Place]
+PATTERNS = [Rows, Fan, Stride, Sweep, Place, TunedPlace]
 GRID = AngularGrid()
 
 

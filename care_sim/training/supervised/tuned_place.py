@@ -1,0 +1,218 @@
+"""Make the map of the control `tuned-place`: the cells that detect most, one after the other.
+
+The map is tuned to the very counts by which allocators are compared: newcomers that emerge and that
+enter, objects kept, people kept. It is what a fixed pattern can reach, and no camera is needed.
+"""
+
+import time
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from care_sim.base.compiled import compiled
+from care_sim.base.files import ZIP, check_output
+from care_sim.base.seeds import TRAINING
+from care_sim.core.arrays import Floats, Integers
+from care_sim.core.grid import AngularGrid
+from care_sim.core.types import CLASSES
+from care_sim.evaluation.sightings import Sightings
+from care_sim.evaluation.strata import ENTRY, NEWCOMERS, strata
+from care_sim.loops.film import Film
+from care_sim.perception.measured.recall import recall
+from care_sim.perception.measured.tables import measurement
+from care_sim.policies.learned.weights import save_weights
+from care_sim.sources.street_films import street_film
+from care_sim.training.supervised.fit import card_of, one_by_one, print_end
+from care_sim.training.supervised.options import TunedPlaceConfig
+
+DETECTOR = "centerpoint"
+"""The detector whose recall says what a return is worth."""
+ENOUGH = 0.9
+"""The share of a full scan's count after which cells are no longer chosen for it."""
+MOST_SHARE = 0.35
+"""The share of the cells that are put in order; the others follow as the pattern `rows` has them.
+No budget of the comparison is larger than 20%."""
+MOST_RETURNS = 256
+"""More returns on an object add nothing."""
+_PEOPLE = [CLASSES.index(name) for name in ("bicycle", "pedestrian")]
+
+
+class Frames(NamedTuple):
+    """Objects at keyframes (o,): the cells (c,) that return from each, one object after the other,
+    with the `sizes` (o,); and of each its row in the table of chances and its `counts` (o, 4).
+    """
+
+    cells: Integers
+    sizes: Integers
+    chances: Integers
+    counts: Floats
+
+
+def train_tuned_place(config: TunedPlaceConfig) -> int:
+    """Make the map and write it; returns the exit code of the command."""
+    check_output(config.out, ZIP)
+    started = time.perf_counter()
+    seeds = one_by_one(range(TRAINING, TRAINING + config.streets), "training street")
+    frames = joined(frames_of(street_film(seed)) for seed in seeds)
+    grid = AngularGrid()
+    order, shares = tuned_order(frames, chance_table(), grid.size)
+    card = card_of(
+        "place",
+        scenario="CARE-Street-v0",
+        data=f"{len(frames.sizes)} objects at keyframes, tuned to four counts",
+        seeds={"train": [TRAINING, TRAINING + config.streets - 1]},
+    )
+    worth = np.zeros(grid.size, np.float32)
+    worth[order] = np.arange(len(order), 0, -1)
+    save_weights(config.out, {"sightings": worth.reshape(grid.shape)}, card)
+    names = (*NEWCOMERS, "kept", "people kept")
+    reached = {f"{name} at 10%": share for name, share in zip(names, shares, strict=True)}
+    print_end(config.out, started, reached, None, "run", str(config.out))
+    return 0
+
+
+def frames_of(film: Film) -> Frames:
+    """The objects of a film within the range that is scored, at every keyframe."""
+    annotated = [shot.annotations for shot in film.shots]
+    sightings = Sightings.of(film.name, annotated, hidden=film.hidden)
+    table = sightings.frames
+    entries = strata(sightings)[ENTRY]
+    is_new = np.zeros(len(table), bool)
+    is_new[sightings.events] = True
+    newcomers = [
+        is_new & np.any([entries[label] for label in labels], axis=0)
+        for labels in NEWCOMERS.values()
+    ]
+    people = np.isin(table.classes, _PEOPLE)
+    counts = np.stack([*newcomers, np.ones(len(table)), people], axis=1).astype(float)
+    cells = [*_cells_by_row(film, table.keyframes, table.objects)]
+    sizes = np.array([len(own) for own in cells], np.int64)
+    joined_cells = np.concatenate([np.empty(0, np.int64), *cells])
+    return Frames(joined_cells, sizes, 2 * table.classes + is_new, counts)
+
+
+def _cells_by_row(film: Film, keyframes: Integers, objects: Integers) -> Iterator[Integers]:
+    """The cells that return from each object at its keyframe; `keyframes` ascend."""
+    for keyframe, shot in enumerate(film.shots):
+        cloud = shot.cloud.to_shots()
+        for number in objects[keyframes == keyframe]:
+            yield np.unique(cloud.cells[cloud.objects == number])
+
+
+def joined(parts: Iterable[Frames]) -> Frames:
+    """The objects of all parts."""
+    return Frames(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+
+
+def chance_table() -> Floats:
+    """(2 * classes, MOST_RETURNS + 1) the chance that the detector reports an object of a class
+    with 0, 1, 2, ... returns: seen before, and in its first keyframe.
+    """
+    table = np.zeros((2 * len(CLASSES), MOST_RETURNS + 1))
+    known = measurement(DETECTOR).recall
+    for label, name in enumerate(CLASSES):
+        if known.known[label]:
+            returns = np.arange(MOST_RETURNS + 1) * known.worth[label]
+            table[2 * label] = recall(DETECTOR, name, returns)
+            table[2 * label + 1] = recall(DETECTOR, name, returns, np.zeros(len(returns)))
+    return table
+
+
+def tuned_order(frames: Frames, chances: Floats, size: int) -> tuple[Integers, Floats]:
+    """The cells of a grid of `size` cells, the next one always that which adds most to the four
+    counts, each as a share of a full scan's, up to `ENOUGH` of it; and the shares (4,) that the
+    first tenth of the grid reaches.
+    """
+    full = np.array(
+        [
+            frames.counts[:, n] @ chances[frames.chances, np.minimum(frames.sizes, MOST_RETURNS)]
+            for n in range(frames.counts.shape[1])
+        ]
+    )
+    # A count of which a full scan has nothing weighs nothing.
+    weights = np.divide(1.0, full, out=np.zeros_like(full), where=full > 0)
+    hits = _Hits.of(frames, size)
+    most = round(MOST_SHARE * size)
+    order, shares = _greedy(hits, frames.chances, chances, frames.counts * weights, most)
+    return order, shares[min(round(0.1 * size), most) - 1]
+
+
+class _Hits(NamedTuple):
+    """Which cell returns from which object: those of object o are cells[starts[o] : starts[o + 1]],
+    those of cell c owners[bounds[c] : bounds[c + 1]].
+    """
+
+    cells: Integers
+    starts: Integers
+    owners: Integers
+    bounds: Integers
+
+    @classmethod
+    def of(cls, frames: Frames, size: int) -> "_Hits":
+        owners = np.repeat(np.arange(len(frames.sizes)), frames.sizes)
+        by_cell = np.argsort(frames.cells, kind="stable")
+        bounds = np.searchsorted(frames.cells[by_cell], np.arange(size + 1))
+        starts = np.concatenate([[0], np.cumsum(frames.sizes)])
+        return cls(frames.cells, starts, owners[by_cell], bounds)
+
+
+@compiled()
+def _greedy(
+    hits: _Hits, rows: Integers, chances: Floats, counts: Floats, most: int
+) -> tuple[Integers, Floats]:
+    """The first `most` cells in their order, and the shares (most, 4) of the counts after each."""
+    returns = np.zeros(len(rows), np.int64)
+    wanted = np.ones(counts.shape[1])
+    order = np.empty(most, np.int64)
+    shares = np.zeros((most, len(wanted)))
+    reached = np.zeros(len(wanted))
+    worth = _worth(hits, rows, chances, counts @ wanted, returns)
+    has_enough = False
+    for n in range(most):
+        order[n] = best = worth.argmax()
+        for place in range(hits.bounds[best], hits.bounds[best + 1]):
+            o = hits.owners[place]
+            gain, further = _gains(chances[rows[o]], returns[o])
+            returns[o] += 1
+            reached += gain * counts[o]
+            change = (further - gain) * (counts[o] @ wanted)
+            for other in range(hits.starts[o], hits.starts[o + 1]):
+                worth[hits.cells[other]] += change
+        worth[best] = -np.inf
+        shares[n] = reached
+
+        # A count that has enough is no longer wanted. Once every one has, all are again, and the
+        # rest of the map adds to all of them.
+        still = reached < ENOUGH
+        if not has_enough and (still != (wanted > 0)).any():
+            has_enough = not still.any()
+            wanted = np.ones(len(wanted)) if has_enough else still.astype(np.float64)
+            anew = _worth(hits, rows, chances, counts @ wanted, returns)
+            worth = np.where(worth > -np.inf, anew, worth)
+    return order, shares
+
+
+@compiled()
+def _worth(
+    hits: _Hits, rows: Integers, chances: Floats, weights: Floats, returns: Integers
+) -> Floats:
+    """(N,) what one more return in each cell adds, where objects (o,) have `weights` and have had
+    `returns`.
+    """
+    worth = np.zeros(len(hits.bounds) - 1)
+    for o in range(len(rows)):
+        gain, _ = _gains(chances[rows[o]], returns[o])
+        for place in range(hits.starts[o], hits.starts[o + 1]):
+            worth[hits.cells[place]] += gain * weights[o]
+    return worth
+
+
+@compiled()
+def _gains(chances: Floats, returns: int) -> tuple[float, float]:
+    """What the next return adds to the chance of an object with so many, and what the one after
+    that.
+    """
+    last = len(chances) - 1
+    one, two, three = min(returns, last), min(returns + 1, last), min(returns + 2, last)
+    return chances[two] - chances[one], chances[three] - chances[two]
