@@ -24,7 +24,6 @@ from care_sim.perception.measured.recall import (
 )
 from care_sim.perception.measured.tables import (
     ERRORS,
-    NORMALS,
     WIDEST_NORMAL,
     Errors,
     Luck,
@@ -296,12 +295,22 @@ def _average(counts: Floats, weights: Floats, keyframe: int) -> float:
 
 
 @compiled()
+def _at_normal(normal: float, quantiles: Floats) -> float:
+    """The quantile at a standard normal, of quantiles at `NORMALS`, which are evenly spaced."""
+    steps = len(quantiles) - 1
+    place = (normal + WIDEST_NORMAL) / (2 * WIDEST_NORMAL) * steps
+    place = min(max(place, 0.0), float(steps))
+    first = min(int(place), steps - 1)
+    quantile: float = quantiles[first] + (place - first) * (quantiles[first + 1] - quantiles[first])
+    return quantile
+
+
+@compiled()
 def _misplace(box: Floats, label: int, returns: float, signals: Floats, table: Errors) -> None:
     """Give a box (7,) of an object with so many `returns` the errors that its `signals` have."""
     errors = np.empty(len(ERRORS))
     for place in range(len(ERRORS)):
-        normal = min(max(signals[FIRST_ERROR + place], -WIDEST_NORMAL), WIDEST_NORMAL)
-        errors[place] = np.interp(normal, NORMALS, table.quantiles[label, place])
+        errors[place] = _at_normal(signals[FIRST_ERROR + place], table.quantiles[label, place])
 
     # Errors were measured of boxes within 2 m of their objects.
     radial = errors[_RADIAL] * returns ** table.powers[label, 0]

@@ -16,7 +16,7 @@ import math
 import numpy as np
 
 from care_sim.base.compiled import compiled
-from care_sim.base.hashing import finalised
+from care_sim.base.hashing import mixed, normal
 from care_sim.core.arrays import Floats, Integers
 from care_sim.perception.measured.tables import SIGNALS, Luck
 
@@ -31,14 +31,8 @@ _CONSTANT = 2**20
 
 @compiled()
 def normal_of(seed: np.uint64, number: int, keyframe: int, channel: int) -> float:
-    """The standard normal of an object at a keyframe, by the method of Box and Muller."""
-    state = finalised(seed ^ np.uint64(number) * np.uint64(0x9E3779B97F4A7C15))
-    state = finalised(state + np.uint64(keyframe) * np.uint64(0xD1B54A32D192ED03))
-    state = finalised(state + np.uint64(channel) * np.uint64(0x9E3779B97F4A7C15))
-    # From above 0 to 1: its logarithm is finite.
-    first = (np.float64(state >> np.uint64(11)) + 1.0) / 2.0**53
-    second = np.float64(finalised(state + np.uint64(1)) >> np.uint64(11)) / 2.0**53
-    return math.sqrt(-2.0 * math.log(first)) * math.cos(2.0 * math.pi * second)
+    """The standard normal of an object at a keyframe."""
+    return normal(mixed(mixed(seed, number), keyframe), channel)
 
 
 @compiled()
