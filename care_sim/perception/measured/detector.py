@@ -15,7 +15,16 @@ from care_sim.core.rig import Rig
 from care_sim.core.types import Detections
 from care_sim.perception.matching import MATCH_M
 from care_sim.perception.measured.false_boxes import FalseBoxPopulation
-from care_sim.perception.measured.luck import CHANNELS, FIRST_ERROR, LUCK, TURNED, advance
+from care_sim.perception.measured.luck import (
+    CHANNELS,
+    FIRST_ERROR,
+    LUCK,
+    TURNED,
+    Memory,
+    Shares,
+    shares_of,
+    signal_of,
+)
 from care_sim.perception.measured.recall import (
     FIRST_HIT,
     effective_returns,
@@ -24,9 +33,9 @@ from care_sim.perception.measured.recall import (
 )
 from care_sim.perception.measured.tables import (
     ERRORS,
+    SIGNALS,
     WIDEST_NORMAL,
     Errors,
-    Luck,
     Measurement,
     Recall,
     measurement,
@@ -132,7 +141,7 @@ class MeasuredEpisode(Detector):
         self._angles = _angles(rig) if rules.worth is None else np.ones(len(self._heads))
         self._weights = _weights(measured, rules.first_hit, rig.keyframe_s, is_filmed)
         self._seed = seed.generate_state(1, np.uint64)[0]
-        self._keyframe_s = rig.keyframe_s
+        self._shares = shares_of(measured.luck, rig.keyframe_s, measured.flash_s)
         self._false = (
             FalseBoxPopulation(
                 measured, self._least, rig.grid, rig.sensor_height_m, rig.keyframe_s, seed
@@ -145,8 +154,7 @@ class MeasuredEpisode(Detector):
         self._rows: dict[int, int] = {}
         none = np.empty(0, np.int64)
         self._objects, self._places, self._ascending, self._ranks = none, none, none, none
-        self._last = none
-        self._processes = np.empty((0, CHANNELS))
+        self._memory = Memory(none, np.empty((0, len(SIGNALS)), np.int64), np.empty((0, CHANNELS)))
         self._counts = np.empty((0, len(self._weights)))
 
     def at(self, token: str | None, sensor: Frame) -> None:
@@ -157,16 +165,14 @@ class MeasuredEpisode(Detector):
         """See `care_sim.perception.points_only.Detector`."""
         self._meet(annotations.objects)
         rows, boxes, scores, returns = _detected(
-            (self._seed, self._keyframe, self._keyframe_s, self._measured.flash_s),
+            (self._seed, self._keyframe),
             (annotations.objects, annotations.classes, self._places),
             np.ascontiguousarray(annotations.boxes, float),
             (cloud.objects, self._ascending, self._ranks, max(len(cloud.poses), 1)),
             (np.append(np.searchsorted(cloud.cells, self._heads), len(cloud)), self._angles),
-            (self._last, self._processes, self._counts),
-            self._weights,
-            self._table,
-            self._measured.luck,
-            self._errors,
+            self._memory,
+            (self._counts, self._weights),
+            (self._table, self._shares, self._errors),
             (self._least, self._measured.most_score),
         )
         classes, objects = annotations.classes[rows], annotations.objects[rows]
@@ -192,9 +198,13 @@ class MeasuredEpisode(Detector):
         order = np.argsort(objects)
         self._objects, self._ascending = objects, objects[order]
         self._ranks = np.argsort(order)
-        if (new := len(known) - len(self._last)) > 0:
-            self._last = np.concatenate([self._last, np.full(new, -1)])
-            self._processes = np.concatenate([self._processes, np.zeros((new, CHANNELS))])
+        if (new := len(known) - len(self._counts)) > 0:
+            first, last, processes = self._memory
+            self._memory = Memory(
+                np.concatenate([first, np.full(new, self._keyframe)]),
+                np.concatenate([last, np.full((new, len(SIGNALS)), -1)]),
+                np.concatenate([processes, np.zeros((new, CHANNELS))]),
+            )
             self._counts = np.concatenate([self._counts, np.zeros((new, self._counts.shape[1]))])
 
 
@@ -216,48 +226,42 @@ def _angles(rig: Rig) -> Floats:
     return np.array(angles) / (usual.column_width * usual.row_height)
 
 
-Clock = tuple[np.uint64, int, float, float]
-"""The episode's seed, the keyframe, seconds between keyframes, and `flash_s`."""
-
-
 @compiled()
 def _detected(
-    clock: Clock,
+    clock: tuple[np.uint64, int],
     present: tuple[Integers, Integers, Integers],
     boxes: Floats,
     returned: tuple[Integers, Integers, Integers, int],
     heads: tuple[Integers, Floats],
-    memory: tuple[Integers, Floats, Floats],
-    weights: Floats,
-    table: Recall,
-    lasting: Luck,
-    errors: Errors,
+    memory: Memory,
+    gathered: tuple[Floats, Floats],
+    tables: tuple[Recall, Shares, Errors],
     bounds: tuple[float, float],
 ) -> tuple[Integers, Floats, Floats, Integers]:
     """The rows (k,) of the `present` objects that are reported, their boxes (k, 7) with errors,
     their scores (k,) within `bounds` and their returns (k,).
 
-    `present` are numbers, classes and rows of memory (n,) of objects with `boxes` (n, 7);
-    `returned` the objects of all returns (P,), the present ones in ascending order, the place of
-    each in it, and how many sweeps the returns are of. Of the `heads` (h,), bounds (h + 1,) say
-    which returns are whose, and angles (h,) what each counts. The `memory` (m,) is the last
-    keyframe of each object, its processes (m, CHANNELS), and its returns (m, k) at the last
-    keyframes, in the column of the keyframe modulo k; they have the `weights` (k,), newest first.
+    The `clock` holds the episode's seed and the keyframe. `present` are numbers, classes and rows
+    of memory (n,) of objects with `boxes` (n, 7); `returned` the objects of all returns (P,), the
+    present ones in ascending order, the place of each in it, and how many sweeps the returns are
+    of. Of the `heads` (h,), bounds (h + 1,) say which returns are whose, and angles (h,) what each
+    counts. `gathered` are returns (m, k) at the last keyframes, in the column of the keyframe
+    modulo k, and their weights (k,), newest first.
     """
-    objects, classes, places = present
+    (seed, keyframe), (objects, classes, places) = clock, present
     hits, ascending, ranks, sweeps = returned
-    last, processes, counts = memory
-    signals = advance(clock, objects, classes, places, last, processes, lasting)
-    kept, keyframe = len(weights), clock[1]
+    (counts, weights), (table, shares, errors) = gathered, tables
     by_rank, usual = np.zeros(len(ascending), np.int64), np.zeros(len(ascending))
     for head, angle in enumerate(heads[1]):
         own = count_hits(ascending, hits[heads[0][head] : heads[0][head + 1]])
         by_rank += own
         usual += angle * own
+    kept = len(weights)
     counts[:, keyframe % kept] = 0.0
     rows = np.empty(len(objects), np.int64)
     seen, scores = np.empty((len(objects), 7)), np.empty(len(objects))
     returns = np.empty(len(objects), np.int64)
+    signals = np.empty(len(SIGNALS))
     count = 0
     for n in range(len(objects)):
         label, place = classes[n], places[n]
@@ -272,12 +276,18 @@ def _detected(
             now * worth, average * worth, table.fall[label], table.most[label]
         )
         latent = latent_score(effective, label, table)
-        score = score_of(latent.mean + latent.spread * signals[n, LUCK], label, table, bounds[1])
+        luck = signal_of(seed, keyframe, objects[n], place, (label, LUCK), memory, shares)
+        score = score_of(latent.mean + latent.spread * luck, label, table, bounds[1])
         if score < bounds[0]:
             continue
+        for signal in range(TURNED, len(SIGNALS)):
+            own_place = label, signal
+            signals[signal] = signal_of(
+                seed, keyframe, objects[n], place, own_place, memory, shares
+            )
         rows[count], scores[count], returns[count] = n, score, by_rank[ranks[n]]
         seen[count] = boxes[n]
-        _misplace(seen[count], label, max(average * worth, 1.0), signals[n], errors)
+        _misplace(seen[count], label, max(average * worth, 1.0), signals, errors)
         count += 1
     return rows[:count], seen[:count], scores[:count], returns[:count]
 
