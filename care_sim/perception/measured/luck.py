@@ -41,7 +41,7 @@ class Shares(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """What is remembered of m objects."""
+    """The state of m objects."""
 
     first: Integers
     """(m,) the keyframe at which each is first annotated."""
