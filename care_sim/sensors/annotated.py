@@ -61,7 +61,8 @@ class Cloud:
     `intensities` (P,), 0 to 1, where pulses have strength (`care_sim.sensors.signal`) or a LiDAR
     recorded it, and `times` (P,), seconds from the keyframe, where they have their own
     (`care_sim.sensors.beams`). `shots` (P,) is how often a cell must be fired for each to return;
-    None where once is enough for all. `rings` (P,) number the lasers of a recorded LiDAR.
+    None where once is enough for all. `rings` (P,) number the lasers of a recorded LiDAR. `ranges`
+    (P,) are metres from the LiDAR, where `points` are not made.
 
     `far` are the returns of a recorded LiDAR from beyond the reach of the grid. A real detector
     gets them too, since it was trained with them; no ray, no proxy and no score counts them.
@@ -77,6 +78,7 @@ class Cloud:
     rings: Integers | None = None
     far: "Cloud | None" = None
     poses: tuple["SweepPose", ...] = ()
+    ranges: Floats | None = None
 
     def __len__(self) -> int:
         return len(self.cells)
@@ -155,9 +157,9 @@ def cloud_of(scan: Scan, objects: Integers, grid: Grid) -> Cloud:
 
 
 def pointless_cloud(scan: Scan, objects: Integers) -> Cloud:
-    """As `cloud_of`, with cells and objects alone: `points` is empty."""
+    """As `cloud_of`, with cells, objects and ranges alone: `points` is empty."""
     (rows,) = np.nonzero(np.isfinite(scan.ranges))
-    return Cloud(scan.cells[rows], np.empty((0, 3)), objects[rows])
+    return Cloud(scan.cells[rows], np.empty((0, 3)), objects[rows], ranges=scan.ranges[rows])
 
 
 def rings_of(cells: Cells, grid: Grid) -> Integers:

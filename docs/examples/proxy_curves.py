@@ -133,6 +133,7 @@ def main():
             cells = [f"{share:.0f} ({count:.0f})" for share, count in by_returns(own, kind)]
             print(f"| {name}, {scan} | " + " | ".join(cells) + " |")
         steps = np.array([least for least, _ in BINS])
+        print("| graded | " + " | ".join(f"{100 * chance(kind, n):.0f}" for n in steps) + " |")
         for name in MEASURED:
             worth = measurement(name).recall.worth[CLASSES.index(kind)]
             for label, before in (("steady", None), ("newcomers", 0)):

@@ -13,12 +13,17 @@ from care_sim.evaluation.sightings import RANGE_M
 from care_sim.perception.matching import UNSERVED, served_by
 from care_sim.sensors.annotated import Annotations
 
-KINDS = {"vehicle.car": "car", "human.pedestrian": "pedestrian"}
+KINDS = {
+    "vehicle.car": "car",
+    "human.pedestrian": "pedestrian",
+    "vehicle.truck": "truck",
+    "vehicle.bicycle": "bicycle",
+}
 OBJECT = [
     ("scene", "i4"), ("keyframe", "i4"), ("object", "i4"), ("label", "i4"), ("returns", "f8"),
     ("previous", "f8"), ("age", "i4"), ("score", "f8"),
 ]  # fmt: skip
-"""A row per car or person within 50 m, of a keyframe that is not the first of its scene: `previous`
+"""A row per object of `KINDS` within 50 m at every keyframe but the first of its scene: `previous`
 returns are 0 for a newcomer, and the `score` is 0 where nothing was reported."""
 
 

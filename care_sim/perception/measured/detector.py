@@ -6,43 +6,24 @@ from typing import ClassVar
 import numpy as np
 
 from care_sim.base.checks import check_flag, check_number
-from care_sim.base.compiled import compiled
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
 from care_sim.core.types import Detections
-from care_sim.perception.matching import MATCH_M
 from care_sim.perception.measured.false_boxes import FalseBoxPopulation
-from care_sim.perception.measured.luck import CHANNELS, FIRST_ERROR, LUCK, TURNED, advance
-from care_sim.perception.measured.recall import (
-    FIRST_HIT,
-    effective_returns,
-    latent_score,
-    score_of,
-)
-from care_sim.perception.measured.tables import (
-    ERRORS,
-    NORMALS,
-    WIDEST_NORMAL,
-    Errors,
-    Luck,
-    Measurement,
-    Recall,
-    measurement,
-)
+from care_sim.perception.measured.luck import CHANNELS, Memory, shares_of
+from care_sim.perception.measured.recall import FIRST_HIT
+from care_sim.perception.measured.reporting import report_objects
+from care_sim.perception.measured.tables import SIGNALS, Measurement, measurement
 from care_sim.perception.points_only import Detector
-from care_sim.perception.proxy import count_hits
 from care_sim.sensors.annotated import NO_OBJECT, Annotations, Cloud
 
 GATHERED_S = 1.0
 """In the closed loop, and in films with short keyframes, a detector that gathers ten sweeps has
 those of the last ten keyframes, of 0.1 s each. Of longer ones it has as many as fit in this time.
 """
-_WIDEST_M = MATCH_M * (1 - 1e-9)
-"""An error is at most as wide: rounded, a box at just MATCH_M lies beyond."""
-_RADIAL, _TANGENTIAL, _LENGTH, _WIDTH, _HEIGHT, _YAW = range(len(ERRORS))
 
 
 class MeasuredDetector(Detector):
@@ -105,7 +86,7 @@ class Megvii(MeasuredDetector):
 
 
 class PointRCNN(MeasuredDetector):
-    """PointRCNN as measured on KITTI, by returns: the harsh one; no trucks and no buses."""
+    """PointRCNN as measured on KITTI, by returns; no trucks and no buses."""
 
     name = "pointrcnn"
 
@@ -133,7 +114,7 @@ class MeasuredEpisode(Detector):
         self._angles = _angles(rig) if rules.worth is None else np.ones(len(self._heads))
         self._weights = _weights(measured, rules.first_hit, rig.keyframe_s, is_filmed)
         self._seed = seed.generate_state(1, np.uint64)[0]
-        self._keyframe_s = rig.keyframe_s
+        self._shares = shares_of(measured.luck, rig.keyframe_s, measured.flash_s)
         self._false = (
             FalseBoxPopulation(
                 measured, self._least, rig.grid, rig.sensor_height_m, rig.keyframe_s, seed
@@ -146,8 +127,7 @@ class MeasuredEpisode(Detector):
         self._rows: dict[int, int] = {}
         none = np.empty(0, np.int64)
         self._objects, self._places, self._ascending, self._ranks = none, none, none, none
-        self._last = none
-        self._processes = np.empty((0, CHANNELS))
+        self._memory = Memory(none, np.empty((0, len(SIGNALS)), np.int64), np.empty((0, CHANNELS)))
         self._counts = np.empty((0, len(self._weights)))
 
     def at(self, token: str | None, sensor: Frame) -> None:
@@ -157,17 +137,15 @@ class MeasuredEpisode(Detector):
     def detect(self, cloud: Cloud, annotations: Annotations) -> tuple[Detections, Integers]:
         """See `care_sim.perception.points_only.Detector`."""
         self._meet(annotations.objects)
-        rows, boxes, scores, returns = _detected(
-            (self._seed, self._keyframe, self._keyframe_s, self._measured.flash_s),
+        rows, boxes, scores, returns = report_objects(
+            (self._seed, self._keyframe),
             (annotations.objects, annotations.classes, self._places),
             np.ascontiguousarray(annotations.boxes, float),
             (cloud.objects, self._ascending, self._ranks, max(len(cloud.poses), 1)),
             (np.append(np.searchsorted(cloud.cells, self._heads), len(cloud)), self._angles),
-            (self._last, self._processes, self._counts),
-            self._weights,
-            self._table,
-            self._measured.luck,
-            self._errors,
+            self._memory,
+            (self._counts, self._weights),
+            (self._table, self._shares, self._errors),
             (self._least, self._measured.most_score),
         )
         classes, objects = annotations.classes[rows], annotations.objects[rows]
@@ -193,9 +171,13 @@ class MeasuredEpisode(Detector):
         order = np.argsort(objects)
         self._objects, self._ascending = objects, objects[order]
         self._ranks = np.argsort(order)
-        if (new := len(known) - len(self._last)) > 0:
-            self._last = np.concatenate([self._last, np.full(new, -1)])
-            self._processes = np.concatenate([self._processes, np.zeros((new, CHANNELS))])
+        if (new := len(known) - len(self._counts)) > 0:
+            first, last, processes = self._memory
+            self._memory = Memory(
+                np.concatenate([first, np.full(new, self._keyframe)]),
+                np.concatenate([last, np.full((new, len(SIGNALS)), -1)]),
+                np.concatenate([processes, np.zeros((new, CHANNELS))]),
+            )
             self._counts = np.concatenate([self._counts, np.zeros((new, self._counts.shape[1]))])
 
 
@@ -215,111 +197,3 @@ def _angles(rig: Rig) -> Floats:
     usual = AngularGrid()
     angles = [head.grid.column_width * head.grid.row_height for head in rig.grid.heads]
     return np.array(angles) / (usual.column_width * usual.row_height)
-
-
-Clock = tuple[np.uint64, int, float, float]
-"""The episode's seed, the keyframe, seconds between keyframes, and `flash_s`."""
-
-
-@compiled()
-def _detected(
-    clock: Clock,
-    present: tuple[Integers, Integers, Integers],
-    boxes: Floats,
-    returned: tuple[Integers, Integers, Integers, int],
-    heads: tuple[Integers, Floats],
-    memory: tuple[Integers, Floats, Floats],
-    weights: Floats,
-    table: Recall,
-    lasting: Luck,
-    errors: Errors,
-    bounds: tuple[float, float],
-) -> tuple[Integers, Floats, Floats, Integers]:
-    """The rows (k,) of the `present` objects that are reported, their boxes (k, 7) with errors,
-    their scores (k,) within `bounds` and their returns (k,).
-
-    `present` are numbers, classes and rows of memory (n,) of objects with `boxes` (n, 7);
-    `returned` the objects of all returns (P,), the present ones in ascending order, the place of
-    each in it, and how many sweeps the returns are of. Of the `heads` (h,), bounds (h + 1,) say
-    which returns are whose, and angles (h,) what each counts. The `memory` (m,) is the last
-    keyframe of each object, its processes (m, CHANNELS), and its returns (m, k) at the last
-    keyframes, in the column of the keyframe modulo k; they have the `weights` (k,), newest first.
-    """
-    objects, classes, places = present
-    hits, ascending, ranks, sweeps = returned
-    last, processes, counts = memory
-    signals = advance(clock, objects, classes, places, last, processes, lasting)
-    kept, keyframe = len(weights), clock[1]
-    by_rank, usual = np.zeros(len(ascending), np.int64), np.zeros(len(ascending))
-    for head, angle in enumerate(heads[1]):
-        own = count_hits(ascending, hits[heads[0][head] : heads[0][head + 1]])
-        by_rank += own
-        usual += angle * own
-    counts[:, keyframe % kept] = 0.0
-    rows = np.empty(len(objects), np.int64)
-    seen, scores = np.empty((len(objects), 7)), np.empty(len(objects))
-    returns = np.empty(len(objects), np.int64)
-    count = 0
-    for n in range(len(objects)):
-        label, place = classes[n], places[n]
-        now = usual[ranks[n]] / sweeps
-        counts[place, keyframe % kept] = now
-        average = now if sweeps > 1 else _average(counts[place], weights, keyframe)
-        # Nothing comes from nothing, though the fitted curve has a share at 0.
-        if not table.known[label] or now + average <= 0:
-            continue
-        worth = table.worth[label]
-        effective = effective_returns(
-            now * worth, average * worth, table.fall[label], table.most[label]
-        )
-        latent = latent_score(effective, label, table)
-        score = score_of(latent.mean + latent.spread * signals[n, LUCK], label, table, bounds[1])
-        if score < bounds[0]:
-            continue
-        rows[count], scores[count], returns[count] = n, score, by_rank[ranks[n]]
-        seen[count] = boxes[n]
-        _misplace(seen[count], label, max(average * worth, 1.0), signals[n], errors)
-        count += 1
-    return rows[:count], seen[:count], scores[:count], returns[:count]
-
-
-@compiled()
-def _average(counts: Floats, weights: Floats, keyframe: int) -> float:
-    """The returns of an object per sweep. At the start there are fewer sweeps than the detector
-    gathers; detectors fill up with those that there are.
-    """
-    total, weight = 0.0, 0.0
-    for age in range(min(len(weights), keyframe + 1)):
-        total += weights[age] * counts[(keyframe - age) % len(weights)]
-        weight += weights[age]
-    return total / weight if weight > 0 else counts[keyframe % len(weights)]
-
-
-@compiled()
-def _misplace(box: Floats, label: int, returns: float, signals: Floats, table: Errors) -> None:
-    """Give a box (7,) of an object with so many `returns` the errors that its `signals` have."""
-    errors = np.empty(len(ERRORS))
-    for place in range(len(ERRORS)):
-        normal = min(max(signals[FIRST_ERROR + place], -WIDEST_NORMAL), WIDEST_NORMAL)
-        errors[place] = np.interp(normal, NORMALS, table.quantiles[label, place])
-
-    # Errors were measured of boxes within 2 m of their objects.
-    radial = errors[_RADIAL] * returns ** table.powers[label, 0]
-    across = errors[_TANGENTIAL] * returns ** table.powers[label, 1]
-    size = math.hypot(radial, across)
-    if size > _WIDEST_M:
-        radial, across = radial * _WIDEST_M / size, across * _WIDEST_M / size
-    away = max(math.hypot(box[0], box[1]), 1e-6)
-    cos, sin = box[0] / away, box[1] / away
-    box[0] += cos * radial - sin * across
-    box[1] += sin * radial + cos * across
-
-    # A box keeps standing on the ground.
-    box[2] -= box[5] / 2
-    box[3] *= math.exp(errors[_LENGTH])
-    box[4] *= math.exp(errors[_WIDTH])
-    box[5] *= math.exp(errors[_HEIGHT])
-    box[2] += box[5] / 2
-    box[6] += min(max(errors[_YAW], -math.pi / 2), math.pi / 2)
-    if signals[TURNED] < table.turned_below[label]:
-        box[6] += math.pi

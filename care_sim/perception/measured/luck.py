@@ -7,16 +7,16 @@ of `care_sim.perception.measured.tables.SIGNALS` is
     sqrt(stays) * constant + sqrt(decays) * slow + sqrt(1 - stays - decays) * quick,
 
 where `slow` decays in the measured time and `quick` in `flash_s`. Both follow an autoregressive
-process of first order, which is advanced at every keyframe at which the object is annotated,
-detected or not.
+process of first order from the keyframe on at which the object is first annotated. A signal that no
+keyframe needs is advanced later, by the same steps.
 """
 
-import math
+from typing import NamedTuple
 
 import numpy as np
 
 from care_sim.base.compiled import compiled
-from care_sim.base.hashing import finalised
+from care_sim.base.hashing import mixed, normal
 from care_sim.core.arrays import Floats, Integers
 from care_sim.perception.measured.tables import SIGNALS, Luck
 
@@ -29,57 +29,67 @@ _CONSTANT = 2**20
 """A keyframe that no episode reaches, whose normals are those that stay."""
 
 
-@compiled()
-def normal_of(seed: np.uint64, number: int, keyframe: int, channel: int) -> float:
-    """The standard normal of an object at a keyframe, by the method of Box and Muller."""
-    state = finalised(seed ^ np.uint64(number) * np.uint64(0x9E3779B97F4A7C15))
-    state = finalised(state + np.uint64(keyframe) * np.uint64(0xD1B54A32D192ED03))
-    state = finalised(state + np.uint64(channel) * np.uint64(0x9E3779B97F4A7C15))
-    # From above 0 to 1: its logarithm is finite.
-    first = (np.float64(state >> np.uint64(11)) + 1.0) / 2.0**53
-    second = np.float64(finalised(state + np.uint64(1)) >> np.uint64(11)) / 2.0**53
-    return math.sqrt(-2.0 * math.log(first)) * math.cos(2.0 * math.pi * second)
+class Shares(NamedTuple):
+    """How `SIGNALS` are made at keyframes of a length; c classes."""
+
+    kept: Floats
+    """(c, 16) what a keyframe leaves of the slow process and of the quick one of each signal."""
+    fresh: Floats
+    """(c, 16) the weight of the normals that are added to them."""
+    weights: Floats
+    """(c, 8, 3) the weights of the constant, the slow and the quick part of each signal."""
+
+
+class Memory(NamedTuple):
+    """The state of m objects."""
+
+    first: Integers
+    """(m,) the keyframe at which each is first annotated."""
+    last: Integers
+    """(m, 8) the keyframe to which each signal is advanced, -1 before the first time."""
+    processes: Floats
+    """(m, CHANNELS)"""
+
+
+def shares_of(luck: Luck, keyframe_s: float, flash_s: float) -> Shares:
+    """The shares of a detector, for keyframes of a length."""
+    lasts = np.stack([luck.decay_s, np.full_like(luck.decay_s, flash_s)], axis=2)
+    kept = np.where(lasts > 0, np.exp(-keyframe_s / np.maximum(lasts, 1e-9)), 0.0)
+    new = np.maximum(1 - luck.stays - luck.decays, 0.0)
+    weights = np.sqrt(np.stack([luck.stays, luck.decays, new], axis=2))
+    flat = kept.reshape(len(kept), -1)
+    return Shares(flat, np.sqrt(1 - flat**2), weights)
 
 
 @compiled()
-def advance(
-    clock: tuple[np.uint64, int, float, float],
-    objects: Integers,
-    classes: Integers,
-    rows: Integers,
-    last: Integers,
-    processes: Floats,
-    table: Luck,
-) -> Floats:
-    """(n, 8) the `SIGNALS` of annotated `objects` (n,) of `classes` (n,) at a keyframe, standard
-    normals. The `clock` holds the episode's seed, the keyframe, seconds between keyframes, and
-    seconds of the quick ones.
-
-    `rows` (n,) are their places in `last` (m,), the keyframe at which each was annotated before or
-    -1, and in `processes` (m, CHANNELS), which are advanced.
+def signal_of(
+    seed: np.uint64,
+    keyframe: int,
+    number: int,
+    row: int,
+    place: tuple[int, int],
+    memory: Memory,
+    shares: Shares,
+) -> float:
+    """One of the `SIGNALS` of an object at a keyframe, a standard normal: `number` is that of the
+    object, `row` its place in the `memory`, which is advanced, and `place` its class and the
+    signal.
     """
-    seed, keyframe, keyframe_s, flash_s = clock
-    signals = np.empty((len(objects), len(SIGNALS)))
-    for n in range(len(objects)):
-        row, label = rows[n], classes[n]
-        begins = last[row] < 0
-        elapsed_s = (keyframe - last[row]) * keyframe_s
-        for signal in range(len(SIGNALS)):
-            slow, quick = 2 * signal, 2 * signal + 1
-            for channel in (slow, quick):
-                lasts_s = table.decay_s[label, signal] if channel == slow else flash_s
-                kept = 0.0 if begins or lasts_s <= 0 else math.exp(-elapsed_s / lasts_s)
-                processes[row, channel] = kept * processes[row, channel] + math.sqrt(
-                    1.0 - kept * kept
-                ) * normal_of(seed, objects[n], keyframe, channel)
-            constant = 2 * len(SIGNALS) + signal
-            if begins:
-                processes[row, constant] = normal_of(seed, objects[n], _CONSTANT, slow)
-            stays, decays = table.stays[label, signal], table.decays[label, signal]
-            signals[n, signal] = (
-                math.sqrt(stays) * processes[row, constant]
-                + math.sqrt(decays) * processes[row, slow]
-                + math.sqrt(max(1.0 - stays - decays, 0.0)) * processes[row, quick]
-            )
-        last[row] = keyframe
-    return signals
+    label, signal = place
+    own, constant = memory.processes[row], 2 * len(SIGNALS) + signal
+    key, slow = mixed(seed, number), 2 * signal
+    first = memory.last[row, signal] + 1
+    if first == 0:
+        own[constant] = normal(mixed(key, _CONSTANT), slow)
+        first = memory.first[row]
+    for step in range(first, keyframe + 1):
+        now = mixed(key, step)
+        for channel in (slow, slow + 1):
+            begins = step == memory.first[row]
+            kept = 0.0 if begins else shares.kept[label, channel]
+            fresh = 1.0 if begins else shares.fresh[label, channel]
+            own[channel] = kept * own[channel] + fresh * normal(now, channel)
+    memory.last[row, signal] = keyframe
+    weights = shares.weights[label, signal]
+    total: float = weights[0] * own[constant] + weights[1] * own[slow] + weights[2] * own[slow + 1]
+    return total

@@ -97,7 +97,7 @@ def recall(
     `name` is the class, `returns` (n,) are the returns on each object in the keyframe's sweep of
     the detector's own sensor, and `previous` (n,) those a keyframe (0.5 s) ago, 0 for a newcomer;
     without them the returns are steady. For `pointrcnn` returns are rays of an HDL-64 that stop at
-    the object's box, and `previous` counts nothing. `score` is in the detector's own scale, its
+    the object's body, and `previous` counts nothing. `score` is in the detector's own scale, its
     `track_score` unless given. An object without a return in either keyframe is not reported; with
     `from_nothing` it has the fitted share, which also covers returns of sweeps between keyframes.
     Raises InvalidInput for another detector or class, and for a score that is not in the table.

@@ -1,0 +1,204 @@
+"""Candidates for false boxes: they are born, stay where they are in the world, and end.
+
+The whole world holds candidates of even density. The episode's seed, the tile and the keyframe
+alone draw them: every car meets the same ones at the same place and time. A part of each class
+lasts (`lasting`, `lasts_s`), the rest is there for `flash_s`. Each candidate has a rank from 0 to
+1. It is a false box while its rank is below the density of its class at its distance, divided by
+the highest density of the class. So the car meets the measured density at every distance, on all
+sides, at any speed.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from care_sim.base.compiled import compiled
+from care_sim.base.hashing import mixed, normal, uniform
+from care_sim.core.arrays import Floats, Integers
+from care_sim.perception.measured.tables import FalseBoxes, Measurement
+
+RING_M = 10.0
+"""Distances are known by rings of so many metres."""
+REACH_M = 50.0
+"""No false box was counted beyond."""
+TILE_M = 20.0
+"""The side of a tile. Candidates are made for tiles within reach."""
+LABEL, X, Y, SCORE, LAST, AHEAD, RANK, KIND = 0, 1, 2, 8, 9, 10, 11, 12
+"""Columns of a table of candidates (n, 13): class, world box (7) without its height above the road,
+score, last keyframe, a number below `kept_ahead` where the box may be on the road ahead, rank, row
+of `Kinds`."""
+COLUMNS = KIND + 1
+
+Place = tuple[float, float]
+"""World x and y, metres."""
+Tile = tuple[int, int]
+
+
+class Kinds(NamedTuple):
+    """The candidates by kind, which is a class and whether they last; k kinds."""
+
+    labels: Integers
+    means: Floats
+    """(2, k) candidates per tile: those of the first keyframe, and those that are born at a later
+    one. Cumulative over the kinds."""
+    lives: Floats
+    """(k,) mean lives in keyframes."""
+    shares: Floats
+    """(k, rings) densities by distance, as shares of the highest one."""
+    scores: Floats
+    """(k, m) ascending scores."""
+    logs: Floats
+    """(k, m) logarithm of the number from each of the scores on; -inf where a kind has fewer."""
+    log_sizes: Floats
+    """(k, 3, 2) mean and spread of the logarithms of length, width and height."""
+
+
+def kinds_of(measured: Measurement, least_score: float, keyframe_s: float) -> Kinds:
+    """The kinds of a detector with scores of `least_score` or more, by keyframes of a length."""
+    kinds = [_from(one, least_score) for one in measured.false_boxes]
+    known = [one for one in kinds if one is not None]
+    lasting = np.array([one.lasting for one in known])
+    lives = np.array([one.lasts_s for one in known])
+    areas = np.pi * RING_M**2 * (2 * np.arange(len(known[0].distances)) + 1) if known else 1.0
+    densities = np.array([one.distances for one in known]).reshape(len(known), -1) / areas
+    most = densities.max(axis=1, initial=1e-12)
+    around = 360.0 / measured.view_deg
+    means = np.array([one.rates[0, 1] for one in known]) * around * most * TILE_M**2
+    # Both kinds of each class: those that last, then the others. As many are born as end.
+    means = np.concatenate([means * lasting, means * (1 - lasting)])
+    lives = np.concatenate([lives, np.full(len(lives), measured.flash_s)]) / keyframe_s
+    ends = 1 - np.exp(-1 / np.maximum(lives, 1e-9))
+    longest = max((len(one.rates) for one in known), default=1)
+    table = np.full((2, len(known), longest), -np.inf)
+    for row, one in enumerate(known):
+        table[0, row, : len(one.rates)] = one.rates[:, 0]
+        table[1, row, : len(one.rates)] = np.log(one.rates[:, 1])
+    return Kinds(
+        np.tile([one.label for one in known], 2).astype(np.int64),
+        np.cumsum([means, means * ends], axis=1),
+        lives,
+        np.tile(densities / most[:, None], (2, 1)),
+        np.tile(table[0], (2, 1)),
+        np.tile(table[1], (2, 1)),
+        np.tile(np.array([one.log_sizes for one in known]).reshape(-1, 3, 2), (2, 1, 1)),
+    )
+
+
+def _from(kind: FalseBoxes, least_score: float) -> FalseBoxes | None:
+    """The kind with rates from `least_score` on; None where there are none."""
+    scores, rates = kind.rates.T
+    if least_score > scores[-1]:
+        return None
+    least = np.exp(np.interp(least_score, scores, np.log(rates)))
+    higher = kind.rates[scores > least_score]
+    if not len(higher):
+        return None
+    return kind._replace(rates=np.concatenate([[[least_score, least]], higher]))
+
+
+@compiled()
+def advance_candidates(
+    table: Floats, seed: np.uint64, keyframe: int, place: Place, before: Place, kinds: Kinds
+) -> Floats:
+    """The candidates (n, 13) of a keyframe within reach of a sensor at a `place`, from those of the
+    keyframe before, when it was at another one (nan at the start).
+    """
+    living, count = np.empty((2 * len(table) + 16, COLUMNS)), 0
+    for row in table:
+        tile = math.floor(row[X] / TILE_M), math.floor(row[Y] / TILE_M)
+        if row[LAST] >= keyframe and _is_near(tile, place):
+            living[count] = row
+            count += 1
+    if not len(kinds.labels):
+        return living[:0]
+    across, along = _tiles(place[0]), _tiles(place[1])
+    for i in range(across[0], across[1]):
+        for j in range(along[0], along[1]):
+            if _is_near((i, j), place):
+                # A tile that comes within reach has had its births since the episode began.
+                first = keyframe if _is_near((i, j), before) else 0
+                living, count = _add_births(living, count, seed, (i, j), (first, keyframe), kinds)
+    return living[:count]
+
+
+@compiled()
+def _add_births(
+    living: Floats, count: int, seed: np.uint64, tile: Tile, time: tuple[int, int], kinds: Kinds
+) -> tuple[Floats, int]:
+    """Add a tile's candidates that are born from the first keyframe of `time` to the last one, and
+    alive at the last one, to the `count` in a table. Returns the table, or a longer one.
+    """
+    first, keyframe = time
+    key = mixed(mixed(seed, tile[0] + 2**40), tile[1] + 2**40)
+    for born in range(first, keyframe + 1):
+        now = mixed(key, born)
+        means = kinds.means[min(born, 1)]
+        for birth in range(_poisson(uniform(now, 0), means[-1])):
+            own = mixed(now, birth + 1)
+            kind = np.searchsorted(means, uniform(own, 0) * means[-1])
+            # It is there now, and as long as its exponential life lasts.
+            last = born + math.floor(-kinds.lives[kind] * math.log(uniform(own, 1)))
+            if last < keyframe:
+                continue
+            if count == len(living):
+                living = np.concatenate((living, np.empty_like(living)))
+            _fill(living[count], own, tile, kind, kinds)
+            living[count, LAST] = last
+            count += 1
+    return living, count
+
+
+@compiled()
+def _tiles(along: float) -> tuple[int, int]:
+    """The first tile within reach along an axis, and the first one beyond."""
+    first, last = (along - REACH_M) / TILE_M, (along + REACH_M) / TILE_M
+    return math.floor(first), math.floor(last) + 1
+
+
+@compiled()
+def _is_near(tile: Tile, place: Place) -> bool:
+    """Whether a part of a tile is within reach of a place; False of nan."""
+    x = max(tile[0] * TILE_M - place[0], place[0] - (tile[0] + 1) * TILE_M, 0.0)
+    y = max(tile[1] * TILE_M - place[1], place[1] - (tile[1] + 1) * TILE_M, 0.0)
+    return place[0] == place[0] and x * x + y * y <= REACH_M * REACH_M
+
+
+@compiled()
+def _poisson(share: float, mean: float) -> int:
+    """The number of a Poisson distribution at the quantile `share`."""
+    chance, count = math.exp(-mean), 0
+    total = chance
+    while share > total and count < 1000:
+        count += 1
+        chance *= mean / count
+        total += chance
+    return count
+
+
+@compiled()
+def _fill(row: Floats, key: np.uint64, tile: Tile, kind: int, kinds: Kinds) -> None:
+    """Draw a candidate of a tile into its row; uniform numbers 0 and 1 of its key are taken."""
+    row[LABEL], row[KIND] = kinds.labels[kind], kind
+    row[X] = (tile[0] + uniform(key, 2)) * TILE_M
+    row[Y] = (tile[1] + uniform(key, 3)) * TILE_M
+    row[3] = 0.0
+    for side in range(3):
+        mean, spread = kinds.log_sizes[kind, side]
+        row[4 + side] = math.exp(mean + spread * normal(key, 4 + side))
+    row[7] = 2 * math.pi * uniform(key, 4)
+    row[SCORE] = _score_at(kinds.scores[kind], kinds.logs[kind], uniform(key, 5))
+    row[RANK], row[AHEAD] = uniform(key, 6), uniform(key, 7)
+
+
+@compiled()
+def _score_at(scores: Floats, logs: Floats, share: float) -> float:
+    """The score from which on there is a `share` of all boxes. Between two scores, and beyond the
+    last, the logarithm of the number is a line.
+    """
+    wanted, place = math.log(share) + logs[0], 0
+    while place + 2 < len(scores) and logs[place + 1] > wanted and logs[place + 2] > -math.inf:
+        place += 1
+    part = (wanted - logs[place]) / (logs[place + 1] - logs[place])
+    score: float = scores[place] + part * (scores[place + 1] - scores[place])
+    return score
