@@ -95,7 +95,7 @@ def simulated(told, numbers, seed):
     labels, _ = as_labels(told)
     rng = np.random.default_rng(seed)
     false = Chance(
-        np.uint64(rng.integers(2**63)),
+        *rng.integers(2**63, size=2).astype(np.uint64),
         np.zeros((len(labels.kinds), PAIRS * MOST), np.int64),
         np.zeros((told.count, 3 * MOST), np.int64),
     )

@@ -103,7 +103,7 @@ class KittiDetector:
         self._keyframe += 1
         luck, edges = self._luck.next()[:, 0], self._edges.next()
         key = np.uint64(key_of(self._key, self._keyframe, 0, 0))
-        false = Chance(self._false_key, self._beside.next(), self._scene.next())
+        false = Chance(self._false_key, key, self._beside.next(), self._scene.next())
         draws = Draws(luck, edges, key, false)
 
         places = self._order[np.searchsorted(self._objects, seen.objects, sorter=self._order)]
@@ -237,14 +237,15 @@ def _add_found(
     numbers: Numbers,
     into: Boxes,
 ) -> int:
-    """Fill the rows `own` of `erring` (n, 4) with the objects' boxes after errors, and `into` with
-    the found ones, the surest first; return how many.
+    """Fill `into` with the found objects' boxes after errors, the surest first, and the rows `own`
+    of `erring` (n, 4) with them, or the labels' boxes of missed ones; return how many are found.
     """
     count = 0
     for place in surest_of(scores[own]):
         i = own[place]
-        _lay_own(labels, i, scores[i], count, picture, draws, numbers, into, erring[i])
+        copy_box(labels.boxes[i], erring[i])
         if scores[i] > 0:
+            _lay_own(labels, i, scores[i], count, picture, draws, numbers, into, erring[i])
             into.classes[count], into.scores[count] = labels.classes[i], scores[i]
             into.sources[count] = i
             copy_box(erring[i], into.edges[count])
@@ -264,7 +265,7 @@ def _lay_own(
     shown: Boxes,
     into: Floats,
 ) -> None:
-    """Fill `into` (4,) with an object's box after errors. They are drawn again while the box would
+    """Let an object's box `into` (4,) err. Errors are drawn again while the box would
     not count as the object's, or one of the `surer` boxes shown of its class suppresses it.
     """
     place, label = labels.places[i], labels.boxes[i]
@@ -272,7 +273,6 @@ def _lay_own(
     key = key_of(draws.key, place, 1, 0)
     normals, trial = np.empty(EDGES), np.empty(EDGES)
     copy_box(draws.edges[place], normals)
-    copy_box(label, into)
     has_one = False
     for t in range(TRIES):
         if t:
@@ -281,9 +281,7 @@ def _lay_own(
         if not resembles(trial, label):
             continue
         most = numbers.suppression_iou
-        covered = score > 0 and overlaps_any(
-            trial, labels.classes[i], shown.edges, shown.classes, surer, most
-        )
+        covered = overlaps_any(trial, labels.classes[i], shown.edges, shown.classes, surer, most)
         if not (covered and has_one):
             copy_box(trial, into)
         has_one = True

@@ -3,7 +3,8 @@
 Beside an object, found or not, their number depends on its height, occlusion, cover and neighbours;
 place and size are relative to the box that the detector makes of the object, whose errors they
 share. Those of the background have places and sizes of their own. Both are mixtures of normal
-distributions with independent columns.
+distributions with independent columns. The lower edge of both is counted from where a box of that
+size would end that stands on the road as objects do: real false boxes follow the road.
 """
 
 import math
@@ -37,13 +38,19 @@ EDGE_PX = 20.0, 36.0, 23.0
 FITTED_HALF_PX, FITTED_BELOW_PX = 621.0, 202.1
 """Half the width of KITTI's pictures, and how far they reach below the horizon."""
 
+USUAL_LOWS = 1.08, 0.94, 0.94
+"""Means of `low_of` of the three kinds on KITTI: the camera's height, 1.65 m, over theirs."""
+
 _KINDS = tuple(KINDS.tolist())
 
 
 class Chance(NamedTuple):
-    """What false boxes are drawn from: a `key`, and the keyframe since which each lasts."""
+    """What false boxes are drawn from: a `key`, a key of the keyframe (`now`), and the keyframe
+    since which each lasts.
+    """
 
     key: np.uint64
+    now: np.uint64
     beside: Integers
     """(objects, PAIRS * MOST)."""
     scene: Integers
@@ -87,8 +94,9 @@ def add_beside(
                 key = key_of(chance.key, place, slot, chance.beside[place, slot])
                 if uniform(key, 0) >= _further(rate, n):
                     break
+                keys = key, key_of(chance.now, place, slot, 2)
                 if _place_beside(
-                    labels, own, i, pair, key, reported, picture, numbers, into, count
+                    labels, own, i, pair, keys, reported, picture, numbers, into, count
                 ):
                     count += 1
             turn += 1
@@ -98,21 +106,50 @@ def add_beside(
 @compiled()
 def _rate(labels: Labels, own: Integers, i: int, coefficients: Floats) -> float:
     """Mean number of false boxes beside an object."""
-    box = labels.boxes[i]
+    rate = coefficients[0]
+    looks = rate_looks(labels, own, i)
+    for k in range(len(looks)):
+        rate += coefficients[1 + k] * looks[k]
+    return math.exp(min(max(rate, -12.0), 0.7))
+
+
+@compiled()
+def rate_looks(labels: Labels, own: Integers, i: int) -> Floats:
+    """(7,) size, its square, levels 1 to 3 of occlusion, cover and neighbours of an object among
+    the objects `own` (k,) of its picture.
+    """
+    box, looks = labels.boxes[i], np.zeros(7)
     height = box[3] - box[1]
-    middle = (box[0] + box[2]) / 2
     neighbours = 0
     for j in own:
-        other = (labels.boxes[j, 0] + labels.boxes[j, 2]) / 2
+        away = abs(labels.boxes[j, 0] + labels.boxes[j, 2] - box[0] - box[2]) / 2
         alike = (labels.kinds[j] == CAR) == (labels.kinds[i] == CAR)
-        if j != i and alike and abs(other - middle) < NEIGHBOUR_HEIGHTS * height:
-            neighbours += 1
-    size = math.log(min(max(height, 15.0), 250.0) / 50)
-    rate = coefficients[0] + coefficients[1] * size + coefficients[2] * size * size
+        neighbours += j != i and alike and away < NEIGHBOUR_HEIGHTS * height
+    looks[0] = math.log(min(max(height, 15.0), 250.0) / 50)
+    looks[1] = looks[0] * looks[0]
     if labels.levels[i]:
-        rate += coefficients[2 + labels.levels[i]]
-    rate += coefficients[6] * labels.cover[i] + coefficients[7] * math.log(1.0 + neighbours)
-    return math.exp(min(max(rate, -12.0), 0.7))
+        looks[1 + labels.levels[i]] = 1.0
+    looks[5], looks[6] = labels.cover[i], math.log(1.0 + neighbours)
+    return looks
+
+
+@compiled()
+def low_of(box: Floats, horizon: float) -> float:
+    """How many of its heights a box ends below the horizon. Whoever stands on one road has about
+    the same, however far away.
+    """
+    return float(min(max((box[3] - horizon) / max(box[3] - box[1], 1.0), 0.2), 2.0))
+
+
+@compiled()
+def usual_low(labels: Labels, own: Integers, kind: int, picture: Floats) -> float:
+    """The mean of `low_of` of the picture's objects of a kind, else the usual one."""
+    total, count = 0.0, 0
+    for j in own:
+        if labels.classes[j] == CLASS_OF[kind] and not labels.cut[j, 3]:
+            total += low_of(labels.boxes[j], picture[3])
+            count += 1
+    return float(total / count if count else USUAL_LOWS[kind])
 
 
 @compiled()
@@ -132,7 +169,7 @@ def _place_beside(
     own: Integers,
     i: int,
     pair: int,
-    key: np.uint64,
+    keys: tuple[np.uint64, np.uint64],
     reported: tuple[Floats, Floats],
     picture: Floats,
     numbers: Numbers,
@@ -146,11 +183,14 @@ def _place_beside(
     like = _likely(mixture, math.log((labels.boxes[i, 3] - labels.boxes[i, 1]) / 50))
     kind = numbers.pairs[pair, 1]
     label = labels.classes[i] if kind == CAR else CLASS_OF[kind]
+    low = low_of(labels.boxes[i], picture[3])
     for t in range(TRIES):
         first = 8 * t + 1
-        drawn = _drawn(mixture, _pick(like, uniform(key, 2 * first - 1)), key, first)
-        middle, foot = (box[0] + box[2]) / 2 + drawn[0] * wide, box[3] + drawn[1] * high
+        pick = _pick(like, uniform(keys[0], 2 * first - 1))
+        drawn = _drawn(mixture, pick, keys, first, numbers.score_share)
         size = wide * math.exp(drawn[2]), high * math.exp(drawn[3])
+        middle = (box[0] + box[2]) / 2 + drawn[0] * wide
+        foot = box[3] + drawn[1] * high + low * (size[1] - high)
         _lay(middle, foot, size, picture, into.edges[at])
         if _fits_beside(labels, own, i, label, into.edges[at], reported, numbers.suppression_iou):
             _tell(into, at, label, _score(numbers.pair_scores[pair], drawn[4], numbers))
@@ -202,7 +242,8 @@ def add_scene(
             key = key_of(chance.key, place, slot, chance.scene[number, slot])
             if uniform(key, 0) >= numbers.scene_counts[kind, n]:
                 break
-            if _place_scene(labels, own, kind, key, picture, numbers, into, count):
+            keys = key, key_of(chance.now, place, slot, 2)
+            if _place_scene(labels, own, kind, keys, picture, numbers, into, count):
                 count += 1
     return count
 
@@ -212,31 +253,32 @@ def _place_scene(
     labels: Labels,
     own: Integers,
     kind: int,
-    key: np.uint64,
+    keys: tuple[np.uint64, np.uint64],
     picture: Floats,
     numbers: Numbers,
     into: Boxes,
     at: int,
 ) -> bool:
     """Lay a false box of the background into row `at`; return False if no place is free."""
-    cut = uniform(key, 1) < numbers.scene_cuts[kind]
+    cut = uniform(keys[0], 1) < numbers.scene_cuts[kind]
     mixture = numbers.scene_mixtures[kind, int(cut)]
-    weights = mixture[:, 0].copy()
+    weights, low = mixture[:, 0].copy(), usual_low(labels, own, kind, picture)
     for t in range(TRIES):
         first = 8 * t + 2
-        drawn = _drawn(mixture, _pick(weights, uniform(key, 2 * first - 1)), key, first)
+        pick = _pick(weights, uniform(keys[0], 2 * first - 1))
+        drawn = _drawn(mixture, pick, keys, first, numbers.score_share)
         high = 50 * math.exp(drawn[0])
         # Cut boxes lie at the edges: their places are relative to the picture's.
         ahead = picture[0] / 2 / FITTED_HALF_PX if cut else 1.0
         middle = picture[2] + FOCAL_PX * drawn[3] * ahead
-        foot = picture[3] + drawn[2] * (100.0 if cut else high)
+        foot = picture[3] + drawn[2] * (100.0 if cut else high * low)
         box = into.edges[at]
         _lay(middle, foot, (high * math.exp(drawn[1]), high), picture, box)
         stays = not cut or _reach_edges(box, foot, picture)
         stays = stays and 0 < middle < picture[0] and foot - high > 0
         if stays and _fits_scene(labels, own, kind, box, numbers.pairs):
             _tell(into, at, CLASS_OF[kind], _score(numbers.scene_scores[kind], drawn[4], numbers))
-            let_err(box, kind, into.scores[at], key, 8 * TRIES + 2, picture, numbers)
+            let_err(box, kind, into.scores[at], keys[0], 8 * TRIES + 2, picture, numbers)
             return True
     return False
 
@@ -364,13 +406,20 @@ def _pick(weights: Floats, draw: float) -> int:
 
 
 @compiled()
-def _drawn(mixture: Floats, component: int, key: np.uint64, first: int) -> Floats:
-    """(5,) columns of a component."""
+def _drawn(
+    mixture: Floats, component: int, keys: tuple[np.uint64, np.uint64], first: int, share: float
+) -> Floats:
+    """(5,) columns of a component. Of the last one, the score, a `share` of the variance is the
+    box's, by the first key, and the rest the keyframe's, by the second.
+    """
     columns = (mixture.shape[1] - 1) // 2
     row = mixture[component]
     drawn = np.empty(5)
     for j in range(5):
-        drawn[j] = row[1 + j] + row[1 + columns + j] * normal(key, first + j)
+        number = normal(keys[0], first + j)
+        if j == 4:
+            number = math.sqrt(share) * number + math.sqrt(1 - share) * normal(keys[1], 0)
+        drawn[j] = row[1 + j] + row[1 + columns + j] * number
     return drawn
 
 
