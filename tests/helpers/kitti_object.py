@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from care_sim.core.types import CLASSES
+from care_sim.sensors.kitti.beside import PAIRS
 from care_sim.sensors.kitti.detector import Draws, report
-from care_sim.sensors.kitti.inventions import MOST, PAIRS, Chance
+from care_sim.sensors.kitti.invented import MOST, Chance
 from care_sim.sensors.kitti.labels import KINDS, Labels, covered
 
 FOLDER = Path(__file__).parents[3] / "shared" / "data" / "kitti-object"

@@ -13,6 +13,8 @@ from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import ImageDetections
 from care_sim.sensors.annotated import IdentifiedDetections
+from care_sim.sensors.kitti.background import add_lent, add_scene
+from care_sim.sensors.kitti.beside import PAIRS, add_beside
 from care_sim.sensors.kitti.draws import PersistentNormals, Renewals, key_of
 from care_sim.sensors.kitti.errors import (
     TRIES,
@@ -24,15 +26,7 @@ from care_sim.sensors.kitti.errors import (
     resembles,
     surest_of,
 )
-from care_sim.sensors.kitti.inventions import (
-    MOST,
-    PAIRS,
-    Boxes,
-    Chance,
-    add_beside,
-    add_lent,
-    add_scene,
-)
+from care_sim.sensors.kitti.invented import MOST, Boxes, Chance
 from care_sim.sensors.kitti.labels import Labels, labels_of, pictures_of
 from care_sim.sensors.kitti.numbers import FOCAL_PX, Numbers, measured
 from care_sim.sensors.kitti.recall import features, score_logits, score_of
@@ -139,7 +133,10 @@ def report(
     """
     pairs = len(numbers.pairs) * MOST
     most = len(labels.kinds) * (1 + PAIRS * MOST) + len(pictures) * pairs + len(lent[0])
-    all_boxes, shown_in = _room(most), np.empty(most, np.int64)
+    all_boxes = Boxes(
+        np.empty(most, np.int64), np.empty(most), np.empty((most, 4)), np.empty(most, np.int64)
+    )
+    shown_in = np.empty(most, np.int64)
     scores = _scores(labels, draws.luck, numbers)
     count = 0
     for number in range(len(pictures)):
@@ -161,13 +158,6 @@ def report(
         all_boxes.sources[:count],
     )
     return taken, shown_in[:count]
-
-
-@compiled()
-def _room(most: int) -> Boxes:
-    return Boxes(
-        np.empty(most, np.int64), np.empty(most), np.empty((most, 4)), np.empty(most, np.int64)
-    )
 
 
 @compiled()
