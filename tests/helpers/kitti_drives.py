@@ -55,9 +55,8 @@ def drive_of(name):
     beyond, levels = BEYOND[np.clip(numbers[:, 0], 0, 2).astype(int)], np.clip(numbers[:, 1], 0, 3)
     x, z = numbers[:, 10], numbers[:, 12]
     told = np.column_stack([beyond, levels, np.hypot(x, z)])
-    nothing = np.empty((0, 7))
-    boxes = numbers[:, 3:7]
-    return Pictures(names, frames, boxes, told, z, nothing, frames.max() + 1), tracks
+    boxes, stand, nothing = numbers[:, 3:7], numbers[:, [11, 7]], np.empty((0, 7))
+    return Pictures(names, frames, boxes, told, z, stand, nothing, frames.max() + 1), tracks
 
 
 def played(name, measured, seed):

@@ -23,8 +23,9 @@ DETECTED = {1: "pedestrian", 2: "car", 3: "bicycle"}
 
 class Pictures(NamedTuple):
     """`names` (n,) types of all labels, `pictures` (n,) that show them, `boxes` (n, 4), `told`
-    (n, 3) truncation, occlusion, planar distance, `depths` (n,); and `found` (m, 7) boxes of the
-    detector: class, score, edges, picture.
+    (n, 3) truncation, occlusion, planar distance, `depths` (n,), `stand` (n, 2) how far their
+    base is below the camera and their height, metres; and `found` (m, 7) boxes of the detector:
+    class, score, edges, picture.
     """
 
     names: np.ndarray
@@ -32,6 +33,7 @@ class Pictures(NamedTuple):
     boxes: np.ndarray
     told: np.ndarray
     depths: np.ndarray
+    stand: np.ndarray
     found: np.ndarray
     count: int
 
@@ -52,6 +54,7 @@ def kitti_pictures():
         numbers[:, 3:7],
         np.column_stack([numbers[:, :2], np.hypot(x, z)]),
         z,
+        numbers[:, [11, 7]],
         np.array(found),
         len(ids),
     )
