@@ -68,6 +68,7 @@ def lay(
 
 @compiled()
 def add_box(into: Boxes, at: int, label: int, score: float) -> None:
+    """Enter the class and score of a false box in row `at`."""
     into.classes[at], into.scores[at], into.sources[at] = label, score, -1
 
 
