@@ -14,8 +14,8 @@ from care_sim.sensors.kitti.invented import (
     MOST,
     TOUCHING,
     TRIES,
-    Boxes,
     Chance,
+    Picture,
     add_box,
     drawn_columns,
     lay,
@@ -37,28 +37,18 @@ _KINDS = tuple(KINDS.tolist())
 
 
 @compiled()
-def add_scene(
-    labels: Labels,
-    own: Integers,
-    number: int,
-    picture: Floats,
-    chance: Chance,
-    numbers: Numbers,
-    into: Boxes,
-    count: int,
-) -> int:
-    """Add the false boxes of the background of picture `number`; return the new `count`."""
-    for kind in range(len(numbers.scene_counts)):
+def add_scene(shown: Picture, chance: Chance, count: int) -> int:
+    """Add the false boxes of the background of a picture; return the new `count`."""
+    for kind in range(len(shown.numbers.scene_counts)):
         for n in range(MOST):
             slot = kind * MOST + n
             # Objects count from 0 as well: pictures follow them.
-            place = len(chance.beside) + number
-            key = key_of(chance.key, place, slot, chance.scene[number, slot])
-            if uniform(key, 0) >= numbers.scene_counts[kind, n]:
+            place = len(chance.beside) + shown.number
+            key = key_of(chance.key, place, slot, chance.scene[shown.number, slot])
+            if uniform(key, 0) >= shown.numbers.scene_counts[kind, n]:
                 break
             keys = key, key_of(chance.now, place, slot, 2)
-            if _place_scene(labels, own, kind, keys, picture, numbers, into, count):
-                count += 1
+            count += _place_scene(shown, kind, keys, count)
     return count
 
 
@@ -74,20 +64,12 @@ def usual_low(labels: Labels, own: Integers, kind: int, picture: Floats) -> floa
 
 
 @compiled()
-def _place_scene(
-    labels: Labels,
-    own: Integers,
-    kind: int,
-    keys: tuple[np.uint64, np.uint64],
-    picture: Floats,
-    numbers: Numbers,
-    into: Boxes,
-    at: int,
-) -> bool:
+def _place_scene(shown: Picture, kind: int, keys: tuple[np.uint64, np.uint64], at: int) -> bool:
     """Lay a false box of the background into row `at`; return False if no place is free."""
+    numbers, picture, into = shown.numbers, shown.frame, shown.into
     cut = uniform(keys[0], 1) < numbers.scene_cuts[kind]
     mixture = numbers.scene_mixtures[kind, int(cut)]
-    weights, low = mixture[:, 0].copy(), usual_low(labels, own, kind, picture)
+    weights, low = mixture[:, 0].copy(), usual_low(shown.labels, shown.own, kind, picture)
     for t in range(TRIES):
         first = 8 * t + 2
         pick = pick_component(weights, uniform(keys[0], 2 * first - 1))
@@ -101,7 +83,7 @@ def _place_scene(
         lay(middle, foot, (high * math.exp(drawn[1]), high), picture, box)
         stays = not cut or _reach_edges(box, foot, picture)
         stays = stays and 0 < middle < picture[0] and foot - high > 0
-        if stays and _fits_scene(labels, own, kind, box, numbers.pairs):
+        if stays and _fits_scene(shown.labels, shown.own, kind, box, numbers.pairs):
             add_box(
                 into, at, CLASS_OF[kind], score_at(numbers.scene_scores[kind], drawn[4], numbers)
             )
@@ -141,26 +123,21 @@ def _fits_scene(labels: Labels, own: Integers, kind: int, box: Floats, pairs: In
 
 @compiled()
 def add_lent(
-    lent: tuple[Integers, Floats, Integers],
-    number: int,
-    picture: Floats,
-    key: np.uint64,
-    numbers: Numbers,
-    into: Boxes,
-    count: int,
+    shown: Picture, lent: tuple[Integers, Floats, Integers], key: np.uint64, count: int
 ) -> int:
-    """Add those of further false boxes that are in picture `number`, with errors and scores as of
-    the background; return the new `count`. They are classes (l,), edges (l, 4) and pictures (l,).
+    """Add those of further false boxes that are in a picture, with errors and scores as of the
+    background; return the new `count`. They are classes (l,), edges (l, 4) and pictures (l,).
     """
+    into, numbers = shown.into, shown.numbers
     for n in range(len(lent[0])):
-        if lent[2][n] != number:
+        if lent[2][n] != shown.number:
             continue
         kind = _KINDS[lent[0][n]]
         own = key_of(key, n, 0, 0)
         score = score_at(numbers.scene_scores[kind], normal(own, 0), numbers)
         add_box(into, count, lent[0][n], score)
         copy_box(lent[1][n], into.edges[count])
-        let_err(into.edges[count], kind, score, own, picture, numbers)
+        let_err(into.edges[count], kind, score, own, shown.frame, numbers)
         count += 1
     return count
 

@@ -19,8 +19,8 @@ from care_sim.sensors.kitti.invented import (
     MOST,
     TOUCHING,
     TRIES,
-    Boxes,
     Chance,
+    Picture,
     add_box,
     drawn_columns,
     lay,
@@ -29,7 +29,7 @@ from care_sim.sensors.kitti.invented import (
     score_at,
 )
 from care_sim.sensors.kitti.labels import Labels
-from care_sim.sensors.kitti.numbers import CAR, CLASS_OF, Numbers
+from care_sim.sensors.kitti.numbers import CAR, CLASS_OF
 
 PAIRS = 2
 """Most pairs of `Numbers.pairs` that one kind of object has."""
@@ -40,38 +40,27 @@ FOUND_IOU = 0.5
 
 
 @compiled()
-def add_beside(
-    labels: Labels,
-    own: Integers,
-    reported: tuple[Floats, Floats],
-    picture: Floats,
-    chance: Chance,
-    numbers: Numbers,
-    into: Boxes,
-    count: int,
-) -> int:
-    """Add the false boxes beside the objects `own` (k,) of a picture; return the new `count`.
+def add_beside(shown: Picture, reported: tuple[Floats, Floats], chance: Chance, count: int) -> int:
+    """Add the false boxes beside the objects of a picture; return the new `count`.
 
     `reported` are the scores (n,) of all labels, 0 of missed ones, and their boxes (n, 4) with
     errors.
     """
-    for i in own:
+    labels, numbers = shown.labels, shown.numbers
+    for i in shown.own:
         place = labels.places[i]
         turn = 0
         for pair in range(len(numbers.pairs)):
             if numbers.pairs[pair, 0] != labels.kinds[i]:
                 continue
-            rate = _rate(labels, own, i, numbers.pair_rates[pair])
+            rate = _rate(labels, shown.own, i, numbers.pair_rates[pair])
             for n in range(MOST):
                 slot = turn * MOST + n
                 key = key_of(chance.key, place, slot, chance.beside[place, slot])
                 if uniform(key, 0) >= _further(rate, n):
                     break
                 keys = key, key_of(chance.now, place, slot, 2)
-                if _place_beside(
-                    labels, own, i, pair, keys, reported, picture, numbers, into, count
-                ):
-                    count += 1
+                count += _place_beside(shown, i, pair, keys, reported, count)
             turn += 1
     return count
 
@@ -119,25 +108,21 @@ def _further(rate: float, count: int) -> float:
 
 @compiled()
 def _place_beside(
-    labels: Labels,
-    own: Integers,
+    shown: Picture,
     i: int,
     pair: int,
     keys: tuple[np.uint64, np.uint64],
     reported: tuple[Floats, Floats],
-    picture: Floats,
-    numbers: Numbers,
-    into: Boxes,
     at: int,
 ) -> bool:
     """Lay the false box of a pair into row `at`; return False if no place is free."""
-    box = reported[1][i]
+    labels, numbers, into, box = shown.labels, shown.numbers, shown.into, reported[1][i]
     wide, high = box[2] - box[0], box[3] - box[1]
     mixture = numbers.pair_mixtures[pair]
     like = _likely(mixture, math.log((labels.boxes[i, 3] - labels.boxes[i, 1]) / 50))
     kind = numbers.pairs[pair, 1]
     label = labels.classes[i] if kind == CAR else CLASS_OF[kind]
-    low = low_of(labels.boxes[i], picture[3])
+    low = low_of(labels.boxes[i], shown.frame[3])
     for t in range(TRIES):
         first = 8 * t + 1
         pick = pick_component(like, uniform(keys[0], 2 * first - 1))
@@ -145,8 +130,8 @@ def _place_beside(
         size = wide * math.exp(drawn[2]), high * math.exp(drawn[3])
         middle = (box[0] + box[2]) / 2 + drawn[0] * wide
         foot = box[3] + drawn[1] * high + low * (size[1] - high)
-        lay(middle, foot, size, picture, into.edges[at])
-        if _fits_beside(labels, own, i, label, into.edges[at], reported, numbers.suppression_iou):
+        lay(middle, foot, size, shown.frame, into.edges[at])
+        if _fits_beside(shown, i, label, into.edges[at], reported):
             add_box(into, at, label, score_at(numbers.pair_scores[pair], drawn[4], numbers))
             return True
     return False
@@ -154,18 +139,13 @@ def _place_beside(
 
 @compiled()
 def _fits_beside(
-    labels: Labels,
-    own: Integers,
-    i: int,
-    label: int,
-    box: Floats,
-    reported: tuple[Floats, Floats],
-    most: float,
+    shown: Picture, i: int, label: int, box: Floats, reported: tuple[Floats, Floats]
 ) -> bool:
     """Whether a false box counts as one, and no found object of its class suppresses it."""
     if box[2] - box[0] <= LEAST_WIDTH or box[3] - box[1] <= LEAST_HEIGHT:
         return False
-    for j in own:
+    labels, most = shown.labels, shown.numbers.suppression_iou
+    for j in shown.own:
         if labels.classes[j] != label:
             continue
         if reported[0][j] > 0:

@@ -14,6 +14,7 @@ from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers
 from care_sim.sensors.kitti.draws import normal
 from care_sim.sensors.kitti.errors import lay_clipped
+from care_sim.sensors.kitti.labels import Labels
 from care_sim.sensors.kitti.numbers import Numbers
 
 MOST = 3
@@ -46,6 +47,19 @@ class Boxes(NamedTuple):
     scores: Floats
     edges: Floats
     sources: Integers
+
+
+class Picture(NamedTuple):
+    """What a picture shows, and where its boxes are entered."""
+
+    labels: Labels
+    own: Integers
+    """(k,) the objects in it."""
+    number: int
+    frame: Floats
+    """(4,) a row of `labels.pictures_of`."""
+    numbers: Numbers
+    into: Boxes
 
 
 @compiled()
