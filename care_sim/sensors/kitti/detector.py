@@ -141,24 +141,19 @@ def report(
     count = 0
     for number in range(len(pictures)):
         (own,) = np.nonzero(labels.cameras == number)
-        into = Boxes(
-            all_boxes.classes[count:],
-            all_boxes.scores[count:],
-            all_boxes.edges[count:],
-            all_boxes.sources[count:],
-        )
+        into = _part(all_boxes, count, most)
         shown = Picture(labels, own, number, pictures[number], numbers, into)
         added = _add_picture(shown, scores, lent, draws)
         for n in range(count, count + added):
             shown_in[n] = number
         count += added
-    taken = Boxes(
-        all_boxes.classes[:count],
-        all_boxes.scores[:count],
-        all_boxes.edges[:count],
-        all_boxes.sources[:count],
-    )
-    return taken, shown_in[:count]
+    return _part(all_boxes, 0, count), shown_in[:count]
+
+
+@compiled()
+def _part(boxes: Boxes, first: int, end: int) -> Boxes:
+    classes, scores, edges, sources = boxes
+    return Boxes(classes[first:end], scores[first:end], edges[first:end], sources[first:end])
 
 
 @compiled()
