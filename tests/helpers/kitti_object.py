@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from care_sim.core.types import CLASSES
+from care_sim.sensors.kitti.beside import PAIRS
 from care_sim.sensors.kitti.detector import Draws, report
-from care_sim.sensors.kitti.inventions import MOST, PAIRS, Chance
+from care_sim.sensors.kitti.invented import MOST, Chance
 from care_sim.sensors.kitti.labels import KINDS, Labels, covered
 
 FOLDER = Path(__file__).parents[3] / "shared" / "data" / "kitti-object"
@@ -22,8 +23,9 @@ DETECTED = {1: "pedestrian", 2: "car", 3: "bicycle"}
 
 class Pictures(NamedTuple):
     """`names` (n,) types of all labels, `pictures` (n,) that show them, `boxes` (n, 4), `told`
-    (n, 3) truncation, occlusion, planar distance, `depths` (n,); and `found` (m, 7) boxes of the
-    detector: class, score, edges, picture.
+    (n, 3) truncation, occlusion, planar distance, `depths` (n,), `stand` (n, 2) how far their
+    base is below the camera and their height, metres; and `found` (m, 7) boxes of the detector:
+    class, score, edges, picture.
     """
 
     names: np.ndarray
@@ -31,6 +33,7 @@ class Pictures(NamedTuple):
     boxes: np.ndarray
     told: np.ndarray
     depths: np.ndarray
+    stand: np.ndarray
     found: np.ndarray
     count: int
 
@@ -51,6 +54,7 @@ def kitti_pictures():
         numbers[:, 3:7],
         np.column_stack([numbers[:, :2], np.hypot(x, z)]),
         z,
+        numbers[:, [11, 7]],
         np.array(found),
         len(ids),
     )
@@ -95,7 +99,7 @@ def simulated(told, numbers, seed):
     labels, _ = as_labels(told)
     rng = np.random.default_rng(seed)
     false = Chance(
-        np.uint64(rng.integers(2**63)),
+        *rng.integers(2**63, size=2).astype(np.uint64),
         np.zeros((len(labels.kinds), PAIRS * MOST), np.int64),
         np.zeros((told.count, 3 * MOST), np.int64),
     )

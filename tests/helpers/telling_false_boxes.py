@@ -9,12 +9,19 @@ from sklearn.metrics import roc_auc_score
 from care_sim.core.types import ImageDetections
 from care_sim.envs.open_loop import FilmEnv
 from care_sim.sensors.annotated import NO_OBJECT
+from care_sim.sensors.kitti.invented import TOUCHING
 from care_sim.sources.street_films import record
 from care_sim.streets.street import make_street
-from tests.helpers.kitti_object import overlaps
+from tests.helpers.kitti_object import PICTURE, TYPES, overlaps
 
 VERTICAL = (3, 5, 9, 11)
 """Columns of `visible` that tell how high in the picture a box is."""
+ALL_BUT_FOOT = (1, 2, 3, 4, 6, *range(8, 19))
+"""All columns but class, height and lower edge."""
+CUT_PX = 369.0
+"""Boxes that end lower are cut by KITTI's pictures."""
+CAMERA_M, FOCAL_PX = 1.65, 721.5
+"""Height of KITTI's camera over the road, and its focal length."""
 
 
 def visible(rows):
@@ -61,6 +68,39 @@ def area_under_the_curve(rows, false, half, left_out=()):
         chances = model.predict_proba(seen[half == part])[:, 1]
         areas.append(roc_auc_score(false[half == part], chances))
     return float(np.mean(areas))
+
+
+def on_a_flat_road(told, rows):
+    """Boxes (m, 7) as if KITTI's road were flat and all objects of a type equally high.
+
+    A box that overlaps a label moves and grows with it, another moves as the picture's labels do
+    (median).
+    """
+    flat = rows.copy()
+    with np.errstate(divide="ignore"):
+        shifts = (told.stand[:, 0] - CAMERA_M) / np.maximum(told.depths, 3.0) * FOCAL_PX
+    growth = np.ones(len(shifts))
+    for name in TYPES:
+        own = told.names == name
+        growth[own] = told.stand[own, 1].mean() / told.stand[own, 1]
+    measured = np.isin(told.names, list(TYPES))
+    for picture in np.unique(rows[:, 6]):
+        (own,), (shown,) = (
+            np.nonzero(rows[:, 6] == picture),
+            np.nonzero(measured & (told.pictures == picture)),
+        )
+        if not len(shown):
+            continue
+        union, _ = overlaps(rows[own, 2:6], told.boxes[shown])
+        for n, behind in zip(own, shown[union.argmax(axis=1)], strict=True):
+            foot = told.boxes[behind, 3]
+            moved = foot - shifts[behind] + (rows[n, [3, 5]] - foot) * growth[behind]
+            beside = union[own == n].max() >= TOUCHING
+            flat[n, [3, 5]] = moved if beside else rows[n, [3, 5]] - np.median(shifts[shown])
+    flat[:, [3, 5]] = np.clip(np.trunc(flat[:, [3, 5]]), 0, PICTURE[1])
+    cut = rows[:, 5] >= CUT_PX
+    flat[cut, 5] = rows[cut, 5]
+    return flat
 
 
 def boxes_of_streets(seeds, episodes, profile="kitti"):

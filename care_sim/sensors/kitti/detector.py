@@ -13,6 +13,8 @@ from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import ImageDetections
 from care_sim.sensors.annotated import IdentifiedDetections
+from care_sim.sensors.kitti.background import add_lent, add_scene
+from care_sim.sensors.kitti.beside import PAIRS, add_beside
 from care_sim.sensors.kitti.draws import PersistentNormals, Renewals, key_of
 from care_sim.sensors.kitti.errors import (
     TRIES,
@@ -24,15 +26,7 @@ from care_sim.sensors.kitti.errors import (
     resembles,
     surest_of,
 )
-from care_sim.sensors.kitti.inventions import (
-    MOST,
-    PAIRS,
-    Boxes,
-    Chance,
-    add_beside,
-    add_lent,
-    add_scene,
-)
+from care_sim.sensors.kitti.invented import MOST, Boxes, Chance, Picture
 from care_sim.sensors.kitti.labels import Labels, labels_of, pictures_of
 from care_sim.sensors.kitti.numbers import FOCAL_PX, Numbers, measured
 from care_sim.sensors.kitti.recall import features, score_logits, score_of
@@ -103,7 +97,7 @@ class KittiDetector:
         self._keyframe += 1
         luck, edges = self._luck.next()[:, 0], self._edges.next()
         key = np.uint64(key_of(self._key, self._keyframe, 0, 0))
-        false = Chance(self._false_key, self._beside.next(), self._scene.next())
+        false = Chance(self._false_key, key, self._beside.next(), self._scene.next())
         draws = Draws(luck, edges, key, false)
 
         places = self._order[np.searchsorted(self._objects, seen.objects, sorter=self._order)]
@@ -139,35 +133,27 @@ def report(
     """
     pairs = len(numbers.pairs) * MOST
     most = len(labels.kinds) * (1 + PAIRS * MOST) + len(pictures) * pairs + len(lent[0])
-    all_boxes, shown_in = _room(most), np.empty(most, np.int64)
+    all_boxes = Boxes(
+        np.empty(most, np.int64), np.empty(most), np.empty((most, 4)), np.empty(most, np.int64)
+    )
+    shown_in = np.empty(most, np.int64)
     scores = _scores(labels, draws.luck, numbers)
     count = 0
     for number in range(len(pictures)):
         (own,) = np.nonzero(labels.cameras == number)
-        into = Boxes(
-            all_boxes.classes[count:],
-            all_boxes.scores[count:],
-            all_boxes.edges[count:],
-            all_boxes.sources[count:],
-        )
-        added = _add_picture(labels, own, number, scores, pictures, lent, draws, numbers, into)
+        into = _part(all_boxes, count, most)
+        shown = Picture(labels, own, number, pictures[number], numbers, into)
+        added = _add_picture(shown, scores, lent, draws)
         for n in range(count, count + added):
             shown_in[n] = number
         count += added
-    taken = Boxes(
-        all_boxes.classes[:count],
-        all_boxes.scores[:count],
-        all_boxes.edges[:count],
-        all_boxes.sources[:count],
-    )
-    return taken, shown_in[:count]
+    return _part(all_boxes, 0, count), shown_in[:count]
 
 
 @compiled()
-def _room(most: int) -> Boxes:
-    return Boxes(
-        np.empty(most, np.int64), np.empty(most), np.empty((most, 4)), np.empty(most, np.int64)
-    )
+def _part(boxes: Boxes, first: int, end: int) -> Boxes:
+    classes, scores, edges, sources = boxes
+    return Boxes(classes[first:end], scores[first:end], edges[first:end], sources[first:end])
 
 
 @compiled()
@@ -198,24 +184,15 @@ def _scores(labels: Labels, luck: Floats, numbers: Numbers) -> Floats:
 
 @compiled()
 def _add_picture(
-    labels: Labels,
-    own: Integers,
-    number: int,
-    scores: Floats,
-    pictures: Floats,
-    lent: tuple[Integers, Floats, Integers],
-    draws: Draws,
-    numbers: Numbers,
-    into: Boxes,
+    shown: Picture, scores: Floats, lent: tuple[Integers, Floats, Integers], draws: Draws
 ) -> int:
-    """Fill `into` with the boxes of picture `number`; return how many."""
-    picture = pictures[number]
-    erring = np.empty((len(scores), EDGES))
-    count = _add_found(labels, own, scores, erring, picture, draws, numbers, into)
-    reported = scores, erring
-    count = add_beside(labels, own, reported, picture, draws.false, numbers, into, count)
-    count = add_scene(labels, own, number, picture, draws.false, numbers, into, count)
-    count = add_lent(lent, number, picture, draws.key, numbers, into, count)
+    """Enter the boxes of a picture; return how many."""
+    into, numbers = shown.into, shown.numbers
+    reported = scores, np.empty((len(scores), EDGES))
+    count = _add_found(shown, reported, draws)
+    count = add_beside(shown, reported, draws.false, count)
+    count = add_scene(shown, draws.false, count)
+    count = add_lent(shown, lent, draws.key, count)
     stays = kept(
         into.edges[:count],
         into.scores[:count],
@@ -227,24 +204,17 @@ def _add_picture(
 
 
 @compiled()
-def _add_found(
-    labels: Labels,
-    own: Integers,
-    scores: Floats,
-    erring: Floats,
-    picture: Floats,
-    draws: Draws,
-    numbers: Numbers,
-    into: Boxes,
-) -> int:
-    """Fill the rows `own` of `erring` (n, 4) with the objects' boxes after errors, and `into` with
-    the found ones, the surest first; return how many.
+def _add_found(shown: Picture, reported: tuple[Floats, Floats], draws: Draws) -> int:
+    """Enter the found objects' boxes after errors, the surest first; return how many. Fill
+    `reported[1]` (n, 4) with them, and with the labels' boxes of missed objects.
     """
+    into, labels, (scores, erring) = shown.into, shown.labels, reported
     count = 0
-    for place in surest_of(scores[own]):
-        i = own[place]
-        _lay_own(labels, i, scores[i], count, picture, draws, numbers, into, erring[i])
+    for place in surest_of(scores[shown.own]):
+        i = shown.own[place]
+        copy_box(labels.boxes[i], erring[i])
         if scores[i] > 0:
+            _lay_own(shown, i, scores[i], count, draws, erring[i])
             into.classes[count], into.scores[count] = labels.classes[i], scores[i]
             into.sources[count] = i
             copy_box(erring[i], into.edges[count])
@@ -253,36 +223,25 @@ def _add_found(
 
 
 @compiled()
-def _lay_own(
-    labels: Labels,
-    i: int,
-    score: float,
-    surer: int,
-    picture: Floats,
-    draws: Draws,
-    numbers: Numbers,
-    shown: Boxes,
-    into: Floats,
-) -> None:
-    """Fill `into` (4,) with an object's box after errors. They are drawn again while the box would
-    not count as the object's, or one of the `surer` boxes shown of its class suppresses it.
+def _lay_own(shown: Picture, i: int, score: float, surer: int, draws: Draws, into: Floats) -> None:
+    """Let an object's box `into` (4,) err. Errors are drawn again while the box would not count as
+    the object's, or one of the `surer` boxes of its class that are entered suppresses it.
     """
+    labels, numbers, entered = shown.labels, shown.numbers, shown.into
     place, label = labels.places[i], labels.boxes[i]
     seen_as = labels.kinds[i], labels.levels[i], score
     key = key_of(draws.key, place, 1, 0)
     normals, trial = np.empty(EDGES), np.empty(EDGES)
     copy_box(draws.edges[place], normals)
-    copy_box(label, into)
-    has_one = False
+    has_one, most = False, numbers.suppression_iou
     for t in range(TRIES):
         if t:
             lay_normals(key, EDGES * t, normals)
-        lay_erring(label, seen_as, labels.cut[i], normals, picture, numbers, trial)
+        lay_erring(label, seen_as, labels.cut[i], normals, shown.frame, numbers, trial)
         if not resembles(trial, label):
             continue
-        most = numbers.suppression_iou
-        covered = score > 0 and overlaps_any(
-            trial, labels.classes[i], shown.edges, shown.classes, surer, most
+        covered = overlaps_any(
+            trial, labels.classes[i], entered.edges, entered.classes, surer, most
         )
         if not (covered and has_one):
             copy_box(trial, into)

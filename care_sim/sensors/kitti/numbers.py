@@ -78,6 +78,8 @@ class Numbers(NamedTuple):
     """(3, 7) as `pair_scores`."""
     score_shares: Floats
     """(7,)."""
+    score_share: float
+    """Share of the variance of a false box's normal score that stays as long as the box does."""
     suppression_iou: float
     """Of two boxes of a class that overlap more only one is reported."""
 
@@ -141,6 +143,7 @@ def read_measured(told: dict[str, Any]) -> Measured:
         scene_cuts=np.array([one["cut_share"] for one in scene]),
         scene_scores=np.array([one["scores"] for one in scene]),
         score_shares=np.array(told["score_shares"], float),
+        score_share=told["false_time"]["score_share"],
         suppression_iou=told["suppression_iou"],
     )
     return Measured(numbers, times)
@@ -148,13 +151,8 @@ def read_measured(told: dict[str, Any]) -> Measured:
 
 def _coefficients(fitted: dict[str, Any]) -> Floats:
     """(9, 22) of one kind, 0 for the FEATURES that it does not have."""
-    heights = [f"height{knot}" for knot in fitted["knots"][1:]]
-    names = [
-        f"height{heights.index(name) + 1}" if name in heights else name
-        for name in fitted["features"]
-    ]
     rows = np.zeros((len(fitted["coefficients"]), len(FEATURES)))
-    rows[:, [FEATURES.index(name) for name in names]] = fitted["coefficients"]
+    rows[:, [FEATURES.index(name) for name in fitted["features"]]] = fitted["coefficients"]
     return rows
 
 

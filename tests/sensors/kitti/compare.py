@@ -6,8 +6,11 @@ KITTI's pictures and the detector's boxes are read from ../shared/data.
 """
 
 import sys
+import zlib
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -15,15 +18,24 @@ from matplotlib.figure import Figure
 from care_sim.core.types import CLASSES
 from care_sim.reports.figures.styles import BLUE, GREEN, INK, ORANGE, default_style, save
 from care_sim.sensors.kitti import recall
+from care_sim.sensors.kitti.labels import labels_of, pictures_of
 from care_sim.sensors.kitti.numbers import measured
 from tests.helpers.kitti_object import as_labels, kitti_pictures, matched, simulated
+from tests.helpers.telling_false_boxes import (
+    ALL_BUT_FOOT,
+    VERTICAL,
+    area_under_the_curve,
+    boxes_of_streets,
+    on_a_flat_road,
+)
+from tests.sensors.kitti.halves import held_out, held_out_by_luck
 
 CONFIDENCE = 0.25
 SEEDS = 4
 STREETS, EPISODES = range(3000, 3006), 3
-SCATTER_PX = 8.0
-"""How far the lower edges of labels of equal height and class scatter in a picture of KITTI: cars
-7.6, pedestrians 8.2 pixels.
+CAR_HEIGHTS, PICTURE_PX, OBJECT_PX = 0.09, 7.0, 5.0
+"""What streets lack: the spread of cars' heights on KITTI, and how far the ground of a picture's
+labels, and of each label in it, is from that of a flat road.
 """
 FEWEST = 20
 """Labels in a bin, for its share to be shown."""
@@ -68,38 +80,51 @@ def false_table(told, reported, excused):
     return np.array([(len(rows) / told.count, np.median(rows[:, 1])) for rows in own])
 
 
-def areas(told, left_out=()):
+def areas(told, left_out=(), flat=False):
     """Area under the curve of the real boxes, and of simulated ones of some seeds."""
-    from tests.helpers.telling_false_boxes import area_under_the_curve
-
     found = []
     made = [simulated(told, measured().numbers, seed) for seed in range(SEEDS)]
     for reported, excused in [(told.found, True), *((one, False) for one in made)]:
         sure = reported[reported[:, 1] >= CONFIDENCE]
         behind = matched(told, sure, excused)
         rows, false = sure[behind != -2], behind[behind != -2] == -1
+        shown = on_a_flat_road(told, rows) if flat else rows
         half = rows[:, 6].astype(int) % 2
-        found.append(area_under_the_curve(rows, false, half, left_out))
+        found.append(area_under_the_curve(shown, false, half, left_out))
     return found
 
 
 def street_areas():
-    """The same of boxes that observations of streets show, by what is left out or changed."""
-    from tests.helpers.telling_false_boxes import VERTICAL, area_under_the_curve, boxes_of_streets
+    """The same of boxes that observations of streets show: by all columns, and by class, height and
+    lower edge alone; as they are, and with what streets lack.
+    """
+    heights = partial(_uneven, spread=CAR_HEIGHTS, shifts=(0.0, 0.0))
+    roads = partial(_uneven, spread=CAR_HEIGHTS, shifts=(PICTURE_PX, OBJECT_PX))
+    found = {}
+    for name, labels in (("as shown", labels_of), ("heights", heights), ("roads too", roads)):
+        with patch("care_sim.sensors.kitti.detector.labels_of", labels):
+            rows, false, streets = boxes_of_streets(STREETS, EPISODES)
+        found[name] = [
+            area_under_the_curve(rows, false, streets % 2, out) for out in ((), ALL_BUT_FOOT)
+        ]
+    return found
 
-    rows, false, streets = boxes_of_streets(STREETS, EPISODES)
-    others, false_others, streets_of = boxes_of_streets(STREETS, EPISODES, "yolox")
-    half = streets % 2
-    moved = rows.copy()
-    # In pixels of the surround cameras; the scatter is that of KITTI's feet at equal height.
-    scatter = SCATTER_PX * 228.5 / 721.5
-    moved[:, [3, 5]] += np.random.default_rng(0).normal(0, scatter, len(rows))[:, None]
-    return {
-        "as shown": area_under_the_curve(rows, false, half),
-        "upper and lower edges left out": area_under_the_curve(rows, false, half, VERTICAL),
-        f"moved up and down by {SCATTER_PX:.0f} px": area_under_the_curve(moved, false, half),
-        "as shown, yolox": area_under_the_curve(others, false_others, streets_of % 2),
-    }
+
+def _uneven(seen, boxes, places, cameras, focal_px, spread, shifts):
+    """Labels of cars of uneven heights (`spread`) on roads that lie higher or lower, by picture and
+    by object (`shifts`, pixels).
+    """
+    labels = labels_of(seen, boxes, places, cameras, focal_px)
+    heights = np.random.default_rng(0).normal(0, spread, places.max(initial=0) + 1)[places]
+    rng = np.random.default_rng(zlib.crc32(labels.boxes.tobytes()))
+    moved = rng.normal(0, shifts[0], len(cameras))[labels.cameras]
+    moved += rng.normal(0, shifts[1], len(places))
+    edges, is_car = labels.boxes.copy(), labels.classes < CLASSES.index("bicycle")
+    edges[:, 1] -= np.where(is_car, heights, 0.0) * (edges[:, 3] - edges[:, 1])
+    lowest = pictures_of(cameras, focal_px)[labels.cameras, 1]
+    edges[:, 1] = np.clip(edges[:, 1] + moved, 0, lowest - 2)
+    edges[:, 3] = np.where(labels.cut[:, 3], lowest, np.clip(edges[:, 3] + moved, 1, lowest))
+    return labels._replace(boxes=edges)
 
 
 @default_style()
@@ -125,10 +150,25 @@ def recall_figure(table):
     return figure
 
 
+def _print_halves(told):
+    bins, lucky = held_out(told), held_out_by_luck(told, 20)
+    errors = np.array([one.error for one in bins])
+    by_luck = np.array([[one.error for one in each] for each in lucky])
+    for name, own in (("one half predicts the other", errors[None]), ("by luck alone", by_luck)):
+        off = np.abs(own)
+        print(
+            f"{name}: {len(bins)} bins, off by {100 * np.sqrt(np.mean(own**2, axis=1)).mean():.1f}"
+            f" points, more than 2 in {(off > 0.02).sum(axis=1).mean():.0f}, the worst by"
+            f" {100 * off.max(axis=1).mean():.1f}"
+        )
+    for n in np.argsort(-np.abs(errors))[:5]:
+        name, count, found, predicted = bins[n]
+        luck = np.quantile(np.abs(by_luck[:, n]), 0.95)
+        print(f"{name}: {count} labels, {found:.3f}, {predicted:.3f}, luck {luck:.3f}")
+
+
 def main(stem):
     """Print the tables and draw the figure."""
-    from tests.helpers.telling_false_boxes import VERTICAL
-
     told = kitti_pictures()
     table = recall_table(told)
     for (label, level), bins in table.items():
@@ -142,13 +182,16 @@ def main(stem):
     print("false boxes per picture and their median score, real and simulated:")
     for label, real, simulated_ones in zip(HEIGHTS, *both, strict=True):
         print(label, real.round(3), simulated_ones.round(3))
-    for left_out in ((), VERTICAL):
-        real, *others = areas(told, left_out)
-        print(
-            f"told apart, columns {left_out} left out: real {real:.3f}, made {np.round(others, 3)}"
-        )
-    for how, area in street_areas().items():
-        print(f"told apart on streets, {how}: {area:.3f}")
+    for left_out in ((), VERTICAL, ALL_BUT_FOOT):
+        for flat in (False, True):
+            real, *others = areas(told, left_out, flat)
+            print(
+                f"told apart, columns {left_out} left out{', flat' * flat}: real {real:.3f},"
+                f" made {np.round(others, 3)}"
+            )
+    for how, found in street_areas().items():
+        print(f"told apart on streets, {how}: {found[0]:.3f}, by the lower edge {found[1]:.3f}")
+    _print_halves(told)
     save(recall_figure(table), stem)
 
 

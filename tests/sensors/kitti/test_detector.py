@@ -187,10 +187,13 @@ def test_false_boxes_of_an_empty_scene_are_as_many_as_measured():
 def test_false_boxes_last_as_long_as_measured():
     stayed = there = 0
     for episode in of_nothing(keyframe_s=0.1):
-        sets = [{tuple(row) for row in rows[:, :6].tolist()} for rows in episode]
+        # Their scores change meanwhile.
+        sets = [
+            {tuple(row) for row in np.delete(rows[:, :6], 1, axis=1).tolist()} for rows in episode
+        ]
         stayed += sum(len(now & before) for before, now in pairwise(sets))
         there += sum(map(len, sets[:-1]))
-    assert stayed / there == pytest.approx(np.exp(-0.1 / 0.24), abs=0.06)
+    assert stayed / there == pytest.approx(np.exp(-0.1 / 0.36), abs=0.06)
 
 
 def test_false_boxes_beside_a_person_are_as_many_as_measured():
