@@ -5,8 +5,9 @@ import math
 import numpy as np
 
 from care_sim.base.compiled import compiled
+from care_sim.base.hashing import normal, uniform
 from care_sim.core.arrays import Floats, Integers
-from care_sim.sensors.kitti.draws import key_of, normal, uniform
+from care_sim.sensors.kitti.draws import key_of
 from care_sim.sensors.kitti.errors import copy_box, iou, lay_erring, lay_normals, resembles
 from care_sim.sensors.kitti.invented import (
     LEAST_HEIGHT,

@@ -10,8 +10,9 @@ import math
 import numpy as np
 
 from care_sim.base.compiled import compiled
+from care_sim.base.hashing import uniform
 from care_sim.core.arrays import Floats, Integers
-from care_sim.sensors.kitti.draws import key_of, uniform
+from care_sim.sensors.kitti.draws import key_of
 from care_sim.sensors.kitti.errors import iou
 from care_sim.sensors.kitti.invented import (
     LEAST_HEIGHT,

@@ -2,8 +2,8 @@
 same.
 
 Numbers that change gradually are drawn for every object at every keyframe (`PersistentNormals`).
-Numbers that few objects ever need are hashes of a key (`uniform`, `normal`): whether one is used
-changes no other.
+Numbers that few objects ever need are hashes of a key (`key_of`, `care_sim.base.hashing`): whether
+one is used changes no other.
 """
 
 import math
@@ -12,11 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from care_sim.base.compiled import compiled
-from care_sim.base.hashing import finalised
+from care_sim.base.hashing import mixed
 from care_sim.core.arrays import Floats, Integers
-
-_GOLDEN = np.uint64(0x9E3779B97F4A7C15)
-_ONE, _ELEVEN = np.uint64(1), np.uint64(11)
 
 
 class PersistentNormals:
@@ -79,24 +76,4 @@ class Renewals:
 @compiled()
 def key_of(key: np.uint64, one: int, two: int, three: int) -> np.uint64:
     """A key of its own for every three numbers from 0 up, below a key."""
-    mixed = _mixed(key, np.uint64(one))
-    return _mixed(_mixed(mixed, np.uint64(two)), np.uint64(three))
-
-
-@compiled()
-def uniform(key: np.uint64, number: int) -> float:
-    """Hash a key and a number evenly between 0 and 1, both excluded."""
-    return (float(_mixed(key, np.uint64(number)) >> _ELEVEN) + 0.5) / 2.0**53
-
-
-@compiled()
-def normal(key: np.uint64, number: int) -> float:
-    """Hash a key and a number to a standard normal number (Box and Muller 1958)."""
-    radius = math.sqrt(-2 * math.log(uniform(key, 2 * number)))
-    return radius * math.cos(2 * math.pi * uniform(key, 2 * number + 1))
-
-
-@compiled()
-def _mixed(key: np.uint64, number: np.uint64) -> np.uint64:
-    """The generator SplitMix64 at its step `number`."""
-    return finalised(key + (number + _ONE) * _GOLDEN)
+    return mixed(mixed(mixed(key, one), two), three)

@@ -5,8 +5,8 @@ import math
 import numpy as np
 
 from care_sim.base.compiled import compiled
+from care_sim.base.hashing import normal
 from care_sim.core.arrays import Floats, Integers, Mask
-from care_sim.sensors.kitti.draws import normal
 from care_sim.sensors.kitti.numbers import FARTHEST, Numbers
 
 CUT = 3

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from care_sim.base.compiled import compiled
+from care_sim.base.hashing import normal
 from care_sim.core.arrays import Floats, Integers
-from care_sim.sensors.kitti.draws import normal
 from care_sim.sensors.kitti.errors import lay_clipped
 from care_sim.sensors.kitti.labels import Labels
 from care_sim.sensors.kitti.numbers import Numbers

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from care_sim.sensors.kitti.draws import PersistentNormals, Renewals, key_of, normal, uniform
+from care_sim.base.hashing import normal, uniform
+from care_sim.sensors.kitti.draws import PersistentNormals, Renewals, key_of
 
 KEYFRAME_S = 0.1
 
