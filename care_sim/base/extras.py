@@ -5,9 +5,11 @@ extra where one is missing; and silence for those that print from C.
 import ctypes
 import errno
 import os
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
+from importlib.util import find_spec, module_from_spec
 from pathlib import Path
 from types import ModuleType
 
@@ -33,6 +35,24 @@ def install_command(extra: str) -> str:
     if (_HOME / "constraints.txt").is_file():
         return f"pip install -c constraints.txt -e '.[{extra}]' in the clone"
     return f"pip install 'care-sim[{extra}]'"
+
+
+@contextmanager
+def package_alone(name: str) -> Iterator[None]:
+    """Import modules of a package within, without what the package itself imports.
+
+    A later import of the package runs all of it and keeps these modules. `from` finds them there;
+    the package has no attributes of their names.
+    """
+    spec = None if name in sys.modules else find_spec(name)
+    if spec is None:
+        yield
+        return
+    sys.modules[name] = module_from_spec(spec)
+    try:
+        yield
+    finally:
+        del sys.modules[name]
 
 
 def import_open3d() -> ModuleType:

@@ -4,13 +4,18 @@ from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
-from highway_env.road.lane import StraightLane
-from highway_env.road.road import Road, RoadNetwork
-from highway_env.utils import not_zero
-from highway_env.vehicle.behavior import IDMVehicle
-from highway_env.vehicle.kinematics import Vehicle
 
+from care_sim.base.extras import package_alone
 from care_sim.core.arrays import Floats
+
+# highway-env itself imports its environments, and these pandas, Matplotlib and pygame: a second.
+with package_alone("highway_env"):
+    from highway_env.road.lane import StraightLane
+    from highway_env.road.road import Road, RoadNetwork
+    from highway_env.utils import not_zero as not_zero
+    from highway_env.vehicle.behavior import IDMVehicle
+    from highway_env.vehicle.kinematics import Vehicle
+    from highway_env.vehicle.objects import Obstacle as Obstacle
 
 _DRAWS = np.random.RandomState(0)
 """highway-env's roads want a generator, and each makes one from the system's entropy where it is

@@ -14,8 +14,7 @@ from care_sim.core.frames import Pose
 from care_sim.world.bodies import BodyKind
 from care_sim.world.lane_flow import STANDING_GAP_M
 
-# highway-env loads pandas and Matplotlib, half a second: functions import it, and only a world with
-# a road waits for it.
+# highway-env takes time to load: functions import it, and only a world with a road waits for it.
 if TYPE_CHECKING:
     from highway_env.vehicle.kinematics import Vehicle
 
@@ -102,7 +101,7 @@ class Traffic:
 
     def add_stop_line(self, x: float, lane: int) -> None:
         """Let drivers of `lane` come to rest with their centres at `x`, where they give way."""
-        from highway_env.vehicle.objects import Obstacle
+        from care_sim.world.lane_driver import Obstacle
 
         key = self.lane_key(lane)
         road_lane = self._road.network.get_lane(key)
@@ -192,7 +191,7 @@ class RoadVehicle:
 
     def keeping_lane(self, seconds: float) -> LaneKeeper | None:
         """Return what moves it if it can do nothing for `seconds` but keep its lane, else None."""
-        from highway_env.utils import not_zero
+        from care_sim.world.lane_driver import not_zero
 
         vehicle, lane = self._vehicle, self._vehicle.lane
         x, speed = float(vehicle.position[0]), float(vehicle.speed)

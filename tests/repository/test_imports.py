@@ -87,7 +87,7 @@ inside = threading.Event()
 
 class Slow:
     def find_spec(self, name, *_):
-        if name == "highway_env.envs":
+        if name == "highway_env.road.road":
             inside.set()
             time.sleep(0.5)
 
@@ -108,4 +108,20 @@ the middle of highway-env."""
 def test_threads_that_build_the_first_worlds_at_once_all_find_highway_env_whole():
     """Its modules import each other: a thread that enters it elsewhere gets halves."""
     done = subprocess.run([sys.executable, "-c", THREADS], capture_output=True, text=True)
+    assert done.stderr == ""
+
+
+HIGHWAY = """
+import sys
+from care_sim.world import lane_driver
+assert not {"highway_env", "matplotlib", "pandas", "pygame"} & set(sys.modules)
+import gymnasium, highway_env
+gymnasium.make("highway-v0").reset(seed=0)
+from highway_env.vehicle.behavior import IDMVehicle
+assert IDMVehicle is lane_driver.IDMVehicle
+"""
+
+
+def test_traffic_loads_no_environments_of_highway_env_and_leaves_them_to_others():
+    done = subprocess.run([sys.executable, "-c", HIGHWAY], capture_output=True, text=True)
     assert done.stderr == ""
