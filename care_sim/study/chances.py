@@ -1,0 +1,120 @@
+"""The chance that a detector reports each object of a play, given the returns so far.
+
+A measured detector (`care_sim.perception.measured`) and the graded proxy detect by chance, and the
+chance follows from the returns on an object alone. For an object in its first keyframe it is exact:
+nothing that was drawn before could have moved a cell towards it or away from it. For an object that
+was there before it leaves out that luck lasts: a lucky object is tracked, and gets more cells.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from care_sim.core.arrays import Floats
+from care_sim.core.grid import AngularGrid
+from care_sim.core.rig import Rig
+from care_sim.core.types import CLASSES
+from care_sim.evaluation.sightings import Sightings
+from care_sim.loops.open_loop import OpenLoop
+from care_sim.perception.detectors import GRADED
+from care_sim.perception.measured.detector import GATHERED_S
+from care_sim.perception.measured.recall import FIRST_HIT, recall
+from care_sim.perception.measured.tables import MEASURED, measurement
+from care_sim.perception.proxy import chance
+from care_sim.sensors.annotated import Annotations, Cloud
+
+_Rule = Callable[[str, Floats, Floats], Floats]
+"""From a class, and the returns (n,) in this keyframe and on average per sweep, to chances (n,)."""
+
+
+class Chances:
+    """Notes the returns on every annotated object, keyframe by keyframe of an open loop."""
+
+    def __init__(self, rule: _Rule, weights: Floats, angles: Floats, heads: list[int]):
+        self._rule = rule
+        self._weights, self._angles, self._heads = weights, angles, heads
+        self._counts: list[dict[int, float]] = []
+        self._noted: list[tuple[Floats, Floats, Floats]] = []
+
+    @classmethod
+    def of(cls, detector: str, parameters: Mapping[str, Any], rig: Rig) -> "Chances | None":
+        """Those of a detector; None of a detector whose chances are not known."""
+        heads = [head.first for head in rig.grid.heads]
+        if detector == GRADED:
+            return cls(lambda name, now, _: chance(name, now), np.ones(1), np.ones(len(heads)), heads)
+        if detector not in MEASURED:
+            return None
+        weights = _weights(detector, parameters.get("first_hit", FIRST_HIT), rig.keyframe_s)
+        angles = np.ones(len(heads)) if parameters.get("worth") else _angles(rig)
+        return cls(_measured_rule(detector, parameters), weights, angles, heads)
+
+    def note(self, loop: OpenLoop) -> None:
+        """Take in the keyframe that was just played."""
+        annotations = loop.film.shots[loop.index - 1].annotations
+        now = self._returns(loop.handed, annotations)
+        self._counts.insert(0, dict(zip(annotations.objects.tolist(), now.tolist(), strict=True)))
+        del self._counts[len(self._weights) :]
+        # At the start there are fewer keyframes, and those that there are fill up for the others.
+        known = self._weights[: len(self._counts)]
+        earlier = [
+            [counts.get(each, 0.0) for counts in self._counts]
+            for each in annotations.objects.tolist()
+        ]
+        average = np.array(earlier).reshape(-1, len(known)) @ known / known.sum()
+        # Gathered sweeps are averaged already.
+        average = now if loop.handed.poses or not known.sum() else average
+        self._noted.append((annotations.classes, now, average))
+
+    def of_frames(self, sightings: Sightings) -> Floats:
+        """(r,) the chances of the rows of `sightings.frames`, once all keyframes are noted."""
+        classes, now, average = (np.concatenate(part) for part in zip(*self._noted, strict=True))
+        chances = np.zeros(len(classes))
+        for label, name in enumerate(CLASSES):
+            own = classes == label
+            chances[own] = self._rule(name, now[own], average[own])
+        return chances[sightings.in_range]
+
+    def _returns(self, cloud: Cloud, annotations: Annotations) -> Floats:
+        """(n,) returns on each object per sweep, in cells of the default grid."""
+        order = np.argsort(annotations.objects)
+        ascending = annotations.objects[order]
+        own = np.isin(cloud.objects, ascending)
+        heads = np.searchsorted(self._heads, cloud.cells[own], side="right") - 1
+        places = order[np.searchsorted(ascending, cloud.objects[own])]
+        counts = np.bincount(places, self._angles[heads], len(annotations))
+        return counts / max(len(cloud.poses), 1)
+
+
+def _measured_rule(detector: str, parameters: Mapping[str, Any]) -> _Rule:
+    table = measurement(detector).recall
+    worth = np.full(len(CLASSES), parameters.get("worth") or np.nan)
+    worth = np.where(np.isnan(worth), table.worth, worth)
+
+    def rule(name: str, now: Floats, average: Floats) -> Floats:
+        label = CLASSES.index(name)
+        if not table.known[label]:
+            return np.zeros(len(now))
+        least = parameters.get("track_score")
+        given = now * worth[label], average * worth[label]
+        return recall(detector, name, *given, least, first_hit=0.0)
+
+    return rule
+
+
+def _weights(detector: str, first_hit: float, keyframe_s: float) -> Floats:
+    """(k,) the weights of the returns of the last keyframes, newest first, as the detector's."""
+    measured = measurement(detector)
+    if measured.sweeps == 1:
+        return np.ones(1)
+    if keyframe_s > measured.step_s - 1e-9:
+        return np.array([first_hit, 1 - first_hit])
+    return np.ones(min(measured.sweeps, max(1, math.floor(GATHERED_S / keyframe_s + 1e-9))))
+
+
+def _angles(rig: Rig) -> Floats:
+    """(k,) the solid angle of a cell of each LiDAR, in cells of the default grid."""
+    usual = AngularGrid()
+    angles = [head.grid.column_width * head.grid.row_height for head in rig.grid.heads]
+    return np.array(angles) / (usual.column_width * usual.row_height)
