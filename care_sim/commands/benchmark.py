@@ -5,27 +5,26 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from care_sim.base.errors import BrokenPolicy, InvalidInput, print_lines, report_problems
+from care_sim.base.errors import InvalidInput, print_lines, report_problems
 from care_sim.base.files import JSON, check_output
 from care_sim.base.interrupts import DONE, FAILED
-from care_sim.commands.options.results import Benchmark
+from care_sim.commands.budgets import smallest_budgets
+from care_sim.commands.options.results import B90, Benchmark
 from care_sim.commands.shared.console import TableConsole
-from care_sim.commands.shared.selection import check_values, playable, policy_parameters
-from care_sim.policies import tags_of
+from care_sim.commands.shared.entries import entries_of
+from care_sim.commands.shared.selection import check_values
 from care_sim.policies.isolation import isolated_policies
 from care_sim.reports.leaderboard import leaderboard_table
 from care_sim.study.benchmark.play import played, player_in, screened_worlds
 from care_sim.study.benchmark.suite import (
     Entry,
     Salt,
-    Task,
     World,
     published_worlds,
     quick_tenth,
     tasks_of,
 )
 from care_sim.study.executors import processes
-from care_sim.study.run_config import parameters_for
 from care_sim.study.runner import by_reason
 
 
@@ -33,6 +32,8 @@ from care_sim.study.runner import by_reason
 def benchmark(options: Benchmark) -> int:
     """Play the official suite and write a result file per policy."""
     check_values(options, "policy")
+    if options.score == B90:
+        return smallest_budgets(options)
     if options.quick and options.sealed:
         raise InvalidInput("a sealed set is played whole: give either quick or sealed")
     if options.sealed and options.out == Benchmark.out:
@@ -41,7 +42,11 @@ def benchmark(options: Benchmark) -> int:
             f"not {Benchmark.out}"
         )
     salt = Salt.read(options.sealed) if options.sealed else None
-    entries, left_out = _entries(options)
+    # One world of every part is enough to see whether a policy can be made.
+    tried = [*{world.part: world for world in published_worlds()}.values()]
+    entries, left_out = entries_of(
+        options, lambda entry: [task.config for task in tasks_of(entry, tried)]
+    )
     for entry in entries:
         check_output(_file(options, entry), JSON)
     print_lines(f"Results go to {options.out}", file=sys.stderr)
@@ -62,34 +67,7 @@ def _published(options: Benchmark) -> Sequence[World]:
     return quick_tenth(published_worlds()) if options.quick else published_worlds()
 
 
-def _entries(options: Benchmark) -> tuple[list[Entry], list[str]]:
-    """What takes part, and a line for each policy that cannot be made."""
-    given = policy_parameters(options.policy_parameters, options.policy)
-
-    def entry(name: str) -> Entry:
-        return Entry(name, parameters_for(name, given), options.cell_order, options.name)
-
-    # One world of every part is enough to see whether a policy can be made.
-    tried = [*{world.part: world for world in published_worlds()}.values()]
-    policies, left_out = playable(
-        options.policy, lambda name: [task.config for task in _tasks(entry(name), tried)]
-    )
-    entries = [entry(name) for name in policies]
-    if options.name and len(entries) > 1:
-        raise InvalidInput("--name names one entry, and several policies are given")
-    for each in entries:
-        each.check()
-    return entries, left_out
-
-
 def _file(options: Benchmark, entry: Entry) -> Path:
     kind = ".quick" if options.quick else ".sealed" if options.sealed else ""
     name = re.sub(r"[^\w.=-]+", "-", entry.full_name)
     return options.out / f"{name}{kind}.json"
-
-
-def _tasks(entry: Entry, worlds: Sequence[World]) -> list[Task]:
-    """The tasks of an entry. Raises BrokenPolicy for one that knows the truth."""
-    if {"privileged", "non-causal"} & {*tags_of(entry.policy)}:
-        raise BrokenPolicy(f"policy {entry.policy} knows the truth, and the benchmark plays none")
-    return tasks_of(entry, worlds)

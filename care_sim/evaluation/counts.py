@@ -20,11 +20,12 @@ the chances are known a count is the sum of the chances, given all returns so fa
 """
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from care_sim.core.arrays import Floats
-from care_sim.evaluation.recall import SceneScore
+from care_sim.evaluation.sightings import Sightings
 from care_sim.evaluation.strata import EMERGING, ENTERING, ENTRY, NEWCOMERS, strata
 
 KEPT, PEOPLE_KEPT = "kept", "people kept"
@@ -36,26 +37,24 @@ EPISODE_COUNTS = (AVOIDED, NEEDLESS)
 PEOPLE = ("bicycle", "pedestrian")
 _EXPECTED = "expected"
 _CLASS = "class"
-_OF = {EMERGING: (ENTRY, NEWCOMERS[EMERGING]), ENTERING: (ENTRY, NEWCOMERS[ENTERING])} | {
+_STRATA = {EMERGING: (ENTRY, NEWCOMERS[EMERGING]), ENTERING: (ENTRY, NEWCOMERS[ENTERING])} | {
     PEOPLE_KEPT: (_CLASS, PEOPLE)
 }
 """The kind and the labels of the strata that a count adds up; none of `KEPT`, which takes all."""
 
 
-def expected_columns(score: SceneScore, chances: Floats) -> dict[str, float]:
+def expected_columns(sightings: Sightings, chances: Floats) -> dict[str, float]:
     """The expected counts as columns `expected/COUNT` of a row, from the `chances` (r,) that each
-    row of `score.sightings.frames` is detected.
+    row of `sightings.frames` is detected.
     """
-    masks = strata(score.sightings)
-    expected = replace(score, found=chances)
-    sums = {
-        f"{kind}/{label}/{name}": value
-        for kind in (ENTRY, _CLASS)
-        for label, mask in masks[kind].items()
-        for name, value in vars(expected.tally(mask)).items()
-    }
-    sums |= vars(expected.tally())
-    return {f"{_EXPECTED}/{count}": _summed(sums, count) for count in SCENE_COUNTS}
+    masks = strata(sightings)
+    is_first = np.isin(np.arange(len(chances)), sightings.events)
+    columns = {f"{_EXPECTED}/{KEPT}": float(chances.sum())}
+    for count, (kind, labels) in _STRATA.items():
+        rows = np.any([masks[kind][label] for label in labels], axis=0)
+        rows = rows & is_first if kind == ENTRY else rows
+        columns[f"{_EXPECTED}/{count}"] = float(chances[rows].sum())
+    return columns
 
 
 def scene_counts(row: Mapping[str, Any]) -> dict[str, float]:
@@ -68,6 +67,6 @@ def scene_counts(row: Mapping[str, Any]) -> dict[str, float]:
 def _summed(sums: Mapping[str, Any], count: str) -> float:
     if count == KEPT:
         return float(sums["found"])
-    kind, labels = _OF[count]
+    kind, labels = _STRATA[count]
     last = "sighted" if kind == ENTRY else "found"
     return float(sum(sums[f"{kind}/{label}/{last}"] for label in labels))

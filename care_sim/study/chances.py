@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from care_sim.core.arrays import Floats
+from care_sim.core.arrays import Floats, Integers
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES
@@ -36,14 +36,19 @@ class Chances:
         self._rule = rule
         self._weights, self._angles, self._heads = weights, angles, heads
         self._counts: list[dict[int, float]] = []
-        self._noted: list[tuple[Floats, Floats, Floats]] = []
+        self._noted: list[tuple[Integers, Floats, Floats]] = []
 
     @classmethod
     def of(cls, detector: str, parameters: Mapping[str, Any], rig: Rig) -> "Chances | None":
         """Those of a detector; None of a detector whose chances are not known."""
         heads = [head.first for head in rig.grid.heads]
         if detector == GRADED:
-            return cls(lambda name, now, _: chance(name, now), np.ones(1), np.ones(len(heads)), heads)
+            return cls(
+                lambda name, now, _: chance(name, now.astype(np.int64)),
+                np.ones(1),
+                np.ones(len(heads)),
+                heads,
+            )
         if detector not in MEASURED:
             return None
         weights = _weights(detector, parameters.get("first_hit", FIRST_HIT), rig.keyframe_s)
@@ -62,9 +67,10 @@ class Chances:
             [counts.get(each, 0.0) for counts in self._counts]
             for each in annotations.objects.tolist()
         ]
-        average = np.array(earlier).reshape(-1, len(known)) @ known / known.sum()
         # Gathered sweeps are averaged already.
-        average = now if loop.handed.poses or not known.sum() else average
+        is_averaged = bool(loop.handed.poses) or not known.any()
+        average: Floats = np.array(earlier).reshape(-1, len(known)) @ known
+        average = now if is_averaged else average / known.sum()
         self._noted.append((annotations.classes, now, average))
 
     def of_frames(self, sightings: Sightings) -> Floats:

@@ -202,7 +202,8 @@ def play_through_film(config: PlayConfig, film: Film) -> PlayRecord:
                 released.append(count)
         score = env.score
         keyframes = env.keyframes
-    expected = expected_columns(score, chances.of_frames(score.sightings)) if chances else {}
+    seen = score.sightings
+    expected = expected_columns(seen, chances.of_frames(seen)) if chances else {}
     tracks, explanations = np.mean(counts, axis=0).tolist()
     mean_released = float(np.mean(released)) if released else None
     wall_s = time.perf_counter() - started

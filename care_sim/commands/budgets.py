@@ -1,0 +1,72 @@
+"""`care-sim benchmark --score b90`: how few cells are enough for a policy."""
+
+import re
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from care_sim.base.errors import print_lines, report_problems
+from care_sim.base.files import JSON, check_output
+from care_sim.base.interrupts import DONE, FAILED
+from care_sim.commands.options.results import Benchmark
+from care_sim.commands.shared.console import TableConsole
+from care_sim.commands.shared.entries import entries_of
+from care_sim.reports.budgets import budgets_table
+from care_sim.reports.figures.budgets import BUDGETS_FIGURE, budgets_figure
+from care_sim.reports.figures.styles import check_figure, save
+from care_sim.study.benchmark.budgets import (
+    MAIN_DETECTOR,
+    BudgetResult,
+    budget_tasks,
+    budget_worlds,
+    play_budgets,
+    references,
+)
+from care_sim.study.benchmark.play import player_in
+from care_sim.study.benchmark.suite import Entry
+from care_sim.study.executors import processes
+from care_sim.study.run_config import RunConfig
+from care_sim.study.runner import by_reason
+
+
+def smallest_budgets(options: Benchmark) -> int:
+    """Play the budgets, write a result file per policy, a table and a figure."""
+    detector = options.detector or MAIN_DETECTOR
+    kind = f"{detector}{'.quick' if options.quick else ''}"
+    figure = options.out / f"{BUDGETS_FIGURE}.{kind}"
+
+    def first_tasks(entry: Entry) -> Sequence[RunConfig]:
+        parts = budget_worlds(options.quick).items()
+        return [budget_tasks(entry, part, seeds[:1], detector)[0][-1] for part, seeds in parts]
+
+    entries, left_out = entries_of(options, first_tasks)
+    files = {entry: _file(options.out, entry, kind) for entry in entries}
+    for path in files.values():
+        check_output(path, JSON)
+    check_figure(figure)
+    print_lines(f"Results go to {options.out}", file=sys.stderr)
+    with player_in(options.out, options.workers, processes) as player:
+        results = play_budgets(entries, player, detector, options.quick)
+    for result in results:
+        result.write(files[result.entry])
+    if results:
+        shown = _with_references(results)
+        save(budgets_figure(shown), figure)
+        TableConsole().print(budgets_table(shown).rich())
+        print_lines(*(f"Result: {files[result.entry]}" for result in results))
+        print_lines(f"Figure: {figure}.svg")
+    failed = [f"failed: {line}" for line in by_reason(player.failures, "plays")]
+    report_problems([*failed, *left_out])
+    return FAILED if failed or left_out else DONE
+
+
+def _with_references(results: Sequence[BudgetResult]) -> list[BudgetResult]:
+    """The results, and the published entries in the same worlds that are none of them."""
+    own = {result.entry.full_name for result in results}
+    published = references(results[0].detector, results[0].worlds)
+    return [*results, *(each for each in published if each.entry.full_name not in own)]
+
+
+def _file(folder: Path, entry: Entry, kind: str) -> Path:
+    name = re.sub(r"[^\w.=-]+", "-", entry.full_name)
+    return folder / f"{name}.b90.{kind}.json"
