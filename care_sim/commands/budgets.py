@@ -32,12 +32,15 @@ from care_sim.study.runner import by_reason
 def smallest_budgets(options: Benchmark) -> int:
     """Play the budgets, write a result file per policy, a table and a figure."""
     detector = options.detector or MAIN_DETECTOR
-    kind = f"{detector}{'.quick' if options.quick else ''}"
+    worlds = budget_worlds(options.quick, options.closed_loop)
+    marks = {"quick": options.quick, "closed-loop": options.closed_loop}
+    kind = ".".join([detector, *(name for name, on in marks.items() if on)])
     figure = options.out / f"{BUDGETS_FIGURE}.{kind}"
 
     def first_tasks(entry: Entry) -> Sequence[RunConfig]:
-        parts = budget_worlds(options.quick).items()
-        return [budget_tasks(entry, part, seeds[:1], detector)[0][-1] for part, seeds in parts]
+        return [
+            budget_tasks(entry, part, seeds[:1], detector)[0][-1] for part, seeds in worlds.items()
+        ]
 
     entries, left_out = entries_of(options, first_tasks)
     files = {entry: _file(options.out, entry, kind) for entry in entries}
@@ -46,7 +49,7 @@ def smallest_budgets(options: Benchmark) -> int:
     check_figure(figure)
     print_lines(f"Results go to {options.out}", file=sys.stderr)
     with player_in(options.out, options.workers, processes) as player:
-        results = play_budgets(entries, player, detector, options.quick)
+        results = play_budgets(entries, player, detector, worlds, options.quick)
     for result in results:
         result.write(files[result.entry])
     if results:

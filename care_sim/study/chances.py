@@ -1,9 +1,9 @@
-"""The chance that a detector reports each object of a play, given the returns so far.
+"""The chance that a detector reports each newcomer in its first keyframe, given its returns.
 
 A measured detector (`care_sim.perception.measured`) and the graded proxy detect by chance, and the
-chance follows from the returns on an object alone. For an object in its first keyframe it is exact:
-nothing that was drawn before could have moved a cell towards it or away from it. For an object that
-was there before it leaves out that luck lasts: a lucky object is tracked, and gets more cells.
+chance follows from the returns on an object alone. In the first keyframe of an object it is exact:
+nothing that was drawn before could have moved a cell towards the object or away from it. Later it
+would not be: luck lasts, and a lucky object is tracked.
 """
 
 import math
@@ -73,14 +73,17 @@ class Chances:
         average = now if is_averaged else average / known.sum()
         self._noted.append((annotations.classes, now, average))
 
-    def of_frames(self, sightings: Sightings) -> Floats:
-        """(r,) the chances of the rows of `sightings.frames`, once all keyframes are noted."""
-        classes, now, average = (np.concatenate(part) for part in zip(*self._noted, strict=True))
-        chances = np.zeros(len(classes))
+    def of_events(self, sightings: Sightings) -> Floats:
+        """(e,) the chances of `sightings.events`, once all keyframes are noted."""
+        rows = np.flatnonzero(sightings.in_range)[sightings.events]
+        classes, now, average = (
+            np.concatenate(part)[rows] for part in zip(*self._noted, strict=True)
+        )
+        chances = np.zeros(len(rows))
         for label, name in enumerate(CLASSES):
             own = classes == label
             chances[own] = self._rule(name, now[own], average[own])
-        return chances[sightings.in_range]
+        return chances
 
     def _returns(self, cloud: Cloud, annotations: Annotations) -> Floats:
         """(n,) returns on each object per sweep, in cells of the default grid."""

@@ -129,7 +129,8 @@ class ScenePlayer:
         `Tally`, those of every stratum as `KIND/STRATUM/FIELD`, `ttfds` and `sightings` of the
         events; `emerging`, by how many events the two presences differ
         (`care_sim.evaluation.sightings`); `tracks`, `explained` and `released`;
-        `expected/COUNT` where the detector detects by chance (`care_sim.evaluation.counts`);
+        `expected/COUNT` of newcomers where the detector detects by chance
+        (`care_sim.evaluation.counts`);
         `differing_keyframes` and `differing_cells` against the reference; `keyframes`,
         `peak_rss_mb`, and `wall_s` with the share of the film's that falls to one of so many plays.
         """
@@ -203,7 +204,7 @@ def play_through_film(config: PlayConfig, film: Film) -> PlayRecord:
         score = env.score
         keyframes = env.keyframes
     seen = score.sightings
-    expected = expected_columns(seen, chances.of_frames(seen)) if chances else {}
+    expected = expected_columns(seen, chances.of_events(seen)) if chances else {}
     tracks, explanations = np.mean(counts, axis=0).tolist()
     mean_released = float(np.mean(released)) if released else None
     wall_s = time.perf_counter() - started

@@ -60,6 +60,9 @@ class Benchmark(WorkerOptions):
     """share: what the policy reaches with 1% of the cells; b90: how few cells are enough."""
     detector: str | None = None
     """For --score b90: the detector, centerpoint unless given. Others are columns beside it."""
+    closed_loop: Flag = False
+    """For --score b90: play drives and Euro NCAP tests too. Collisions avoided and needless stops
+    then count as well."""
     quick: Flag = False
     """The first tenth of the worlds alone: a trial, and no line of the leaderboard. With --score
     b90 the first 24 streets."""
@@ -73,6 +76,7 @@ class Benchmark(WorkerOptions):
         super().__post_init__()
         _refuse(
             (self.detector and self.score != B90, "detector is for --score b90"),
+            (self.closed_loop and self.score != B90, "closed_loop is for --score b90"),
             (self.sealed and self.score == B90, "--score b90 plays no sealed set yet"),
         )
 

@@ -31,7 +31,6 @@ from care_sim.study.benchmark.suite import (
     DRIVES,
     FIRST_SEED,
     LATE,
-    PARTS,
     STREETS,
     TESTS,
     Entry,
@@ -47,9 +46,24 @@ BUDGET_MARK = "care_sim_b90"
 BUDGET_VERSION = 1
 MAIN_DETECTOR = "centerpoint"
 """The detector of the main column; others are columns beside it."""
-WORLDS = {DRIVES: 0, TESTS: 0, STREETS: 100}
-QUICK_STREETS = 24
-"""The first streets alone, which a trial plays."""
+STREETS_PLAYED, QUICK_STREETS = 80, 24
+"""Streets of the score, and those of a trial. Of 80 the interval of the best policy is a fifth of
+its B90."""
+EPISODES_PLAYED = {DRIVES: 24, TESTS: 40}
+"""Worlds of the closed loop, where they are played too."""
+REFERENCE_ENTRIES = (
+    Entry("care-sector"),
+    Entry("care-sector", (("residual", False),)),
+    Entry("care-sightlines"),
+    Entry("learned-sets"),
+    Entry("care", cell_order="core-spread"),
+    Entry("care"),
+    Entry("all-camera", cell_order="core-spread"),
+    Entry("boxes"),
+    Entry("place"),
+    Entry("history"),
+)
+"""The entries that stand beside everybody's."""
 COUNTS = {STREETS: SCENE_COUNTS, DRIVES: EPISODE_COUNTS, TESTS: EPISODE_COUNTS}
 _REFERENCES = Path(__file__).with_name("references.json")
 _DECIMALS = 3
@@ -139,15 +153,19 @@ def _percent(budget: float) -> float | str:
     return round(100 * budget, 2) if np.isfinite(budget) else "never"
 
 
-def budget_worlds(quick: bool) -> dict[str, list[int]]:
-    """The seeds of every part that is played; a trial plays streets alone."""
-    streets = QUICK_STREETS if quick else WORLDS[STREETS]
-    closed = {
-        part: [world.seed for world in published_worlds() if world.part == part][: WORLDS[part]]
-        for part in PARTS
-        if part != STREETS and WORLDS[part] and not quick
+Worlds = dict[str, list[int]]
+"""The seeds of every part that is played."""
+
+
+def budget_worlds(quick: bool = False, closed_loop: bool = False) -> Worlds:
+    """The streets, of a trial fewer; with the `closed_loop` the first drives and tests too."""
+    streets = QUICK_STREETS if quick else STREETS_PLAYED
+    episodes = {
+        part: [world.seed for world in published_worlds() if world.part == part][:number]
+        for part, number in EPISODES_PLAYED.items()
     }
-    return closed | {STREETS: [FIRST_SEED + n for n in range(streets)]}
+    street_seeds = {STREETS: [FIRST_SEED + n for n in range(streets)]}
+    return street_seeds | (episodes if closed_loop else {})
 
 
 def budget_tasks(
@@ -168,27 +186,26 @@ def budget_tasks(
 
 
 def play_budgets(
-    entries: Sequence[Entry], player: Player, detector: str, quick: bool
+    entries: Sequence[Entry], player: Player, detector: str, worlds: Worlds, quick: bool = False
 ) -> list[BudgetResult]:
     """The results of the entries that finished every play, in their order."""
-    worlds = [(part, seed) for part, seeds in budget_worlds(quick).items() for seed in seeds]
+    named = [(part, seed) for part, seeds in worlds.items() for seed in seeds]
     tasks = {
         entry: [
             task
-            for part, seeds in budget_worlds(quick).items()
+            for part, seeds in worlds.items()
             for task in budget_tasks(entry, part, seeds, detector)
         ]
         for entry in entries
     }
     # All at once, so that the entries share the film of a street and its full scan.
-    configs = [config for own in tasks.values() for task in own for config in task]
-    configs = [*dict.fromkeys(configs)]
+    configs = [*dict.fromkeys(config for own in tasks.values() for task in own for config in task)]
     row_of = dict(zip(configs, player.rows(configs), strict=True))
     results = []
     for entry, own in tasks.items():
         rows = [[row_of[config] for config in task] for task in own]
         if all(row for world in rows for row in world):
-            kept = tuple(_row(*world, own) for world, own in zip(worlds, rows, strict=True))
+            kept = tuple(_row(*world, own) for world, own in zip(named, rows, strict=True))
             tags = tags_of(entry.policy)
             results.append(BudgetResult(entry, tags, detector, kept, quick, made_by(entry)))
     return results
