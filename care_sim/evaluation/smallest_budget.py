@@ -107,12 +107,11 @@ def budget_ratio(ours: Counts, theirs: Counts) -> tuple[float, float, float]:
     """B90 of one entry divided by that of another in the same worlds, with its interval, paired.
 
     Where both never get there they are tied, and the ratio is 1. A budget of at most `BUDGETS[0]`
-    counts as that. Raises InvalidInput where full scans differ: the worlds are then others.
+    counts as that. Each share is of the entry's own full scan, since another machine may round
+    the last bit of one. Raises InvalidInput for other parts or numbers of worlds.
     """
-    same = len(ours) == len(theirs) and all(
-        np.array_equal(a.full, b.full) for a, b in zip(ours, theirs, strict=True)
-    )
-    if not same:
+    sizes = [[(part.names, len(part.full)) for part in counts] for counts in (ours, theirs)]
+    if sizes[0] != sizes[1]:
         raise InvalidInput("a ratio of smallest budgets must be of the same worlds")
     ratio = _divided(reaching(ours).max(keepdims=True), reaching(theirs).max(keepdims=True))
     low, high = _interval(_divided(_resampled(ours), _resampled(theirs)))

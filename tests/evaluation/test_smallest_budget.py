@@ -164,7 +164,7 @@ def test_entries_that_never_get_there_are_tied():
 
 def test_a_ratio_of_other_worlds_is_refused():
     with pytest.raises(InvalidInput, match="same worlds"):
-        budget_ratio(drawn_counts(1), drawn_counts(2))
+        budget_ratio(drawn_counts(1), drawn_counts(1, worlds=11))
 
 
 @pytest.mark.parametrize(
