@@ -53,8 +53,11 @@ def expected_columns(sightings: Sightings, chances: Floats) -> dict[str, float]:
 
 def scene_counts(row: Mapping[str, Any]) -> dict[str, float]:
     """The counts of a row of the open loop: of newcomers expectations where the row has them."""
-    draws = {count: _drawn(row, count) for count in SCENE_COUNTS}
-    return {count: row.get(f"{_EXPECTED}/{count}", drawn) for count, drawn in draws.items()}
+    # A file that holds plays of several detectors has nothing there for some of them.
+    expected = {count: row.get(f"{_EXPECTED}/{count}") for count in SCENE_COUNTS}
+    return {
+        count: _drawn(row, count) if value is None else value for count, value in expected.items()
+    }
 
 
 def _drawn(row: Mapping[str, Any], count: str) -> float:

@@ -5,7 +5,7 @@ import pytest
 from care_sim.evaluation.smallest_budget import BUDGETS
 from care_sim.study.benchmark import budgets
 from care_sim.study.benchmark.budgets import read_budget_result
-from care_sim.study.benchmark.suite import STREETS
+from care_sim.study.benchmark.suite import STREETS, TESTS
 from tests.helpers.commands import run
 from tests.helpers.made_budgets import HALF_WAY, made_budgets
 
@@ -54,6 +54,22 @@ def test_a_policy_of_ones_own_gets_a_line(capsys, here, one_street):
     # It is no result of the other score.
     code, _, err = run(capsys, "leaderboard", folder)
     assert (code, "no result of care-sim benchmark" in err) == (2, True)
+
+
+def test_drives_and_tests_count_collisions_and_needless_stops(
+    capsys, here, one_street, monkeypatch
+):
+    monkeypatch.setattr(budgets, "EPISODES_PLAYED", {TESTS: 1})
+    words = "--quick", "--closed-loop", "--workers", 1, "--detector", "returns"
+    code, out, _ = run(capsys, "benchmark", "--score", "b90", "--policy", "boxes", *words)
+    assert (code, "B90, 2 worlds, returns" in out) == (0, True)
+    # Published entries play streets alone.
+    assert "care-sector" not in out
+    path = here / "runs" / "benchmark" / "boxes.b90.returns.quick.closed-loop.json"
+    street, test = read_budget_result(path).rows
+    assert (street.part, test.part, test.full) == (STREETS, TESTS, (1.0, 0.0))
+    assert {len(counts) for counts in test.got} == {2}
+    assert len(read_budget_result(path).counts) == 2
 
 
 @pytest.mark.parametrize(

@@ -104,5 +104,6 @@ DRAWN = {
 def test_counts_of_a_row_are_draws_unless_it_has_expectations():
     drawn = {EMERGING: 2.0, ENTERING: 11.0, KEPT: 30.0, "people kept": 7.0}
     assert scene_counts(DRAWN) == drawn
+    assert scene_counts(DRAWN | {f"expected/{EMERGING}": None}) == drawn
     more = DRAWN | {f"expected/{EMERGING}": 2.5, f"expected/{ENTERING}": 10.25}
     assert scene_counts(more) == drawn | {EMERGING: 2.5, ENTERING: 10.25}
