@@ -26,39 +26,37 @@ from care_sim.perception.proxy import chance
 from care_sim.sensors.annotated import Annotations, Cloud
 
 _Rule = Callable[[str, Floats, Floats], Floats]
-"""From a class, and the returns (n,) in this keyframe and on average per sweep, to chances (n,)."""
+"""From a class, and the returns (n,) now and on average per sweep, to chances (n,)."""
 
 
 class Chances:
     """Notes the returns on every annotated object, keyframe by keyframe of an open loop."""
 
-    def __init__(self, rule: _Rule, weights: Floats, angles: Floats, heads: list[int]):
+    def __init__(self, rule: _Rule, weights: Floats, angles: Floats, rig: Rig):
         self._rule = rule
-        self._weights, self._angles, self._heads = weights, angles, heads
+        self._weights, self._angles = weights, angles
+        self._heads = [head.first for head in rig.grid.heads]
         self._counts: list[dict[int, float]] = []
         self._noted: list[tuple[Integers, Floats, Floats]] = []
 
     @classmethod
     def of(cls, detector: str, parameters: Mapping[str, Any], rig: Rig) -> "Chances | None":
         """Those of a detector; None of a detector whose chances are not known."""
-        heads = [head.first for head in rig.grid.heads]
+        alike = np.ones(len(rig.grid.heads))
         if detector == GRADED:
-            return cls(
-                lambda name, now, _: chance(name, now.astype(np.int64)),
-                np.ones(1),
-                np.ones(len(heads)),
-                heads,
-            )
+            return cls(_graded, np.ones(1), alike, rig)
         if detector not in MEASURED:
             return None
         weights = _weights(detector, parameters.get("first_hit", FIRST_HIT), rig.keyframe_s)
-        angles = np.ones(len(heads)) if parameters.get("worth") else _angles(rig)
-        return cls(_measured_rule(detector, parameters), weights, angles, heads)
+        angles = alike if parameters.get("worth") else _angles(rig)
+        return cls(_measured_rule(detector, parameters), weights, angles, rig)
 
     def note(self, loop: OpenLoop) -> None:
         """Take in the keyframe that was just played."""
         annotations = loop.film.shots[loop.index - 1].annotations
         now = self._returns(loop.handed, annotations)
+        if self._rule is not _graded:
+            now = now / max(len(loop.handed.poses), 1)
         self._counts.insert(0, dict(zip(annotations.objects.tolist(), now.tolist(), strict=True)))
         del self._counts[len(self._weights) :]
         # At the start there are fewer keyframes, and those that there are fill up for the others.
@@ -86,14 +84,18 @@ class Chances:
         return chances
 
     def _returns(self, cloud: Cloud, annotations: Annotations) -> Floats:
-        """(n,) returns on each object per sweep, in cells of the default grid."""
+        """(n,) returns on each object, in cells of the default grid."""
         order = np.argsort(annotations.objects)
         ascending = annotations.objects[order]
         own = np.isin(cloud.objects, ascending)
         heads = np.searchsorted(self._heads, cloud.cells[own], side="right") - 1
         places = order[np.searchsorted(ascending, cloud.objects[own])]
-        counts = np.bincount(places, self._angles[heads], len(annotations))
-        return counts / max(len(cloud.poses), 1)
+        return np.asarray(np.bincount(places, self._angles[heads], len(annotations)), float)
+
+
+def _graded(name: str, now: Floats, _average: Floats) -> Floats:
+    """The graded proxy counts all returns that it is handed, of however many sweeps."""
+    return chance(name, now.astype(np.int64))
 
 
 def _measured_rule(detector: str, parameters: Mapping[str, Any]) -> _Rule:

@@ -8,6 +8,7 @@ import pytest
 from care_sim.envs.open_loop import FilmEnv
 from care_sim.evaluation.counts import KEPT, expected_columns, scene_counts
 from care_sim.evaluation.strata import EMERGING, ENTERING
+from care_sim.loops.film import Sweep
 from care_sim.study.chances import Chances
 from tests.helpers.handmade_film import FIRST_KEYFRAMES, handmade_film, returns_of
 
@@ -46,9 +47,28 @@ def played(env, detector, parameters, seed):
 
 @pytest.mark.parametrize(("detector", "parameters", "keyframe_s"), CASES.values(), ids=CASES)
 def test_newcomers_are_detected_as_often_as_their_chances_say(detector, parameters, keyframe_s):
-    film = replace(handmade_film(), keyframe_s=keyframe_s)
+    assert_as_often(replace(handmade_film(), keyframe_s=keyframe_s), detector, parameters)
+
+
+def test_returns_of_gathered_sweeps_count_as_their_mean():
+    """Half of the sweeps show nobody, which halves the returns per sweep."""
+    film = handmade_film()
+    shots = []
+    for shot in film.shots:
+        empty = shot.cloud.take(np.zeros(len(shot.cloud), bool))
+        sweeps = tuple(
+            Sweep(shot.time_s - ago, shot.sensor, cloud)
+            for ago, cloud in ((0.3, empty), (0.2, shot.cloud), (0.1, empty))
+        )
+        shots.append(replace(shot, sweeps=sweeps))
+    film = replace(film, shots=tuple(shots))
+    assert_as_often(film, "centerpoint", {}, sweep_mask="coming")
+
+
+def assert_as_often(film, detector, parameters, **conditions):
     given = parameters | {"false_boxes": False}
-    with FilmEnv(film, detector=detector, detector_parameters=given, floor=False) as env:
+    known = {"detector": detector, "detector_parameters": given, "floor": False}
+    with FilmEnv(film, **known, **conditions) as env:
         draws, chances = zip(
             *(played(env, detector, given, seed) for seed in range(SEEDS)), strict=True
         )
