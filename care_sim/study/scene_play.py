@@ -17,6 +17,7 @@ from care_sim.core.forgetting import released_cells
 from care_sim.core.grid import Cells
 from care_sim.core.residual import explained
 from care_sim.envs.open_loop import OpenLoopEnv
+from care_sim.evaluation.chances import Chances
 from care_sim.evaluation.counts import expected_columns
 from care_sim.evaluation.differences import AllocationDifference, allocation_difference
 from care_sim.evaluation.recall import SceneScore, Tally
@@ -24,7 +25,6 @@ from care_sim.evaluation.strata import strata
 from care_sim.loops.film import Film
 from care_sim.loops.open_loop import OpenLoop, OpenLoopKeyframe, SceneKeyframe
 from care_sim.policies.base import Policy
-from care_sim.study.chances import Chances
 from care_sim.study.episode_play import GymEnv, peak_rss_mb, result_or_reason
 from care_sim.study.play_config import PlayConfig
 from care_sim.study.run_config import FULL, REFERENCE, Row

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from care_sim.envs.open_loop import FilmEnv
+from care_sim.evaluation.chances import Chances
 from care_sim.evaluation.counts import KEPT, expected_columns, scene_counts
 from care_sim.evaluation.strata import EMERGING, ENTERING
 from care_sim.loops.film import Sweep
-from care_sim.study.chances import Chances
 from tests.helpers.handmade_film import FIRST_KEYFRAMES, handmade_film, returns_of
 
 SEEDS = 200
