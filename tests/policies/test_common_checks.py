@@ -33,7 +33,7 @@ BEFORE = {
 is, and before a cut-in nobody is hidden.
 """
 FOUR = ("care", "care-sbf", "care-sightlines", "history-uniform")
-CASES = dict.fromkeys([*product(BEFORE, FOUR), *zip([*BEFORE] * 4, BUILT_IN, strict=False)])
+CASES = dict.fromkeys([*product(BEFORE, FOUR), *zip([*BEFORE] * 5, BUILT_IN, strict=False)])
 KEYFRAMES = 6
 OWN = {"care-spread": 1, "care-sightlines": 2, "care-sector": 2}
 """The policies of our own, and the layer of each in which its hulls come first."""
