@@ -115,13 +115,13 @@ def _smallest_budgets(options: Benchmark) -> int:
 
 
 def _with_references(results: Sequence[BudgetResult]) -> list[BudgetResult]:
-    """The results, and the published entries in the same worlds that are none of them."""
+    """Return the results with the other published entries in the same worlds."""
     own = {result.entry.full_name for result in results}
     published = references(results[0].detector, results[0].worlds)
     return [*results, *(each for each in published if each.entry.full_name not in own)]
 
 
 def _file(options: Benchmark, entry: Entry, kind: str) -> Path:
-    """The result file of an entry; `kind` tells trials and other scores apart."""
+    """Return the result file of an entry; `kind` marks trials and other scores."""
     name = re.sub(r"[^\w.=-]+", "-", entry.full_name)
     return options.out / f"{name}{kind}.json"

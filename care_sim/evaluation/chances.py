@@ -30,7 +30,7 @@ _Rule = Callable[[str, Floats, Floats], Floats]
 
 
 class Chances:
-    """Notes the returns on every annotated object, keyframe by keyframe of an open loop."""
+    """Meter of the returns on every annotated object, keyframe by keyframe of an open loop."""
 
     def __init__(self, rule: _Rule, weights: Floats, angles: Floats, rig: Rig):
         self._rule = rule
@@ -41,7 +41,7 @@ class Chances:
 
     @classmethod
     def of(cls, detector: str, parameters: Mapping[str, Any], rig: Rig) -> "Chances | None":
-        """Those of a detector; None of a detector whose chances are not known."""
+        """Return the meter of a detector; None where the chances of the detector are not known."""
         alike = np.ones(len(rig.grid.heads))
         if detector == GRADED:
             return cls(_graded, np.ones(1), alike, rig)
@@ -52,14 +52,14 @@ class Chances:
         return cls(_measured_rule(detector, parameters), weights, angles, rig)
 
     def note(self, loop: OpenLoop) -> None:
-        """Take in the keyframe that was just played."""
+        """Note the keyframe that was just played."""
         annotations = loop.film.shots[loop.index - 1].annotations
         now = self._returns(loop.handed, annotations)
         if self._rule is not _graded:
             now = now / max(len(loop.handed.poses), 1)
         self._counts.insert(0, dict(zip(annotations.objects.tolist(), now.tolist(), strict=True)))
         del self._counts[len(self._weights) :]
-        # At the start there are fewer keyframes, and those that there are fill up for the others.
+        # At the start there are fewer keyframes, and they weigh as much as all do later.
         known = self._weights[: len(self._counts)]
         earlier = [
             [counts.get(each, 0.0) for counts in self._counts]
@@ -72,7 +72,7 @@ class Chances:
         self._noted.append((annotations.classes, now, average))
 
     def of_events(self, sightings: Sightings) -> Floats:
-        """(e,) the chances of `sightings.events`, once all keyframes are noted."""
+        """Return the chances (e,) of `sightings.events`, once all keyframes are noted."""
         rows = np.flatnonzero(sightings.in_range)[sightings.events]
         classes, now, average = (
             np.concatenate(part)[rows] for part in zip(*self._noted, strict=True)
@@ -84,7 +84,7 @@ class Chances:
         return chances
 
     def _returns(self, cloud: Cloud, annotations: Annotations) -> Floats:
-        """(n,) returns on each object, in cells of the default grid."""
+        """Return the number of returns (n,) on each object, in cells of the default grid."""
         order = np.argsort(annotations.objects)
         ascending = annotations.objects[order]
         own = np.isin(cloud.objects, ascending)
@@ -94,7 +94,7 @@ class Chances:
 
 
 def _graded(name: str, now: Floats, _average: Floats) -> Floats:
-    """The graded proxy counts all returns that it is handed, of however many sweeps."""
+    """Return the chances of the graded proxy, which counts the returns of all sweeps."""
     return chance(name, now.astype(np.int64))
 
 
@@ -115,7 +115,7 @@ def _measured_rule(detector: str, parameters: Mapping[str, Any]) -> _Rule:
 
 
 def _weights(detector: str, first_hit: float, keyframe_s: float) -> Floats:
-    """(k,) the weights of the returns of the last keyframes, newest first, as the detector's."""
+    """Return the detector's weights (k,) of the returns at the last keyframes, newest first."""
     measured = measurement(detector)
     if measured.sweeps == 1:
         return np.ones(1)
@@ -125,7 +125,7 @@ def _weights(detector: str, first_hit: float, keyframe_s: float) -> Floats:
 
 
 def _angles(rig: Rig) -> Floats:
-    """(k,) the solid angle of a cell of each LiDAR, in cells of the default grid."""
+    """Return the solid angle (k,) of a cell of each LiDAR, in cells of the default grid."""
     usual = AngularGrid()
     angles = [head.grid.column_width * head.grid.row_height for head in rig.grid.heads]
     return np.array(angles) / (usual.column_width * usual.row_height)

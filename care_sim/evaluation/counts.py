@@ -40,8 +40,9 @@ _EXPECTED = "expected"
 
 
 def expected_columns(sightings: Sightings, chances: Floats) -> dict[str, float]:
-    """The expected counts of newcomers as columns `expected/COUNT` of a row, from the `chances`
-    (e,) that `sightings.events` are detected.
+    """Return the expected counts of newcomers as columns `expected/COUNT` of a row.
+
+    `chances` (e,) are those that `sightings.events` are detected.
     """
     entries = strata(sightings)[ENTRY]
     columns = {}
@@ -52,7 +53,7 @@ def expected_columns(sightings: Sightings, chances: Floats) -> dict[str, float]:
 
 
 def scene_counts(row: Mapping[str, Any]) -> dict[str, float]:
-    """The counts of a row of the open loop: of newcomers expectations where the row has them."""
+    """Return the counts of a row of the open loop: expected newcomers where the row has them."""
     # A file that holds plays of several detectors has nothing there for some of them.
     expected = {count: row.get(f"{_EXPECTED}/{count}") for count in SCENE_COUNTS}
     return {

@@ -76,13 +76,13 @@ class SmallestBudget(NamedTuple):
 
 
 def names_of(counts: Counts) -> tuple[str, ...]:
-    """The counts of all parts, in the order in which the functions here return them."""
+    """Return the names of all counts, in the order of the arrays of this module."""
     return tuple(name for part in counts for name in part.names)
 
 
 def shares(counts: Counts) -> Floats:
-    """(b, k) each count as a share of the full scan's; of needless stops, those per world that the
-    full scan has less. A share of nothing is NaN.
+    """Return each count (b, k) as a share of the full scan's; a share of nothing is NaN. Needless
+    stops are the full scan's minus the entry's, per world.
     """
     once = [np.ones((1, len(part.full))) for part in counts]
     levels: Floats = _levels(counts, once)[0]
@@ -90,21 +90,21 @@ def shares(counts: Counts) -> Floats:
 
 
 def reaching(counts: Counts) -> Floats:
-    """(k,) the smallest budget of every count alone."""
+    """Return the smallest budget (k,) of every count alone."""
     once = [np.ones((1, len(part.full))) for part in counts]
     budgets: Floats = _crossings(_margins(counts, once))[0]
     return budgets
 
 
 def smallest_budget(counts: Counts) -> SmallestBudget:
-    """B90 of an entry. A count of which the full scan has nothing asks nothing."""
+    """Return B90 of an entry. A count of which the full scan has none needs no cell."""
     each = reaching(counts)
     low, high = _interval(_resampled(counts))
     return SmallestBudget(float(each.max()), low, high, names_of(counts)[int(each.argmax())])
 
 
 def budget_ratio(ours: Counts, theirs: Counts) -> tuple[float, float, float]:
-    """B90 of one entry divided by that of another in the same worlds, with its interval, paired.
+    """Return the paired ratio of two entries' B90 in the same worlds, with its interval.
 
     Where both never get there they are tied, and the ratio is 1. A budget of at most `BUDGETS[0]`
     counts as that. Each share is of the entry's own full scan, since another machine may round
@@ -126,13 +126,13 @@ def _divided(ours: Floats, theirs: Floats) -> Floats:
 
 def _interval(values: Floats) -> tuple[float, float]:
     ends = (1 - INTERVAL_CONFIDENCE) / 2, (1 + INTERVAL_CONFIDENCE) / 2
-    # Some may be infinite, between which and another number there is nothing.
+    # Infinite budgets rule out interpolation between two draws.
     low, high = np.quantile(values, ends, method="inverted_cdf")
     return float(low), float(high)
 
 
 def _resampled(counts: Counts) -> Floats:
-    """(resamples,) B90 of every draw of worlds."""
+    """Return B90 (resamples,) of every draw of worlds."""
     weights = [_drawn(part, len(each.full)) for part, each in enumerate(counts)]
     budgets: Floats = _crossings(_margins(counts, weights)).max(axis=-1)
     return budgets
@@ -140,13 +140,13 @@ def _resampled(counts: Counts) -> Floats:
 
 @lru_cache(maxsize=8)
 def _drawn(part: int, worlds: int) -> Floats:
-    """(resamples, worlds) how often each world of a part is drawn."""
+    """Return how often each world of a part is drawn, (resamples, worlds)."""
     rng = np.random.default_rng([0, part])
     return rng.multinomial(worlds, np.full(worlds, 1 / worlds), RESAMPLES).astype(float)
 
 
 def _margins(counts: Counts, weights: Sequence[Floats]) -> Floats:
-    """(r, b, k) by how much each count is on the right side of what is enough."""
+    """Return by how much (r, b, k) each count exceeds what is enough."""
     levels = _levels(counts, weights)
     is_stop = np.array([name == NEEDLESS for name in names_of(counts)])
     margins = np.where(is_stop, levels + MORE_STOPS, levels - ENOUGH) + _ROUNDING
@@ -154,7 +154,7 @@ def _margins(counts: Counts, weights: Sequence[Floats]) -> Floats:
 
 
 def _levels(counts: Counts, weights: Sequence[Floats]) -> Floats:
-    """(r, b, k) `shares` of the worlds of every part, each as often as its weight (r, w) says."""
+    """Return `shares` (r, b, k) of the worlds of every part, with weights (r, w) of the worlds."""
     levels = []
     for part, drawn in zip(counts, weights, strict=True):
         got = np.tensordot(drawn, part.got, axes=1)
@@ -166,7 +166,7 @@ def _levels(counts: Counts, weights: Sequence[Floats]) -> Floats:
 
 
 def _crossings(margins: Floats) -> Floats:
-    """(r, k) the budget above which each of the `margins` (r, b, k) stays at 0 or more."""
+    """Return the budget (r, k) above which each of the `margins` (r, b, k) stays at 0 or more."""
     missed = margins < 0
     largest = len(BUDGETS) - 1
     # The last budget that misses; -1 where none does.

@@ -26,25 +26,27 @@ _TRIAL = "A trial on the streets that --quick plays."
 
 
 def budgets_table(results: Sequence[BudgetResult], by: str = YARDSTICK) -> Table:
-    """A line for every result, the smallest B90 first, with what each count alone needs and with
-    the ratio to the entry `by`, where that is among them. All must be of the same worlds.
+    """Return a table with a line per result, the smallest B90 first.
+
+    A line has what each count alone needs, and the ratio to the entry `by` where that entry is
+    there. All results must be of the same worlds.
     """
     yardstick = next((each for each in results if each.entry.name == by), None)
     rows: list[TableRow] = []
     place = 0
-    for each in by_budget(results):
+    for each in sorted_by_budget(results):
         is_beyond = bool({*each.tags} & {*MARKS}) or each.entry.policy == FULL
         place += not is_beyond
         score = each.score
-        interval = f"{told(score.budget)} [{told(score.low)}, {told(score.high)}]"
+        budget, low, high = map(format_budget, score[:3])
         ratio = [] if yardstick is None else [_ratio(each, yardstick)]
         rows.append(
             (
                 "" if is_beyond else f"{place}",
                 marked(each.entry.name, each.tags),
-                interval,
+                f"{budget} [{low}, {high}]",
                 score.held_back_by,
-                *map(told, reaching(each.counts)),
+                *map(format_budget, reaching(each.counts)),
                 *ratio,
             )
         )
@@ -62,13 +64,13 @@ def budgets_table(results: Sequence[BudgetResult], by: str = YARDSTICK) -> Table
     )
 
 
-def by_budget(results: Sequence[BudgetResult]) -> list[BudgetResult]:
-    """The smallest B90 first; of equal ones that which was given first."""
+def sorted_by_budget(results: Sequence[BudgetResult]) -> list[BudgetResult]:
+    """Sort results by B90, the smallest first; equal ones keep their order."""
     return sorted(results, key=lambda result: result.score.budget)
 
 
-def told(budget: float) -> str:
-    """A budget in percent of the cells; the ends of what was played as such."""
+def format_budget(budget: float) -> str:
+    """Format a budget in percent of the cells, with ≤ at the smallest one; "never" if infinite."""
     if isinf(budget):
         return "never"
     return f"≤{100 * budget:.1f}" if budget <= BUDGETS[0] else f"{100 * budget:.1f}"

@@ -3,7 +3,7 @@
 import pytest
 
 from care_sim.evaluation.smallest_budget import BUDGETS
-from care_sim.reports.budgets import budgets_table, told
+from care_sim.reports.budgets import budgets_table, format_budget
 from care_sim.reports.figures.budgets import budgets_figure
 from care_sim.study.benchmark.suite import Entry
 from tests.helpers.made_budgets import ALWAYS, HALF_WAY, NEVER, made_budgets
@@ -55,7 +55,7 @@ def test_a_trial_is_named_as_one():
     ("budget", "text"), [(0.005, "≤0.5"), (0.0051, "0.5"), (0.2, "20.0"), (float("inf"), "never")]
 )
 def test_budgets_in_percent(budget, text):
-    assert told(budget) == text
+    assert format_budget(budget) == text
 
 
 def test_every_count_has_a_panel_and_every_entry_a_curve():

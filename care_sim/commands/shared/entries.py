@@ -13,7 +13,7 @@ from care_sim.study.run_config import RunConfig, parameters_for
 def entries_of(
     options: Benchmark, tasks: Callable[[Entry], Sequence[RunConfig]]
 ) -> tuple[list[Entry], list[str]]:
-    """The entries, and a line for each policy that cannot begin the `tasks`.
+    """Return the entries, and a line for each policy that cannot begin the `tasks`.
 
     Raises InvalidInput for a --name of several entries or one that no table can hold, and where no
     policy is left.

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from care_sim.evaluation.counts import NEEDLESS
 from care_sim.evaluation.smallest_budget import BUDGETS, ENOUGH, MORE_STOPS, names_of, shares
-from care_sim.reports.budgets import by_budget
+from care_sim.reports.budgets import sorted_by_budget
 from care_sim.reports.figures.styles import INK, colours, default_style
 from care_sim.reports.formatting import marked
 from care_sim.study.benchmark.budgets import BudgetResult
@@ -19,10 +19,10 @@ _LINES = ("-", "--", ":", "-.")
 
 @default_style()
 def budgets_figure(results: Sequence[BudgetResult]) -> Figure:
-    """A panel for every count, a curve for every result: the share of a full scan's count over the
+    """Draw a panel per count and a curve per result: the share of a full scan's count over the
     share of the cells that fire.
     """
-    ordered = by_budget(results)
+    ordered = sorted_by_budget(results)
     names = names_of(ordered[0].counts)
     figure = Figure(figsize=(2.4 * len(names) + 2.4, 3.4), layout="constrained")
     panels = figure.subplots(1, len(names), sharex=True, squeeze=False)[0]

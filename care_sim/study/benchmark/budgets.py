@@ -99,7 +99,7 @@ class BudgetResult:
 
     @property
     def counts(self) -> Counts:
-        """What its score is worked out of."""
+        """Counts of all parts, from which the score follows."""
         return [
             PartCounts(
                 COUNTS[part],
@@ -111,18 +111,18 @@ class BudgetResult:
 
     @property
     def score(self) -> SmallestBudget:
-        """Its B90."""
+        """B90 of the entry."""
         return smallest_budget(self.counts)
 
     def cut_to(self, worlds: Iterable[tuple[str, int]]) -> "BudgetResult | None":
-        """The same in these worlds, in their order; None where it lacks one."""
+        """Return the result in these worlds, in their order; None where one is missing."""
         own = dict(zip(self.worlds, self.rows, strict=True))
         kept = [own.get(world) for world in worlds]
         rows = tuple(row for row in kept if row is not None)
         return replace(self, rows=rows) if len(rows) == len(kept) else None
 
     def content(self) -> dict[str, Any]:
-        """It as plain data, the score for people alone: it is worked out of the rows again."""
+        """Return the result as plain data. The score in it is for people; readers use the rows."""
         score = self.score
         return {
             BUDGET_MARK: BUDGET_VERSION,
@@ -141,7 +141,7 @@ class BudgetResult:
         }
 
     def write(self, path: Path) -> None:
-        """Write it, a world a line."""
+        """Write the result, one line per world."""
         head = self.content()
         rows = ",\n  ".join(json.dumps(row) for row in head.pop("rows"))
         opened = json.dumps(head, indent=1).removesuffix("\n}")
@@ -158,7 +158,7 @@ Worlds = dict[str, list[int]]
 
 
 def budget_worlds(quick: bool = False, closed_loop: bool = False) -> Worlds:
-    """The streets, of a trial fewer; with the `closed_loop` the first drives and tests too."""
+    """Return the streets, fewer for a trial; with `closed_loop` the first drives and tests too."""
     streets = QUICK_STREETS if quick else STREETS_PLAYED
     episodes = {
         part: [world.seed for world in published_worlds() if world.part == part][:number]
@@ -171,7 +171,7 @@ def budget_worlds(quick: bool = False, closed_loop: bool = False) -> Worlds:
 def budget_tasks(
     entry: Entry, part: str, seeds: Sequence[int], detector: str
 ) -> list[list[RunConfig]]:
-    """World by world, the full scan and then the entry at every budget. Raises InvalidInput for an
+    """Return per world the full scan and the entry at every budget. Raises InvalidInput for an
     entry or a detector that cannot be played.
     """
     common: dict[str, Any] = {"detector": detector, "camera_profile": KITTI_CAMERA}
@@ -188,7 +188,7 @@ def budget_tasks(
 def play_budgets(
     entries: Sequence[Entry], player: Player, detector: str, worlds: Worlds, quick: bool = False
 ) -> list[BudgetResult]:
-    """The results of the entries that finished every play, in their order."""
+    """Play the entries; return the results of those that finished every play, in their order."""
     named = [(part, seed) for part, seeds in worlds.items() for seed in seeds]
     tasks = {
         entry: [
@@ -217,14 +217,14 @@ def _row(part: str, world: int, rows: Sequence[Row | None]) -> BudgetRow:
 
 
 def counts_of(part: str, row: Row) -> tuple[float, ...]:
-    """The counts of a play, in the order of `COUNTS`."""
+    """Return the counts of a play, in the order of `COUNTS`."""
     if part == STREETS:
         return tuple(round(value, _DECIMALS) for value in scene_counts(row).values())
     return float(is_avoided(row)), float(stops_for_nothing(row))
 
 
 def read_budget_result(path: Path) -> BudgetResult:
-    """The result in a file. Raises InvalidInput for a file that holds none or is damaged."""
+    """Read the result in a file. Raises InvalidInput for a file that holds none or is damaged."""
     try:
         content = json_content(path, _MOST_BYTES)
     except (OSError, ValueError) as error:
@@ -233,10 +233,10 @@ def read_budget_result(path: Path) -> BudgetResult:
     return result_of(content, str(path))
 
 
-def result_of(content: Any, told: str) -> BudgetResult:
-    """The result that parsed JSON holds; `told` names where it is from. Raises InvalidInput."""
+def result_of(content: Any, origin: str) -> BudgetResult:
+    """Return the result that parsed JSON holds; `origin` names its place. Raises InvalidInput."""
     if not isinstance(content, dict) or content.get(BUDGET_MARK) != BUDGET_VERSION:
-        raise InvalidInput(f"{told} holds no B90 of version {BUDGET_VERSION}: play it again")
+        raise InvalidInput(f"{origin} holds no B90 of version {BUDGET_VERSION}: play it again")
     try:
         given = with_tuples({"given": content["parameters"]})["given"]
         parameters = tuple((str(name), value) for name, value in given)
@@ -255,15 +255,15 @@ def result_of(content: Any, told: str) -> BudgetResult:
         if not result.counts:
             raise ValueError("it has no rows")
     except KeyError as error:
-        raise InvalidInput(f"{told} is damaged: {shown(error.args[0])} is missing") from error
+        raise InvalidInput(f"{origin} is damaged: {shown(error.args[0])} is missing") from error
     except (InvalidInput, TypeError, ValueError, OverflowError) as error:
-        raise InvalidInput(f"{told} is damaged: {printable(str(error))}") from error
+        raise InvalidInput(f"{origin} is damaged: {printable(str(error))}") from error
     entry.check()
     return result
 
 
 def references(detector: str, worlds: Sequence[tuple[str, int]]) -> list[BudgetResult]:
-    """The published entries in these worlds under a detector; none where they were not played."""
+    """Return the published entries in these worlds under a detector; none without such plays."""
     listed = parsed_json(_REFERENCES.read_text(encoding="utf-8"))
     results = [result_of(content, _REFERENCES.name) for content in listed]
     cut = (result.cut_to(worlds) for result in results if result.detector == detector)
