@@ -28,6 +28,7 @@ from care_sim.policies.makers import (
     policy_faults,
     tags_of_maker,
 )
+from care_sim.policies.own.boxes import Boxes
 from care_sim.policies.own.care import CareSector, CareSightlines, CareSpread
 from care_sim.policies.own.care_units import CareUnits
 from care_sim.policies.paper.blind import BeamReduce, FarthestPoints, Full, Random, RandomPoints
@@ -81,6 +82,7 @@ BUILT_IN: dict[str, PolicyMaker | EntryPoint] = {
         AfterShoouri,
         AfterAncha,
         AfterGofer,
+        Boxes,
         Rows,
         Fan,
         Stride,

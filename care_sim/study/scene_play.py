@@ -17,6 +17,8 @@ from care_sim.core.forgetting import released_cells
 from care_sim.core.grid import Cells
 from care_sim.core.residual import explained
 from care_sim.envs.open_loop import OpenLoopEnv
+from care_sim.evaluation.chances import Chances
+from care_sim.evaluation.counts import expected_columns
 from care_sim.evaluation.differences import AllocationDifference, allocation_difference
 from care_sim.evaluation.recall import SceneScore, Tally
 from care_sim.evaluation.strata import strata
@@ -85,7 +87,8 @@ class PlayRecord:
 
     `tracks`, `explained` and `released` are means per keyframe: tracks held, camera detections that
     a forecast explains, and cells of the full hulls that exploitation does not ask for; `released`
-    is None of a policy that exploits no set. `wall_s` is in seconds.
+    is None of a policy that exploits no set. `expected` are the columns of expected counts, empty
+    for a detector that does not detect by chance. `wall_s` is in seconds.
     """
 
     score: SceneScore
@@ -93,6 +96,7 @@ class PlayRecord:
     tracks: float
     explained: float
     released: float | None
+    expected: dict[str, float]
     wall_s: float
 
     @property
@@ -123,6 +127,8 @@ class ScenePlayer:
         `Tally`, those of every stratum as `KIND/STRATUM/FIELD`, `ttfds` and `sightings` of the
         events; `emerging`, by how many events the two presences differ
         (`care_sim.evaluation.sightings`); `tracks`, `explained` and `released`;
+        `expected/COUNT` of newcomers where the detector detects by chance
+        (`care_sim.evaluation.counts`);
         `differing_keyframes` and `differing_cells` against the reference; `keyframes`,
         `peak_rss_mb`, and `wall_s` with the share of the film's that falls to one of so many plays.
         """
@@ -143,6 +149,7 @@ class ScenePlayer:
             "tracks": record.tracks,
             "explained": record.explained,
             "released": record.released,
+            **record.expected,
             **self._difference(config, record),
             "wall_s": record.wall_s + self._film_s / sharers,
             "peak_rss_mb": peak_rss_mb(),
@@ -175,6 +182,7 @@ def play_through_film(config: PlayConfig, film: Film) -> PlayRecord:
         observation, _ = env.reset(seed=config.scene.seed)
         policy.reset()
         loop = env.loop
+        chances = Chances.of(config.detector, dict(config.detector_parameters), env.rig)
         counts = []
         released = []
         while not loop.over:
@@ -187,14 +195,18 @@ def play_through_film(config: PlayConfig, film: Film) -> PlayRecord:
                 )
             )
             observation, *_ = env.step(policy(observation))
+            if chances:
+                chances.note(loop)
             if (count := _released(policy, belief)) is not None:
                 released.append(count)
         score = env.score
         keyframes = env.keyframes
+    seen = score.sightings
+    expected = expected_columns(seen, chances.of_events(seen)) if chances else {}
     tracks, explanations = np.mean(counts, axis=0).tolist()
     mean_released = float(np.mean(released)) if released else None
     wall_s = time.perf_counter() - started
-    return PlayRecord(score, keyframes, tracks, explanations, mean_released, wall_s)
+    return PlayRecord(score, keyframes, tracks, explanations, mean_released, expected, wall_s)
 
 
 def _released(policy: Policy, belief: Belief) -> int | None:

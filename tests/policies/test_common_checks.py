@@ -37,7 +37,7 @@ CASES = dict.fromkeys([*product(BEFORE, FOUR), *zip([*BEFORE] * 5, BUILT_IN, str
 KEYFRAMES = 6
 OWN = {"care-spread": 1, "care-sightlines": 2, "care-sector": 2}
 """The policies of our own, and the layer of each in which its hulls come first."""
-CORE_FIRST = (*OWN, "place-hulls", "care-units", "learned-sets")
+CORE_FIRST = (*OWN, "boxes", "place-hulls", "care-units", "learned-sets")
 """The policies that list their sets with the core first."""
 SEEING = [
     name

@@ -10,7 +10,16 @@ import pytest
 
 from care_sim import cli
 from care_sim.policies import BUILT_IN
+from care_sim.reports.budgets import budgets_table
+from care_sim.study.benchmark.budgets import (
+    MAIN_DETECTOR,
+    REFERENCE_ENTRIES,
+    budget_worlds,
+    read_budget_result,
+    references,
+)
 from care_sim.study.benchmark.result import read_result
+from care_sim.study.benchmark.suite import STREETS
 from care_sim.study.results_formats import EPISODES
 from care_sim.study.rows.parquet import read_rows
 from tests.helpers.places import RESULTS, ROOT, links, loaded
@@ -97,6 +106,18 @@ def test_every_entry_of_the_leaderboard_stands_on_its_page_as_it_scores():
     assert len(entries) > 10
     for score in (one.score() for one in entries if one.entry.policy != "full"):
         assert "{:.1f} [{:.1f}, {:.1f}]".format(*score) in page
+
+
+def test_the_table_of_b90_is_of_its_files_which_are_the_published_entries():
+    results = {one.entry: one for one in map(read_budget_result, (DATA / "b90").glob("*.json"))}
+    assert {*results} == {*REFERENCE_ENTRIES}
+    ordered = [results[entry] for entry in REFERENCE_ENTRIES]
+    worlds = [(STREETS, seed) for seed in budget_worlds()[STREETS]]
+    assert [one.rows for one in references(MAIN_DETECTOR, worlds)] == [one.rows for one in ordered]
+    table = budgets_table(ordered).markdown()
+    assert (DATA / "b90" / "tables.md").read_text() == f"# B90\n\n{table}"
+    page = (FOLDER / "b90.md").read_text()
+    assert all(line in page for line in table.splitlines() if line.startswith("|"))
 
 
 def test_the_page_of_the_leaderboard_is_of_its_files(tmp_path, capsys):

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import tyro
 
-from care_sim.base.checks import LARGEST_INTEGER, bounded, check_fields, check_whole
+from care_sim.base.checks import LARGEST_INTEGER, bounded, check_fields, check_whole, one_of
 from care_sim.base.errors import InvalidInput
 from care_sim.certify import ALL_EPISODES
 from care_sim.commands.options.shared import (
@@ -20,6 +20,8 @@ from care_sim.commands.options.shared import (
 )
 from care_sim.core.defaults import AS_DEMANDED
 
+SHARE, B90 = "share", "b90"
+"""The scores of the benchmark."""
 CONTROL = "place"
 """The entry of the leaderboard over which leads are measured."""
 _MOST_EPISODES = 100_000
@@ -39,6 +41,9 @@ class Benchmark(WorkerOptions):
 
     The suite is drives, Euro NCAP tests and streets at 1% of the cells: 480 plays an entry, 48 with
     --quick. `care-sim leaderboard` makes the table.
+
+    With --score b90 it plays streets at seven budgets, and prints the smallest one at which the
+    policy has 90% of what a full scan has, beside published entries.
     """
 
     policy: tuple[str, ...] = ()
@@ -51,13 +56,29 @@ class Benchmark(WorkerOptions):
     rows-down, rows-up, columns, random, spread, core-spread."""
     name: str = ""
     """What you call the entry, for its line in tables, if one policy is played alone."""
+    score: str = one_of(SHARE, (SHARE, B90))
+    """share: what the policy reaches with 1% of the cells; b90: how few cells are enough."""
+    detector: str | None = None
+    """For --score b90: the detector, centerpoint unless given. Others are columns beside it."""
+    closed_loop: Flag = False
+    """For --score b90: play drives and Euro NCAP tests too. Collisions avoided and needless stops
+    then count as well."""
     quick: Flag = False
-    """The first tenth of the worlds alone: a trial, and no line of the leaderboard."""
+    """The first tenth of the worlds alone: a trial, and no line of the leaderboard. With --score
+    b90 the first 24 streets."""
     sealed: Path | None = None
     """For organisers of a competition: a file with a secret salt, which draws other worlds. The
     journal in the folder holds their seeds; the result files do not."""
     out: Path = Path("runs/benchmark")
     """Folder of the result files; what is finished stays there, and the same command resumes."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _refuse(
+            (self.detector and self.score != B90, "detector is for --score b90"),
+            (self.closed_loop and self.score != B90, "closed_loop is for --score b90"),
+            (self.sealed and self.score == B90, "--score b90 plays no sealed set yet"),
+        )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,6 +11,7 @@ from care_sim.core.beliefs import Beliefs
 from care_sim.core.cells.sets import CellSets, WorldSets
 from care_sim.core.conditions import MIN_RETURNS
 from care_sim.core.residual import camera_layers, unexplained_layer_of
+from care_sim.core.residual import wedges as wedges_of_boxes
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.policies.base import Policy, RowPolicy
@@ -89,7 +90,7 @@ class CareSector(Policy):
     In order of priority: a round of unexplained wedges; the sector ahead, in the row at which
     things enter the range; a round of hulls; a round of explained wedges; the rest of the
     unexplained ones; the rest of that row; more of the hulls; and the pattern `rows` in the place
-    of the random floor.
+    of the random floor. Without the `residual` every wedge counts as unexplained.
     """
 
     name = "care-sector"
@@ -97,9 +98,11 @@ class CareSector(Policy):
     told: ClassVar[Mapping[str, str]] = {"min_returns": "min_returns"}
     keeps_order = True
 
-    def __init__(self, rig: Rig, min_returns: int = MIN_RETURNS):
+    def __init__(self, rig: Rig, min_returns: int = MIN_RETURNS, residual: bool = True):
         super().__init__(rig)
         self._round = Round.of(min_returns)
+        check_flag("residual", residual)
+        self._uses_residual = residual
         self._rows = cells_by_row(rig)
         entries = entry_cells(rig)
         self._entries = len(entries)
@@ -107,7 +110,7 @@ class CareSector(Policy):
 
     def demand(self, belief: Belief) -> Demand:
         """Layers in order of priority; see the class."""
-        unexplained, known = camera_layers(belief, self.rig)
+        unexplained, known = self._camera_layers(belief)
         few, more = self._round
         wedges = self.rig.listed(unexplained, CORE_FIRST, WEDGE_ROUNDS * more)
         hulls = self.rig.listed(self.rig.hulls(belief.tracks.boxes), CORE_FIRST, few + more)
@@ -123,6 +126,11 @@ class CareSector(Policy):
                 [self._rows[: belief.budget]],
             ]
         )
+
+    def _camera_layers(self, belief: Belief) -> tuple[CellSets, CellSets]:
+        if self._uses_residual:
+            return camera_layers(belief, self.rig)
+        return wedges_of_boxes(belief.detections, self.rig), CellSets.of([])
 
 
 WEDGE_ROUNDS = 4

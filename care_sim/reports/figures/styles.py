@@ -112,6 +112,7 @@ _COLOURS = {
     "care-sightlines": "#9B59D0",
     "care-spread": "#5B82C2",
     "care-sector": "#C2478A",
+    "boxes": "#B3543C",
     "uncertainty": "#B5679A",
     "history-uniform": "#A8506F",
     "beam-reduce": "#7468C0",

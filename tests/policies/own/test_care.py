@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 
 import care_sim
+from care_sim.base.errors import InvalidInput
 from care_sim.core.belief import MAX_DETECTIONS, Belief
 from care_sim.core.grid import AngularGrid
-from care_sim.core.residual import camera_layers
+from care_sim.core.residual import camera_layers, wedges
 from care_sim.core.rig import Rig
 from care_sim.core.types import ImageDetections
 from care_sim.policies.controls.patterns import cells_by_row
@@ -121,6 +122,32 @@ def test_wedges_and_hulls_are_served_in_rounds(environment, encounter):
             assert [cells.tolist() for cells in layers[number]] == [s.tolist() for s in sets]
         served += [sum(map(len, sets)) for sets in expected.values()]
     assert served.min() > 0
+
+
+def test_without_the_residual_every_wedge_counts_as_unexplained(environment, encounter):
+    """All wedges in the order of their boxes; nothing else moves."""
+    policy, usual = (
+        care_sim.make_policy("care-sector", environment, residual=residual)
+        for residual in (False, True)
+    )
+    explained = 0
+    for observation in encounter:
+        belief = policy.rig.read(observation)
+        _, known = camera_layers(belief, policy.rig)
+        every = policy.rig.listed(wedges(belief.detections, policy.rig), CORE_FIRST)
+        layers, usual_layers = policy.demand(belief).layers, usual.demand(belief).layers
+        assert_same(layers[0], [cells[:9] for cells in every])
+        assert_same(layers[4], [cells[9:36] for cells in every])
+        assert not len(layers[3])
+        for number in (1, 2, 5, 6, 7):
+            assert_same(layers[number], usual_layers[number])
+        explained += len(known)
+    assert explained
+
+
+def test_the_residual_is_a_switch():
+    with pytest.raises(InvalidInput, match="residual"):
+        CareSector(Rig(), residual=1)
 
 
 def blind(observation):

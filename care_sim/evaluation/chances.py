@@ -1,0 +1,131 @@
+"""The chance that a detector reports each newcomer in its first keyframe, given its returns.
+
+A measured detector (`care_sim.perception.measured`) and the graded proxy detect by chance, and the
+chance follows from the returns on an object alone. In the first keyframe of an object it is exact:
+nothing that was drawn before could have moved a cell towards the object or away from it. Later it
+would not be: luck lasts, and a lucky object is tracked.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from care_sim.core.arrays import Floats, Integers
+from care_sim.core.grid import AngularGrid
+from care_sim.core.rig import Rig
+from care_sim.core.types import CLASSES
+from care_sim.evaluation.sightings import Sightings
+from care_sim.loops.open_loop import OpenLoop
+from care_sim.perception.detectors import GRADED
+from care_sim.perception.measured.detector import GATHERED_S
+from care_sim.perception.measured.recall import FIRST_HIT, recall
+from care_sim.perception.measured.tables import MEASURED, measurement
+from care_sim.perception.proxy import chance
+from care_sim.sensors.annotated import Annotations, Cloud
+
+_Rule = Callable[[str, Floats, Floats], Floats]
+"""From a class, and the returns (n,) now and on average per sweep, to chances (n,)."""
+
+
+class Chances:
+    """Meter of the returns on every annotated object, keyframe by keyframe of an open loop."""
+
+    def __init__(self, rule: _Rule, weights: Floats, angles: Floats, rig: Rig):
+        self._rule = rule
+        self._weights, self._angles = weights, angles
+        self._heads = [head.first for head in rig.grid.heads]
+        self._counts: list[dict[int, float]] = []
+        self._noted: list[tuple[Integers, Floats, Floats]] = []
+
+    @classmethod
+    def of(cls, detector: str, parameters: Mapping[str, Any], rig: Rig) -> "Chances | None":
+        """Return the meter of a detector; None where the chances of the detector are not known."""
+        alike = np.ones(len(rig.grid.heads))
+        if detector == GRADED:
+            return cls(_graded, np.ones(1), alike, rig)
+        if detector not in MEASURED:
+            return None
+        weights = _weights(detector, parameters.get("first_hit", FIRST_HIT), rig.keyframe_s)
+        angles = alike if parameters.get("worth") else _angles(rig)
+        return cls(_measured_rule(detector, parameters), weights, angles, rig)
+
+    def note(self, loop: OpenLoop) -> None:
+        """Note the keyframe that was just played."""
+        annotations = loop.film.shots[loop.index - 1].annotations
+        now = self._returns(loop.handed, annotations)
+        if self._rule is not _graded:
+            now = now / max(len(loop.handed.poses), 1)
+        self._counts.insert(0, dict(zip(annotations.objects.tolist(), now.tolist(), strict=True)))
+        del self._counts[len(self._weights) :]
+        # At the start there are fewer keyframes, and they weigh as much as all do later.
+        known = self._weights[: len(self._counts)]
+        earlier = [
+            [counts.get(each, 0.0) for counts in self._counts]
+            for each in annotations.objects.tolist()
+        ]
+        # Gathered sweeps are averaged already.
+        is_averaged = bool(loop.handed.poses) or not known.any()
+        average: Floats = np.array(earlier).reshape(-1, len(known)) @ known
+        average = now if is_averaged else average / known.sum()
+        self._noted.append((annotations.classes, now, average))
+
+    def of_events(self, sightings: Sightings) -> Floats:
+        """Return the chances (e,) of `sightings.events`, once all keyframes are noted."""
+        rows = np.flatnonzero(sightings.in_range)[sightings.events]
+        classes, now, average = (
+            np.concatenate(part)[rows] for part in zip(*self._noted, strict=True)
+        )
+        chances = np.zeros(len(rows))
+        for label, name in enumerate(CLASSES):
+            own = classes == label
+            chances[own] = self._rule(name, now[own], average[own])
+        return chances
+
+    def _returns(self, cloud: Cloud, annotations: Annotations) -> Floats:
+        """Return the number of returns (n,) on each object, in cells of the default grid."""
+        order = np.argsort(annotations.objects)
+        ascending = annotations.objects[order]
+        own = np.isin(cloud.objects, ascending)
+        heads = np.searchsorted(self._heads, cloud.cells[own], side="right") - 1
+        places = order[np.searchsorted(ascending, cloud.objects[own])]
+        return np.asarray(np.bincount(places, self._angles[heads], len(annotations)), float)
+
+
+def _graded(name: str, now: Floats, _average: Floats) -> Floats:
+    """Return the chances of the graded proxy, which counts the returns of all sweeps."""
+    return chance(name, now.astype(np.int64))
+
+
+def _measured_rule(detector: str, parameters: Mapping[str, Any]) -> _Rule:
+    table = measurement(detector).recall
+    worth = np.full(len(CLASSES), parameters.get("worth") or np.nan)
+    worth = np.where(np.isnan(worth), table.worth, worth)
+
+    def rule(name: str, now: Floats, average: Floats) -> Floats:
+        label = CLASSES.index(name)
+        if not table.known[label]:
+            return np.zeros(len(now))
+        least = parameters.get("track_score")
+        given = now * worth[label], average * worth[label]
+        return recall(detector, name, *given, least, first_hit=0.0)
+
+    return rule
+
+
+def _weights(detector: str, first_hit: float, keyframe_s: float) -> Floats:
+    """Return the detector's weights (k,) of the returns at the last keyframes, newest first."""
+    measured = measurement(detector)
+    if measured.sweeps == 1:
+        return np.ones(1)
+    if keyframe_s > measured.step_s - 1e-9:
+        return np.array([first_hit, 1 - first_hit])
+    return np.ones(min(measured.sweeps, max(1, math.floor(GATHERED_S / keyframe_s + 1e-9))))
+
+
+def _angles(rig: Rig) -> Floats:
+    """Return the solid angle (k,) of a cell of each LiDAR, in cells of the default grid."""
+    usual = AngularGrid()
+    angles = [head.grid.column_width * head.grid.row_height for head in rig.grid.heads]
+    return np.array(angles) / (usual.column_width * usual.row_height)

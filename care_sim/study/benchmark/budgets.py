@@ -1,0 +1,276 @@
+"""B90 of entries: which worlds are played at which budgets, and the result file.
+
+The worlds are those of the suite (`care_sim.study.benchmark.suite`) with more streets, and the
+score is `care_sim.evaluation.smallest_budget`. A street needs no screening: one in which a full
+scan detects nothing adds nothing to any count.
+"""
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from care_sim.base.errors import InvalidInput, printable, shown
+from care_sim.base.files import JSON, json_content, parsed_json, replacing, write_text
+from care_sim.core.conditions import KITTI_CAMERA
+from care_sim.evaluation.counts import EPISODE_COUNTS, SCENE_COUNTS, scene_counts
+from care_sim.evaluation.smallest_budget import (
+    BUDGETS,
+    Counts,
+    PartCounts,
+    SmallestBudget,
+    smallest_budget,
+)
+from care_sim.policies import tags_of
+from care_sim.study.benchmark.play import Player
+from care_sim.study.benchmark.result import made_by
+from care_sim.study.benchmark.suite import (
+    DRIVES,
+    FIRST_SEED,
+    LATE,
+    STREETS,
+    TESTS,
+    Entry,
+    configurations,
+    published_worlds,
+)
+from care_sim.study.rows.parquet import with_tuples
+from care_sim.study.rows.reading import is_avoided, stops_for_nothing
+from care_sim.study.run_config import FULL, Row, RunConfig
+
+BUDGET_MARK = "care_sim_b90"
+"""The key by which a file is known; its value is the version of the score."""
+BUDGET_VERSION = 1
+MAIN_DETECTOR = "centerpoint"
+"""The detector of the main column; others are columns beside it."""
+STREETS_PLAYED, QUICK_STREETS = 80, 24
+"""Streets of the score, and those of a trial. Of 80 the interval of the best policy is a fifth of
+its B90."""
+EPISODES_PLAYED = {DRIVES: 24, TESTS: 40}
+"""Worlds of the closed loop, where they are played too."""
+REFERENCE_ENTRIES = (
+    Entry("care-sector"),
+    Entry("care-sector", (("residual", False),)),
+    Entry("care-sightlines"),
+    Entry("learned-sets"),
+    Entry("care", cell_order="core-spread"),
+    Entry("care"),
+    Entry("all-camera", cell_order="core-spread"),
+    Entry("boxes"),
+    Entry("place"),
+    Entry("history"),
+)
+"""The entries that stand beside everybody's."""
+COUNTS = {STREETS: SCENE_COUNTS, DRIVES: EPISODE_COUNTS, TESTS: EPISODE_COUNTS}
+_REFERENCES = Path(__file__).with_name("references.json")
+_DECIMALS = 3
+_MOST_BYTES = 2**24
+
+
+class BudgetRow(NamedTuple):
+    """The counts (k) of a world: of the full scan, and of the entry at every budget."""
+
+    part: str
+    world: int
+    full: tuple[float, ...]
+    got: tuple[tuple[float, ...], ...]
+
+
+@dataclass(frozen=True)
+class BudgetResult:
+    """What an entry has at every budget, world by world, under a detector. `quick` is a trial on a
+    few streets; `made_by` are versions and machine.
+    """
+
+    entry: Entry
+    tags: tuple[str, ...]
+    detector: str
+    rows: tuple[BudgetRow, ...]
+    quick: bool
+    made_by: Mapping[str, Any]
+
+    @property
+    def worlds(self) -> tuple[tuple[str, int], ...]:
+        """Part and number of its worlds."""
+        return tuple((row.part, row.world) for row in self.rows)
+
+    @property
+    def counts(self) -> Counts:
+        """Counts of all parts, from which the score follows."""
+        return [
+            PartCounts(
+                COUNTS[part],
+                np.array([row.got for row in self.rows if row.part == part], float),
+                np.array([row.full for row in self.rows if row.part == part], float),
+            )
+            for part in dict.fromkeys(row.part for row in self.rows)
+        ]
+
+    @property
+    def score(self) -> SmallestBudget:
+        """B90 of the entry."""
+        return smallest_budget(self.counts)
+
+    def cut_to(self, worlds: Iterable[tuple[str, int]]) -> "BudgetResult | None":
+        """Return the result in these worlds, in their order; None where one is missing."""
+        own = dict(zip(self.worlds, self.rows, strict=True))
+        kept = [own.get(world) for world in worlds]
+        rows = tuple(row for row in kept if row is not None)
+        return replace(self, rows=rows) if len(rows) == len(kept) else None
+
+    def content(self) -> dict[str, Any]:
+        """Return the result as plain data. The score in it is for people; readers use the rows."""
+        score = self.score
+        return {
+            BUDGET_MARK: BUDGET_VERSION,
+            "entry": self.entry.name,
+            "b90_percent": [_percent(value) for value in score[:3]],
+            "held_back_by": score.held_back_by,
+            **asdict(self.entry),
+            "tags": self.tags,
+            "detector": self.detector,
+            "quick": self.quick,
+            "made_by": self.made_by,
+            "budgets": BUDGETS,
+            "counts": {part: COUNTS[part] for part in COUNTS},
+            "columns": BudgetRow._fields,
+            "rows": self.rows,
+        }
+
+    def write(self, path: Path) -> None:
+        """Write the result, one line per world."""
+        head = self.content()
+        rows = ",\n  ".join(json.dumps(row) for row in head.pop("rows"))
+        opened = json.dumps(head, indent=1).removesuffix("\n}")
+        with replacing(path, JSON) as unfinished:
+            unfinished.write_text(f'{opened},\n "rows": [\n  {rows}\n ]\n}}\n', encoding="utf-8")
+
+
+def _percent(budget: float) -> float | str:
+    return round(100 * budget, 2) if np.isfinite(budget) else "never"
+
+
+Worlds = dict[str, list[int]]
+"""The seeds of every part that is played."""
+
+
+def budget_worlds(quick: bool = False, closed_loop: bool = False) -> Worlds:
+    """Return the streets, fewer for a trial; with `closed_loop` the first drives and tests too."""
+    streets = QUICK_STREETS if quick else STREETS_PLAYED
+    episodes = {
+        part: [world.seed for world in published_worlds() if world.part == part][:number]
+        for part, number in EPISODES_PLAYED.items()
+    }
+    street_seeds = {STREETS: [FIRST_SEED + n for n in range(streets)]}
+    return street_seeds | (episodes if closed_loop else {})
+
+
+def budget_tasks(
+    entry: Entry, part: str, seeds: Sequence[int], detector: str
+) -> list[list[RunConfig]]:
+    """Return per world the full scan and the entry at every budget. Raises InvalidInput for an
+    entry or a detector that cannot be played.
+    """
+    common: dict[str, Any] = {"detector": detector, "camera_profile": KITTI_CAMERA}
+    # Films have a picture every 0.5 s and none that is 0.12 s old.
+    common |= {} if part == STREETS else LATE
+    full = configurations(part, seeds, FULL, **common)
+    own = [
+        configurations(part, seeds, entry.policy, budget, **common, **entry.conditions)
+        for budget in BUDGETS
+    ]
+    return [[*world] for world in zip(full, *own, strict=True)]
+
+
+def play_budgets(
+    entries: Sequence[Entry], player: Player, detector: str, worlds: Worlds, quick: bool = False
+) -> list[BudgetResult]:
+    """Play the entries; return the results of those that finished every play, in their order."""
+    named = [(part, seed) for part, seeds in worlds.items() for seed in seeds]
+    tasks = {
+        entry: [
+            task
+            for part, seeds in worlds.items()
+            for task in budget_tasks(entry, part, seeds, detector)
+        ]
+        for entry in entries
+    }
+    # All at once, so that the entries share the film of a street and its full scan.
+    configs = [*dict.fromkeys(config for own in tasks.values() for task in own for config in task)]
+    row_of = dict(zip(configs, player.rows(configs), strict=True))
+    results = []
+    for entry, own in tasks.items():
+        rows = [[row_of[config] for config in task] for task in own]
+        if all(row for world in rows for row in world):
+            kept = tuple(_row(*world, own) for world, own in zip(named, rows, strict=True))
+            tags = tags_of(entry.policy)
+            results.append(BudgetResult(entry, tags, detector, kept, quick, made_by(entry)))
+    return results
+
+
+def _row(part: str, world: int, rows: Sequence[Row | None]) -> BudgetRow:
+    full, *got = (counts_of(part, row) for row in rows if row)
+    return BudgetRow(part, world, full, tuple(got))
+
+
+def counts_of(part: str, row: Row) -> tuple[float, ...]:
+    """Return the counts of a play, in the order of `COUNTS`."""
+    if part == STREETS:
+        return tuple(round(value, _DECIMALS) for value in scene_counts(row).values())
+    return float(is_avoided(row)), float(stops_for_nothing(row))
+
+
+def read_budget_result(path: Path) -> BudgetResult:
+    """Read the result in a file. Raises InvalidInput for a file that holds none or is damaged."""
+    try:
+        content = json_content(path, _MOST_BYTES)
+    except (OSError, ValueError) as error:
+        reason = printable(getattr(error, "strerror", None) or str(error))
+        raise InvalidInput(f"{path} cannot be read: {reason}") from error
+    return result_of(content, str(path))
+
+
+def result_of(content: Any, origin: str) -> BudgetResult:
+    """Return the result that parsed JSON holds; `origin` names its place. Raises InvalidInput."""
+    if not isinstance(content, dict) or content.get(BUDGET_MARK) != BUDGET_VERSION:
+        raise InvalidInput(f"{origin} holds no B90 of version {BUDGET_VERSION}: play it again")
+    try:
+        given = with_tuples({"given": content["parameters"]})["given"]
+        parameters = tuple((str(name), value) for name, value in given)
+        texts = (content[name] for name in ("cell_order", "label"))
+        entry = Entry(str(content["policy"]), parameters, *map(str, texts))
+        rows = tuple(
+            BudgetRow(str(part), int(world), tuple(full), tuple(map(tuple, got)))
+            for part, world, full, got in content["rows"]
+        )
+        tags = tuple(map(str, content["tags"]))
+        maker = dict(content["made_by"])
+        result = BudgetResult(
+            entry, tags, str(content["detector"]), rows, bool(content["quick"]), maker
+        )
+        # Its shapes and numbers are checked where its counts are made.
+        if not result.counts:
+            raise ValueError("it has no rows")
+    except KeyError as error:
+        raise InvalidInput(f"{origin} is damaged: {shown(error.args[0])} is missing") from error
+    except (InvalidInput, TypeError, ValueError, OverflowError) as error:
+        raise InvalidInput(f"{origin} is damaged: {printable(str(error))}") from error
+    entry.check()
+    return result
+
+
+def references(detector: str, worlds: Sequence[tuple[str, int]]) -> list[BudgetResult]:
+    """Return the published entries in these worlds under a detector; none without such plays."""
+    listed = parsed_json(_REFERENCES.read_text(encoding="utf-8"))
+    results = [result_of(content, _REFERENCES.name) for content in listed]
+    cut = (result.cut_to(worlds) for result in results if result.detector == detector)
+    return [result for result in cut if result]
+
+
+def publish_references(results: Sequence[BudgetResult]) -> None:
+    """For maintainers: make these the published entries."""
+    told = ",\n".join(json.dumps(result.content()) for result in results)
+    write_text(_REFERENCES, f"[\n{told}\n]\n")

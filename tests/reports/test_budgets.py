@@ -1,0 +1,80 @@
+"""The table and the figure of B90, by results made by hand."""
+
+import pytest
+
+from care_sim.evaluation.smallest_budget import BUDGETS
+from care_sim.reports.budgets import budgets_table, format_budget
+from care_sim.reports.figures.budgets import budgets_figure
+from care_sim.study.benchmark.suite import Entry
+from tests.helpers.made_budgets import ALWAYS, HALF_WAY, NEVER, made_budgets
+
+PLAIN = Entry("care-sector", (("residual", False),))
+RESULTS = (
+    made_budgets("boxes", NEVER, ALWAYS),
+    made_budgets(PLAIN, (0.1, 0.2, 0.3, 0.8, 1.0, 1.0, 1.0), ALWAYS),
+    made_budgets("care-sector", HALF_WAY, ALWAYS),
+    made_budgets("full", ALWAYS),
+    made_budgets("place", ALWAYS, ALWAYS, NEVER, NEVER),
+)
+
+
+def test_the_smallest_budget_comes_first_with_what_holds_it_back():
+    rows = [tuple(map(str, row)) for row in budgets_table(RESULTS).rows]
+    assert rows == [
+        # The full scan takes no place.
+        ("", "full", "≤0.5 [≤0.5, ≤0.5]", "emerging", *["≤0.5"] * 4, "0.20 [0.20, 0.20]"),
+        ("1", "care-sector", "2.4 [2.4, 2.4]", "emerging", "2.4", *["≤0.5"] * 3, ""),
+        (
+            "2",
+            "care-sector residual=False",
+            "3.9 [3.9, 3.9]",
+            "emerging",
+            "3.9",
+            *["≤0.5"] * 3,
+            "1.58 [1.58, 1.58]",
+        ),
+        ("3", "boxes", "never [never, never]", "emerging", "never", *["≤0.5"] * 3, "never"),
+        ("4", "place", "never [never, never]", "kept", *["≤0.5"] * 2, *["never"] * 2, "never"),
+    ]
+
+
+def test_without_the_yardstick_there_are_no_ratios():
+    table = budgets_table(RESULTS[:2])
+    assert table.columns[-1] == "people kept"
+    assert {len(row) for row in table.rows} == {len(table.columns)}
+    assert "3 worlds, centerpoint" in table.title
+
+
+def test_a_trial_is_named_as_one():
+    assert not any("trial" in note for note in budgets_table(RESULTS).notes)
+    trial = budgets_table([made_budgets("care", HALF_WAY, quick=True)])
+    assert any("trial" in note for note in trial.notes)
+
+
+@pytest.mark.parametrize(
+    ("budget", "text"), [(0.005, "≤0.5"), (0.0051, "0.5"), (0.2, "20.0"), (float("inf"), "never")]
+)
+def test_budgets_in_percent(budget, text):
+    assert format_budget(budget) == text
+
+
+def test_every_count_has_a_panel_and_every_entry_a_curve():
+    figure = budgets_figure(RESULTS)
+    assert [axes.get_title(loc="left") for axes in figure.axes] == [
+        "emerging",
+        "entering",
+        "kept",
+        "people kept",
+    ]
+    line, *curves = figure.axes[0].get_lines()
+    assert {*line.get_ydata()} == {90.0}
+    assert len(curves) == len(RESULTS)
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert names == ["full", "care-sector", "care-sector residual=False", "boxes", "place"]
+    drawn = dict(zip(names, curves, strict=True))
+    assert [*drawn["care-sector"].get_ydata()] == pytest.approx([10, 20, 80, 100, 100, 100, 100])
+    assert [*drawn["boxes"].get_xdata()] == pytest.approx([100 * budget for budget in BUDGETS])
+    # Entries of one policy have one colour and their own kind of line.
+    one, other = drawn["care-sector"], drawn["care-sector residual=False"]
+    assert one.get_color() == other.get_color() != drawn["boxes"].get_color()
+    assert one.get_linestyle() != other.get_linestyle()
