@@ -5,16 +5,16 @@ Each is at most 0, so that 0 is the best return there is.
 
 import math
 from collections.abc import Mapping
-from typing import Any, TypeVar
+from typing import Any
+
+import numpy as np
 
 from care_sim.base.checks import check_known, check_number
 from care_sim.base.compiled import compiled
 from care_sim.base.errors import InvalidInput, shown
-from care_sim.core.arrays import Floats
+from care_sim.core.arrays import Floats, Mask
 from care_sim.core.defaults import HEAVIEST
-from care_sim.loops.records import Keyframe
-
-_Number = TypeVar("_Number", float, Floats)
+from care_sim.loops.records import Records
 
 KEEP_CLEAR_M = 2.0
 """Clearance below which it costs: the standstill distance s_0 of the controller."""
@@ -103,46 +103,76 @@ def terms(before: Course, told: Told, measured: bool) -> tuple[Course, Terms]:
     )
 
 
-class EpisodeReward:
-    """The reward of one episode. `weights` holds one of every term."""
+class Rewards:
+    """The rewards of `worlds` worlds. `weights` holds one of every term."""
 
-    def __init__(self, weights: Mapping[str, float]):
+    def __init__(self, weights: Mapping[str, float], worlds: int):
         self._weights = weights
         self._measured = bool(weights["gain"])
-        self._course = BEGINNING
+        # Columns (W,) of `Course`.
+        self._courses: Any = tuple(np.full(worlds, value) for value in BEGINNING)
+
+    def begin(self, world: int) -> None:
+        """Begin an episode in a world."""
+        for column, value in zip(self._courses, BEGINNING, strict=True):
+            column[world] = value
 
     @property
-    def needs_bound(self) -> bool:
-        """Whether the full-scan bound counts and is not known yet."""
-        return self._measured and math.isnan(self._course[BOUND])
+    def need_bound(self) -> Mask:
+        """(W,) where the full-scan bound counts and is not known yet."""
+        wanted: Mask = np.isnan(self._courses[BOUND]) & self._measured
+        return wanted
 
-    def of(self, record: Keyframe, detectable: bool, over: bool) -> tuple[float, dict[str, float]]:
-        """The reward of the next keyframe, and its `terms`.
+    def of(
+        self, records: Records, detectable: Mask, over: Mask, who: Mask
+    ) -> tuple[Floats, dict[str, Floats]]:
+        """The rewards (W,) of the next keyframe in the worlds `who`, 0 in the others, and their
+        terms.
 
-        `detectable` says whether a scan of every cell would detect the actor, where `needs_bound`
-        asks for it; `over` whether the episode ends with this keyframe.
+        `detectable` (W,) says whether a scan of every cell would detect the actor, where
+        `need_bound` asks for it; `over` (W,) whether the episode ends with this keyframe.
         """
-        impact_speed_mps = record.impact_speed_mps
-        told = (
-            record.in_view,
-            record.detected,
-            record.braking,
-            record.distance_m,
-            record.clearance_m,
-            math.nan if impact_speed_mps is None else impact_speed_mps,
-            detectable,
-            over,
-        )
-        self._course, values = terms(self._course, told, self._measured)
-        earned = dict(zip(REWARD_WEIGHTS, values, strict=True))
+        table = np.zeros((len(REWARD_WEIGHTS), len(who)))
+        _earn(who, self._courses, records, detectable, over, self._measured, table)
+        earned = dict(zip(REWARD_WEIGHTS, table, strict=True))
         return weighted(self._weights, earned), earned
 
 
-def weighted(weights: Mapping[str, float], earned: Mapping[str, _Number]) -> _Number:
-    """The weighted sum of terms: numbers, or columns of numbers."""
+@compiled(brief=True)
+def _earn(
+    who: Mask,
+    courses: tuple[Mask, Mask, Floats, Floats],
+    records: Records,
+    detectable: Mask,
+    over: Mask,
+    measured: bool,
+    table: Floats,
+) -> None:
+    """Fill the `table` (5, W) with the terms of the worlds `who`, and lead their courses on."""
+    for w in range(len(who)):
+        if who[w]:
+            before = courses[0][w], courses[1][w], courses[2][w], courses[3][w]
+            told = (
+                records.in_view[w],
+                records.detected[w],
+                records.braking[w],
+                records.distance_m[w],
+                records.clearance_m[w],
+                records.impact_speed_mps[w],
+                detectable[w],
+                over[w],
+            )
+            after, values = terms(before, told, measured)
+            courses[0][w], courses[1][w], courses[2][w], courses[3][w] = after
+            for n in range(len(values)):
+                table[n, w] = values[n]
+
+
+def weighted(weights: Mapping[str, float], earned: Mapping[str, Floats]) -> Floats:
+    """The weighted sum (W,) of columns of terms."""
     # Not `sum`, which adds floats in another way from Python 3.12 on.
     total: Any = 0.0
     for name, value in earned.items():
         total = total + weights[name] * value
-    result: _Number = total
+    result: Floats = total
     return result

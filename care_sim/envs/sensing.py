@@ -210,14 +210,13 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         super().reset(seed=int(seed))
         return int(seed)
 
-    def _begin(self, loop: AnyLoop, floor: np.random.SeedSequence) -> Observed:
-        """Start an episode over a loop and a floor; its first observation."""
+    def _begin(self, loop: AnyLoop, floor: np.random.SeedSequence) -> None:
+        """Start an episode over a loop and a floor."""
         self._running = loop
         self._over = False
         self._floors = RandomFloor(floor, self.conditions.floor_seed, self.rig.grid.size)
         self._keyframe = 0
         self._last_fired = np.empty(0, np.int64)
-        return loop.belief.to_observation()
 
     def _choose_cells(self, action: Action) -> Cells:
         """Take an action: the cells that it fires at the coming keyframe.

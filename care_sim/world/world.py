@@ -48,6 +48,29 @@ class Actor:
         return CLASSES.index(self.kind.label) if self.reported and self.kind.label else None
 
 
+@dataclass(frozen=True)
+class Reflection:
+    """The motion on the other side of the x axis of a function of time, or of a vehicle."""
+
+    of: Motion | RoadVehicle
+
+    def __call__(self, time: float) -> Pose:
+        """The pose at `time`."""
+        pose = self.of.pose if isinstance(self.of, RoadVehicle) else self.of(time)
+        return on_the_other_side(pose)
+
+
+def on_the_other_side(pose: Pose) -> Pose:
+    """A pose reflected at the x axis."""
+    x, y, heading = pose
+    return x, -y, -heading
+
+
+def source_of(moved_by: Pose | Motion | RoadVehicle) -> Pose | Motion | RoadVehicle:
+    """What moves an actor, on either side of the street."""
+    return moved_by.of if isinstance(moved_by, Reflection) else moved_by
+
+
 class World:
     """Bodies in PyBullet, moved by highway-env, walks and events. Built by a scenario.
 
@@ -198,6 +221,10 @@ class World:
         x, y = self._footprints.boxes[body, :2].tolist()
         return x, y
 
+    def kind_of(self, body: int) -> BodyKind:
+        """The kind of a body."""
+        return self._kinds[body]
+
     def velocities_of(self, bodies: Integers) -> Floats:
         """(n, 2) velocities of bodies (n,) in the world frame, m/s, over the last world step."""
         moved = self._footprints.boxes[bodies, :2] - self._before[bodies, :2]
@@ -261,6 +288,29 @@ class World:
         if not self._footprints.move_all(bodies, table):
             for name, pose in zip(["the ego", *(a.name for a in self._moving)], poses, strict=True):
                 self._check_pose(name, pose)
+
+    def put(
+        self, steps: int, boxes: Floats, before: Floats, motion: Ego, lanes: Mapping[int, Floats]
+    ) -> None:
+        """Put everything where it is after so many world steps, if other code has moved it.
+
+        `boxes` and `before` (m, 7) are those of all bodies now and a world step ago, `motion` the
+        ego's. `lanes` holds x and speed of every vehicle by its body.
+        """
+        self._steps = steps
+        self.time = round(steps * WORLD_STEP_S, 9)
+        self._ego_motion = motion
+        poses = np.ascontiguousarray(boxes[self._moving_bodies][:, [0, 1, 6]])
+        self._before = before.copy()
+        self.bullet.move_all(self._moving_bodies, poses)
+        self._footprints.move_all(self._moving_bodies, poses)
+        vehicles = {self.ego_body: self.ego} | {
+            actor.body: source_of(actor.moved_by) for actor in self._moving
+        }
+        for body, (x, speed) in lanes.items():
+            vehicle = vehicles[body]
+            assert isinstance(vehicle, RoadVehicle)
+            vehicle.put(float(x), float(speed))
 
     def close(self) -> None:
         """Free the simulator."""

@@ -8,7 +8,7 @@ from care_sim.core.frames import Frame
 from care_sim.core.rig import Rig
 from care_sim.core.sensor_setup import LIDAR_POSITION
 from care_sim.core.types import CLASSES
-from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.loops.one_world import OneWorld
 from care_sim.loops.episode import SensorSeeds
 from care_sim.sensors.pictures import FRONT_CAMERA
 from care_sim.world.bodies import CATALOGUE
@@ -52,7 +52,7 @@ def row_of_cars(street):
 
 
 def loop_in(world, seeds=(0, 1, 2), **conditions):
-    return ClosedLoop(
+    return OneWorld(
         world,
         RIG,
         ClosedLoopConditions(**conditions),

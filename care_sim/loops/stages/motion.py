@@ -1,27 +1,34 @@
-"""Many worlds move on: what `World.advance` does, with no Python per world in the common case.
+"""Worlds move on: what `World.step` does, with no Python per world in the common case.
 
 Common is a world whose ego and drivers keep their lanes and whose other bodies stand, or go where
 the time alone tells. Any other moves by its own Python.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple, TypeGuard
 
 import numpy as np
 
 from care_sim.base.compiled import compiled
-from care_sim.batch.clearances import Clearances, Impacts
-from care_sim.batch.lane_columns import SPEED, LaneColumns
-from care_sim.batch.state import BatchState, Bodies, Egos, Passages, filled
+from care_sim.loops.stages.clearances import Clearances, Impacts
+from care_sim.loops.stages.lane_columns import SPEED, LaneColumns
+from care_sim.loops.stages.state import Bodies, Egos, Passages, State, filled, load_bodies
 from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.types import Ego
 from care_sim.loops.episode import most_keyframes
-from care_sim.scenarios.base import Reflection
 from care_sim.world.bullet import NO_BODY
-from care_sim.world.contact import ClearanceJudge
 from care_sim.world.motions import LaneChange, Walk
 from care_sim.world.route import RouteCar
 from care_sim.world.traffic import LaneKeeper, RoadVehicle
-from care_sim.world.world import WORLD_STEP_S, Actor, World, whole_steps
+from care_sim.world.world import (
+    WORLD_STEP_S,
+    Actor,
+    Reflection,
+    World,
+    has_arrived,
+    source_of,
+    whole_steps,
+)
 
 KNOWN_BELOW_M = 2.0
 """Clearances below this are exact in any case: the reward reads them."""
@@ -71,9 +78,8 @@ class Motion:
     """The motion of `worlds` worlds, whose episodes last `steps` world steps at most."""
 
     def __init__(self, worlds: int, steps: int):
-        self._judge = ClearanceJudge()
-        self._clearances = Clearances(worlds, steps, self._judge)
-        self._impacts = Impacts(worlds, self._judge)
+        self._clearances = Clearances(worlds, steps)
+        self._impacts = Impacts(worlds)
         # The world steps that each has done, and their times, counted and rounded as its own.
         self._steps = np.zeros(worlds, np.int64)
         self._times = np.array([round(n * WORLD_STEP_S, 9) for n in range(steps + 1)])
@@ -84,14 +90,16 @@ class Motion:
         self._timed = np.zeros((worlds, 1), np.int64)
         self._ways = np.zeros((worlds, 1, steps + 1, 5))
         self._by_itself: dict[int, World] = {}
+        self._built: list[World | None] = [None] * worlds
+        self._current = np.zeros(worlds, np.int64)
         self._goes_along = np.ones(worlds, np.bool_)
 
     def begin(self, world: int, built: World) -> None:
-        """Move a fresh world from now on. Its tables lie in the state by the first `advance`.
-
-        The world is left as it is unless it moves by its own Python. No body may be added later.
+        """Move a fresh world from now on. Its tables lie in the state by the first `advance`. A
+        world that does not move by its own Python is brought up to date by `current` alone.
         """
-        self._steps[world] = 0
+        self._steps[world] = self._current[world] = 0
+        self._built[world] = built
         self._clearances.begin(world, built)
         self._impacts.begin(world, built)
         self._by_itself.pop(world, None)
@@ -100,7 +108,7 @@ class Motion:
         others = [actor for actor in built.actors if not _is_vehicle(_source(actor))]
         keepers = self._keepers(built, drivers)
         timed = [actor for actor in others if not isinstance(actor.moved_by, tuple)]
-        by_time = all(isinstance(_timetable(actor), _BY_TIME_ALONE) for actor in timed)
+        by_time = all(type(_timetable(actor)) in _BY_TIME_ALONE for actor in timed)
         if keepers is None or not by_time:
             self._by_itself[world] = built
             self._goes_along[world] = False
@@ -114,13 +122,19 @@ class Motion:
             self._ways = filled(self._ways, world, self._tabulated(timed))
 
     def advance(
-        self, state: BatchState, accelerations: Floats, duration_s: float, exact: bool = True
+        self,
+        state: State,
+        accelerations: Floats,
+        duration_s: float,
+        exact: bool = True,
+        after_step: Callable[[int], None] = lambda _steps: None,
     ) -> Passages:
         """Move the worlds that are live by `duration_s` seconds, a whole number of world steps. The
         egos hold `accelerations` (W,), m/s^2, meanwhile.
 
         Unless `exact`, a clearance above `KNOWN_BELOW_M` may be a bound that is above it, too, and
-        no greater than the clearance; `settle` tells the least of an episode then.
+        no greater than the clearance; `settle` tells the least of an episode then. `after_step` is
+        called with the number of steps after each but the last.
         """
         worlds = state.worlds
         passages = Passages(
@@ -132,13 +146,15 @@ class Motion:
         )
         targeted = state.live & (state.egos.targets != NO_BODY)
         count = whole_steps(duration_s)
-        for _ in range(count):
+        for step in range(1, count + 1):
             self._step(state, accelerations)
             self._clearances.note(state, self._steps, passages.nearest_m)
             for world, impact in self._impacts.now(state, state.live & ~passages.hit):
                 passages.hit[world] = True
                 passages.impact_speed_mps[world] = impact.speed_mps
                 passages.impacts[world] = impact
+            if step < count:
+                after_step(step)
         below = np.inf if exact else KNOWN_BELOW_M
         passages.clearance_m[:] = self._clearances.least_since(self._steps, count, targeted, below)
         return passages
@@ -150,13 +166,36 @@ class Motion:
         begin = round(since_s / WORLD_STEP_S) + 1
         return self._clearances.least(world, begin, int(self._steps[world]) + 1)
 
-    def close(self) -> None:
-        """Free the simulator. The worlds are their owner's to close."""
-        self._judge.close()
+    def current(self, state: State, world: int) -> World:
+        """A world as it is now."""
+        built, step = self._built[world], int(self._steps[world])
+        assert built is not None
+        if world not in self._by_itself and self._current[world] != step:
+            self._current[world] = step
+            bodies, egos = state.bodies, state.egos
+            count = bodies.counts[world]
+            ego = Ego(
+                float(egos.speeds[world]),
+                float(egos.yaw_rates[world]),
+                float(egos.accelerations[world]),
+            )
+            drivers = self._drivers[world, : self._lanes.counts[world]].tolist()
+            lanes = dict(zip(drivers, self._lanes.rows[world, :, : SPEED + 1], strict=False))
+            boxes = bodies.boxes[world, :count], bodies.before[world, :count]
+            built.put(step, *boxes, ego, lanes)
+        return built
+
+    def are_over(self, live: Mask) -> Mask:
+        """(W,) in which of the worlds that are `live` nothing can happen any more."""
+        over = np.zeros(len(live), np.bool_)
+        for world, built in self._by_itself.items():
+            over[world] = live[world] and built.is_over()
+        return over
 
     def _keepers(self, built: World, drivers: Sequence[Actor]) -> list[LaneKeeper] | None:
         """What ego and drivers of a world go by, if they are to keep their lanes, else None."""
-        if built.scripted or isinstance(built.ego, RouteCar):
+        ends = built.ended is not has_arrived or built.goal_m < np.inf
+        if built.scripted or ends or built.speed_plan or isinstance(built.ego, RouteCar):
             return None
         vehicles = [built.ego, *filter(_is_vehicle, map(_source, drivers))]
         return built.traffic.lane_keepers(vehicles, float(self._times[-1]))
@@ -176,7 +215,7 @@ class Motion:
             way[:, 3], way[:, 4] = np.sin(half), np.cos(half)
         return ways
 
-    def _step(self, state: BatchState, accelerations: Floats) -> None:
+    def _step(self, state: State, accelerations: Floats) -> None:
         """Move all by a world step."""
         together = state.live & self._goes_along
         speeds = self._lanes.rows[:, 0, SPEED].copy()
@@ -192,9 +231,7 @@ class Motion:
 
 
 def _source(actor: Actor) -> object:
-    """What moves an actor, on either side of the street."""
-    moved_by = actor.moved_by
-    return moved_by.of if isinstance(moved_by, Reflection) else moved_by
+    return source_of(actor.moved_by)
 
 
 def _is_vehicle(source: object) -> TypeGuard[RoadVehicle]:
@@ -206,11 +243,15 @@ def _timetable(actor: Actor) -> object:
     return getattr(_source(actor), "__self__", None)
 
 
-def _copy(built: World, world: int, state: BatchState) -> None:
+def _copy(built: World, world: int, state: State) -> None:
     """Write where all is in a world that moved by itself into the state."""
-    count = state.bodies.counts[world]
+    poses = built.bullet.primitives.poses
+    count = len(poses)
+    # An event may have added bodies.
+    if count != state.bodies.counts[world]:
+        load_bodies(state, world, built)
     state.bodies.boxes[world, :count] = built.boxes_of(np.arange(count))
-    state.bodies.poses[world, :count] = built.bullet.primitives.poses
+    state.bodies.poses[world, :count] = poses
     motion = built.ego_motion
     state.egos.speeds[world] = motion.speed
     state.egos.yaw_rates[world] = motion.yaw_rate

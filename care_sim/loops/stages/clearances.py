@@ -12,22 +12,21 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from care_sim.base.compiled import compiled
-from care_sim.batch.state import BatchState, Bodies
+from care_sim.loops.stages.state import State, Bodies
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.world.approach import Impact
 from care_sim.world.bodies import BodyKind
 from care_sim.world.body_tables import bodies_near
 from care_sim.world.bullet import NO_BODY
-from care_sim.world.contact import CONTACT_REACH_M, PADDING_M, ClearanceJudge, StandIns, least_gap
+from care_sim.world.contact import CONTACT_REACH_M, PADDING_M, judge_here, least_gap
 from care_sim.world.world import WORLD_STEP_S, World
 
 
 class Clearances:
     """At every world step of an episode, up to `steps`, in each of `worlds` worlds."""
 
-    def __init__(self, worlds: int, steps: int, judge: ClearanceJudge):
-        self._judge = judge
-        self._pairs: list[StandIns | None] = [None] * worlds
+    def __init__(self, worlds: int, steps: int):
+        self._kinds: list[tuple[BodyKind, BodyKind] | None] = [None] * worlds
         # By world and step, of which the first is 1: the poses of the two, what they are apart at
         # least, and exactly where it is known, else NaN.
         self._poses = np.zeros((worlds, steps + 1, 2, 7))
@@ -37,13 +36,11 @@ class Clearances:
     def begin(self, world: int, built: World) -> None:
         """Forget the episode that was, and take in the two bodies of a new one."""
         target = built.first_sighting
-        self._pairs[world] = (
-            None if target is None else self._judge.stand_ins(built.ego_kind, target.kind)
-        )
+        self._kinds[world] = None if target is None else (built.ego_kind, target.kind)
         self._bounds[world] = np.inf
         self._known[world] = np.nan
 
-    def note(self, state: BatchState, steps: Integers, nearest_m: Floats) -> None:
+    def note(self, state: State, steps: Integers, nearest_m: Floats) -> None:
         """Note where the bodies are at the `steps` (W,) to which the worlds have come. What is
         `nearest_m` (W,) from centre to centre falls to what it is now.
         """
@@ -92,9 +89,10 @@ class Clearances:
 
     def _exact(self, world: int, step: int) -> float:
         known = float(self._known[world, step])
-        pair = self._pairs[world]
-        if math.isnan(known) and pair is not None:
-            known = self._judge.clearance(pair, self._poses[world, step])
+        kinds = self._kinds[world]
+        if math.isnan(known) and kinds is not None:
+            judge = judge_here()
+            known = judge.clearance(judge.stand_ins(*kinds), self._poses[world, step])
             self._known[world, step] = known
         return known
 
@@ -128,30 +126,28 @@ class Impacts:
     about few bodies: those that are near.
     """
 
-    def __init__(self, worlds: int, judge: ClearanceJudge):
-        self._judge = judge
-        self._egos: list[BodyKind | None] = [None] * worlds
-        self._kinds: list[dict[int, BodyKind]] = [{} for _ in range(worlds)]
+    def __init__(self, worlds: int):
+        self._built: list[World | None] = [None] * worlds
 
     def begin(self, world: int, built: World) -> None:
         """Take in the bodies of a world."""
-        self._egos[world] = built.ego_kind
-        self._kinds[world] = {actor.body: actor.kind for actor in built.actors}
+        self._built[world] = built
 
-    def now(self, state: BatchState, looked: Mask) -> Iterator[tuple[int, Impact]]:
+    def now(self, state: State, looked: Mask) -> Iterator[tuple[int, Impact]]:
         """The worlds among those `looked` at (W,) whose ego touches a body, and the impact."""
         bodies, egos = state.bodies, state.egos
         counts, near = _near(looked, bodies.counts, bodies.boxes, egos.bodies, CONTACT_REACH_M)
         for world in np.flatnonzero(counts).tolist():
-            own, ego, kinds = self._egos[world], int(egos.bodies[world]), self._kinds[world]
-            assert own is not None
+            built, ego = self._built[world], int(egos.bodies[world])
+            assert built is not None
             for body in near[world, : counts[world]].tolist():
-                if self._judge.touch((own, kinds[body]), bodies.poses[world, [ego, body]]):
+                kind = built.kind_of(body)
+                if judge_here().touch((built.ego_kind, kind), bodies.poses[world, [ego, body]]):
                     # The velocity is that of `World.velocities_of`.
                     boxes, before = bodies.boxes[world], bodies.before[world]
                     velocity = (boxes[body, :2] - before[body, :2]) / WORLD_STEP_S
                     speed_mps = float(egos.speeds[world])
-                    yield world, Impact.on(body, kinds[body].name, boxes, ego, speed_mps, velocity)
+                    yield world, Impact.on(body, kind.name, boxes, ego, speed_mps, velocity)
                     break
 
 

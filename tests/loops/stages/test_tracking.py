@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from care_sim.batch.scanning import Found
-from care_sim.batch.state import BatchState, filled
-from care_sim.batch.tracking import Tracking
+from care_sim.loops.stages.scanning import Found
+from care_sim.loops.stages.state import BatchState, filled
+from care_sim.loops.stages.tracking import Tracking
 from care_sim.core.frames import Frame
 from care_sim.core.types import Detections
 from care_sim.perception.tracker import MemoryRules, TrackMemory

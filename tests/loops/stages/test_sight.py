@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from care_sim.batch.camera_faults import BatchDelay, BatchMisses, Detected, DrawnAhead
+from care_sim.loops.stages.camera_faults import BatchDelay, BatchMisses, Detected, DrawnAhead
 from care_sim.core.conditions import CameraFaults
 from care_sim.core.types import ImageDetections
 from care_sim.sensors.annotated import IdentifiedDetections

@@ -5,8 +5,8 @@ from contextlib import closing
 import numpy as np
 import pytest
 
-from care_sim.batch.motion import KNOWN_BELOW_M, Motion, steps_of
-from care_sim.batch.state import BatchState, load
+from care_sim.loops.stages.motion import KNOWN_BELOW_M, Motion, steps_of
+from care_sim.loops.stages.state import BatchState, load
 from care_sim.core.types import Ego
 from care_sim.scenarios import make_scenario
 from care_sim.world.bodies import CATALOGUE

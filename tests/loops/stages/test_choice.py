@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_sim.batch.scanning import Choice
+from care_sim.loops.stages.scanning import Choice
 from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.firing.floor import RandomFloor
 from care_sim.core.grid import AngularGrid

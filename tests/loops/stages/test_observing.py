@@ -5,8 +5,8 @@ from gymnasium.vector.utils import create_empty_array
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from care_sim.batch.loop import Observing
-from care_sim.batch.state import BatchState
+from care_sim.loops.loop import Observing
+from care_sim.loops.stages.state import BatchState
 from care_sim.core.belief import MAX_DETECTIONS, MAX_TRACKS
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES, Ego, ImageDetections, Tracks

@@ -13,6 +13,8 @@ from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.conditions import CameraFaults
 from care_sim.core.types import ImageDetections
+from care_sim.loops.stages.state import filled
+from care_sim.sensors.annotated import IdentifiedDetections
 from care_sim.sensors.camera import first_bursts, later_bursts, miss_rates
 
 # Numbers of a module are what compiled code can hold.
@@ -20,12 +22,25 @@ _AGE, _YAW_CHANGE = ImageDetections.AGE, ImageDetections.YAW_CHANGE
 
 
 class Detected(NamedTuple):
-    """Camera detections: `counts` (W,), and `rows` (W, D, 9) in the order of
-    `ImageDetections.COLUMNS`.
+    """Camera detections: `counts` (W,); `rows` (W, D, 9) in the order of
+    `ImageDetections.COLUMNS`; and the `objects` (W, D) behind them, bodies or NO_OBJECT.
     """
 
     counts: Integers
     rows: Floats
+    objects: Integers
+
+    @classmethod
+    def of(cls, worlds: int, most: int) -> "Detected":
+        """Tables for so many of each world."""
+        rows = np.zeros((worlds, most, len(ImageDetections.COLUMNS)))
+        return cls(np.zeros(worlds, np.int64), rows, np.zeros((worlds, most), np.int64))
+
+    def put(self, world: int, arrived: IdentifiedDetections) -> "Detected":
+        """Write those of a world; longer tables, if they need more room than there is."""
+        self.counts[world] = len(arrived)
+        rows = filled(self.rows, world, arrived.detections.rows())
+        return Detected(self.counts, rows, filled(self.objects, world, arrived.objects))
 
 
 class BatchMisses:
@@ -80,13 +95,14 @@ def _below(rng: np.random.Generator, most: int, keyframes: int) -> Integers:
 
 
 class _Sent(NamedTuple):
-    """The pictures on their way, in a ring of L places each: `counts` (W, L) and `rows`
-    (W, L, D, 9) of their detections, the car's `headings` (W, L) when they were taken, and the
+    """The pictures on their way, in a ring of L places each: `counts` (W, L), `rows`
+    (W, L, D, 9) and `objects` (W, L, D) of their detections, the car's `headings` (W, L) when they were taken, and the
     keyframes at which they are `due` (W, L). `taken` (W,) tells how many there have been.
     """
 
     counts: Integers
     rows: Floats
+    objects: Integers
     headings: Floats
     due: Integers
     taken: Integers
@@ -108,11 +124,12 @@ class BatchDelay:
         self._sent = _Sent(
             np.zeros((worlds, places), np.int64),
             np.empty((worlds, places, 0, len(ImageDetections.COLUMNS))),
+            np.empty((worlds, places, 0), np.int64),
             np.zeros((worlds, places)),
             np.zeros((worlds, places), np.int64),
             np.zeros(worlds, np.int64),
         )
-        self._arrived = Detected(self._sent.taken, self._sent.rows[:, 0])
+        self._arrived = Detected.of(worlds, 0)
 
     def begin(self, world: int, seed: np.random.SeedSequence) -> None:
         """Begin an episode; lateness is drawn from `seed`."""
@@ -129,12 +146,13 @@ class BatchDelay:
         if self._jitters.any():
             late = late + self._draws.next(live, 1)[:, 0].astype(np.int64)
         worlds, most, columns = seen.rows.shape
-        if self._sent.rows.shape[2] < most:
-            places = self._sent.rows.shape[1]
+        places, room = self._sent.rows.shape[1:3]
+        if room < most:
             rows = np.empty((worlds, places, most, columns))
-            rows[:, :, : self._sent.rows.shape[2]] = self._sent.rows
-            self._sent = self._sent._replace(rows=rows)
-            self._arrived = Detected(np.zeros(worlds, np.int64), np.empty(seen.rows.shape))
+            objects = np.empty((worlds, places, most), np.int64)
+            rows[:, :, :room], objects[:, :, :room] = self._sent.rows, self._sent.objects
+            self._sent = self._sent._replace(rows=rows, objects=objects)
+            self._arrived = Detected.of(worlds, most)
         _deliver(live, seen, headings, late, self._keyframe_s, self._sent, self._arrived)
         return self._arrived
 
@@ -162,6 +180,7 @@ def _deliver(
         sent.counts[w, place] = seen.counts[w]
         for n in range(seen.counts[w]):
             sent.rows[w, place, n] = seen.rows[w, n]
+            sent.objects[w, place, n] = seen.objects[w, n]
 
         # The newest first. Jitter lets a picture overtake the ones before it, which are then never
         # handed out: what has been due once is so later.
@@ -172,6 +191,7 @@ def _deliver(
                 arrived.counts[w] = sent.counts[w, place]
                 for n in range(sent.counts[w, place]):
                     arrived.rows[w, n] = sent.rows[w, place, n]
+                    arrived.objects[w, n] = sent.objects[w, place, n]
                     arrived.rows[w, n, _AGE] = age * keyframe_s
                     arrived.rows[w, n, _YAW_CHANGE] = headings[w] - sent.headings[w, place]
                 break

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from care_sim.batch.lane_columns import SPEED, LaneColumns
+from care_sim.loops.stages.lane_columns import SPEED, LaneColumns
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.traffic import Traffic
 

@@ -1,0 +1,422 @@
+"""What the cameras of all worlds show, and the detections that arrive.
+
+The pictures are those of the engine `fast` (`care_sim.sensors.engines.picture_kernels`), the
+detections those of an ideal camera (`care_sim.sensors.camera`): it may miss bodies, be late and
+black, and takes its pictures at keyframes. Other cameras have a detector of their own, world by
+world.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from care_sim.base.compiled import compiled
+from care_sim.loops.stages.camera_faults import BatchDelay, BatchMisses, Detected
+from care_sim.loops.stages.state import State, Bodies, Outlines, Reported, Sensors, seen_by
+from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.cells.boxes import planar_ranges
+from care_sim.core.conditions import IDEAL_CAMERA, CameraFaults, Sensing
+from care_sim.core.frames import Frame, turned_alike
+from care_sim.core.pinhole import NEAR_M, CameraModels, PinholeCamera, model_of, window_on
+from care_sim.core.rig import Rig
+from care_sim.core.types import ImageDetections
+from care_sim.sensors.annotated import IdentifiedDetections
+from care_sim.sensors.camera import CameraDetector, picture_timing
+from care_sim.sensors.engines import make_engine
+from care_sim.sensors.engines.picture_kernels import Line, draw_silhouettes, empty_line
+from care_sim.sensors.engines.silhouette_kernels import (
+    Silhouettes,
+    lay_silhouettes,
+    room_for,
+)
+from care_sim.sensors.engines.view_kernels import Lens, Meshes, PlacedCamera
+from care_sim.sensors.false_boxes import BoxPool
+from care_sim.sensors.pictures import (
+    MIN_PIXELS,
+    class_table,
+    faultless_detections,
+    reported_boxes,
+    surest_first,
+)
+from care_sim.world.bullet import FAR_M
+from care_sim.world.world import WORLD_STEP_S, World
+
+_DEPTHS = (NEAR_M, FAR_M)
+
+
+class Cameras(NamedTuple):
+    """The k cameras of a rig: their `models`; `mounts` (k, 4, 3), place and axes in the frame of
+    the sensor; `sizes` (k, 2), width and height in pixels; in each world the `least` (W,)
+    confidence of a box; and (W,) whether detections stay `unsorted`, for a detector to come.
+    """
+
+    models: CameraModels
+    mounts: Floats
+    sizes: Integers
+    least: Floats
+    unsorted: Mask
+
+
+class _Room(NamedTuple):
+    """Room that one picture after the other is drawn in; `found` (B, 6) is its table of boxes."""
+
+    seen: Silhouettes
+    line: Line
+    found: Integers
+
+
+def has_own_detector(conditions: Sensing) -> bool:
+    """Whether a camera has faults or a detector of which compiled code knows nothing."""
+    return (
+        conditions.engine != "fast"
+        or conditions.camera_profile != IDEAL_CAMERA
+        or bool(
+            conditions.false_positive_rate
+            or conditions.camera_latency_s
+            or conditions.camera_rotation_sigma_deg
+            or conditions.camera_position_sigma_m
+        )
+    )
+
+
+class Sight:
+    """The cameras of all worlds, which differ in their `conditions` alone.
+
+    What it returns it fills anew at the next keyframe.
+    """
+
+    def __init__(self, rig: Rig, conditions: Sequence[Sensing]):
+        models = rig.camera_models
+        self._rig = rig
+        self._conditions = conditions
+        self.own = np.array([has_own_detector(each) for each in conditions])
+        """(W,) where detections come from a `CameraDetector` of the world."""
+        self.own_cameras: dict[int, OwnCameras] = {}
+        """Their cameras, by world."""
+        self._cameras = Cameras(
+            models,
+            np.concatenate([models.positions[:, None], models.axes], axis=1),
+            np.array([(camera.width, camera.height) for camera in rig.cameras]).reshape(-1, 2),
+            np.array([float(each.camera_confidence) for each in conditions]),
+            self.own,
+        )
+        # The faults of own detectors are theirs alone.
+        alike = [CameraFaults() if own else each for own, each in zip(self.own, conditions, strict=True)]
+        timings = [picture_timing(each, rig.keyframe_s, WORLD_STEP_S) for each in alike]
+        latencies = np.array([timing.keyframes for timing in timings])
+        jitters = np.array([each.camera_jitter for each in alike])
+        self._misses = BatchMisses(alike)
+        self._delay = BatchDelay(latencies, jitters, rig.keyframe_s)
+        self._is_late = bool(latencies.any() or jitters.any())
+        self._faults = alike
+        self._is_ever_dark = any(each.blackout_s for each in alike)
+
+    def begin(
+        self, world: int, built: World, seed: np.random.SeedSequence, pool: BoxPool
+    ) -> None:
+        """Begin an episode; `seed` is that of the camera (`care_sim.loops.episode.SensorSeeds`).
+        False boxes are made from the `pool`.
+        """
+        if self.own[world]:
+            own = OwnCameras(built, self._rig, self._conditions[world], seed, pool)
+            self.own_cameras[world] = own
+            return
+        self._misses.begin(world, seed, len(built.labels()))
+        if self._is_late:
+            # The streams are those of `care_sim.sensors.camera.CameraDetector`.
+            _, delay, *_ = seed.spawn(7)
+            self._delay.begin(world, delay)
+
+    @property
+    def between(self) -> dict[int, int]:
+        """Worlds whose pictures are taken between keyframes, and how many world steps after."""
+        steps = {world: one.after_steps for world, one in self.own_cameras.items()}
+        return {world: after for world, after in steps.items() if after}
+
+    def look(self, state: State) -> tuple[Detected, Mask]:
+        """Take the pictures of a keyframe: the newest detections that are due, and (W, B) which
+        bodies a camera shows enough of for a box.
+        """
+        boxes = self._boxes(state)
+        seen = Detected.of(state.worlds, len(self._cameras.sizes) * boxes.shape[1])
+        shown = np.zeros(state.bodies.boxes.shape[:2], np.bool_)
+        _look(
+            state.live,
+            self._cameras,
+            state.sensors,
+            state.bodies,
+            state.outlines,
+            state.reported,
+            boxes,
+            self._silent(state, boxes),
+            seen,
+            shown,
+        )
+        if self._is_late:
+            arrived = self._delay.newest(state.live & ~self.own, seen, state.taken.poses[:, 3])
+        else:
+            arrived = seen
+        for world in np.flatnonzero(state.live & self.own).tolist():
+            count = seen.counts[world]
+            pictured = IdentifiedDetections(
+                ImageDetections.from_checked_rows(seen.rows[world, :count].copy()),
+                seen.objects[world, :count].copy(),
+            )
+            own = self.own_cameras[world]
+            moment = _moment(state, world, boxes)
+            arrived = arrived.put(world, own.look(moment, pictured, shown[world]))
+        return arrived, shown
+
+    def look_between(self, state: State, world: int) -> None:
+        """Take the pictures of a world after some of its steps."""
+        self.own_cameras[world].take(_moment(state, world, self._boxes(state)), None)
+
+    def _boxes(self, state: State) -> Floats:
+        """(W, R, 7) of the reported bodies in the frames of the sensors."""
+        boxes = np.zeros((*state.reported.bodies.shape, 7))
+        _see_boxes(state.live, state.sensors, state.bodies, state.reported, boxes)
+        return boxes
+
+    def _silent(self, state: State, boxes: Floats) -> Mask:
+        """(W, R) the reported bodies that are missed, or are there when all is dark."""
+        silent: Mask = np.zeros(boxes.shape[:2], np.bool_)
+        if self._misses.any:
+            ranges = planar_ranges(boxes.reshape(-1, 7)).reshape(silent.shape)
+            silent = self._misses.draw(state.live, ranges)
+        if self._is_ever_dark:
+            times = state.times.tolist()
+            dark = [each.black_at(at) for each, at in zip(self._faults, times, strict=True)]
+            silent |= np.array(dark)[:, None]
+        return silent
+
+
+class Moment(NamedTuple):
+    """When and where the pictures of a world are taken: the LiDAR, the heading that the car takes
+    itself to have, the `boxes` (n, 7) of the reported bodies in the frame of the sensor.
+    """
+
+    sensor: Frame
+    heading: float
+    boxes: Floats
+    time_s: float
+
+
+def _moment(state: State, world: int, boxes: Floats) -> Moment:
+    return Moment(
+        state.sensors.frame(world),
+        float(state.taken.poses[world, 3]),
+        boxes[world, : state.reported.counts[world]].copy(),
+        float(state.times[world]),
+    )
+
+
+class OwnCameras:
+    """The cameras of one world with a `CameraDetector`, whose mounts may err."""
+
+    def __init__(
+        self,
+        world: World,
+        rig: Rig,
+        sensing: Sensing,
+        seed: np.random.SeedSequence,
+        pool: BoxPool,
+    ):
+        labels = world.labels()
+        self._designed = rig.cameras
+        self._pictures = Pictures(world, rig, sensing)
+        self.detector = CameraDetector(
+            list(labels), sensing, rig.keyframe_s, seed, rig.cameras, pool, step_s=WORLD_STEP_S
+        )
+        self.after_steps = round(self.detector.timing.after_s / WORLD_STEP_S)
+        """World steps from a keyframe to the pictures that the detector is given."""
+        self._is_fast = sensing.engine == "fast"
+
+    def look(
+        self, moment: Moment, seen: IdentifiedDetections, shown: Mask
+    ) -> IdentifiedDetections:
+        """Take the pictures of a keyframe: the newest detections that are due. `seen` are those of
+        the engine `fast`; of another `shown` (B,) is written anew.
+        """
+        if not self._is_fast:
+            shown[:] = False
+            tables = self._pictures.of(self._designed, moment.sensor, moment.boxes)
+            for table in tables:
+                shown[table[table[:, 5] >= MIN_PIXELS, 0]] = True
+            seen = faultless_detections(tables, self._pictures.classes)
+        if not self.after_steps:
+            self.take(moment, seen if self.detector.mounted == self._designed else None)
+        return self.detector.newest(moment.heading)
+
+    def take(self, moment: Moment, seen: IdentifiedDetections | None) -> None:
+        """Hand the detector its pictures; `seen` is what they show, where that is known."""
+        sensor, heading, boxes, time_s = moment
+        if seen is None:
+            seen = self._pictures.faultless(self.detector.mounted, sensor, boxes)
+        self.detector.take(seen, heading, boxes, time_s)
+
+
+class Pictures:
+    """Pictures of one world, which its engine draws."""
+
+    def __init__(self, world: World, rig: Rig, sensing: Sensing):
+        self._engine = make_engine(sensing.engine, world.bullet, rig.grid)
+        self.classes = class_table(world.labels())
+
+    def faultless(
+        self, cameras: Sequence[PinholeCamera], sensor: Frame, boxes: Floats
+    ) -> IdentifiedDetections:
+        """What a detector without faults would report of cameras; see `of`."""
+        return faultless_detections(self.of(cameras, sensor, boxes), self.classes)
+
+    def of(
+        self, cameras: Sequence[PinholeCamera], sensor: Frame, boxes: Floats
+    ) -> list[Integers]:
+        """The table of boxes (`care_sim.sensors.pictures`) of each camera, of pictures around
+        `boxes` (n, 7) of all that a detector may ever report, in the sensor frame.
+        """
+        windows = [(camera, camera.window_on(boxes)) for camera in cameras]
+        return [self._engine.visible_boxes(camera, sensor, at) for camera, at in windows]
+
+
+@compiled(brief=True)
+def _copy_rows(rows: Floats, into: Floats) -> None:
+    """Copy `rows` (n, k) to the first n rows of `into` (m, k).
+
+    An assignment of slices does the same, but Numba compiles the text of its error along, which
+    takes seconds.
+    """
+    for n in range(rows.shape[0]):
+        for k in range(rows.shape[1]):
+            into[n, k] = rows[n, k]
+
+
+@compiled(brief=True)
+def _copy(numbers: Integers, into: Integers) -> None:
+    """As `_copy_rows`, of numbers (n,)."""
+    for n in range(len(numbers)):
+        into[n] = numbers[n]
+
+
+@compiled(brief=True)
+def _see_boxes(
+    live: Mask, sensors: Sensors, bodies: Bodies, reported: Reported, boxes: Floats
+) -> None:
+    """Fill `boxes` (W, R, 7) with those of the reported bodies in the frames of the sensors."""
+    for w in range(len(live)):
+        if live[w]:
+            count = reported.counts[w]
+            for n in range(count):
+                for k in range(boxes.shape[2]):
+                    boxes[w, n, k] = bodies.boxes[w, reported.bodies[w, n], k]
+            _copy_rows(seen_by(sensors, w, boxes[w, :count]), boxes[w])
+
+
+@compiled()
+def _look(
+    live: Mask,
+    cameras: Cameras,
+    sensors: Sensors,
+    bodies: Bodies,
+    outlines: Outlines,
+    reported: Reported,
+    boxes: Floats,
+    silent: Mask,
+    seen: Detected,
+    shown: Mask,
+) -> None:
+    """See `Sight.look`; of the reported bodies that are `silent` (W, R) there is no detection."""
+    room = _room(live, cameras, bodies, outlines)
+    for w in range(len(live)):
+        if not live[w]:
+            continue
+        parts = outlines.counts[w]
+        meshes = Meshes(
+            outlines.corners[w],
+            outlines.faces[w],
+            outlines.edges[w],
+            outlines.starts[w],
+            outlines.owners[w, :parts],
+            outlines.reaches[w],
+        )
+        x, y, z, _, _, _ = sensors.poses[w]
+        cos, sin = sensors.turns[w]
+        classes = _told_classes(reported, w, bodies.counts[w], silent)
+        count = 0
+        for camera in range(len(cameras.sizes)):
+            table = _photograph(
+                cameras,
+                camera,
+                ((x, y, z), (cos, sin)),
+                boxes[w, : reported.counts[w]],
+                meshes,
+                bodies.poses[w, : bodies.counts[w]],
+                room,
+            )
+            for n in range(len(table)):
+                shown[w, table[n, 0]] |= table[n, 5] >= MIN_PIXELS
+            rows, objects = reported_boxes(table, classes, camera)
+            _copy_rows(rows, seen.rows[w, count:])
+            _copy(objects, seen.objects[w, count:])
+            count += len(rows)
+        if not cameras.unsorted[w]:
+            rows, objects = seen.rows[w, :count], seen.objects[w, :count]
+            surest, objects = surest_first(rows, objects, cameras.least[w])
+            _copy_rows(surest, seen.rows[w])
+            _copy(objects, seen.objects[w])
+            count = len(surest)
+        seen.counts[w] = count
+
+
+@compiled()
+def _room(live: Mask, cameras: Cameras, bodies: Bodies, outlines: Outlines) -> _Room:
+    """Room for any picture of the worlds that are `live`."""
+    parts, width, height = 0, 0, 0
+    for w in range(len(live)):
+        parts = max(parts, outlines.counts[w] if live[w] else 0)
+    for camera in range(len(cameras.sizes)):
+        width, height = max(width, cameras.sizes[camera, 0]), max(height, cameras.sizes[camera, 1])
+    counts = parts, outlines.faces.shape[1], outlines.edges.shape[1]
+    return _Room(
+        room_for(counts, width, height),
+        empty_line(width, _DEPTHS),
+        np.empty((bodies.poses.shape[1], 6), np.int64),
+    )
+
+
+@compiled()
+def _told_classes(reported: Reported, world: int, bodies: int, silent: Mask) -> Integers:
+    """The class of every body of a world, -1 of those without one and those that are silent."""
+    classes = reported.by_body[world, :bodies].copy()
+    for n in range(reported.counts[world]):
+        if silent[world, n]:
+            classes[reported.bodies[world, n]] = -1
+    return classes
+
+
+@compiled()
+def _photograph(
+    cameras: Cameras,
+    number: int,
+    sensor: tuple[tuple[float, float, float], tuple[float, float]],
+    boxes: Floats,
+    meshes: Meshes,
+    poses: Floats,
+    room: _Room,
+) -> Integers:
+    """The table of what a camera shows around boxes (n, 7) in the frame of the sensor, whose place
+    and turn are told.
+    """
+    model = model_of(cameras.models, number)
+    width, height = cameras.sizes[number]
+    window = window_on(boxes, model, NEAR_M, width, height)
+    # As `PinholeCamera.stance` of an upright sensor.
+    (x, y, z), turn = sensor
+    mount = turned_alike(cameras.mounts[number], turn)
+    place = np.array((x + mount[0, 0], y + mount[0, 1], z + mount[0, 2]))
+    camera = PlacedCamera(place, mount[1:])
+    lens = Lens(model.focal, model.centre[0], model.centre[1])
+    lay_silhouettes(camera, lens, window, _DEPTHS, meshes, poses, room.seen)
+    found = room.found[: len(poses)]
+    no_picture = np.empty((0, 0), np.int64)
+    return found[: draw_silhouettes(room.seen, window, _DEPTHS, room.line, found, no_picture)]
