@@ -109,13 +109,12 @@ class Rewards:
     def __init__(self, weights: Mapping[str, float], worlds: int):
         self._weights = weights
         self._measured = bool(weights["gain"])
-        # Columns (W,) of `Course`.
-        self._courses: Any = tuple(np.full(worlds, value) for value in BEGINNING)
+        # (4, W) columns of `Course`.
+        self._courses = np.full((worlds, len(BEGINNING)), BEGINNING, float).T.copy()
 
     def begin(self, world: int) -> None:
         """Begin an episode in a world."""
-        for column, value in zip(self._courses, BEGINNING, strict=True):
-            column[world] = value
+        self._courses[:, world] = BEGINNING
 
     @property
     def need_bound(self) -> Mask:
@@ -133,37 +132,43 @@ class Rewards:
         `need_bound` asks for it; `over` (W,) whether the episode ends with this keyframe.
         """
         table = np.zeros((len(REWARD_WEIGHTS), len(who)))
-        _earn(who, self._courses, records, detectable, over, self._measured, table)
+        told = np.array(
+            [
+                records.in_view,
+                records.detected,
+                records.braking,
+                records.distance_m,
+                records.clearance_m,
+                records.impact_speed_mps,
+                detectable,
+                over,
+            ]
+        )
+        _earn(who, self._courses, told, self._measured, table)
         earned = dict(zip(REWARD_WEIGHTS, table, strict=True))
         return weighted(self._weights, earned), earned
 
 
 @compiled(brief=True)
-def _earn(
-    who: Mask,
-    courses: tuple[Mask, Mask, Floats, Floats],
-    records: Records,
-    detectable: Mask,
-    over: Mask,
-    measured: bool,
-    table: Floats,
-) -> None:
-    """Fill the `table` (5, W) with the terms of the worlds `who`, and lead their courses on."""
+def _earn(who: Mask, courses: Floats, told: Floats, measured: bool, table: Floats) -> None:
+    """Fill the `table` (5, W) with the terms of the worlds `who`, and lead their `courses` (4, W)
+    on; `told` (8, W) holds columns of `Told`.
+    """
     for w in range(len(who)):
         if who[w]:
-            before = courses[0][w], courses[1][w], courses[2][w], courses[3][w]
-            told = (
-                records.in_view[w],
-                records.detected[w],
-                records.braking[w],
-                records.distance_m[w],
-                records.clearance_m[w],
-                records.impact_speed_mps[w],
-                detectable[w],
-                over[w],
+            before = courses[0, w] > 0, courses[1, w] > 0, courses[2, w], courses[3, w]
+            now = (
+                told[0, w] > 0,
+                told[1, w] > 0,
+                told[2, w] > 0,
+                told[3, w],
+                told[4, w],
+                told[5, w],
+                told[6, w] > 0,
+                told[7, w] > 0,
             )
-            after, values = terms(before, told, measured)
-            courses[0][w], courses[1][w], courses[2][w], courses[3][w] = after
+            after, values = terms(before, now, measured)
+            courses[0, w], courses[1, w], courses[2, w], courses[3, w] = after
             for n in range(len(values)):
                 table[n, w] = values[n]
 

@@ -69,16 +69,18 @@ class OneWorld:
 
     def record(self, fired: Cells, records: Records) -> Keyframe:
         """The record of the keyframe that the loop has played since."""
-        loop, index = self._loop, self.index
-        found = loop.found
+        loop, found, impact = self._loop, self._loop.found, self._loop.impacts.get(0)
         self._objects.note(found.tracks[0, : found.counts[0]], found.behind(0))
+        told = dict(zip(Records._fields, [column.item() for column in records], strict=True))
+        told |= {
+            "index": self.index,
+            "fired": fired,
+            "impact_speed_mps": impact.speed_mps if impact else None,
+            "impact": impact,
+            "sights": loop.sights.get(0, ()),
+        }
         self.index += 1
-        told = {name: column[0].item() for name, column in records._asdict().items()}
-        impact = loop.impacts.get(0)
-        speed = impact.speed_mps if impact else None
-        sights = loop.sights.get(0, ())
-        own = {"fired": fired, "impact_speed_mps": speed}
-        return Keyframe(index=index, impact=impact, sights=sights, **(told | own))
+        return Keyframe(**told)
 
     @property
     def world(self) -> World:

@@ -12,13 +12,20 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from care_sim.base.compiled import compiled
-from care_sim.loops.stages.state import State, Bodies
+from care_sim.loops.stages.state import State
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.world.approach import Impact
 from care_sim.world.bodies import BodyKind
 from care_sim.world.body_tables import bodies_near
 from care_sim.world.bullet import NO_BODY
-from care_sim.world.contact import CONTACT_REACH_M, PADDING_M, judge_here, least_gap
+from care_sim.world.contact import (
+    CONTACT_REACH_M,
+    PADDING_M,
+    ClearanceJudge,
+    StandIns,
+    judge_here,
+    least_gap,
+)
 from care_sim.world.world import WORLD_STEP_S, World
 
 
@@ -27,6 +34,8 @@ class Clearances:
 
     def __init__(self, worlds: int, steps: int):
         self._kinds: list[tuple[BodyKind, BodyKind] | None] = [None] * worlds
+        # What stands in for both, of the judge that made it.
+        self._pairs: list[tuple[ClearanceJudge, StandIns] | None] = [None] * worlds
         # By world and step, of which the first is 1: the poses of the two, what they are apart at
         # least, and exactly where it is known, else NaN.
         self._poses = np.zeros((worlds, steps + 1, 2, 7))
@@ -37,33 +46,33 @@ class Clearances:
         """Forget the episode that was, and take in the two bodies of a new one."""
         target = built.first_sighting
         self._kinds[world] = None if target is None else (built.ego_kind, target.kind)
+        self._pairs[world] = None
         self._bounds[world] = np.inf
         self._known[world] = np.nan
+
+    def __getstate__(self) -> dict[str, object]:
+        return vars(self) | {"_pairs": [None] * len(self._pairs)}
 
     def note(self, state: State, steps: Integers, nearest_m: Floats) -> None:
         """Note where the bodies are at the `steps` (W,) to which the worlds have come. What is
         `nearest_m` (W,) from centre to centre falls to what it is now.
         """
-        egos = state.egos
+        bodies, egos = state.bodies, state.egos
         tables = self._poses, self._bounds, nearest_m
-        _note(state.live, steps, state.bodies, egos.bodies, egos.targets, *tables)
+        whose = egos.bodies, egos.targets
+        _note(state.live, steps, bodies.boxes, bodies.poses, *whose, *tables)
 
     def least_since(self, steps: Integers, count: int, live: Mask, exact_below: float) -> Floats:
         """(W,) the least clearance of the last `count` of all `steps` (W,) so far, metres. What is
         above `exact_below` may be a bound that is above it, too, and no greater than the clearance.
         """
-        rows = np.arange(len(steps))[:, None]
         recent = steps[:, None] - np.arange(count)
-        bounds = self._bounds[rows, recent]
-        order = np.argsort(bounds, axis=1)
-        recent, bounds = recent[rows, order], bounds[rows, order]
-        least: Floats = bounds[:, 0].copy()
-        asked = np.flatnonzero(live & (least <= exact_below) & (least < np.inf))
-        moments = zip(recent[asked].tolist(), bounds[asked].tolist(), strict=True)
-        least[asked] = [
-            self._least(world, *moment, exact_below)
-            for world, moment in zip(asked.tolist(), moments, strict=True)
-        ]
+        bounds = self._bounds[np.arange(len(steps))[:, None], recent]
+        least: Floats = bounds.min(axis=1)
+        for world in np.flatnonzero(live & (least <= exact_below) & (least < np.inf)).tolist():
+            order = np.argsort(bounds[world])
+            moments = recent[world, order].tolist(), bounds[world, order].tolist()
+            least[world] = self._least(world, *moments, exact_below)
         return least
 
     def least(self, world: int, begin: int, end: int) -> float:
@@ -89,10 +98,12 @@ class Clearances:
 
     def _exact(self, world: int, step: int) -> float:
         known = float(self._known[world, step])
-        kinds = self._kinds[world]
+        kinds, pair = self._kinds[world], self._pairs[world]
         if math.isnan(known) and kinds is not None:
             judge = judge_here()
-            known = judge.clearance(judge.stand_ins(*kinds), self._poses[world, step])
+            if pair is None or pair[0] is not judge:
+                pair = self._pairs[world] = judge, judge.stand_ins(*kinds)
+            known = judge.clearance(pair[1], self._poses[world, step])
             self._known[world, step] = known
         return known
 
@@ -101,7 +112,8 @@ class Clearances:
 def _note(
     live: Mask,
     steps: Integers,
-    bodies: Bodies,
+    boxes: Floats,
+    now: Floats,
     egos: Integers,
     targets: Integers,
     poses: Floats,
@@ -113,12 +125,12 @@ def _note(
         if not live[world] or targets[world] == NO_BODY:
             continue
         ego, target, step = egos[world], targets[world], steps[world]
-        box, other = bodies.boxes[world, ego], bodies.boxes[world, target]
+        box, other = boxes[world, ego], boxes[world, target]
         away = np.hypot(other[0] - box[0], other[1] - box[1])
         nearest_m[world] = min(nearest_m[world], away)
         bounds[world, step] = least_gap(box, other) - PADDING_M
-        poses[world, step, 0] = bodies.poses[world, ego]
-        poses[world, step, 1] = bodies.poses[world, target]
+        poses[world, step, 0] = now[world, ego]
+        poses[world, step, 1] = now[world, target]
 
 
 class Impacts:

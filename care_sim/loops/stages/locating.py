@@ -2,9 +2,10 @@
 
 import numpy as np
 
+from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.conditions import Sensing
-from care_sim.core.frames import Frame, mounted_at
+from care_sim.core.frames import Frame
 from care_sim.core.rig import Rig
 from care_sim.core.types import Ego
 from care_sim.driving.localisation import Localisation, Odometry
@@ -21,7 +22,7 @@ class Locating:
         self._rig = rig
         self._sensing = sensing
         self._limits = limits
-        x, y, z = self._at = rig.sensor_position
+        x, y, z = self._at = tuple(map(float, rig.sensor_position))
         self._middle = x, 0.0, z
         self._errs = bool(sensing.ego_position_sigma_m or sensing.ego_yaw_sigma_deg)
         self._localisations: list[Localisation | None] = [None] * state.worlds
@@ -48,13 +49,13 @@ class Locating:
         if self._errs:
             self._err(state)
         egos = state.egos
-        moving = np.stack([egos.speeds, egos.yaw_rates, egos.accelerations], axis=1)
+        moving = np.array([egos.speeds, egos.yaw_rates, egos.accelerations]).T
         if self._sensing.ego_speed_sigma:
             for world in np.flatnonzero(state.live).tolist():
                 odometer = self._odometers[world]
                 assert odometer is not None
                 moving[world, 0] = odometer.reading(Ego(*moving[world].tolist())).speed
-        state.read[state.live] = np.clip(moving, *self._limits)[state.live]
+        np.clip(moving, *self._limits, out=state.read, where=state.live[:, None])
 
     def place(self, state: State, world: int) -> None:
         """Put the sensor of a world where it is now, between two keyframes."""
@@ -83,9 +84,31 @@ def place_sensors(
     """Write where the sensors are, which are mounted `at` (x, y, z) on the bodies `egos` (W,) of
     those whose `boxes` (W, B, 7) are told.
     """
-    x, y, yaw = boxes[np.arange(len(egos)), egos][:, [0, 1, 6]].T
-    cos, sin = np.cos(yaw), np.sin(yaw)
-    sensors.turns[:, 0], sensors.turns[:, 1] = cos, sin
-    sensors.turns_back[:, 0], sensors.turns_back[:, 1] = np.cos(-yaw), np.sin(-yaw)
-    sensors.poses[:, 0], sensors.poses[:, 1] = mounted_at((x, y), (cos, sin), at)
-    sensors.poses[:, 2], sensors.poses[:, 3] = at[2], yaw
+    yaws = boxes[np.arange(len(egos)), egos, 6]
+    # The sines and cosines are NumPy's, as in `care_sim.core.frames`.
+    turns = np.cos(yaws), np.sin(yaws), np.cos(-yaws), np.sin(-yaws)
+    _place(boxes, egos, at, *turns, *sensors)
+
+
+@compiled(brief=True)
+def _place(
+    boxes: Floats,
+    egos: Integers,
+    at: tuple[float, float, float],
+    cosines: Floats,
+    sines: Floats,
+    back_cosines: Floats,
+    back_sines: Floats,
+    poses: Floats,
+    turns: Floats,
+    turns_back: Floats,
+) -> None:
+    """See `place_sensors`."""
+    ahead, left, height = at
+    for w in range(len(egos)):
+        box = boxes[w, egos[w]]
+        cos, sin = turns[w, 0], turns[w, 1] = cosines[w], sines[w]
+        turns_back[w, 0], turns_back[w, 1] = back_cosines[w], back_sines[w]
+        poses[w, 0] = box[0] + (cos * ahead - sin * left)
+        poses[w, 1] = box[1] + (sin * ahead + cos * left)
+        poses[w, 2], poses[w, 3] = height, box[6]

@@ -5,14 +5,14 @@ the time alone tells. Any other moves by its own Python.
 """
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple, TypeGuard
+from typing import TypeGuard
 
 import numpy as np
 
 from care_sim.base.compiled import compiled
 from care_sim.loops.stages.clearances import Clearances, Impacts
 from care_sim.loops.stages.lane_columns import SPEED, LaneColumns
-from care_sim.loops.stages.state import Bodies, Egos, Passages, State, filled, load_bodies
+from care_sim.loops.stages.state import Passages, State, filled, load_bodies
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.types import Ego
 from care_sim.loops.episode import most_keyframes
@@ -41,37 +41,6 @@ _REFLECTED = np.array([1.0, -1.0, -1.0])
 def steps_of(duration_s: float, keyframe_s: float) -> int:
     """World steps of an episode of `duration_s` seconds, which ends with a whole keyframe."""
     return most_keyframes(duration_s, keyframe_s) * whole_steps(keyframe_s)
-
-
-class Clock(NamedTuple):
-    """The world `steps` (W,) that each world has done; the `times` of all steps; those of each
-    world `now` (W,).
-    """
-
-    steps: Integers
-    times: Floats
-    now: Floats
-
-
-class Drivers(NamedTuple):
-    """The vehicles in the lanes, `counts` and `rows` as in `LaneColumns`, the ego first: their
-    `bodies` (W, V), and the egos' speeds (W,) `before` the world step.
-    """
-
-    counts: Integers
-    rows: Floats
-    bodies: Integers
-    before: Floats
-
-
-class Timed(NamedTuple):
-    """What goes by time alone: `bodies` (W, P), and their `ways` (W, P, steps + 1, 5): x, y,
-    heading, and sine and cosine of half of it.
-    """
-
-    counts: Integers
-    bodies: Integers
-    ways: Floats
 
 
 class Motion:
@@ -220,10 +189,13 @@ class Motion:
         together = state.live & self._goes_along
         speeds = self._lanes.rows[:, 0, SPEED].copy()
         self._lanes.step(together, accelerations, WORLD_STEP_S)
-        clock = Clock(self._steps, self._times, state.times)
-        drivers = Drivers(self._lanes.counts, self._lanes.rows, self._drivers, speeds)
-        timed = Timed(self._timed_counts, self._timed, self._ways)
-        _follow(state.live, together, clock, drivers, timed, state.bodies, state.egos)
+        bodies, egos = state.bodies, state.egos
+        _go_on(state.live, self._steps, self._times, state.times, *bodies[:3])
+        if together.any():
+            lanes = self._lanes.counts, self._lanes.rows, self._drivers, speeds
+            timed = self._timed_counts, self._timed, self._ways
+            moved = bodies.boxes, bodies.poses, *egos[:3]
+            _follow(together, self._steps, *lanes, *timed, *moved)
         for world, built in self._by_itself.items():
             if state.live[world]:
                 built.step(float(accelerations[world]))
@@ -259,43 +231,65 @@ def _copy(built: World, world: int, state: State) -> None:
 
 
 @compiled(brief=True)
-def _follow(
+def _go_on(
     live: Mask,
-    together: Mask,
-    clock: Clock,
-    drivers: Drivers,
-    timed: Timed,
-    bodies: Bodies,
-    egos: Egos,
+    steps: Integers,
+    times: Floats,
+    now: Floats,
+    counts: Integers,
+    boxes: Floats,
+    before: Floats,
 ) -> None:
-    """Let the clocks of the worlds that are `live` go on by a world step, and put the bodies of
-    those that move `together` where they are then.
+    """Let the clocks of the worlds that are `live` go on by a world step: the `steps` (W,) that
+    each has done, and of the `times` of all steps that of each world `now` (W,). What was in
+    `boxes` is in `before`.
     """
     for world in range(len(live)):
-        if not live[world]:
-            continue
-        clock.steps[world] += 1
-        step = clock.steps[world]
-        clock.now[world] = clock.times[step]
-        for body in range(bodies.counts[world]):
-            for k in range(bodies.boxes.shape[2]):
-                bodies.before[world, body, k] = bodies.boxes[world, body, k]
+        if live[world]:
+            steps[world] += 1
+            now[world] = times[steps[world]]
+            for body in range(counts[world]):
+                for k in range(boxes.shape[2]):
+                    before[world, body, k] = boxes[world, body, k]
+
+
+@compiled(brief=True)
+def _follow(
+    together: Mask,
+    steps: Integers,
+    lane_counts: Integers,
+    rows: Floats,
+    drivers: Integers,
+    before: Floats,
+    timed_counts: Integers,
+    timed: Integers,
+    ways: Floats,
+    boxes: Floats,
+    poses: Floats,
+    speeds: Floats,
+    yaw_rates: Floats,
+    accelerations: Floats,
+) -> None:
+    """Put the bodies of the worlds that move `together` where they are after their `steps`.
+
+    The vehicles in the lanes have `rows` as in `LaneColumns`, the ego first, and are the bodies
+    `drivers` (W, V); the egos' speeds (W,) were those `before` the world step. What goes by time
+    alone are the bodies `timed` (W, P), and their `ways` (W, P, steps + 1, 5) x, y, heading, and
+    sine and cosine of half of it.
+    """
+    for world in range(len(together)):
         if not together[world]:
             continue
-
         # Who keeps a lane along x changes nothing but x.
-        for n in range(drivers.counts[world]):
-            body, x = drivers.bodies[world, n], drivers.rows[world, n, 0]
-            bodies.boxes[world, body, 0] = x
-            bodies.poses[world, body, 0] = x
-        for n in range(timed.counts[world]):
-            row = timed.ways[world, n, step]
-            box = bodies.boxes[world, timed.bodies[world, n]]
-            pose = bodies.poses[world, timed.bodies[world, n]]
+        for n in range(lane_counts[world]):
+            body, x = drivers[world, n], rows[world, n, 0]
+            boxes[world, body, 0] = x
+            poses[world, body, 0] = x
+        for n in range(timed_counts[world]):
+            row = ways[world, n, steps[world]]
+            box, pose = boxes[world, timed[world, n]], poses[world, timed[world, n]]
             box[0], box[1], box[6] = row[0], row[1], row[2]
             pose[0], pose[1], pose[5], pose[6] = row[0], row[1], row[3], row[4]
-
-        speed = drivers.rows[world, 0, SPEED]
-        egos.speeds[world] = speed
-        egos.yaw_rates[world] = 0.0
-        egos.accelerations[world] = (speed - drivers.before[world]) / WORLD_STEP_S
+        speeds[world] = rows[world, 0, SPEED]
+        yaw_rates[world] = 0.0
+        accelerations[world] = (speeds[world] - before[world]) / WORLD_STEP_S

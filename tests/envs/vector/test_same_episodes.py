@@ -10,7 +10,7 @@ from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.envs import CLOSED_LOOP
 from care_sim.envs.scenarios import DartoutEnv
-from care_sim.envs.vector.arguments import why_conditions_separate, why_separate
+
 from care_sim.envs.vector.env import ClosedLoopVectorEnv
 from tests.helpers.vectors import MODES, native, played_alike
 
