@@ -45,7 +45,7 @@ class Setting:
     scoring_info: bool
 
     def episode(self, entropy: int) -> Episode:
-        """What an episode begins with, without boxes for false ones. The caller closes its world."""
+        """What an episode begins with, without its pool. The caller closes its world."""
         seeds = EpisodeSeeds.of(entropy, self.secret)
         world = self.scenario.make_world(np.random.default_rng(seeds.scenario))
         return Episode(world, seeds.sensors, seeds.floor)
@@ -175,11 +175,18 @@ class Worlds:
         stepped = self.play(fired, who)
         names, floor = self._scan_columns(), self._first.conditions.floor
         single = stepped.single
-        told = {world: self._told(world) for world in _places(who)} if len(names) > 1 or not floor else {}
+        told = (
+            {world: self._told(world) for world in _places(who)}
+            if len(names) > 1 or not floor
+            else {}
+        )
         if floor:
-            # There are columns even where nobody plays: they are joined with those of other threads.
+            # There are columns even where nobody plays, to be joined with those of other threads.
             columns = {"fired": self._all_fired(fired)}
-            columns |= {name: self._column([(w, own[name]) for w, own in told.items()]) for name in names[1:]}
+            columns |= {
+                name: self._column([(w, own[name]) for w, own in told.items()])
+                for name in names[1:]
+            }
             return stepped._replace(columns=columns | stepped.columns)
         # Cells of different numbers, as lists: they are no column.
         for world, own in told.items():
@@ -259,7 +266,10 @@ class Worlds:
             return fired.cells[:, : self._budgets[0]]
         counts = np.minimum(self._budgets, fired.cells.shape[1])
         return self._column(
-            [(w, row[:n].copy()) for w, (row, n) in enumerate(zip(fired.cells, counts, strict=True))]
+            [
+                (w, row[:n].copy())
+                for w, (row, n) in enumerate(zip(fired.cells, counts, strict=True))
+            ]
         )
 
     def _column(self, rows: Sequence[tuple[int, np.ndarray]]) -> NDArray[Any]:

@@ -1,7 +1,7 @@
-"""One keyframe of the closed loop in W worlds: fire, detect, track, act, let the worlds move, look.
+"""One keyframe of the closed loop in W worlds: fire, detect, track, act, let them move, look.
 
-Every stage (`care_sim.loops.stages`) is compiled code over all worlds, and goes world by world where
-a condition needs more than that. `care_sim.loops.one_world` is one world of a loop.
+Every stage (`care_sim.loops.stages`) is compiled code over all worlds. Where a condition needs
+more, that stage goes world by world. `care_sim.loops.one_world` shows the world of a loop of one.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,7 +13,8 @@ from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.rig import Rig
 from care_sim.loops.episode import Episode
 from care_sim.loops.observation_limits import Limits
-from care_sim.loops.records import Records, Sight as Met
+from care_sim.loops.records import Records
+from care_sim.loops.records import Sight as Met
 from care_sim.loops.stages.detecting import Detecting, Found
 from care_sim.loops.stages.driving import Driving
 from care_sim.loops.stages.judging import Judging

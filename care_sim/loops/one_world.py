@@ -1,6 +1,8 @@
 """One world of the closed loop, with all that is true about it."""
 
+from collections.abc import Iterable
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -71,7 +73,10 @@ class OneWorld:
         """The record of the keyframe that the loop has played since."""
         loop, found, impact = self._loop, self._loop.found, self._loop.impacts.get(0)
         self._objects.note(found.tracks[0, : found.counts[0]], found.behind(0))
-        told = dict(zip(Records._fields, [column.item() for column in records], strict=True))
+        columns: Iterable[np.ndarray] = records
+        told: dict[str, Any] = {
+            name: column.item() for name, column in zip(Records._fields, columns, strict=True)
+        }
         told |= {
             "index": self.index,
             "fired": fired,

@@ -96,8 +96,8 @@ def _below(rng: np.random.Generator, most: int, keyframes: int) -> Integers:
 
 class _Sent(NamedTuple):
     """The pictures on their way, in a ring of L places each: `counts` (W, L), `rows`
-    (W, L, D, 9) and `objects` (W, L, D) of their detections, the car's `headings` (W, L) when they were taken, and the
-    keyframes at which they are `due` (W, L). `taken` (W,) tells how many there have been.
+    (W, L, D, 9) and `objects` (W, L, D) of their detections, the car's `headings` (W, L) when they
+    were taken, and the keyframes at which they are `due` (W, L). `taken` (W,) counts them.
     """
 
     counts: Integers

@@ -12,8 +12,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from care_sim.base.compiled import compiled
-from care_sim.loops.stages.state import State
 from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.loops.stages.state import State
 from care_sim.world.approach import Impact
 from care_sim.world.bodies import BodyKind
 from care_sim.world.body_tables import bodies_near

@@ -80,9 +80,8 @@ class Detecting:
                 room = [np.empty(shape, np.int64) for _ in range(3)]
                 found = Found(found.counts, room[0], np.empty((*shape, 7)), *room[1:])
                 self._found = found
-            tables = state.reported, state.bodies, state.sensors
-            hits = returns.counts, returns.ids
-            _detect(state.live, *hits, *tables, self._least, found)
+            hits = state.live, returns.counts, returns.ids
+            _detect(*hits, state.reported, state.bodies, state.sensors, self._least, found)
             return found
         for world in np.flatnonzero(state.live).tolist():
             one = self._ones[world]
@@ -95,9 +94,13 @@ class Detecting:
                 state, world, scan, returns.ids[world, :count]
             )
             found.counts[world] = len(classes)
-            rows = classes, boxes, behind, behind
-            tables = [filled(t, world, row) for t, row in zip(found[1:], rows, strict=True)]
-            found = self._found = Found(found.counts, *tables)
+            found = self._found = Found(
+                found.counts,
+                filled(found.classes, world, classes),
+                filled(found.boxes, world, boxes),
+                filled(found.objects, world, behind),
+                filled(found.tracks, world, behind),
+            )
         return found
 
     def detected(self, state: State, found: Found) -> Mask:

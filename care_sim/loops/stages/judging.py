@@ -86,6 +86,8 @@ class Judging:
             detected = detecting.bodies_found(found, world)
             sights[world] = tuple(
                 Sight(distance, shows(world, body), body in detected)
-                for body, distance in zip(bodies.tolist(), planar_ranges(boxes).tolist(), strict=True)
+                for body, distance in zip(
+                    bodies.tolist(), planar_ranges(boxes).tolist(), strict=True
+                )
             )
         return sights

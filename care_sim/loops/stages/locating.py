@@ -22,8 +22,8 @@ class Locating:
         self._rig = rig
         self._sensing = sensing
         self._limits = limits
-        x, y, z = self._at = tuple(map(float, rig.sensor_position))
-        self._middle = x, 0.0, z
+        x, y, z = map(float, rig.sensor_position)
+        self._at, self._middle = (x, y, z), (x, 0.0, z)
         self._errs = bool(sensing.ego_position_sigma_m or sensing.ego_yaw_sigma_deg)
         self._localisations: list[Localisation | None] = [None] * state.worlds
         self._odometers: list[Odometry | None] = [None] * state.worlds

@@ -84,7 +84,9 @@ class Observing:
         ranges: NDArray[np.float32],
     ) -> Belief:
         """What the policy of a world is told, in full precision. `ego` (3,) as in `State.read`."""
-        seen, known = (table[world, : counts[world]].copy() for counts, table in (detections, tracks))
+        seen, known = (
+            table[world, : counts[world]].copy() for counts, table in (detections, tracks)
+        )
         return self._limits.belief(
             Ego(*ego.tolist()),
             ImageDetections.from_checked_rows(seen),

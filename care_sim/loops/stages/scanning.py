@@ -80,8 +80,9 @@ class Scanning:
             self._spacing = grid.spacing
         self._lidars: list[Lidar | None] = [None] * worlds
         self.scans = [None] * worlds
+        none = np.zeros(worlds, np.int64)
         empty = np.empty((worlds, 0), np.int64)
-        self._returns = Returns(np.zeros(worlds, np.int64), empty, np.empty((worlds, 0)), empty)
+        self._returns = Returns(none, empty, np.empty((worlds, 0)), empty)
 
     def begin(self, world: int, built: World, seed: np.random.SeedSequence) -> None:
         """Begin an episode; `seed` is that of the LiDAR (`care_sim.loops.episode.SensorSeeds`)."""
@@ -96,32 +97,27 @@ class Scanning:
             shape = fired.cells.shape
             self._returns = Returns(*fired, np.empty(shape), np.empty(shape, np.int64))
         returns = self._returns._replace(counts=fired.counts, cells=fired.cells)
-        _scan(
-            state.live,
-            fired,
-            state.sensors,
-            state.solids,
-            state.bodies,
-            self._fan,
-            self._spacing,
-            self._reach,
-            returns.ranges,
-            returns.ids,
-        )
+        self._cast(state, state.live, fired, returns.ranges, returns.ids)
         return returns
 
+    def _cast(self, state: State, live: Mask, fired: Fired, ranges: Floats, ids: Integers) -> None:
+        """Fill `ranges` and `ids` (W, F) with what cells meet in the worlds that are `live`."""
+        tables = state.sensors, state.solids, state.bodies
+        _scan(live, fired, *tables, self._fan, self._spacing, self._reach, ranges, ids)
+
     def _one_by_one(self, state: State, fired: Fired) -> Returns:
-        counts, *tables = self._returns
+        counts, cells, ranges, ids = self._returns
         for world in np.flatnonzero(state.live).tolist():
             lidar = self._lidars[world]
             assert lidar is not None
-            cells = fired.cells[world, : fired.counts[world]]
-            scan, ids = lidar.fire(cells, state.sensors.frame(world))
+            asked = fired.cells[world, : fired.counts[world]]
+            scan, bodies = lidar.fire(asked, state.sensors.frame(world))
             self.scans[world] = scan
-            counts[world] = len(ids)
-            rows = scan.cells, scan.ranges, ids
-            tables = [filled(table, world, row) for table, row in zip(tables, rows, strict=True)]
-        self._returns = Returns(counts, *tables)
+            counts[world] = len(bodies)
+            cells = filled(cells, world, scan.cells)
+            ranges = filled(ranges, world, scan.ranges)
+            ids = filled(ids, world, bodies)
+        self._returns = Returns(counts, cells, ranges, ids)
         return self._returns
 
     def lidar(self, world: int) -> Lidar | None:
@@ -142,9 +138,7 @@ class Scanning:
                 found[world] = lidar.hits(int(bodies[world]), cells, sensor)
             return found
         ids = np.full(asked.cells.shape, NO_BODY)
-        tables = state.sensors, state.solids, state.bodies
-        cast = self._fan, self._spacing, self._reach
-        _scan(live, asked, *tables, *cast, np.empty(ids.shape), ids)
+        self._cast(state, live, asked, np.empty(ids.shape), ids)
         in_use = np.arange(ids.shape[1]) < asked.counts[:, None]
         hit = (ids == bodies[:, None]) & in_use & live[:, None]
         return np.asarray(hit.sum(axis=1))

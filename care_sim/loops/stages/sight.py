@@ -12,8 +12,6 @@ from typing import NamedTuple
 import numpy as np
 
 from care_sim.base.compiled import compiled
-from care_sim.loops.stages.camera_faults import BatchDelay, BatchMisses, Detected
-from care_sim.loops.stages.state import State, Bodies, Outlines, Reported, Sensors, seen_by
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.cells.boxes import planar_ranges
 from care_sim.core.conditions import IDEAL_CAMERA, CameraFaults, Sensing
@@ -21,6 +19,8 @@ from care_sim.core.frames import Frame, turned_alike
 from care_sim.core.pinhole import NEAR_M, CameraModels, PinholeCamera, model_of, window_on
 from care_sim.core.rig import Rig
 from care_sim.core.types import ImageDetections
+from care_sim.loops.stages.camera_faults import BatchDelay, BatchMisses, Detected
+from care_sim.loops.stages.state import Bodies, Outlines, Reported, Sensors, State, seen_by
 from care_sim.sensors.annotated import IdentifiedDetections
 from care_sim.sensors.camera import CameraDetector, picture_timing
 from care_sim.sensors.engines import make_engine
@@ -102,7 +102,9 @@ class Sight:
             self.own,
         )
         # The faults of own detectors are theirs alone.
-        alike = [CameraFaults() if own else each for own, each in zip(self.own, conditions, strict=True)]
+        alike = [
+            CameraFaults() if own else each for own, each in zip(self.own, conditions, strict=True)
+        ]
         timings = [picture_timing(each, rig.keyframe_s, WORLD_STEP_S) for each in alike]
         latencies = np.array([timing.keyframes for timing in timings])
         jitters = np.array([each.camera_jitter for each in alike])
@@ -112,9 +114,7 @@ class Sight:
         self._faults = alike
         self._is_ever_dark = any(each.blackout_s for each in alike)
 
-    def begin(
-        self, world: int, built: World, seed: np.random.SeedSequence, pool: BoxPool
-    ) -> None:
+    def begin(self, world: int, built: World, seed: np.random.SeedSequence, pool: BoxPool) -> None:
         """Begin an episode; `seed` is that of the camera (`care_sim.loops.episode.SensorSeeds`).
         False boxes are made from the `pool`.
         """
@@ -232,9 +232,7 @@ class OwnCameras:
         """World steps from a keyframe to the pictures that the detector is given."""
         self._is_fast = sensing.engine == "fast"
 
-    def look(
-        self, moment: Moment, seen: IdentifiedDetections, shown: Mask
-    ) -> IdentifiedDetections:
+    def look(self, moment: Moment, seen: IdentifiedDetections, shown: Mask) -> IdentifiedDetections:
         """Take the pictures of a keyframe: the newest detections that are due. `seen` are those of
         the engine `fast`; of another `shown` (B,) is written anew.
         """
@@ -269,9 +267,7 @@ class Pictures:
         """What a detector without faults would report of cameras; see `of`."""
         return faultless_detections(self.of(cameras, sensor, boxes), self.classes)
 
-    def of(
-        self, cameras: Sequence[PinholeCamera], sensor: Frame, boxes: Floats
-    ) -> list[Integers]:
+    def of(self, cameras: Sequence[PinholeCamera], sensor: Frame, boxes: Floats) -> list[Integers]:
         """The table of boxes (`care_sim.sensors.pictures`) of each camera, of pictures around
         `boxes` (n, 7) of all that a detector may ever report, in the sensor frame.
         """

@@ -13,7 +13,7 @@ import numpy as np
 from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.belief import MAX_TRACKS
-from care_sim.core.frames import Frame, mounted_at, placed_at, seen_from
+from care_sim.core.frames import Frame, placed_at, seen_from
 from care_sim.core.grid import Cells
 from care_sim.core.types import Tracks
 from care_sim.world.approach import Impact

@@ -20,8 +20,8 @@ from care_sim.core.frames import Frame
 from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
-from care_sim.loops.one_world import OneWorld
 from care_sim.loops.episode import EpisodeSeeds
+from care_sim.loops.one_world import OneWorld
 from care_sim.policies.base import Policy
 from care_sim.policies.controls.patterns import Pattern, likeliest_first
 from care_sim.policies.controls.patterns_and_tracks import HistoryPattern

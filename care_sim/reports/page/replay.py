@@ -14,8 +14,8 @@ import numpy as np
 from care_sim.core.conditions import FilmedReturns
 from care_sim.core.types import CLASSES
 from care_sim.evaluation.recall import CENSORED_AT
-from care_sim.loops.one_world import OneWorld
 from care_sim.loops.film import Film
+from care_sim.loops.one_world import OneWorld
 from care_sim.loops.open_loop import OpenLoop, SceneKeyframe
 from care_sim.loops.records import Keyframe, Outcome
 from care_sim.loops.watcher import sought

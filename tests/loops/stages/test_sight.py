@@ -4,9 +4,9 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from care_sim.loops.stages.camera_faults import BatchDelay, BatchMisses, Detected, DrawnAhead
 from care_sim.core.conditions import CameraFaults
 from care_sim.core.types import ImageDetections
+from care_sim.loops.stages.camera_faults import BatchDelay, BatchMisses, Detected, DrawnAhead
 from care_sim.sensors.annotated import IdentifiedDetections
 from care_sim.sensors.camera import Delay, Misses, PictureTiming
 
@@ -77,10 +77,13 @@ def test_what_is_late_arrives_as_in_one_world(seed, latencies, jitters):
         counts, rows, headings = rng.integers(0, 4, 2), rng.random((2, 3, 9)), rng.random(2)
         # A picture of a rendered world is new when it is taken.
         rows[:, :, ImageDetections.AGE :] = 0.0
-        arrived = together.newest(live, Detected(counts, rows), headings)
+        objects = rng.integers(9, size=(2, 3))
+        arrived = together.newest(live, Detected(counts, rows, objects), headings)
         for world in np.flatnonzero(live).tolist():
             taken = ImageDetections.from_checked_rows(rows[world, : counts[world]].copy())
-            bodies = np.zeros(counts[world], np.int64)
+            bodies = objects[world, : counts[world]].copy()
             apart[world].take(IdentifiedDetections(taken, bodies), headings[world])
-            expected = apart[world].newest(headings[world]).detections.rows()
-            assert arrived.rows[world, : arrived.counts[world]].tolist() == expected.tolist()
+            expected = apart[world].newest(headings[world])
+            own = slice(arrived.counts[world])
+            assert arrived.rows[world, own].tolist() == expected.detections.rows().tolist()
+            assert arrived.objects[world, own].tolist() == expected.objects.tolist()
