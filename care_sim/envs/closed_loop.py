@@ -228,7 +228,7 @@ class ClosedLoopEnv(SensingEnv[OneWorld]):
         fired = self._choose_cells(action)
         assert worlds is not None
         stepped = worlds.play(Fired.of([fired]), _HERE)
-        self.keyframes.append(loop.record(fired, stepped.records))
+        self.keyframes.append(loop.record(fired, worlds.records))
         info = self._scan_info(fired) | _first(stepped.columns) | stepped.single.get(0, {})
         terminated, truncated = bool(stepped.terminated[0]), bool(stepped.truncated[0])
         self._over = terminated or truncated

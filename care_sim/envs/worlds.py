@@ -90,7 +90,7 @@ class History:
 class Stepped(NamedTuple):
     """What n worlds give at a step: rewards, terminations and truncations (n,), 0 and False of
     those that did not play; what `info` says of all in `columns` (n, ...), by name, which the next
-    step may write over; what it says of one alone in `single`, by world; and the `records`.
+    step may write over; and what it says of one alone in `single`, by world.
     """
 
     rewards: Floats
@@ -98,7 +98,6 @@ class Stepped(NamedTuple):
     truncated: Mask
     columns: dict[str, Any]
     single: dict[int, dict[str, Any]]
-    records: Records
 
 
 class Worlds:
@@ -109,6 +108,9 @@ class Worlds:
     `one_budget` says whether all worlds of the vector environment, those of other threads too, fire
     equally many cells: infos then hold them as one array, else as one for each world.
     """
+
+    records: Records
+    """Of the last keyframe."""
 
     def __init__(
         self,
@@ -173,25 +175,36 @@ class Worlds:
         assert self._choice is not None
         fired = self._choice.fired(actions, who, self.loop.state.keyframes)
         stepped = self.play(fired, who)
-        names, floor = self._scan_columns(), self._first.conditions.floor
-        single = stepped.single
-        told = (
-            {world: self._told(world) for world in _places(who)}
-            if len(names) > 1 or not floor
-            else {}
-        )
-        if floor:
-            # There are columns even where nobody plays, to be joined with those of other threads.
-            columns = {"fired": self._all_fired(fired)}
-            columns |= {
-                name: self._column([(w, own[name]) for w, own in told.items()])
-                for name in names[1:]
-            }
-            return stepped._replace(columns=columns | stepped.columns)
+        told = {
+            world: {"fired": fired.cells[world, : fired.counts[world]]} | self.loop.told(world)
+            for world in _places(who)
+        }
+        if self._first.conditions.floor:
+            return stepped._replace(columns=self._columns(told) | stepped.columns)
         # Cells of different numbers, as lists: they are no column.
         for world, own in told.items():
-            single[world] = {name: own[name].tolist() for name in names} | single.get(world, {})
+            lists = {name: values.tolist() for name, values in own.items()}
+            stepped.single[world] = lists | stepped.single.get(world, {})
         return stepped
+
+    def _columns(self, told: Mapping[int, Mapping[str, np.ndarray]]) -> dict[str, NDArray[Any]]:
+        """What was `told` of the cells of worlds: (W, B), or (W,) arrays of each world's own where
+        budgets differ.
+        """
+        conditions, worlds = self._first.conditions, len(self._budgets)
+        # There are columns even where nobody plays, to be joined with those of other threads.
+        kinds: dict[str, type] = {"fired": np.int64}
+        kinds |= {"intensities": np.float64} if conditions.shapes_beams else {}
+        kinds |= {"times_s": np.float64} if conditions.lidar_sweep_s else {}
+        shape = (worlds, self._budgets[0]) if self._one_budget else (worlds,)
+        columns = {
+            name: np.zeros(shape, kind if self._one_budget else object)
+            for name, kind in kinds.items()
+        }
+        for world, own in told.items():
+            for name, column in columns.items():
+                column[world] = own[name] if self._one_budget else own[name].copy()
+        return columns
 
     def play(self, fired: Fired, who: Mask) -> Stepped:
         """Let those play that are True in `who` (n,), and fire these cells; without what infos tell
@@ -203,7 +216,7 @@ class Worlds:
         needed = self._rewards.need_bound & who
         detectable = loop.detectable(needed) if needed.any() else needed
         keyframes = loop.state.keyframes.copy()
-        records = loop.keyframe(fired, who)
+        self.records = records = loop.keyframe(fired, who)
         self._history.note(keyframes, records)
         if self._is_drive:
             for world in _places(who):
@@ -226,7 +239,7 @@ class Worlds:
                 "speed_mps": records.speed_mps,
                 "reward_terms": earned,
             }
-        return Stepped(rewards, terminated, truncated, columns, single, records)
+        return Stepped(rewards, terminated, truncated, columns, single)
 
     def close(self) -> None:
         """Free the simulators."""
@@ -249,41 +262,6 @@ class Worlds:
             return result
         appeared = float(episode.time_s[episode.in_view.argmax()])
         return replace(result, clearance_m=self.loop.motion.settle(world, appeared))
-
-    def _scan_columns(self) -> list[str]:
-        """What infos tell of the fired cells."""
-        conditions = self._first.conditions
-        told = {"intensities": conditions.shapes_beams, "times_s": conditions.lidar_sweep_s > 0}
-        return ["fired", *(name for name, is_told in told.items() if is_told)]
-
-    def _told(self, world: int) -> dict[str, Floats | Integers]:
-        fired = self.loop.fired
-        return {"fired": fired.cells[world, : fired.counts[world]]} | self.loop.told(world)
-
-    def _all_fired(self, fired: Fired) -> NDArray[Any]:
-        """(W, B) the cells of all worlds, or (W,) arrays of each world's own."""
-        if self._one_budget and fired.cells.shape[1] >= self._budgets[0]:
-            return fired.cells[:, : self._budgets[0]]
-        counts = np.minimum(self._budgets, fired.cells.shape[1])
-        return self._column(
-            [
-                (w, row[:n].copy())
-                for w, (row, n) in enumerate(zip(fired.cells, counts, strict=True))
-            ]
-        )
-
-    def _column(self, rows: Sequence[tuple[int, np.ndarray]]) -> NDArray[Any]:
-        """(W, B) the rows of worlds, or (W,) arrays of each world's own where budgets differ."""
-        worlds = len(self._budgets)
-        if not self._one_budget:
-            column = np.full(worlds, None, object)
-            for world, row in rows:
-                column[world] = row
-            return column
-        table = np.zeros((worlds, self._budgets[0]), rows[0][1].dtype if rows else float)
-        for world, row in rows:
-            table[world, : len(row)] = row
-        return table
 
     def _entropy(self, world: int, seed: int | None) -> int:
         if seed is not None:

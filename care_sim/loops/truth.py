@@ -52,7 +52,6 @@ class Loop(Protocol):
         """What the returns of the last keyframe told besides their ranges."""
         ...
 
-
     def true_boxes(self, tracks: Tracks) -> Floats:
         """(n, 7) true boxes, in the sensor frame, of the objects behind forecasts."""
         ...

@@ -31,7 +31,6 @@ from care_sim.envs.vector.arguments import (
     last_rows,
     makers_of,
     models_of,
-    same_step,
     seeds_of,
     worlds_to_reset,
 )
@@ -238,17 +237,21 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         stepped = self._played(scores, ~begins)
         self._steps += ~begins
         stepped.truncated[:] |= ~begins & (self._steps >= self._most_steps)
-        infos = self._infos(stepped, ~begins)
         over = stepped.terminated | stepped.truncated
 
         # What is over begins anew, now or at the next step. In the mode "SameStep" its last
         # observation and info are told apart from the first ones of the new episode.
         anybody = [None] * self.num_envs
         if self.autoreset_mode == AutoresetMode.SAME_STEP and over.any():
-            last = last_rows(self._observed, over)
-            infos = same_step(infos, self._begin(over, anybody, {}), last, over)
+            final = {
+                "final_obs": last_rows(self._observed, over),
+                "_final_obs": over.copy(),
+                "final_info": self._infos(stepped, over),
+                "_final_info": over.copy(),
+            }
+            infos = self._begin(over, anybody, self._infos(stepped, ~over)) | final
         else:
-            infos = self._begin(begins, anybody, infos)
+            infos = self._begin(begins, anybody, self._infos(stepped, ~begins))
             self._over = over
         return self._handed_out(), stepped.rewards, stepped.terminated, stepped.truncated, infos
 
@@ -288,21 +291,19 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
             ]
         )
         self._begun[:] = True
-        single = {
-            share.start + world: info
-            for share, part in zip(self._shares, parts, strict=True)
-            for world, info in part.single.items()
-        }
         rewards, terminated, truncated = (
             np.concatenate(column) for column in zip(*(part[:3] for part in parts), strict=True)
         )
-        columns = joined([part.columns for part in parts])
-        return parts[0]._replace(
-            rewards=rewards,
-            terminated=terminated,
-            truncated=truncated,
-            columns=columns,
-            single=single,
+        return Stepped(
+            rewards,
+            terminated,
+            truncated,
+            joined([part.columns for part in parts]),
+            {
+                share.start + world: info
+                for share, part in zip(self._shares, parts, strict=True)
+                for world, info in part.single.items()
+            },
         )
 
     def _begin(

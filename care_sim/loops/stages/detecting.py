@@ -10,13 +10,13 @@ from typing import NamedTuple
 import numpy as np
 
 from care_sim.base.compiled import compiled
-from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.arrays import Floats, Integers, Mask, filled
 from care_sim.core.rig import Rig
 from care_sim.core.types import Scan
 from care_sim.loops.episode import SensorSeeds
 from care_sim.loops.gathering import Gathering, acted_on
 from care_sim.loops.stages.scanning import Returns
-from care_sim.loops.stages.state import Bodies, Reported, Sensors, State, filled, seen_by
+from care_sim.loops.stages.state import Bodies, Reported, Sensors, State, seen_by
 from care_sim.perception.matching import found_objects
 from care_sim.perception.points_only import Detector
 from care_sim.perception.proxy import count_hits

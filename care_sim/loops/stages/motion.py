@@ -10,12 +10,12 @@ from typing import TypeGuard
 import numpy as np
 
 from care_sim.base.compiled import compiled
-from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.arrays import Floats, Integers, Mask, filled
 from care_sim.core.types import Ego
 from care_sim.loops.episode import most_keyframes
 from care_sim.loops.stages.clearances import Clearances, Impacts
 from care_sim.loops.stages.lane_columns import SPEED, LaneColumns
-from care_sim.loops.stages.state import Passages, State, filled, load_bodies
+from care_sim.loops.stages.state import Passages, State, load_bodies
 from care_sim.world.bullet import NO_BODY
 from care_sim.world.motions import LaneChange, Walk
 from care_sim.world.route import RouteCar

@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.compiled import compiled
-from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.arrays import Floats, Integers, Mask, filled
 from care_sim.core.belief import lay_ranges
 from care_sim.core.cells.boxes import GridSpacing
 from care_sim.core.conditions import Sensing
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
 from care_sim.core.types import Scan
-from care_sim.loops.stages.state import Bodies, Fired, Sensors, Solids, State, filled
+from care_sim.loops.stages.state import Bodies, Fired, Sensors, Solids, State
 from care_sim.sensors.beams import Beams
 from care_sim.sensors.engines import make_engine
 from care_sim.sensors.engines.ray_kernels import Fan, cast_into
@@ -139,9 +139,10 @@ class Scanning:
             return found
         ids = np.full(asked.cells.shape, NO_BODY)
         self._cast(state, live, asked, np.empty(ids.shape), ids)
-        in_use = np.arange(ids.shape[1]) < asked.counts[:, None]
+        in_use = np.arange(asked.cells.shape[1]) < asked.counts[:, None]
         hit = (ids == bodies[:, None]) & in_use & live[:, None]
-        return np.asarray(hit.sum(axis=1))
+        counts: Integers = hit.sum(axis=1)
+        return counts
 
     def image(self, returns: Returns, out: NDArray[np.float32], live: Mask) -> None:
         """Write the range images of the worlds that are `live` (W,) into `out` (W, E, A): metres,

@@ -18,11 +18,10 @@ from care_sim.core.conditions import IDEAL_CAMERA, CameraFaults, Sensing
 from care_sim.core.frames import Frame, turned_alike
 from care_sim.core.pinhole import NEAR_M, CameraModels, PinholeCamera, model_of, window_on
 from care_sim.core.rig import Rig
-from care_sim.core.types import ImageDetections
-from care_sim.loops.stages.camera_faults import BatchDelay, BatchMisses, Detected
 from care_sim.loops.stages.state import Bodies, Outlines, Reported, Sensors, State, seen_by
 from care_sim.sensors.annotated import IdentifiedDetections
 from care_sim.sensors.camera import CameraDetector, picture_timing
+from care_sim.sensors.camera_faults import Delay, Detected, Misses
 from care_sim.sensors.engines import make_engine
 from care_sim.sensors.engines.picture_kernels import Line, draw_silhouettes, empty_line
 from care_sim.sensors.engines.silhouette_kernels import (
@@ -108,8 +107,8 @@ class Sight:
         timings = [picture_timing(each, rig.keyframe_s, WORLD_STEP_S) for each in alike]
         latencies = np.array([timing.keyframes for timing in timings])
         jitters = np.array([each.camera_jitter for each in alike])
-        self._misses = BatchMisses(alike)
-        self._delay = BatchDelay(latencies, jitters, rig.keyframe_s)
+        self._misses = Misses(alike)
+        self._delay = Delay(latencies, jitters, rig.keyframe_s)
         self._is_late = bool(latencies.any() or jitters.any())
         self._faults = alike
         self._is_ever_dark = any(each.blackout_s for each in alike)
@@ -154,18 +153,15 @@ class Sight:
             shown,
         )
         if self._is_late:
-            arrived = self._delay.newest(state.live & ~self.own, seen, state.taken.poses[:, 3])
+            whose, headings = state.live & ~self.own, state.taken.poses[:, 3]
+            self._delay.take(whose, seen, headings)
+            arrived = self._delay.newest(whose, headings)
         else:
             arrived = seen
         for world in np.flatnonzero(state.live & self.own).tolist():
-            count = seen.counts[world]
-            pictured = IdentifiedDetections(
-                ImageDetections.from_checked_rows(seen.rows[world, :count].copy()),
-                seen.objects[world, :count].copy(),
-            )
-            own = self.own_cameras[world]
+            pictured = seen.take(world), shown[world]
             moment = _moment(state, world, boxes)
-            arrived = arrived.put(world, own.look(moment, pictured, shown[world]))
+            arrived = arrived.put(world, self.own_cameras[world].look(moment, *pictured))
         return arrived, shown
 
     def look_between(self, state: State, world: int) -> None:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from care_sim.base.compiled import compiled
-from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.arrays import Floats, Integers, Mask, filled
 from care_sim.core.belief import MAX_TRACKS
 from care_sim.core.frames import Frame, placed_at, seen_from
 from care_sim.core.grid import Cells
@@ -202,18 +202,6 @@ class State:
         """(W, 3) speed, yaw rate and acceleration that the odometry reads, within their limits."""
         motion = np.zeros(worlds), np.zeros(worlds), np.zeros(worlds)
         self.egos = Egos(*motion, _counts(worlds), _counts(worlds))
-
-
-def filled(table: np.ndarray, world: int, rows: np.ndarray) -> np.ndarray:
-    """The table (W, n, ...) with `rows` (k, ...) at the beginning of a world's; a longer table, if
-    they need more room than there is.
-    """
-    if len(rows) > table.shape[1]:
-        longer = np.zeros((len(table), 2 * len(rows), *table.shape[2:]), table.dtype)
-        longer[:, : table.shape[1]] = table
-        table = longer
-    table[world, : len(rows)] = rows
-    return table
 
 
 def _counts(worlds: int) -> Integers:

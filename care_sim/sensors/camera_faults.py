@@ -1,6 +1,7 @@
-"""What goes wrong between the pictures of all worlds and the detections that arrive, in each world
-by its own faults; see `care_sim.sensors.camera`. Their random numbers are drawn for many
-keyframes at once.
+"""What goes wrong between the pictures of W worlds and the detections that arrive, in each world by
+its own faults.
+
+Random numbers are drawn for many keyframes at once.
 """
 
 from collections.abc import Callable, Sequence
@@ -10,12 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from care_sim.base.compiled import compiled
-from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.arrays import Floats, Integers, Mask, filled
 from care_sim.core.conditions import CameraFaults
 from care_sim.core.types import ImageDetections
-from care_sim.loops.stages.state import filled
 from care_sim.sensors.annotated import IdentifiedDetections
-from care_sim.sensors.camera import first_bursts, later_bursts, miss_rates
 
 # Numbers of a module are what compiled code can hold.
 _AGE, _YAW_CHANGE = ImageDetections.AGE, ImageDetections.YAW_CHANGE
@@ -42,10 +41,18 @@ class Detected(NamedTuple):
         rows = filled(self.rows, world, arrived.detections.rows())
         return Detected(self.counts, rows, filled(self.objects, world, arrived.objects))
 
+    def take(self, world: int) -> IdentifiedDetections:
+        """A copy of those of a world."""
+        own = slice(self.counts[world])
+        detections = ImageDetections.from_checked_rows(self.rows[world, own].copy())
+        return IdentifiedDetections(detections, self.objects[world, own].copy())
 
-class BatchMisses:
-    """Which of the reported bodies the cameras miss; the numbers are those of
-    `care_sim.sensors.camera.Misses`.
+
+class Misses:
+    """Which objects the cameras miss: in the long run the stated share, in bursts of keyframes.
+
+    One number is drawn for every object at every keyframe, seen or not, so that every policy meets
+    the same misses.
     """
 
     def __init__(self, faults: Sequence[CameraFaults]):
@@ -54,6 +61,7 @@ class BatchMisses:
         self._shares = np.array(told)[:, :, None]
         self._bursts = np.array([[one.false_negative_burst] for one in faults])
         self._draws = DrawnAhead(worlds)
+        # Keyframes for which each object's burst still lasts.
         self._lasting = np.zeros((worlds, 0), np.int64)
         self._started = np.zeros(worlds, np.bool_)
         self.any = bool(self._shares.any())
@@ -70,10 +78,13 @@ class BatchMisses:
         """(W, R) who is missed at this keyframe of the worlds that are `live`; `ranges` (W, R) are
         distances in metres.
         """
+        if not self.any:
+            return np.zeros(ranges.shape, np.bool_)
         width = ranges.shape[1]
         lasting = self._lasting
         if lasting.shape[1] < width:
             lasting = np.pad(lasting, ((0, 0), (0, width - lasting.shape[1])))
+        # One draw per object decides all: whether it is missed, and at the start for how long.
         rates = miss_rates(self._shares[:, 0], self._shares[:, 1], ranges)
         draws = self._draws.next(live, width)
         first = first_bursts(rates, draws, self._bursts)
@@ -83,6 +94,38 @@ class BatchMisses:
         self._lasting = np.where(live[:, None], drawn - missed, lasting)
         self._started |= live
         return missed
+
+
+def miss_rates(rate: Floats, per_m: Floats, ranges: Floats) -> Floats:
+    """The share of keyframes at which objects so many metres away are missed, in any shape, by
+    `false_negative_rate` and `false_negative_per_m`.
+    """
+    return np.minimum(rate + per_m * ranges, 1.0)
+
+
+def first_bursts(rates: Floats, draws: Floats, burst: Integers) -> Integers:
+    """For how many keyframes, from the first on, objects are missed that have these rates and
+    draws. Arrays of one shape.
+
+    The first keyframe shows the long run: an object is missed at its rate, and whoever is missed is
+    at any keyframe of its burst with equal chance.
+    """
+    hit = draws < rates
+    # A draw below the rate, divided by it, is again evenly distributed from 0 to 1.
+    share = np.divide(draws, rates, out=np.zeros_like(draws), where=hit)
+    served = np.floor(burst * share).astype(np.int64)
+    return np.where(hit, burst - served, 0)
+
+
+def later_bursts(lasting: Integers, rates: Floats, draws: Floats, burst: Integers) -> Integers:
+    """The same at a later keyframe, before which they were missed for `lasting` more: bursts begin
+    among the objects that are in none.
+    """
+    # With the chance p that a burst of L keyframes begins, (1 - p) / p keyframes without one lie
+    # between two bursts on the mean. The share of missed keyframes is L / (L + (1 - p) / p); it is
+    # the rate r for p = r / (L - (L - 1) r).
+    begins = (lasting == 0) & (draws < rates / (burst - (burst - 1) * rates))
+    return np.where(begins, burst, lasting)
 
 
 # No closures: a copy of the worlds then draws from copies of the generators.
@@ -97,7 +140,8 @@ def _below(rng: np.random.Generator, most: int, keyframes: int) -> Integers:
 class _Sent(NamedTuple):
     """The pictures on their way, in a ring of L places each: `counts` (W, L), `rows`
     (W, L, D, 9) and `objects` (W, L, D) of their detections, the car's `headings` (W, L) when they
-    were taken, and the keyframes at which they are `due` (W, L). `taken` (W,) counts them.
+    were taken, and the keyframes at which they are `due` (W, L). `taken` (W,) counts them, `begun`
+    (W,) the keyframes.
     """
 
     counts: Integers
@@ -106,42 +150,48 @@ class _Sent(NamedTuple):
     headings: Floats
     due: Integers
     taken: Integers
+    begun: Integers
 
 
-class BatchDelay:
-    """Hands out the newest picture that has arrived, as `care_sim.sensors.camera.Delay`:
-    each is late by its world's one of the `latencies` (W,), keyframes, and by 0 to that of the
-    `jitters` (W,) more that are drawn for it.
+class Delay:
+    """Hands out the newest picture that has arrived.
+
+    One is taken per keyframe, `after_s` seconds after it. Each is late by its world's one of the
+    `latencies` (W,), keyframes, and by 0 to that of the `jitters` (W,) more that are drawn for it.
     """
 
-    def __init__(self, latencies: Integers, jitters: Integers, keyframe_s: float):
+    def __init__(
+        self, latencies: Integers, jitters: Integers, keyframe_s: float, after_s: float = 0.0
+    ):
         worlds = len(latencies)
         self._latencies, self._jitters = latencies, jitters
-        self._keyframe_s = keyframe_s
+        self._keyframe_s, self._after_s = float(keyframe_s), float(after_s)
         self._draws = DrawnAhead(worlds)
-        # The last one that has not come by now has come in any case.
-        places = int((latencies + jitters).max()) + 1
+        # No picture is later than latency plus jitter.
+        ring = worlds, int((latencies + jitters).max()) + 1
         self._sent = _Sent(
-            np.zeros((worlds, places), np.int64),
-            np.empty((worlds, places, 0, len(ImageDetections.COLUMNS))),
-            np.empty((worlds, places, 0), np.int64),
-            np.zeros((worlds, places)),
-            np.zeros((worlds, places), np.int64),
+            np.zeros(ring, np.int64),
+            np.empty((*ring, 0, len(ImageDetections.COLUMNS))),
+            np.empty((*ring, 0), np.int64),
+            np.zeros(ring),
+            np.zeros(ring, np.int64),
+            np.zeros(worlds, np.int64),
             np.zeros(worlds, np.int64),
         )
         self._arrived = Detected.of(worlds, 0)
 
     def begin(self, world: int, seed: np.random.SeedSequence) -> None:
         """Begin an episode; lateness is drawn from `seed`."""
-        self._sent.taken[world] = 0
+        self._sent.taken[world] = self._sent.begun[world] = 0
         if self._jitters.any():
             rng, most = np.random.default_rng(seed), self._jitters[world] + 1
             self._draws.begin(world, partial(_below, rng, most))
 
-    def newest(self, live: Mask, seen: Detected, headings: Floats) -> Detected:
-        """Take in what is `seen` at a keyframe of the worlds that are `live`, the cars with these
-        `headings` (W,), radians; the newest detections that are due, with age and yaw change.
+    def take(self, live: Mask, seen: Detected, headings: Floats) -> None:
+        """Take in what is `seen` in the pictures of a keyframe of the worlds that are `live`, taken
+        by cars with these `headings` (W,), radians.
         """
+        # Lateness is drawn for every picture in turn, whatever it shows.
         late = self._latencies
         if self._jitters.any():
             late = late + self._draws.next(live, 1)[:, 0].astype(np.int64)
@@ -153,27 +203,24 @@ class BatchDelay:
             rows[:, :, :room], objects[:, :, :room] = self._sent.rows, self._sent.objects
             self._sent = self._sent._replace(rows=rows, objects=objects)
             self._arrived = Detected.of(worlds, most)
-        _deliver(live, seen, headings, late, self._keyframe_s, self._sent, self._arrived)
+        _send(live, seen, headings, late, self._sent)
+
+    def newest(self, live: Mask, headings: Floats) -> Detected:
+        """Begin a keyframe of the worlds that are `live`, the cars with these `headings` (W,); the
+        newest detections that are due, with age and yaw change. The next call fills them anew.
+        """
+        _deliver(live, headings, self._keyframe_s, self._after_s, self._sent, self._arrived)
         return self._arrived
 
 
 @compiled()
-def _deliver(
-    live: Mask,
-    seen: Detected,
-    headings: Floats,
-    late: Integers,
-    keyframe_s: float,
-    sent: _Sent,
-    arrived: Detected,
-) -> None:
-    """See `BatchDelay.newest`."""
-    places = sent.due.shape[1]
+def _send(live: Mask, seen: Detected, headings: Floats, late: Integers, sent: _Sent) -> None:
+    """See `Delay.take`."""
     for w in range(len(live)):
         if not live[w]:
             continue
         keyframe = sent.taken[w]
-        place = keyframe % places
+        place = keyframe % sent.due.shape[1]
         sent.taken[w] += 1
         sent.due[w, place] = keyframe + late[w]
         sent.headings[w, place] = headings[w]
@@ -182,18 +229,36 @@ def _deliver(
             sent.rows[w, place, n] = seen.rows[w, n]
             sent.objects[w, place, n] = seen.objects[w, n]
 
+
+@compiled()
+def _deliver(
+    live: Mask,
+    headings: Floats,
+    keyframe_s: float,
+    after_s: float,
+    sent: _Sent,
+    arrived: Detected,
+) -> None:
+    """See `Delay.newest`."""
+    places = sent.due.shape[1]
+    for w in range(len(live)):
+        if not live[w]:
+            continue
+        keyframe = sent.begun[w]
+        sent.begun[w] += 1
+        arrived.counts[w] = 0
         # The newest first. Jitter lets a picture overtake the ones before it, which are then never
         # handed out: what has been due once is so later.
-        arrived.counts[w] = 0
         for age in range(min(keyframe + 1, places)):
-            place = (keyframe - age) % places
-            if sent.due[w, place] <= keyframe:
+            number = keyframe - age
+            place = number % places
+            if number < sent.taken[w] and sent.due[w, place] <= keyframe:
                 arrived.counts[w] = sent.counts[w, place]
                 for n in range(sent.counts[w, place]):
                     arrived.rows[w, n] = sent.rows[w, place, n]
                     arrived.objects[w, n] = sent.objects[w, place, n]
-                    arrived.rows[w, n, _AGE] = age * keyframe_s
-                    arrived.rows[w, n, _YAW_CHANGE] = headings[w] - sent.headings[w, place]
+                    arrived.rows[w, n, _AGE] += age * keyframe_s - after_s
+                    arrived.rows[w, n, _YAW_CHANGE] += headings[w] - sent.headings[w, place]
                 break
 
 
