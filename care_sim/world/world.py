@@ -15,8 +15,8 @@ from care_sim.core.types import CLASSES, Ego
 from care_sim.world.approach import ClosestApproach
 from care_sim.world.bodies import CATALOGUE, BodyKind
 from care_sim.world.body_tables import Footprints
-from care_sim.world.bullet import BulletWorld
-from care_sim.world.contact import Passage
+from care_sim.world.bullet import NO_BODY, BulletWorld
+from care_sim.world.clearances import Clearances, Impacts
 from care_sim.world.copying import check_copyable
 from care_sim.world.motions import LinearMotion, Meeting, rates_between
 from care_sim.world.route import Route, RouteCar, SpeedPlan
@@ -221,9 +221,10 @@ class World:
         x, y = self._footprints.boxes[body, :2].tolist()
         return x, y
 
-    def kind_of(self, body: int) -> BodyKind:
-        """The kind of a body."""
-        return self._kinds[body]
+    @property
+    def kinds(self) -> Mapping[int, BodyKind]:
+        """The kind of every body by id."""
+        return self._kinds
 
     def velocities_of(self, bodies: Integers) -> Floats:
         """(n, 2) velocities of bodies (n,) in the world frame, m/s, over the last world step."""
@@ -245,14 +246,23 @@ class World:
         `acceleration` (m/s^2) meanwhile. Clearance and distance are those of the first-sighting
         actor at its beginning.
         """
-        target = None if self.first_sighting is None else self.first_sighting.body
-        passage = Passage(
-            self._footprints, self.bullet, self._kinds, self.ego_body, target, self.velocities_of
-        )
-        for _ in range(whole_steps(duration)):
+        steps, target = whole_steps(duration), self.first_sighting
+        clearances, impacts = Clearances(1, steps), Impacts(1, WORLD_STEP_S)
+        clearances.begin(0, None if target is None else (self.ego_kind, target.kind))
+        impacts.begin(0, self.kinds)
+        here, nearest_m, impact = np.ones(1, np.bool_), np.full(1, np.inf), None
+        egos = np.array([self.ego_body])
+        targets = np.array([NO_BODY if target is None else target.body])
+        for step in range(1, steps + 1):
             self.step(acceleration)
-            passage.look(self.ego.speed)
-        return passage.closest()
+            boxes, before = self._footprints.boxes[None], self._before[None]
+            poses, counts = self.bullet.primitives.poses[None], np.array([boxes.shape[1]])
+            clearances.note(here, np.array([step]), boxes, poses, (egos, targets), nearest_m)
+            if impact is None:
+                bodies = counts, boxes, before, poses
+                touched = impacts.now(here, *bodies, egos, np.array([self.ego.speed], float))
+                impact = next((one for _, one in touched), None)
+        return ClosestApproach(float(nearest_m[0]), clearances.least(0, 1, steps + 1), impact)
 
     def step(self, acceleration: float) -> None:
         """Move everything by a world step, as `advance` does, and look at nothing. Raises

@@ -13,10 +13,10 @@ from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers, Mask, filled
 from care_sim.core.types import Ego
 from care_sim.loops.episode import most_keyframes
-from care_sim.loops.stages.clearances import Clearances, Impacts
-from care_sim.loops.stages.lane_columns import SPEED, LaneColumns
 from care_sim.loops.stages.state import Passages, State, load_bodies
 from care_sim.world.bullet import NO_BODY
+from care_sim.world.clearances import Clearances, Impacts
+from care_sim.world.lane_columns import SPEED, LaneColumns
 from care_sim.world.motions import LaneChange, Walk
 from care_sim.world.route import RouteCar
 from care_sim.world.traffic import LaneKeeper, RoadVehicle
@@ -48,7 +48,7 @@ class Motion:
 
     def __init__(self, worlds: int, steps: int):
         self._clearances = Clearances(worlds, steps)
-        self._impacts = Impacts(worlds)
+        self._impacts = Impacts(worlds, WORLD_STEP_S)
         # The world steps that each has done, and their times, counted and rounded as its own.
         self._steps = np.zeros(worlds, np.int64)
         self._times = np.array([round(n * WORLD_STEP_S, 9) for n in range(steps + 1)])
@@ -69,8 +69,10 @@ class Motion:
         """
         self._steps[world] = self._current[world] = 0
         self._built[world] = built
-        self._clearances.begin(world, built)
-        self._impacts.begin(world, built)
+        target = built.first_sighting
+        pair = None if target is None else (built.ego_kind, target.kind)
+        self._clearances.begin(world, pair)
+        self._impacts.begin(world, built.kinds)
         self._by_itself.pop(world, None)
         self._goes_along[world] = True
         drivers = [actor for actor in built.actors if _is_vehicle(_source(actor))]
@@ -113,12 +115,18 @@ class Motion:
             np.zeros(worlds),
             {},
         )
-        targeted = state.live & (state.egos.targets != NO_BODY)
+        egos = state.egos
+        targeted = state.live & (egos.targets != NO_BODY)
         count = whole_steps(duration_s)
         for step in range(1, count + 1):
             self._step(state, accelerations)
-            self._clearances.note(state, self._steps, passages.nearest_m)
-            for world, impact in self._impacts.now(state, state.live & ~passages.hit):
+            counts, boxes, before, poses = state.bodies
+            whose = egos.bodies, egos.targets
+            self._clearances.note(state.live, self._steps, boxes, poses, whose, passages.nearest_m)
+            looked = state.live & ~passages.hit
+            for world, impact in self._impacts.now(
+                looked, counts, boxes, before, poses, egos.bodies, egos.speeds
+            ):
                 passages.hit[world] = True
                 passages.impact_speed_mps[world] = impact.speed_mps
                 passages.impacts[world] = impact

@@ -1,4 +1,4 @@
-"""From the ego to the first-sighting actor, hull to hull, in many worlds.
+"""From the ego to the first-sighting actor, hull to hull, in one world or many.
 
 PyBullet's exact distance costs more than all else that is scored. So the moments are kept, with a
 bound that is no greater, and it is asked about those alone that matter.
@@ -7,13 +7,12 @@ And which bodies the egos touch.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers, Mask
-from care_sim.loops.stages.state import State
 from care_sim.world.approach import Impact
 from care_sim.world.bodies import BodyKind
 from care_sim.world.body_tables import bodies_near
@@ -26,7 +25,6 @@ from care_sim.world.contact import (
     judge_here,
     least_gap,
 )
-from care_sim.world.world import WORLD_STEP_S, World
 
 
 class Clearances:
@@ -42,10 +40,11 @@ class Clearances:
         self._bounds = np.full((worlds, steps + 1), np.inf)
         self._known = np.full((worlds, steps + 1), np.nan)
 
-    def begin(self, world: int, built: World) -> None:
-        """Forget the episode that was, and take in the two bodies of a new one."""
-        target = built.first_sighting
-        self._kinds[world] = None if target is None else (built.ego_kind, target.kind)
+    def begin(self, world: int, kinds: tuple[BodyKind, BodyKind] | None) -> None:
+        """Forget the episode that was, and take in the kinds of the ego and of the actor whom a new
+        one is about, None without one.
+        """
+        self._kinds[world] = kinds
         self._pairs[world] = None
         self._bounds[world] = np.inf
         self._known[world] = np.nan
@@ -53,14 +52,22 @@ class Clearances:
     def __getstate__(self) -> dict[str, object]:
         return vars(self) | {"_pairs": [None] * len(self._pairs)}
 
-    def note(self, state: State, steps: Integers, nearest_m: Floats) -> None:
-        """Note where the bodies are at the `steps` (W,) to which the worlds have come. What is
-        `nearest_m` (W,) from centre to centre falls to what it is now.
+    def note(
+        self,
+        live: Mask,
+        steps: Integers,
+        boxes: Floats,
+        poses: Floats,
+        whose: tuple[Integers, Integers],
+        nearest_m: Floats,
+    ) -> None:
+        """Note where bodies are, by their `boxes` and `poses` (W, B, 7), at the `steps` (W,) to
+        which the worlds have come that are `live`. It is about the egos and the actors `whose` ids
+        (W,) are given, NO_BODY for none. What is `nearest_m` (W,) from centre to centre falls to
+        what it is now.
         """
-        bodies, egos = state.bodies, state.egos
         tables = self._poses, self._bounds, nearest_m
-        whose = egos.bodies, egos.targets
-        _note(state.live, steps, bodies.boxes, bodies.poses, *whose, *tables)
+        _note(live, steps, boxes, poses, *whose, *tables)
 
     def least_since(self, steps: Integers, count: int, live: Mask, exact_below: float) -> Floats:
         """(W,) the least clearance of the last `count` of all `steps` (W,) so far, metres. What is
@@ -134,32 +141,41 @@ def _note(
 
 
 class Impacts:
-    """The egos' contacts in `worlds` worlds. The exact distance is PyBullet's, and it is asked
-    about few bodies: those that are near.
+    """The egos' contacts in `worlds` worlds, whose steps last `step_s` seconds. The exact distance
+    is PyBullet's, and it is asked about few bodies: those that are near.
     """
 
-    def __init__(self, worlds: int):
-        self._built: list[World | None] = [None] * worlds
+    def __init__(self, worlds: int, step_s: float):
+        self._step_s = step_s
+        self._kinds: list[Mapping[int, BodyKind]] = [{}] * worlds
 
-    def begin(self, world: int, built: World) -> None:
-        """Take in the bodies of a world."""
-        self._built[world] = built
+    def begin(self, world: int, kinds: Mapping[int, BodyKind]) -> None:
+        """Take in the kinds of the bodies of a world, the ego's among them, by id."""
+        self._kinds[world] = kinds
 
-    def now(self, state: State, looked: Mask) -> Iterator[tuple[int, Impact]]:
-        """The worlds among those `looked` at (W,) whose ego touches a body, and the impact."""
-        bodies, egos = state.bodies, state.egos
-        counts, near = _near(looked, bodies.counts, bodies.boxes, egos.bodies, CONTACT_REACH_M)
-        for world in np.flatnonzero(counts).tolist():
-            built, ego = self._built[world], int(egos.bodies[world])
-            assert built is not None
-            for body in near[world, : counts[world]].tolist():
-                kind = built.kind_of(body)
-                if judge_here().touch((built.ego_kind, kind), bodies.poses[world, [ego, body]]):
-                    # The velocity is that of `World.velocities_of`.
-                    boxes, before = bodies.boxes[world], bodies.before[world]
-                    velocity = (boxes[body, :2] - before[body, :2]) / WORLD_STEP_S
-                    speed_mps = float(egos.speeds[world])
-                    yield world, Impact.on(body, kind.name, boxes, ego, speed_mps, velocity)
+    def now(
+        self,
+        looked: Mask,
+        counts: Integers,
+        boxes: Floats,
+        before: Floats,
+        poses: Floats,
+        egos: Integers,
+        speeds: Floats,
+    ) -> Iterator[tuple[int, Impact]]:
+        """The worlds among those `looked` at (W,) whose ego touches a body, and the impact. Bodies,
+        `counts` (W,) of them, are where `boxes` and `poses` (W, B, 7) are, and were `before` a step
+        ago; the `egos` (W,) have `speeds` (W,).
+        """
+        found, near = _near(looked, counts, boxes, egos, CONTACT_REACH_M)
+        for world in np.flatnonzero(found).tolist():
+            ego, kinds = int(egos[world]), self._kinds[world]
+            for body in near[world, : found[world]].tolist():
+                kind = kinds[body]
+                if judge_here().touch((kinds[ego], kind), poses[world, [ego, body]]):
+                    moved = boxes[world, body, :2] - before[world, body, :2]
+                    own = boxes[world], ego, float(speeds[world])
+                    yield world, Impact.on(body, kind.name, *own, moved / self._step_s)
                     break
 
 
