@@ -80,9 +80,9 @@ class ClosedLoopEnv(SensingEnv[OneWorld]):
     of numbers that no sensor can tell.
 
     ### Reward
-    A weighted sum of `care_sim.envs.reward.terms`: undetected time in view, clearance, collision,
-    needless braking, and, with `reward_weights={"gain": ...}`, the first-detection distance against
-    the full-scan bound. Every term is at most 0, and so is the best return. The reward knows what
+    A weighted sum of the terms of `care_sim.envs.reward.Rewards`: undetected time in view,
+    clearance, collision, needless braking, and, with `reward_weights={"gain": ...}`, the
+    first-detection distance against the full-scan bound. Every term is at most 0, and so is the best return. The reward knows what
     no observation shows. A learner may learn from it; no policy may read it while it plays.
 
     ### Episode end
@@ -105,7 +105,7 @@ class ClosedLoopEnv(SensingEnv[OneWorld]):
     | `in_view` | whether a faultless camera shows that actor | scoring alone |
     | `clearance_m` | least distance to it, hull to hull, until the next keyframe | scoring alone |
     | `speed_mps` | the car's true speed; the observation's is what odometry reads | scoring alone |
-    | `reward_terms` | `care_sim.envs.reward.terms` | scoring alone |
+    | `reward_terms` | `care_sim.envs.reward.Rewards` | scoring alone |
     | `seed` | from `reset`: it repeats the episode, and so tells all of it | scoring alone |
     | `drawn` | from `reset`: scenario parameters that the seed drew, if any | scoring alone |
     | `outcome` | at the end: a dict of `care_sim.loops.records.Outcome` | scoring alone |

@@ -1,7 +1,6 @@
 """One world of the closed loop, with all that is true about it."""
 
 from collections.abc import Iterable
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -18,13 +17,15 @@ from care_sim.loops.episode import Episode, SensorSeeds
 from care_sim.loops.loop import Loop
 from care_sim.loops.records import Keyframe, Records
 from care_sim.loops.stages.scanning import lidar_of
-from care_sim.loops.stages.sight import Pictures
+from care_sim.loops.stages.sight import photographed
 from care_sim.loops.stages.state import Fired
 from care_sim.loops.truth import Told, TrackObjects
 from care_sim.perception.points_only import Detector
 from care_sim.sensors.annotated import IdentifiedDetections
+from care_sim.sensors.engines import make_engine
 from care_sim.sensors.false_boxes import EMPTY_POOL, BoxPool
 from care_sim.sensors.lidar import Lidar
+from care_sim.sensors.pictures import class_table, faultless_detections
 from care_sim.world.world import World
 
 _HERE = np.ones(1, np.bool_)
@@ -180,9 +181,11 @@ class OneWorld:
         """What a detector without faults would report of `cameras`, those of the rig unless given.
         Truth: for scoring and people.
         """
-        bodies = np.array([*self.world.labels()], np.int64)
-        boxes = self._local_boxes(bodies)
-        return self._pictures.faultless(cameras or self.rig.cameras, self.sensor, boxes)
+        world, taken = self.world, cameras or self.rig.cameras
+        labels, engine = world.labels(), self._loop.conditions.engine
+        boxes = self._local_boxes(np.array([*labels], np.int64))
+        drawn = make_engine(engine, world.bullet, self.rig.grid), taken, self.sensor, boxes
+        return faultless_detections(photographed(*drawn), class_table(labels))
 
     @property
     def mounted(self) -> tuple[PinholeCamera, ...]:
@@ -190,19 +193,11 @@ class OneWorld:
         own = self._loop.sight.own_cameras.get(0)
         return self.rig.cameras if own is None else own.detector.mounted
 
-    @cached_property
-    def _pictures(self) -> Pictures:
-        return Pictures(self.world, self.rig, self._loop.conditions)
-
     @property
     def _lidar(self) -> Lidar:
-        """The LiDAR, whose peeks draw nothing."""
-        # The world goes to where it is.
-        world = self.world
-        return self._loop.scanning.lidar(0) or self._own_lidar(world)
-
-    def _own_lidar(self, world: World) -> Lidar:
-        return lidar_of(world, self.rig, self._loop.conditions, _NO_FAULT)
+        """The LiDAR, in the world as it is now. Peeks draw no fault."""
+        given = self.world, self.rig, self._loop.conditions, _NO_FAULT
+        return self._loop.scanning.lidar(0) or lidar_of(*given)
 
     def _local_boxes(self, bodies: Integers) -> Floats:
         return self.sensor.boxes_to_local(self._loop.state.bodies.boxes[0, bodies])

@@ -22,7 +22,7 @@ from care_sim.loops.stages.state import Bodies, Outlines, Reported, Sensors, Sta
 from care_sim.sensors.annotated import IdentifiedDetections
 from care_sim.sensors.camera import CameraDetector, picture_timing
 from care_sim.sensors.camera_faults import Delay, Detected, Misses
-from care_sim.sensors.engines import make_engine
+from care_sim.sensors.engines import Engine, make_engine
 from care_sim.sensors.engines.picture_kernels import Line, draw_silhouettes, empty_line
 from care_sim.sensors.engines.silhouette_kernels import (
     Silhouettes,
@@ -118,8 +118,8 @@ class Sight:
         False boxes are made from the `pool`.
         """
         if self.own[world]:
-            own = OwnCameras(built, self._rig, self._conditions[world], seed, pool)
-            self.own_cameras[world] = own
+            given = self._rig, self._conditions[world], seed, pool
+            self.own_cameras[world] = OwnCameras(built, *given)
             return
         self._misses.begin(world, seed, len(built.labels()))
         if self._is_late:
@@ -159,14 +159,15 @@ class Sight:
         else:
             arrived = seen
         for world in np.flatnonzero(state.live & self.own).tolist():
-            pictured = seen.take(world), shown[world]
-            moment = _moment(state, world, boxes)
-            arrived = arrived.put(world, self.own_cameras[world].look(moment, *pictured))
+            at = state, world, boxes[world, : state.reported.counts[world]].copy()
+            own = self.own_cameras[world].look(at, seen.take(world), shown[world])
+            arrived = arrived.put(world, own)
         return arrived, shown
 
     def look_between(self, state: State, world: int) -> None:
         """Take the pictures of a world after some of its steps."""
-        self.own_cameras[world].take(_moment(state, world, self._boxes(state)), None)
+        boxes = self._boxes(state)[world, : state.reported.counts[world]].copy()
+        self.own_cameras[world].take((state, world, boxes))
 
     def _boxes(self, state: State) -> Floats:
         """(W, R, 7) of the reported bodies in the frames of the sensors."""
@@ -187,26 +188,6 @@ class Sight:
         return silent
 
 
-class Moment(NamedTuple):
-    """When and where the pictures of a world are taken: the LiDAR, the heading that the car takes
-    itself to have, the `boxes` (n, 7) of the reported bodies in the frame of the sensor.
-    """
-
-    sensor: Frame
-    heading: float
-    boxes: Floats
-    time_s: float
-
-
-def _moment(state: State, world: int, boxes: Floats) -> Moment:
-    return Moment(
-        state.sensors.frame(world),
-        float(state.taken.poses[world, 3]),
-        boxes[world, : state.reported.counts[world]].copy(),
-        float(state.times[world]),
-    )
-
-
 class OwnCameras:
     """The cameras of one world with a `CameraDetector`, whose mounts may err."""
 
@@ -220,55 +201,50 @@ class OwnCameras:
     ):
         labels = world.labels()
         self._designed = rig.cameras
-        self._pictures = Pictures(world, rig, sensing)
+        self._classes = class_table(labels)
+        self._is_fast = sensing.engine == "fast"
+        self._engine = make_engine(sensing.engine, world.bullet, rig.grid)
         self.detector = CameraDetector(
             list(labels), sensing, rig.keyframe_s, seed, rig.cameras, pool, step_s=WORLD_STEP_S
         )
         self.after_steps = round(self.detector.timing.after_s / WORLD_STEP_S)
         """World steps from a keyframe to the pictures that the detector is given."""
-        self._is_fast = sensing.engine == "fast"
 
-    def look(self, moment: Moment, seen: IdentifiedDetections, shown: Mask) -> IdentifiedDetections:
-        """Take the pictures of a keyframe: the newest detections that are due. `seen` are those of
-        the engine `fast`; of another `shown` (B,) is written anew.
-        """
-        if not self._is_fast:
-            shown[:] = False
-            tables = self._pictures.of(self._designed, moment.sensor, moment.boxes)
-            for table in tables:
-                shown[table[table[:, 5] >= MIN_PIXELS, 0]] = True
-            seen = faultless_detections(tables, self._pictures.classes)
-        if not self.after_steps:
-            self.take(moment, seen if self.detector.mounted == self._designed else None)
-        return self.detector.newest(moment.heading)
-
-    def take(self, moment: Moment, seen: IdentifiedDetections | None) -> None:
-        """Hand the detector its pictures; `seen` is what they show, where that is known."""
-        sensor, heading, boxes, time_s = moment
-        if seen is None:
-            seen = self._pictures.faultless(self.detector.mounted, sensor, boxes)
-        self.detector.take(seen, heading, boxes, time_s)
-
-
-class Pictures:
-    """Pictures of one world, which its engine draws."""
-
-    def __init__(self, world: World, rig: Rig, sensing: Sensing):
-        self._engine = make_engine(sensing.engine, world.bullet, rig.grid)
-        self.classes = class_table(world.labels())
-
-    def faultless(
-        self, cameras: Sequence[PinholeCamera], sensor: Frame, boxes: Floats
+    def look(
+        self, at: tuple[State, int, Floats], seen: IdentifiedDetections, shown: Mask
     ) -> IdentifiedDetections:
-        """What a detector without faults would report of cameras; see `of`."""
-        return faultless_detections(self.of(cameras, sensor, boxes), self.classes)
-
-    def of(self, cameras: Sequence[PinholeCamera], sensor: Frame, boxes: Floats) -> list[Integers]:
-        """The table of boxes (`care_sim.sensors.pictures`) of each camera, of pictures around
-        `boxes` (n, 7) of all that a detector may ever report, in the sensor frame.
+        """Take the pictures of a keyframe: the newest detections that are due. `seen` and `shown`
+        (B,) are of the engine `fast`; of another `shown` is written anew.
         """
-        windows = [(camera, camera.window_on(boxes)) for camera in cameras]
-        return [self._engine.visible_boxes(camera, sensor, at) for camera, at in windows]
+        state, world, boxes = at
+        if not self._is_fast:
+            sensor = state.sensors.frame(world)
+            tables = photographed(self._engine, self._designed, sensor, boxes)
+            shown[:] = False
+            shown[[row[0] for table in tables for row in table if row[5] >= MIN_PIXELS]] = True
+            seen = faultless_detections(tables, self._classes)
+        if not self.after_steps:
+            self.take(at, seen if self.detector.mounted == self._designed else None)
+        return self.detector.newest(float(state.taken.poses[world, 3]))
+
+    def take(self, at: tuple[State, int, Floats], seen: IdentifiedDetections | None = None) -> None:
+        """Hand the detector its pictures; `seen` is what they show, where that is known."""
+        state, world, boxes = at
+        if seen is None:
+            sensor = state.sensors.frame(world)
+            tables = photographed(self._engine, self.detector.mounted, sensor, boxes)
+            seen = faultless_detections(tables, self._classes)
+        heading, time_s = state.taken.poses[world, 3], state.times[world]
+        self.detector.take(seen, float(heading), boxes, float(time_s))
+
+
+def photographed(
+    engine: Engine, cameras: Sequence[PinholeCamera], sensor: Frame, boxes: Floats
+) -> list[Integers]:
+    """The table of boxes (`care_sim.sensors.pictures`) of each camera, which an engine draws around
+    the `boxes` (n, 7) of all that a detector may ever report, in the frame of the sensor.
+    """
+    return [engine.visible_boxes(one, sensor, one.window_on(boxes)) for one in cameras]
 
 
 @compiled(brief=True)
