@@ -82,8 +82,9 @@ class ClosedLoopEnv(SensingEnv[OneWorld]):
     ### Reward
     A weighted sum of the terms of `care_sim.envs.reward.Rewards`: undetected time in view,
     clearance, collision, needless braking, and, with `reward_weights={"gain": ...}`, the
-    first-detection distance against the full-scan bound. Every term is at most 0, and so is the best return. The reward knows what
-    no observation shows. A learner may learn from it; no policy may read it while it plays.
+    first-detection distance against the full-scan bound. Every term is at most 0, and so is the
+    best return. The reward knows what no observation shows. A learner may learn from it; no policy
+    may read it while it plays.
 
     ### Episode end
     Terminated at a collision, and where the scenario knows that nothing can happen any more;
