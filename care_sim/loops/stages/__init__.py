@@ -1,1 +1,1 @@
-"""Closed-loop worlds in batches: the keyframe of `care_sim.loops.closed_loop` over arrays."""
+"""The stages of a keyframe of `care_sim.loops.loop`: arrays with a row for each world."""
