@@ -119,7 +119,7 @@ class Loop:
         judged = {world for world in self._judging.worlds if who[world]}
         ahead = self.driving.ahead(state, tracks, judged)
         accelerations, braking = self.driving.command(state, tracks, ahead)
-        detected = self._detecting.detected(state, found) & self._has_target
+        detected = self._detecting.detected & self._has_target
         built = {world: self.world(world) for world in judged}
         needless, unfounded = self._judging.judge(built, ahead, found, braking, in_view)
         self.sights = self._judging.sights(state, self.shows, self._detecting, found)
@@ -141,8 +141,8 @@ class Loop:
             braking.copy(),
             speed,
             distance,
-            passages.nearest_m,
-            passages.clearance_m,
+            passages.nearest_m.copy(),
+            passages.clearance_m.copy(),
             np.where(passages.hit, passages.impact_speed_mps, np.nan),
             needless,
             unfounded,

@@ -212,8 +212,8 @@ class World:
         """(n, 7) boxes of actors in the world frame."""
         return self.boxes_of(np.array([actor.body for actor in actors], np.int64))
 
-    def boxes_of(self, bodies: Integers) -> Floats:
-        """(n, 7) boxes of bodies (n,) in the world frame."""
+    def boxes_of(self, bodies: Integers | slice) -> Floats:
+        """(n, 7) boxes of bodies (n,), or of a slice of all, in the world frame."""
         return self._footprints.boxes[bodies]
 
     def centre_of(self, body: int) -> tuple[float, float]:

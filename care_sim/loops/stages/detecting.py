@@ -49,6 +49,8 @@ class Detecting:
 
     bodies: list[Integers]
     """(W,) the bodies that a detector other than the proxy found, by the scoring's match."""
+    detected: Mask
+    """(W,) where the first-sighting actor is detected at the last keyframe."""
 
     def __init__(self, rig: Rig, detectors: Sequence[Detector | None], min_returns: int):
         worlds = len(detectors)
@@ -59,6 +61,7 @@ class Detecting:
         self.is_proxy = all(one is None for one in detectors)
         """Whether all detect by the number of returns."""
         self.bodies = [np.empty(0, np.int64)] * worlds
+        self.detected = np.zeros(worlds, np.bool_)
         empty = np.empty((worlds, 0), np.int64)
         none = np.zeros(worlds, np.int64)
         self._found = Found(none, empty, np.empty((worlds, 0, 7)), empty, empty)
@@ -81,7 +84,8 @@ class Detecting:
                 found = Found(found.counts, room[0], np.empty((*shape, 7)), *room[1:])
                 self._found = found
             hits = state.live, returns.counts, returns.ids
-            _detect(*hits, state.reported, state.bodies, state.sensors, self._least, found)
+            told = state.egos.targets, self.detected
+            _detect(*hits, state.reported, state.bodies, state.sensors, self._least, found, *told)
             return found
         for world in np.flatnonzero(state.live).tolist():
             one = self._ones[world]
@@ -93,6 +97,7 @@ class Detecting:
             classes, boxes, behind, self.bodies[world] = one.detect(
                 state, world, scan, returns.ids[world, :count]
             )
+            self.detected[world] = state.egos.targets[world] in self.bodies[world]
             found.counts[world] = len(classes)
             found = self._found = Found(
                 found.counts,
@@ -102,15 +107,6 @@ class Detecting:
                 filled(found.tracks, world, behind),
             )
         return found
-
-    def detected(self, state: State, found: Found) -> Mask:
-        """(W,) where the first-sighting actor is detected."""
-        if self.is_proxy:
-            in_use = np.arange(found.objects.shape[1]) < found.counts[:, None]
-            hit: Mask = ((found.objects == state.egos.targets[:, None]) & in_use).any(axis=1)
-            return hit
-        targets = state.egos.targets.tolist()
-        return np.array([b in own for b, own in zip(targets, self.bodies, strict=True)], np.bool_)
 
     def bodies_found(self, found: Found, world: int) -> Integers:
         """(n,) all bodies that are detected in a world."""
@@ -184,18 +180,21 @@ def _detect(
     sensors: Sensors,
     least: int,
     found: Found,
+    targets: Integers,
+    detected: Mask,
 ) -> None:
     """Fill `found` with the reported bodies that at least so many of the returns `ids` (W, F) hit,
-    `counts` (W,) of them.
+    `counts` (W,) of them, and `detected` (W,) with whether these hold the one of the `targets`.
     """
     for w in range(len(live)):
         if not live[w]:
             continue
         known = reported.bodies[w, : reported.counts[w]]
         hits = count_hits(known, ids[w, : counts[w]])
-        count = 0
+        count, detected[w] = 0, False
         for row in range(len(known)):
             if hits[row] >= least:
+                detected[w] |= known[row] == targets[w]
                 found.classes[w, count] = reported.classes[w, row]
                 found.objects[w, count] = known[row]
                 for k in range(7):

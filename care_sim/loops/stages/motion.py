@@ -44,7 +44,9 @@ def steps_of(duration_s: float, keyframe_s: float) -> int:
 
 
 class Motion:
-    """The motion of `worlds` worlds, whose episodes last `steps` world steps at most."""
+    """The motion of `worlds` worlds, whose episodes last `steps` world steps at most. What
+    `advance` returns it fills anew at the next call.
+    """
 
     def __init__(self, worlds: int, steps: int):
         self._clearances = Clearances(worlds, steps)
@@ -61,6 +63,8 @@ class Motion:
         self._by_itself: dict[int, World] = {}
         self._built: list[World | None] = [None] * worlds
         self._current = np.zeros(worlds, np.int64)
+        metres = np.zeros(worlds), np.zeros(worlds)
+        self._passages = Passages(*metres, np.zeros(worlds, np.bool_), np.zeros(worlds), {})
         self._goes_along = np.ones(worlds, np.bool_)
 
     def begin(self, world: int, built: World) -> None:
@@ -107,14 +111,10 @@ class Motion:
         no greater than the clearance; `settle` tells the least of an episode then. `after_step` is
         called with the number of steps after each but the last.
         """
-        worlds = state.worlds
-        passages = Passages(
-            np.full(worlds, np.inf),
-            np.full(worlds, np.inf),
-            np.zeros(worlds, np.bool_),
-            np.zeros(worlds),
-            {},
-        )
+        passages = self._passages
+        passages.nearest_m.fill(np.inf)
+        passages.hit.fill(False)
+        passages.impacts.clear()
         egos = state.egos
         targeted = state.live & (egos.targets != NO_BODY)
         count = whole_steps(duration_s)
@@ -195,11 +195,11 @@ class Motion:
     def _step(self, state: State, accelerations: Floats) -> None:
         """Move all by a world step."""
         together = state.live & self._goes_along
-        speeds = self._lanes.rows[:, 0, SPEED].copy()
-        self._lanes.step(together, accelerations, WORLD_STEP_S)
         bodies, egos = state.bodies, state.egos
         _go_on(state.live, self._steps, self._times, state.times, *bodies[:3])
         if together.any():
+            speeds = self._lanes.rows[:, 0, SPEED].copy()
+            self._lanes.step(together, accelerations, WORLD_STEP_S)
             lanes = self._lanes.counts, self._lanes.rows, self._drivers, speeds
             timed = self._timed_counts, self._timed, self._ways
             moved = bodies.boxes, bodies.poses, *egos[:3]
@@ -230,7 +230,7 @@ def _copy(built: World, world: int, state: State) -> None:
     # An event may have added bodies.
     if count != state.bodies.counts[world]:
         load_bodies(state, world, built)
-    state.bodies.boxes[world, :count] = built.boxes_of(np.arange(count))
+    state.bodies.boxes[world, :count] = built.boxes_of(slice(None))
     state.bodies.poses[world, :count] = poses
     motion = built.ego_motion
     state.egos.speeds[world] = motion.speed

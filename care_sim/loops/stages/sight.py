@@ -91,6 +91,7 @@ class Sight:
         self._conditions = conditions
         self.own = np.array([has_own_detector(each) for each in conditions])
         """(W,) where detections come from a `CameraDetector` of the world."""
+        self._has_own = bool(self.own.any())
         self.own_cameras: dict[int, OwnCameras] = {}
         """Their cameras, by world."""
         self._cameras = Cameras(
@@ -158,7 +159,7 @@ class Sight:
             arrived = self._delay.newest(whose, headings)
         else:
             arrived = seen
-        for world in np.flatnonzero(state.live & self.own).tolist():
+        for world in np.flatnonzero(state.live & self.own).tolist() if self._has_own else ():
             at = state, world, boxes[world, : state.reported.counts[world]].copy()
             own = self.own_cameras[world].look(at, seen.take(world), shown[world])
             arrived = arrived.put(world, own)
