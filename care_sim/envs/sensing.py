@@ -27,7 +27,7 @@ from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.rig import Rig
 from care_sim.core.types import Action
 from care_sim.loops.observation_limits import Limits
-from care_sim.loops.truth import Loop, Truth
+from care_sim.loops.truth import Truth, Watchable
 from care_sim.perception.detectors import CLUSTER, PROXY, check_detector, make_detector
 from care_sim.perception.points_only import Detector
 from care_sim.sensors.lidar import check_dead_rows
@@ -107,7 +107,7 @@ def detector_of(
 
 
 Observed = dict[str, NDArray[np.float32]]
-AnyLoop = TypeVar("AnyLoop", bound=Loop)
+AnyLoop = TypeVar("AnyLoop", bound=Watchable)
 AnyConditions = TypeVar("AnyConditions", bound=Conditions)
 
 

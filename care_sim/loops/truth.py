@@ -39,7 +39,7 @@ def told_by(
     }
 
 
-class Loop(Protocol):
+class Watchable(Protocol):
     """What environments and privileged policies ask of a loop, besides its keyframes."""
 
     @property
