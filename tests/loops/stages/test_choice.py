@@ -3,7 +3,7 @@
 from functools import partial
 
 import numpy as np
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from care_sim.core.conditions import ClosedLoopConditions
@@ -40,6 +40,16 @@ def rows(fired):
     return [row[:count].tolist() for count, row in zip(counts, cells, strict=True)]
 
 
+def at(*cells):
+    """The scores of an action that demands these cells alone."""
+    return [float(cell in cells) for cell in range(GRID.size)]
+
+
+# A window stays where it stood, in each world, if nothing is demanded.
+STANDING = [([at(0), at(3), at(6)], [True] * 3), ([at()] * 3, [True] * 3)]
+
+
+@example(STANDING, [10] * 3, False, 0, "azimuth-window")
 @given(keyframes, budgets, st.booleans(), st.integers(0, 2), HARDWARE)
 def test_every_world_fires_as_if_alone(played, budgets, floor, floor_seed, firing):
     rig = Rig(GRID, firing=firing)
