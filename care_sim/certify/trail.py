@@ -15,7 +15,7 @@ from care_sim.base.digests import portable_bytes
 from care_sim.certify.design import Drawn
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.evaluation.outcomes import outcome
-from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.loops.one_world import OneWorld
 
 CONFIGURATION = "configuration"
 OUTCOME = "outcome"
@@ -104,7 +104,7 @@ class Trail(gymnasium.Wrapper[Any, Any, Any, Any]):
         """Note the first three of `TRAIL_STAGES`, before the policy chooses."""
         loop = self.env.unwrapped.loop  # type: ignore[attr-defined]
         self._note(
-            *(_moving(loop) if isinstance(loop, ClosedLoop) else _filmed(loop)),
+            *(_moving(loop) if isinstance(loop, OneWorld) else _filmed(loop)),
             observation["ego"],
         )
         self._note(observation["detections"])
@@ -156,7 +156,7 @@ def _outcome(env: Any, info: Mapping[str, Any]) -> tuple[tuple[str, Any], ...]:
     return tuple((name, math.nan if value is None else value) for name, value in sums.items())
 
 
-def _moving(loop: ClosedLoop) -> tuple[Any, ...]:
+def _moving(loop: OneWorld) -> tuple[Any, ...]:
     world = loop.world
     poses = [world.ego.pose, *(actor.pose_at(world.time) for actor in world.actors)]
     return world.time, poses, astuple(world.ego_motion)

@@ -22,13 +22,11 @@ the strip instead.
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from care_sim.base.compiled import compiled
 from care_sim.base.times import LAST_BITS_S
 from care_sim.core.arrays import Floats
 from care_sim.core.conditions import DriverSettings
-from care_sim.core.types import Command, Ego, Tracks
+from care_sim.core.types import Tracks
 from care_sim.driving.corridor import Turns, enters, footprint, leaves_s
 
 _X, _Y = Tracks.CENTRE.start, Tracks.CENTRE.start + 1
@@ -129,40 +127,6 @@ def _weighed(
     return is_due, is_blocked
 
 
-class BrakingController:
-    """Brakes on tracks. `front_m` and `half_width_m` are the ego's extents seen from its sensor,
-    metres; it cruises at `cruise_mps`.
-    """
-
-    def __init__(
-        self,
-        cruise_mps: float,
-        front_m: float,
-        half_width_m: float,
-        keyframe_s: float,
-        rules: DriverSettings,
-    ):
-        self.guarded_m = guarded_m(half_width_m, rules)
-        self._cruise_mps = float(cruise_mps)
-        self._for_oncoming = rules.brake_for_oncoming
-        self._rules = braking_rules(front_m, half_width_m, keyframe_s, rules)
-        self._brake = BRAKE_OFF
-
-    def command(self, tracks: Tracks, ego: Ego) -> Command:
-        """Decide from the tracks of this keyframe, as they lie before a car that drives straight
-        ahead, and the ego's motion.
-        """
-        rows = tracks.rows()
-        headings = rows[:, Tracks.YAW]
-        # The sines and cosines are NumPy's, on every machine, and the square is Python's.
-        turns = np.cos(headings), np.sin(headings)
-        speed = float(ego.speed), float(ego.speed) ** 2
-        self._brake, acceleration, braking = decided(
-            self._brake, rows, turns, speed, self._cruise_mps, self._for_oncoming, self._rules
-        )
-        return Command(acceleration, braking)
-
-
 def guarded_m(half_width_m: float, rules: DriverSettings) -> float:
     """Width of the strip ahead that a car guards, metres."""
     return 2 * (half_width_m + rules.brake_side_margin_m)
@@ -171,8 +135,8 @@ def guarded_m(half_width_m: float, rules: DriverSettings) -> float:
 def braking_rules(
     front_m: float, half_width_m: float, keyframe_s: float, rules: DriverSettings
 ) -> Rules:
-    """The fields of `care_sim.driving.braking.BrakingRules`, as compiled code takes them at
-    once; what is given is as in `BrakingController`.
+    """The fields of `BrakingRules`, as compiled code takes them at once. `front_m` and
+    `half_width_m` are the car's extents seen from its sensor, metres.
     """
     return (
         float(front_m),

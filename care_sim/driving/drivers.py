@@ -1,8 +1,6 @@
 """The drivers by name, and how they drive along a route before anything calls for the brake."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 
@@ -10,9 +8,8 @@ from care_sim.base.errors import InvalidInput
 from care_sim.base.times import LAST_BITS_S
 from care_sim.core.arrays import Floats, Mask
 from care_sim.core.cells.boxes import half_extents
-from care_sim.core.conditions import BRAKING_RULES, CAREFUL_HUMAN, FIXED, DriverSettings
+from care_sim.core.conditions import BRAKING_RULES, FIXED, DriverSettings
 from care_sim.core.types import Command, Ego, Tracks
-from care_sim.driving.braking import BrakingController
 from care_sim.driving.corridor import enters_strip
 from care_sim.world.route import SpeedPlan
 
@@ -119,7 +116,6 @@ class CarefulHuman:
         keyframe_s: float,
         settings: DriverSettings,
     ):
-        self.guarded_m = 2 * half_width_m
         self._cruise_mps = cruise_mps
         self._front_m = front_m
         self._half_width_m = half_width_m
@@ -177,24 +173,6 @@ class CarefulHuman:
         return np.array(evaluated, dtype=float) >= least_s
 
 
-class Driver(Protocol):
-    """Drives the car along its lane."""
-
-    guarded_m: float
-    """Width of the strip ahead that it guards, metres."""
-
-    def command(self, tracks: Tracks, ego: Ego) -> Command:
-        """Decide from the tracks of this keyframe, as they lie before a car that drives straight
-        ahead, and the ego's motion.
-        """
-
-
-_KINDS: dict[str, Callable[..., Driver]] = {
-    FIXED: BrakingController,
-    CAREFUL_HUMAN: CarefulHuman,
-}
-
-
 def check_driver(settings: DriverSettings) -> None:
     """Raise InvalidInput for rules that the driver does not know."""
     usual = DriverSettings()
@@ -208,19 +186,6 @@ def check_driver(settings: DriverSettings) -> None:
 def brake_delay_s(settings: DriverSettings) -> float:
     """Seconds from the driver's decision until the brake acts."""
     return settings.brake_reaction_s if settings.driver == FIXED else HUMAN_MODEL.delay_s
-
-
-def make_driver(
-    settings: DriverSettings,
-    cruise_mps: float,
-    front_m: float,
-    half_width_m: float,
-    keyframe_s: float,
-) -> Driver:
-    """The driver of an episode. `front_m` and `half_width_m` are the ego's extents seen from its
-    sensor, metres; it cruises at `cruise_mps`.
-    """
-    return _KINDS[settings.driver](cruise_mps, front_m, half_width_m, keyframe_s, settings)
 
 
 @dataclass(frozen=True)

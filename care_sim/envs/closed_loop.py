@@ -1,7 +1,6 @@
-"""The closed-loop environments: thin Gymnasium adapters around `care_sim.loops.closed_loop`."""
+"""The closed-loop environments: thin Gymnasium adapters around `care_sim.loops.one_world`."""
 
 from collections.abc import Mapping
-from dataclasses import asdict
 from textwrap import indent
 from typing import Any
 
@@ -9,26 +8,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.checks import check_arguments, check_choice, check_number
-from care_sim.base.times import LAST_BITS_S
 from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.types import Action
 from care_sim.driving.drivers import check_driver
 from care_sim.envs import reward as rewards
 from care_sim.envs.conditions_page import CONDITIONS
 from care_sim.envs.sensing import Observed, SensingEnv, arguments_of, detector_of, split_conditions
-from care_sim.evaluation.outcomes import outcome
-from care_sim.loops.closed_loop import ClosedLoop
-from care_sim.loops.episode import Episode, EpisodeSeeds
-from care_sim.loops.false_box_pools import pool_of_another_drive
-from care_sim.loops.records import Keyframe, Outcome, Records
+from care_sim.envs.worlds import Setting, Worlds
+from care_sim.loops.one_world import OneWorld
+from care_sim.loops.records import Keyframe
+from care_sim.loops.stages.state import Fired
 from care_sim.perception.detectors import PROXY
 from care_sim.scenarios import make_scenario, scenario_class
 from care_sim.scenarios.base import Scenario
-from care_sim.sensors.camera_profiles import invents_boxes
 from care_sim.sensors.engines import check_engine
-from care_sim.sensors.false_boxes import EMPTY_POOL, BoxPool
 from care_sim.sensors.setups import DEFAULT_SETUP, Sensor, sensor_setup
-from care_sim.world.world import WORLD_STEP_S, World, whole_steps
+from care_sim.world.world import WORLD_STEP_S, whole_steps
 
 KEYFRAME_S = 0.1
 """Between two decisions, unless another time is given: a turn of a spinning LiDAR."""
@@ -36,7 +31,10 @@ LONGEST_KEYFRAME_S = 1.0
 """In a longer keyframe a car at 30 km/h drives more than 8 m, past what it brakes for."""
 
 
-class ClosedLoopEnv(SensingEnv[ClosedLoop]):
+_HERE = np.ones(1, np.bool_)
+
+
+class ClosedLoopEnv(SensingEnv[OneWorld]):
     """A scenario in which the agent chooses the LiDAR's cells and a driver brakes by fixed rules.
 
     ### Action
@@ -82,10 +80,11 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     of numbers that no sensor can tell.
 
     ### Reward
-    A weighted sum of `care_sim.envs.reward.terms`: undetected time in view, clearance, collision,
-    needless braking, and, with `reward_weights={"gain": ...}`, the first-detection distance against
-    the full-scan bound. Every term is at most 0, and so is the best return. The reward knows what
-    no observation shows. A learner may learn from it; no policy may read it while it plays.
+    A weighted sum of the terms of `care_sim.envs.reward.Rewards`: undetected time in view,
+    clearance, collision, needless braking, and, with `reward_weights={"gain": ...}`, the
+    first-detection distance against the full-scan bound. Every term is at most 0, and so is the
+    best return. The reward knows what no observation shows. A learner may learn from it; no policy
+    may read it while it plays.
 
     ### Episode end
     Terminated at a collision, and where the scenario knows that nothing can happen any more;
@@ -107,7 +106,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     | `in_view` | whether a faultless camera shows that actor | scoring alone |
     | `clearance_m` | least distance to it, hull to hull, until the next keyframe | scoring alone |
     | `speed_mps` | the car's true speed; the observation's is what odometry reads | scoring alone |
-    | `reward_terms` | `care_sim.envs.reward.terms` | scoring alone |
+    | `reward_terms` | `care_sim.envs.reward.Rewards` | scoring alone |
     | `seed` | from `reset`: it repeats the episode, and so tells all of it | scoring alone |
     | `drawn` | from `reset`: scenario parameters that the seed drew, if any | scoring alone |
     | `outcome` | at the end: a dict of `care_sim.loops.records.Outcome` | scoring alone |
@@ -192,12 +191,16 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         self.render_mode = render_mode
         self.keyframes: list[Keyframe] = []
         self.reward_weights = rewards.weights(reward_weights)
-        self._reward = rewards.EpisodeReward(self.reward_weights)
-
-    @property
-    def detects_by_returns(self) -> bool:
-        """Whether the detector is the paper's proxy."""
-        return self._detector is None
+        self.setting = Setting(
+            self.scenario,
+            self.rig,
+            conditions,
+            self._detector,
+            self.reward_weights,
+            self._secret,
+            scoring_info,
+        )
+        self._worlds: Worlds | None = None
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -209,41 +212,12 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         """
         entropy = self._entropy(seed, options)
         self.close()
-        pool = self._pool(entropy)
-        world, seeds, floor = self.episode(entropy)
-        self._reward = rewards.EpisodeReward(self.reward_weights)
+        if self._worlds is None:
+            self._worlds = Worlds([self.setting])
+        episode, info = self._worlds.start({0: entropy})[0]
         self.keyframes = []
-        loop = ClosedLoop(world, self.rig, self.conditions, seeds, pool, self._detector)
-        return self._begin(loop, floor), self.first_info(entropy, world)
-
-    def episode(self, entropy: int) -> Episode:
-        """What an episode begins with. The caller closes its world."""
-        seeds = EpisodeSeeds.of(entropy, self._secret)
-        world = self.scenario.make_world(np.random.default_rng(seeds.scenario))
-        return Episode(world, seeds.sensors, seeds.floor)
-
-    def first_info(self, entropy: int, world: World) -> dict[str, Any]:
-        """The info of `reset`."""
-        drawn = {"drawn": dict(world.drawn)} if world.drawn else {}
-        return {"seed": entropy, **drawn} if self.scoring_info else {}
-
-    def keyframe_info(
-        self, scan: dict[str, Any], record: Keyframe | Records, terms: Mapping[str, Any]
-    ) -> dict[str, Any]:
-        """The info of a keyframe, or columns of many worlds: with `scan`, what the fired cells
-        told, and the terms of the reward.
-        """
-        own = {**scan, "braking": record.braking, "time_s": record.time_s}
-        if not self.scoring_info:
-            return own
-        return {
-            **own,
-            "detected": record.detected,
-            "in_view": record.in_view,
-            "clearance_m": record.clearance_m,
-            "speed_mps": record.speed_mps,
-            "reward_terms": terms,
-        }
+        self._begin(OneWorld(self._worlds.loop), episode.floor)
+        return self._observed(self._worlds), info
 
     def step(self, action: Action) -> tuple[Observed, float, bool, bool, dict[str, Any]]:
         """Fire the cells that `action` scores highest and go on to the next keyframe.
@@ -251,21 +225,15 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         Raises InvalidInput for an action of the wrong shape or with values that are not finite, and
         gymnasium.error.ResetNeeded before `reset` and after the end.
         """
-        loop = self.loop
+        loop, worlds = self.loop, self._worlds
         fired = self._choose_cells(action)
-        # Asked before the keyframe, which moves the world on, and only while it is needed: it costs
-        # rays.
-        detectable = self._reward.needs_bound and loop.detectable()
-        record = loop.keyframe(fired)
-        self.keyframes.append(record)
-        terminated = record.impact_speed_mps is not None or loop.world.is_over()
-        truncated = loop.world.time >= self.scenario.duration_s - LAST_BITS_S
+        assert worlds is not None
+        stepped = worlds.play(Fired.of([fired]), _HERE)
+        self.keyframes.append(loop.record(fired, worlds.records))
+        info = self._scan_info(fired) | _first(stepped.columns) | stepped.single.get(0, {})
+        terminated, truncated = bool(stepped.terminated[0]), bool(stepped.truncated[0])
         self._over = terminated or truncated
-        reward, terms = self._reward.of(record, detectable, self._over)
-        info = self.keyframe_info(self._scan_info(fired), record, terms)
-        if self._over:
-            info["outcome"] = asdict(self._outcome())
-        return loop.belief.to_observation(), reward, terminated, truncated, info
+        return self._observed(worlds), float(stepped.rewards[0]), terminated, truncated, info
 
     def render(self) -> NDArray[np.uint8] | None:
         """A picture (H, W, 3) of the last keyframe: chase view, camera, fired cells."""
@@ -279,22 +247,18 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
 
     def close(self) -> None:
         """Free the simulator. The environment can be reset again."""
-        if self._running is not None:
-            self._running.world.close()
-            self._running = None
+        if self._worlds is not None:
+            self._worlds.close()
+        self._running = None
 
-    def _pool(self, entropy: int) -> BoxPool:
-        """The boxes that false ones are drawn from, if there are any: those of another drive
-        through this scenario.
-        """
-        if not invents_boxes(self.conditions):
-            return EMPTY_POOL
-        scenario, rig, conditions = self.scenario, self.rig, self.conditions
-        seeds = EpisodeSeeds.of(entropy, self._secret)
-        world = scenario.make_world(np.random.default_rng(seeds.another))
-        drive = world, scenario.duration_s, rig, conditions, seeds.sensors
-        return pool_of_another_drive(*drive, self._detector)
+    @staticmethod
+    def _observed(worlds: Worlds) -> Observed:
+        return {name: rows[0].copy() for name, rows in worlds.observed.items()}
 
-    def _outcome(self) -> Outcome:
-        """The result of the episode."""
-        return outcome(self.keyframes)
+
+def _first(columns: Mapping[str, Any]) -> dict[str, Any]:
+    """The numbers of the first world."""
+    return {
+        name: _first(column) if isinstance(column, Mapping) else column[0].item()
+        for name, column in columns.items()
+    }

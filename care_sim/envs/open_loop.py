@@ -150,7 +150,8 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         seeds = SensorSeeds(camera, lidar, odometry, luck)
         loop = OpenLoop(film, self.rig, self.conditions, seeds, self._detector)
         info = {"seed": seed, "scene": film.name} if self.scoring_info else {}
-        return self._begin(loop, floor), info
+        self._begin(loop, floor)
+        return loop.belief.to_observation(), info
 
     def step(self, action: Action) -> tuple[Observed, float, bool, bool, dict[str, Any]]:
         """Fire the cells that `action` scores highest and go on to the next keyframe.

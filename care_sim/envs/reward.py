@@ -5,16 +5,16 @@ Each is at most 0, so that 0 is the best return there is.
 
 import math
 from collections.abc import Mapping
-from typing import Any, TypeVar
+from typing import Any
+
+import numpy as np
 
 from care_sim.base.checks import check_known, check_number
 from care_sim.base.compiled import compiled
 from care_sim.base.errors import InvalidInput, shown
-from care_sim.core.arrays import Floats
+from care_sim.core.arrays import Floats, Mask
 from care_sim.core.defaults import HEAVIEST
-from care_sim.loops.records import Keyframe
-
-_Number = TypeVar("_Number", float, Floats)
+from care_sim.loops.records import Records
 
 KEEP_CLEAR_M = 2.0
 """Clearance below which it costs: the standstill distance s_0 of the controller."""
@@ -44,28 +44,18 @@ def weights(changes: Mapping[str, float] | None) -> dict[str, float]:
     return {**REWARD_WEIGHTS, **{name: float(value) for name, value in changes.items()}}
 
 
-Course = tuple[bool, bool, float, float]
-"""What the reward remembers of an episode: whether the first-sighting actor has been in view and
-detected at any keyframe; the full-scan bound, which is the distance at the first keyframe at which
-a scan of every cell would have detected the actor, NaN while there was none; and the share of the
-bound that is lost.
+BEGINNING = (0.0, 0.0, math.nan, 0.0)
+"""What the reward remembers of an episode, before its first keyframe: whether the first-sighting
+actor has been in view and detected at any keyframe; the full-scan bound, which is the distance at
+the first keyframe at which a scan of every cell would have detected the actor, NaN while there was
+none; and the share of the bound that is lost.
 """
-Told = tuple[bool, bool, bool, float, float, float, bool, bool]
-"""What the reward is told of a keyframe: `in_view`, `detected`, `braking`, `distance_m`,
-`clearance_m` and `impact_speed_mps` as in `care_sim.loops.records.Records`; whether a scan of every
-cell would detect the actor; and whether the episode ends with this keyframe.
-"""
-Terms = tuple[float, float, float, float, float]
-BEGINNING: Course = (False, False, math.nan, 0.0)
-"""Before the first keyframe."""
 BOUND = 2
-"""The place of the full-scan bound in a course."""
+"""The place of the full-scan bound in it."""
 
 
-@compiled()
-def terms(before: Course, told: Told, measured: bool) -> tuple[Course, Terms]:
-    """The course after a keyframe, and the terms of the keyframe in the order of `REWARD_WEIGHTS`.
-    `measured` says whether the bound is, on which `gain` stands.
+class Rewards:
+    """The rewards of `worlds` worlds. `weights` holds one of every term.
 
     | term | of a keyframe | of an episode |
     |---|---|---|
@@ -85,64 +75,87 @@ def terms(before: Course, told: Told, measured: bool) -> tuple[Course, Terms]:
     differences sum to the metric itself, however they are spread over the episode. A learner that
     discounts more weighs early losses more.
     """
-    was_in_view, was_detected, bound_m, lost = before
-    in_view, detected, braking, distance_m, clearance_m, impact_speed_mps, detectable, over = told
-    if math.isnan(bound_m) and (detectable or detected):
-        bound_m = distance_m
-    if not (math.isnan(bound_m) or was_detected):
-        # A car that comes nearer loses more; one that moves away again wins nothing back.
-        lost = 1.0 if over and not detected else max(lost, 1.0 - distance_m / bound_m)
-    in_view, detected = was_in_view or in_view, was_detected or detected
-    closeness = 1.0 - min(max(clearance_m, 0.0), KEEP_CLEAR_M) / KEEP_CLEAR_M
-    return (in_view, detected, bound_m, lost), (
-        -1.0 if in_view and not detected else 0.0,
-        -closeness if in_view and closeness > 0 else 0.0,
-        0.0 if math.isnan(impact_speed_mps) else -1.0,
-        -1.0 if braking and not in_view else 0.0,
-        -(lost - before[3] if measured else 0.0),
-    )
 
-
-class EpisodeReward:
-    """The reward of one episode. `weights` holds one of every term."""
-
-    def __init__(self, weights: Mapping[str, float]):
+    def __init__(self, weights: Mapping[str, float], worlds: int):
         self._weights = weights
         self._measured = bool(weights["gain"])
-        self._course = BEGINNING
+        # (4, W) columns of `BEGINNING`.
+        self._courses = np.full((worlds, len(BEGINNING)), BEGINNING, float).T.copy()
+
+    def begin(self, world: int) -> None:
+        """Begin an episode in a world."""
+        self._courses[:, world] = BEGINNING
 
     @property
-    def needs_bound(self) -> bool:
-        """Whether the full-scan bound counts and is not known yet."""
-        return self._measured and math.isnan(self._course[BOUND])
+    def need_bound(self) -> Mask:
+        """(W,) where the full-scan bound counts and is not known yet."""
+        wanted: Mask = np.isnan(self._courses[BOUND]) & self._measured
+        return wanted
 
-    def of(self, record: Keyframe, detectable: bool, over: bool) -> tuple[float, dict[str, float]]:
-        """The reward of the next keyframe, and its `terms`.
+    def of(
+        self, records: Records, detectable: Mask, over: Mask, who: Mask
+    ) -> tuple[Floats, dict[str, Floats]]:
+        """The rewards (W,) of the next keyframe in the worlds `who`, 0 in the others, and their
+        terms.
 
-        `detectable` says whether a scan of every cell would detect the actor, where `needs_bound`
-        asks for it; `over` whether the episode ends with this keyframe.
+        `detectable` (W,) says whether a scan of every cell would detect the actor, where
+        `need_bound` asks for it; `over` (W,) whether the episode ends with this keyframe.
         """
-        impact_speed_mps = record.impact_speed_mps
-        told = (
-            record.in_view,
-            record.detected,
-            record.braking,
-            record.distance_m,
-            record.clearance_m,
-            math.nan if impact_speed_mps is None else impact_speed_mps,
-            detectable,
-            over,
+        table = np.zeros((len(REWARD_WEIGHTS), len(who)))
+        told = np.array(
+            [
+                records.in_view,
+                records.detected,
+                records.braking,
+                records.distance_m,
+                records.clearance_m,
+                records.impact_speed_mps,
+                detectable,
+                over,
+            ]
         )
-        self._course, values = terms(self._course, told, self._measured)
-        earned = dict(zip(REWARD_WEIGHTS, values, strict=True))
+        _earn(who, self._courses, told, self._measured, table)
+        earned = dict(zip(REWARD_WEIGHTS, table, strict=True))
         return weighted(self._weights, earned), earned
 
 
-def weighted(weights: Mapping[str, float], earned: Mapping[str, _Number]) -> _Number:
-    """The weighted sum of terms: numbers, or columns of numbers."""
+@compiled(brief=True)
+def _earn(who: Mask, courses: Floats, told: Floats, measured: bool, table: Floats) -> None:
+    """Fill the `table` (5, W) with the terms of the worlds `who`, in the order of `REWARD_WEIGHTS`,
+    and lead their `courses` (4, W) on, each as `BEGINNING`.
+
+    The rows of `told` (8, W) are `in_view`, `detected`, `braking`, `distance_m`, `clearance_m` and
+    `impact_speed_mps` as in `care_sim.loops.records.Records`; whether a scan of every cell would
+    detect the actor; and whether the episode ends with this keyframe. `measured` says whether the
+    bound is, on which `gain` depends.
+    """
+    for w in range(len(who)):
+        if not who[w]:
+            continue
+        course, now = courses[:, w], told[:, w]
+        bound_m, lost = course[BOUND], course[3]
+        distance_m, detectable, over = now[3], now[6] > 0, now[7] > 0
+        if math.isnan(bound_m) and (detectable or now[1] > 0):
+            bound_m = distance_m
+        if not (math.isnan(bound_m) or course[1] > 0):
+            # A car that comes nearer loses more; one that moves away again wins nothing back.
+            gone = over and not now[1] > 0
+            lost = 1.0 if gone else max(lost, 1.0 - distance_m / bound_m)
+        in_view, detected = max(course[0], now[0]), max(course[1], now[1])
+        closeness = 1.0 - min(max(now[4], 0.0), KEEP_CLEAR_M) / KEEP_CLEAR_M
+        table[0, w] = -1.0 if in_view > 0 and not detected > 0 else 0.0
+        table[1, w] = -closeness if in_view > 0 and closeness > 0 else 0.0
+        table[2, w] = 0.0 if math.isnan(now[5]) else -1.0
+        table[3, w] = -1.0 if now[2] > 0 and not in_view > 0 else 0.0
+        table[4, w] = -(lost - course[3] if measured else 0.0)
+        course[0], course[1], course[BOUND], course[3] = in_view, detected, bound_m, lost
+
+
+def weighted(weights: Mapping[str, float], earned: Mapping[str, Floats]) -> Floats:
+    """The weighted sum (W,) of columns of terms."""
     # Not `sum`, which adds floats in another way from Python 3.12 on.
     total: Any = 0.0
     for name, value in earned.items():
         total = total + weights[name] * value
-    result: _Number = total
+    result: Floats = total
     return result

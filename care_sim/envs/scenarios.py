@@ -6,11 +6,8 @@ from care_sim.base.errors import BrokenScenario, InvalidInput
 from care_sim.base.plugins import is_environment_id, scenario_of
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.envs.sensing import arguments_of
-from care_sim.evaluation.outcomes import drive_outcome
-from care_sim.loops.records import DriveOutcome, Outcome
 from care_sim.scenarios import PLUGINS, scenario_class
 from care_sim.scenarios.base import Scenario
-from care_sim.scenarios.drive import DriveScenario
 
 
 class DartoutEnv(ClosedLoopEnv):
@@ -89,9 +86,6 @@ class DriveEnv(ClosedLoopEnv):
     __doc__ = f"{__doc__}\n    {ClosedLoopEnv.__doc__}"
     scenario_name = "drive"
 
-    def _outcome(self) -> DriveOutcome:
-        return _of_drive(self)
-
 
 class ScenarioEnv(ClosedLoopEnv):
     """Any `scenario` of the closed loop: of an installed package, by its name or the id of its
@@ -116,15 +110,6 @@ class ScenarioEnv(ClosedLoopEnv):
                 )
         self.scenario_name = scenario
         super().__init__(**parameters)
-
-    def _outcome(self) -> Outcome:
-        # As the drive that it derives from is scored.
-        return _of_drive(self) if isinstance(self.scenario, DriveScenario) else super()._outcome()
-
-
-def _of_drive(env: ClosedLoopEnv) -> DriveOutcome:
-    world = env.loop.world
-    return drive_outcome(env.keyframes, world.meetings, world.along_m / world.goal_m)
 
 
 def _check_counts(environment: str) -> None:

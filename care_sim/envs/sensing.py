@@ -27,7 +27,7 @@ from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.rig import Rig
 from care_sim.core.types import Action
 from care_sim.loops.observation_limits import Limits
-from care_sim.loops.truth import Loop, Truth
+from care_sim.loops.truth import Truth, Watchable
 from care_sim.perception.detectors import CLUSTER, PROXY, check_detector, make_detector
 from care_sim.perception.points_only import Detector
 from care_sim.sensors.lidar import check_dead_rows
@@ -107,7 +107,7 @@ def detector_of(
 
 
 Observed = dict[str, NDArray[np.float32]]
-AnyLoop = TypeVar("AnyLoop", bound=Loop)
+AnyLoop = TypeVar("AnyLoop", bound=Watchable)
 AnyConditions = TypeVar("AnyConditions", bound=Conditions)
 
 
@@ -210,14 +210,13 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         super().reset(seed=int(seed))
         return int(seed)
 
-    def _begin(self, loop: AnyLoop, floor: np.random.SeedSequence) -> Observed:
-        """Start an episode over a loop and a floor; its first observation."""
+    def _begin(self, loop: AnyLoop, floor: np.random.SeedSequence) -> None:
+        """Start an episode over a loop and a floor."""
         self._running = loop
         self._over = False
         self._floors = RandomFloor(floor, self.conditions.floor_seed, self.rig.grid.size)
         self._keyframe = 0
         self._last_fired = np.empty(0, np.int64)
-        return loop.belief.to_observation()
 
     def _choose_cells(self, action: Action) -> Cells:
         """Take an action: the cells that it fires at the coming keyframe.

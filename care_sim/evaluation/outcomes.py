@@ -51,16 +51,28 @@ def drive_outcome(
     keyframes: Sequence[Keyframe], meetings: Sequence[Meeting], progress: float
 ) -> DriveOutcome:
     """The result of a drive with `meetings`, after a share `progress` of its way."""
+    sights = [record.sights for record in keyframes]
     impact = keyframes[-1].impact
+    return drive_outcome_of(Records.of(keyframes), impact, sights, meetings, progress)
+
+
+def drive_outcome_of(
+    records: Records,
+    impact: Impact | None,
+    sights: Sequence[tuple[Sight, ...]],
+    meetings: Sequence[Meeting],
+    progress: float,
+) -> DriveOutcome:
+    """`drive_outcome` of columns and of the `sights` of each keyframe; see `outcome_of`."""
     return DriveOutcome(
-        **asdict(outcome(keyframes)),
+        **asdict(outcome_of(records, impact)),
         hit_standing=impact.speed_mps == 0.0 if impact else None,
-        needless_braking=sum(record.needless for record in keyframes),
+        needless_braking=int(records.needless.sum()),
         progress=min(max(progress, 0.0), 1.0),
         encounters=tuple(
             _encounter(
                 one,
-                [record.sights[number] for record in keyframes],
+                [own[number] for own in sights],
                 impact is not None and impact.body == one.body,
             )
             for number, one in enumerate(meetings)

@@ -7,6 +7,7 @@ from numpy.random import SeedSequence
 
 from care_sim.base.seeds import streams
 from care_sim.base.times import LAST_BITS_S
+from care_sim.sensors.false_boxes import EMPTY_POOL, BoxPool
 from care_sim.world.world import World
 
 
@@ -39,11 +40,14 @@ class EpisodeSeeds(NamedTuple):
 
 
 class Episode(NamedTuple):
-    """A world at time zero, the random streams of the sensors, and that of the floor."""
+    """A world at time zero, the random streams of the sensors, that of the floor, and the boxes
+    that false ones are drawn from.
+    """
 
     world: World
     seeds: SensorSeeds
     floor: SeedSequence
+    pool: BoxPool = EMPTY_POOL
 
 
 def most_keyframes(duration_s: float, keyframe_s: float) -> int:

@@ -9,9 +9,9 @@ import numpy as np
 from care_sim.base.times import LAST_BITS_S
 from care_sim.core.conditions import IDEAL_CAMERA, RETURN_SETTINGS, ClosedLoopConditions
 from care_sim.core.rig import Rig
-from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.episode import SensorSeeds
 from care_sim.loops.film import Film
+from care_sim.loops.one_world import OneWorld
 from care_sim.perception.points_only import Detector
 from care_sim.sensors.false_boxes import BoxPool
 from care_sim.world.world import World
@@ -53,7 +53,7 @@ def pool_of_another_drive(
             camera_profile=IDEAL_CAMERA,
             **RETURN_SETTINGS,
         )
-        loop = ClosedLoop(world, rig, ideal, seeds, detector=detector)
+        loop = OneWorld.begun(world, rig, ideal, seeds, duration_s, detector=detector)
         cells = np.arange(rig.grid.size)
         seen = []
         times_s = []
@@ -61,10 +61,10 @@ def pool_of_another_drive(
 
         # What the camera shows is taken before each keyframe, as the episode takes it.
         while not over:
-            seen.append(loop.cameras.seen)
-            times_s.append(world.time)
+            seen.append(loop.faultless(loop.mounted))
+            times_s.append(loop.world.time)
             hit = loop.keyframe(cells).impact_speed_mps is not None
-            over = hit or world.time >= duration_s - LAST_BITS_S
+            over = hit or loop.world.time >= duration_s - LAST_BITS_S
     return BoxPool.of(seen, times_s, rig.cameras, near_s=NEAR_S)
 
 

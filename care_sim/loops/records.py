@@ -175,6 +175,7 @@ class Records(NamedTuple):
     nearest_m: Floats
     clearance_m: Floats
     impact_speed_mps: Floats
+    needless: Mask
     unfounded: Mask
 
     @classmethod
@@ -189,6 +190,6 @@ class Records(NamedTuple):
 def kind_of(column: str) -> type:
     """What the numbers of a column are."""
     kinds: dict[str, type] = {"fired": np.int64} | dict.fromkeys(
-        ("in_view", "detected", "braking", "unfounded"), np.bool_
+        ("in_view", "detected", "braking", "needless", "unfounded"), np.bool_
     )
     return kinds.get(column, np.float64)

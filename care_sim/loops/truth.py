@@ -39,11 +39,18 @@ def told_by(
     }
 
 
-class Loop(Protocol):
+class Watchable(Protocol):
     """What environments and privileged policies ask of a loop, besides its keyframes."""
 
-    belief: Belief
-    told: Told
+    @property
+    def belief(self) -> Belief:
+        """All that a policy may know when it chooses the cells."""
+        ...
+
+    @property
+    def told(self) -> Told:
+        """What the returns of the last keyframe told besides their ranges."""
+        ...
 
     def true_boxes(self, tracks: Tracks) -> Floats:
         """(n, 7) true boxes, in the sensor frame, of the objects behind forecasts."""

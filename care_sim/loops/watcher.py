@@ -17,7 +17,7 @@ from care_sim.core.frames import Frame, Pose
 from care_sim.core.grid import Cells
 from care_sim.core.residual import explained
 from care_sim.core.types import CLASSES, Action, Demand, ImageDetections
-from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.loops.one_world import OneWorld
 from care_sim.loops.open_loop import OpenLoop, SceneKeyframe
 from care_sim.loops.records import Keyframe
 from care_sim.sensors.annotated import NO_OBJECT
@@ -122,16 +122,16 @@ class Watcher:
     `confidence` is the threshold of the camera's detector.
     """
 
-    def __init__(self, loop: ClosedLoop | OpenLoop, confidence: float):
+    def __init__(self, loop: OneWorld | OpenLoop, confidence: float):
         self._loop = loop
         self._confidence = confidence
 
     def situation(self) -> TrueSituation:
         """How things stand before the next keyframe."""
         loop = self._loop
-        if isinstance(loop, ClosedLoop):
+        if isinstance(loop, OneWorld):
             # Through the camera as designed: what an error of its mount hides is missed, too.
-            there, given, clear = _of_world(loop), loop.detected_bodies, loop.cameras.faultless()
+            there, given, clear = _of_world(loop), loop.detected_bodies, loop.faultless()
         else:
             there, given, clear = _of_film(loop), loop.true_detected_objects(), loop.shot.seen
         sure = clear.detections.confidences >= self._confidence
@@ -155,11 +155,11 @@ class Watcher:
         loop, fired = self._loop, record.fired
         assert fired is not None
         shares = shares_of(fired, action, demand, loop.rig)
-        ranges = loop.belief.ranges if isinstance(loop, ClosedLoop) else loop.last_ranges
+        ranges = loop.belief.ranges if isinstance(loop, OneWorld) else loop.last_ranges
         return Watched(situation, shares, ranges, record, fired)
 
 
-def _of_world(loop: ClosedLoop) -> dict[str, Any]:
+def _of_world(loop: OneWorld) -> dict[str, Any]:
     """What is there around a world's ego."""
     world = loop.world
     pieces = 1 if world.route is None else _PIECES

@@ -23,7 +23,7 @@ from care_sim.sensors.pictures import FRONT_CAMERA
 from care_sim.streets.layouts import LANE_WIDTH_M, PARKING_WIDTH_M, SPEED_LIMIT_MPS
 from care_sim.world.bodies import CATALOGUE, BodyKind
 from care_sim.world.traffic import RoadVehicle, Traffic
-from care_sim.world.world import Actor, Motion, World
+from care_sim.world.world import Actor, Motion, Reflection, World, on_the_other_side
 
 
 def scenario_faults(made: Any) -> Iterator[str]:
@@ -150,22 +150,5 @@ class MirroredWorld(World):
         backdrop: bool = False,
     ) -> Actor:
         """Add a body where `World.add` would put its reflection."""
-        reflected = _on_the_other_side(pose) if isinstance(pose, tuple) else Reflection(pose)
+        reflected = on_the_other_side(pose) if isinstance(pose, tuple) else Reflection(pose)
         return super().add(name, kind, reflected, reported=reported, backdrop=backdrop)
-
-
-@dataclass(frozen=True)
-class Reflection:
-    """The motion on the other side of the x axis of a function of time, or of a vehicle."""
-
-    of: Motion | RoadVehicle
-
-    def __call__(self, time: float) -> Pose:
-        """The pose at `time`."""
-        pose = self.of.pose if isinstance(self.of, RoadVehicle) else self.of(time)
-        return _on_the_other_side(pose)
-
-
-def _on_the_other_side(pose: Pose) -> Pose:
-    x, y, heading = pose
-    return x, -y, -heading

@@ -2,19 +2,20 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from care_sim.base.times import LAST_BITS_S
-from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.arrays import Floats, Integers
 from care_sim.core.cells.boxes import planar_ranges
 from care_sim.core.conditions import KITTI_CAMERA, YOLOX_CAMERA, CameraFaults, Sensing
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import ImageDetections
 from care_sim.sensors.annotated import NO_OBJECT, IdentifiedDetections
 from care_sim.sensors.camera_errors import ProfiledDetector
+from care_sim.sensors.camera_faults import Delay, Detected, Misses
 from care_sim.sensors.camera_profiles import YOLOX
 from care_sim.sensors.false_boxes import EMPTY_POOL, NO_ROWS, BoxPool, FalseBoxes
 from care_sim.sensors.kitti.detector import KittiDetector
@@ -45,131 +46,10 @@ def picture_timing(faults: CameraFaults, keyframe_s: float, step_s: float) -> Pi
     return PictureTiming(keyframes, (keyframes * per_keyframe - steps) * step_s)
 
 
+_HERE = np.ones(1, np.bool_)
 NOTHING_SEEN = IdentifiedDetections(
     ImageDetections.from_rows(np.empty((0, len(ImageDetections.COLUMNS)))), np.empty(0, np.int64)
 )
-
-
-class Misses:
-    """Which objects the camera misses: in the long run the stated share, in bursts of keyframes.
-
-    One number is drawn for every object at every keyframe, seen or not, so that every policy meets
-    the same misses.
-    """
-
-    def __init__(self, objects: int, faults: CameraFaults, rng: np.random.Generator):
-        self._faults = faults
-        self._rng = rng
-        self._lasting = np.zeros(objects, np.int64)
-        """(n,) keyframes for which each object's burst still lasts."""
-        self._started = False
-
-    def draw(self, ranges: Floats) -> Mask:
-        """(n,) who is missed at this keyframe; `ranges` (n,) are distances in metres."""
-        faults = self._faults
-        if not (faults.false_negative_rate or faults.false_negative_per_m):
-            return np.zeros(len(ranges), bool)
-        rates = miss_rates(faults.false_negative_rate, faults.false_negative_per_m, ranges)
-        # One draw per object decides all: whether it is missed, and at the start for how long.
-        draws = self._rng.random(len(rates))
-        burst = faults.false_negative_burst
-        if self._started:
-            self._lasting = later_bursts(self._lasting, rates, draws, burst)
-        else:
-            self._lasting = first_bursts(rates, draws, burst)
-        self._started = True
-        missed = self._lasting > 0
-        self._lasting -= missed
-        return missed
-
-
-def miss_rates(rate: float | Floats, per_m: float | Floats, ranges: Floats) -> Floats:
-    """The share of keyframes at which objects so many metres away are missed, in any shape, by
-    `false_negative_rate` and `false_negative_per_m`.
-    """
-    return np.minimum(rate + per_m * ranges, 1.0)
-
-
-def first_bursts(rates: Floats, draws: Floats, burst: int | Integers) -> Integers:
-    """For how many keyframes, from the first on, objects are missed that have these rates and
-    draws. Arrays of one shape.
-
-    The first keyframe shows the long run: an object is missed at its rate, and whoever is missed is
-    at any keyframe of its burst with equal chance.
-    """
-    hit = draws < rates
-    # A draw below the rate, divided by it, is again evenly distributed from 0 to 1.
-    share = np.divide(draws, rates, out=np.zeros_like(draws), where=hit)
-    served = np.floor(burst * share).astype(np.int64)
-    return np.where(hit, burst - served, 0)
-
-
-def later_bursts(
-    lasting: Integers, rates: Floats, draws: Floats, burst: int | Integers
-) -> Integers:
-    """The same at a later keyframe, before which they were missed for `lasting` more: bursts begin
-    among the objects that are in none.
-    """
-    # With the chance p that a burst of L keyframes begins, (1 - p) / p keyframes without one lie
-    # between two bursts on the mean. The share of missed keyframes is L / (L + (1 - p) / p); it is
-    # the rate r for p = r / (L - (L - 1) r).
-    begins = (lasting == 0) & (draws < rates / (burst - (burst - 1) * rates))
-    return np.where(begins, burst, lasting)
-
-
-class _SentPicture(NamedTuple):
-    """The detections of a picture on their way: that of `keyframe`, taken with the car's `heading`,
-    they arrive at the keyframe `due`.
-    """
-
-    seen: IdentifiedDetections
-    heading: float
-    keyframe: int
-    due: int
-
-
-@dataclass
-class Delay:
-    """Hands out the newest picture that has arrived.
-
-    One is taken per keyframe, as `timing` says. Each is late by its keyframes, and by 0 to `jitter`
-    more that are drawn for it.
-    """
-
-    timing: PictureTiming
-    jitter: int
-    keyframe_s: float
-    rng: np.random.Generator
-
-    def __post_init__(self) -> None:
-        self._sent: list[_SentPicture] = []
-        self._taken = 0
-        self._keyframe = -1
-
-    def take(self, seen: IdentifiedDetections, heading: float) -> None:
-        """Take in the detections of a keyframe's picture, and the car's heading when it was taken,
-        radians.
-        """
-        # Lateness is drawn for every picture in turn, whatever it shows.
-        late = self.timing.keyframes
-        late += int(self.rng.integers(self.jitter + 1)) if self.jitter else 0
-        self._sent.append(_SentPicture(seen, heading, self._taken, self._taken + late))
-        self._taken += 1
-
-    def newest(self, heading: float) -> IdentifiedDetections:
-        """Begin a keyframe with the car's `heading`, radians; return the newest detections that are
-        due, with age and yaw change.
-        """
-        self._keyframe += 1
-        arrived = [n for n, picture in enumerate(self._sent) if picture.due <= self._keyframe]
-        if not arrived:
-            return NOTHING_SEEN
-        # Jitter lets a picture overtake the ones before it, which are then never handed out.
-        self._sent = self._sent[arrived[-1] :]
-        picture = self._sent[0]
-        age_s = (self._keyframe - picture.keyframe) * self.keyframe_s - self.timing.after_s
-        detections = picture.seen.detections.aged(age_s, heading - picture.heading)
-        return IdentifiedDetections(detections, picture.seen.objects)
 
 
 def mounted(camera: PinholeCamera, faults: CameraFaults, rng: np.random.Generator) -> PinholeCamera:
@@ -204,15 +84,18 @@ class CameraDetector:
     ):
         # Every fault has a random stream of its own: one switched on leaves the others as they are.
         *own, errors, jitter, confusion, ghosts = seed.spawn(7)
-        false_boxes, delay, mount = (np.random.default_rng(child) for child in own)
+        false_boxes, _, mount = (np.random.default_rng(child) for child in own)
         self._objects = np.asarray(objects, np.int64)
         self._sensing = sensing
         self._least_confidence = float(sensing.camera_confidence)
-        self._misses = Misses(len(objects), sensing, np.random.default_rng(seed))
+        self._misses = Misses([sensing])
+        self._misses.begin(0, seed, len(objects))
         rate = sensing.false_positive_rate
         self._false_boxes = FalseBoxes(pool, rate, len(cameras), false_boxes) if rate else None
         self.timing = picture_timing(sensing, keyframe_s, step_s or keyframe_s)
-        self._delay = Delay(self.timing, sensing.camera_jitter, keyframe_s, delay)
+        late = np.array([self.timing.keyframes]), np.array([sensing.camera_jitter])
+        self._delay = Delay(*late, keyframe_s, self.timing.after_s)
+        self._delay.begin(0, own[1])
         self.mounted = tuple(mounted(camera, sensing, mount) for camera in cameras)
         """The cameras as they really stand."""
         self._measured: ProfiledDetector | KittiDetector | None = None
@@ -245,7 +128,7 @@ class CameraDetector:
         # every policy meets the same ones.
         rows = seen.detections.rows()
         objects = seen.objects
-        missed = self._misses.draw(planar_ranges(boxes))
+        missed = self._misses.draw(_HERE, planar_ranges(boxes)[None])[0]
         false = self._false_boxes.draw(rows, time_s) if self._false_boxes else NO_ROWS
         if self._measured is not None:
             rows, objects, false = self._measured.detect(seen, boxes, false, time_s)
@@ -267,14 +150,14 @@ class CameraDetector:
             rows, objects = rows[:0], objects[:0]
         # Of equally sure boxes the leftmost comes first: nothing depends on the order of bodies.
         rows, objects = surest_first(rows, objects, self._least_confidence)
-        detections = ImageDetections.from_checked_rows(rows)
-        self._delay.take(IdentifiedDetections(detections, objects), heading)
+        seen_here = Detected(np.array([len(rows)]), rows[None], objects[None])
+        self._delay.take(_HERE, seen_here, np.array([heading], float))
 
     def newest(self, heading: float) -> IdentifiedDetections:
         """Begin a keyframe with the car's `heading`: the newest detections that are due, the surest
         first, each with the object behind it.
         """
-        return self._delay.newest(heading)
+        return self._delay.newest(_HERE, np.array([heading], float)).take(0)
 
 
 def _with_false_boxes(rows: Floats, objects: Integers, false: Floats) -> tuple[Floats, Integers]:

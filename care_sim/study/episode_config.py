@@ -14,8 +14,7 @@ from care_sim.core.conditions import COLUMNS_WHERE_CHANGED, DEFAULTS, ClosedLoop
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.envs import ENVIRONMENT_IDS, make_scenario_env
 from care_sim.envs.closed_loop import KEYFRAME_S, ClosedLoopEnv
-from care_sim.envs.vector.arguments import STRAIGHT, why_conditions_separate
-from care_sim.perception.detectors import PROXY
+from care_sim.perception.detectors import PRIVILEGED, PROXY
 from care_sim.policies import tags_of
 from care_sim.scenarios import SCENARIOS, make_scenario
 from care_sim.sensors.setups import DEFAULT_SETUP, sensor_columns, sensor_setup
@@ -121,16 +120,12 @@ class EpisodeConfig(ClosedLoopConditions, RunConfig):
 
     @property
     def batch(self) -> Hashable:
-        """Everything but the seed. An episode stands alone where it is not played in arrays
-        (`care_sim.study.episode_play`), so that an interrupt need not wait for a batch of them.
+        """Everything but the seed. An episode is played alone (`care_sim.study.episode_play`) if
+        its policy asks for the truth, or if its scenario or detector is not built in.
         """
-        in_arrays = (
-            SCENARIOS.get(self.scenario) in STRAIGHT
-            and self.detector == PROXY
-            and why_conditions_separate(self) is None
-            and "privileged" not in tags_of(self.policy)
-        )
-        return self.changed(seed=0) if in_arrays else self
+        is_known = self.scenario in SCENARIOS and self.detector in PRIVILEGED
+        together = is_known and "privileged" not in tags_of(self.policy)
+        return self.changed(seed=0) if together else self
 
 
 def closed_loop(env: gymnasium.Env[Any, Any]) -> ClosedLoopEnv:

@@ -25,9 +25,8 @@ from care_sim.core.arrays import Floats
 from care_sim.core.conditions import DriverSettings
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.envs.sensing import Observed, checked_scores
-from care_sim.envs.vector.arguments import why_separate
-from care_sim.envs.vector.worlds import CompiledWorlds, Stepped
-from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.envs.worlds import Stepped, Worlds
+from care_sim.loops.one_world import OneWorld
 from care_sim.loops.records import Keyframe
 from care_sim.policies import tags_of
 from care_sim.policies.base import Policy
@@ -46,7 +45,7 @@ def world_hash(env: ClosedLoopEnv, seed: int) -> str:
     content = hashlib.sha256()
     # Somebody may react to a brake alone.
     for acceleration in (0.0, -DriverSettings().brake_mps2):
-        with closing(env.episode(seed).world) as world:
+        with closing(env.setting.episode(seed).world) as world:
             content.update(portable_bytes(*_told(world)))
             bodies = np.array([world.ego_body, *(actor.body for actor in world.actors)])
             while world.time < env.scenario.duration_s - LAST_BITS_S and not world.is_over():
@@ -68,7 +67,7 @@ def _told(world: World) -> Iterator[tuple[Content, ...]]:
 
 
 _Result = TypeVar("_Result")
-Watcher = Callable[[ClosedLoop, Keyframe], None]
+Watcher = Callable[[OneWorld, Keyframe], None]
 GymEnv = gymnasium.Env[Any, Any]
 _KIB_MB = 1024 / 1e6
 
@@ -101,7 +100,7 @@ def run_episode(config: EpisodeConfig) -> Row:
 def trace(
     config: EpisodeConfig,
     *watchers: Watcher,
-    begin: Callable[[ClosedLoop], None] = lambda _loop: None,
+    begin: Callable[[OneWorld], None] = lambda _loop: None,
     wrap: Callable[[GymEnv, Policy], GymEnv] = lambda env, _policy: env,
 ) -> tuple[Row, list[Keyframe]]:
     """Play an episode; gives its row and the record of every keyframe (for scoring only: it holds
@@ -126,7 +125,7 @@ def trace(
         ended = False
         while not ended:
             observation, _, terminated, truncated, info = env.step(policy(observation))
-            digest.add(info["fired"], observation["ranges"], _boxes(played.loop))
+            digest.add(info["fired"], observation["ranges"], played.loop.boxes)
             for watch in watchers:
                 watch(played.loop, played.keyframes[-1])
             ended = terminated or truncated
@@ -186,12 +185,6 @@ class EpisodeHash:
         return self._content.hexdigest()[:16]
 
 
-def _boxes(loop: ClosedLoop) -> Floats:
-    """(n, 7) of the ego and then every actor."""
-    world = loop.world
-    return world.boxes_of(np.array([world.ego_body, *(actor.body for actor in world.actors)]))
-
-
 def peak_rss_mb() -> float:
     """The most memory this process has held, in MB."""
     # getrusage would count what the parent held when it started this process.
@@ -238,11 +231,13 @@ def play_together(configs: Sequence[EpisodeConfig]) -> list[Row]:
         model = closed_loop(env)
         if "privileged" in tags_of(configs[0].policy):
             raise InvalidInput("a privileged policy asks its own world for the truth")
-        if reason := why_separate(model):
-            raise InvalidInput(f"{reason} is not played as arrays")
         observed = cast(Observed, create_empty_array(model.observation_space, count))
         policy = vector_policy(partial(configs[0].make_policy, env), count)
-        with closing(CompiledWorlds([model] * count, observed, exact=False)) as worlds:
+        # A detector may remember something of its world.
+        settings = [model.setting] * count
+        if model.setting.detector is not None:
+            settings = [closed_loop(config.make_env()).setting for config in configs]
+        with closing(Worlds(settings, observed, exact=False)) as worlds:
             infos = worlds.begin({world: config.seed for world, config in enumerate(configs)})
             policy.reset()
             drawn = _common_draws()
@@ -255,7 +250,7 @@ def play_together(configs: Sequence[EpisodeConfig]) -> list[Row]:
                 stepped = worlds.step(actions, live)
                 for world in np.flatnonzero(live).tolist():
                     fired = _fired(stepped, world)
-                    hashes[world].add(fired, observed["ranges"][world], worlds.boxes(world))
+                    hashes[world].add(fired, observed["ranges"][world], worlds.loop.boxes(world))
                 over = stepped.terminated | stepped.truncated
                 outcomes |= {w: stepped.single[w]["outcome"] for w in np.flatnonzero(over).tolist()}
                 keyframes += live

@@ -21,7 +21,7 @@ from care_sim.core.grid import Cells
 from care_sim.core.residual import wedges
 from care_sim.core.types import Action
 from care_sim.envs.sensing import Observed, sensing
-from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.loops.one_world import OneWorld
 from care_sim.policies import make_policy
 from care_sim.sensors.annotated import NO_OBJECT
 from care_sim.study.episode_config import EpisodeConfig
@@ -126,7 +126,7 @@ class VehicleWatch(gymnasium.Wrapper[Observed, Action, Observed, Action]):
         for name, number in added.items():
             self._counts[name] += int(number)
 
-    def _note_evidence(self, loop: ClosedLoop) -> None:
+    def _note_evidence(self, loop: OneWorld) -> None:
         """Note the age of the pictures, and of the boxes taken before a turn those whose wedge
         holds the centre of their object, with and without compensation.
 
@@ -154,7 +154,7 @@ class VehicleWatch(gymnasium.Wrapper[Observed, Action, Observed, Action]):
         )
         self._count(turned_held=held, unturned_held=unturned)
 
-    def _note_forecasts(self, loop: ClosedLoop) -> None:
+    def _note_forecasts(self, loop: OneWorld) -> None:
         """Note how far the forecasts of tracks with a velocity are off, and whose error in azimuth
         lies within Eq. 4's margin, and within that of a full hull.
         """
@@ -173,7 +173,7 @@ class VehicleWatch(gymnasium.Wrapper[Observed, Action, Observed, Action]):
             forecasts_in_margin=(columns <= loop.rig.azimuth_margin).sum(),
         )
 
-    def _note_guard(self, loop: ClosedLoop) -> None:
+    def _note_guard(self, loop: OneWorld) -> None:
         """Note the guard of a standing car, and the cells that forgetting releases without and with
         the margin of Eq. 4.
         """
@@ -190,7 +190,7 @@ class VehicleWatch(gymnasium.Wrapper[Observed, Action, Observed, Action]):
             released.append(released_cells(hulls, kept, loop.rig.grid.size))
         self._count(released_cells=released[0], released_cells_vehicle=released[1])
 
-    def _note_blackout(self, loop: ClosedLoop) -> None:
+    def _note_blackout(self, loop: OneWorld) -> None:
         """Note at every keyframe of a blackout whether all that are asked fire alike, and after it
         when they first differ.
         """
@@ -216,7 +216,7 @@ class VehicleWatch(gymnasium.Wrapper[Observed, Action, Observed, Action]):
             self._lists["dark_entry_cells"].append(int(np.isin(hull, first).sum()))
             self._lists["dark_entry_covered"].append(int(is_covered(hull, tracked)))
 
-    def _new_entries(self, loop: ClosedLoop) -> Sequence[Cells]:
+    def _new_entries(self, loop: OneWorld) -> Sequence[Cells]:
         """The hulls of the bodies that a faultless camera shows for the first time. What is there
         at the start is no entry.
         """

@@ -5,10 +5,12 @@ from typing import Any
 import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
+from numpy.typing import NDArray
 
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.seeds import LAST, TRAINING, VALIDATION
-from care_sim.envs.vector.arguments import last_rows, same_step
+from care_sim.core.arrays import Mask
+from care_sim.envs.vector.arguments import last_rows
 from care_sim.envs.wrappers.reading import WorldsWrapper
 
 
@@ -83,8 +85,57 @@ class VectorTrainingSeeds(WorldsWrapper):
                 seed=drawn,  # type: ignore[arg-type]
                 options={"reset_mask": over.copy()},
             )
-            infos = same_step(infos, begun, last, over)
+            infos = _same_step(infos, begun, last, over)
         return observation, rewards, terminated, truncated, infos
+
+
+_Infos = dict[str, Any]
+
+
+def _same_step(infos: _Infos, begun: _Infos, last: NDArray[np.object_], over: Mask) -> _Infos:
+    """What a step tells whose `infos` are of all worlds, if in those that are `over`, with the
+    `last` observations (W,), episodes begin that tell `begun`.
+    """
+    finals = {
+        "final_obs": last,
+        "_final_obs": over.copy(),
+        "final_info": _part(infos, over),
+        "_final_info": over.copy(),
+    }
+    return _joined(_part(infos, ~over), begun) | finals
+
+
+def _part(infos: _Infos, who: Mask) -> _Infos:
+    """What infos tell of the worlds `who` (W,), in the form of Gymnasium."""
+    part = _Infos()
+    for name, column in _columns(infos):
+        told = infos[f"_{name}"] & who
+        if told.any():
+            part[name] = _part(column, who) if isinstance(column, dict) else column.copy()
+            part[f"_{name}"] = told
+            if not isinstance(column, dict):
+                part[name][~told] = None if column.dtype == object else 0
+    return part
+
+
+def _joined(infos: _Infos, others: _Infos) -> _Infos:
+    """What both tell, the `others` of other worlds."""
+    joined = infos | {name: value for name, value in others.items() if name not in infos}
+    for name, column in _columns(others):
+        if name not in infos:
+            continue
+        told = others[f"_{name}"]
+        if isinstance(column, dict):
+            joined[name] = _joined(infos[name], column)
+        else:
+            joined[name] = infos[name].copy()
+            joined[name][told] = column[told]
+        joined[f"_{name}"] = infos[f"_{name}"] | told
+    return joined
+
+
+def _columns(infos: _Infos) -> list[tuple[str, Any]]:
+    return [(name, column) for name, column in infos.items() if f"_{name}" in infos]
 
 
 class _Sequence:

@@ -1,7 +1,6 @@
 """How close the ego came to others, and how it hit them."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,16 +58,6 @@ class ClosestApproach:
     nearest_m: float
     clearance_m: float
     impact: Impact | None
-
-    @classmethod
-    def over(cls, parts: "Sequence[ClosestApproach]") -> "ClosestApproach":
-        """That of a time which consists of `parts`, in their order."""
-        impacts = (part.impact for part in parts if part.impact is not None)
-        return cls(
-            min(part.nearest_m for part in parts),
-            min(part.clearance_m for part in parts),
-            next(impacts, None),
-        )
 
     @property
     def impact_speed_mps(self) -> float | None:

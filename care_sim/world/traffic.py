@@ -217,6 +217,11 @@ class RoadVehicle:
         """Never again look up the nearest lane: only drivers ask which one they are in."""
         self._vehicle.road = None
 
+    def put(self, x: float, speed: float) -> None:
+        """Put it farther along its lane, which runs along x, at a speed."""
+        self._vehicle.position = np.array([x, self._vehicle.position[1]])
+        self._vehicle.speed = speed
+
     def stand(self) -> None:
         """Lose all speed at once."""
         self._vehicle.speed = 0.0

@@ -15,8 +15,8 @@ from care_sim.core.types import CLASSES, Ego
 from care_sim.world.approach import ClosestApproach
 from care_sim.world.bodies import CATALOGUE, BodyKind
 from care_sim.world.body_tables import Footprints
-from care_sim.world.bullet import BulletWorld
-from care_sim.world.contact import Passage
+from care_sim.world.bullet import NO_BODY, BulletWorld
+from care_sim.world.clearances import Clearances, Impacts
 from care_sim.world.copying import check_copyable
 from care_sim.world.motions import LinearMotion, Meeting, rates_between
 from care_sim.world.route import Route, RouteCar, SpeedPlan
@@ -46,6 +46,29 @@ class Actor:
     def label(self) -> int | None:
         """Index into CLASSES, None when perception does not report it."""
         return CLASSES.index(self.kind.label) if self.reported and self.kind.label else None
+
+
+@dataclass(frozen=True)
+class Reflection:
+    """The motion on the other side of the x axis of a function of time, or of a vehicle."""
+
+    of: Motion | RoadVehicle
+
+    def __call__(self, time: float) -> Pose:
+        """The pose at `time`."""
+        pose = self.of.pose if isinstance(self.of, RoadVehicle) else self.of(time)
+        return on_the_other_side(pose)
+
+
+def on_the_other_side(pose: Pose) -> Pose:
+    """A pose reflected at the x axis."""
+    x, y, heading = pose
+    return x, -y, -heading
+
+
+def source_of(moved_by: Pose | Motion | RoadVehicle) -> Pose | Motion | RoadVehicle:
+    """What moves an actor, on either side of the street."""
+    return moved_by.of if isinstance(moved_by, Reflection) else moved_by
 
 
 class World:
@@ -189,14 +212,19 @@ class World:
         """(n, 7) boxes of actors in the world frame."""
         return self.boxes_of(np.array([actor.body for actor in actors], np.int64))
 
-    def boxes_of(self, bodies: Integers) -> Floats:
-        """(n, 7) boxes of bodies (n,) in the world frame."""
+    def boxes_of(self, bodies: Integers | slice) -> Floats:
+        """(n, 7) boxes of bodies (n,), or of a slice of all, in the world frame."""
         return self._footprints.boxes[bodies]
 
     def centre_of(self, body: int) -> tuple[float, float]:
         """x, y of the centre of a body in the world frame."""
         x, y = self._footprints.boxes[body, :2].tolist()
         return x, y
+
+    @property
+    def kinds(self) -> Mapping[int, BodyKind]:
+        """The kind of every body by id."""
+        return self._kinds
 
     def velocities_of(self, bodies: Integers) -> Floats:
         """(n, 2) velocities of bodies (n,) in the world frame, m/s, over the last world step."""
@@ -218,14 +246,23 @@ class World:
         `acceleration` (m/s^2) meanwhile. Clearance and distance are those of the first-sighting
         actor at its beginning.
         """
-        target = None if self.first_sighting is None else self.first_sighting.body
-        passage = Passage(
-            self._footprints, self.bullet, self._kinds, self.ego_body, target, self.velocities_of
-        )
-        for _ in range(whole_steps(duration)):
+        steps, target = whole_steps(duration), self.first_sighting
+        clearances, impacts = Clearances(1, steps), Impacts(1, WORLD_STEP_S)
+        clearances.begin(0, None if target is None else (self.ego_kind, target.kind))
+        impacts.begin(0, self.kinds)
+        here, nearest_m, impact = np.ones(1, np.bool_), np.full(1, np.inf), None
+        egos = np.array([self.ego_body])
+        targets = np.array([NO_BODY if target is None else target.body])
+        for step in range(1, steps + 1):
             self.step(acceleration)
-            passage.look(self.ego.speed)
-        return passage.closest()
+            boxes, before = self._footprints.boxes[None], self._before[None]
+            poses, counts = self.bullet.primitives.poses[None], np.array([boxes.shape[1]])
+            clearances.note(here, np.array([step]), boxes, poses, (egos, targets), nearest_m)
+            if impact is None:
+                bodies = counts, boxes, before, poses
+                touched = impacts.now(here, *bodies, egos, np.array([self.ego.speed], float))
+                impact = next((one for _, one in touched), None)
+        return ClosestApproach(float(nearest_m[0]), clearances.least(0, 1, steps + 1), impact)
 
     def step(self, acceleration: float) -> None:
         """Move everything by a world step, as `advance` does, and look at nothing. Raises
@@ -261,6 +298,29 @@ class World:
         if not self._footprints.move_all(bodies, table):
             for name, pose in zip(["the ego", *(a.name for a in self._moving)], poses, strict=True):
                 self._check_pose(name, pose)
+
+    def put(
+        self, steps: int, boxes: Floats, before: Floats, motion: Ego, lanes: Mapping[int, Floats]
+    ) -> None:
+        """Put everything where it is after so many world steps, if other code has moved it.
+
+        `boxes` and `before` (m, 7) are those of all bodies now and a world step ago, `motion` the
+        ego's. `lanes` holds x and speed of every vehicle by its body.
+        """
+        self._steps = steps
+        self.time = round(steps * WORLD_STEP_S, 9)
+        self._ego_motion = motion
+        poses = np.ascontiguousarray(boxes[self._moving_bodies][:, [0, 1, 6]])
+        self._before = before.copy()
+        self.bullet.move_all(self._moving_bodies, poses)
+        self._footprints.move_all(self._moving_bodies, poses)
+        vehicles = {self.ego_body: self.ego} | {
+            actor.body: source_of(actor.moved_by) for actor in self._moving
+        }
+        for body, (x, speed) in lanes.items():
+            vehicle = vehicles[body]
+            assert isinstance(vehicle, RoadVehicle)
+            vehicle.put(float(x), float(speed))
 
     def close(self) -> None:
         """Free the simulator."""

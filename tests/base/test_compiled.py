@@ -34,7 +34,7 @@ def test_kernels_answer_the_same_without_compiling():
         "core/firing/test_floor",
         "core/test_cell_sets",
         "perception/test_tracker",
-        "batch/test_motion",
+        "loops/stages/test_motion",
     )
     places = [
         *(str(ROOT / "tests" / f"{file}.py") for file in files),

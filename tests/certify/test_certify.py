@@ -47,15 +47,16 @@ from care_sim.certify.verdict import verdict_of
 from care_sim.commands.certify import certify
 from care_sim.commands.options.results import Certify
 from care_sim.core.firing import base
-from care_sim.core.types import Scan, Tracks
-from care_sim.driving.braking import BrakingController
+from care_sim.core.types import ImageDetections, Tracks
 from care_sim.loops.needless import NeedlessBraking
-from care_sim.perception.tracker import TrackMemory
+from care_sim.loops.stages.driving import Driving
+from care_sim.loops.stages.motion import Motion
+from care_sim.loops.stages.scanning import Scanning
+from care_sim.loops.stages.sight import Sight
+from care_sim.loops.stages.tracking import Tracking
 from care_sim.policies import make_policy, maker
 from care_sim.policies.makers import is_privileged
-from care_sim.sensors.camera import CameraDetector
-from care_sim.sensors.lidar import Lidar, RecordedLidar
-from care_sim.world.world import World
+from care_sim.sensors.lidar import RecordedLidar
 from tests.helpers.places import ROOT
 
 LIST = [drawn(number) for number in range(CERTIFIED_EPISODES)]
@@ -184,17 +185,15 @@ MADE = replace(
 )
 
 
-def wider(arrived):
-    boxes = arrived.detections.boxes.copy()
-    boxes[:1, 2] += 1
-    return replace(arrived, detections=replace(arrived.detections, boxes=boxes))
+def wider(looked):
+    arrived, shown = looked
+    arrived.rows[0, :1, ImageDetections.BOX.start + 2] += 1
+    return arrived, shown
 
 
-def longer(fired):
-    scan, bodies = fired
-    ranges = scan.ranges.copy()
-    ranges[np.flatnonzero(np.isfinite(ranges))[:1]] += 0.01
-    return Scan(scan.cells, ranges), bodies
+def longer(returns):
+    returns.ranges[0, np.flatnonzero(np.isfinite(returns.ranges[0]))[:1]] += 0.01
+    return returns
 
 
 def other(cells):
@@ -202,24 +201,23 @@ def other(cells):
     return np.sort(np.concatenate([cells[:-1], free]))
 
 
-def moved(_passage, world):
-    world.ego._vehicle.position[0] += 0.001
-    return _passage
+def moved(_none, motion, _state, _accelerations):
+    motion._lanes.rows[0, 0, 0] += 0.001
 
 
-def drifted(_none, memory):
-    memory._table[:1, Tracks.CENTRE.start] += 0.001
+def drifted(_none, _tracking, state):
+    state.tracks.rows[0, :1, Tracks.CENTRE.start] += 0.001
 
 
 @pytest.mark.parametrize(
     ("owner", "name", "call", "change", "environment", "where"),
     [
         # A step of the world is half a keyframe; the first tracks come after a keyframe.
-        (World, "step", 4, moved, "CARE-Dense-v0", (TRAIL_STAGES[0], 2)),
-        (CameraDetector, "newest", 3, wider, "CARE-Dense-v0", (TRAIL_STAGES[1], 2)),
-        (TrackMemory, "predict", 2, drifted, "CARE-Dense-v0", (TRAIL_STAGES[2], 2)),
+        (Motion, "_step", 4, moved, "CARE-Dense-v0", (TRAIL_STAGES[0], 2)),
+        (Sight, "look", 3, wider, "CARE-Dense-v0", (TRAIL_STAGES[1], 2)),
+        (Tracking, "predict", 2, drifted, "CARE-Dense-v0", (TRAIL_STAGES[2], 2)),
         (base, "fired_cells", 3, other, "CARE-Dense-v0", (TRAIL_STAGES[3], 2)),
-        (Lidar, "fire", 3, longer, "CARE-Dense-v0", (TRAIL_STAGES[4], 2)),
+        (Scanning, "scan", 3, longer, "CARE-Dense-v0", (TRAIL_STAGES[4], 2)),
         (
             RecordedLidar,
             "fire",
@@ -229,10 +227,10 @@ def drifted(_none, memory):
             (TRAIL_STAGES[4], 2),
         ),
         (
-            BrakingController,
+            Driving,
             "command",
             3,
-            lambda given: replace(given, braking=not given.braking),
+            lambda given: (given[0], ~given[1]),
             "CARE-Dense-v0",
             (TRAIL_STAGES[5], 2),
         ),
@@ -259,7 +257,7 @@ def test_what_is_broken_is_named(
         calls.append(None)
         if len(calls) != call:
             return found
-        return change(found, given[0]) if change in (moved, drifted) else change(found)
+        return change(found, *given) if change in (moved, drifted) else change(found)
 
     monkeypatch.setattr(owner, name, broken)
     assert first_difference(sound, alone(made, source)) == where

@@ -10,9 +10,9 @@ import care_sim
 from care_sim.core.conditions import DriverSettings
 from care_sim.core.frames import Frame
 from care_sim.core.types import Ego, Tracks
-from care_sim.driving.braking import BrakingController
 from care_sim.driving.corridor import along_route, enters_strip, leaves_s
 from care_sim.world.route import Route
+from tests.helpers.brake import Brake
 
 FRONT, HALF_WIDTH, KEYFRAME = 2.5, 0.9, 0.1
 EDGE = HALF_WIDTH + 0.3 + 0.5
@@ -20,7 +20,7 @@ EDGE = HALF_WIDTH + 0.3 + 0.5
 
 
 def controller(cruise=10.0, **rules):
-    return BrakingController(cruise, FRONT, HALF_WIDTH, KEYFRAME, DriverSettings(**rules))
+    return Brake(cruise, FRONT, HALF_WIDTH, KEYFRAME, DriverSettings(**rules))
 
 
 def objects(*rows, size=(2.0, 1.0, 1.5), yaw=0.0):
@@ -195,7 +195,7 @@ LANE = 3.5
 
 def foreseeing(foresees=True, cruise=10.0):
     rules = DriverSettings(brake_for_oncoming=foresees)
-    return BrakingController(cruise, FRONT, HALF_WIDTH, KEYFRAME, rules)
+    return Brake(cruise, FRONT, HALF_WIDTH, KEYFRAME, rules)
 
 
 def car(x, y, vx, vy, yaw=0.0):

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import ClosedLoopConditions, DriverSettings
 from care_sim.core.types import Command, Ego, Tracks
-from care_sim.driving.braking import BrakingController
 from care_sim.driving.drivers import HUMAN_MODEL as HUMAN
 from care_sim.driving.drivers import (
     CarefulHuman,
@@ -20,7 +19,6 @@ from care_sim.driving.drivers import (
     CruisingRules,
     brake_delay_s,
     check_driver,
-    make_driver,
 )
 from care_sim.world.route import Route, SpeedPlan
 
@@ -117,15 +115,6 @@ def test_it_brakes_down_to_the_other_speed_holds_it_and_gains_speed_on_a_free_ro
     free = driver.command(vehicles(), Ego(10.0))
     assert (free.braking, free.acceleration) == (False, 1.5)
     assert driver.command(vehicles(), Ego(19.95)).acceleration == pytest.approx(0.5)
-
-
-def test_drivers_by_name():
-    made = [
-        make_driver(DriverSettings(driver=name), 10.0, FRONT, HALF_WIDTH, KEYFRAME)
-        for name in ("fixed", "careful-human")
-    ]
-    assert [type(driver) for driver in made] == [BrakingController, CarefulHuman]
-    assert [driver.guarded_m for driver in made] == pytest.approx([2.4, 1.8])
 
 
 @pytest.mark.parametrize(

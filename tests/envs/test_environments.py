@@ -14,6 +14,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.envs import CLOSED_LOOP
 from care_sim.envs.closed_loop import ClosedLoopEnv
+from care_sim.envs.scenarios import ScenarioEnv
 from care_sim.scenarios.base import Scenario
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.traffic import Traffic
@@ -107,8 +108,7 @@ def braked_by(**driver):
     """When the brake is on and how fast the car is, keyframe by keyframe, behind a standing bus
     15 m ahead.
     """
-    env = make("CARE-Dartout-v0", budget=1.0, **driver).unwrapped
-    env.scenario = BusAhead(gap_m=15.0)
+    env = ScenarioEnv(scenario=BusAhead, gap_m=15.0, budget=1.0, **driver)
     env.reset(seed=0)
     over = False
     while not over:
@@ -138,8 +138,7 @@ def test_every_condition_stands_on_the_page_of_the_environments():
 
 def test_a_contact_ends_the_episode_with_the_speed_it_happened_at():
     """Braking from 0.3 s on covers 3.65 m by 0.70 s, 4.05 m by 0.75 s; 7.75 m/s are left."""
-    env = make("CARE-Dartout-v0", budget=1.0).unwrapped
-    env.scenario = BusAhead()
+    env = ScenarioEnv(scenario=BusAhead, budget=1.0)
     env.reset(seed=0)
     steps = [env.step(EVERYTHING) for _ in range(8)]
     env.close()

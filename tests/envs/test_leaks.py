@@ -6,7 +6,6 @@
 import gc
 import os
 import threading
-from dataclasses import dataclass
 from pathlib import Path
 
 import gymnasium
@@ -24,12 +23,9 @@ GROWTH_MB = 20.0
 """A client holds 28 MB; the rest is the allocator's own unrest."""
 
 
-@dataclass(frozen=True)
-class Broken(Dartout):
-    """A street in which something goes wrong once the world is there."""
-
-    def furnish(self, world, crossing_x, rng):
-        raise RuntimeError("no furniture")
+def without_furniture(_scenario, _world, _crossing_x, _rng):
+    """Something goes wrong once the world is there."""
+    raise RuntimeError("no furniture")
 
 
 def made(name="CARE-Dartout-v0", **conditions):
@@ -58,9 +54,10 @@ def reset_twice(seed):
 def failed(seed):
     env = made().unwrapped
     env.reset(seed=seed)
-    env.scenario = Broken()
-    with pytest.raises(BrokenScenario, match="no furniture"):
-        env.reset(seed=seed)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Dartout, "furnish", without_furniture)
+        with pytest.raises(BrokenScenario, match="no furniture"):
+            env.reset(seed=seed)
 
 
 def vector_dropped(seed):

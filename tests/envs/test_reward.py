@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_sim.envs.reward import KEEP_CLEAR_M, REWARD_WEIGHTS, EpisodeReward, weights
-from care_sim.envs.vector.worlds import Rewards
+from care_sim.envs.reward import KEEP_CLEAR_M, REWARD_WEIGHTS, Rewards, weights
 from care_sim.loops.records import Keyframe, Records
 
 
@@ -38,6 +37,13 @@ def nothing(**changes):
     }
 
 
+def of_one(rewards, frame, *flags):
+    """The reward and the terms of one world."""
+    told = [np.array([flag]) for flag in (*flags, True)]
+    (earned,), terms = rewards.of(Records.of([frame]), *told)
+    return earned, {name: column[0] for name, column in terms.items()}
+
+
 @pytest.mark.parametrize(
     ("frame", "before", "expected"),
     [
@@ -61,9 +67,9 @@ def nothing(**changes):
     ],
 )
 def test_terms(frame, before, expected):
-    reward = EpisodeReward(weights(None))
-    reward.of(keyframe(in_view=before[0], detected=before[1]), False, False)
-    earned, terms = reward.of(keyframe(**frame), False, False)
+    rewards = Rewards(weights(None), 1)
+    of_one(rewards, keyframe(in_view=before[0], detected=before[1]), False, False)
+    earned, terms = of_one(rewards, keyframe(**frame), False, False)
     assert terms == nothing(**expected)
     assert earned == pytest.approx(sum(REWARD_WEIGHTS[name] * terms[name] for name in terms))
 
@@ -78,11 +84,11 @@ def losses(*frames):
     """What is lost at keyframes of (distance, whether a full scan detects, whether it was
     detected).
     """
-    reward = EpisodeReward(weights({"gain": 1.0}))
+    rewards = Rewards(weights({"gain": 1.0}), 1)
     last = len(frames) - 1
     terms = [
-        reward.of(keyframe(distance_m=distance, detected=detected), detectable, number == last)[1]
-        for number, (distance, detectable, detected) in enumerate(frames)
+        of_one(rewards, keyframe(distance_m=at, detected=detected), detectable, number == last)[1]
+        for number, (at, detectable, detected) in enumerate(frames)
     ]
     return [-term["gain"] for term in terms]
 
@@ -112,13 +118,13 @@ def test_the_losses_are_positive_and_sum_to_one_at_most(frames):
 
 
 def test_without_a_weight_nothing_is_asked_nor_lost():
-    reward = EpisodeReward(weights(None))
-    assert not reward.needs_bound
-    assert reward.of(keyframe(detected=True), False, False)[1]["gain"] == 0
-    asks = EpisodeReward(weights({"gain": 0.5}))
-    assert asks.needs_bound
-    assert asks.of(keyframe(), True, True) == (-0.5, nothing(gain=-1.0))
-    assert not asks.needs_bound
+    rewards = Rewards(weights(None), 1)
+    assert not rewards.need_bound
+    assert of_one(rewards, keyframe(detected=True), False, False)[1]["gain"] == 0
+    asks = Rewards(weights({"gain": 0.5}), 1)
+    assert asks.need_bound
+    assert of_one(asks, keyframe(), True, True) == (-0.5, nothing(gain=-1.0))
+    assert not asks.need_bound
 
 
 KEYFRAMES = st.builds(
@@ -136,7 +142,7 @@ MOMENTS = st.lists(st.tuples(KEYFRAMES, st.booleans(), st.booleans(), st.boolean
 @given(st.lists(MOMENTS, min_size=1, max_size=3), st.sampled_from([{}, {"gain": 2.0}]))
 def test_many_episodes_are_rewarded_as_each_of_them(episodes, changes):
     together = Rewards(weights(changes), len(episodes))
-    apart = [EpisodeReward(weights(changes)) for _ in episodes]
+    apart = [Rewards(weights(changes), 1) for _ in episodes]
     pause = (keyframe(), False, False, False)
     for now in zip_longest(*episodes, fillvalue=pause):
         records = Records.of([frame for frame, *_ in now])
@@ -146,8 +152,8 @@ def test_many_episodes_are_rewarded_as_each_of_them(episodes, changes):
         for world, one in enumerate(apart):
             expected = (0.0, nothing())
             if who[world]:
-                assert wanted[world] == one.needs_bound
-                expected = one.of(now[world][0], detectable[world], over[world])
+                assert wanted[world] == one.need_bound[0]
+                expected = of_one(one, now[world][0], detectable[world], over[world])
             told = {name: column[world] for name, column in terms.items()}
             assert (earned[world], told) == expected
 

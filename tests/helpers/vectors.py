@@ -60,8 +60,10 @@ def difference(one, other, place=""):
     return None if same else f"{place}: {one!r} {other!r}"
 
 
-def played_alike(name, worlds, steps, *, mode="NextStep", threads=1, policy="care", **arguments):
-    """The first difference between both over `steps` steps from seed 3 on, None without one. Every
+def played_alike(
+    name, worlds, steps, *, mode="NextStep", threads=1, policy="care", seed=3, **arguments
+):
+    """The first difference between both over `steps` steps from a seed on, None without one. Every
     fifth action of world 0 is at random. Worlds that are over begin anew.
     """
     vector = native(name, worlds, threads=threads, autoreset_mode=mode, **arguments)
@@ -69,7 +71,7 @@ def played_alike(name, worlds, steps, *, mode="NextStep", threads=1, policy="car
     rng = np.random.default_rng(0)
     try:
         policies = [care_sim.make_policy(policy, env.unwrapped) for env in reference.envs]
-        given, expected = vector.reset(seed=3), reference.reset(seed=3)
+        given, expected = vector.reset(seed=seed), reference.reset(seed=seed)
         found = difference(
             dict(zip("oi", given, strict=True)), dict(zip("oi", expected, strict=True))
         )

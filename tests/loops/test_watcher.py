@@ -11,7 +11,6 @@ from care_sim.core.firing.actions import EXPLOITATION, FLOOR, RESERVE
 from care_sim.core.sensor_setup import LIDAR_POSITION
 from care_sim.envs.wrappers.record_rerun import Watching
 from care_sim.loops.watcher import WAY_M, Watcher
-from care_sim.sensors.pictures import MIN_PIXELS
 from care_sim.sources.named import source_of
 from care_sim.study.play_config import play_grid
 
@@ -24,9 +23,7 @@ class Notes(Watching):
 
     def look(self, loop):
         labelled = [actor.body for actor in loop.world.actors if actor.label is not None]
-        (picture,) = loop.cameras.pictures
-        seen = np.isin(picture[:, 0], labelled) & (picture[:, 5] >= MIN_PIXELS)
-        self.shown.append(int(np.count_nonzero(seen)))
+        self.shown.append(sum(map(loop.shows, labelled)))
 
     def keep(self, watched):
         self.moments.append(watched)

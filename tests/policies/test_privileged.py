@@ -13,7 +13,7 @@ import pytest
 import care_sim
 from care_sim.base.errors import InvalidInput, MissingExtra
 from care_sim.core.belief import Belief
-from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.loops.one_world import OneWorld
 from care_sim.policies import BUILT_IN, tags_of
 from care_sim.policies.base import PrivilegedPolicy
 from care_sim.policies.paper.blind import FarthestPoints
@@ -45,7 +45,7 @@ def reachable(thing, seen=None):
 
 def knows(policy):
     """Whether an environment, a simulation or truth can be reached from a policy."""
-    inside = (gymnasium.Env, ClosedLoop, World, BulletWorld)
+    inside = (gymnasium.Env, OneWorld, World, BulletWorld)
     return any(isinstance(o, inside) or hasattr(o, "full_scan") for o in reachable(policy).values())
 
 
@@ -70,7 +70,7 @@ def test_a_twin_is_no_part_of_the_environment(environment, encounter):
     world = environment.unwrapped.loop.world
     assert twin is not world
     assert twin.bullet is not world.bullet
-    assert not any(isinstance(thing, gymnasium.Env | ClosedLoop) for thing in reached)
+    assert not any(isinstance(thing, gymnasium.Env | OneWorld) for thing in reached)
 
 
 def test_tags():

@@ -12,7 +12,7 @@ import pytest
 from care_sim.core.firing.base import demanded
 from care_sim.core.types import ImageDetections
 from care_sim.loops.episode import EpisodeSeeds
-from care_sim.perception.tracker import TrackMemory
+from care_sim.loops.stages.tracking import Tracking
 from care_sim.study.designs.paper import paper_study
 from care_sim.study.episode_config import EpisodeConfig
 from tests.helpers.places import EXAMPLES, loaded
@@ -30,13 +30,15 @@ def one_file():
 def detector_output(monkeypatch):
     """Note the detections of the LiDAR, scan by scan."""
     found = []
-    update = TrackMemory.update
+    update = Tracking.update
 
-    def noted(memory, detections, sensor):
-        found.append([*zip(detections.classes.tolist(), detections.boxes, strict=True)])
-        return update(memory, detections, sensor)
+    def noted(tracking, state, detected):
+        own = slice(detected.counts[0])
+        classes, boxes = detected.classes[0, own], detected.boxes[0, own].copy()
+        found.append([*zip(classes.tolist(), boxes, strict=True)])
+        return update(tracking, state, detected)
 
-    monkeypatch.setattr(TrackMemory, "update", noted)
+    monkeypatch.setattr(Tracking, "update", noted)
     return found
 
 

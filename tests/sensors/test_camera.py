@@ -12,16 +12,13 @@ import care_sim
 from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import CameraFaults, Conditions, Sensing
 from care_sim.core.frames import Frame
-from care_sim.core.types import CLASSES, ImageDetections
-from care_sim.sensors.annotated import IdentifiedDetections
+from care_sim.core.types import CLASSES
 from care_sim.sensors.camera import (
     CameraDetector,
-    Delay,
-    Misses,
-    PictureTiming,
     mounted,
     picture_timing,
 )
+from care_sim.sensors.camera_faults import Delay, Detected, Misses
 from care_sim.sensors.engines.picture_kernels import visible_boxes
 from care_sim.sensors.pictures import (
     FRONT_CAMERA,
@@ -164,13 +161,15 @@ def test_rendering_only_a_window_shows_the_same_bodies(bullet):
             assert np.abs(before.max(axis=0) - after.max(axis=0)).max() <= 1
 
 
+HERE = np.ones(1, np.bool_)
 NEAR, FAR = np.full(40, 10.0), np.full(40, 30.0)
 
 
 def missed_by(frames, ranges=NEAR, seed=0, **faults):
     """(frames, objects) who was missed."""
-    misses = Misses(len(ranges), CameraFaults(**faults), np.random.default_rng(seed))
-    return np.array([misses.draw(ranges) for _ in range(frames)])
+    misses = Misses([CameraFaults(**faults)])
+    misses.begin(0, np.random.SeedSequence(seed), len(ranges))
+    return np.array([misses.draw(HERE, ranges[None])[0] for _ in range(frames)])
 
 
 def runs(missing):
@@ -215,17 +214,17 @@ def test_misses_grow_with_the_distance_up_to_all():
 def tagged(number):
     """One detection that says which picture it is of."""
     row = [0, 0.9, number, 0, number + 1, 1, 0, 0, 0]
-    return IdentifiedDetections(
-        ImageDetections.from_rows(np.array([row], float)), np.array([number])
-    )
+    return Detected(np.array([1]), np.array([[row]], float), np.array([[number]]))
 
 
 def delivered(latency, jitter, frames, seed=0):
-    delay = Delay(PictureTiming(latency, 0.0), jitter, 0.1, np.random.default_rng(seed))
+    delay = Delay(np.array([latency]), np.array([jitter]), 0.1)
+    delay.begin(0, np.random.SeedSequence(seed))
     handed_out = []
     for n in range(frames):
-        delay.take(tagged(n), 0.01 * n)
-        handed_out.append(delay.newest(0.01 * n))
+        heading = np.array([0.01 * n])
+        delay.take(HERE, tagged(n), heading)
+        handed_out.append(delay.newest(HERE, heading).take(0))
     assert all(seen.objects.tolist() == seen.detections.boxes[:, 0].tolist() for seen in handed_out)
     return [seen.detections for seen in handed_out]
 

@@ -202,7 +202,8 @@ def played(env, seed):
     loop, everything, over = env.unwrapped.loop, np.ones(env.action_space.shape, np.float32), False
     keyframes = []
     while not over:
-        identified = (loop.cameras if hasattr(loop, "cameras") else loop.shot).seen
+        film = hasattr(loop, "shot")
+        identified = loop.shot.seen if film else loop.faultless(loop.mounted)
         truth = {
             tuple(row) for row in identified.detections.rows().astype(np.float32)[:, SHOWN].tolist()
         }

@@ -37,6 +37,17 @@ CASES = {
     "forgets": ("dense", "care-sbf", 0.1, {"false_negative_rate": 0.3, "camera_jitter": 1}),
     "learned": ("dense", "learned-scorer", 0.05, {"camera_latency": 2}),
     "told": ("dartout", "care-sector", 0.02, {"min_returns": 6, "cell_order": "core-spread"}),
+    "a test": ("ncap", "care", 0.02, {"lidar_dropout": 0.2, "driver": "careful-human"}),
+    "a drive": (
+        "drive",
+        "care",
+        0.01,
+        {
+            "detector": "centerpoint",
+            "camera_profile": "kitti",
+            "scenario_parameters": (("duration_s", 1.0),),
+        },
+    ),
     "unspent": ("dense", "all-camera", 0.3, {"floor": False, "keyframe_s": 0.2}),
 }
 
@@ -64,22 +75,23 @@ def test_episodes_that_end_at_different_keyframes():
     assert [*map(steady, together)] == [steady(run_episode(config)) for config in configs]
 
 
-def test_who_asks_for_truth_and_what_no_arrays_hold_is_played_alone():
-    together = EpisodeConfig("dartout", "care")
-    for config, reason in (
-        (EpisodeConfig("dartout", "history-oracle"), "asks its own world for the truth"),
-        (EpisodeConfig("dartout", "care", lidar_dropout=0.1), "faults of the LiDAR"),
-        (EpisodeConfig("dartout", "care", engine="bullet"), "the engine"),
-    ):
-        with pytest.raises(InvalidInput, match=reason):
-            play_together([config, config.changed(seed=1)])
+def test_who_asks_for_truth_and_what_is_not_built_in_is_played_alone():
+    asking = EpisodeConfig("dartout", "history-oracle")
+    with pytest.raises(InvalidInput, match="asks its own world for the truth"):
+        play_together([asking, asking.changed(seed=1)])
     # What is surely alone does not wait for others in a batch.
     for config in (
-        EpisodeConfig("drive", "care"),
-        EpisodeConfig("dartout", "care", engine="bullet"),
+        asking,
+        EpisodeConfig("care_sim.scenarios.dartout:Dartout", "care"),
+        EpisodeConfig("dartout", "care", detector="cluster"),
     ):
         assert config.batch != config.changed(seed=1).batch
-    assert together.batch == together.changed(seed=1).batch
+    for together in (
+        EpisodeConfig("dartout", "care"),
+        EpisodeConfig("drive", "care", detector="centerpoint", camera_profile="kitti"),
+        EpisodeConfig("ncap", "care", engine="bullet", lidar_dropout=0.1),
+    ):
+        assert together.batch == together.changed(seed=1).batch
 
 
 def test_one_that_fails_costs_only_itself(third_party):

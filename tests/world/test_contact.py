@@ -13,7 +13,8 @@ from care_sim.world.bodies import CATALOGUE
 from care_sim.world.body_tables import Footprints
 from care_sim.world.bullet import BulletWorld
 from care_sim.world.bullet_bodies import pybullet
-from care_sim.world.contact import PADDING_M, ClearanceJudge, LeastClearance, judge_here, least_gap
+from care_sim.world.clearances import Clearances
+from care_sim.world.contact import PADDING_M, ClearanceJudge, judge_here, least_gap
 
 KINDS = ("pedestrian", "bicycle", "car", "bus", "trailer", "hoarding")
 BODIES = st.lists(
@@ -100,14 +101,15 @@ POSES = st.tuples(st.floats(-9.0, 9.0), st.floats(-9.0, 9.0), st.floats(-7.0, 7.
 
 
 class Pair:
-    """The ego and another body, and how often a judge was asked about them."""
+    """The ego and another body, and how often the judge was asked about them."""
 
     def __init__(self, kind):
         self.world = BulletWorld()
         self.footprints = Footprints()
-        self.judge = ClearanceJudge()
-        self.least = LeastClearance(self.judge, CATALOGUE["ego"], CATALOGUE[kind])
-        self.asked = 0
+        self.judge = judge_here()
+        self.clearances = Clearances(1, 4)
+        self.clearances.begin(0, (CATALOGUE["ego"], CATALOGUE[kind]))
+        self.steps, self.asked = np.zeros(1, int), 0
         start = (0.0, 0.0, 0.0)
         self.bodies = []
         for each in (CATALOGUE["ego"], CATALOGUE[kind]):
@@ -123,10 +125,17 @@ class Pair:
 
     def close(self):
         self.world.close()
-        self.judge.close()
+        del self.judge.clearance
 
     def note(self):
-        self.least.note(self.boxes, self.world.primitives.poses[self.bodies])
+        self.steps += 1
+        own, other = ([body] for body in self.bodies)
+        tables = self.footprints.boxes[None], self.world.primitives.poses[None]
+        whose = np.array(own), np.array(other)
+        self.clearances.note(np.ones(1, bool), self.steps, *tables, whose, np.full(1, np.inf))
+
+    def least(self):
+        return self.clearances.least(0, 1, int(self.steps[0]) + 1)
 
     def put(self, *poses):
         table = np.array(poses)
@@ -149,7 +158,7 @@ def test_the_least_of_all_moments_is_that_of_asking_at_each(kind, moments):
             pair.note()
             each.append(pair.world.clearance(*pair.bodies))
             assert least_gap(*pair.boxes) - PADDING_M <= each[-1]
-        assert pair.least.metres() == min(each)
+        assert pair.least() == min(each)
 
 
 def test_of_two_that_come_nearer_only_the_last_moment_is_asked_about():
@@ -157,5 +166,5 @@ def test_of_two_that_come_nearer_only_the_last_moment_is_asked_about():
         for x in (9.0, 8.6, 8.2):
             pair.put((0.0, 0.0, 0.0), (x, 1.0, np.pi / 2))
             pair.note()
-        assert pair.least.metres() == pytest.approx(8.2 - 2.04 - 0.33, abs=0.01)
+        assert pair.least() == pytest.approx(8.2 - 2.04 - 0.33, abs=0.01)
         assert pair.asked == 1

@@ -14,20 +14,8 @@ from numpy.typing import NDArray
 from care_sim.base.checks import as_array, check_seed
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.arrays import Mask
-from care_sim.core.conditions import (
-    CAMERA_FAULTS,
-    DEFAULTS,
-    FIXED,
-    IDEAL_CAMERA,
-    ClosedLoopConditions,
-)
-from care_sim.core.defaults import CELLS
-from care_sim.core.grid import AngularGrid
+from care_sim.core.conditions import CAMERA_FAULTS, DEFAULTS
 from care_sim.envs.closed_loop import ClosedLoopEnv
-from care_sim.envs.scenarios import CutInEnv, DartoutEnv, DenseEnv, R157Env, ScenarioEnv
-from care_sim.scenarios.cutin import CutIn
-from care_sim.scenarios.dartout import Dartout, Dense
-from care_sim.scenarios.r157 import R157
 
 OF_EACH_WORLD = ("budget", *CAMERA_FAULTS, "camera_confidence")
 """Arguments that may be a list, of a value for each world: what an allocator has to cope with."""
@@ -63,14 +51,14 @@ def makers_of(kind: type[ClosedLoopEnv], arguments: Mapping[str, Any], worlds: i
 
 def models_of(makers: Sequence[Maker]) -> list[ClosedLoopEnv]:
     """The environments, which nobody resets, that show what is fixed about each world: one for all
-    whose arguments are alike.
+    whose arguments are alike, unless their detector may remember something.
     """
     made: dict[tuple[str, ...], ClosedLoopEnv] = {}
     models = []
     for make in makers:
         # As they are written: True equals 1, and yet is refused where 1 is taken.
         own = tuple(repr(make.keywords.get(name)) for name in OF_EACH_WORLD)
-        if own not in made:
+        if own not in made or made[own].setting.detector is not None:
             made[own] = make()
         models.append(made[own])
     return models
@@ -127,62 +115,6 @@ def worlds_to_reset(options: dict[str, Any] | None, worlds: int) -> Mask:
     return mask
 
 
-STRAIGHT = (Dartout, Dense, CutIn, R157)
-"""Scenarios on a straight road, without a route, a plan of speeds or an end before their time."""
-PLAIN = (DartoutEnv, DenseEnv, CutInEnv, R157Env, ScenarioEnv)
-"""Environments that do nothing of their own in a step. A class that derives from them may."""
-
-
-def why_separate(env: ClosedLoopEnv) -> str | None:
-    """Why worlds of an environment are played one after the other, None if as arrays."""
-    conditions, rig = env.conditions, env.rig
-    if type(env.scenario) not in STRAIGHT:
-        return f"the scenario {env.scenario_name}"
-    if type(env) not in PLAIN:
-        return f"the class {type(env).__name__}"
-    reasons = {
-        "the detector": not env.detects_by_returns,
-        "the hardware": rig.firing != CELLS,
-        "the LiDAR": not isinstance(rig.grid, AngularGrid)
-        or rig.grid.is_tilted
-        or bool(rig.sensor_y_m),
-    }
-    own = next((name for name, holds in reasons.items() if holds), None)
-    return own or why_conditions_separate(conditions)
-
-
-def why_conditions_separate(conditions: ClosedLoopConditions) -> str | None:
-    """Which conditions have worlds played one after the other, None if none does."""
-    reasons = {
-        "the engine": conditions.engine != "fast",
-        "the driver": conditions.driver != FIXED,
-        "the hardware": conditions.firing != CELLS,
-        "beams": conditions.shapes_beams,
-        "faults of the LiDAR": bool(
-            conditions.lidar_range_sigma
-            or conditions.lidar_dropout
-            or conditions.lidar_dead_rows
-            or conditions.lidar_crosstalk
-        ),
-        "odometry and localisation": bool(
-            conditions.ego_speed_sigma
-            or conditions.ego_position_sigma_m
-            or conditions.ego_yaw_sigma_deg
-        ),
-        "the camera": conditions.camera_profile != IDEAL_CAMERA
-        or bool(
-            conditions.false_positive_rate
-            or conditions.camera_latency_s
-            or conditions.camera_rotation_sigma_deg
-            or conditions.camera_position_sigma_m
-        ),
-    }
-    return next((name for name, holds in reasons.items() if holds), None)
-
-
-Infos = dict[str, Any]
-
-
 def last_rows(observation: Any, over: Mask) -> NDArray[np.object_]:
     """(W,) copies of the observations of the worlds that are `over`, None of the others."""
     rows = np.full(len(over), None, object)
@@ -193,52 +125,6 @@ def last_rows(observation: Any, over: Mask) -> NDArray[np.object_]:
             else observation[world].copy()
         )
     return rows
-
-
-def same_step(infos: Infos, begun: Infos, last: NDArray[np.object_], over: Mask) -> Infos:
-    """What a step tells whose `infos` are of all worlds, if in those that are `over`, with the
-    `last` observations (W,), episodes begin that tell `begun`.
-    """
-    finals = {
-        "final_obs": last,
-        "_final_obs": over.copy(),
-        "final_info": _part(infos, over),
-        "_final_info": over.copy(),
-    }
-    return _joined(_part(infos, ~over), begun) | finals
-
-
-def _part(infos: Infos, who: Mask) -> Infos:
-    """What infos tell of the worlds `who` (W,), in the form of Gymnasium."""
-    part = Infos()
-    for name, column in _columns(infos):
-        told = infos[f"_{name}"] & who
-        if told.any():
-            part[name] = _part(column, who) if isinstance(column, dict) else column.copy()
-            part[f"_{name}"] = told
-            if not isinstance(column, dict):
-                part[name][~told] = None if column.dtype == object else 0
-    return part
-
-
-def _joined(infos: Infos, others: Infos) -> Infos:
-    """What both tell, the `others` of other worlds."""
-    joined = infos | {name: value for name, value in others.items() if name not in infos}
-    for name, column in _columns(others):
-        if name not in infos:
-            continue
-        told = others[f"_{name}"]
-        if isinstance(column, dict):
-            joined[name] = _joined(infos[name], column)
-        else:
-            joined[name] = infos[name].copy()
-            joined[name][told] = column[told]
-        joined[f"_{name}"] = infos[f"_{name}"] | told
-    return joined
-
-
-def _columns(infos: Infos) -> list[tuple[str, Any]]:
-    return [(name, column) for name, column in infos.items() if f"_{name}" in infos]
 
 
 def joined(parts: Sequence[dict[str, Any]]) -> dict[str, Any]:

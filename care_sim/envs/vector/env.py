@@ -25,19 +25,16 @@ from care_sim.envs import scenarios
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.envs.sensing import Observed, checked_scores
 from care_sim.envs.vector.arguments import (
-    Maker,
     autoreset_of,
     joined,
     kept,
     last_rows,
     makers_of,
     models_of,
-    same_step,
     seeds_of,
-    why_separate,
     worlds_to_reset,
 )
-from care_sim.envs.vector.worlds import CompiledWorlds, SeparateWorlds, Stepped, Worlds
+from care_sim.envs.worlds import Stepped, Worlds
 from care_sim.scenarios.base import Scenario
 
 _T = TypeVar("_T")
@@ -85,6 +82,15 @@ MOST_STEPS = 2**31 - 1
 _SINGLE = 'pass vectorization_mode="sync" to gymnasium.make_vec (docs/vectors.md)'
 
 
+def check_steps(single: type[ClosedLoopEnv]) -> None:
+    """Raise InvalidInput for an environment with a step or reset of its own."""
+    for name in ("step", "reset"):
+        if getattr(single, name) is not getattr(ClosedLoopEnv, name):
+            raise InvalidInput(
+                f"{single.__name__} has its own {name}, which many worlds do not call: {_SINGLE}"
+            )
+
+
 class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
     """Worlds of one environment, played together: `num_envs` of them on up to `threads` threads.
 
@@ -125,8 +131,8 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         self.autoreset_mode = autoreset_of(autoreset_mode)
         self.metadata = {**self.single.metadata, "autoreset_mode": self.autoreset_mode}
         self.copy = copy
-        makers = makers_of(self.single, arguments, num_envs)
-        self._models = models_of(makers)
+        check_steps(self.single)
+        self._models = models_of(makers_of(self.single, arguments, num_envs))
         # Settings that all worlds share are read from world 0.
         self._model = self._models[0]
         self._one_budget = len({model.rig.budget for model in self._models}) == 1
@@ -141,7 +147,7 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         count = min(num_envs, threads)
         ends = [num_envs * k // count for k in range(count + 1)]
         self._shares = [slice(*ends[k : k + 2]) for k in range(count)]
-        self._worlds = [self._made(share, makers) for share in self._shares]
+        self._worlds = [self._made(share) for share in self._shares]
         self._threads = Threads(count)
         self._steps = np.zeros(num_envs, np.int64)
         self._over = np.zeros(num_envs, np.bool_)
@@ -231,17 +237,21 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         stepped = self._played(scores, ~begins)
         self._steps += ~begins
         stepped.truncated[:] |= ~begins & (self._steps >= self._most_steps)
-        infos = self._infos(stepped, ~begins)
         over = stepped.terminated | stepped.truncated
 
         # What is over begins anew, now or at the next step. In the mode "SameStep" its last
         # observation and info are told apart from the first ones of the new episode.
         anybody = [None] * self.num_envs
         if self.autoreset_mode == AutoresetMode.SAME_STEP and over.any():
-            last = last_rows(self._observed, over)
-            infos = same_step(infos, self._begin(over, anybody, {}), last, over)
+            final = {
+                "final_obs": last_rows(self._observed, over),
+                "_final_obs": over.copy(),
+                "final_info": self._infos(stepped, over),
+                "_final_info": over.copy(),
+            }
+            infos = self._begin(over, anybody, self._infos(stepped, ~over)) | final
         else:
-            infos = self._begin(begins, anybody, infos)
+            infos = self._begin(begins, anybody, self._infos(stepped, ~begins))
             self._over = over
         return self._handed_out(), stepped.rewards, stepped.terminated, stepped.truncated, infos
 
@@ -265,13 +275,11 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         if self.closed:
             raise gymnasium.error.ClosedEnvironmentError("the environment is closed: make another")
 
-    def _made(self, share: slice, makers: Sequence[Maker]) -> Worlds:
+    def _made(self, share: slice) -> Worlds:
         rows = _rows(self._observed, share)
-        if not any(map(why_separate, {*self._models})):
-            # Where no info tells of clearances, few of them are needed.
-            exact = self._model.scoring_info
-            return CompiledWorlds(self._models[share], rows, exact, self._one_budget)
-        return SeparateWorlds(makers[share], rows)
+        settings = [model.setting for model in self._models[share]]
+        # Where no info tells of clearances, few of them are needed.
+        return Worlds(settings, rows, self._model.scoring_info, self._one_budget)
 
     def _played(self, scores: NDArray[np.float32], who: Mask) -> Stepped:
         # An error leaves worlds at different keyframes: then all have to begin anew.
@@ -283,16 +291,20 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
             ]
         )
         self._begun[:] = True
-        single = {
-            share.start + world: info
-            for share, part in zip(self._shares, parts, strict=True)
-            for world, info in part.single.items()
-        }
         rewards, terminated, truncated = (
             np.concatenate(column) for column in zip(*(part[:3] for part in parts), strict=True)
         )
-        columns = joined([part.columns for part in parts])
-        return Stepped(rewards, terminated, truncated, columns, single)
+        return Stepped(
+            rewards,
+            terminated,
+            truncated,
+            joined([part.columns for part in parts]),
+            {
+                share.start + world: info
+                for share, part in zip(self._shares, parts, strict=True)
+                for world, info in part.single.items()
+            },
+        )
 
     def _begin(
         self, who: Mask, seeds: Sequence[int | None], infos: dict[str, Any]

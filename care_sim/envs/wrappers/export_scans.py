@@ -22,7 +22,7 @@ from care_sim.core.firing.actions import SHARES
 from care_sim.core.grid import Cells
 from care_sim.core.types import CLASSES, Action, Tracks
 from care_sim.envs.wrappers.record_rerun import Watching, numbered
-from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.loops.one_world import OneWorld
 from care_sim.loops.open_loop import OpenLoop
 from care_sim.loops.records import Keyframe
 from care_sim.loops.watcher import Watched
@@ -92,7 +92,7 @@ class ExportScans(Watching):
         self._open3d: ModuleType = import_open3d()
         self._path = self._folder = Path(path)
 
-    def begin(self, loop: ClosedLoop | OpenLoop, episode: int) -> None:
+    def begin(self, loop: OneWorld | OpenLoop, episode: int) -> None:
         """Make the folder."""
         self._folder = numbered(self._path, episode)
         if any(self._folder.glob("[0-9]*.pcd")):

@@ -15,7 +15,7 @@ from care_sim.base.extras import import_rerun
 from care_sim.core.types import Action
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.envs.open_loop import OpenLoopEnv
-from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.loops.one_world import OneWorld
 from care_sim.loops.open_loop import OpenLoop
 from care_sim.loops.watcher import Watched, Watcher
 from care_sim.policies.base import Policy
@@ -198,7 +198,7 @@ class RecordRerun(Watching):
         self._name = name or (policy.name if policy is not None else "") or "agent"
         self._episode: RecordedEpisode | None = None
 
-    def begin(self, loop: ClosedLoop | OpenLoop, episode: int) -> None:
+    def begin(self, loop: OneWorld | OpenLoop, episode: int) -> None:
         """Open the file of this episode, or its lane in a file that was given."""
         if self._path is not None:
             self._recording = recording(

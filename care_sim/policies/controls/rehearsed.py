@@ -20,8 +20,8 @@ from care_sim.core.frames import Frame
 from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
-from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.episode import EpisodeSeeds
+from care_sim.loops.one_world import OneWorld
 from care_sim.policies.base import Policy
 from care_sim.policies.controls.patterns import Pattern, likeliest_first
 from care_sim.policies.controls.patterns_and_tracks import HistoryPattern
@@ -45,7 +45,7 @@ def known_scenario(told: Scenario | str | None) -> Scenario:
     return make_scenario(name)
 
 
-def rehearsal(scenario: Scenario, seed: int, rig: Rig) -> ClosedLoop:
+def rehearsal(scenario: Scenario, seed: int, rig: Rig) -> OneWorld:
     """The episode of a seed before its first keyframe, as an environment without faults builds it.
 
     The caller closes its world.
@@ -54,7 +54,8 @@ def rehearsal(scenario: Scenario, seed: int, rig: Rig) -> ClosedLoop:
     world = scenario.make_world(np.random.default_rng(seeds.scenario))
     # A rig that was made alone may have no camera; the scenario's environment has these.
     equipped = rig if rig.cameras else replace(rig, cameras=scenario.cameras)
-    return ClosedLoop(world, equipped, ClosedLoopConditions(), seeds.sensors)
+    given = equipped, ClosedLoopConditions(), seeds.sensors, scenario.duration_s
+    return OneWorld.begun(world, *given)
 
 
 class LearnedPlace(Pattern):
@@ -105,13 +106,13 @@ def _first_hull(rig: Rig, scenario: Scenario, seed: int) -> Cells:
         over = False
         while (target := world.first_sighting) and not over:
             # Where the actor is at the scan: the keyframe moves the world on.
-            boxes = loop.sensor.boxes_to_local(world.boxes([target]))
+            boxes = loop.sensor.boxes_to_local(loop.world.boxes([target]))
             record = loop.keyframe(everything)
             if record.detected:
                 (hull,) = rig.hulls(boxes)
                 return hull
-            hit = record.impact_speed_mps is not None
-            over = hit or world.is_over() or world.time >= scenario.duration_s
+            hit, now = record.impact_speed_mps is not None, loop.world
+            over = hit or now.is_over() or now.time >= scenario.duration_s
     return np.zeros(0, np.int64)
 
 

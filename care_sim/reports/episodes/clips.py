@@ -10,7 +10,7 @@ from PIL import Image, ImageDraw
 
 from care_sim.base.checks import check_number
 from care_sim.base.errors import InvalidInput
-from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.loops.one_world import OneWorld
 from care_sim.loops.open_loop import OpenLoop, SceneKeyframe
 from care_sim.loops.records import Keyframe
 from care_sim.loops.watcher import Watched
@@ -30,7 +30,7 @@ _OUTCOME_TOP = 32
 
 
 def view_of(
-    loop: ClosedLoop | OpenLoop, frames: Sequence[Any], watched: Watched | None = None
+    loop: OneWorld | OpenLoop, frames: Sequence[Any], watched: Watched | None = None
 ) -> View:
     """Return the view after the keyframes `frames` of a loop, the last of which may be
     `watched`.
@@ -67,7 +67,7 @@ class Clip:
         film: list[Image.Image] = []
         self._films.append(film)
 
-        def watch(loop: ClosedLoop | OpenLoop, frame: Keyframe | SceneKeyframe) -> None:
+        def watch(loop: OneWorld | OpenLoop, frame: Keyframe | SceneKeyframe) -> None:
             if self._path is not None:
                 # Episodes of one clip have the same keyframe, because they meet the same world.
                 self._keyframe_s = loop.rig.keyframe_s

@@ -9,7 +9,7 @@ from care_sim.base.checks import check_known, check_number
 from care_sim.base.errors import InvalidInput
 from care_sim.base.files import PNG, check_output, replacing
 from care_sim.envs.wrappers.record_rerun import Watching
-from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.loops.one_world import OneWorld
 from care_sim.loops.open_loop import OpenLoop
 from care_sim.loops.watcher import Watched
 from care_sim.policies.base import Policy
@@ -48,7 +48,7 @@ class Photo:
         """`env`, watched where there is a path."""
         return env if self._path is None else _Watched(env, policy, self)
 
-    def show(self, loop: ClosedLoop | OpenLoop, watched: Watched) -> None:
+    def show(self, loop: OneWorld | OpenLoop, watched: Watched) -> None:
         """Take the picture after a keyframe, if none is taken and the keyframe is the one."""
         if self._at is None and isinstance(loop, OpenLoop):
             self._nobody = "nobody appeared"
@@ -72,7 +72,7 @@ class _Watched(Watching):
         super().__init__(env, policy)
         self._photo = photo
 
-    def begin(self, loop: ClosedLoop | OpenLoop, episode: int) -> None:
+    def begin(self, loop: OneWorld | OpenLoop, episode: int) -> None:
         """Nothing: the picture is one for all."""
 
     def keep(self, watched: Watched) -> None:

@@ -14,8 +14,8 @@ import numpy as np
 from care_sim.core.conditions import FilmedReturns
 from care_sim.core.types import CLASSES
 from care_sim.evaluation.recall import CENSORED_AT
-from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.film import Film
+from care_sim.loops.one_world import OneWorld
 from care_sim.loops.open_loop import OpenLoop, SceneKeyframe
 from care_sim.loops.records import Keyframe, Outcome
 from care_sim.loops.watcher import sought
@@ -70,23 +70,23 @@ class Recorder:
         self._poses: list[dict[int, list[int]]] = []
         self._seen: list[set[int]] = []
 
-    def before(self, loop: ClosedLoop | OpenLoop) -> None:
+    def before(self, loop: OneWorld | OpenLoop) -> None:
         """Take down what there is and what is known before the coming keyframe."""
         self.loop = loop
-        read: Any = _of_world if isinstance(loop, ClosedLoop) else _of_film
+        read: Any = _of_world if isinstance(loop, OneWorld) else _of_film
         moment, poses, seen = read(loop)
         self._poses.append({body: whole_pose(pose) for body, pose in poses.items()})
         self._seen.append(seen)
-        sensor = loop.sensor if isinstance(loop, ClosedLoop) else loop.shot.sensor
+        sensor = loop.sensor if isinstance(loop, OneWorld) else loop.shot.sensor
         moment |= known_before(loop.belief, sensor, loop.rig, self._tracked)
         for name, value in moment.items():
             self._columns.setdefault(name, []).append(value)
 
-    def after(self, loop: ClosedLoop | OpenLoop, frame: Keyframe | SceneKeyframe) -> None:
+    def after(self, loop: OneWorld | OpenLoop, frame: Keyframe | SceneKeyframe) -> None:
         """Take down what the keyframe fired, and what there is before the next."""
         assert frame.fired is not None
         self._columns["rays"].append(fullness(frame.fired, loop.rig.grid))
-        if isinstance(loop, ClosedLoop) or not loop.over:
+        if isinstance(loop, OneWorld) or not loop.over:
             self.before(loop)
 
     def story(self, bodies: Sequence[int], car_size: Sequence[float]) -> dict[str, Any]:
@@ -105,7 +105,7 @@ class Recorder:
         return [poses.get(body) for poses in self._poses]
 
 
-def _of_world(loop: ClosedLoop) -> tuple[dict[str, Any], dict[int, Any], set[int]]:
+def _of_world(loop: OneWorld) -> tuple[dict[str, Any], dict[int, Any], set[int]]:
     """The moment, the poses of the bodies that are there, and which of them the cameras show."""
     world, actors = loop.world, [*enumerate(loop.world.actors)]
     poses = {n: actor.pose_at(world.time) for n, actor in actors}
@@ -158,7 +158,7 @@ def replayed(config: EpisodeConfig | PlayConfig) -> Replay:
     return Replay(row, standing, story, tuple(Outcome.__dataclass_fields__))
 
 
-def _told(loop: ClosedLoop, keyframes: Sequence[Keyframe]) -> dict[str, Any]:
+def _told(loop: OneWorld, keyframes: Sequence[Keyframe]) -> dict[str, Any]:
     """Return the keyframes as columns, and whom the episode is about."""
     world, about = loop.world, sought(loop.world)
 
@@ -192,7 +192,7 @@ def _told(loop: ClosedLoop, keyframes: Sequence[Keyframe]) -> dict[str, Any]:
     }
 
 
-def _way(loop: ClosedLoop) -> list[list[int]] | None:
+def _way(loop: OneWorld) -> list[list[int]] | None:
     """Points of the route from its start to where the LiDAR reaches now, None straight ahead."""
     if loop.world.route is None:
         return None

@@ -44,7 +44,7 @@ from care_sim.core.conditions import MIN_RETURNS
 from care_sim.core.grid import Cells
 from care_sim.envs.open_loop import FilmEnv
 from care_sim.evaluation.sightings import RANGE_M
-from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.loops.one_world import OneWorld
 from care_sim.loops.open_loop import OpenLoop
 from care_sim.policies.learned.cell_inputs import CellInputs, Float32s
 from care_sim.policies.learned.weights import save_weights
@@ -118,7 +118,7 @@ def balanced(parts: Iterable[Examples]) -> Examples:
     return replace(together, weights=weights.astype(np.float32))
 
 
-def untracked_cells(loop: OpenLoop | ClosedLoop) -> tuple[Cells, Float32s]:
+def untracked_cells(loop: OpenLoop | OneWorld) -> tuple[Cells, Float32s]:
     """Cells (n,) of the coming keyframe that should fire, and what each weighs (n,). Truth.
 
     In the full scan they have a return from an object in range that has no track and can be
@@ -151,7 +151,7 @@ def _in_share(world: World, rng: np.random.Generator) -> bool:
 
 
 def _keyframe(
-    loop: OpenLoop | ClosedLoop, belief: Belief, inputs: CellInputs, rng: np.random.Generator
+    loop: OpenLoop | OneWorld, belief: Belief, inputs: CellInputs, rng: np.random.Generator
 ) -> Examples:
     positive, shares = untracked_cells(loop)
     # Drawn from all cells and not from the others alone: a few of so many are positive.

@@ -22,8 +22,8 @@ from care_sim.core.grid import Cells
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.envs.open_loop import FilmEnv
 from care_sim.envs.scenarios import DriveEnv, NcapEnv
-from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.film import Film, Shot
+from care_sim.loops.one_world import OneWorld
 from care_sim.loops.open_loop import OpenLoop
 from care_sim.policies.base import Policy
 from care_sim.sources.street_films import record
@@ -100,7 +100,7 @@ def kept(env: AnyEnv, rng: np.random.Generator, share: float = 1.0) -> bool:
     return bool(rng.random() < KEPT_PER_S * env.rig.keyframe_s * share)
 
 
-def present(loop: OpenLoop | ClosedLoop) -> Present:
+def present(loop: OpenLoop | OneWorld) -> Present:
     """Return the objects at the coming keyframe. Truth."""
     if isinstance(loop, OpenLoop):
         annotations, cloud = loop.shot.annotations, loop.shot.cloud.to_shots()

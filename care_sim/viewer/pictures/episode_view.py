@@ -15,7 +15,7 @@ from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.residual import explained
 from care_sim.core.types import CLASSES
 from care_sim.evaluation.outcomes import outcome
-from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.loops.one_world import OneWorld
 from care_sim.loops.records import Keyframe
 from care_sim.loops.watcher import sought, way_ahead
 from care_sim.sensors.annotated import NO_OBJECT
@@ -38,7 +38,7 @@ _BEHIND_RAD = np.deg2rad(170.0)
 _AHEAD_RAD = np.deg2rad(10.0)
 
 
-def cameras_picture(scene: BulletWorld, loop: ClosedLoop) -> Image.Image:
+def cameras_picture(scene: BulletWorld, loop: OneWorld) -> Image.Image:
     """Draw every camera's view with its detections: those that a forecast explains in one colour,
     the others in another, and in a third, crossed out, those that show nothing.
 
@@ -75,7 +75,7 @@ def cameras_picture(scene: BulletWorld, loop: ClosedLoop) -> Image.Image:
     return canvas
 
 
-def _picture(scene: BulletWorld, loop: ClosedLoop, number: int, width: int) -> Image.Image:
+def _picture(scene: BulletWorld, loop: OneWorld, number: int, width: int) -> Image.Image:
     """Draw the picture of camera `number`, `width` pixels wide."""
     camera, seen = loop.rig.cameras[number], loop.belief.detections
     scale = width / camera.width
@@ -120,7 +120,7 @@ _PANEL_CAMERA = PinholeCamera(
 BOXES_MEAN = "boxes: tracks, faint when the last scan missed them"
 
 
-def episode_view(loop: ClosedLoop, frames: Sequence[Keyframe]) -> View:
+def episode_view(loop: OneWorld, frames: Sequence[Keyframe]) -> View:
     """The present state of `loop` after the keyframes `frames`, and the scan of the last of them.
 
     The street has tracks as wireframes, arrows at whom the episode is about and at whom the car
@@ -144,7 +144,7 @@ def episode_view(loop: ClosedLoop, frames: Sequence[Keyframe]) -> View:
     )
 
 
-def _clearance(loop: ClosedLoop, frame: Keyframe) -> str:
+def _clearance(loop: OneWorld, frame: Keyframe) -> str:
     target = loop.world.first_sighting
     if target is None or not np.isfinite(frame.clearance_m):
         return ""
@@ -168,7 +168,7 @@ def verdict(frames: Sequence[Keyframe], keyframe_s: float) -> State:
     return State(words, palette.DETECTED.colour)
 
 
-def _scenery(loop: ClosedLoop, frame: Keyframe | None, whole: bool) -> Scenery:
+def _scenery(loop: OneWorld, frame: Keyframe | None, whole: bool) -> Scenery:
     camera = CHASE_CAMERA if whole else _PANEL_CAMERA
     with furnished(loop.world) as scene:
         # The cameras do not see the car that carries them, nor the marks on the ground.
@@ -186,7 +186,7 @@ def _scenery(loop: ClosedLoop, frame: Keyframe | None, whole: bool) -> Scenery:
 
 
 def _mark_street(
-    street: Image.Image, camera: PinholeCamera, loop: ClosedLoop, frame: Keyframe | None
+    street: Image.Image, camera: PinholeCamera, loop: OneWorld, frame: Keyframe | None
 ) -> Labels:
     """Tracks as wireframes with their classes, those that the last scan missed faint, arrows at
     whom the episode is about, and in a corner what the boxes mean. Gives the labels, for more.
@@ -215,7 +215,7 @@ def _mark_street(
 
 
 def mark_sought(
-    labels: Labels, camera: PinholeCamera, loop: ClosedLoop, frame: Keyframe | None
+    labels: Labels, camera: PinholeCamera, loop: OneWorld, frame: Keyframe | None
 ) -> None:
     """An arrow at everybody whom the episode is about, and at whom the car hit.
 
@@ -235,7 +235,7 @@ def mark_sought(
             labels.arrow(at, f"{actor.name}: {state.words}", state.colour)
 
 
-def contact_text(loop: ClosedLoop, frame: Keyframe) -> str | None:
+def contact_text(loop: OneWorld, frame: Keyframe) -> str | None:
     """Whom the car hit in a keyframe, and how fast it was, or who hit the car; None without a
     contact.
     """
@@ -247,19 +247,19 @@ def contact_text(loop: ClosedLoop, frame: Keyframe) -> str | None:
     return f"HIT {hit.name} at {frame.impact.speed_mps:.1f} m/s"
 
 
-def _hit_actor(loop: ClosedLoop, frame: Keyframe | None) -> Actor | None:
+def _hit_actor(loop: OneWorld, frame: Keyframe | None) -> Actor | None:
     if frame is None or frame.impact is None:
         return None
     return next(actor for actor in loop.world.actors if actor.body == frame.impact.body)
 
 
-def _state(loop: ClosedLoop, frame: Keyframe | None, actor: Actor) -> State:
+def _state(loop: OneWorld, frame: Keyframe | None, actor: Actor) -> State:
     if frame is not None and _is_detected(loop, frame, actor):
         return palette.DETECTED
     return palette.IN_VIEW if loop.shows(actor.body) else palette.OUT_OF_VIEW
 
 
-def _is_detected(loop: ClosedLoop, frame: Keyframe, actor: Actor) -> bool:
+def _is_detected(loop: OneWorld, frame: Keyframe, actor: Actor) -> bool:
     if not loop.world.meetings:
         return frame.detected
     return any(

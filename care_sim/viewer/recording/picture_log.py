@@ -14,7 +14,7 @@ from care_sim.core.firing.actions import SHARES
 from care_sim.core.grid import Cells
 from care_sim.core.residual import wedges
 from care_sim.core.types import CLASSES, ImageDetections
-from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.loops.one_world import OneWorld
 from care_sim.loops.open_loop import OpenLoop
 from care_sim.loops.watcher import TrueSituation, Watched
 from care_sim.viewer import palette
@@ -40,7 +40,7 @@ _QUALITY = 80
 class PictureLog:
     """Logs the camera's picture, of which a film keeps none, and the picture of the grid."""
 
-    def __init__(self, lane: Lane, loop: ClosedLoop | OpenLoop):
+    def __init__(self, lane: Lane, loop: OneWorld | OpenLoop):
         self._lane = lane
         self._rig = loop.rig
         self._photo: Image.Image | None = None
@@ -71,9 +71,9 @@ class PictureLog:
             # Detections are drawn on it, at every keyframe.
             lane.fix(_CAMERA, _encoded(Image.fromarray(backdrop(camera))))
 
-    def look(self, loop: ClosedLoop | OpenLoop) -> None:
+    def look(self, loop: OneWorld | OpenLoop) -> None:
         """Take the camera's picture of the keyframe that is about to be played."""
-        if isinstance(loop, ClosedLoop):
+        if isinstance(loop, OneWorld):
             camera = loop.rig.cameras[0]
             self._photo = photograph(loop.world.bullet, camera, loop.sensor)
 

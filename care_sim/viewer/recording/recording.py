@@ -11,7 +11,7 @@ import rerun.blueprint as rrb
 
 from care_sim.base.errors import InvalidInput, printable, unknown
 from care_sim.base.files import RERUN, replacing
-from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.loops.one_world import OneWorld
 from care_sim.loops.open_loop import OpenLoop
 from care_sim.loops.watcher import Watched
 from care_sim.viewer.palette import BACKGROUND, Colour
@@ -154,7 +154,7 @@ class Recording(AbstractContextManager["Recording"]):
         page = rr.TextDocument(about(entities_of(open_loop)), media_type=rr.MediaType.MARKDOWN)
         self._stream.log(ABOUT_ENTITY, page, static=True)
 
-    def episode(self, name: str, loop: ClosedLoop | OpenLoop) -> "RecordedEpisode":
+    def episode(self, name: str, loop: OneWorld | OpenLoop) -> "RecordedEpisode":
         """Begin the lane `name`. Raises InvalidInput for a name that is none of `lanes`."""
         if name not in self._lanes:
             raise unknown("lane", name, self._lanes)
@@ -176,15 +176,15 @@ class Recording(AbstractContextManager["Recording"]):
 class RecordedEpisode:
     """Logs one episode, keyframe by keyframe, of either loop."""
 
-    def __init__(self, lane: Lane, loop: ClosedLoop | OpenLoop, colour: Colour):
+    def __init__(self, lane: Lane, loop: OneWorld | OpenLoop, colour: Colour):
         self._lane = lane
         # A film has no driver, who would guard a strip.
-        guarded_m = loop.guarded_m if isinstance(loop, ClosedLoop) else 0.0
+        guarded_m = loop.guarded_m if isinstance(loop, OneWorld) else 0.0
         self._space = SpaceLog(lane, loop.rig, guarded_m)
         self._pictures = PictureLog(lane, loop)
         self._curves = MeasureLog(lane, loop.rig.budget, colour, isinstance(loop, OpenLoop))
 
-    def look(self, loop: ClosedLoop | OpenLoop) -> None:
+    def look(self, loop: OneWorld | OpenLoop) -> None:
         """Take the camera's picture of the keyframe that is about to be played."""
         self._pictures.look(loop)
 

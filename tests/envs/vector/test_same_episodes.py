@@ -1,16 +1,13 @@
 """World i of a vector environment is the single environment, to the last bit."""
 
-from inspect import getsource
-
-import numpy as np
 import pytest
 
-from care_sim.core.conditions import DEFAULTS, RETURN_SETTINGS
+from care_sim import InvalidInput
+from care_sim.core.conditions import DEFAULTS
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.envs import CLOSED_LOOP
 from care_sim.envs.scenarios import DartoutEnv
-from care_sim.envs.vector.arguments import why_conditions_separate, why_separate
 from care_sim.envs.vector.env import ClosedLoopVectorEnv
 from tests.helpers.vectors import MODES, native, played_alike
 
@@ -41,10 +38,40 @@ CONDITIONS = {
     "with all that a learner gains": {"reward_weights": {"gain": 2.0}},
     "without scoring": {"scoring_info": False, "secret": "a text that nobody knows"},
     "several cameras": {"sensor": "paper-vehicle", "duration_s": 3.0} | LATE,
-    # These are played one after the other.
-    "noisy": {"lidar_range_sigma": 0.05, "lidar_dropout": 0.2},
+    # In these, stages go world by world.
+    "noisy": {"lidar_range_sigma": 0.05, "lidar_dropout": 0.2, "lidar_dead_rows": (3, 4)},
+    "jammed": {"lidar_crosstalk": 0.1},
+    "rolling": {"lidar_sweep_s": 0.1, "lidar_compensated": True},
+    "wide beams": {"lidar_divergence_mrad": 3.0, "lidar_returns": "both"},
+    "weather": {
+        "lidar_stated_range_m": 40.0,
+        "lidar_stated_reflectance": 0.2,
+        "visibility_m": 200.0,
+        "rain_mm_h": 20.0,
+    },
     "by tiles": {"firing": "tiles:4x8"},
+    "shared energy": {"firing": "energy:3"},
+    "a window without a floor": {"firing": "azimuth-window", "floor": False},
     "a measured detector": {"detector": "centerpoint"},
+    "a detector of points": {"detector": "cluster", "duration_s": 1.0},
+    "lost": {
+        "ego_speed_sigma": 0.5,
+        "ego_position_sigma_m": 0.3,
+        "ego_yaw_sigma_deg": 1.0,
+        "ego_pose_correlation_s": 1.0,
+    },
+    "a human": {"driver": "careful-human"},
+    "bullet": {"engine": "bullet", "duration_s": 0.6},
+    "a camera that invents": {"false_positive_rate": 1.0, "camera_latency_s": 0.13},
+    "crooked": {"camera_rotation_sigma_deg": 1.0, "camera_position_sigma_m": 0.1},
+    "a measured camera": {"camera_profile": "kitti"} | LATE,
+}
+SLOW_CONDITIONS = {
+    "rolling",
+    "a detector of points",
+    "bullet",
+    "a camera that invents",
+    "a measured camera",
 }
 
 OWN_BUDGETS = {"budget": [0.01, 0.2, 0.03]}
@@ -65,7 +92,6 @@ OWN = {
     "both": OWN_BUDGETS | OWN_FAULTS,
     "budgets without a floor": OWN_BUDGETS | {"floor": False},
     "budgets without scoring": OWN_BUDGETS | {"scoring_info": False},
-    # These are played one after the other.
     "budgets of noisy worlds": OWN_BUDGETS | {"lidar_dropout": 0.2},
     "one profile of a detector": {"camera_profile": ["kitti", "yolox", "ideal"]},
 }
@@ -81,26 +107,24 @@ def test_every_world_and_every_mode(name, mode):
 
 
 @pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("arguments", [{}, {"lidar_dropout": 0.2}], ids=["arrays", "separate"])
+@pytest.mark.parametrize("arguments", [{}, {"lidar_dropout": 0.2}], ids=["plain", "noisy"])
 def test_episodes_end_after_the_most_steps(mode, arguments):
     arguments = arguments | {"max_episode_steps": 5}
     assert played_alike("CARE-CutIn-v0", worlds=2, steps=14, mode=mode, **arguments) is None
 
 
-@pytest.mark.parametrize("conditions", CONDITIONS.values(), ids=CONDITIONS)
-def test_conditions(conditions):
-    arguments = {"budget": 0.03} | conditions
-    assert played_alike("CARE-Dense-v0", worlds=2, steps=62, **arguments) is None
+@pytest.mark.parametrize("name", CONDITIONS)
+def test_conditions(name):
+    arguments = {"budget": 0.03} | CONDITIONS[name]
+    steps = 8 if name in SLOW_CONDITIONS else 62
+    assert played_alike("CARE-Dense-v0", worlds=2, steps=steps, **arguments) is None
 
 
-def test_every_condition_is_played_here_or_apart():
-    """One that `batch` does not know and nobody played here would be lost without a word."""
+def test_every_condition_is_played():
+    """One that nobody played here would be lost without a word."""
     played = {name for own in (*CONDITIONS.values(), *OWN.values()) for name in own}
-    apart = getsource(why_conditions_separate)
-    of_beams = {*RETURN_SETTINGS}
-    unheard = {n for n in DEFAULTS if n not in played | of_beams and n not in apart}
-    # The first says how long errors last that are played apart; the others are of films.
-    assert unheard == {"ego_pose_correlation_s", "sweep_mask", "clutter"}
+    # These are of films.
+    assert {*DEFAULTS} - played == {"sweep_mask", "clutter"}
 
 
 @pytest.mark.parametrize("own", OWN.values(), ids=OWN)
@@ -133,17 +157,13 @@ class Miser(DartoutEnv):
 
     def step(self, action):
         observation, _, *rest = super().step(action)
-        return observation, 7.0, *rest
+        return observation, 0.0, *rest
 
 
 class Misers(ClosedLoopVectorEnv):
     single = Miser
 
 
-def test_a_class_that_derives_from_an_environment_plays_as_it_does():
-    assert why_separate(DartoutEnv()) is None
-    assert why_separate(Miser()) == "the class Miser"
-    env = Misers(2, threads=1)
-    env.reset(seed=0)
-    assert env.step(np.zeros(env.action_space.shape, np.float32))[1].tolist() == [7.0, 7.0]
-    env.close()
+def test_a_class_with_a_step_of_its_own_is_refused_in_one_line():
+    with pytest.raises(InvalidInput, match="Miser has its own step, which many"):
+        Misers(2, threads=1)

@@ -1,14 +1,13 @@
-"""What the cameras of many worlds show is what each single loop sees, to the last bit."""
+"""What goes wrong with the cameras of many worlds is what goes wrong with each alone."""
 
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from care_sim.batch.camera_faults import BatchDelay, BatchMisses, Detected, DrawnAhead
 from care_sim.core.conditions import CameraFaults
-from care_sim.core.types import ImageDetections
-from care_sim.sensors.annotated import IdentifiedDetections
-from care_sim.sensors.camera import Delay, Misses, PictureTiming
+from care_sim.sensors.camera_faults import Delay, Detected, DrawnAhead, Misses
+
+HERE = np.ones(1, np.bool_)
 
 
 @given(st.integers(0, 2**32), st.integers(0, 12), st.integers(0, 9))
@@ -40,22 +39,20 @@ def test_numbers_drawn_ahead_are_those_of_single_draws(seed, objects, jitter):
 )
 def test_the_misses_are_those_of_one_world(seed, faults):
     sizes = [3, 0, 7]
-    together = BatchMisses(faults)
+    together = Misses(faults)
     apart = []
     for world, size in enumerate(sizes):
         together.begin(world, np.random.SeedSequence((seed, world)), size)
-        rng = np.random.default_rng(np.random.SeedSequence((seed, world)))
-        apart.append(Misses(size, faults[world], rng))
+        apart.append(Misses([faults[world]]))
+        apart[world].begin(0, np.random.SeedSequence((seed, world)), size)
     rng = np.random.default_rng(seed)
     for _ in range(20):
         ranges, live = rng.uniform(0, 60, (3, 7)), rng.random(3) < 0.7
-        if not together.any:
-            continue
         missed = together.draw(live, ranges)
         for world in np.flatnonzero(live).tolist():
             size = sizes[world]
-            expected = apart[world].draw(ranges[world, :size])
-            assert missed[world, :size].tolist() == expected.tolist()
+            expected = apart[world].draw(HERE, ranges[[world], :size])
+            assert missed[[world], :size].tolist() == expected.tolist()
 
 
 @settings(max_examples=40)
@@ -65,22 +62,24 @@ def test_the_misses_are_those_of_one_world(seed, faults):
 )
 def test_what_is_late_arrives_as_in_one_world(seed, latencies, jitters):
     seeds = [np.random.SeedSequence((seed, world)) for world in range(2)]
-    together = BatchDelay(np.array(latencies), np.array(jitters), 0.1)
+    together = Delay(np.array(latencies), np.array(jitters), 0.1)
     apart = []
     for world in range(2):
         together.begin(world, seeds[world])
-        rng = np.random.default_rng(seeds[world])
-        apart.append(Delay(PictureTiming(latencies[world], 0.0), jitters[world], 0.1, rng))
+        late = np.array([latencies[world]]), np.array([jitters[world]])
+        apart.append(Delay(*late, 0.1))
+        apart[world].begin(0, seeds[world])
     rng = np.random.default_rng(seed)
     for _ in range(25):
         live = rng.random(2) < 0.8
         counts, rows, headings = rng.integers(0, 4, 2), rng.random((2, 3, 9)), rng.random(2)
-        # A picture of a rendered world is new when it is taken.
-        rows[:, :, ImageDetections.AGE :] = 0.0
-        arrived = together.newest(live, Detected(counts, rows), headings)
+        objects = rng.integers(9, size=(2, 3))
+        together.take(live, Detected(counts, rows, objects), headings)
+        arrived = together.newest(live, headings)
         for world in np.flatnonzero(live).tolist():
-            taken = ImageDetections.from_checked_rows(rows[world, : counts[world]].copy())
-            bodies = np.zeros(counts[world], np.int64)
-            apart[world].take(IdentifiedDetections(taken, bodies), headings[world])
-            expected = apart[world].newest(headings[world]).detections.rows()
-            assert arrived.rows[world, : arrived.counts[world]].tolist() == expected.tolist()
+            own = [table[[world]] for table in (counts, rows, objects)]
+            apart[world].take(HERE, Detected(*own), headings[[world]])
+            expected = apart[world].newest(HERE, headings[[world]]).take(0)
+            found = arrived.take(world)
+            assert found.detections.rows().tolist() == expected.detections.rows().tolist()
+            assert found.objects.tolist() == expected.objects.tolist()

@@ -1,15 +1,16 @@
-"""Worlds in a batch move as each does alone, to the last bit."""
+"""Worlds that move together move as each does alone, to the last bit."""
 
 from contextlib import closing
 
 import numpy as np
 import pytest
 
-from care_sim.batch.motion import KNOWN_BELOW_M, Motion, steps_of
-from care_sim.batch.state import BatchState, load
 from care_sim.core.types import Ego
+from care_sim.loops.stages.motion import KNOWN_BELOW_M, Motion, steps_of
+from care_sim.loops.stages.state import State, load
 from care_sim.scenarios import make_scenario
 from care_sim.world.bodies import CATALOGUE
+from care_sim.world.contact import ClearanceJudge
 from care_sim.world.traffic import Traffic
 from care_sim.world.world import World
 
@@ -32,7 +33,7 @@ class Batch:
     """Worlds, moved in a batch, and their like, each moved alone."""
 
     def __init__(self, *builds):
-        self.state = BatchState(len(builds))
+        self.state = State(len(builds))
         self.motion = Motion(len(builds), steps_of(KEYFRAMES * KEYFRAME_S, KEYFRAME_S))
         self.alone = [None] * len(builds)
         for world, build in enumerate(builds):
@@ -58,6 +59,7 @@ class Batch:
 
     def assert_same(self, world):
         alone, state = self.alone[world], self.state
+        assert_alike(self.motion.current(state, world), alone)
         count = state.bodies.counts[world]
         boxes = alone.boxes_of(np.arange(count))
         assert state.bodies.boxes[world, :count].tobytes() == boxes.tobytes()
@@ -70,9 +72,21 @@ class Batch:
         assert ego == alone.ego_motion
 
     def close(self):
-        self.motion.close()
         for world in self.alone:
             world.close()
+
+
+def assert_alike(world, other):
+    """What anybody may read off both is the same."""
+    for read in (
+        lambda one: (one.time, one.ego_motion, one.ego.pose, one.along_m, one.ego.speed),
+        lambda one: [actor.pose_at(one.time) for actor in one.actors],
+        lambda one: one._footprints.boxes.tobytes(),
+        lambda one: one._before.tobytes(),
+        lambda one: one.bullet.primitives.poses.tobytes(),
+        lambda one: one.linear_motion().rates.tobytes(),
+    ):
+        assert read(world) == read(other)
 
 
 def of(name, seed, **physics):
@@ -125,13 +139,16 @@ def test_only_a_contact_is_an_impact(gap_m, hit):
 def test_clearances_that_are_put_off_are_settled_in_the_end(name, monkeypatch):
     asked, clearances, bounds = [], [], []
     with closing(Batch(*(of(name, seed) for seed in range(4)))) as batch:
-        judge = batch.motion._judge
-        exactly = judge.clearance
-        monkeypatch.setattr(judge, "clearance", lambda *its: asked.append(1) or exactly(*its))
+        exactly = ClearanceJudge.clearance
+        monkeypatch.setattr(
+            ClearanceJudge, "clearance", lambda *its: asked.append(1) or exactly(*its)
+        )
         for _ in range(KEYFRAMES):
             passages = batch.motion.advance(batch.state, np.zeros(4), KEYFRAME_S, exact=False)
             bounds.append(passages.clearance_m)
+            count = len(asked)
             clearances.append([one.advance(0.0, KEYFRAME_S).clearance_m for one in batch.alone])
+            del asked[count:]
         exact, told = np.array(clearances), np.array(bounds)
         assert (told <= exact).all()
         assert ((told == exact) | (told > KNOWN_BELOW_M)).all()

@@ -1,16 +1,16 @@
-"""What all worlds fire is what each fires alone."""
+"""What all worlds fire is what each fires alone, with any hardware."""
 
 from functools import partial
 
 import numpy as np
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
-from care_sim.batch.scanning import Choice
 from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.firing.floor import RandomFloor
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
+from care_sim.loops.stages.choice import Choice
 
 WORLDS = 3
 GRID = AngularGrid(columns=8, rows=5)
@@ -31,6 +31,7 @@ keyframes = st.lists(
 )
 
 
+HARDWARE = st.sampled_from(["cells", "rows", "energy:3", "vertical-window"])
 budgets = st.lists(st.integers(1, GRID.size), min_size=WORLDS, max_size=WORLDS)
 
 
@@ -39,28 +40,33 @@ def rows(fired):
     return [row[:count].tolist() for count, row in zip(counts, cells, strict=True)]
 
 
-@given(keyframes, budgets, st.booleans(), st.integers(0, 2))
-def test_every_world_fires_as_if_alone(played, budgets, floor, floor_seed):
-    rig = Rig(GRID)
+def at(*cells):
+    """The scores of an action that demands these cells alone."""
+    return [float(cell in cells) for cell in range(GRID.size)]
+
+
+# A window stays where it stood, in each world, if nothing is demanded.
+STANDING = [([at(0), at(16), at(32)], [True] * 3), ([at()] * 3, [True] * 3)]
+
+
+@example(STANDING, [16] * 3, False, 0, "vertical-window")
+@given(keyframes, budgets, st.booleans(), st.integers(0, 2), HARDWARE)
+def test_every_world_fires_as_if_alone(played, budgets, floor, floor_seed, firing):
+    rig = Rig(GRID, firing=firing)
     conditions = ClosedLoopConditions(floor=floor, floor_seed=floor_seed)
     choice = Choice(rig, conditions, np.array(budgets))
-    floors = []
+    floors, last = [], [NOTHING] * WORLDS
     for world in range(WORLDS):
         choice.begin(world, np.random.SeedSequence(world))
         floors.append(RandomFloor(np.random.SeedSequence(world), floor_seed, GRID.size))
     now = np.zeros(WORLDS, np.int64)
     for given_scores, live in played:
         action = np.array(given_scores, np.float32).reshape(WORLDS, *GRID.shape)
-        alone = [
-            rig.hardware.fire(
-                action[world],
-                budgets[world],
-                partial(floors[world].at, now[world]) if floor else None,
-                NOTHING,
-            ).tolist()
-            if live[world]
-            else []
-            for world in range(WORLDS)
-        ]
+        alone = [[]] * WORLDS
+        for world in np.flatnonzero(live).tolist():
+            drawn = partial(floors[world].at, now[world]) if floor else None
+            given_ones = action[world], budgets[world], drawn, last[world]
+            last[world] = rig.hardware.fire(*given_ones)
+            alone[world] = last[world].tolist()
         assert rows(choice.fired(action, np.array(live), now)) == alone
         now += live

@@ -1,19 +1,20 @@
-"""The state of a batch of worlds, as arrays with a row per world that compiled code takes whole.
+"""The state of W worlds, as arrays with a row per world that compiled code takes whole.
 
 W worlds, each with its own numbers of bodies, parts, tracks: tables are as long as the longest
 needs, and `counts` (W,) says how many rows of a world's table are in use. What lies beyond them
 means nothing. World frame, metres and radians, unless it says otherwise.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from care_sim.base.compiled import compiled
-from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.arrays import Floats, Integers, Mask, filled
 from care_sim.core.belief import MAX_TRACKS
-from care_sim.core.frames import mounted_at, placed_at, seen_from
+from care_sim.core.frames import Frame, placed_at, seen_from
+from care_sim.core.grid import Cells
 from care_sim.core.types import Tracks
 from care_sim.world.approach import Impact
 from care_sim.world.bullet import NO_BODY
@@ -90,6 +91,22 @@ class Sensors(NamedTuple):
     turns: Floats
     turns_back: Floats
 
+    @classmethod
+    def of(cls, worlds: int) -> "Sensors":
+        """Tables of so many worlds."""
+        return cls(np.zeros((worlds, 6)), np.zeros((worlds, 2)), np.zeros((worlds, 2)))
+
+    def frame(self, world: int) -> Frame:
+        """That of a world."""
+        x, y, z, yaw, _, _ = self.poses[world].tolist()
+        return Frame(x, y, z, yaw)
+
+    def put(self, world: int, frame: Frame) -> None:
+        """Write that of a world."""
+        self.poses[world, :4] = frame.x, frame.y, frame.z, frame.yaw
+        self.turns[world] = np.cos(frame.yaw), np.sin(frame.yaw)
+        self.turns_back[world] = frame.turn_back
+
 
 class Egos(NamedTuple):
     """Each car's own motion: `speeds`, `yaw_rates`, `accelerations` (W,) as in
@@ -105,10 +122,23 @@ class Egos(NamedTuple):
 
 
 class Fired(NamedTuple):
-    """The cells of a keyframe: `cells` (W, F), ascending in each row."""
+    """The cells of a keyframe: `cells` (W, F), ascending in each row. One that is fired several
+    times is there as often.
+    """
 
     counts: Integers
     cells: Integers
+
+    @classmethod
+    def of(cls, rows: Sequence[Cells]) -> "Fired":
+        """The cells of each world."""
+        counts = np.array([len(row) for row in rows])
+        if len(rows) == 1:
+            return cls(counts, np.ascontiguousarray(rows[0], np.int64)[None])
+        cells = np.zeros((len(rows), counts.max(initial=0)), np.int64)
+        for world, row in enumerate(rows):
+            cells[world, : len(row)] = row
+        return cls(counts, cells)
 
 
 class Passages(NamedTuple):
@@ -125,7 +155,7 @@ class Passages(NamedTuple):
     impacts: dict[int, Impact]
 
 
-class BatchState:
+class State:
     """The tables of `worlds` worlds."""
 
     def __init__(self, worlds: int):
@@ -164,36 +194,18 @@ class BatchState:
         self.tracks = TrackTables(
             _counts(worlds), np.zeros((worlds, MAX_TRACKS, len(Tracks.COLUMNS))), _counts(worlds)
         )
-        self.sensors = Sensors(np.zeros((worlds, 6)), np.zeros((worlds, 2)), np.zeros((worlds, 2)))
+        self.sensors = self.taken = self.driven = Sensors.of(worlds)
+        """Where the LiDARs are; where the software takes them to be; and where it takes the point
+        of the car's middle line beside them to be, from which the driver measures.
+        """
+        self.read = np.zeros((worlds, 3))
+        """(W, 3) speed, yaw rate and acceleration that the odometry reads, within their limits."""
         motion = np.zeros(worlds), np.zeros(worlds), np.zeros(worlds)
         self.egos = Egos(*motion, _counts(worlds), _counts(worlds))
 
 
-def filled(table: np.ndarray, world: int, rows: np.ndarray) -> np.ndarray:
-    """The table (W, n, ...) with `rows` (k, ...) at the beginning of a world's; a longer table, if
-    they need more room than there is.
-    """
-    if len(rows) > table.shape[1]:
-        longer = np.zeros((len(table), 2 * len(rows), *table.shape[2:]), table.dtype)
-        longer[:, : table.shape[1]] = table
-        table = longer
-    table[world, : len(rows)] = rows
-    return table
-
-
 def _counts(worlds: int) -> Integers:
     return np.zeros(worlds, np.int64)
-
-
-def place_sensors(state: BatchState, at: tuple[float, float, float]) -> None:
-    """Write where the sensors are, which are mounted `at` (x, y, z) on the egos."""
-    x, y, yaw = state.bodies.boxes[np.arange(state.worlds), state.egos.bodies][:, [0, 1, 6]].T
-    sensors = state.sensors
-    cos, sin = np.cos(yaw), np.sin(yaw)
-    sensors.turns[:, 0], sensors.turns[:, 1] = cos, sin
-    sensors.turns_back[:, 0], sensors.turns_back[:, 1] = np.cos(-yaw), np.sin(-yaw)
-    sensors.poses[:, 0], sensors.poses[:, 1] = mounted_at((x, y), (cos, sin), at)
-    sensors.poses[:, 2], sensors.poses[:, 3] = at[2], yaw
 
 
 @compiled()
@@ -212,16 +224,7 @@ def placed_by(sensors: Sensors, world: int, boxes: Floats) -> Floats:
     return placed_at(boxes, (cos, sin), (x, y, z, yaw))
 
 
-@compiled()
-def seen_by_each(sensors: Sensors, worlds: Integers, boxes: Floats) -> Floats:
-    """Boxes (n, 7), one of each of some `worlds` (n,), each in the frame of the sensor there."""
-    seen = np.empty_like(boxes)
-    for n in range(len(worlds)):
-        seen[n] = seen_by(sensors, worlds[n], boxes[n : n + 1])[0]
-    return seen
-
-
-def load(state: BatchState, world: int, built: World) -> None:
+def load(state: State, world: int, built: World) -> None:
     """Write the tables of a `world` of the batch anew: bodies, parts, classes, the ego; no tracks,
     and keyframe 0.
     """
@@ -235,6 +238,24 @@ def load(state: BatchState, world: int, built: World) -> None:
     state.egos.accelerations[world] = motion.acceleration
     state.tracks.counts[world] = state.tracks.next_ids[world] = 0
 
+    load_bodies(state, world, built)
+
+    # Ids count up in the order in which bodies were added, and so do those that are reported.
+    labels = built.labels()
+    state.reported.by_body[world] = -1
+    by_body = np.full(int(state.bodies.counts[world]), -1)
+    by_body[[*labels]] = [*labels.values()]
+    reported = state.reported
+    reported.counts[world] = len(labels)
+    state.reported = reported._replace(
+        bodies=filled(reported.bodies, world, np.array([*labels], np.int64)),
+        classes=filled(reported.classes, world, np.array([*labels.values()], np.int64)),
+        by_body=filled(reported.by_body, world, by_body),
+    )
+
+
+def load_bodies(state: State, world: int, built: World) -> None:
+    """Write the bodies of a `world` and their parts anew."""
     primitives = built.bullet.primitives
     count = len(primitives.poses)
     boxes = built.boxes_of(np.arange(count))
@@ -252,18 +273,6 @@ def load(state: BatchState, world: int, built: World) -> None:
     state.outlines.counts[world] = len(meshes[-1])
     outlines = _all_filled(state.outlines[1:], world, meshes)
     state.outlines = Outlines(state.outlines.counts, *outlines)
-
-    # Ids count up in the order in which bodies were added, and so do those that are reported.
-    labels = built.labels()
-    by_body = np.full(count, -1)
-    by_body[[*labels]] = [*labels.values()]
-    reported = state.reported
-    reported.counts[world] = len(labels)
-    state.reported = reported._replace(
-        bodies=filled(reported.bodies, world, np.array([*labels], np.int64)),
-        classes=filled(reported.classes, world, np.array([*labels.values()], np.int64)),
-        by_body=filled(reported.by_body, world, by_body),
-    )
 
 
 def _all_filled(

@@ -8,8 +8,8 @@ from care_sim.core.frames import Frame
 from care_sim.core.rig import Rig
 from care_sim.core.sensor_setup import LIDAR_POSITION
 from care_sim.core.types import CLASSES
-from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.episode import SensorSeeds
+from care_sim.loops.one_world import OneWorld
 from care_sim.sensors.pictures import FRONT_CAMERA
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.route import Route, SpeedPlan
@@ -52,11 +52,12 @@ def row_of_cars(street):
 
 
 def loop_in(world, seeds=(0, 1, 2), **conditions):
-    return ClosedLoop(
+    return OneWorld.begun(
         world,
         RIG,
         ClosedLoopConditions(**conditions),
         SensorSeeds(*(np.random.SeedSequence(seed) for seed in (*seeds, 3))),
+        10.0,
     )
 
 
@@ -71,7 +72,7 @@ def test_a_keyframe_tells_time_speed_and_distance_at_its_scan(street):
     loop = loop_in(world)
     frames, travelled = [], []
     for _ in range(6):
-        travelled.append(world.ego.pose[0])
+        travelled.append(loop.world.ego.pose[0])
         frames.append(loop.keyframe(EVERYTHING))
     ahead = BUMPER + 12.0 + BUS - LIDAR_POSITION[0]
     assert [frame.index for frame in frames] == list(range(6))

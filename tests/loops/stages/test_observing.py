@@ -5,13 +5,13 @@ from gymnasium.vector.utils import create_empty_array
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from care_sim.batch.loop import Observing
-from care_sim.batch.state import BatchState
 from care_sim.core.belief import MAX_DETECTIONS, MAX_TRACKS
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES, Ego, ImageDetections, Tracks
 from care_sim.envs.sensing import observation_space
 from care_sim.loops.observation_limits import Limits
+from care_sim.loops.stages.observing import Observing
+from care_sim.loops.stages.state import State
 from care_sim.sensors.pictures import CAMERA_HEIGHT, CAMERA_WIDTH, FRONT_CAMERA
 
 RIG = Rig(cameras=(FRONT_CAMERA,))
@@ -43,9 +43,9 @@ def tracks(rng, count, reach):
 
 def told(egos, seen, known, live):
     """What `Observing` writes of worlds, over ones, and what each would be told alone."""
-    state = BatchState(len(egos))
+    state = State(len(egos))
     state.live[:] = live
-    state.egos.speeds[:], state.egos.yaw_rates[:], state.egos.accelerations[:] = egos.T
+    state.read[:] = np.clip(egos, *Limits(RIG).ego)
     observed = create_empty_array(observation_space(RIG), len(egos), np.ones)
     tables = []
     for parts in (seen, known):
@@ -55,7 +55,7 @@ def told(egos, seen, known, live):
             rows[world, : len(part)] = part
         tables.append((np.array([*map(len, parts)]), rows))
     observed["ranges"][:] = 0.0
-    Observing(RIG, np.full(len(egos), RIG.budget)).write(state, *tables, observed)
+    Observing(Limits(RIG), np.full(len(egos), RIG.budget)).write(state, *tables, observed)
     alone = [
         Limits(RIG)
         .belief(Ego(*ego), ImageDetections.from_rows(boxes), Tracks.from_rows(rows), NOWHERE)

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from care_sim.batch.lane_columns import SPEED, LaneColumns
 from care_sim.world.bodies import CATALOGUE
+from care_sim.world.lane_columns import SPEED, LaneColumns
 from care_sim.world.traffic import Traffic
 
 CAR, EGO = CATALOGUE["car"], CATALOGUE["ego"]

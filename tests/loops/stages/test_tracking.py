@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from care_sim.batch.scanning import Found
-from care_sim.batch.state import BatchState, filled
-from care_sim.batch.tracking import Tracking
 from care_sim.core.frames import Frame
 from care_sim.core.types import Detections
+from care_sim.loops.stages.detecting import Found
+from care_sim.loops.stages.state import State
+from care_sim.loops.stages.tracking import Tracking
 from care_sim.perception.tracker import MemoryRules, TrackMemory
 
 DT = 0.1
@@ -20,42 +20,41 @@ def test_crowds_are_tracked_as_in_a_single_world(people, spread, line):
     """Of 300 that are new at every keyframe there are soon more than a table has rows."""
     worlds, keyframes = 3, 8
     draw = np.random.default_rng(people)
-    state = BatchState(worlds)
+    state = State(worlds)
     rules, tracking = MemoryRules(velocity_keyframes=line), Tracking(DT, line)
     memories = [TrackMemory(DT, rules) for _ in range(worlds)]
     state.live[:] = True, True, False
     boxes = draw.normal(size=(worlds, people, 7)) * spread
     boxes[:, :, 3:6] = 1.0
     classes = draw.integers(0, 2, (worlds, people))
-    for world in range(worlds):
-        rows = state.reported._replace(
-            bodies=filled(state.reported.bodies, world, np.arange(people)),
-            classes=filled(state.reported.classes, world, classes[world]),
-        )
-        state.reported = rows
     for _ in range(keyframes):
         boxes[:, :, :2] += draw.normal(size=(worlds, people, 2)) * (40 if people == 300 else 0.5)
-        found = Found(np.zeros(worlds, np.int64), np.zeros((worlds, people), np.int64))
+        empty = np.zeros((worlds, people), np.int64)
+        found = Found(
+            np.zeros(worlds, np.int64),
+            empty,
+            np.zeros((worlds, people, 7)),
+            empty.copy(),
+            empty.copy(),
+        )
+        ids = {}
         for world in range(worlds):
-            state.bodies = state.bodies._replace(
-                boxes=filled(state.bodies.boxes, world, boxes[world])
-            )
             seen = np.flatnonzero(draw.random(people) < 0.8)
-            found.counts[world] = len(seen)
-            found.rows[world, : len(seen)] = seen
             sensor = Frame(*draw.normal(size=2), 1.84, draw.uniform(-3, 3))
-            state.sensors.poses[world] = sensor.x, sensor.y, sensor.z, sensor.yaw, 0, 0
-            state.sensors.turns[world] = np.cos(sensor.yaw), np.sin(sensor.yaw)
-            state.sensors.turns_back[world] = sensor.turn_back
+            state.sensors.put(world, sensor)
+            local = sensor.boxes_to_local(boxes[world, seen])
+            found.counts[world] = len(seen)
+            found.classes[world, : len(seen)] = classes[world, seen]
+            found.boxes[world, : len(seen)] = local
             if state.live[world]:
-                local = sensor.boxes_to_local(boxes[world, seen])
                 detections = Detections(classes[world, seen], local, np.full(len(seen), 3))
-                memories[world].update(detections, sensor)
+                ids[world] = memories[world].update(detections, sensor)
         tracking.update(state, found)
-        counts, rows = tracking.seen(state)
+        for world, expected in ids.items():
+            assert found.tracks[world, : len(expected)].tolist() == expected.tolist()
+        counts, rows = tracking.seen(state, state.taken)
         for world in np.flatnonzero(state.live):
-            pose = state.sensors.poses[world]
-            expected = memories[world].tracks(Frame(*pose[:4])).rows()
+            expected = memories[world].tracks(state.sensors.frame(world)).rows()
             same(rows[world, : counts[world]], expected)
             memories[world].predict()
         tracking.predict(state)

@@ -10,8 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from care_sim.base.compiled import compiled
-from care_sim.batch.state import filled
-from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.arrays import Floats, Integers, Mask, filled
 from care_sim.world.lane_flow import (
     BRAKING_MPS2,
     EXPONENT,

@@ -1,0 +1,279 @@
+"""What plays the worlds of closed-loop environments: one of a single one, many of a vector."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from gymnasium.utils import seeding
+from numpy.typing import NDArray
+
+from care_sim.base.times import LAST_BITS_S
+from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.conditions import ClosedLoopConditions
+from care_sim.core.rig import Rig
+from care_sim.envs.reward import Rewards
+from care_sim.envs.sensing import Observed
+from care_sim.evaluation.outcomes import drive_outcome_of, outcome_of
+from care_sim.loops.episode import Episode, EpisodeSeeds, most_keyframes
+from care_sim.loops.false_box_pools import pool_of_another_drive
+from care_sim.loops.loop import Loop
+from care_sim.loops.records import Outcome, Records, Sight, kind_of
+from care_sim.loops.stages.choice import Choice
+from care_sim.loops.stages.state import Fired
+from care_sim.perception.points_only import Detector
+from care_sim.scenarios.base import Scenario
+from care_sim.scenarios.drive import DriveScenario
+from care_sim.sensors.camera_profiles import invents_boxes
+from care_sim.sensors.false_boxes import EMPTY_POOL, BoxPool
+from care_sim.world.world import World
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What is fixed about the episodes of a closed-loop environment. The `detector` is None for the
+    paper's proxy; `weights` holds one of every term of the reward; `scoring_info` says whether
+    infos hold what is for scoring alone.
+    """
+
+    scenario: Scenario
+    rig: Rig
+    conditions: ClosedLoopConditions
+    detector: Detector | None
+    weights: Mapping[str, float]
+    secret: str
+    scoring_info: bool
+
+    def episode(self, entropy: int) -> Episode:
+        """What an episode begins with, without its pool. The caller closes its world."""
+        seeds = EpisodeSeeds.of(entropy, self.secret)
+        world = self.scenario.make_world(np.random.default_rng(seeds.scenario))
+        return Episode(world, seeds.sensors, seeds.floor)
+
+    def pool(self, entropy: int) -> BoxPool:
+        """The boxes that false ones are drawn from, if there are any: those of another drive
+        through this scenario.
+        """
+        if not invents_boxes(self.conditions):
+            return EMPTY_POOL
+        seeds = EpisodeSeeds.of(entropy, self.secret)
+        world = self.scenario.make_world(np.random.default_rng(seeds.another))
+        drive = world, self.scenario.duration_s, self.rig, self.conditions, seeds.sensors
+        return pool_of_another_drive(*drive, self.detector)
+
+
+class History:
+    """The records of the running episodes of `worlds` worlds, of up to `keyframes` each."""
+
+    def __init__(self, worlds: int, keyframes: int):
+        # Any column is exact as a float. A row more, for worlds that rest after their last one.
+        self._table = np.zeros((keyframes + 1, worlds, len(Records._fields)))
+        self._all = np.arange(worlds)
+
+    def note(self, keyframes: Integers, records: Records) -> None:
+        """Keep the records of the `keyframes` (W,); a world that rests keeps them until it goes
+        on.
+        """
+        self._table[keyframes, self._all] = np.array(records, float).T
+
+    def episode(self, world: int, keyframes: int) -> Records:
+        """The first `keyframes` records of a world's episode, (keyframes,) each."""
+        columns = self._table[:keyframes, world].T
+        return Records(
+            *(
+                column.astype(kind_of(name))
+                for name, column in zip(Records._fields, columns, strict=True)
+            )
+        )
+
+
+class Stepped(NamedTuple):
+    """What n worlds give at a step: rewards, terminations and truncations (n,), 0 and False of
+    those that did not play; what `info` says of all in `columns` (n, ...), by name, which the next
+    step may write over; and what it says of one alone in `single`, by world.
+    """
+
+    rewards: Floats
+    terminated: Mask
+    truncated: Mask
+    columns: dict[str, Any]
+    single: dict[int, dict[str, Any]]
+
+
+class Worlds:
+    """A loop over a world for each of the `settings`, which differ at most in budget, camera and
+    detector. Each writes the observation of its coming keyframe into its row of `observed`.
+
+    Unless `exact`, clearances that no reward needs are bounds (`Loop`); outcomes are exact.
+    `one_budget` says whether all worlds of the vector environment, those of other threads too, fire
+    equally many cells: infos then hold them as one array, else as one for each world.
+    """
+
+    records: Records
+    """Of the last keyframe."""
+
+    def __init__(
+        self,
+        settings: Sequence[Setting],
+        observed: Observed | None = None,
+        exact: bool = True,
+        one_budget: bool = True,
+    ):
+        worlds = len(settings)
+        # Settings that all worlds share are read from world 0.
+        self._settings = settings
+        self._first = first = settings[0]
+        self._exact = exact
+        rigs, conditions = [each.rig for each in settings], [each.conditions for each in settings]
+        self._budgets = np.array([rig.budget for rig in rigs])
+        self._one_budget = one_budget
+        duration_s = first.scenario.duration_s
+        detectors = [each.detector for each in settings]
+        self.loop = Loop(rigs, conditions, duration_s, detectors, observed, exact)
+        self.observed = self.loop.observed
+        self._rewards = Rewards(first.weights, worlds)
+        self._history = History(worlds, most_keyframes(duration_s, first.rig.keyframe_s))
+        self._is_drive = isinstance(first.scenario, DriveScenario)
+        self._sights: list[list[tuple[Sight, ...]]] = [[] for _ in settings]
+        self._built: dict[int, World] = {}
+        self._choice: Choice | None = None
+        # Each world draws the seeds of its later episodes as a single environment does.
+        self._generators: list[np.random.Generator | None] = [None] * worlds
+
+    def begin(self, seeds: Mapping[int, int | None]) -> dict[int, dict[str, Any]]:
+        """Begin an episode in those that have a seed or None here, as `reset` of the single
+        environment does with it; their infos.
+        """
+        entropies = {world: self._entropy(world, seed) for world, seed in seeds.items()}
+        if self._choice is None:
+            self._choice = Choice(self._first.rig, self._first.conditions, self._budgets)
+        infos = {}
+        for world, (episode, info) in self.start(entropies).items():
+            self._choice.begin(world, episode.floor)
+            infos[world] = info
+        return infos
+
+    def start(self, entropies: Mapping[int, int]) -> dict[int, tuple[Episode, dict[str, Any]]]:
+        """Begin the episodes of seeds, by world; each with its info."""
+        begun = {}
+        for world, entropy in entropies.items():
+            setting = self._settings[world]
+            if world in self._built:
+                self._built.pop(world).close()
+            pool = setting.pool(entropy)
+            episode = setting.episode(entropy)._replace(pool=pool)
+            built = self._built[world] = episode.world
+            self._rewards.begin(world)
+            self._sights[world] = []
+            drawn = {"drawn": dict(built.drawn)} if built.drawn else {}
+            begun[world] = episode, {"seed": entropy, **drawn} if setting.scoring_info else {}
+        self.loop.begin({world: episode for world, (episode, _) in begun.items()})
+        return begun
+
+    def step(self, actions: NDArray[np.float32], who: Mask) -> Stepped:
+        """Let those play that are True in `who` (n,), with their rows of `actions` (n, E, A)."""
+        assert self._choice is not None
+        fired = self._choice.fired(actions, who, self.loop.state.keyframes)
+        stepped = self.play(fired, who)
+        told = {
+            world: {"fired": fired.cells[world, : fired.counts[world]]} | self.loop.told(world)
+            for world in _places(who)
+        }
+        if self._first.conditions.floor:
+            return stepped._replace(columns=self._columns(told) | stepped.columns)
+        # Cells of different numbers, as lists: they are no column.
+        for world, own in told.items():
+            lists = {name: values.tolist() for name, values in own.items()}
+            stepped.single[world] = lists | stepped.single.get(world, {})
+        return stepped
+
+    def _columns(self, told: Mapping[int, Mapping[str, np.ndarray]]) -> dict[str, NDArray[Any]]:
+        """What was `told` of the cells of worlds: (W, B), or (W,) arrays of each world's own where
+        budgets differ.
+        """
+        conditions, worlds = self._first.conditions, len(self._budgets)
+        # There are columns even where nobody plays, to be joined with those of other threads.
+        kinds: dict[str, type] = {"fired": np.int64}
+        kinds |= {"intensities": np.float64} if conditions.shapes_beams else {}
+        kinds |= {"times_s": np.float64} if conditions.lidar_sweep_s else {}
+        shape = (worlds, self._budgets[0]) if self._one_budget else (worlds,)
+        columns = {
+            name: np.zeros(shape, kind if self._one_budget else object)
+            for name, kind in kinds.items()
+        }
+        for world, own in told.items():
+            for name, column in columns.items():
+                column[world] = own[name] if self._one_budget else own[name].copy()
+        return columns
+
+    def play(self, fired: Fired, who: Mask) -> Stepped:
+        """Let those play that are True in `who` (n,), and fire these cells; without what infos tell
+        of them.
+        """
+        # Asked before the keyframe, which moves the worlds on, and only while it is needed: it
+        # costs rays.
+        loop, first = self.loop, self._first
+        needed = self._rewards.need_bound & who
+        detectable = loop.detectable(needed) if needed.any() else needed
+        keyframes = loop.state.keyframes.copy()
+        self.records = records = loop.keyframe(fired, who)
+        self._history.note(keyframes, records)
+        if self._is_drive:
+            for world in _places(who):
+                self._sights[world].append(loop.sights.get(world, ()))
+
+        terminated = who & (~np.isnan(records.impact_speed_mps) | loop.motion.are_over(who))
+        truncated = who & (loop.state.times >= first.scenario.duration_s - LAST_BITS_S)
+        over = terminated | truncated
+        rewards, earned = self._rewards.of(records, detectable, over, who)
+        single: dict[int, dict[str, Any]] = {
+            world: {"outcome": asdict(self._outcome(world, int(keyframes[world]) + 1))}
+            for world in _places(over)
+        }
+        columns: dict[str, Any] = {"braking": records.braking, "time_s": records.time_s}
+        if first.scoring_info:
+            columns |= {
+                "detected": records.detected,
+                "in_view": records.in_view,
+                "clearance_m": records.clearance_m,
+                "speed_mps": records.speed_mps,
+                "reward_terms": earned,
+            }
+        return Stepped(rewards, terminated, truncated, columns, single)
+
+    def close(self) -> None:
+        """Free the simulators."""
+        for built in self._built.values():
+            built.close()
+        self._built.clear()
+
+    def _outcome(self, world: int, keyframes: int) -> Outcome:
+        """The result of a world's episode of so many keyframes."""
+        episode = self._history.episode(world, keyframes)
+        impact = self.loop.impacts.get(world)
+        if self._is_drive:
+            built = self.loop.world(world)
+            progress = built.along_m / built.goal_m
+            sights = self._sights[world]
+            result: Outcome = drive_outcome_of(episode, impact, sights, built.meetings, progress)
+        else:
+            result = outcome_of(episode, impact)
+        if self._exact or result.clearance_m is None:
+            return result
+        appeared = float(episode.time_s[episode.in_view.argmax()])
+        return replace(result, clearance_m=self.loop.motion.settle(world, appeared))
+
+    def _entropy(self, world: int, seed: int | None) -> int:
+        if seed is not None:
+            self._generators[world], _ = seeding.np_random(int(seed))
+            return int(seed)
+        generator = self._generators[world]
+        if generator is None:
+            generator, _ = seeding.np_random()
+            self._generators[world] = generator
+        return int(generator.integers(2**32))
+
+
+def _places(who: Mask) -> list[int]:
+    places: list[int] = np.flatnonzero(who).tolist()
+    return places

@@ -1,0 +1,114 @@
+"""Where the sensors of all worlds are, and what their software takes pose and motion to be."""
+
+import numpy as np
+
+from care_sim.base.compiled import compiled
+from care_sim.core.arrays import Floats, Integers
+from care_sim.core.conditions import Sensing
+from care_sim.core.frames import Frame
+from care_sim.core.rig import Rig
+from care_sim.core.types import Ego
+from care_sim.driving.localisation import Localisation, Odometry
+from care_sim.loops.episode import SensorSeeds
+from care_sim.loops.stages.state import Sensors, State
+
+
+class Locating:
+    """Places the sensors at every keyframe, and reads the odometry. `limits` (2, 3) are the least
+    and the most that an observation tells of speed, yaw rate and acceleration.
+    """
+
+    def __init__(self, rig: Rig, sensing: Sensing, limits: Floats, state: State):
+        self._rig = rig
+        self._sensing = sensing
+        self._limits = limits
+        x, y, z = map(float, rig.sensor_position)
+        self._at, self._middle = (x, y, z), (x, 0.0, z)
+        self._errs = bool(sensing.ego_position_sigma_m or sensing.ego_yaw_sigma_deg)
+        self._localisations: list[Localisation | None] = [None] * state.worlds
+        self._odometers: list[Odometry | None] = [None] * state.worlds
+        # One table serves all three where nothing sets them apart.
+        if self._errs:
+            state.taken = state.driven = Sensors.of(state.worlds)
+        if y:
+            state.driven = Sensors.of(state.worlds)
+
+    def begin(self, world: int, seeds: SensorSeeds) -> None:
+        """Begin the episode of a world."""
+        if self._errs:
+            localisation = Localisation(self._sensing, self._rig.keyframe_s, seeds.odometry)
+            self._localisations[world] = localisation
+        if self._sensing.ego_speed_sigma:
+            self._odometers[world] = Odometry(self._sensing.ego_speed_sigma, seeds.odometry)
+
+    def look(self, state: State) -> None:
+        """Go on to the keyframe of the worlds that are live."""
+        place_sensors(state.sensors, state.bodies.boxes, state.egos.bodies, self._at)
+        if state.driven is not state.taken:
+            place_sensors(state.driven, state.bodies.boxes, state.egos.bodies, self._middle)
+        if self._errs:
+            self._err(state)
+        egos = state.egos
+        moving = np.array([egos.speeds, egos.yaw_rates, egos.accelerations]).T
+        if self._sensing.ego_speed_sigma:
+            for world in np.flatnonzero(state.live).tolist():
+                odometer = self._odometers[world]
+                assert odometer is not None
+                moving[world, 0] = odometer.reading(Ego(*moving[world].tolist())).speed
+        np.clip(moving, *self._limits, out=state.read, where=state.live[:, None])
+
+    def place(self, state: State, world: int) -> None:
+        """Put the sensor of a world where it is now, between two keyframes."""
+        x, y, yaw = state.bodies.boxes[world, state.egos.bodies[world], [0, 1, 6]].tolist()
+        sensor = Frame.mounted((x, y, yaw), self._at)
+        state.sensors.put(world, sensor)
+        localisation = self._localisations[world]
+        if localisation is not None:
+            state.taken.put(world, localisation.taken_for(sensor))
+
+    def _err(self, state: State) -> None:
+        """Put the sensors where the software takes them to be."""
+        for world in np.flatnonzero(state.live).tolist():
+            localisation = self._localisations[world]
+            assert localisation is not None
+            localisation.advance()
+            if state.driven is not state.taken:
+                middle = state.driven.frame(world)
+                state.driven.put(world, localisation.taken_for(middle))
+            state.taken.put(world, localisation.taken_for(state.sensors.frame(world)))
+
+
+def place_sensors(
+    sensors: Sensors, boxes: Floats, egos: Integers, at: tuple[float, float, float]
+) -> None:
+    """Write where the sensors are, which are mounted `at` (x, y, z) on the bodies `egos` (W,) of
+    those whose `boxes` (W, B, 7) are told.
+    """
+    yaws = boxes[np.arange(len(egos)), egos, 6]
+    # The sines and cosines are NumPy's, as in `care_sim.core.frames`.
+    turns = np.cos(yaws), np.sin(yaws), np.cos(-yaws), np.sin(-yaws)
+    _place(boxes, egos, at, *turns, *sensors)
+
+
+@compiled(brief=True)
+def _place(
+    boxes: Floats,
+    egos: Integers,
+    at: tuple[float, float, float],
+    cosines: Floats,
+    sines: Floats,
+    back_cosines: Floats,
+    back_sines: Floats,
+    poses: Floats,
+    turns: Floats,
+    turns_back: Floats,
+) -> None:
+    """See `place_sensors`."""
+    ahead, left, height = at
+    for w in range(len(egos)):
+        box = boxes[w, egos[w]]
+        cos, sin = turns[w, 0], turns[w, 1] = cosines[w], sines[w]
+        turns_back[w, 0], turns_back[w, 1] = back_cosines[w], back_sines[w]
+        poses[w, 0] = box[0] + (cos * ahead - sin * left)
+        poses[w, 1] = box[1] + (sin * ahead + cos * left)
+        poses[w, 2], poses[w, 3] = height, box[6]

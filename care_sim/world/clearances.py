@@ -1,0 +1,194 @@
+"""From the ego to the first-sighting actor, hull to hull, in one world or many.
+
+PyBullet's exact distance costs more than all else that is scored. So the moments are kept, with a
+bound that is no greater, and it is asked about those alone that matter.
+
+And which bodies the egos touch.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from care_sim.base.compiled import compiled
+from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.world.approach import Impact
+from care_sim.world.bodies import BodyKind
+from care_sim.world.body_tables import bodies_near
+from care_sim.world.bullet import NO_BODY
+from care_sim.world.contact import (
+    CONTACT_REACH_M,
+    PADDING_M,
+    ClearanceJudge,
+    StandIns,
+    judge_here,
+    least_gap,
+)
+
+
+class Clearances:
+    """At every world step of an episode, up to `steps`, in each of `worlds` worlds."""
+
+    def __init__(self, worlds: int, steps: int):
+        self._kinds: list[tuple[BodyKind, BodyKind] | None] = [None] * worlds
+        # What stands in for both, of the judge that made it.
+        self._pairs: list[tuple[ClearanceJudge, StandIns] | None] = [None] * worlds
+        # By world and step, of which the first is 1: the poses of the two, what they are apart at
+        # least, and exactly where it is known, else NaN.
+        self._poses = np.zeros((worlds, steps + 1, 2, 7))
+        self._bounds = np.full((worlds, steps + 1), np.inf)
+        self._known = np.full((worlds, steps + 1), np.nan)
+
+    def begin(self, world: int, kinds: tuple[BodyKind, BodyKind] | None) -> None:
+        """Forget the episode that was, and take in the kinds of the ego and of the actor whom a new
+        one is about, None without one.
+        """
+        self._kinds[world] = kinds
+        self._pairs[world] = None
+        self._bounds[world] = np.inf
+        self._known[world] = np.nan
+
+    def __getstate__(self) -> dict[str, object]:
+        return vars(self) | {"_pairs": [None] * len(self._pairs)}
+
+    def note(
+        self,
+        live: Mask,
+        steps: Integers,
+        boxes: Floats,
+        poses: Floats,
+        whose: tuple[Integers, Integers],
+        nearest_m: Floats,
+    ) -> None:
+        """Note where bodies are, by their `boxes` and `poses` (W, B, 7), at the `steps` (W,) to
+        which the worlds have come that are `live`. It is about the egos and the actors `whose` ids
+        (W,) are given, NO_BODY for none. What is `nearest_m` (W,) from centre to centre falls to
+        what it is now.
+        """
+        tables = self._poses, self._bounds, nearest_m
+        _note(live, steps, boxes, poses, *whose, *tables)
+
+    def least_since(self, steps: Integers, count: int, live: Mask, exact_below: float) -> Floats:
+        """(W,) the least clearance of the last `count` of all `steps` (W,) so far, metres. What is
+        above `exact_below` may be a bound that is above it, too, and no greater than the clearance.
+        """
+        recent = steps[:, None] - np.arange(count)
+        bounds = self._bounds[np.arange(len(steps))[:, None], recent]
+        least: Floats = bounds.min(axis=1)
+        for world in np.flatnonzero(live & (least <= exact_below) & (least < np.inf)).tolist():
+            order = np.argsort(bounds[world])
+            moments = recent[world, order].tolist(), bounds[world, order].tolist()
+            least[world] = self._least(world, *moments, exact_below)
+        return least
+
+    def least(self, world: int, begin: int, end: int) -> float:
+        """The least clearance of a world from its step `begin` to the one before `end`."""
+        bounds = self._bounds[world, begin:end]
+        order = np.argsort(bounds)
+        return self._least(world, (begin + order).tolist(), bounds[order].tolist(), math.inf)
+
+    def _least(
+        self, world: int, steps: Sequence[int], bounds: Sequence[float], exact_below: float
+    ) -> float:
+        """The least clearance at some `steps`, whose `bounds` ascend."""
+        # First the moment at which they could be nearest. Whoever was farther apart than what is
+        # found by then need not be asked about.
+        least = math.inf
+        for step, bound in zip(steps, bounds, strict=True):
+            if bound > least or bound == math.inf:
+                break
+            if bound > exact_below:
+                return min(least, bound)
+            least = min(least, self._exact(world, step))
+        return least
+
+    def _exact(self, world: int, step: int) -> float:
+        known = float(self._known[world, step])
+        kinds, pair = self._kinds[world], self._pairs[world]
+        if math.isnan(known) and kinds is not None:
+            judge = judge_here()
+            if pair is None or pair[0] is not judge:
+                pair = self._pairs[world] = judge, judge.stand_ins(*kinds)
+            known = judge.clearance(pair[1], self._poses[world, step])
+            self._known[world, step] = known
+        return known
+
+
+@compiled(brief=True)
+def _note(
+    live: Mask,
+    steps: Integers,
+    boxes: Floats,
+    now: Floats,
+    egos: Integers,
+    targets: Integers,
+    poses: Floats,
+    bounds: Floats,
+    nearest_m: Floats,
+) -> None:
+    """See `Clearances.note`."""
+    for world in range(len(live)):
+        if not live[world] or targets[world] == NO_BODY:
+            continue
+        ego, target, step = egos[world], targets[world], steps[world]
+        box, other = boxes[world, ego], boxes[world, target]
+        away = np.hypot(other[0] - box[0], other[1] - box[1])
+        nearest_m[world] = min(nearest_m[world], away)
+        bounds[world, step] = least_gap(box, other) - PADDING_M
+        poses[world, step, 0] = now[world, ego]
+        poses[world, step, 1] = now[world, target]
+
+
+class Impacts:
+    """The egos' contacts in `worlds` worlds, whose steps last `step_s` seconds. The exact distance
+    is PyBullet's, and it is asked about few bodies: those that are near.
+    """
+
+    def __init__(self, worlds: int, step_s: float):
+        self._step_s = step_s
+        self._kinds: list[Mapping[int, BodyKind]] = [{}] * worlds
+
+    def begin(self, world: int, kinds: Mapping[int, BodyKind]) -> None:
+        """Take in the kinds of the bodies of a world, the ego's among them, by id."""
+        self._kinds[world] = kinds
+
+    def now(
+        self,
+        looked: Mask,
+        counts: Integers,
+        boxes: Floats,
+        before: Floats,
+        poses: Floats,
+        egos: Integers,
+        speeds: Floats,
+    ) -> Iterator[tuple[int, Impact]]:
+        """The worlds among those `looked` at (W,) whose ego touches a body, and the impact. Bodies,
+        `counts` (W,) of them, are where `boxes` and `poses` (W, B, 7) are, and were `before` a step
+        ago; the `egos` (W,) have `speeds` (W,).
+        """
+        found, near = _near(looked, counts, boxes, egos, CONTACT_REACH_M)
+        for world in np.flatnonzero(found).tolist():
+            ego, kinds = int(egos[world]), self._kinds[world]
+            for body in near[world, : found[world]].tolist():
+                kind = kinds[body]
+                if judge_here().touch((kinds[ego], kind), poses[world, [ego, body]]):
+                    moved = boxes[world, body, :2] - before[world, body, :2]
+                    own = boxes[world], ego, float(speeds[world])
+                    yield world, Impact.on(body, kind.name, *own, moved / self._step_s)
+                    break
+
+
+@compiled(brief=True)
+def _near(
+    looked: Mask, counts: Integers, boxes: Floats, egos: Integers, within: float
+) -> tuple[Integers, Integers]:
+    """How many bodies may be `within` metres of the ego in each world (W,), and which (W, B)."""
+    found = np.zeros(len(looked), np.int64)
+    near = np.empty((len(looked), boxes.shape[1]), np.int64)
+    for world in range(len(looked)):
+        if looked[world]:
+            bodies = bodies_near(boxes[world, : counts[world]], egos[world], within)
+            found[world] = len(bodies)
+            near[world, : len(bodies)] = bodies
+    return found, near

@@ -1,0 +1,50 @@
+"""Vectors of drawn environments, conditions, policies and seeds are their single environments."""
+
+from random import Random
+
+import pytest
+
+from care_sim.certify.design import CLOSED, drawn
+from tests.envs.vector.test_same_episodes import CONDITIONS, OWN
+from tests.helpers.vectors import MODES, played_alike
+
+
+def first_difference(number):
+    """Where worlds of the number differ first from single environments, None nowhere.
+
+    The arguments are those of an episode of the certificate, with the conditions of a case of
+    `test_same_episodes` over half of them.
+    """
+    rng = Random(f"vectors {number}")
+    episodes = (drawn(rng.randrange(10_000)) for _ in range(100))
+    episode = next(one for one in episodes if one.environment in CLOSED)
+    arguments = dict(episode.arguments)
+    if rng.random() < 0.5:
+        arguments |= rng.choice([*CONDITIONS.values(), *OWN.values()])
+        arguments.pop("duration_s", None)
+        if arguments.get("driver") == "careful-human":
+            arguments = {name: v for name, v in arguments.items() if not name.startswith("brake_")}
+    if arguments.get("detector"):
+        arguments.pop("min_returns", None)
+    return played_alike(
+        episode.environment,
+        worlds=3,
+        steps=min(episode.keyframes, 8),
+        mode=rng.choice(MODES),
+        threads=rng.choice((1, 2)),
+        policy=rng.choice(("care", "random", "history", "care-sector")),
+        seed=episode.seed,
+        **arguments,
+    )
+
+
+@pytest.mark.parametrize("number", range(12))
+def test_drawn_worlds_are_single_ones(number):
+    assert first_difference(number) is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("batch", range(20))
+def test_two_thousand_drawn_worlds_are_single_ones(batch):
+    numbers = range(100 + 100 * batch, 200 + 100 * batch)
+    assert {number: found for number in numbers if (found := first_difference(number))} == {}
