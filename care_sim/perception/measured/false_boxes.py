@@ -64,10 +64,10 @@ class FalseBoxPopulation:
         keyframe_s: float,
         seed: np.random.SeedSequence,
     ):
-        self._most_score = measured.most_score
+        self._scores = least_score, measured.most_score
         self._kept_ahead = measured.kept_ahead
         self._height_m = sensor_height_m
-        self._kinds = kinds_of(measured, least_score, keyframe_s)
+        self._kinds = kinds_of(measured, keyframe_s)
         self._grid = grid
         self._seed = seed.generate_state(1, np.uint64)[0]
         self._table = np.empty((0, COLUMNS))
@@ -84,10 +84,12 @@ class FalseBoxPopulation:
             self._table, self._seed, keyframe, place, self._before, self._kinds
         )
         self._before = place
-        boxes = sensor.boxes_to_local(self._table[:, X:SCORE])
+        # Every least score chooses from the same candidates.
+        table = self._table[self._table[:, SCORE] >= self._scores[0]]
+        boxes = sensor.boxes_to_local(table[:, X:SCORE])
         boxes[:, 2] = boxes[:, 5] / 2 - self._height_m
         kept = _candidates_now(
-            (self._table, boxes, self._kinds.shares, self._kept_ahead),
+            (table, boxes, self._kinds.shares, self._kept_ahead),
             present.classes,
             np.ascontiguousarray(present.boxes, float),
         )
@@ -97,9 +99,9 @@ class FalseBoxPopulation:
         for head, view in zip(self._grid.heads, _views(self._grid, self._height_m), strict=True):
             in_view |= _are_in_view(head.boxes(boxes[kept]), farthest, view)
         kept = kept[in_view]
-        rows = self._table[kept]
+        rows = table[kept]
         none = np.zeros(len(kept), np.int64)
-        scores = np.minimum(rows[:, SCORE], self._most_score)
+        scores = np.minimum(rows[:, SCORE], self._scores[1])
         return Detections(rows[:, LABEL].astype(np.int64), boxes[kept], none, scores)
 
 

@@ -100,6 +100,17 @@ def test_all_cars_meet_the_same_at_one_place_and_time():
     assert len(one) > 10
 
 
+def test_a_higher_track_score_takes_some_of_the_same_boxes():
+    """In the closed loop, where what becomes no track is not made."""
+    found = []
+    for score in (0.3, 0.5):
+        detector = begun("centerpoint", is_filmed=False, track_score=score)
+        detector.at("", STANDING)
+        boxes = detector.detect(ALL, NO_ANNOTATIONS)[0].boxes
+        found.append({tuple(box) for box in boxes.tolist()})
+    assert found[0] > found[1] != set()
+
+
 def test_they_stay_where_they_are_in_the_world_and_are_the_same_for_all_policies():
     def drives(number):
         return Frame(0.3 * number, 0.0, 1.84, 0.01 * number)
