@@ -114,9 +114,16 @@ def _views(grid: Grid, sensor_height_m: float) -> tuple[View, ...]:
         down = np.tan(np.minimum(elevations, -1e-9))
         roads = np.where(elevations < 0, -(sensor_height_m + head.place[2]) / down, np.inf)
         order = np.argsort(azimuths)
-        columns = azimuths, elevations, np.cos(elevations), roads
-        row_height = float(head.grid.row_height)
-        views.append(View(head.first + order, *(one[order] for one in columns), row_height))
+        views.append(
+            View(
+                head.first + order,
+                azimuths[order],
+                elevations[order],
+                np.cos(elevations)[order],
+                roads[order],
+                float(head.grid.row_height),
+            )
+        )
     return tuple(views)
 
 
