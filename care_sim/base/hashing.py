@@ -29,7 +29,7 @@ def mixed(key: np.uint64, number: int) -> np.uint64:
 
 @compiled()
 def uniform(key: np.uint64, number: int) -> float:
-    """Hash a key and a number evenly between 0 and 1, both excluded."""
+    """Hash a key and a number evenly above 0 and up to 1."""
     return (float(mixed(key, number) >> _ELEVEN) + 0.5) / 2.0**53
 
 

@@ -55,7 +55,7 @@ def _together(now: Cloud, sensor: Frame, earlier: list[tuple[float, Frame, Cloud
     clouds += [_moved(cloud, frame, sensor, ago) for ago, frame, cloud in earlier]
     # The latest sweep first.
     poses = [SweepPose(ago, _matrix(frame, sensor)) for ago, frame, _ in reversed(earlier)]
-    return replace(joined(clouds), poses=(AT_KEYFRAME, *poses))
+    return replace(joined(clouds), poses=(AT_KEYFRAME, *poses), newest=now)
 
 
 def _moved(cloud: Cloud, sensor: Frame, to: Frame, ago_s: float) -> Cloud:

@@ -62,11 +62,12 @@ class Cloud:
     recorded it, and `times` (P,), seconds from the keyframe, where they have their own
     (`care_sim.sensors.beams`). `shots` (P,) is how often a cell must be fired for each to return;
     None where once is enough for all. `rings` (P,) number the lasers of a recorded LiDAR. `ranges`
-    (P,) are metres from the LiDAR, where `points` are not made.
+    (P,) are metres from the LiDAR, in clouds without `points`.
 
     `far` are the returns of a recorded LiDAR from beyond the reach of the grid. A real detector
     gets them too, since it was trained with them; no ray, no proxy and no score counts them.
-    `poses` are those of gathered sweeps, the keyframe's first; of one sweep none need be told.
+    Of gathered sweeps, `poses` are theirs, the keyframe's first, and `newest` is the keyframe's
+    own sweep.
     """
 
     cells: Cells
@@ -79,6 +80,7 @@ class Cloud:
     far: "Cloud | None" = None
     poses: tuple["SweepPose", ...] = ()
     ranges: Floats | None = None
+    newest: "Cloud | None" = None
 
     def __len__(self) -> int:
         return len(self.cells)
@@ -107,7 +109,7 @@ class Cloud:
         """The returns in these rows, in this order; those from far away stay."""
         return Cloud(
             self.cells[rows],
-            self.points.take(rows, axis=0),
+            self.points.take(rows, axis=0) if self.ranges is None else self.points,
             self.objects[rows],
             None if self.intensities is None else self.intensities[rows],
             None if self.times is None else self.times[rows],
@@ -115,6 +117,8 @@ class Cloud:
             None if self.rings is None else self.rings[rows],
             self.far,
             self.poses,
+            None if self.ranges is None else self.ranges[rows],
+            self.newest,
         )
 
 
@@ -128,15 +132,18 @@ def joined(clouds: Sequence[Cloud]) -> Cloud:
     cells = np.concatenate([cloud.cells for cloud in clouds])
     order = np.argsort(cells, kind="stable")
     far = [cloud.far for cloud in clouds if cloud.far is not None]
+    points = np.concatenate([cloud.points for cloud in clouds])
+    ranges = _column([cloud.ranges for cloud in clouds], order)
     return Cloud(
         cells[order],
-        np.concatenate([cloud.points for cloud in clouds])[order],
+        points[order] if ranges is None else points,
         np.concatenate([cloud.objects for cloud in clouds])[order],
         _column([cloud.intensities for cloud in clouds], order),
         _column([cloud.times for cloud in clouds], order),
         _column([cloud.shots for cloud in clouds], order),
         _column([cloud.rings for cloud in clouds], order),
         far=joined(far) if far else None,
+        ranges=ranges,
     )
 
 

@@ -27,8 +27,9 @@ from tests.helpers import kitti_reports, nuscenes_reports
 
 BINS = ((0, 0), (1, 1), (2, 2), (3, 3), (4, 5), (6, 8), (9, 16), (17, 32), (33, 10**6))
 RAY_BINS = ((0, 16), (17, 32), (33, 64), (65, 128), (129, 256), (257, 10**6))
-CURVES = {"car": None, "pedestrian": None, "truck": "car", "bicycle": "pedestrian"}
-"""The classes, and whose curve each has but for a shift: of those there are too few."""
+KINDS = ("car", "pedestrian", "truck", "bicycle")
+"""The classes. One that is `as` another in the shipped table has its curve, but for a shift: there
+are too few of it."""
 
 
 def rows_of(data, detector):
@@ -72,7 +73,7 @@ def deviance(rows, curve):
 def shipped(detector, kind):
     """The curve of the shipped table."""
     rows = json.loads((SHIPPED / f"{detector}.json").read_text())["classes"]
-    return rows.get(CURVES[kind], {}) | rows[kind]
+    return rows.get(rows[kind].get("as"), {}) | rows[kind]
 
 
 def fit(rows, detector, kind):
@@ -93,20 +94,30 @@ def fit(rows, detector, kind):
     start += [-1.0] * (len(scores) - 1)
     falls = (0, 1 - FIRST_HIT) if gathers else (0, 0)
     bounds = [(0.1, 5), (-4, 5), (-0.5, 1), falls, (-20, 20)] + [(-8, 3)] * (len(scores) - 1)
-    return curve(minimize(lambda n: deviance(rows, curve(n)), start, bounds=bounds).x)
+    return curve(least(lambda n: deviance(rows, curve(n)), start, bounds))
+
+
+def least(loss, start, bounds=None):
+    """Where a loss is least. Raises RuntimeError if the search fails."""
+    found = minimize(loss, start, bounds=bounds)
+    if not found.success:
+        raise RuntimeError(f"no fit: {found.message}")
+    return found.x
 
 
 def fits(rows, detector):
     """The curve of every class."""
     curves = {}
-    for kind, other in CURVES.items():
+    for kind in KINDS:
+        if not measurement(detector).recall.known[CLASSES.index(kind)]:
+            continue
         own = of_class(rows, kind)
-        if other is None:
-            curves[kind] = fit(own, detector, kind)
-        elif measurement(detector).recall.known[CLASSES.index(kind)]:
+        if other := shipped(detector, kind).get("as"):
             curve = curves[other]
-            best = minimize(lambda n: deviance(own, curve | {"shift": n[0]}), [0.0])  # noqa: B023
-            curves[kind] = {"shift": best.x[0]}
+            (shift,) = least(lambda n: deviance(own, curve | {"shift": n[0]}), [0.0])  # noqa: B023
+            curves[kind] = {"shift": shift}
+        else:
+            curves[kind] = fit(own, detector, kind)
     return curves
 
 

@@ -19,13 +19,13 @@ COLUMNS = 540
 
 
 @cache
-def objects_of(folder, drives=None):
+def objects_of(folder):
     """Rows of OBJECT of every fifth frame: the number of the drive as scene, rays of an HDL-64 that
     stop at the box as `returns`, and raw scores, -inf where nothing was reported.
     """
     source = Kitti(folder, sensor=_front())
     rows = []
-    for drive in drives or source.scenes():
+    for drive in source.scenes():
         reports = _reports(folder, drive)
         for keyframe, shot in enumerate(source.film(drive).shots):
             here = shot.annotations

@@ -16,7 +16,7 @@ import numpy as np
 from care_sim.base.compiled import compiled
 from care_sim.base.hashing import mixed, normal, uniform
 from care_sim.core.arrays import Floats, Integers
-from care_sim.perception.measured.tables import FalseBoxes, Measurement
+from care_sim.perception.measured.tables import Measurement
 
 RING_M = 10.0
 """Distances are known by rings of so many metres."""
@@ -24,6 +24,8 @@ REACH_M = 50.0
 """No false box was counted beyond."""
 TILE_M = 20.0
 """The side of a tile. Candidates are made for tiles within reach."""
+LONGEST_LIVES = 20
+"""Of 500 million candidates one lasts longer than as many mean lives."""
 LABEL, X, Y, SCORE, LAST, AHEAD, RANK, KIND = 0, 1, 2, 8, 9, 10, 11, 12
 """Columns of a table of candidates (n, 13): class, world box (7) without its height above the road,
 score, last keyframe, a number below `kept_ahead` where the box may be on the road ahead, rank, row
@@ -54,22 +56,21 @@ class Kinds(NamedTuple):
     """(k, 3, 2) mean and spread of the logarithms of length, width and height."""
 
 
-def kinds_of(measured: Measurement, least_score: float, keyframe_s: float) -> Kinds:
-    """The kinds of a detector with scores of `least_score` or more, by keyframes of a length."""
-    kinds = [_from(one, least_score) for one in measured.false_boxes]
-    known = [one for one in kinds if one is not None]
+def kinds_of(measured: Measurement, keyframe_s: float) -> Kinds:
+    """The kinds of a detector, by keyframes of a length."""
+    known = measured.false_boxes
     lasting = np.array([one.lasting for one in known])
     lives = np.array([one.lasts_s for one in known])
-    areas = np.pi * RING_M**2 * (2 * np.arange(len(known[0].distances)) + 1) if known else 1.0
-    densities = np.array([one.distances for one in known]).reshape(len(known), -1) / areas
-    most = densities.max(axis=1, initial=1e-12)
+    areas = np.pi * RING_M**2 * (2 * np.arange(len(known[0].distances)) + 1)
+    densities = np.array([one.distances for one in known]) / areas
+    most = densities.max(axis=1)
     around = 360.0 / measured.view_deg
     means = np.array([one.rates[0, 1] for one in known]) * around * most * TILE_M**2
     # Both kinds of each class: those that last, then the others. As many are born as end.
     means = np.concatenate([means * lasting, means * (1 - lasting)])
     lives = np.concatenate([lives, np.full(len(lives), measured.flash_s)]) / keyframe_s
     ends = 1 - np.exp(-1 / np.maximum(lives, 1e-9))
-    longest = max((len(one.rates) for one in known), default=1)
+    longest = max(len(one.rates) for one in known)
     table = np.full((2, len(known), longest), -np.inf)
     for row, one in enumerate(known):
         table[0, row, : len(one.rates)] = one.rates[:, 0]
@@ -81,20 +82,8 @@ def kinds_of(measured: Measurement, least_score: float, keyframe_s: float) -> Ki
         np.tile(densities / most[:, None], (2, 1)),
         np.tile(table[0], (2, 1)),
         np.tile(table[1], (2, 1)),
-        np.tile(np.array([one.log_sizes for one in known]).reshape(-1, 3, 2), (2, 1, 1)),
+        np.tile(np.array([one.log_sizes for one in known]), (2, 1, 1)),
     )
-
-
-def _from(kind: FalseBoxes, least_score: float) -> FalseBoxes | None:
-    """The kind with rates from `least_score` on; None where there are none."""
-    scores, rates = kind.rates.T
-    if least_score > scores[-1]:
-        return None
-    least = np.exp(np.interp(least_score, scores, np.log(rates)))
-    higher = kind.rates[scores > least_score]
-    if not len(higher):
-        return None
-    return kind._replace(rates=np.concatenate([[[least_score, least]], higher]))
 
 
 @compiled()
@@ -110,14 +99,14 @@ def advance_candidates(
         if row[LAST] >= keyframe and _is_near(tile, place):
             living[count] = row
             count += 1
-    if not len(kinds.labels):
-        return living[:0]
     across, along = _tiles(place[0]), _tiles(place[1])
     for i in range(across[0], across[1]):
         for j in range(along[0], along[1]):
             if _is_near((i, j), place):
-                # A tile that comes within reach has had its births since the episode began.
-                first = keyframe if _is_near((i, j), before) else 0
+                # A tile that comes within reach has had births before. Older ones have ended.
+                first = keyframe
+                if not _is_near((i, j), before):
+                    first = max(0, keyframe - math.ceil(LONGEST_LIVES * kinds.lives.max()))
                 living, count = _add_births(living, count, seed, (i, j), (first, keyframe), kinds)
     return living[:count]
 

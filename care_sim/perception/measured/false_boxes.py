@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from care_sim.base.compiled import compiled
-from care_sim.core.arrays import Floats, Integers
+from care_sim.base.errors import InvalidInput
+from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.cells.stack import Grid
 from care_sim.core.frames import Frame
 from care_sim.core.types import Detections
@@ -37,8 +38,8 @@ SHORT_M = 0.5
 
 
 class View(NamedTuple):
-    """All cells of a grid by ascending azimuth: cells, azimuths, elevations and their cosines, and
-    the distances on the ground at which their rays meet the road; the angle between two rows.
+    """The cells of one LiDAR by ascending azimuth: cells, azimuths, elevations and their cosines,
+    and the distances on the ground at which their rays meet the road; the angle between two rows.
     """
 
     cells: Integers
@@ -63,10 +64,10 @@ class FalseBoxPopulation:
         keyframe_s: float,
         seed: np.random.SeedSequence,
     ):
-        self._most_score = measured.most_score
+        self._scores = least_score, measured.most_score
         self._kept_ahead = measured.kept_ahead
         self._height_m = sensor_height_m
-        self._kinds = kinds_of(measured, least_score, keyframe_s)
+        self._kinds = kinds_of(measured, keyframe_s)
         self._grid = grid
         self._seed = seed.generate_state(1, np.uint64)[0]
         self._table = np.empty((0, COLUMNS))
@@ -83,64 +84,69 @@ class FalseBoxPopulation:
             self._table, self._seed, keyframe, place, self._before, self._kinds
         )
         self._before = place
-        boxes = sensor.boxes_to_local(self._table[:, X:SCORE])
+        # Every least score chooses from the same candidates.
+        table = self._table[self._table[:, SCORE] >= self._scores[0]]
+        boxes = sensor.boxes_to_local(table[:, X:SCORE])
         boxes[:, 2] = boxes[:, 5] / 2 - self._height_m
-        kept = _shown(
-            (self._table, boxes, self._kinds.shares, self._kept_ahead),
-            (present.classes, np.ascontiguousarray(present.boxes, float)),
-            (cloud.cells, _ranges(cloud)),
-            _view(self._grid, self._height_m),
+        kept = _candidates_now(
+            (table, boxes, self._kinds.shares, self._kept_ahead),
+            present.classes,
+            np.ascontiguousarray(present.boxes, float),
         )
-        rows = self._table[kept]
+        # Cells are those of the sensor as it stands: of gathered sweeps only the last one looks.
+        newest = cloud if cloud.newest is None else cloud.newest
+        farthest, in_view = _farthest(newest, self._grid), np.zeros(len(kept), np.bool_)
+        for head, view in zip(self._grid.heads, _views(self._grid, self._height_m), strict=True):
+            in_view |= _are_in_view(head.boxes(boxes[kept]), farthest, view)
+        kept = kept[in_view]
+        rows = table[kept]
         none = np.zeros(len(kept), np.int64)
-        scores = np.minimum(rows[:, SCORE], self._most_score)
+        scores = np.minimum(rows[:, SCORE], self._scores[1])
         return Detections(rows[:, LABEL].astype(np.int64), boxes[kept], none, scores)
 
 
 @lru_cache(8)
-def _view(grid: Grid, sensor_height_m: float) -> View:
-    x, y, z = grid.directions.T
-    azimuths, elevations = np.arctan2(y, x), np.arctan2(z, np.hypot(x, y))
-    heights = np.empty(len(z))
+def _views(grid: Grid, sensor_height_m: float) -> tuple[View, ...]:
+    views = []
     for head in grid.heads:
-        heights[head.cells] = sensor_height_m + head.place[2]
-    down = np.tan(np.minimum(elevations, -1e-9))
-    roads = np.where(elevations < 0, -heights / down, np.inf)
-    order = np.argsort(azimuths)
-    cosines = np.cos(elevations)
-    return View(
-        order,
-        azimuths[order],
-        elevations[order],
-        cosines[order],
-        roads[order],
-        float(grid.row_height),
-    )
+        x, y, z = head.grid.directions.T
+        azimuths, elevations = np.arctan2(y, x), np.arctan2(z, np.hypot(x, y))
+        down = np.tan(np.minimum(elevations, -1e-9))
+        roads = np.where(elevations < 0, -(sensor_height_m + head.place[2]) / down, np.inf)
+        order = np.argsort(azimuths)
+        views.append(
+            View(
+                head.first + order,
+                azimuths[order],
+                elevations[order],
+                np.cos(elevations)[order],
+                roads[order],
+                float(head.grid.row_height),
+            )
+        )
+    return tuple(views)
 
 
-def _ranges(cloud: Cloud) -> Floats:
-    """(P,) the ranges of the returns, metres."""
-    if cloud.ranges is not None:
-        return cloud.ranges
-    return np.asarray(np.sqrt((cloud.points**2).sum(axis=1)))
+def _farthest(cloud: Cloud, grid: Grid) -> Floats:
+    """(N,) the farthest range of each cell from its LiDAR, metres, 0 without a return."""
+    known = cloud.points if cloud.ranges is None else cloud.ranges
+    if len(known) != len(cloud):
+        raise InvalidInput(f"a cloud must have a range per return: {len(known)} of {len(cloud)}")
+    ranges = grid.ranges_to(cloud.cells, known) if cloud.ranges is None else known
+    farthest = np.zeros(grid.size)
+    np.maximum.at(farthest, cloud.cells, ranges)
+    return farthest
 
 
 @compiled()
-def _shown(
-    candidates: tuple[Floats, Floats, Floats, float],
-    present: tuple[Integers, Floats],
-    returned: tuple[Integers, Floats],
-    view: View,
+def _candidates_now(
+    candidates: tuple[Floats, Floats, Floats, float], classes: Integers, present: Floats
 ) -> Integers:
-    """The rows (k,) of the candidates that are reported. The `candidates` are their table (n, 13),
-    boxes (n, 7) in the sensor frame, shares by ring and `kept_ahead`; `present` are classes and
-    boxes of objects, `returned` the cells (P,) and ranges (P,) of all returns.
+    """The rows (k,) of the candidates that a free view would show. The `candidates` are their table
+    (n, 13), boxes (n, 7) in the sensor frame, shares by ring and `kept_ahead`; `present` are the
+    boxes (m, 7) of objects, and `classes` (m,) theirs.
     """
     table, boxes, shares, kept_ahead = candidates
-    farthest = np.zeros(len(view.cells))
-    cells, ranges = returned
-    for row in range(len(cells)):
-        farthest[cells[row]] = max(farthest[cells[row]], ranges[row])
     shown, count = np.empty(len(boxes), np.int64), 0
     for n in range(len(boxes)):
         x, y = boxes[n, 0], boxes[n, 1]
@@ -150,9 +156,7 @@ def _shown(
         ahead = 0.0 < x < FREE_LENGTH_M and abs(y) < FREE_WIDTH_M / 2
         if ahead and table[n, AHEAD] >= kept_ahead:
             continue
-        if _is_of_another(x, y, table[n, LABEL], present[0], present[1]):
-            continue
-        if _is_looked_at(boxes[n], farthest, view):
+        if not _is_of_another(x, y, table[n, LABEL], classes, present):
             shown[count] = n
             count += 1
     return shown[:count]
@@ -169,24 +173,40 @@ def _is_of_another(x: float, y: float, label: float, classes: Integers, boxes: F
 
 
 @compiled()
-def _is_looked_at(box: Floats, farthest: Floats, view: View) -> bool:
-    """Whether a ray looks at a `box` (7,) or at the road just before it, and ends there or beyond;
-    `farthest` (N,) are the ranges of all cells, 0 without a return.
+def _are_in_view(boxes: Floats, farthest: Floats, view: View) -> Mask:
+    """(n,) which of `boxes` (n, 7), as seen from the LiDAR, it has in view."""
+    in_view = np.empty(len(boxes), np.bool_)
+    for n in range(len(boxes)):
+        in_view[n] = _is_in_view(boxes[n], farthest, view)
+    return in_view
+
+
+@compiled()
+def _is_in_view(box: Floats, farthest: Floats, view: View) -> bool:
+    """Whether a ray ends at a `box` (7,) or beyond; `farthest` (N,) are the ranges of all cells, 0
+    without a return. A ray of the row below may also end on the road before the box, unless one at
+    the height of the box ends too early: a wall can stand between that road and the box.
     """
     away = math.hypot(box[0], box[1])
     near = away - max(box[3], box[4]) / 2
     wide = math.atan2(max(box[3], box[4]) / 2, away)
     azimuth = math.atan2(box[1], box[0])
-    lowest = math.atan2(box[2] - box[5] / 2, away) - view.row_height
-    highest = math.atan2(box[2] + box[5] / 2, away)
+    foot = math.atan2(box[2] - box[5] / 2, away)
+    # Where rows are farther apart than the box is high, the height of the box has a row, too.
+    top = max(math.atan2(box[2] + box[5] / 2, away), foot + view.row_height)
+    is_road_seen = is_hidden = False
     for turn in (-2 * math.pi, 0.0, 2 * math.pi):
         first = np.searchsorted(view.azimuths, azimuth + turn - wide)
         for place in range(first, len(view.azimuths)):
             if view.azimuths[place] > azimuth + turn + wide:
                 break
-            if not lowest <= view.elevations[place] <= highest:
-                continue
+            elevation = view.elevations[place]
             ends = farthest[view.cells[place]] * view.cosines[place]
-            if ends > 0.0 and ends >= min(view.roads[place], near) - SHORT_M:
+            if ends <= 0.0 or not foot - view.row_height <= elevation <= top:
+                continue
+            is_far = ends >= min(view.roads[place], near) - SHORT_M
+            if elevation >= foot and is_far:
                 return True
-    return False
+            is_road_seen = is_road_seen or is_far
+            is_hidden = is_hidden or elevation >= foot
+    return is_road_seen and not is_hidden

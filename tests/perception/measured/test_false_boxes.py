@@ -1,14 +1,24 @@
 """False boxes of measured detectors: how many, how long, where, and for whom."""
 
+import copy
+import pickle
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
+from care_sim.base.errors import InvalidInput
+from care_sim.core.cells.stack import GridStack
 from care_sim.core.frames import Frame
+from care_sim.core.grid import AngularGrid
+from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES
+from care_sim.loops.gathering import Gathering
+from care_sim.perception.detectors import make_detector
 from care_sim.perception.measured.tables import measurement
-from care_sim.sensors.annotated import NO_ANNOTATIONS, NO_OBJECT, Annotations, Cloud
+from care_sim.sensors.annotated import NO_ANNOTATIONS, NO_OBJECT, Annotations, Cloud, joined
+from care_sim.sensors.pictures import FRONT_CAMERA
 from tests.perception.measured.test_measured_detector import begun, rig
 
 DIRECTIONS = rig(0.5).grid.directions
@@ -90,6 +100,17 @@ def test_all_cars_meet_the_same_at_one_place_and_time():
     assert len(one) > 10
 
 
+def test_a_higher_track_score_takes_some_of_the_same_boxes():
+    """In the closed loop, where what becomes no track is not made."""
+    found = []
+    for score in (0.3, 0.5):
+        detector = begun("centerpoint", is_filmed=False, track_score=score)
+        detector.at("", STANDING)
+        boxes = detector.detect(ALL, NO_ANNOTATIONS)[0].boxes
+        found.append({tuple(box) for box in boxes.tolist()})
+    assert found[0] > found[1] != set()
+
+
 def test_they_stay_where_they_are_in_the_world_and_are_the_same_for_all_policies():
     def drives(number):
         return Frame(0.3 * number, 0.0, 1.84, 0.01 * number)
@@ -108,22 +129,104 @@ def test_they_stay_where_they_are_in_the_world_and_are_the_same_for_all_policies
     assert 0 < sum(map(len, some)) < sum(map(len, frames))
 
 
-def test_none_is_behind_a_wall_and_the_road_before_one_is_enough():
-    """A wall on the left, 12 m away and 10 m high; on the right the road alone, within 50 m."""
-    _, y, z = DIRECTIONS.T
-    wall = np.where(y > 1e-9, 12 / np.maximum(y, 1e-9), np.inf)
-    road = np.where(z < 0, 1.84 / np.maximum(-z, 1e-9), np.inf)
-    ranges = np.minimum(wall, road)
-    returned = ranges < 50
-    cloud = Cloud(np.flatnonzero(returned), (ranges[:, None] * DIRECTIONS)[returned], ALL.objects)
+ROAD_M = np.where(DIRECTIONS[:, 2] < 0, 1.84 / np.maximum(-DIRECTIONS[:, 2], 1e-9), np.inf)
+
+
+def returns_of(ranges):
+    """The returns of a full scan whose rays end after `ranges` (N,) within 50 m."""
+    cells = np.flatnonzero(ranges < 50)
+    points = ranges[cells, None] * DIRECTIONS[cells]
+    return Cloud(cells, points, np.full(len(cells), NO_OBJECT))
+
+
+def walled(away, axis):
+    """A road with a wall that is 10 m high, so far `away` along x or y."""
+    along = DIRECTIONS[:, axis]
+    return returns_of(
+        np.minimum(ROAD_M, np.where(along > 0, away / np.maximum(along, 1e-9), np.inf))
+    )
+
+
+def beyond(boxes, away, axis):
+    """Which of `boxes` begin more than half a length and a kerb behind such a wall."""
+    return boxes[:, axis] - boxes[:, 3:5].max(axis=1) > away + 0.5
+
+
+@pytest.mark.parametrize(("away", "axis"), [(12, 1), (20, 0), (30, 0), (40, 0)])
+def test_none_is_behind_a_wall_and_the_road_before_one_is_enough(away, axis):
     free, seen = (
         STANDING.boxes_to_local(np.concatenate([boxes for boxes, _, _ in frames]))
-        for frames in (reported("centerpoint", 100), reported("centerpoint", 100, cloud=cloud))
+        for frames in (
+            reported("centerpoint", 100),
+            reported("centerpoint", 100, cloud=walled(away, axis)),
+        )
     )
-    assert (seen[:, 1] < 0).sum() == (free[:, 1] < 0).sum() > 1000
-    # A box counts as in view a bit behind the wall, where the last row on the road ends before it.
-    behind, hidden = (own[:, 1] - own[:, 3:5].max(axis=1) / 2 > 18 for own in (seen, free))
-    assert behind.sum() < 0.02 * hidden.sum()
+    assert (seen[:, axis] < 0).sum() == (free[:, axis] < 0).sum() > 1000
+    before = [(own[:, axis] > 0) & (own[:, axis] < away - 3) for own in (seen, free)]
+    assert before[0].sum() == before[1].sum() > 100
+    assert beyond(free, away, axis).sum() > 20
+    assert not beyond(seen, away, axis).any()
+
+
+def test_of_gathered_sweeps_the_last_one_looks():
+    """A car turns by 0.3 before a wall: of the sweeps before, cells looked elsewhere."""
+    now, then = walled(12, 1), Frame(0, 0, 1.84, -0.3)
+    gathering = Gathering(2, 0.1)
+    gathering.add(walled(12, 0), then)
+    gathered = gathering.add(now, Frame(0, 0, 1.84, 0))
+    one, several = (
+        [boxes.tolist() for boxes, _, _ in reported("centerpoint", 20, cloud=cloud)]
+        for cloud in (now, gathered)
+    )
+    assert one == several
+
+
+def test_every_lidar_looks_from_its_own_place():
+    """Of two LiDARs only the second fires, 20 m to the left, into a sector ahead."""
+    grid, place = AngularGrid(), (0.0, 20.0, 0.0)
+    ahead = np.flatnonzero(np.abs(np.arctan2(*DIRECTIONS.T[1::-1])) < 0.3)
+    cloud = Cloud(ahead + grid.size, place + 60 * DIRECTIONS[ahead], np.full(len(ahead), NO_OBJECT))
+    both = Rig(GridStack((grid, grid), ((0, 0, 0), place)), (FRONT_CAMERA,), 1638, keyframe_s=0.5)
+    detector = make_detector("centerpoint", 1.84).begin(np.random.SeedSequence(0), both, True)
+    count = 0
+    for free, _, _ in reported("centerpoint", 20):
+        detector.at("", STANDING)
+        seen = detector.detect(cloud, NO_ANNOTATIONS)[0].boxes
+        x, y = (STANDING.boxes_to_local(free)[:, :2] - place[:2]).T
+        # Boxes are at most 3 m wide or long to each side.
+        aside = np.where(x > 0, np.abs(np.arctan2(y, x)), np.inf)
+        assert (aside < 0.3).sum() <= len(seen) <= (aside < 0.3 + np.arctan2(3, x)).sum()
+        count += len(seen)
+    assert count > 20
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda one: pickle.loads(pickle.dumps(one))])
+def test_a_copy_goes_on_as_the_original(copied):
+    detector = begun("megvii")
+
+    def play(one, keyframes):
+        for _ in range(keyframes):
+            one.at("", STANDING)
+            report, _ = one.detect(ALL, NO_ANNOTATIONS)
+        return np.column_stack([report.classes, report.boxes, report.scores]).tolist()
+
+    assert len(play(detector, 30)) > 5
+    twin = copied(detector)
+    assert play(twin, 20) == play(detector, 20)
+
+
+def test_a_cloud_without_points_needs_ranges():
+    full = returns_of(ROAD_M)
+    pointless = replace(full, points=np.empty((0, 3)), ranges=ROAD_M[full.cells])
+    for cloud in (full, full.take(DIRECTIONS[full.cells, 1] > 0.3)):
+        bare = pointless if cloud is full else pointless.take(DIRECTIONS[full.cells, 1] > 0.3)
+        assert joined([bare]).ranges == pytest.approx(bare.ranges)
+        for (one, _, _), (other, _, _) in zip(
+            reported("megvii", 5, cloud=cloud), reported("megvii", 5, cloud=bare), strict=True
+        ):
+            assert one.tolist() == other.tolist()
+    with pytest.raises(InvalidInput, match=r"^a cloud must have a range per return: 0 of \d+$"):
+        list(reported("megvii", 1, cloud=replace(pointless, ranges=None)))
 
 
 def test_none_is_where_nobody_looks_nor_on_an_object_of_its_class_nor_near_ahead():

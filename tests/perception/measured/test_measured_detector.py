@@ -180,7 +180,7 @@ def test_luck_depends_on_seed_object_and_time_alone():
 
 @pytest.mark.parametrize("copied", [copy.deepcopy, lambda one: pickle.loads(pickle.dumps(one))])
 def test_a_copy_goes_on_as_the_original(copied):
-    present, detector = crowd(100), begun("megvii", 0.1, False)
+    present, detector = crowd(100), begun("megvii", 0.1, False, false_boxes=False)
     detector.at(None, Frame(0, 0, 1.84, 0))
     played(detector, present, np.full((70, 100), 3))
     twin = copied(detector)
