@@ -16,7 +16,7 @@ run                                       | missing: SCENARIO|SOURCE|AGENT
 run dens                                  | unknown scenario 'dens'; the nearest is dense; known:
 run no/body                               | unknown agent 'no/body'; known: learned-scorer,
 run ppo --policy care                     | --policy has no meaning for an agent
-run dense --policy kare                   | unknown policy 'kare'; the nearest is care; known: all-camera,
+run dense --policy kare                   | unknown policy 'kare'; the nearest is care; known: after-ancha,
 run dense --bugdet 1                      | unrecognized options: --bugdet 1; perhaps --budget
 run dense --budget x                      | --budget takes {None}|FLOAT:
 run dense --budget 1.5                    | budget must lie in (0, 1], got 1.5

@@ -145,7 +145,7 @@ def test_clearances_that_are_put_off_are_settled_in_the_end(name, monkeypatch):
         )
         for _ in range(KEYFRAMES):
             passages = batch.motion.advance(batch.state, np.zeros(4), KEYFRAME_S, exact=False)
-            bounds.append(passages.clearance_m)
+            bounds.append(passages.clearance_m.copy())
             count = len(asked)
             clearances.append([one.advance(0.0, KEYFRAME_S).clearance_m for one in batch.alone])
             del asked[count:]
