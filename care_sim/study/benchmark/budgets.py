@@ -61,7 +61,11 @@ REFERENCE_ENTRIES = (
     Entry("all-camera", cell_order="core-spread"),
     Entry("boxes"),
     Entry("place"),
+    Entry("tuned-place"),
     Entry("history"),
+    Entry("after-shoouri"),
+    Entry("after-ancha"),
+    Entry("after-gofer"),
 )
 """The entries that stand beside everybody's."""
 COUNTS = {STREETS: SCENE_COUNTS, DRIVES: EPISODE_COUNTS, TESTS: EPISODE_COUNTS}
