@@ -15,7 +15,7 @@ from care_sim.sensors.kitti.labels import KINDS, Labels, covered
 
 FOLDER = Path(__file__).parents[3] / "shared" / "data" / "kitti-object"
 needs_kitti = pytest.mark.skipif(not FOLDER.is_dir(), reason=f"no {FOLDER}")
-PICTURE = np.array([1242.0, 375.0, 609.6, 172.9])
+PICTURE = np.array([1242.0, 375.0, 609.6, 172.9, 1.0])
 TYPES = {"Car": "car", "Pedestrian": "pedestrian", "Cyclist": "bicycle"}
 EXCUSES = {"car": ("Van", "Truck"), "pedestrian": ("Person_sitting",), "bicycle": ()}
 DETECTED = {1: "pedestrian", 2: "car", 3: "bicycle"}
