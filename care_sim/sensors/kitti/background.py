@@ -88,7 +88,7 @@ def _place_scene(shown: Picture, kind: int, keys: tuple[np.uint64, np.uint64], a
         if stays and _fits_scene(shown.labels, shown.own, kind, box, numbers.pairs):
             score = score_at(numbers.scene_scores[kind], drawn[4], numbers)
             add_box(into, at, CLASS_OF[kind], score)
-            # The mixture holds the errors that last.
+            # The errors that last are in the mixture already.
             let_err(box, kind, score, (keys[1], 1 - numbers.edges_share), picture, numbers)
             return True
     return False
