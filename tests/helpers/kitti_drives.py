@@ -49,7 +49,6 @@ def drive_of(name):
     """The labels of a drive as pictures, and (n,) the track of each label."""
     lines = [line.split() for line in (DRIVES / f"{name}.txt").read_text().splitlines()]
     names = np.array([line[2] for line in lines])
-    names[names == "Person"] = "Person_sitting"
     frames, tracks = np.array([line[:2] for line in lines], int).T
     numbers = np.array([line[3:] for line in lines], float)
     beyond, levels = BEYOND[np.clip(numbers[:, 0], 0, 2).astype(int)], np.clip(numbers[:, 1], 0, 3)

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from scipy.sparse.csgraph import connected_components
 
 from care_sim.core.types import CLASSES
 from care_sim.sensors.kitti.beside import PAIRS
@@ -15,7 +16,7 @@ from care_sim.sensors.kitti.labels import KINDS, Labels, covered
 
 FOLDER = Path(__file__).parents[3] / "shared" / "data" / "kitti-object"
 needs_kitti = pytest.mark.skipif(not FOLDER.is_dir(), reason=f"no {FOLDER}")
-PICTURE = np.array([1242.0, 375.0, 609.6, 172.9])
+PICTURE = np.array([1242.0, 375.0, 609.6, 172.9, 1.0])
 TYPES = {"Car": "car", "Pedestrian": "pedestrian", "Cyclist": "bicycle"}
 EXCUSES = {"car": ("Van", "Truck"), "pedestrian": ("Person_sitting",), "bicycle": ()}
 DETECTED = {1: "pedestrian", 2: "car", 3: "bicycle"}
@@ -58,6 +59,28 @@ def kitti_pictures():
         np.array(found),
         len(ids),
     )
+
+
+@cache
+def halves(seed=None):
+    """(count,) the half, 0 or 1, of every picture of `kitti_pictures`, in whole groups: pictures
+    that share two labels of one type and size show the same objects. The largest groups go first,
+    with a `seed` in any order.
+    """
+    lines = [line.split() for line in (FOLDER / "val_labels.txt").read_text().splitlines()]
+    objects = ["/".join([line[1], *line[9:12]]) for line in lines if line[1] != "DontCare"]
+    pictures = kitti_pictures().pictures[kitti_pictures().names != "DontCare"]
+    shown = np.zeros((kitti_pictures().count, len(set(objects))), np.float32)
+    shown[pictures, np.unique(objects, return_inverse=True)[1]] = 1
+    groups = connected_components(shown @ shown.T >= 2)[1]
+    sizes = np.bincount(groups)
+    rng = np.random.default_rng(seed)
+    order = np.argsort(-sizes, kind="stable") if seed is None else rng.permutation(len(sizes))
+    half, totals = np.zeros(len(sizes), int), np.zeros(2, int)
+    for group in order:
+        half[group] = totals.argmin()
+        totals[half[group]] += sizes[group]
+    return half[groups]
 
 
 def as_labels(told: Pictures) -> tuple[Labels, np.ndarray]:

@@ -14,8 +14,6 @@ from care_sim.sources.street_films import record
 from care_sim.streets.street import make_street
 from tests.helpers.kitti_object import PICTURE, TYPES, overlaps
 
-VERTICAL = (3, 5, 9, 11)
-"""Columns of `visible` that tell how high in the picture a box is."""
 ALL_BUT_FOOT = (1, 2, 3, 4, 6, *range(8, 19))
 """All columns but class, height and lower edge."""
 CUT_PX = 369.0
@@ -51,7 +49,7 @@ def visible(rows):
 
 
 def area_under_the_curve(rows, false, half, left_out=()):
-    """Mean over both ways: learned from one `half` (n,) 0 or 1 of the boxes, asked of the other.
+    """Mean over both ways: learned from one `half` (n,) 0 or 1 of the boxes, tested on the other.
     The columns `left_out` are not shown.
     """
     seen = np.delete(visible(rows), left_out, axis=1)

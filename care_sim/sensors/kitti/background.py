@@ -8,7 +8,7 @@ from care_sim.base.compiled import compiled
 from care_sim.base.hashing import normal, uniform
 from care_sim.core.arrays import Floats, Integers
 from care_sim.sensors.kitti.draws import key_of
-from care_sim.sensors.kitti.errors import copy_box, iou, lay_erring, lay_normals, resembles
+from care_sim.sensors.kitti.errors import copy_box, iou, is_cut, lay_erring, lay_normals, resembles
 from care_sim.sensors.kitti.invented import (
     LEAST_HEIGHT,
     LEAST_WIDTH,
@@ -28,11 +28,9 @@ from care_sim.sensors.kitti.labels import KINDS, Labels
 from care_sim.sensors.kitti.numbers import CLASS_OF, FOCAL_PX, Numbers
 
 EDGE_PX = 20.0, 36.0, 23.0
-"""Boxes of the cut mixture are cut if they end so near the left, right and lower edge."""
+"""Boxes of the cut mixture end so near the left, right or lower edge of KITTI's pictures."""
 FITTED_HALF_PX, FITTED_BELOW_PX = 621.0, 202.1
 """Half the width of KITTI's pictures, and how far they reach below the horizon."""
-USUAL_LOWS = 1.08, 0.94, 0.94
-"""Means of `low_of` of the three kinds on KITTI: the camera's height, 1.65 m, over theirs."""
 
 _KINDS = tuple(KINDS.tolist())
 
@@ -54,14 +52,16 @@ def add_scene(shown: Picture, chance: Chance, count: int) -> int:
 
 
 @compiled()
-def usual_low(labels: Labels, own: Integers, kind: int, picture: Floats) -> float:
-    """The mean of `low_of` of the picture's objects of a kind, else the usual one."""
+def usual_low(labels: Labels, own: Integers, kind: int, picture: Floats, usual: float) -> float:
+    """The mean of `low_of` of the picture's objects of a kind, else KITTI's `usual` one at the
+    camera's height.
+    """
     total, count = 0.0, 0
     for j in own:
         if labels.classes[j] == CLASS_OF[kind] and not labels.cut[j, 3]:
             total += low_of(labels.boxes[j], picture[3])
             count += 1
-    return float(total / count if count else USUAL_LOWS[kind])
+    return float(total / count if count else usual * picture[4])
 
 
 @compiled()
@@ -70,7 +70,8 @@ def _place_scene(shown: Picture, kind: int, keys: tuple[np.uint64, np.uint64], a
     numbers, picture, into = shown.numbers, shown.frame, shown.into
     cut = uniform(keys[0], 1) < numbers.scene_cuts[kind]
     mixture = numbers.scene_mixtures[kind, int(cut)]
-    weights, low = mixture[:, 0].copy(), usual_low(shown.labels, shown.own, kind, picture)
+    weights = mixture[:, 0].copy()
+    low = usual_low(shown.labels, shown.own, kind, picture, numbers.usual_lows[kind])
     for t in range(TRIES):
         first = 8 * t + 2
         pick = pick_component(weights, uniform(keys[0], 2 * first - 1))
@@ -82,31 +83,25 @@ def _place_scene(shown: Picture, kind: int, keys: tuple[np.uint64, np.uint64], a
         foot = picture[3] + drawn[2] * (100.0 if cut else high * low)
         box = into.edges[at]
         lay(middle, foot, (high * math.exp(drawn[1]), high), picture, box)
-        stays = not cut or _reach_edges(box, foot, picture)
+        stays = not cut or _ends_near_edges(box, foot, picture)
         stays = stays and 0 < middle < picture[0] and foot - high > 0
         if stays and _fits_scene(shown.labels, shown.own, kind, box, numbers.pairs):
-            add_box(
-                into, at, CLASS_OF[kind], score_at(numbers.scene_scores[kind], drawn[4], numbers)
-            )
+            score = score_at(numbers.scene_scores[kind], drawn[4], numbers)
+            add_box(into, at, CLASS_OF[kind], score)
+            # The errors that last are in the mixture already.
+            let_err(box, kind, score, (keys[1], 1 - numbers.edges_share), picture, numbers)
             return True
     return False
 
 
 @compiled()
-def _reach_edges(box: Floats, foot: float, picture: Floats) -> bool:
-    """Let a box that ends near an edge of the picture end there; return whether one does.
-
-    KITTI's pictures end nearer to the horizon. A box at their lower edge counts as cut.
+def _ends_near_edges(box: Floats, foot: float, picture: Floats) -> bool:
+    """Whether a box ends near an edge at the side of its picture, or the lower one of KITTI's
+    pictures, which end nearer to the horizon.
     """
     left, right, below = EDGE_PX
-    near_left, near_right = box[0] < left, box[2] > picture[0] - right
-    if near_left:
-        box[0] = 0.0
-    if near_right:
-        box[2] = picture[0]
-    if box[3] > picture[1] - below:
-        box[3] = picture[1]
-    return bool(near_left or near_right or foot > picture[3] + FITTED_BELOW_PX - below)
+    aside = box[0] < left or box[2] > picture[0] - right
+    return bool(aside or foot > picture[3] + FITTED_BELOW_PX - below)
 
 
 @compiled()
@@ -138,7 +133,7 @@ def add_lent(
         score = score_at(numbers.scene_scores[kind], normal(own, 0), numbers)
         add_box(into, count, lent[0][n], score)
         copy_box(lent[1][n], into.edges[count])
-        let_err(into.edges[count], kind, score, own, shown.frame, numbers)
+        let_err(into.edges[count], kind, score, (own, 1.0), shown.frame, numbers)
         count += 1
     return count
 
@@ -148,16 +143,19 @@ def let_err(
     box: Floats,
     kind: int,
     score: float,
-    key: np.uint64,
+    chance: tuple[np.uint64, float],
     picture: Floats,
     numbers: Numbers,
 ) -> None:
-    """Let a false box (4,) err as objects do, by the normal numbers of a key."""
+    """Let a false box (4,) err as objects do. `chance` is a key, and the share of the variance of
+    an object's normal numbers that those of the key have.
+    """
     whole, normals, cut = np.empty(4), np.empty(4), np.empty(4, np.bool_)
     copy_box(box, whole)
-    lay_normals(key, 1, normals)
+    lay_normals(chance[0], 1, normals)
     for j in range(4):
-        cut[j] = whole[j] <= 0 if j < 2 else whole[j] >= picture[j - 2]
+        normals[j] *= math.sqrt(chance[1])
+        cut[j] = is_cut(whole, j, picture)
     lay_erring(whole, (kind, 0, score), cut, normals, picture, numbers, box)
     if not resembles(box, whole):
         copy_box(whole, box)

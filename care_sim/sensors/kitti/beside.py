@@ -13,7 +13,7 @@ from care_sim.base.compiled import compiled
 from care_sim.base.hashing import uniform
 from care_sim.core.arrays import Floats, Integers
 from care_sim.sensors.kitti.draws import key_of
-from care_sim.sensors.kitti.errors import iou
+from care_sim.sensors.kitti.errors import iou, lay_cut
 from care_sim.sensors.kitti.invented import (
     LEAST_HEIGHT,
     LEAST_WIDTH,
@@ -132,6 +132,7 @@ def _place_beside(
         middle = (box[0] + box[2]) / 2 + drawn[0] * wide
         foot = box[3] + drawn[1] * high + low * (size[1] - high)
         lay(middle, foot, size, shown.frame, into.edges[at])
+        lay_cut(keys[1], 4 * t + 1, shown.frame, numbers, into.edges[at])
         if _fits_beside(shown, i, label, into.edges[at], reported):
             add_box(into, at, label, score_at(numbers.pair_scores[pair], drawn[4], numbers))
             return True

@@ -59,7 +59,8 @@ class KittiDetector:
         keyframe_s: float,
         seeds: Sequence[np.random.SeedSequence],
     ):
-        luck, edges, false, key = (np.random.default_rng(seed) for seed in seeds)
+        streams = *seeds[:2], seeds[3], *seeds[2].spawn(2)
+        luck, edges, key, beside, scene = (np.random.default_rng(seed) for seed in streams)
         self._numbers, times = measured()
         self._objects = objects
         self._order = np.argsort(objects)
@@ -78,7 +79,8 @@ class KittiDetector:
         )
         shapes = (len(objects), PAIRS * MOST), (len(cameras), len(self._numbers.pair_scores) * MOST)
         self._beside, self._scene = (
-            Renewals(shape, times.false_s, keyframe_s, false) for shape in shapes
+            Renewals(shape, times.false_s, keyframe_s, rng)
+            for shape, rng in zip(shapes, (beside, scene), strict=True)
         )
         self._false_key, self._key = key.integers(2**63, size=2).astype(np.uint64)
         self._keyframe = 0
@@ -127,7 +129,7 @@ def report(
     draws: Draws,
     numbers: Numbers,
 ) -> tuple[Boxes, Integers]:
-    """The boxes of all pictures (p, 4), not rounded yet, and the picture of each.
+    """The boxes of all pictures (p, 5), not rounded yet, and the picture of each.
 
     `lent` are classes (l,), edges (l, 4) and pictures (l,) of further false boxes.
     """

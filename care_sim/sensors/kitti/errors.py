@@ -60,14 +60,37 @@ def lay_erring(
         for k in range(j + 1):
             shared += numbers.edge_roots[kind, j, k] * normals[k]
         if cut[j]:
-            middle, spread = numbers.cut_errors[j]
-            error = middle + spread * _tail(numbers.tails[CUT, j], shared)
+            error = _cut_error(j, shared, numbers)
         else:
             spread = _spread(numbers.edge_spreads[kind, j], sizes[1], level, sure)
             error = numbers.edge_means[kind, j] + spread * _tail(numbers.tails[kind, j], shared)
             error *= sizes[j % 2]
         into[j] = box[j] + error
     lay_clipped(into, picture, into)
+
+
+@compiled()
+def is_cut(box: Floats, j: int, picture: Floats) -> bool:
+    """Whether the edge j of a box is at the edge of its picture."""
+    return bool(box[j] <= 0 if j < 2 else box[j] >= picture[j - 2])
+
+
+@compiled()
+def lay_cut(key: np.uint64, first: int, picture: Floats, numbers: Numbers, box: Floats) -> None:
+    """Let the edges of a box (4,) that its picture cuts err as those of objects, by the normal
+    numbers of a key from the number `first` on.
+    """
+    for j in range(4):
+        if is_cut(box, j, picture):
+            box[j] += _cut_error(j, normal(key, first + j), numbers)
+    lay_clipped(box, picture, box)
+
+
+@compiled()
+def _cut_error(j: int, score: float, numbers: Numbers) -> float:
+    """Pixels by which a cut edge j errs at a normal score."""
+    middle, spread = numbers.cut_errors[j]
+    return float(middle + spread * _tail(numbers.tails[CUT, j], score))
 
 
 @compiled()

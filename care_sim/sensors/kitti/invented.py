@@ -57,15 +57,15 @@ class Picture(NamedTuple):
     """(k,) the objects in it."""
     number: int
     frame: Floats
-    """(4,) a row of `labels.pictures_of`."""
+    """(5,) a row of `labels.pictures_of`."""
     numbers: Numbers
     into: Boxes
 
 
 @compiled()
 def low_of(box: Floats, horizon: float) -> float:
-    """How many of its heights a box ends below the horizon. Whoever stands on one road has about
-    the same, however far away.
+    """How many of its heights a box ends below the horizon. Objects of one height on one road have
+    about the same, however far away.
     """
     return float(min(max((box[3] - horizon) / max(box[3] - box[1], 1.0), 0.2), 2.0))
 
@@ -104,8 +104,8 @@ def pick_component(weights: Floats, draw: float) -> int:
 def drawn_columns(
     mixture: Floats, component: int, keys: tuple[np.uint64, np.uint64], first: int, share: float
 ) -> Floats:
-    """(5,) columns of a component. Of the last one, the score, a `share` of the variance is the
-    box's, by the first key, and the rest the keyframe's, by the second.
+    """(5,) columns of a component. The last one is the score: the first key, of the box, gives a
+    `share` of its variance, the second, of the keyframe, the rest.
     """
     columns = (mixture.shape[1] - 1) // 2
     row = mixture[component]

@@ -1,4 +1,4 @@
-"""What the detector's formulas ask of each object in a picture, in pixels of KITTI's focal length.
+"""What the detector's formulas use of each object in a picture, in pixels of KITTI's focal length.
 
 KITTI's labels are boxes of whole objects, hidden parts included: on labels of all levels of
 occlusion the width is that of the projected 3D box (cars 1.00, cyclists 1.02, in the median) and so
@@ -14,6 +14,7 @@ import numpy as np
 from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.pinhole import PinholeCamera
+from care_sim.core.rig import LIDAR_HEIGHT_M
 from care_sim.core.types import CLASSES
 from care_sim.sensors.annotated import IdentifiedDetections
 from care_sim.sensors.camera_errors import UNHIDDEN
@@ -26,6 +27,8 @@ LEAST_SHARES = (0.8, 0.45)
 """Visible shares from which an object is not and partly occluded. They are assumed: midway between
 the means of KITTI's levels, 0.97, 0.60 and 0.31.
 """
+KITTI_CAMERA_M = 1.65
+"""Height of KITTI's camera above the road, metres."""
 NEARER_M = 0.3
 """Only what is nearer by more than this covers an object."""
 _POINTS = 12
@@ -58,16 +61,19 @@ class Labels(NamedTuple):
 
 
 def pictures_of(cameras: Sequence[PinholeCamera], focal_px: float) -> Floats:
-    """(k, 4) width, height, middle column and row of the horizon of the cameras' pictures, in
-    pixels of the focal length `focal_px`.
+    """(k, 5) width, height, middle column and row of the horizon of the cameras' pictures, in
+    pixels of the focal length `focal_px`, and how many times as high as KITTI's each camera is.
+
+    The LiDAR is taken to be LIDAR_HEIGHT_M above the road, and cameras not to roll.
     """
     rows = [
         (each.width, each.height, each.width / 2, each.height / 2 + each.focal * np.tan(each.pitch))
         for each in cameras
     ]
     scales = np.array([focal_px / each.focal for each in cameras])
-    table: Floats = np.array(rows, float).reshape(-1, 4) * scales[:, None]
-    return table
+    pixels: Floats = np.array(rows, float).reshape(-1, 4) * scales[:, None]
+    heights = np.array([LIDAR_HEIGHT_M + each.position[2] for each in cameras])
+    return np.column_stack([pixels, heights / KITTI_CAMERA_M])
 
 
 def labels_of(

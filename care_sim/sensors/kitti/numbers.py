@@ -62,7 +62,7 @@ class Numbers(NamedTuple):
     """(5, 2) the kind of an object and that of the false box beside it."""
     pair_rates: Floats
     """(5, 8) logarithmic numbers of false boxes per object: coefficients of
-    `care_sim.sensors.kitti.inventions._rate`.
+    `care_sim.sensors.kitti.beside._rate`.
     """
     pair_mixtures: Floats
     """(5, 10, 13) components: weight, six means, six spreads; weight 0 pads."""
@@ -76,10 +76,14 @@ class Numbers(NamedTuple):
     """(3,) shares of boxes that the picture cuts."""
     scene_scores: Floats
     """(3, 7) as `pair_scores`."""
+    usual_lows: Floats
+    """(3,) means of `care_sim.sensors.kitti.invented.low_of` on KITTI's pictures."""
     score_shares: Floats
     """(7,)."""
     score_share: float
     """Share of the variance of a false box's normal score that stays as long as the box does."""
+    edges_share: float
+    """Share of the variance of its errors that stays as long."""
     suppression_iou: float
     """Of two boxes of a class that overlap more only one is reported."""
 
@@ -142,8 +146,10 @@ def read_measured(told: dict[str, Any]) -> Measured:
         ),
         scene_cuts=np.array([one["cut_share"] for one in scene]),
         scene_scores=np.array([one["scores"] for one in scene]),
+        usual_lows=np.array([one["usual_low"] for one in scene]),
         score_shares=np.array(told["score_shares"], float),
         score_share=told["false_time"]["score_share"],
+        edges_share=told["false_time"]["edges_share"],
         suppression_iou=told["suppression_iou"],
     )
     return Measured(numbers, times)

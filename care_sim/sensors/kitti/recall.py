@@ -44,9 +44,20 @@ def recall(
     of `occlusion`, 0 to 3; the share of the box beyond the picture (`truncation`); planar distance
     in metres; the share of the box that nearer boxes `cover`. Without a distance or a width the
     object has the usual ones for its height. Beyond confidences of 0.05 and 0.9997 the chance
-    stays. Raises InvalidInput for other classes and levels, and confidences that are not between 0
-    and 1.
+    stays. Raises InvalidInput for other classes and levels, lengths that are not above 0, shares
+    that are not from 0 to 1, and confidences that are not between 0 and 1.
     """
+    for name, length in (
+        ("height_px", height_px),
+        ("width_px", 1.0 if width_px is None else width_px),
+        ("distance_m", 1.0 if distance_m is None else distance_m),
+    ):
+        if not (np.asarray(length, float) > 0).all():
+            raise InvalidInput(f"{name} must be above 0, got {shown(length)}")
+    for name, share in (("truncation", truncation), ("cover", cover)):
+        shares = np.asarray(share, float)
+        if not ((shares >= 0) & (shares <= 1)).all():
+            raise InvalidInput(f"{name} must be from 0 to 1, got {shown(share)}")
     if not 0 < confidence < 1:
         raise InvalidInput(f"confidence must be between 0 and 1, got {shown(confidence)}")
     if label not in KIND_OF:

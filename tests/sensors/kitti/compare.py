@@ -20,10 +20,9 @@ from care_sim.reports.figures.styles import BLUE, GREEN, INK, ORANGE, default_st
 from care_sim.sensors.kitti import recall
 from care_sim.sensors.kitti.labels import labels_of, pictures_of
 from care_sim.sensors.kitti.numbers import measured
-from tests.helpers.kitti_object import as_labels, kitti_pictures, matched, simulated
+from tests.helpers.kitti_object import as_labels, halves, kitti_pictures, matched, simulated
 from tests.helpers.telling_false_boxes import (
     ALL_BUT_FOOT,
-    VERTICAL,
     area_under_the_curve,
     boxes_of_streets,
     on_a_flat_road,
@@ -44,6 +43,7 @@ HEIGHTS = {
     "pedestrian": (20, 30, 40, 60, 80, 100, 140, 200, 350),
     "bicycle": (18, 25, 30, 40, 60, 100, 200),
 }
+SIZES = (0, 25, 40, 60, 100, 400)
 LEVELS = ("not occluded", "partly", "largely")
 COLOURS = (BLUE, ORANGE, GREEN)
 
@@ -80,6 +80,15 @@ def false_table(told, reported, excused):
     return np.array([(len(rows) / told.count, np.median(rows[:, 1])) for rows in own])
 
 
+def sizes_of_false(told, reported, excused):
+    """(3, 5) false boxes of every class by their height, between SIZES."""
+    sure = reported[reported[:, 1] >= CONFIDENCE]
+    false = sure[matched(told, sure, excused) == -1]
+    high = false[:, 5] - false[:, 3]
+    own = [high[false[:, 0] == CLASSES.index(label)] for label in HEIGHTS]
+    return np.array([np.histogram(each, SIZES)[0] for each in own])
+
+
 def areas(told, left_out=(), flat=False):
     """Area under the curve of the real boxes, and of simulated ones of some seeds."""
     found = []
@@ -89,7 +98,7 @@ def areas(told, left_out=(), flat=False):
         behind = matched(told, sure, excused)
         rows, false = sure[behind != -2], behind[behind != -2] == -1
         shown = on_a_flat_road(told, rows) if flat else rows
-        half = rows[:, 6].astype(int) % 2
+        half = halves()[rows[:, 6].astype(int)]
         found.append(area_under_the_curve(shown, false, half, left_out))
     return found
 
@@ -177,12 +186,18 @@ def main(stem):
                 f"{label}, {LEVELS[level]}, {middle:.0f} px: {number} labels,"
                 f" {100 * found:.0f}% found, formula {100 * predicted:.0f}%"
             )
-    made = [false_table(told, simulated(told, measured().numbers, n), False) for n in range(SEEDS)]
+    seeds = [simulated(told, measured().numbers, n) for n in range(SEEDS)]
+    made = [false_table(told, one, False) for one in seeds]
     both = false_table(told, told.found, True), np.mean(made, axis=0)
     print("false boxes per picture and their median score, real and simulated:")
     for label, real, simulated_ones in zip(HEIGHTS, *both, strict=True):
         print(label, real.round(3), simulated_ones.round(3))
-    for left_out in ((), VERTICAL, ALL_BUT_FOOT):
+    by_size = [sizes_of_false(told, one, False) for one in seeds]
+    both = sizes_of_false(told, told.found, True), np.mean(by_size, axis=0)
+    print(f"false boxes by height, between {SIZES} pixels, real and simulated:")
+    for label, real, simulated_ones in zip(HEIGHTS, *both, strict=True):
+        print(label, real, simulated_ones.round())
+    for left_out in ((), ALL_BUT_FOOT):
         for flat in (False, True):
             real, *others = areas(told, left_out, flat)
             print(

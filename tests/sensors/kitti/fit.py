@@ -26,7 +26,7 @@ from tests.helpers.kitti_object import PICTURE, as_labels, kitti_pictures, match
 TIMES = {
     "luck": {"a": 0.76, "T_s": 1.29},
     "jitter_time": {"c": 0.36, "a": 0.44, "T_s": 0.49},
-    "false_time": {"T_s": 0.36, "score_share": 0.85},
+    "false_time": {"T_s": 0.36, "score_share": 0.85, "edges_share": 0.8},
 }
 THRESHOLDS = 0.05, 0.25, 0.5, 0.9, 0.97, 0.99, 0.997, 0.999, 0.9997
 LEAST_SCORE = 0.1
@@ -48,6 +48,8 @@ NO_TOP = 2.5, 0.0, 2.0
 """Degrees of freedom, middle and spread (assumed): no picture cuts a top."""
 PER_COMPONENT = 35
 """Boxes per component of a mixture, of which there are at most ten."""
+PER_CUT_COMPONENT = 8
+"""The same of boxes that the picture cuts, which are few and lie at its three edges."""
 
 
 def fitted(told):
@@ -172,7 +174,9 @@ def _scene(labels, boxes, kind, count):
     left, right, below = EDGE_PX
     cut = (boxes[:, 2] < left) | (boxes[:, 4] > PICTURE[0] - right) | (boxes[:, 5] > 375 - below)
     (width, height), score = (boxes[:, 4:6] - boxes[:, 2:4]).T, _normal_scores(boxes[:, 1])
-    lows = [_low(labels, kind, picture) for picture in boxes[:, 6]]
+    standing = labels.boxes[(labels.kinds == kind) & ~labels.cut[:, 3]]
+    usual = np.mean([low_of(box, PICTURE[3]) for box in standing])
+    lows = [_low(labels, kind, picture, usual) for picture in boxes[:, 6]]
     below_px, middle = boxes[:, 5] - PICTURE[3], (boxes[:, 2] + boxes[:, 4]) / 2 - PICTURE[2]
     shape = np.log(height / 50), np.log(width / height)
     whole, ended = (
@@ -186,9 +190,10 @@ def _scene(labels, boxes, kind, count):
         "box": NAMES[kind],
         "per_picture": numbers.mean(),
         "variance": numbers.var(),
+        "usual_low": usual,
         "mixture": _mixture(*(column[~cut] for column in whole)),
         "cut_share": cut.mean(),
-        "cut_mixture": _mixture(*(column[cut] for column in ended)),
+        "cut_mixture": _mixture(*(column[cut] for column in ended), boxes=PER_CUT_COMPONENT),
         "scores": _score_table(boxes[:, 1]),
     }
 
@@ -197,14 +202,14 @@ def _shown(labels, i):
     return np.nonzero(labels.cameras == labels.cameras[i])[0]
 
 
-def _low(labels, kind, picture):
+def _low(labels, kind, picture, usual):
     (own,) = np.nonzero(labels.cameras == picture)
-    return usual_low(labels, own, kind, PICTURE)
+    return usual_low(labels, own, kind, PICTURE, usual)
 
 
-def _mixture(*columns):
+def _mixture(*columns, boxes=PER_COMPONENT):
     table = np.column_stack(columns)
-    most = min(max(len(table) // PER_COMPONENT, 1), 10)
+    most = min(max(len(table) // boxes, 1), 10)
     model = GaussianMixture(most, covariance_type="diag", n_init=5, reg_covar=1e-3, random_state=0)
     model.fit(table)
     return {"weights": model.weights_, "means": model.means_, "covariances": model.covariances_}

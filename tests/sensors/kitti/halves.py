@@ -7,7 +7,7 @@ import numpy as np
 
 from care_sim.core.types import CLASSES
 from care_sim.sensors.kitti.numbers import CLASS_OF, FEATURES
-from tests.helpers.kitti_object import as_labels, matched
+from tests.helpers.kitti_object import as_labels, halves, matched
 from tests.sensors.kitti.fit import KINDS, looks_of, recall_of
 
 HEIGHTS = {
@@ -37,7 +37,7 @@ class Bin(NamedTuple):
 
 
 def held_out(told):
-    """All bins of more than FEWEST labels of even pictures, then of odd ones."""
+    """All bins of more than FEWEST labels of one half of the pictures, then of the other."""
     labels, rows = as_labels(told)
     found = np.isin(rows, matched(told, told.found[told.found[:, 1] >= CONFIDENCE]))
     return _held_out(labels, found, told.told[rows, 2])
@@ -58,7 +58,7 @@ def held_out_by_luck(told, repeats):
 
 
 def _held_out(labels, found, metres):
-    bins, side = [], labels.cameras % 2
+    bins, side = [], halves()[labels.cameras]
     for kind in KINDS:
         own, named = labels.kinds == kind, _bins(CLASSES[CLASS_OF[kind]], labels, metres)
         for part in (0, 1):
