@@ -113,6 +113,8 @@ _COLOURS = {
     "care-spread": "#5B82C2",
     "care-sector": "#C2478A",
     "boxes": "#B3543C",
+    "tuned-place": "#1FA2A6",
+    "after-ancha": "#7A7A3C",
     "uncertainty": "#B5679A",
     "history-uniform": "#A8506F",
     "beam-reduce": "#7468C0",
