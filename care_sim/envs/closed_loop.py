@@ -223,11 +223,14 @@ class ClosedLoopEnv(SensingEnv[OneWorld]):
         """Fire the cells that `action` scores highest and go on to the next keyframe.
 
         Raises InvalidInput for an action of the wrong shape or with values that are not finite, and
-        gymnasium.error.ResetNeeded before `reset` and after the end.
+        gymnasium.error.ResetNeeded before `reset`, after the end, and after an error or interrupt
+        in the middle of a step.
         """
         loop, worlds = self.loop, self._worlds
         fired = self._choose_cells(action)
         assert worlds is not None
+        # An error leaves the world between two keyframes.
+        self._over = True
         stepped = worlds.play(Fired.of([fired]), _HERE)
         self.keyframes.append(loop.record(fired, worlds.records))
         info = self._scan_info(fired) | _first(stepped.columns) | stepped.single.get(0, {})

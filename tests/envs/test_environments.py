@@ -230,3 +230,23 @@ def test_reset_takes_no_options(name):
         pytest.raises(InvalidInput, match=r"reset takes no options, got \{'test': 'CPNA-25'\}"),
     ):
         env.reset(seed=0, options={"test": "CPNA-25"})
+
+
+def test_after_an_interrupted_step_the_episode_begins_anew(monkeypatch):
+    """The world stands between two keyframes."""
+    env = make("CARE-CutIn-v0").unwrapped
+    env.reset(seed=0)
+    nothing = np.zeros(env.action_space.shape, np.float32)
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as broken:
+        broken.setattr(World, "step", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            env.step(nothing)
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        env.step(nothing)
+    env.reset(seed=0)
+    env.step(nothing)
+    env.close()

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.frames import Frame
 from care_sim.core.rig import Rig
@@ -286,3 +287,13 @@ def test_comfort_is_that_of_the_drive_too(street):
     before = world.ego.speed
     loop.keyframe(NOTHING)
     assert world.ego.speed - before == pytest.approx(0.1 * comfort)
+
+
+def test_a_keyframe_past_the_end_of_an_episode_is_refused(street):
+    """Compiled code would write past the ends of its tables."""
+    seeds = SensorSeeds(*(np.random.SeedSequence(seed) for seed in range(4)))
+    loop = OneWorld.begun(street(), RIG, ClosedLoopConditions(), seeds, 0.2)
+    for _ in range(2):
+        loop.keyframe(NOTHING)
+    with pytest.raises(InvalidInput, match="the episode lasts 0.2 s"):
+        loop.keyframe(NOTHING)

@@ -10,6 +10,7 @@ from typing import TypeGuard
 import numpy as np
 
 from care_sim.base.compiled import compiled
+from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats, Integers, Mask, filled
 from care_sim.core.types import Ego
 from care_sim.loops.episode import most_keyframes
@@ -109,15 +110,21 @@ class Motion:
 
         Unless `exact`, a clearance above `KNOWN_BELOW_M` may be a bound that is above it, too, and
         no greater than the clearance; `settle` tells the least of an episode then. `after_step` is
-        called with the number of steps after each but the last.
+        called with the number of steps after each but the last. Raises InvalidInput past the end of
+        an episode.
         """
+        # Compiled code does not check the bounds of tables that have a row per step.
+        count = whole_steps(duration_s)
+        if (self._steps[state.live] + count >= len(self._times)).any():
+            raise InvalidInput(
+                f"the episode lasts {self._times[-1]:g} s: begin another one, or a longer one"
+            )
         passages = self._passages
         passages.nearest_m.fill(np.inf)
         passages.hit.fill(False)
         passages.impacts.clear()
         egos = state.egos
         targeted = state.live & (egos.targets != NO_BODY)
-        count = whole_steps(duration_s)
         for step in range(1, count + 1):
             self._step(state, accelerations)
             counts, boxes, before, poses = state.bodies
