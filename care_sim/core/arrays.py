@@ -13,8 +13,13 @@ def filled(table: np.ndarray, world: int, rows: np.ndarray) -> np.ndarray:
     they need more room than there is.
     """
     if len(rows) > table.shape[1]:
-        longer = np.zeros((len(table), 2 * len(rows), *table.shape[2:]), table.dtype)
-        longer[:, : table.shape[1]] = table
-        table = longer
+        table = longer(table, 2 * len(rows))
     table[world, : len(rows)] = rows
     return table
+
+
+def longer(table: np.ndarray, length: int, empty: int = 0) -> np.ndarray:
+    """The table (W, n, ...) with `length` rows per world; new rows hold `empty`."""
+    grown = np.full((len(table), length, *table.shape[2:]), empty, table.dtype)
+    grown[:, : table.shape[1]] = table
+    return grown

@@ -144,7 +144,6 @@ class ClosedLoopEnv(SensingEnv[OneWorld]):
     __doc__ = f"{__doc__}{indent(CONDITIONS, '    ')}"
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012 (Gymnasium's)
     scenario_name: str | type[Scenario]
-    conditions: ClosedLoopConditions
     conditions_kind = ClosedLoopConditions
 
     def __init__(
@@ -171,12 +170,12 @@ class ClosedLoopEnv(SensingEnv[OneWorld]):
         conditions, physics = split_conditions(self.conditions_kind, parameters)
         check_engine(conditions.engine)
         check_driver(conditions)
-        self.scenario = make_scenario(self.scenario_name, **physics)
+        scenario = make_scenario(self.scenario_name, **physics)
         setup = sensor_setup(sensor)
         super().__init__(
             conditions,
             grid=setup.grid,
-            cameras=setup.equipped(self.scenario.cameras),
+            cameras=setup.equipped(scenario.cameras),
             position=setup.position,
             budget=budget,
             keyframe_s=keyframe_s,
@@ -186,21 +185,34 @@ class ClosedLoopEnv(SensingEnv[OneWorld]):
         )
         made = detector_of(detector, detector_parameters, conditions, self.rig)
         # The proxy asks whose return each is, which the loop knows without a cloud.
-        self._detector = None if detector == PROXY else made
         self.metadata = {**self.metadata, "render_fps": round(1 / keyframe_s)}
         self.render_mode = render_mode
         self.keyframes: list[Keyframe] = []
-        self.reward_weights = rewards.weights(reward_weights)
         self.setting = Setting(
-            self.scenario,
+            scenario,
             self.rig,
             conditions,
-            self._detector,
-            self.reward_weights,
+            None if detector == PROXY else made,
+            rewards.weights(reward_weights),
             self._secret,
             scoring_info,
         )
         self._worlds: Worlds | None = None
+
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario; like all of the `setting`, it stays as it was when this was made."""
+        return self.setting.scenario
+
+    @property
+    def conditions(self) -> ClosedLoopConditions:
+        """The conditions."""
+        return self.setting.conditions
+
+    @property
+    def reward_weights(self) -> Mapping[str, float]:
+        """The weight of every term of the reward."""
+        return self.setting.weights
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -211,7 +223,7 @@ class ClosedLoopEnv(SensingEnv[OneWorld]):
         `scoring_info` is off. There are no `options`.
         """
         entropy = self._entropy(seed, options)
-        self.close()
+        self._running = None
         if self._worlds is None:
             self._worlds = Worlds([self.setting])
         episode, info = self._worlds.start({0: entropy})[0]
@@ -223,11 +235,14 @@ class ClosedLoopEnv(SensingEnv[OneWorld]):
         """Fire the cells that `action` scores highest and go on to the next keyframe.
 
         Raises InvalidInput for an action of the wrong shape or with values that are not finite, and
-        gymnasium.error.ResetNeeded before `reset` and after the end.
+        gymnasium.error.ResetNeeded before `reset`, after the end, and after an error or interrupt
+        in the middle of a step.
         """
         loop, worlds = self.loop, self._worlds
         fired = self._choose_cells(action)
         assert worlds is not None
+        # An error leaves the world between two keyframes.
+        self._over = True
         stepped = worlds.play(Fired.of([fired]), _HERE)
         self.keyframes.append(loop.record(fired, worlds.records))
         info = self._scan_info(fired) | _first(stepped.columns) | stepped.single.get(0, {})
@@ -249,7 +264,7 @@ class ClosedLoopEnv(SensingEnv[OneWorld]):
         """Free the simulator. The environment can be reset again."""
         if self._worlds is not None:
             self._worlds.close()
-        self._running = None
+        self._worlds = self._running = None
 
     @staticmethod
     def _observed(worlds: Worlds) -> Observed:

@@ -119,7 +119,6 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
     """
 
     acted: NDArray[np.float32]
-    conditions: Conditions
     conditions_kind: ClassVar[type[Conditions]] = Conditions
     """What its conditions are made as."""
 
@@ -147,11 +146,11 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
                 f"lidar_sweep_s must be at most the {keyframe_s:g} s between keyframes, got "
                 f"{conditions.lidar_sweep_s:g}"
             )
-        self.conditions = conditions
+        self._conditions = conditions
         self.scoring_info = scoring_info
         self._secret = secret if isinstance(secret, str) else ""
         x, y, z = position
-        self.rig = Rig(
+        self._rig = Rig(
             grid=grid,
             cameras=cameras,
             budget=hardware_of(conditions.firing, grid).budget_cells(budget),
@@ -172,6 +171,16 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         self._running: AnyLoop | None = None
         self._keyframe = 0
         self._over = False
+
+    @property
+    def rig(self) -> Rig:
+        """What is fixed about the sensing task."""
+        return self._rig
+
+    @property
+    def conditions(self) -> Conditions:
+        """The conditions."""
+        return self._conditions
 
     @property
     def loop(self) -> AnyLoop:

@@ -13,8 +13,7 @@ from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.rig import Rig
 from care_sim.loops.episode import Episode
 from care_sim.loops.observation_limits import Limits
-from care_sim.loops.records import Records
-from care_sim.loops.records import Sight as Met
+from care_sim.loops.records import Records, Sight
 from care_sim.loops.stages.detecting import Detecting, Found
 from care_sim.loops.stages.driving import Driving
 from care_sim.loops.stages.judging import Judging
@@ -22,7 +21,7 @@ from care_sim.loops.stages.locating import Locating
 from care_sim.loops.stages.motion import Motion, steps_of
 from care_sim.loops.stages.observing import Observations, Observing, room_for_observations
 from care_sim.loops.stages.scanning import Scanning
-from care_sim.loops.stages.sight import Sight
+from care_sim.loops.stages.sight import Seeing
 from care_sim.loops.stages.state import Fired, State, load, seen_by
 from care_sim.loops.stages.tracking import Tracking
 from care_sim.loops.truth import Told, told_by
@@ -36,7 +35,7 @@ class Loop:
     """W worlds, their sensors and the software of their cars, over episodes of up to `duration_s`
     seconds. Observations are written into `observed`, arrays with a row per world. The `rigs` (W,)
     differ at most in their budgets, the `conditions` (W,) in those of their cameras. Without
-    `detectors` (W,), or where one is None, the paper's proxy detects what enough rays hit.
+    `detectors` (W,), or where all are None, the paper's proxy detects what enough rays hit.
 
     Unless `exact`, records tell the clearance as `Motion.advance` does, and `motion.settle`
     tells the least of an episode.
@@ -48,7 +47,7 @@ class Loop:
     """What was detected there."""
     impacts: Mapping[int, Impact]
     """The first impact after the last keyframe, by world."""
-    sights: Mapping[int, tuple[Met, ...]]
+    sights: Mapping[int, tuple[Sight, ...]]
     """Whom the scenarios let the egos meet, at the last keyframe, by world."""
 
     def __init__(
@@ -68,13 +67,13 @@ class Loop:
         limits = Limits(rig)
         self.locating = Locating(rig, common, limits.ego, state)
         self.scanning = Scanning(rig, common, worlds)
-        self._detecting = Detecting(rig, detectors or [None] * worlds, common.min_returns)
+        self._detecting = Detecting(rigs, detectors or [None] * worlds, common.min_returns)
         self._tracking = Tracking(rig.keyframe_s, common.velocity_keyframes)
         self.driving = Driving(rig, common, worlds)
         self._judging = Judging(rig, common, self.driving, worlds)
         self._exact = exact
         self.motion = Motion(worlds, steps_of(duration_s, rig.keyframe_s))
-        self.sight = Sight(rig, conditions)
+        self.sight = Seeing(rig, conditions)
         self.observing = Observing(limits, np.array([each.budget for each in rigs]))
         self._in_view = np.zeros(worlds, np.bool_)
         self._reads_worlds = (

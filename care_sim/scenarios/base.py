@@ -94,6 +94,10 @@ class Scenario(ABC):
         if not (world.first_sighting or world.meetings or world.route):
             world.close()
             raise BrokenScenario(f"{own}: build sets no first_sighting, the actor that is scored")
+        if world.time:
+            at = world.time
+            world.close()
+            raise BrokenScenario(f"{own}: build must return a world at 0 s, got one at {at:g} s")
         world.scene = own
         return world
 

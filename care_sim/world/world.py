@@ -141,6 +141,7 @@ class World:
         self._every_step: list[Callable[[World], None]] = []
         self._ego_motion = Ego(ego_speed)
         self._steps = 0
+        self._is_handed_over = False
 
     def add(
         self,
@@ -178,11 +179,15 @@ class World:
         return actor
 
     def at(self, time: float, event: Callable[[], None]) -> None:
-        """Call `event` once, at the first world step at or after `time`."""
+        """Call `event` once, at the first world step at or after `time`. Raises InvalidInput after
+        `hand_over`, as `at_every_step` does.
+        """
+        self._check_calls_events()
         self._events.append((time, event))
 
     def at_every_step(self, event: "Callable[[World], None]") -> None:
         """Call `event` with this world at every step, when ego and clock have moved on."""
+        self._check_calls_events()
         self._every_step.append(event)
 
     @property
@@ -299,6 +304,10 @@ class World:
             for name, pose in zip(["the ego", *(a.name for a in self._moving)], poses, strict=True):
                 self._check_pose(name, pose)
 
+    def hand_over(self) -> None:
+        """Let other code move the world, by `put`, which calls no events."""
+        self._is_handed_over = True
+
     def put(
         self, steps: int, boxes: Floats, before: Floats, motion: Ego, lanes: Mapping[int, Floats]
     ) -> None:
@@ -325,6 +334,10 @@ class World:
     def close(self) -> None:
         """Free the simulator."""
         self.bullet.close()
+
+    def _check_calls_events(self) -> None:
+        if self._is_handed_over:
+            raise InvalidInput(f"{self.scene}: events must be set when the world is built")
 
     def _check_pose(self, name: str, pose: Pose) -> None:
         if not np.isfinite(pose).all():

@@ -52,7 +52,7 @@ from care_sim.loops.needless import NeedlessBraking
 from care_sim.loops.stages.driving import Driving
 from care_sim.loops.stages.motion import Motion
 from care_sim.loops.stages.scanning import Scanning
-from care_sim.loops.stages.sight import Sight
+from care_sim.loops.stages.sight import Seeing
 from care_sim.loops.stages.tracking import Tracking
 from care_sim.policies import make_policy, maker
 from care_sim.policies.makers import is_privileged
@@ -214,7 +214,7 @@ def drifted(_none, _tracking, state):
     [
         # A step of the world is half a keyframe; the first tracks come after a keyframe.
         (Motion, "_step", 4, moved, "CARE-Dense-v0", (TRAIL_STAGES[0], 2)),
-        (Sight, "look", 3, wider, "CARE-Dense-v0", (TRAIL_STAGES[1], 2)),
+        (Seeing, "look", 3, wider, "CARE-Dense-v0", (TRAIL_STAGES[1], 2)),
         (Tracking, "predict", 2, drifted, "CARE-Dense-v0", (TRAIL_STAGES[2], 2)),
         (base, "fired_cells", 3, other, "CARE-Dense-v0", (TRAIL_STAGES[3], 2)),
         (Scanning, "scan", 3, longer, "CARE-Dense-v0", (TRAIL_STAGES[4], 2)),

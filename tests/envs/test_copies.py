@@ -132,12 +132,12 @@ def test_a_detector_is_copied_with_what_it_remembers(copied, made, tmp_path):
 def test_copies_share_the_weights_and_a_pickle_opens_the_file_again(made, tmp_path):
     arguments = made(tmp_path)
     with gymnasium.make("CARE-Dartout-v0", **arguments) as env:
-        network = env.unwrapped._detector._detector
-        assert copy.deepcopy(env).unwrapped._detector._detector is network
+        network = env.unwrapped.setting.detector._detector
+        assert copy.deepcopy(env).unwrapped.setting.detector._detector is network
         packed = pickle.dumps(env)
-    assert pickle.loads(packed).unwrapped._detector._detector is network
+    assert pickle.loads(packed).unwrapped.setting.detector._detector is network
     lifetimes._KEPT.clear()
-    again = pickle.loads(packed).unwrapped._detector._detector
+    again = pickle.loads(packed).unwrapped.setting.detector._detector
     assert (type(again), again is network) == (type(network), False)
     # In processes of their own, which have no network of their parent.
     worlds = gymnasium.make_vec(
@@ -165,7 +165,7 @@ def test_a_detector_that_cannot_be_copied_is_named_in_one_line(copied):
     with gymnasium.make("CARE-Dartout-v0", detector=f"{__name__}:Closed") as env:
         with pytest.raises(InvalidInput) as refused:
             copied(env)
-        env.unwrapped._detector._detector._file.close()
+        env.unwrapped.setting.detector._detector._file.close()
     assert str(refused.value) == (
         f"detector {__name__}:Closed cannot be copied: TypeError: cannot pickle "
         "'_io.TextIOWrapper' object; set `stateless = True` if its answers depend on the arguments "

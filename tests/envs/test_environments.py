@@ -1,7 +1,9 @@
 """Every environment of the closed loop through the same checks."""
 
+import gc
 import pickle
 import warnings
+import weakref
 from dataclasses import dataclass, fields
 
 import gymnasium
@@ -230,3 +232,54 @@ def test_reset_takes_no_options(name):
         pytest.raises(InvalidInput, match=r"reset takes no options, got \{'test': 'CPNA-25'\}"),
     ):
         env.reset(seed=0, options={"test": "CPNA-25"})
+
+
+def test_after_an_interrupted_step_the_episode_begins_anew(monkeypatch):
+    """The world stands between two keyframes."""
+    env = make("CARE-CutIn-v0").unwrapped
+    env.reset(seed=0)
+    nothing = np.zeros(env.action_space.shape, np.float32)
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as broken:
+        broken.setattr(World, "step", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            env.step(nothing)
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        env.step(nothing)
+    env.reset(seed=0)
+    env.step(nothing)
+    env.close()
+
+
+@pytest.mark.parametrize("name", ["scenario", "rig", "conditions", "reward_weights"])
+def test_what_is_fixed_about_an_environment_cannot_be_assigned(name):
+    env = make("CARE-CutIn-v0").unwrapped
+    with pytest.raises(AttributeError):
+        setattr(env, name, getattr(env, name))
+
+
+def test_a_closed_environment_keeps_no_world():
+    env = make("CARE-CutIn-v0").unwrapped
+    env.reset(seed=0)
+    world = weakref.ref(env.loop.world)
+    env.close()
+    gc.collect()
+    assert world() is None
+
+
+@dataclass(frozen=True)
+class Late(BusAhead):
+    """A world that has moved already."""
+
+    def build(self, rng):
+        world = super().build(rng)
+        world.step(0.0)
+        return world
+
+
+def test_a_world_that_has_moved_already_is_refused():
+    with pytest.raises(InvalidInput, match=r"must return a world at 0 s, got one at 0\.05 s"):
+        ScenarioEnv(scenario=Late).reset(seed=0)

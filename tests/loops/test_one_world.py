@@ -1,8 +1,11 @@
 """The closed loop on small worlds made by hand: when it reads truth, and what its sensing does."""
 
+from contextlib import closing
+
 import numpy as np
 import pytest
 
+from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.frames import Frame
 from care_sim.core.rig import Rig
@@ -286,3 +289,57 @@ def test_comfort_is_that_of_the_drive_too(street):
     before = world.ego.speed
     loop.keyframe(NOTHING)
     assert world.ego.speed - before == pytest.approx(0.1 * comfort)
+
+
+def test_a_keyframe_past_the_end_of_an_episode_is_refused(street):
+    """Compiled code would write past the ends of its tables."""
+    seeds = SensorSeeds(*(np.random.SeedSequence(seed) for seed in range(4)))
+    loop = OneWorld.begun(street(), RIG, ClosedLoopConditions(), seeds, 0.2)
+    for _ in range(2):
+        loop.keyframe(NOTHING)
+    with pytest.raises(InvalidInput, match=r"the episode lasts 0\.2 s"):
+        loop.keyframe(NOTHING)
+
+
+def test_a_world_with_its_own_step_and_end_uses_them():
+    class Own(World):
+        steps = 0
+
+        def step(self, acceleration):
+            self.steps += 1
+            super().step(acceleration)
+
+        def is_over(self):
+            return self.steps == 2
+
+    with closing(Own(Traffic((1,), 0, 3.5, 14.0), SPEED)) as world:
+        loop = loop_in(world)
+        loop.keyframe(NOTHING)
+        assert world.steps == 2
+        assert loop._loop.motion.are_over(np.ones(1, np.bool_))
+
+
+def test_a_world_with_its_own_advance_is_refused():
+    class Own(World):
+        def advance(self, acceleration, duration):
+            return super().advance(acceleration, duration)
+
+    with (
+        closing(Own(Traffic((1,), 0, 3.5, 14.0), SPEED)) as world,
+        pytest.raises(InvalidInput, match="replace `step`"),
+    ):
+        loop_in(world)
+
+
+def test_events_and_the_first_sighting_are_set_when_a_world_is_built(street):
+    world = street()
+    loop_in(world)
+    for add in (lambda: world.at(0.1, print), lambda: world.at_every_step(print)):
+        with pytest.raises(InvalidInput, match="events must be set when"):
+            add()
+    world = street()
+    car = world.add("car", "car", (25.0, 0.0, 0.0))
+    world.at(0.1, lambda: setattr(world, "first_sighting", car))
+    loop = loop_in(world)
+    with pytest.raises(InvalidInput, match=r"first_sighting changed by 0\.1 s"):
+        loop.keyframe(NOTHING)

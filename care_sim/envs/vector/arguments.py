@@ -1,6 +1,5 @@
 """What goes into a vector environment and what comes out of it beside arrays: arguments, of which
-every world may have some of its own, seeds and infos. And which environments can be played as
-arrays.
+every world may have some of its own, seeds and infos.
 """
 
 from collections.abc import Iterable, Mapping, Sequence

@@ -43,8 +43,8 @@ class Found(NamedTuple):
 
 
 class Detecting:
-    """The `detectors` (W,), None for the proxy with its threshold. What it returns it fills anew at
-    the next keyframe.
+    """The `detectors` (W,); all None for the proxy with its threshold. Returned arrays are reused
+    at the next keyframe.
     """
 
     bodies: list[Integers]
@@ -52,9 +52,9 @@ class Detecting:
     detected: Mask
     """(W,) where the first-sighting actor is detected at the last keyframe."""
 
-    def __init__(self, rig: Rig, detectors: Sequence[Detector | None], min_returns: int):
+    def __init__(self, rigs: Sequence[Rig], detectors: Sequence[Detector | None], min_returns: int):
         worlds = len(detectors)
-        self._rig = rig
+        self._rigs = rigs
         self._makers = detectors
         self._least = min_returns
         self._ones: list[_OneDetector | None] = [None] * worlds
@@ -70,7 +70,7 @@ class Detecting:
         """Begin an episode."""
         maker = self._makers[world]
         if maker is not None:
-            self._ones[world] = _OneDetector(self._rig, maker, built, seeds.detector)
+            self._ones[world] = _OneDetector(self._rigs[world], maker, built, seeds.detector)
 
     def detect(self, state: State, returns: Returns, scans: Sequence[Scan | None]) -> Found:
         """The detections in the worlds that are live. `scans` (W,) are those of LiDARs that fire

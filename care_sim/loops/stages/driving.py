@@ -46,8 +46,8 @@ class Ahead(NamedTuple):
 
 
 class Driving:
-    """The drivers of `worlds` worlds, all of one car. What `command` returns it fills anew at the
-    next call.
+    """The drivers of `worlds` worlds, all of one car. The arrays that `command` returns are
+    reused at the next call.
     """
 
     front_m: float
@@ -78,7 +78,7 @@ class Driving:
         drivers, settings, cruise_mps = self._drivers, self._settings, built.ego_motion.speed
         drivers.since_s[world], drivers.free_s[world] = BRAKE_OFF
         drivers.cruise_mps[world] = cruise_mps
-        # Where somebody may come towards the ego into its way, the scenario asks for foresight.
+        # The scenario knows whether somebody may come towards the ego into its way.
         drivers.for_oncoming[world] = settings.brake_for_oncoming or built.has_oncoming
         self._built[world] = built
         extents = self.front_m, self._half_width_m, self._keyframe_s
@@ -92,8 +92,7 @@ class Driving:
         self, state: State, tracks: tuple[Integers, Floats], also: Collection[int]
     ) -> dict[int, Ahead]:
         """The tracks (W,) numbers of rows and rows (W, T, 13), in the frames of `state.driven`, of
-        the live worlds with another driver, a route or a plan, and of those that are `also` asked
-        for.
+        the live worlds with another driver, a route or a plan, and of the worlds in `also`.
         """
         counts, rows = tracks
         found = {}
@@ -112,7 +111,7 @@ class Driving:
     def command(
         self, state: State, tracks: tuple[Integers, Floats], ahead: Mapping[int, Ahead]
     ) -> tuple[Floats, Mask]:
-        """Accelerations (W,) that the cars ask for, and (W,) whether each brakes, by the `tracks`
+        """Accelerations (W,) that the drivers choose, and (W,) whether each brakes, by the `tracks`
         that lie `ahead`.
         """
         counts, rows = tracks

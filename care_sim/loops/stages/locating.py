@@ -3,7 +3,7 @@
 import numpy as np
 
 from care_sim.base.compiled import compiled
-from care_sim.core.arrays import Floats, Integers
+from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.conditions import Sensing
 from care_sim.core.frames import Frame
 from care_sim.core.rig import Rig
@@ -43,9 +43,10 @@ class Locating:
 
     def look(self, state: State) -> None:
         """Go on to the keyframe of the worlds that are live."""
-        place_sensors(state.sensors, state.bodies.boxes, state.egos.bodies, self._at)
+        placed = state.bodies.boxes, state.egos.bodies, state.live
+        place_sensors(state.sensors, *placed, self._at)
         if state.driven is not state.taken:
-            place_sensors(state.driven, state.bodies.boxes, state.egos.bodies, self._middle)
+            place_sensors(state.driven, *placed, self._middle)
         if self._errs:
             self._err(state)
         egos = state.egos
@@ -79,21 +80,22 @@ class Locating:
 
 
 def place_sensors(
-    sensors: Sensors, boxes: Floats, egos: Integers, at: tuple[float, float, float]
+    sensors: Sensors, boxes: Floats, egos: Integers, live: Mask, at: tuple[float, float, float]
 ) -> None:
-    """Write where the sensors are, which are mounted `at` (x, y, z) on the bodies `egos` (W,) of
-    those whose `boxes` (W, B, 7) are told.
+    """Write where the sensors of the worlds are that are `live` (W,). They are mounted `at`
+    (x, y, z) on the bodies `egos` (W,), and `boxes` (W, B, 7) are those of all bodies.
     """
     yaws = boxes[np.arange(len(egos)), egos, 6]
     # The sines and cosines are NumPy's, as in `care_sim.core.frames`.
     turns = np.cos(yaws), np.sin(yaws), np.cos(-yaws), np.sin(-yaws)
-    _place(boxes, egos, at, *turns, *sensors)
+    _place(boxes, egos, live, at, *turns, *sensors)
 
 
 @compiled(brief=True)
 def _place(
     boxes: Floats,
     egos: Integers,
+    live: Mask,
     at: tuple[float, float, float],
     cosines: Floats,
     sines: Floats,
@@ -106,6 +108,8 @@ def _place(
     """See `place_sensors`."""
     ahead, left, height = at
     for w in range(len(egos)):
+        if not live[w]:
+            continue
         box = boxes[w, egos[w]]
         cos, sin = turns[w, 0], turns[w, 1] = cosines[w], sines[w]
         turns_back[w, 0], turns_back[w, 1] = back_cosines[w], back_sines[w]

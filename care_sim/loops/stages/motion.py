@@ -10,6 +10,7 @@ from typing import TypeGuard
 import numpy as np
 
 from care_sim.base.compiled import compiled
+from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats, Integers, Mask, filled
 from care_sim.core.types import Ego
 from care_sim.loops.episode import most_keyframes
@@ -32,6 +33,8 @@ from care_sim.world.world import (
 
 KNOWN_BELOW_M = 2.0
 """Clearances below this are exact in any case: the reward reads them."""
+_MAY_BE_REPLACED = ("step", "is_over")
+"""Methods of a world that the loop calls; a class with its own moves by its own Python."""
 _BY_TIME_ALONE = (Walk, LaneChange)
 """Frozen: where they are depends on nothing but the time."""
 _REFLECTED = np.array([1.0, -1.0, -1.0])
@@ -44,8 +47,8 @@ def steps_of(duration_s: float, keyframe_s: float) -> int:
 
 
 class Motion:
-    """The motion of `worlds` worlds, whose episodes last `steps` world steps at most. What
-    `advance` returns it fills anew at the next call.
+    """The motion of `worlds` worlds, whose episodes last `steps` world steps at most. The
+    arrays that `advance` returns are reused at the next call.
     """
 
     def __init__(self, worlds: int, steps: int):
@@ -70,7 +73,13 @@ class Motion:
     def begin(self, world: int, built: World) -> None:
         """Move a fresh world from now on. Its tables lie in the state by the first `advance`. A
         world that does not move by its own Python is brought up to date by `current` alone.
+        Raises InvalidInput for a class with an `advance` of its own.
         """
+        if type(built).advance is not World.advance:
+            raise InvalidInput(
+                f"{built.scene}: environments move a world by `step` and never call the `advance` "
+                f"of {type(built).__name__}; replace `step`"
+            )
         self._steps[world] = self._current[world] = 0
         self._built[world] = built
         target = built.first_sighting
@@ -88,6 +97,7 @@ class Motion:
             self._by_itself[world] = built
             self._goes_along[world] = False
             return
+        built.hand_over()
         self._lanes.begin(world, keepers)
         bodies = np.array([built.ego_body, *(actor.body for actor in drivers)])
         self._drivers = filled(self._drivers, world, bodies)
@@ -109,15 +119,21 @@ class Motion:
 
         Unless `exact`, a clearance above `KNOWN_BELOW_M` may be a bound that is above it, too, and
         no greater than the clearance; `settle` tells the least of an episode then. `after_step` is
-        called with the number of steps after each but the last.
+        called with the number of steps after each but the last. Raises InvalidInput past the end of
+        an episode.
         """
+        # Compiled code does not check the bounds of tables that have a row per step.
+        count = whole_steps(duration_s)
+        if (self._steps[state.live] + count >= len(self._times)).any():
+            raise InvalidInput(
+                f"the episode lasts {self._times[-1]:g} s: begin another one, or a longer one"
+            )
         passages = self._passages
         passages.nearest_m.fill(np.inf)
         passages.hit.fill(False)
         passages.impacts.clear()
         egos = state.egos
         targeted = state.live & (egos.targets != NO_BODY)
-        count = whole_steps(duration_s)
         for step in range(1, count + 1):
             self._step(state, accelerations)
             counts, boxes, before, poses = state.bodies
@@ -171,6 +187,9 @@ class Motion:
 
     def _keepers(self, built: World, drivers: Sequence[Actor]) -> list[LaneKeeper] | None:
         """What ego and drivers of a world go by, if they are to keep their lanes, else None."""
+        kind = type(built)
+        if any(getattr(kind, name) is not getattr(World, name) for name in _MAY_BE_REPLACED):
+            return None
         ends = built.ended is not has_arrived or built.goal_m < np.inf
         if built.scripted or ends or built.speed_plan or isinstance(built.ego, RouteCar):
             return None
@@ -224,7 +243,15 @@ def _timetable(actor: Actor) -> object:
 
 
 def _copy(built: World, world: int, state: State) -> None:
-    """Write where all is in a world that moved by itself into the state."""
+    """Write where all is in a world that moved by itself into the state. Raises InvalidInput where
+    its first-sighting actor is another one than at the start.
+    """
+    target = built.first_sighting
+    if (NO_BODY if target is None else target.body) != state.egos.targets[world]:
+        raise InvalidInput(
+            f"{built.scene}: first_sighting changed by {built.time:g} s; it must be set when the "
+            "world is built"
+        )
     poses = built.bullet.primitives.poses
     count = len(poses)
     # An event may have added bodies.

@@ -31,8 +31,8 @@ def room_for_observations(rig: Rig, worlds: int) -> Observations:
 
 
 class Observing:
-    """Writes what the policies are told, within the limits of observations. Of a budget of the
-    `budgets` (W,) each is told its share of the cells.
+    """Writes what the policies are told, within the limits of observations. Writes each of the
+    `budgets` (W,) as a share of all cells.
     """
 
     def __init__(self, limits: Limits, budgets: Integers):

@@ -56,7 +56,7 @@ def lidar_of(world: World, rig: Rig, sensing: Sensing, seed: np.random.SeedSeque
 
 
 class Scanning:
-    """The LiDARs of `worlds` worlds. What it returns it fills anew at the next keyframe."""
+    """The LiDARs of `worlds` worlds. Returned arrays are reused at the next keyframe."""
 
     scans: list[Scan | None]
     """(W,) of LiDARs that fire world by world, all that they measured at the last keyframe."""

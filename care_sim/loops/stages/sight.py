@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from care_sim.base.compiled import compiled
-from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.arrays import Floats, Integers, Mask, longer
 from care_sim.core.cells.boxes import planar_ranges
 from care_sim.core.conditions import IDEAL_CAMERA, CameraFaults, Sensing
 from care_sim.core.frames import Frame, turned_alike
@@ -79,10 +79,10 @@ def has_own_detector(conditions: Sensing) -> bool:
     )
 
 
-class Sight:
+class Seeing:
     """The cameras of all worlds, which differ in their `conditions` alone.
 
-    What it returns it fills anew at the next keyframe.
+    Returned arrays are reused at the next keyframe.
     """
 
     def __init__(self, rig: Rig, conditions: Sequence[Sensing]):
@@ -94,6 +94,8 @@ class Sight:
         self._has_own = bool(self.own.any())
         self.own_cameras: dict[int, OwnCameras] = {}
         """Their cameras, by world."""
+        self.between: dict[int, int] = {}
+        """Worlds whose pictures are taken between keyframes, and how many world steps after."""
         self._cameras = Cameras(
             models,
             np.concatenate([models.positions[:, None], models.axes], axis=1),
@@ -113,6 +115,7 @@ class Sight:
         self._is_late = bool(latencies.any() or jitters.any())
         self._faults = alike
         self._is_ever_dark = any(each.blackout_s for each in alike)
+        self._shown = np.zeros((len(conditions), 0), np.bool_)
 
     def begin(self, world: int, built: World, seed: np.random.SeedSequence, pool: BoxPool) -> None:
         """Begin an episode; `seed` is that of the camera (`care_sim.loops.episode.SensorSeeds`).
@@ -120,7 +123,9 @@ class Sight:
         """
         if self.own[world]:
             given = self._rig, self._conditions[world], seed, pool
-            self.own_cameras[world] = OwnCameras(built, *given)
+            own = self.own_cameras[world] = OwnCameras(built, *given)
+            if own.after_steps:
+                self.between[world] = own.after_steps
             return
         self._misses.begin(world, seed, len(built.labels()))
         if self._is_late:
@@ -128,19 +133,17 @@ class Sight:
             _, delay, *_ = seed.spawn(7)
             self._delay.begin(world, delay)
 
-    @property
-    def between(self) -> dict[int, int]:
-        """Worlds whose pictures are taken between keyframes, and how many world steps after."""
-        steps = {world: one.after_steps for world, one in self.own_cameras.items()}
-        return {world: after for world, after in steps.items() if after}
-
     def look(self, state: State) -> tuple[Detected, Mask]:
         """Take the pictures of a keyframe: the newest detections that are due, and (W, B) which
         bodies a camera shows enough of for a box.
         """
         boxes = self._boxes(state)
         seen = Detected.of(state.worlds, len(self._cameras.sizes) * boxes.shape[1])
-        shown = np.zeros(state.bodies.boxes.shape[:2], np.bool_)
+        # The other worlds keep what was shown at their last keyframe.
+        if self._shown.shape != state.bodies.boxes.shape[:2]:
+            self._shown = longer(self._shown, state.bodies.boxes.shape[1])
+        shown = self._shown
+        shown[state.live] = False
         _look(
             state.live,
             self._cameras,
@@ -167,7 +170,8 @@ class Sight:
 
     def look_between(self, state: State, world: int) -> None:
         """Take the pictures of a world after some of its steps."""
-        boxes = self._boxes(state)[world, : state.reported.counts[world]].copy()
+        bodies = state.reported.bodies[world, : state.reported.counts[world]]
+        boxes = seen_by(state.sensors, world, state.bodies.boxes[world, bodies])
         self.own_cameras[world].take((state, world, boxes))
 
     def _boxes(self, state: State) -> Floats:
@@ -294,7 +298,7 @@ def _look(
     seen: Detected,
     shown: Mask,
 ) -> None:
-    """See `Sight.look`; of the reported bodies that are `silent` (W, R) there is no detection."""
+    """See `Seeing.look`; of the reported bodies that are `silent` (W, R) there is no detection."""
     room = _room(live, cameras, bodies, outlines)
     for w in range(len(live)):
         if not live[w]:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from care_sim.base.compiled import compiled
-from care_sim.core.arrays import Floats, Integers, Mask, filled
+from care_sim.core.arrays import Floats, Integers, Mask, filled, longer
 from care_sim.core.belief import MAX_TRACKS
 from care_sim.core.frames import Frame, placed_at, seen_from
 from care_sim.core.grid import Cells
@@ -225,7 +225,7 @@ def placed_by(sensors: Sensors, world: int, boxes: Floats) -> Floats:
 
 
 def load(state: State, world: int, built: World) -> None:
-    """Write the tables of a `world` of the batch anew: bodies, parts, classes, the ego; no tracks,
+    """Write the tables of a `world` anew: bodies, parts, classes, the ego; no tracks,
     and keyframe 0.
     """
     state.keyframes[world], state.times[world] = 0, built.time
@@ -242,15 +242,13 @@ def load(state: State, world: int, built: World) -> None:
 
     # Ids count up in the order in which bodies were added, and so do those that are reported.
     labels = built.labels()
-    state.reported.by_body[world] = -1
-    by_body = np.full(int(state.bodies.counts[world]), -1)
-    by_body[[*labels]] = [*labels.values()]
     reported = state.reported
     reported.counts[world] = len(labels)
+    reported.by_body[world] = -1
+    reported.by_body[world, [*labels]] = [*labels.values()]
     state.reported = reported._replace(
         bodies=filled(reported.bodies, world, np.array([*labels], np.int64)),
         classes=filled(reported.classes, world, np.array([*labels.values()], np.int64)),
-        by_body=filled(reported.by_body, world, by_body),
     )
 
 
@@ -266,6 +264,10 @@ def load_bodies(state: State, world: int, built: World) -> None:
         before=filled(bodies.before, world, boxes),
         poses=filled(bodies.poses, world, primitives.poses),
     )
+    # Bodies that an event adds have no class.
+    length, by_body = state.bodies.boxes.shape[1], state.reported.by_body
+    if length > by_body.shape[1]:
+        state.reported = state.reported._replace(by_body=longer(by_body, length, empty=-1))
     parts = primitives.tables
     state.solids.counts[world] = len(parts[-1])
     state.solids = Solids(state.solids.counts, *_all_filled(state.solids[1:], world, parts))

@@ -3,7 +3,7 @@
 import numpy as np
 
 from care_sim.base.compiled import compiled
-from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.arrays import Floats, Integers, Mask, longer
 from care_sim.core.types import Tracks
 from care_sim.loops.stages.detecting import Found
 from care_sim.loops.stages.state import Sensors, State, TrackTables, placed_by, seen_by
@@ -21,7 +21,9 @@ _BOX, _BOX_END = Tracks.BOX.start, Tracks.BOX.stop
 
 
 class Tracking:
-    """The track memories of all worlds. What `seen` returns it fills anew at the next call."""
+    """The track memories of all worlds. The arrays that `seen` returns are reused at the next
+    call.
+    """
 
     def __init__(self, keyframe_s: float, velocity_keyframes: int = 2):
         self._keyframe_s = float(keyframe_s)
@@ -35,9 +37,7 @@ class Tracking:
         # As many rows as there will be if nothing that was found is known.
         needed = int((state.tracks.counts + found.counts).max(initial=0))
         if needed > state.tracks.rows.shape[1]:
-            longer = np.zeros((state.worlds, 2 * needed, state.tracks.rows.shape[2]))
-            longer[:, : state.tracks.rows.shape[1]] = state.tracks.rows
-            state.tracks = state.tracks._replace(rows=longer)
+            state.tracks = state.tracks._replace(rows=longer(state.tracks.rows, 2 * needed))
         crowded = np.zeros(state.worlds, np.bool_)
         _update(state.live, found, state.taken, state.tracks, self._life, crowded)
         # Where a track could be two or two one, Python assigns.
@@ -72,7 +72,7 @@ def _update(
     life: LifeRules,
     crowded: Mask,
 ) -> None:
-    """See `Tracking.update`; worlds that are `crowded` (W,) it tells, and leaves alone."""
+    """See `Tracking.update`; marks `crowded` (W,) worlds and leaves them alone."""
     for w in range(len(live)):
         if live[w]:
             count = found.counts[w]
