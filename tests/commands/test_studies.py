@@ -103,8 +103,8 @@ def test_a_world_is_validated(played, capsys):
     rows = read_results(out)[0]
     # The full scan asks no camera, and its rows have none in their setting.
     assert {row["camera_profile"] for row in rows if row["policy"] != "full"} >= {"yolox"}
-    # Fourteen policies are chosen from; four more, and the full scan at its budget, are tested.
-    assert len(rows) == 2 * (14 + 14 + 4)
+    # Fifteen policies are chosen from; four more, and the full scan at its budget, are tested.
+    assert len(rows) == 2 * (15 + 15 + 4)
     assert {row["scenario.occluder_reported"] for row in rows} == {None, True}
     assert {row["seed"] for row in rows} == {0, 10_000}
     assert "too few for a verdict." in " ".join(printed.split())
