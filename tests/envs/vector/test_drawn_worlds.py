@@ -41,10 +41,3 @@ def first_difference(number):
 @pytest.mark.parametrize("number", range(12))
 def test_drawn_worlds_are_single_ones(number):
     assert first_difference(number) is None
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("batch", range(20))
-def test_two_thousand_drawn_worlds_are_single_ones(batch):
-    numbers = range(100 + 100 * batch, 200 + 100 * batch)
-    assert {number: found for number in numbers if (found := first_difference(number))} == {}
