@@ -184,7 +184,6 @@ class ClosedLoopEnv(SensingEnv[OneWorld]):
             setup=setup.label,
         )
         made = detector_of(detector, detector_parameters, conditions, self.rig)
-        # The proxy asks whose return each is, which the loop knows without a cloud.
         self.metadata = {**self.metadata, "render_fps": round(1 / keyframe_s)}
         self.render_mode = render_mode
         self.keyframes: list[Keyframe] = []
@@ -192,6 +191,7 @@ class ClosedLoopEnv(SensingEnv[OneWorld]):
             scenario,
             self.rig,
             conditions,
+            # The proxy needs to know whose return each is, which the loop knows without a cloud.
             None if detector == PROXY else made,
             rewards.weights(reward_weights),
             self._secret,

@@ -45,7 +45,7 @@ def weights(changes: Mapping[str, float] | None) -> dict[str, float]:
 
 
 BEGINNING = (0.0, 0.0, math.nan, 0.0)
-"""What the reward remembers of an episode, before its first keyframe: whether the first-sighting
+"""State of the reward before the first keyframe of an episode: whether the first-sighting
 actor has been in view and detected at any keyframe; the full-scan bound, which is the distance at
 the first keyframe at which a scan of every cell would have detected the actor, NaN while there was
 none; and the share of the bound that is lost.

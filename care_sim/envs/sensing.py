@@ -174,7 +174,7 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
 
     @property
     def rig(self) -> Rig:
-        """What is fixed about the sensing task."""
+        """The fixed settings of the sensing task."""
         return self._rig
 
     @property

@@ -1,4 +1,4 @@
-"""What plays the worlds of closed-loop environments: one of a single one, many of a vector."""
+"""Play the worlds of closed-loop environments: one of a single environment, many of a vector."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -12,7 +12,7 @@ from care_sim.base.times import LAST_BITS_S
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.rig import Rig
-from care_sim.envs.reward import Rewards
+from care_sim.envs.reward import KEEP_CLEAR_M, Rewards
 from care_sim.envs.sensing import Observed
 from care_sim.evaluation.outcomes import drive_outcome_of, outcome_of
 from care_sim.loops.episode import Episode, EpisodeSeeds, most_keyframes
@@ -31,7 +31,7 @@ from care_sim.world.world import World
 
 @dataclass(frozen=True)
 class Setting:
-    """What is fixed about the episodes of a closed-loop environment. The `detector` is None for the
+    """Fixed settings of the episodes of a closed-loop environment. The `detector` is None for the
     paper's proxy; `weights` holds one of every term of the reward; `scoring_info` says whether
     infos hold what is for scoring alone.
     """
@@ -45,7 +45,7 @@ class Setting:
     scoring_info: bool
 
     def episode(self, entropy: int) -> Episode:
-        """What an episode begins with, without its pool. The caller closes its world."""
+        """Build the beginning of an episode, without its pool. The caller closes its world."""
         seeds = EpisodeSeeds.of(entropy, self.secret)
         world = self.scenario.make_world(np.random.default_rng(seeds.scenario))
         return Episode(world, seeds.sensors, seeds.floor)
@@ -88,7 +88,7 @@ class History:
 
 
 class Stepped(NamedTuple):
-    """What n worlds give at a step: rewards, terminations and truncations (n,), 0 and False of
+    """Result of a step of n worlds: rewards, terminations and truncations (n,), 0 and False of
     those that did not play; what `info` says of all in `columns` (n, ...), by name, which the next
     step may write over; and what it says of one alone in `single`, by world.
     """
@@ -110,7 +110,7 @@ class Worlds:
     """
 
     records: Records
-    """Of the last keyframe."""
+    """Records of the last keyframe."""
 
     def __init__(
         self,
@@ -129,7 +129,8 @@ class Worlds:
         self._one_budget = one_budget
         duration_s = first.scenario.duration_s
         detectors = [each.detector for each in settings]
-        self.loop = Loop(rigs, conditions, duration_s, detectors, observed, exact)
+        exact_below_m = np.inf if exact else KEEP_CLEAR_M
+        self.loop = Loop(rigs, conditions, duration_s, detectors, observed, exact_below_m)
         self.observed = self.loop.observed
         self._rewards = Rewards(first.weights, worlds)
         self._history = History(worlds, most_keyframes(duration_s, first.rig.keyframe_s))
@@ -188,8 +189,8 @@ class Worlds:
         return stepped
 
     def _columns(self, told: Mapping[int, Mapping[str, np.ndarray]]) -> dict[str, NDArray[Any]]:
-        """What was `told` of the cells of worlds: (W, B), or (W,) arrays of each world's own where
-        budgets differ.
+        """Return the columns of what was `told` of the cells: (W, B), or (W,) arrays of each
+        world's own where budgets differ.
         """
         conditions, worlds = self._first.conditions, len(self._budgets)
         # There are columns even where nobody plays, to be joined with those of other threads.

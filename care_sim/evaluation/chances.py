@@ -6,20 +6,18 @@ nothing that was drawn before could have moved a cell towards the object or away
 would not be: luck lasts, and a lucky object is tracked.
 """
 
-import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
 from care_sim.core.arrays import Floats, Integers
-from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES
 from care_sim.evaluation.sightings import Sightings
 from care_sim.loops.open_loop import OpenLoop
 from care_sim.perception.detectors import GRADED
-from care_sim.perception.measured.detector import GATHERED_S
+from care_sim.perception.measured.detector import cell_angles, sweep_weights
 from care_sim.perception.measured.recall import FIRST_HIT, recall
 from care_sim.perception.measured.tables import MEASURED, measurement
 from care_sim.perception.proxy import chance
@@ -47,9 +45,10 @@ class Chances:
             return cls(_graded, np.ones(1), alike, rig)
         if detector not in MEASURED:
             return None
-        weights = _weights(detector, parameters.get("first_hit", FIRST_HIT), rig.keyframe_s)
-        angles = alike if parameters.get("worth") else _angles(rig)
-        return cls(_measured_rule(detector, parameters), weights, angles, rig)
+        first_hit = parameters.get("first_hit", FIRST_HIT)
+        weights = sweep_weights(measurement(detector), first_hit, rig.keyframe_s, is_filmed=True)
+        angles = alike if parameters.get("worth") else cell_angles(rig)
+        return cls(measured_rule(detector, parameters), weights, angles, rig)
 
     def note(self, loop: OpenLoop) -> None:
         """Note the keyframe that was just played."""
@@ -98,7 +97,10 @@ def _graded(name: str, now: Floats, _average: Floats) -> Floats:
     return chance(name, now.astype(np.int64))
 
 
-def _measured_rule(detector: str, parameters: Mapping[str, Any]) -> _Rule:
+def measured_rule(detector: str, parameters: Mapping[str, Any]) -> _Rule:
+    """Return the rule of a measured detector: chances (n,) from a class, and the returns (n,) in
+    this keyframe and on average per sweep.
+    """
     table = measurement(detector).recall
     worth = np.full(len(CLASSES), parameters.get("worth") or np.nan)
     worth = np.where(np.isnan(worth), table.worth, worth)
@@ -112,20 +114,3 @@ def _measured_rule(detector: str, parameters: Mapping[str, Any]) -> _Rule:
         return recall(detector, name, *given, least, first_hit=0.0)
 
     return rule
-
-
-def _weights(detector: str, first_hit: float, keyframe_s: float) -> Floats:
-    """Return the detector's weights (k,) of the returns at the last keyframes, newest first."""
-    measured = measurement(detector)
-    if measured.sweeps == 1:
-        return np.ones(1)
-    if keyframe_s > measured.step_s - 1e-9:
-        return np.array([first_hit, 1 - first_hit])
-    return np.ones(min(measured.sweeps, max(1, math.floor(GATHERED_S / keyframe_s + 1e-9))))
-
-
-def _angles(rig: Rig) -> Floats:
-    """Return the solid angle (k,) of a cell of each LiDAR, in cells of the default grid."""
-    usual = AngularGrid()
-    angles = [head.grid.column_width * head.grid.row_height for head in rig.grid.heads]
-    return np.array(angles) / (usual.column_width * usual.row_height)

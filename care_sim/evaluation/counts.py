@@ -10,14 +10,14 @@ On a street or a recording they are
 The line between emerging and entering is that of `care_sim.evaluation.strata`: an object emerges if
 the film first shows it nearer than 45 m, 5 m within the range. The line has a reason (an object
 covers 5 m in a keyframe), it is older than this score, and recordings have it too, since a box
-says when it first holds a point. At 40 m the best policies would need 0.2% of the cells more.
+says when it first holds a point.
 
 In a drive or a test they are the collision `avoided`, and the `needless stops`.
 
 A detector that detects by chance makes draws, and draws are noise that no policy can help. For
 newcomers the row of such a detector also has the sum of the chances
 (`care_sim.evaluation.chances`), and this sum is the count. Kept objects count by draws: luck lasts
-and tracks follow it, so that a sum of chances is up to 9% too high at 0.5% of the cells.
+and tracks follow it, so that a sum of chances would be too high.
 """
 
 from collections.abc import Mapping
@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from care_sim.core.arrays import Floats
+from care_sim.core.arrays import Floats, Mask
 from care_sim.evaluation.sightings import Sightings
 from care_sim.evaluation.strata import EMERGING, ENTERING, ENTRY, NEWCOMERS, strata
 
@@ -44,12 +44,19 @@ def expected_columns(sightings: Sightings, chances: Floats) -> dict[str, float]:
 
     `chances` (e,) are those that `sightings.events` are detected.
     """
+    return {
+        f"{_EXPECTED}/{count}": float(chances[own[sightings.events]].sum())
+        for count, own in rows_of_newcomers(sightings).items()
+    }
+
+
+def rows_of_newcomers(sightings: Sightings) -> dict[str, Mask]:
+    """Return which rows (r,) of `sightings.frames` are of each kind of newcomers."""
     entries = strata(sightings)[ENTRY]
-    columns = {}
-    for count, labels in NEWCOMERS.items():
-        own = np.any([entries[label] for label in labels], axis=0)[sightings.events]
-        columns[f"{_EXPECTED}/{count}"] = float(chances[own].sum())
-    return columns
+    return {
+        count: np.any([entries[label] for label in labels], axis=0)
+        for count, labels in NEWCOMERS.items()
+    }
 
 
 def scene_counts(row: Mapping[str, Any]) -> dict[str, float]:

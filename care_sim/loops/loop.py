@@ -37,18 +37,18 @@ class Loop:
     differ at most in their budgets, the `conditions` (W,) in those of their cameras. Without
     `detectors` (W,), or where all are None, the paper's proxy detects what enough rays hit.
 
-    Unless `exact`, records tell the clearance as `Motion.advance` does, and `motion.settle`
-    tells the least of an episode.
+    Clearances of `exact_below_m` or more are bounds, as of `Motion.advance`; `motion.settle`
+    returns the least of an episode.
     """
 
     fired: Fired
-    """What was fired at the last keyframe."""
+    """Cells fired at the last keyframe."""
     found: Found
-    """What was detected there."""
+    """Detections of the last keyframe."""
     impacts: Mapping[int, Impact]
     """The first impact after the last keyframe, by world."""
     sights: Mapping[int, tuple[Sight, ...]]
-    """Whom the scenarios let the egos meet, at the last keyframe, by world."""
+    """Sights of the actors that egos are to meet, at the last keyframe, by world."""
 
     def __init__(
         self,
@@ -57,7 +57,7 @@ class Loop:
         duration_s: float,
         detectors: Sequence[Detector | None] = (),
         observed: Observations | None = None,
-        exact: bool = True,
+        exact_below_m: float = np.inf,
     ):
         worlds = len(rigs)
         self.rig = rig = rigs[0]
@@ -71,7 +71,7 @@ class Loop:
         self._tracking = Tracking(rig.keyframe_s, common.velocity_keyframes)
         self.driving = Driving(rig, common, worlds)
         self._judging = Judging(rig, common, self.driving, worlds)
-        self._exact = exact
+        self._exact_below_m = exact_below_m
         self.motion = Motion(worlds, steps_of(duration_s, rig.keyframe_s))
         self.sight = Seeing(rig, conditions)
         self.observing = Observing(limits, np.array([each.budget for each in rigs]))
@@ -125,7 +125,7 @@ class Loop:
 
         # The commands hold until the next keyframe; then the cameras look and forecasts are due.
         passages = self.motion.advance(
-            state, accelerations, self.rig.keyframe_s, self._exact, self._look_between
+            state, accelerations, self.rig.keyframe_s, self._exact_below_m, self._look_between
         )
         self.impacts = passages.impacts
         state.keyframes[who] += 1
@@ -159,7 +159,7 @@ class Loop:
         return boxes
 
     def told(self, world: int) -> Told:
-        """What the returns of the last keyframe of a world told besides their ranges."""
+        """Return data of a world's last keyframe besides ranges."""
         scan = self.scanning.scans[world]
         if scan is None:
             return {}

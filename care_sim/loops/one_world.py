@@ -34,7 +34,7 @@ _NO_FAULT = np.random.SeedSequence(0)
 
 class OneWorld:
     """The episode that runs in a loop of one world. Its attributes are of the coming keyframe: they
-    change with every call of `keyframe`, and with `reset` show the new episode.
+    change with every call of `keyframe`. Use the one of the current episode: `reset` makes another.
     """
 
     index: int

@@ -66,7 +66,7 @@ def budgets_table(results: Sequence[BudgetResult], by: str = YARDSTICK) -> Table
 
 def sorted_by_budget(results: Sequence[BudgetResult]) -> list[BudgetResult]:
     """Sort results by B90, the smallest first; equal ones keep their order."""
-    return sorted(results, key=lambda result: result.score.budget)
+    return sorted(results, key=lambda result: float(reaching(result.counts).max()))
 
 
 def format_budget(budget: float) -> str:

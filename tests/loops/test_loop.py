@@ -58,6 +58,7 @@ def test_perception_reports_no_body_that_an_event_adds(cars):
         known = len(world.kinds)
         world.at(0.1, lambda: [world.add(f"{n}", "car", (9.0, 3.0 * n, 0.0)) for n in range(8)])
         loop.begin({0: begun})
+        assert loop.arrived.counts[0]
         loop.keyframe(Fired.of([np.empty(0, np.int64)]), np.ones(1, np.bool_))
         assert loop.shows(0, known + 1)
         seen = loop.arrived.objects[0, : loop.arrived.counts[0]]

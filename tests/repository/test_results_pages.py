@@ -6,9 +6,12 @@ import re
 import shlex
 from collections import Counter
 
+import numpy as np
 import pytest
 
 from care_sim import cli
+from care_sim.core.defaults import AS_DEMANDED
+from care_sim.evaluation.smallest_budget import budget_ratio
 from care_sim.policies import BUILT_IN
 from care_sim.reports.budgets import budgets_table
 from care_sim.study.benchmark.budgets import (
@@ -19,7 +22,7 @@ from care_sim.study.benchmark.budgets import (
     references,
 )
 from care_sim.study.benchmark.result import read_result
-from care_sim.study.benchmark.suite import STREETS
+from care_sim.study.benchmark.suite import STREETS, Entry
 from care_sim.study.results_formats import EPISODES
 from care_sim.study.rows.parquet import read_rows
 from tests.helpers.places import RESULTS, ROOT, links, loaded
@@ -118,6 +121,21 @@ def test_the_table_of_b90_is_of_its_files_which_are_the_published_entries():
     assert (DATA / "b90" / "tables.md").read_text() == f"# B90\n\n{table}"
     page = (FOLDER / "b90.md").read_text()
     assert all(line in page for line in table.splitlines() if line.startswith("|"))
+    # Ratios to other entries than the table's, and what a full scan has.
+    care, core_first, all_camera = (
+        results[Entry(name, cell_order=order)].counts
+        for name, order in (
+            ("care", AS_DEMANDED),
+            ("care", "core-spread"),
+            ("all-camera", "core-spread"),
+        )
+    )
+    for other in (care, all_camera):
+        ratio, low, high = budget_ratio(core_first, other)
+        assert np.isinf(high)
+        assert f"{ratio:.2f} [{low:.2f}, never]" in page
+    emerging, entering, *_ = ordered[0].counts[0].full.sum(axis=0)
+    assert f"{emerging:.0f} emerging and {entering:.0f} entering newcomers" in page
 
 
 def test_the_page_of_the_leaderboard_is_of_its_files(tmp_path, capsys):

@@ -59,7 +59,8 @@ class Benchmark(WorkerOptions):
     score: str = one_of(SHARE, (SHARE, B90))
     """share: what the policy reaches with 1% of the cells; b90: how few cells are enough."""
     detector: str | None = None
-    """For --score b90: the detector, centerpoint unless given. Others are columns beside it."""
+    """For --score b90: the detector, centerpoint unless given. Published entries use
+    centerpoint only."""
     closed_loop: Flag = False
     """For --score b90: play drives and Euro NCAP tests too. Collisions avoided and needless stops
     then count as well."""

@@ -70,6 +70,7 @@ class Driving:
         )
         self._commands = np.zeros(worlds), np.zeros(worlds, np.bool_)
         self._built: list[World | None] = [None] * worlds
+        self._special: set[int] = set()
         self._humans: list[CarefulHuman | None] = [None] * worlds
         self._cruising: list[Cruising | None] = [None] * worlds
 
@@ -87,6 +88,9 @@ class Driving:
         comfort = CruisingRules(comfort_mps2=settings.comfort_mps2)
         plan = built.speed_plan
         self._cruising[world] = Cruising(plan, *extents, comfort) if plan else None
+        self._special.discard(world)
+        if settings.driver != FIXED or built.route or plan:
+            self._special.add(world)
 
     def ahead(
         self, state: State, tracks: tuple[Integers, Floats], also: Collection[int]
@@ -96,11 +100,9 @@ class Driving:
         """
         counts, rows = tracks
         found = {}
-        for world in np.flatnonzero(state.live).tolist():
+        for world in sorted(self._special.union(also)):
             built = self._built[world]
-            assert built is not None
-            is_special = self._humans[world] or built.route or built.speed_plan
-            if not is_special and world not in also:
+            if built is None or not state.live[world]:
                 continue
             own = lying = Tracks.from_checked_rows(rows[world, : counts[world]].copy())
             if built.route is not None:

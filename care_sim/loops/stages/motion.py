@@ -31,8 +31,6 @@ from care_sim.world.world import (
     whole_steps,
 )
 
-KNOWN_BELOW_M = 2.0
-"""Clearances below this are exact in any case: the reward reads them."""
 _MAY_BE_REPLACED = ("step", "is_over")
 """Methods of a world that the loop calls; a class with its own moves by its own Python."""
 _BY_TIME_ALONE = (Walk, LaneChange)
@@ -111,14 +109,14 @@ class Motion:
         state: State,
         accelerations: Floats,
         duration_s: float,
-        exact: bool = True,
+        exact_below_m: float = np.inf,
         after_step: Callable[[int], None] = lambda _steps: None,
     ) -> Passages:
         """Move the worlds that are live by `duration_s` seconds, a whole number of world steps. The
         egos hold `accelerations` (W,), m/s^2, meanwhile.
 
-        Unless `exact`, a clearance above `KNOWN_BELOW_M` may be a bound that is above it, too, and
-        no greater than the clearance; `settle` tells the least of an episode then. `after_step` is
+        A clearance of `exact_below_m` or more may be a bound that is as large, and no greater than
+        the clearance; `settle` returns the least of an episode then. `after_step` is
         called with the number of steps after each but the last. Raises InvalidInput past the end of
         an episode.
         """
@@ -148,8 +146,9 @@ class Motion:
                 passages.impacts[world] = impact
             if step < count:
                 after_step(step)
-        below = np.inf if exact else KNOWN_BELOW_M
-        passages.clearance_m[:] = self._clearances.least_since(self._steps, count, targeted, below)
+        passages.clearance_m[:] = self._clearances.least_since(
+            self._steps, count, targeted, exact_below_m
+        )
         return passages
 
     def settle(self, world: int, since_s: float = 0.0) -> float:

@@ -59,21 +59,12 @@ class Observing:
         fits = _put(*detections, *self._detection_bounds, _CAMERA, observed["detections"], who)
         fits &= _put(*tracks, *self._track_bounds, _NO_CAMERA, observed["tracks"], who)
         for world in np.flatnonzero(who & ~fits).tolist():
-            self._mend(world, detections, tracks, observed)
-
-    def _mend(
-        self,
-        world: int,
-        detections: tuple[Integers, Floats],
-        tracks: tuple[Integers, Floats],
-        observed: Observations,
-    ) -> None:
-        """Write the tables of a world with numbers beyond the limits, or too many rows."""
-        told = self.belief(
-            world, np.zeros(3), detections, tracks, observed["ranges"][world]
-        ).to_observation()
-        for name in ("detections", "tracks"):
-            observed[name][world] = told[name]
+            # Numbers beyond the limits, or too many rows.
+            ranges = observed["ranges"][world]
+            limited = self.belief(world, state.read[world], detections, tracks, ranges)
+            tables = limited.to_observation()
+            for name in ("detections", "tracks"):
+                observed[name][world] = tables[name]
 
     def belief(
         self,
@@ -83,7 +74,7 @@ class Observing:
         tracks: tuple[Integers, Floats],
         ranges: NDArray[np.float32],
     ) -> Belief:
-        """What the policy of a world is told, in full precision. `ego` (3,) as in `State.read`."""
+        """Return the belief of a world, in full precision. `ego` (3,) as in `State.read`."""
         seen, known = (
             table[world, : counts[world]].copy() for counts, table in (detections, tracks)
         )

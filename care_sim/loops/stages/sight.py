@@ -91,7 +91,6 @@ class Seeing:
         self._conditions = conditions
         self.own = np.array([has_own_detector(each) for each in conditions])
         """(W,) where detections come from a `CameraDetector` of the world."""
-        self._has_own = bool(self.own.any())
         self.own_cameras: dict[int, OwnCameras] = {}
         """Their cameras, by world."""
         self.between: dict[int, int] = {}
@@ -114,6 +113,7 @@ class Seeing:
         self._delay = Delay(latencies, jitters, rig.keyframe_s)
         self._is_late = bool(latencies.any() or jitters.any())
         self._faults = alike
+        self._is_fast = conditions[0].engine == "fast"
         self._is_ever_dark = any(each.blackout_s for each in alike)
         self._shown = np.zeros((len(conditions), 0), np.bool_)
 
@@ -144,8 +144,9 @@ class Seeing:
             self._shown = longer(self._shown, state.bodies.boxes.shape[1])
         shown = self._shown
         shown[state.live] = False
+        # Another engine draws its own pictures, world by world.
         _look(
-            state.live,
+            state.live & self._is_fast,
             self._cameras,
             state.sensors,
             state.bodies,
@@ -162,7 +163,7 @@ class Seeing:
             arrived = self._delay.newest(whose, headings)
         else:
             arrived = seen
-        for world in np.flatnonzero(state.live & self.own).tolist() if self._has_own else ():
+        for world in np.flatnonzero(state.live & self.own).tolist():
             at = state, world, boxes[world, : state.reported.counts[world]].copy()
             own = self.own_cameras[world].look(at, seen.take(world), shown[world])
             arrived = arrived.put(world, own)

@@ -111,8 +111,8 @@ class MeasuredEpisode(Detector):
             worth = np.full(len(worth), float(rules.worth))
         self._table = measured.recall._replace(worth=worth)
         self._heads = [head.first for head in rig.grid.heads]
-        self._angles = _angles(rig) if rules.worth is None else np.ones(len(self._heads))
-        self._weights = _weights(measured, rules.first_hit, rig.keyframe_s, is_filmed)
+        self._angles = cell_angles(rig) if rules.worth is None else np.ones(len(self._heads))
+        self._weights = sweep_weights(measured, rules.first_hit, rig.keyframe_s, is_filmed)
         self._seed = seed.generate_state(1, np.uint64)[0]
         self._shares = shares_of(measured.luck, rig.keyframe_s, measured.flash_s)
         self._false = (
@@ -162,7 +162,7 @@ class MeasuredEpisode(Detector):
     def _meet(self, objects: Integers) -> None:
         """Find the rows of this keyframe's `objects` (n,), and make those of new ones."""
         # The closed loop reports the same bodies at every keyframe.
-        if objects is self._objects:
+        if np.array_equal(objects, self._objects):
             return
         known = self._rows
         self._places = np.array(
@@ -181,7 +181,9 @@ class MeasuredEpisode(Detector):
             self._counts = np.concatenate([self._counts, np.zeros((new, self._counts.shape[1]))])
 
 
-def _weights(measured: Measurement, first_hit: float, keyframe_s: float, is_filmed: bool) -> Floats:
+def sweep_weights(
+    measured: Measurement, first_hit: float, keyframe_s: float, is_filmed: bool
+) -> Floats:
     """(k,) the weights of this keyframe's returns and of those before, newest first."""
     if measured.sweeps == 1:
         return np.ones(1)
@@ -190,9 +192,10 @@ def _weights(measured: Measurement, first_hit: float, keyframe_s: float, is_film
     return np.ones(min(measured.sweeps, max(1, math.floor(GATHERED_S / keyframe_s + 1e-9))))
 
 
-def _angles(rig: Rig) -> Floats:
-    """(k,) the solid angle of a cell of each LiDAR, in cells of the default grid, for which the
-    worth of a return was measured: of denser rays each is worth less.
+def cell_angles(rig: Rig) -> Floats:
+    """Return the solid angle (k,) of a cell of each LiDAR, in cells of the default grid.
+
+    The worth of a return was measured for that grid: of denser rays each is worth less.
     """
     usual = AngularGrid()
     angles = [head.grid.column_width * head.grid.row_height for head in rig.grid.heads]

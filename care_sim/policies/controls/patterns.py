@@ -201,22 +201,19 @@ class Place(Pattern):
     source = "own: a map that never changes"
 
     def __init__(self, rig: Rig, path: str | PathLike[str] | None = None):
+        path = shipped_weights(self.name) if path is None else path
         super().__init__(rig, likeliest_cells(rig, path))
 
 
 class TunedPlace(Place):
-    """`place` with a map tuned to the very counts by which allocators are compared: the cells in
-    the order in which each adds most to them on training streets, by the recall of CenterPoint.
+    """`place` with a map tuned to four counts: newcomers that emerge, newcomers that enter, objects
+    kept, people kept. Cells are in greedy order on training streets, by the recall of CenterPoint.
 
-    No fixed pattern was found that does better, and no camera is needed: what a policy with a
-    camera must beat. `path` is a map that `care-sim train tuned-place` wrote.
+    `path` is a map that `care-sim train tuned-place` wrote; the shipped one, unless given.
     """
 
     name = "tuned-place"
     source = "own: a map tuned to the score"
-
-    def __init__(self, rig: Rig, path: str | PathLike[str] | None = None):
-        super().__init__(rig, shipped_weights(self.name) if path is None else path)
 
 
 def likeliest_cells(rig: Rig, path: str | PathLike[str] | None) -> Cells:

@@ -14,7 +14,7 @@ MEMBERS = 5
 MEMORY_S = 1.0
 """Seconds for which a measured range counts as known."""
 LEAST_M2 = 1e-4
-"""Variance, square metres, of a cell on whose range all members agree: it is fired at last."""
+"""Weight, square metres, that every cell has beside its variance, so that all can be drawn."""
 
 
 class AfterGofer(Policy):
@@ -28,6 +28,7 @@ class AfterGofer(Policy):
     ranges of the last second are what is known. A member knows a random half of them and predicts
     the nearest one in the image; the paper's are trained. There is no picture. Draws follow from
     the number of the keyframe alone. A line without a return has the range of the grid.
+    Ranges stay in their cells while the car moves, and the image ends straight behind the car.
     """
 
     name = "after-gofer"

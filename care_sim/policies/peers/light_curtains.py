@@ -47,6 +47,8 @@ class AfterAncha(Policy):
         super().__init__(rig)
         self._places = (np.arange(PLACES) + 0.5).astype(np.float64) * (rig.grid.range_m / PLACES)
         self._passed = [self._passed_by(head) for head in rig.grid.heads]
+        # No ray meets some places near the car, or between two rows.
+        self._areas = [self._places * passed.any(axis=0) for passed in self._passed]
         self.reset()
 
     def reset(self) -> None:
@@ -63,25 +65,18 @@ class AfterAncha(Policy):
 
     def demand(self, belief: Belief) -> Demand:
         """Curtains, one after the other, until the budget is spent. Several LiDARs take turns."""
-        # No ray meets some places near the car, or between two rows.
-        worth = [
-            uncertain * self._places * passed.any(axis=0)
-            for uncertain, passed in zip(self._uncertain, self._passed, strict=True)
-        ]
+        worth = [one * area for one, area in zip(self._uncertain, self._areas, strict=True)]
+        fired = [np.zeros(head.grid.shape, np.bool_) for head in self.rig.grid.heads]
         curtains: list[Cells] = []
         left = belief.budget
-        while left > 0 and any(own.any() for own in worth):
-            for head, passed, own in zip(self.rig.grid.heads, self._passed, worth, strict=True):
-                path = _best_path(own, STEP)
-                columns = np.arange(len(path))
-                rays = passed[:, columns, path]
-                first, stop = _best_part(own[columns, path], rays.sum(axis=0), left)
-                own[columns[first:stop], path[first:stop]] = 0.0
-                row, column = np.nonzero(rays[:, first:stop])
-                curtains.append(head.first + row * len(path) + first + column)
-                left -= len(row)
-                if first == stop:
-                    left = 0
+        has_placed = True
+        while left > 0 and has_placed:
+            has_placed = False
+            for n, head in enumerate(self.rig.grid.heads):
+                rows, columns = _curtain(self._passed[n], worth[n], fired[n], left)
+                curtains.append(head.first + rows * head.grid.columns + columns)
+                left -= len(rows)
+                has_placed |= len(rows) > 0
         return Demand(layers=[[curtain] for curtain in curtains])
 
     def _passed_by(self, head: Head) -> Mask:
@@ -103,6 +98,22 @@ class AfterAncha(Policy):
         inside = (column < len(uncertain)) & (place < PLACES)
         known = uncertain[np.where(inside, column, 0), np.where(inside, place, 0)]
         return np.where(inside, known, 1.0)
+
+
+def _curtain(passed: Mask, worth: Floats, fired: Mask, budget: int) -> tuple[Integers, Integers]:
+    """Rows and columns (n,) of the next curtain's cells that are not `fired` (e, A) yet. They are
+    then, and places lose their `worth` (A, PLACES) if all rays that could see them fire.
+    """
+    path = _best_path(worth, STEP)
+    columns = np.arange(len(path))
+    rays = passed[:, columns, path] & ~fired
+    first, stop = _best_part(worth[columns, path], rays.sum(axis=0), budget)
+    part = np.zeros_like(fired)
+    part[:, first:stop] = rays[:, first:stop]
+    fired |= part
+    worth[~(passed & ~fired[..., None]).any(axis=0)] = 0.0
+    rows, columns = np.nonzero(part)
+    return rows, columns
 
 
 @compiled()

@@ -13,8 +13,7 @@ from care_sim.policies.base import Policy
 from care_sim.policies.paper.tracks import uniform_pattern
 
 SPARSE = 0.2
-"""Share of the budget that looks everywhere. The paper gives none; this one is ours, and was chosen
-before a policy ran."""
+"""Share of the budget that looks everywhere. The paper gives none."""
 
 
 class AfterShoouri(Policy):

@@ -45,7 +45,7 @@ BUDGET_MARK = "care_sim_b90"
 """The key by which a file is known; its value is the version of the score."""
 BUDGET_VERSION = 1
 MAIN_DETECTOR = "centerpoint"
-"""The detector of the main column; others are columns beside it."""
+"""The detector of the published entries."""
 STREETS_PLAYED, QUICK_STREETS = 80, 24
 """Streets of the score, and those of a trial. Of 80 the interval of the best policy is a fifth of
 its B90."""

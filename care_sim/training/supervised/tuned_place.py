@@ -16,11 +16,12 @@ from care_sim.base.seeds import TRAINING
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.grid import AngularGrid
 from care_sim.core.types import CLASSES
+from care_sim.evaluation.chances import measured_rule
+from care_sim.evaluation.counts import PEOPLE, SCENE_COUNTS, rows_of_newcomers
 from care_sim.evaluation.sightings import Sightings
-from care_sim.evaluation.strata import ENTRY, NEWCOMERS, strata
+from care_sim.evaluation.smallest_budget import ENOUGH
 from care_sim.loops.film import Film
-from care_sim.perception.measured.recall import recall
-from care_sim.perception.measured.tables import measurement
+from care_sim.perception.measured.recall import FIRST_HIT
 from care_sim.policies.learned.weights import save_weights
 from care_sim.sources.street_films import street_film
 from care_sim.training.supervised.fit import card_of, one_by_one, print_end
@@ -28,14 +29,12 @@ from care_sim.training.supervised.options import TunedPlaceConfig
 
 DETECTOR = "centerpoint"
 """The detector whose recall says what a return is worth."""
-ENOUGH = 0.9
-"""The share of a full scan's count after which cells are no longer chosen for it."""
 MOST_SHARE = 0.35
 """The share of the cells that are put in order; the others follow as the pattern `rows` has them.
 No budget of the comparison is larger than 20%."""
 MOST_RETURNS = 256
 """More returns on an object add nothing."""
-_PEOPLE = [CLASSES.index(name) for name in ("bicycle", "pedestrian")]
+_PEOPLE = [CLASSES.index(name) for name in PEOPLE]
 
 
 class Frames(NamedTuple):
@@ -66,8 +65,7 @@ def train_tuned_place(config: TunedPlaceConfig) -> int:
     worth = np.zeros(grid.size, np.float32)
     worth[order] = np.arange(len(order), 0, -1)
     save_weights(config.out, {"sightings": worth.reshape(grid.shape)}, card)
-    names = (*NEWCOMERS, "kept", "people kept")
-    reached = {f"{name} at 10%": share for name, share in zip(names, shares, strict=True)}
+    reached = {f"{name} at 10%": share for name, share in zip(SCENE_COUNTS, shares, strict=True)}
     print_end(config.out, started, reached, None, "run", str(config.out))
     return 0
 
@@ -77,13 +75,9 @@ def frames_of(film: Film) -> Frames:
     annotated = [shot.annotations for shot in film.shots]
     sightings = Sightings.of(film.name, annotated, hidden=film.hidden)
     table = sightings.frames
-    entries = strata(sightings)[ENTRY]
     is_new = np.zeros(len(table), bool)
     is_new[sightings.events] = True
-    newcomers = [
-        is_new & np.any([entries[label] for label in labels], axis=0)
-        for labels in NEWCOMERS.values()
-    ]
+    newcomers = [is_new & own for own in rows_of_newcomers(sightings).values()]
     people = np.isin(table.classes, _PEOPLE)
     counts = np.stack([*newcomers, np.ones(len(table)), people], axis=1).astype(float)
     cells = [*_cells_by_row(film, table.keyframes, table.objects)]
@@ -109,13 +103,11 @@ def chance_table() -> Floats:
     """(2 * classes, MOST_RETURNS + 1) the chance that the detector reports an object of a class
     with 0, 1, 2, ... returns: seen before, and in its first keyframe.
     """
-    table = np.zeros((2 * len(CLASSES), MOST_RETURNS + 1))
-    known = measurement(DETECTOR).recall
+    rule, returns = measured_rule(DETECTOR, {}), np.arange(MOST_RETURNS + 1.0)
+    table = np.zeros((2 * len(CLASSES), len(returns)))
     for label, name in enumerate(CLASSES):
-        if known.known[label]:
-            returns = np.arange(MOST_RETURNS + 1) * known.worth[label]
-            table[2 * label] = recall(DETECTOR, name, returns)
-            table[2 * label + 1] = recall(DETECTOR, name, returns, np.zeros(len(returns)))
+        table[2 * label] = rule(name, returns, returns)
+        table[2 * label + 1] = rule(name, returns, FIRST_HIT * returns)
     return table
 
 
@@ -168,6 +160,7 @@ def _greedy(
     shares = np.zeros((most, len(wanted)))
     reached = np.zeros(len(wanted))
     worth = _worth(hits, rows, chances, counts @ wanted, returns)
+    is_there = counts.sum(axis=0) > 0
     has_enough = False
     for n in range(most):
         order[n] = best = worth.argmax()
@@ -184,7 +177,7 @@ def _greedy(
 
         # A count that has enough is no longer wanted. Once every one has, all are again, and the
         # rest of the map adds to all of them.
-        still = reached < ENOUGH
+        still = (reached < ENOUGH) & is_there
         if not has_enough and (still != (wanted > 0)).any():
             has_enough = not still.any()
             wanted = np.ones(len(wanted)) if has_enough else still.astype(np.float64)

@@ -1,12 +1,16 @@
 """Vectors of drawn environments, conditions, policies and seeds are their single environments."""
 
+from dataclasses import fields
 from random import Random
 
 import pytest
 
 from care_sim.certify.design import CLOSED, drawn
+from care_sim.scenarios.dartout import Dense
 from tests.envs.vector.test_same_episodes import CONDITIONS, OWN
 from tests.helpers.vectors import MODES, played_alike
+
+OF_THE_SCENARIO = {field.name for field in fields(Dense)}
 
 
 def first_difference(number):
@@ -20,8 +24,9 @@ def first_difference(number):
     episode = next(one for one in episodes if one.environment in CLOSED)
     arguments = dict(episode.arguments)
     if rng.random() < 0.5:
-        arguments |= rng.choice([*CONDITIONS.values(), *OWN.values()])
-        arguments.pop("duration_s", None)
+        conditions = rng.choice([*CONDITIONS.values(), *OWN.values()])
+        # Parameters of the dense street's scenario are none of every other one's.
+        arguments |= {name: v for name, v in conditions.items() if name not in OF_THE_SCENARIO}
         if arguments.get("driver") == "careful-human":
             arguments = {name: v for name, v in arguments.items() if not name.startswith("brake_")}
     if arguments.get("detector"):
@@ -41,3 +46,10 @@ def first_difference(number):
 @pytest.mark.parametrize("number", range(12))
 def test_drawn_worlds_are_single_ones(number):
     assert first_difference(number) is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("batch", range(20))
+def test_two_thousand_drawn_worlds_are_single_ones(batch):
+    numbers = range(100 + 100 * batch, 200 + 100 * batch)
+    assert {number: found for number in numbers if (found := first_difference(number))} == {}

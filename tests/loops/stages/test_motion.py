@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from care_sim.core.types import Ego
-from care_sim.loops.stages.motion import KNOWN_BELOW_M, Motion, steps_of
+from care_sim.envs.reward import KEEP_CLEAR_M
+from care_sim.loops.stages.motion import Motion, steps_of
 from care_sim.loops.stages.state import State, load
 from care_sim.scenarios import make_scenario
 from care_sim.world.bodies import CATALOGUE
@@ -144,14 +145,14 @@ def test_clearances_that_are_put_off_are_settled_in_the_end(name, monkeypatch):
             ClearanceJudge, "clearance", lambda *its: asked.append(1) or exactly(*its)
         )
         for _ in range(KEYFRAMES):
-            passages = batch.motion.advance(batch.state, np.zeros(4), KEYFRAME_S, exact=False)
+            passages = batch.motion.advance(batch.state, np.zeros(4), KEYFRAME_S, KEEP_CLEAR_M)
             bounds.append(passages.clearance_m.copy())
             count = len(asked)
             clearances.append([one.advance(0.0, KEYFRAME_S).clearance_m for one in batch.alone])
             del asked[count:]
         exact, told = np.array(clearances), np.array(bounds)
         assert (told <= exact).all()
-        assert ((told == exact) | (told > KNOWN_BELOW_M)).all()
+        assert ((told == exact) | (told > KEEP_CLEAR_M)).all()
         assert (told < exact).any()
         for world in range(4):
             for begin in (0, 20, 55):

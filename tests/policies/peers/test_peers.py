@@ -10,12 +10,14 @@ from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.grid import AngularGrid
+from care_sim.core.residual import wedges
 from care_sim.core.rig import Rig
-from care_sim.core.types import Ego
+from care_sim.core.types import CLASSES, Ego, ImageDetections
 from care_sim.policies.paper.tracks import uniform_pattern
 from care_sim.policies.peers.ensemble_variance import AfterGofer
 from care_sim.policies.peers.light_curtains import PLACES, AfterAncha, _best_part, _best_path
 from care_sim.policies.peers.predicted_regions import AfterShoouri
+from care_sim.sensors.pictures import FRONT_CAMERA
 
 GRID = AngularGrid()
 RIG = Rig(budget=819)
@@ -36,8 +38,14 @@ def walled(metres):
 
 
 def test_a_predicted_region_is_dense_and_the_rest_sparse(belief_of, car):
-    belief = belief_of([car(1, 20.0)])
-    sparse, regions, rest = AfterShoouri(RIG, sparse=0.1).demand(belief).layers
+    rig = Rig(cameras=(FRONT_CAMERA,), budget=819)
+    box = [CLASSES.index("car"), 0.9, 20.0, 60.0, 80.0, 100.0, 0.0, 0.0, 0.0]
+    seen = ImageDetections.from_rows(np.array([box]))
+    belief = replace(belief_of([car(1, 20.0)]), detections=seen)
+    sparse, regions, rest = AfterShoouri(rig, sparse=0.1).demand(belief).layers
+    (wedge,) = wedges(seen, rig)
+    assert len(regions) == 2
+    assert np.array_equal(regions[1], wedge)
     assert np.array_equal(sparse[0], uniform_pattern(GRID, 82))
     assert np.array_equal(regions[0], RIG.hulls(belief.tracks.boxes)[0])
     assert len(rest[0]) == belief.budget
@@ -140,3 +148,10 @@ def test_a_curtain_looks_where_nothing_was_seen(belief_of):
     assert 10 < len(columns) <= 20
     assert columns.min() >= 100
     assert columns.max() < 120
+
+
+@pytest.mark.parametrize("budget", [819, 3277])
+def test_curtains_never_pay_twice_for_a_cell(belief_of, budget):
+    cells = chosen(AfterAncha(RIG), replace(belief_of(), budget=budget))
+    assert len(np.unique(cells)) == len(cells)
+    assert 0.99 * budget < len(cells) <= budget

@@ -39,14 +39,16 @@ def test_the_cell_of_most_objects_comes_first_and_then_what_adds_to_others():
     assert {*order[2:5].tolist()} == {7, 8, 9}
 
 
-def test_a_count_that_has_enough_asks_for_no_more_until_all_have():
-    counts = [[1, 0, 0, 0]] * 4 + [[0, 1, 0, 0]]
-    given = frames([0, 1], [0, 1], [0, 1], [0, 1], [30, 31], counts=counts)
-    sure = np.array([[0.0, 0.95, 1.0]])
-    order, _ = tuned_order(given, sure, SIZE)
-    # The second cell of the four would add more than nothing, the one of the other count more.
-    assert order[0] in (0, 1)
-    assert order[1] in (30, 31)
+def test_a_count_that_has_enough_waits_until_all_have():
+    """Cell 38 gives one count 92%. Cell 39 would add 8% to it, each of thirteen others 7.7% to the
+    other count, which has 92% with twelve of them.
+    """
+    cells = [[38]] * 23 + [[39]] * 2 + [[n] for n in range(13)]
+    counts = [[1, 0, 0, 0]] * 25 + [[0, 1, 0, 0]] * 13
+    order, _ = tuned_order(frames(*cells, counts=counts), np.array([[0.0, 1.0]]), SIZE)
+    assert order[0] == 38
+    assert {*order[1:13].tolist()} < {*range(13)}
+    assert order[13] == 39
 
 
 def test_a_count_weighs_by_its_share_of_a_full_scan_not_by_its_objects():
