@@ -90,7 +90,7 @@ class OneWorld:
 
     @property
     def world(self) -> World:
-        """The world."""
+        """The world at the coming keyframe. Its bodies are moved there when it is asked for."""
         return self._loop.world(0)
 
     @property

@@ -82,6 +82,8 @@ def compare_episode(config, rays, pictures):
             while not is_last:
                 is_last = ended
                 name = {"seed": config.seed, "keyframe": loop.index}
+                # Asking for the world moves its bodies to this keyframe.
+                assert loop.world is world
                 rays.add(compare(engines, loop.sensor, cells), groups, name)
                 pictures.compare(engines.fast, engines.bullet, loop.rig.cameras, loop.sensor)
                 if not ended:

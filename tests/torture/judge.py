@@ -36,7 +36,7 @@ NOTICES = (
     r"interrupted: .*",
     r"the car never braked: no picture",
     r"measuring .*",
-    r"((calibration|held out) )?(street|drive|test) \d+ of \d+ *",
+    r"([a-z ]+ )?(street|drive|test|world) \d+ of \d+ *",
     r"the first take longer on a machine that has not played before: .*",
 )
 """What a command may say on stderr about how far it is, beside lines of its own name."""
