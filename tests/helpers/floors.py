@@ -40,8 +40,12 @@ def drawn_cells(floor, size, batches):
 
 def floor_order(floor, size):
     """All cells (size,) in the order in which a floor names them first."""
-    batches, order = 1, np.empty(0, np.int64)
-    while len(order) < size:
-        cells, places = np.unique(drawn_cells(floor, size, batches), return_index=True)
-        order, batches = cells[np.argsort(places)], 2 * batches
-    return order
+    batches = 1 + size // 8
+    while True:
+        cells = drawn_cells(floor, size, batches)
+        first = np.full(size, len(cells))
+        # Of several places of a cell the one written last stays.
+        first[cells[::-1]] = np.arange(len(cells))[::-1]
+        if first.max() < len(cells):
+            return np.argsort(first)
+        batches *= 2

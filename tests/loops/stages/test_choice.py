@@ -1,13 +1,11 @@
 """What all worlds fire is what each fires alone, with any hardware."""
 
-from functools import partial
-
 import numpy as np
 from hypothesis import example, given
 from hypothesis import strategies as st
 
 from care_sim.core.conditions import ClosedLoopConditions
-from care_sim.core.firing.floor import RandomFloor
+from care_sim.core.firing.floor import Floor, floor_key
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
 from care_sim.loops.stages.choice import Choice
@@ -55,16 +53,16 @@ def test_every_world_fires_as_if_alone(played, budgets, floor, floor_seed, firin
     rig = Rig(GRID, firing=firing)
     conditions = ClosedLoopConditions(floor=floor, floor_seed=floor_seed)
     choice = Choice(rig, conditions, np.array(budgets))
-    floors, last = [], [NOTHING] * WORLDS
+    keys, last = [], [NOTHING] * WORLDS
     for world in range(WORLDS):
         choice.begin(world, np.random.SeedSequence(world))
-        floors.append(RandomFloor(np.random.SeedSequence(world), floor_seed, GRID.size))
+        keys.append(floor_key(np.random.SeedSequence(world), floor_seed))
     now = np.zeros(WORLDS, np.int64)
     for given_scores, live in played:
         action = np.array(given_scores, np.float32).reshape(WORLDS, *GRID.shape)
         alone = [[]] * WORLDS
         for world in np.flatnonzero(live).tolist():
-            drawn = partial(floors[world].at, now[world]) if floor else None
+            drawn = Floor(*keys[world], now[world]) if floor else None
             given_ones = action[world], budgets[world], drawn, last[world]
             last[world] = rig.hardware.fire(*given_ones)
             alone[world] = last[world].tolist()
