@@ -5,7 +5,7 @@ from itertools import permutations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from care_sim.core.firing.base import top_up
@@ -43,11 +43,13 @@ def test_cells_are_those_of_the_reference(floor, size, batches):
     assert found.tolist() == drawn_cells(floor, size, batches).tolist()
 
 
-@given(drawn_floors, st.sets(st.integers(0, 39)), st.integers(0, 40))
+@given(drawn_floors, st.sets(st.integers(0, 399)), st.integers(0, 400))
+@example(Floor(1, 2, 3), {5, 6}, 400)
 def test_a_reader_takes_the_first_free_cells_of_the_order(floor, demanded, budget):
-    order = floor_order(floor, 40).tolist()
-    assert sorted(order) == [*range(40)]
-    chosen = np.isin(np.arange(40), [*demanded])
+    """Of so many cells that a whole order takes many batches."""
+    order = floor_order(floor, 400).tolist()
+    assert sorted(order) == [*range(400)]
+    chosen = np.isin(np.arange(400), [*demanded])
     count = top_up(chosen, len(demanded), floor, budget)
     free = [cell for cell in order if cell not in demanded]
     expected = demanded.union(free[: max(0, budget - len(demanded))])
