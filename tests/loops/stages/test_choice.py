@@ -47,7 +47,13 @@ def at(*cells):
 STANDING = [([at(0), at(16), at(32)], [True] * 3), ([at()] * 3, [True] * 3)]
 
 
+# The floor of a later keyframe, of free cells and of whole units.
+UNASKED = [([at()] * 3, [True, False, True])] * 3
+
+
 @example(STANDING, [16] * 3, False, 0, "vertical-window")
+@example(UNASKED, [5, 8, 9], True, 1, "cells")
+@example(UNASKED, [16] * 3, True, 0, "rows")
 @given(keyframes, budgets, st.booleans(), st.integers(0, 2), HARDWARE)
 def test_every_world_fires_as_if_alone(played, budgets, floor, floor_seed, firing):
     rig = Rig(GRID, firing=firing)
