@@ -115,7 +115,8 @@ def test_drivers_stay_clear_of_who_crosses(seed):
                 own = world.bullet.clearance
                 clearances = [own(meeting.body, one.body, 9.0) for one in driven(world)]
                 nearest_m = min(nearest_m, *clearances)
-    assert 0.5 < nearest_m < 9.0
+    # Drivers who do not brake come within 1.8 and 1.2 m.
+    assert 2.0 < nearest_m < 9.0
     world.close()
 
 
@@ -144,15 +145,12 @@ def test_who_crosses_goes_as_if_nobody_drove_there(seed, monkeypatch):
     world = built(seed)
     monkeypatch.setattr(drive, "_add_vehicles", lambda *_: None)
     alone = built(seed)
-    slowest = np.inf
     while world.along_m < world.goal_m:
-        drive_on(world), drive_on(alone)
+        drive_on(world)
+        drive_on(alone)
         for one, other in zip(world.meetings, alone.meetings, strict=True):
             assert one.crosser.pose(world.time) == other.crosser.pose(alone.time)
-        speeds = np.hypot(*world.velocities_of(np.array([one.body for one in driven(world)])).T)
-        slowest = min(slowest, speeds.min())
-    # Not in vain: somebody in the traffic brakes.
-    assert slowest < 4.0
+    assert all(one.crosser.went for one in world.meetings)
     world.close()
     alone.close()
 
