@@ -24,8 +24,7 @@ YARDSTICK = "care-sector"
 _NOTES = (
     f"Cells needed for {ENOUGH:.0%} of what a full scan has, in % of all cells; B90 is for all "
     "counts. Intervals are over worlds.",
-    "Rank: 1 plus the entries that need surely fewer cells, to those that do not need surely more. "
-    "Entries are tied if the interval of their paired ratio includes 1.",
+    "Tied entries share ranks, such as 1-3: the interval of their paired ratio includes 1.",
 )
 _TIMED = "ms: p50 / p99 of a decision of the policy on streets, on the machine of its file."
 _TRIAL = "A trial on the streets that --quick plays."

@@ -27,7 +27,7 @@ from care_sim.study.play_config import play_grid
 from care_sim.study.rows.parameters import Parameters
 from care_sim.study.run_config import RunConfig
 
-DRIVES, TESTS, STREETS = PARTS = ("drives", "tests", "streets")
+DRIVES, TESTS, STREETS = "drives", "tests", "streets"
 FIRST_SEED = 200
 """The test seeds below it were looked at while the worlds were built (0 to 137 of the drives), and
 policies were first tried on some of them (streets 0 to 19, drives 100 to 139)."""
