@@ -142,7 +142,8 @@ def test_a_result_names_the_code_and_the_files_that_made_it(tmp_path):
     made = made_by(entry)
     assert elsewhere(entry, made) == ""
     assert elsewhere(entry, made | {"machine": {}}).startswith("by other libraries or another")
-    assert elsewhere(entry, made | {"policy_code": "5"}) == "by other code than here"
+    for other in ({"policy_code": "5"}, {"versions": {"code": "0"}}, {"versions": None}):
+        assert elsewhere(entry, made | other) == "by other code than here"
     weights.write_text("2")
     assert elsewhere(entry, made) == "by other code than here"
     assert own_code_of(made_by(entry)) != own_code_of(made)
