@@ -13,10 +13,11 @@ from care_sim.commands.shared.console import TableConsole
 from care_sim.commands.shared.entries import entries_of
 from care_sim.commands.shared.selection import check_values
 from care_sim.policies.isolation import isolated_policies
-from care_sim.reports.budgets import budgets_table
+from care_sim.reports.budgets import budget_tables
 from care_sim.reports.figures.budgets import BUDGETS_FIGURE, budgets_figure
 from care_sim.reports.figures.styles import check_figure, save
 from care_sim.reports.leaderboard import leaderboard_table
+from care_sim.reports.recorded import sources_table
 from care_sim.study.benchmark.budgets import (
     MAIN_DETECTOR,
     BudgetResult,
@@ -26,6 +27,7 @@ from care_sim.study.benchmark.budgets import (
     references,
 )
 from care_sim.study.benchmark.play import played, player_in, screened_worlds
+from care_sim.study.benchmark.recorded import recorded_drives
 from care_sim.study.benchmark.suite import (
     Entry,
     Salt,
@@ -83,8 +85,14 @@ def _published(options: Benchmark) -> Sequence[World]:
 def _smallest_budgets(options: Benchmark) -> int:
     """Play the budgets, write a result file per policy, a table and a figure."""
     detector = options.detector or MAIN_DETECTOR
-    worlds = budget_worlds(options.quick, options.closed_loop)
-    marks = {"quick": options.quick, "closed-loop": options.closed_loop}
+    drives = recorded_drives(options.recorded)
+    worlds = budget_worlds(options.quick, options.closed_loop, drives, options.without_streets)
+    marks = {
+        "quick": options.quick,
+        "closed-loop": options.closed_loop,
+        "recorded": options.recorded,
+        "without-streets": options.without_streets,
+    }
     kind = ".".join([detector, *(name for name, on in marks.items() if on)])
     figure = options.out / f"{BUDGETS_FIGURE}.{kind}"
 
@@ -106,7 +114,8 @@ def _smallest_budgets(options: Benchmark) -> int:
     if results:
         shown = _with_references(results)
         save(budgets_figure(shown), figure)
-        TableConsole().print(budgets_table(shown).rich())
+        sources = [sources_table(shown)] if drives else []
+        TableConsole().print(*(table.rich() for table in [*budget_tables(shown), *sources]))
         print_lines(*(f"Result: {files[result.entry]}" for result in results))
         print_lines(f"Figure: {figure}.svg")
     failed = [f"failed: {line}" for line in by_reason(player.failures, "plays")]

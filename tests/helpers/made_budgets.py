@@ -3,6 +3,7 @@
 from care_sim.evaluation.smallest_budget import BUDGETS
 from care_sim.policies import tags_of
 from care_sim.study.benchmark.budgets import COUNTS, BudgetResult, BudgetRow
+from care_sim.study.benchmark.recorded import RECORDED
 from care_sim.study.benchmark.suite import STREETS, Entry
 
 HALF_WAY = (0.1, 0.2, 0.8, 1.0, 1.0, 1.0, 1.0)
@@ -11,11 +12,23 @@ ALWAYS, NEVER = (1.0,) * len(BUDGETS), (0.5,) * len(BUDGETS)
 FULL = 8.0
 
 
-def made_budgets(entry="care", *curves, detector="centerpoint", streets=3, quick=False):
-    """The result of an entry whose four counts have these curves, the last one for all others."""
+def made_budgets(
+    entry="care", *curves, detector="centerpoint", streets=5, quick=False, recorded=(), later=()
+):
+    """The result of an entry whose four counts have these curves, the last one for all others. In
+    the drives named `recorded` each count has `later`, or the last curve.
+    """
     entry = entry if isinstance(entry, Entry) else Entry(entry)
     names = COUNTS[STREETS]
     each = [curves[min(n, len(curves) - 1)] for n in range(len(names))]
-    got = tuple(tuple(FULL * curve[n] for curve in each) for n in range(len(BUDGETS)))
-    rows = tuple(BudgetRow(STREETS, 200 + n, (FULL,) * len(names), got) for n in range(streets))
+    full, got = (FULL,) * len(names), _got(each)
+    there = _got([later or curves[-1]] * len(names))
+    rows = (
+        *(BudgetRow(STREETS, 200 + n, full, got) for n in range(streets)),
+        *(BudgetRow(RECORDED, name, full, there) for name in recorded),
+    )
     return BudgetResult(entry, tags_of(entry.policy), detector, rows, quick, {"versions": {}})
+
+
+def _got(curves):
+    return tuple(tuple(FULL * curve[n] for curve in curves) for n in range(len(BUDGETS)))

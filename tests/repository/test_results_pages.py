@@ -13,12 +13,12 @@ from care_sim import cli
 from care_sim.core.defaults import AS_DEMANDED
 from care_sim.evaluation.smallest_budget import budget_ratio
 from care_sim.policies import BUILT_IN
-from care_sim.reports.budgets import budgets_table
+from care_sim.reports.budgets import parts_table
+from care_sim.reports.recorded import sources_table
 from care_sim.study.benchmark.budgets import (
     MAIN_DETECTOR,
     REFERENCE_ENTRIES,
     budget_worlds,
-    read_budget_result,
     references,
 )
 from care_sim.study.benchmark.result import read_result
@@ -112,15 +112,17 @@ def test_every_entry_of_the_leaderboard_stands_on_its_page_as_it_scores():
 
 
 def test_the_table_of_b90_is_of_its_files_which_are_the_published_entries():
-    results = {one.entry: one for one in map(read_budget_result, (DATA / "b90").glob("*.json"))}
-    assert {*results} == {*REFERENCE_ENTRIES}
-    ordered = [results[entry] for entry in REFERENCE_ENTRIES]
-    worlds = [(STREETS, seed) for seed in budget_worlds()[STREETS]]
-    assert [one.rows for one in references(MAIN_DETECTOR, worlds)] == [one.rows for one in ordered]
-    table = budgets_table(ordered).markdown()
-    assert (DATA / "b90" / "tables.md").read_text() == f"# B90\n\n{table}"
+    script = loaded(ROOT / "docs" / "b90_results.py")
+    ordered = script.results_of(MAIN_DETECTOR)
+    results = {one.entry: one.of_part(STREETS) for one in ordered}
+    assert [*results] == [*REFERENCE_ENTRIES]
+    streets = tuple((STREETS, seed) for seed in budget_worlds()[STREETS])
+    assert {one.worlds for one in results.values()} == {streets}
+    assert references(MAIN_DETECTOR, ordered[0].worlds) == ordered
+    assert (DATA / "b90" / "tables.md").read_text() == script.written()
     page = (FOLDER / "b90.md").read_text()
-    assert all(line in page for line in table.splitlines() if line.startswith("|"))
+    lines = "".join(make(ordered).markdown() for make in (parts_table, sources_table)).splitlines()
+    assert all(line in page for line in lines if line.startswith("|"))
     # Ratios to other entries than the table's, and what a full scan has.
     care, core_first, all_camera = (
         results[Entry(name, cell_order=order)].counts
@@ -134,8 +136,9 @@ def test_the_table_of_b90_is_of_its_files_which_are_the_published_entries():
         ratio, low, high = budget_ratio(core_first, other)
         assert np.isinf(high)
         assert f"{ratio:.2f} [{low:.2f}, never]" in page
-    emerging, entering, *_ = ordered[0].counts[0].full.sum(axis=0)
-    assert f"{emerging:.0f} emerging and {entering:.0f} entering newcomers" in page
+    for part in ordered[0].counts:
+        emerging, entering, *_ = part.full.sum(axis=0)
+        assert f"{emerging:.0f} emerging and {entering:.0f} entering newcomers" in page
 
 
 def test_the_page_of_the_leaderboard_is_of_its_files(tmp_path, capsys):

@@ -18,7 +18,9 @@ from care_sim.study.benchmark.budgets import (
     read_budget_result,
     references,
 )
+from care_sim.study.benchmark.recorded import RECORDED, recorded_drives
 from care_sim.study.benchmark.suite import DRIVES, STREETS, TESTS, Entry
+from tests.helpers import kitti_drive
 from tests.helpers.made_budgets import ALWAYS, HALF_WAY, NEVER, made_budgets
 
 
@@ -50,6 +52,46 @@ def test_a_world_is_played_by_the_full_scan_and_at_every_budget(part, latency):
         assert {config.detector for config in (full, *own)} == {"megvii"}
     scenes = [getattr(task[0], "scene", None) or task[0].seed for task in worlds]
     assert len({*scenes}) == 2
+
+
+def test_a_recorded_drive_is_played_as_a_street_is(tmp_path):
+    kitti_drive.write(tmp_path)
+    drives = recorded_drives([f"kitti:{tmp_path}", "boreas"])
+    assert [drive.name for drive in drives] == ["kitti/0000", "boreas/boreas-objects-v1"]
+    worlds = budget_worlds(recorded=drives, without_streets=True)
+    assert worlds == {RECORDED: drives}
+    assert [*budget_worlds(recorded=drives)] == [STREETS, RECORDED]
+    entry = Entry("care", cell_order="core-spread")
+    tasks = budget_tasks(entry, RECORDED, drives, "megvii")
+    assert [len(task) for task in tasks] == [1 + len(BUDGETS)] * 2
+    for drive, (full, *own) in zip(drives, tasks, strict=True):
+        assert {(config.source, config.scene) for config in (full, *own)} == {drive}
+        assert (full.policy, full.budget) == ("full", 1.0)
+        assert [config.budget for config in own] == [*BUDGETS]
+        assert {(each.policy, each.cell_order) for each in own} == {("care", "core-spread")}
+        assert {each.camera_profile for each in own} == {"kitti"}
+        assert {each.camera_latency_s for each in own} == {0.0}
+        assert {each.detector for each in (full, *own)} == {"megvii"}
+
+
+def test_drives_of_one_name_are_refused(tmp_path):
+    for folder in ("one", "other"):
+        kitti_drive.write(tmp_path / folder)
+    with pytest.raises(InvalidInput, match="kitti/0000 twice"):
+        recorded_drives([f"kitti:{tmp_path}/one", f"kitti:{tmp_path}/other"])
+    # A source that is given twice plays once.
+    assert len(recorded_drives([f"kitti:{tmp_path}/one"] * 2)) == 1
+
+
+def test_a_file_holds_streets_and_drives(tmp_path):
+    result = made_budgets("care", HALF_WAY, recorded=["kitti/0000"], later=NEVER)
+    result.write(tmp_path / "mine.json")
+    assert read_budget_result(tmp_path / "mine.json") == result
+    content = json.loads((tmp_path / "mine.json").read_text())
+    assert [*content["counts"]] == ["streets", "recorded"]
+    assert content["b90_percent"][0] == "never"
+    assert result.of_part(STREETS).score.budget < 0.03
+    assert result.of_part(RECORDED).worlds == (("recorded", "kitti/0000"),)
 
 
 def test_entries_share_the_full_scan():
@@ -130,7 +172,7 @@ def test_published_entries_stand_beside_results_of_the_same_worlds(tmp_path, mon
     monkeypatch.setattr(budgets, "_REFERENCES", tmp_path / "references.json")
     wide = made_budgets("care", HALF_WAY, streets=4)
     narrow = made_budgets("boxes", HALF_WAY, streets=2)
-    other = made_budgets("place", HALF_WAY, detector="returns")
+    other = made_budgets("place", HALF_WAY, detector="returns", streets=3)
     budgets.publish_references([wide, narrow, other])
     worlds = [(STREETS, 200), (STREETS, 201), (STREETS, 202)]
     assert references("centerpoint", worlds) == [wide.cut_to(worlds)]

@@ -64,6 +64,11 @@ class Benchmark(WorkerOptions):
     closed_loop: Flag = False
     """For --score b90: play drives and Euro NCAP tests too. Collisions avoided and needless stops
     then count as well."""
+    recorded: tuple[str, ...] = ()
+    """For --score b90: play recorded drives too, as a part of their own. nuscenes:FOLDER,
+    argoverse2:FOLDER, kitti:FOLDER, boreas (comes with the package), or a source of your own."""
+    without_streets: Flag = False
+    """For --score b90 with --recorded: play no streets."""
     quick: Flag = False
     """The first tenth of the worlds alone: a trial, and no line of the leaderboard. With --score
     b90 the first 24 streets."""
@@ -78,6 +83,11 @@ class Benchmark(WorkerOptions):
         _refuse(
             (self.detector and self.score != B90, "detector is for --score b90"),
             (self.closed_loop and self.score != B90, "closed_loop is for --score b90"),
+            (self.recorded and self.score != B90, "recorded is for --score b90"),
+            (
+                self.without_streets and not self.recorded,
+                "without-streets leaves nothing to play: give recorded too",
+            ),
             (self.sealed and self.score == B90, "--score b90 plays no sealed set yet"),
         )
 

@@ -1,13 +1,14 @@
 """B90 of entries: which worlds are played at which budgets, and the result file.
 
-The worlds are those of the suite (`care_sim.study.benchmark.suite`) with more streets, and the
-score is `care_sim.evaluation.smallest_budget`. A street needs no screening: one in which a full
-scan detects nothing adds nothing to any count.
+The worlds are those of the suite (`care_sim.study.benchmark.suite`) with more streets, and recorded
+drives (`care_sim.study.benchmark.recorded`). The score is `care_sim.evaluation.smallest_budget`. A
+street needs no screening: one in which a full scan detects nothing adds nothing to any count.
 """
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -26,6 +27,7 @@ from care_sim.evaluation.smallest_budget import (
 )
 from care_sim.policies import tags_of
 from care_sim.study.benchmark.play import Player
+from care_sim.study.benchmark.recorded import RECORDED, RecordedDrive, drive_plays
 from care_sim.study.benchmark.result import made_by
 from care_sim.study.benchmark.suite import (
     DRIVES,
@@ -68,17 +70,26 @@ REFERENCE_ENTRIES = (
     Entry("after-gofer"),
 )
 """The entries that stand beside everybody's."""
-COUNTS = {STREETS: SCENE_COUNTS, DRIVES: EPISODE_COUNTS, TESTS: EPISODE_COUNTS}
+FILMED = (STREETS, RECORDED)
+"""Parts of the open loop."""
+COUNTS = {
+    STREETS: SCENE_COUNTS,
+    RECORDED: SCENE_COUNTS,
+    DRIVES: EPISODE_COUNTS,
+    TESTS: EPISODE_COUNTS,
+}
 _REFERENCES = Path(__file__).with_name("references.json")
 _DECIMALS = 3
 _MOST_BYTES = 2**24
 
 
 class BudgetRow(NamedTuple):
-    """The counts (k) of a world: of the full scan, and of the entry at every budget."""
+    """The counts (k) of a world: of the full scan, and of the entry at every budget. `world` is a
+    seed, or the name of a recorded drive.
+    """
 
     part: str
-    world: int
+    world: int | str
     full: tuple[float, ...]
     got: tuple[tuple[float, ...], ...]
 
@@ -97,8 +108,8 @@ class BudgetResult:
     made_by: Mapping[str, Any]
 
     @property
-    def worlds(self) -> tuple[tuple[str, int], ...]:
-        """Part and number of its worlds."""
+    def worlds(self) -> tuple[tuple[str, int | str], ...]:
+        """Part and number or name of its worlds."""
         return tuple((row.part, row.world) for row in self.rows)
 
     @property
@@ -110,15 +121,24 @@ class BudgetResult:
                 np.array([row.got for row in self.rows if row.part == part], float),
                 np.array([row.full for row in self.rows if row.part == part], float),
             )
-            for part in dict.fromkeys(row.part for row in self.rows)
+            for part in self.parts
         ]
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """Its parts, in their order."""
+        return tuple(dict.fromkeys(part for part, _ in self.worlds))
+
+    def of_part(self, part: str) -> "BudgetResult":
+        """Return the result in the worlds of one of its parts."""
+        return replace(self, rows=tuple(row for row in self.rows if row.part == part))
 
     @property
     def score(self) -> SmallestBudget:
         """B90 of the entry."""
         return smallest_budget(self.counts)
 
-    def cut_to(self, worlds: Iterable[tuple[str, int]]) -> "BudgetResult | None":
+    def cut_to(self, worlds: Iterable[tuple[str, int | str]]) -> "BudgetResult | None":
         """Return the result in these worlds, in their order; None where one is missing."""
         own = dict(zip(self.worlds, self.rows, strict=True))
         kept = [own.get(world) for world in worlds]
@@ -139,7 +159,7 @@ class BudgetResult:
             "quick": self.quick,
             "made_by": self.made_by,
             "budgets": BUDGETS,
-            "counts": {part: COUNTS[part] for part in COUNTS},
+            "counts": {part: COUNTS[part] for part in self.parts},
             "columns": BudgetRow._fields,
             "rows": self.rows,
         }
@@ -157,35 +177,44 @@ def _percent(budget: float) -> float | str:
     return round(100 * budget, 2) if np.isfinite(budget) else "never"
 
 
-Worlds = dict[str, list[int]]
-"""The seeds of every part that is played."""
+Worlds = dict[str, Sequence[int | RecordedDrive]]
+"""The seeds or drives of every part that is played."""
 
 
-def budget_worlds(quick: bool = False, closed_loop: bool = False) -> Worlds:
-    """Return the streets, fewer for a trial; with `closed_loop` the first drives and tests too."""
+def budget_worlds(
+    quick: bool = False,
+    closed_loop: bool = False,
+    recorded: Sequence[RecordedDrive] = (),
+    without_streets: bool = False,
+) -> Worlds:
+    """Return the streets, fewer for a trial, and the recorded drives; with `closed_loop` the first
+    drives and tests too.
+    """
     streets = QUICK_STREETS if quick else STREETS_PLAYED
     episodes = {
         part: [world.seed for world in published_worlds() if world.part == part][:number]
         for part, number in EPISODES_PLAYED.items()
     }
-    street_seeds = {STREETS: [FIRST_SEED + n for n in range(streets)]}
-    return street_seeds | (episodes if closed_loop else {})
+    worlds: Worlds = {
+        STREETS: [] if without_streets else [FIRST_SEED + n for n in range(streets)],
+        RECORDED: recorded,
+        **(episodes if closed_loop else {}),
+    }
+    return {part: own for part, own in worlds.items() if own}
 
 
 def budget_tasks(
-    entry: Entry, part: str, seeds: Sequence[int], detector: str
+    entry: Entry, part: str, worlds: Sequence[Any], detector: str
 ) -> list[list[RunConfig]]:
     """Return per world the full scan and the entry at every budget. Raises InvalidInput for an
     entry or a detector that cannot be played.
     """
     common: dict[str, Any] = {"detector": detector, "camera_profile": KITTI_CAMERA}
     # Films have a picture every 0.5 s and none that is 0.12 s old.
-    common |= {} if part == STREETS else LATE
-    full = configurations(part, seeds, FULL, **common)
-    own = [
-        configurations(part, seeds, entry.policy, budget, **common, **entry.conditions)
-        for budget in BUDGETS
-    ]
+    common |= {} if part in FILMED else LATE
+    plays = drive_plays if part == RECORDED else partial(configurations, part)
+    full = plays(worlds, FULL, **common)
+    own = [plays(worlds, entry.policy, budget, **common, **entry.conditions) for budget in BUDGETS]
     return [[*world] for world in zip(full, *own, strict=True)]
 
 
@@ -193,7 +222,11 @@ def play_budgets(
     entries: Sequence[Entry], player: Player, detector: str, worlds: Worlds, quick: bool = False
 ) -> list[BudgetResult]:
     """Play the entries; return the results of those that finished every play, in their order."""
-    named = [(part, seed) for part, seeds in worlds.items() for seed in seeds]
+    named = [
+        (part, world.name if isinstance(world, RecordedDrive) else world)
+        for part, own in worlds.items()
+        for world in own
+    ]
     tasks = {
         entry: [
             task
@@ -215,14 +248,14 @@ def play_budgets(
     return results
 
 
-def _row(part: str, world: int, rows: Sequence[Row | None]) -> BudgetRow:
+def _row(part: str, world: int | str, rows: Sequence[Row | None]) -> BudgetRow:
     full, *got = (counts_of(part, row) for row in rows if row)
     return BudgetRow(part, world, full, tuple(got))
 
 
 def counts_of(part: str, row: Row) -> tuple[float, ...]:
     """Return the counts of a play, in the order of `COUNTS`."""
-    if part == STREETS:
+    if part in FILMED:
         return tuple(round(value, _DECIMALS) for value in scene_counts(row).values())
     return float(is_avoided(row)), float(stops_for_nothing(row))
 
@@ -247,7 +280,7 @@ def result_of(content: Any, origin: str) -> BudgetResult:
         texts = (content[name] for name in ("cell_order", "label"))
         entry = Entry(str(content["policy"]), parameters, *map(str, texts))
         rows = tuple(
-            BudgetRow(str(part), int(world), tuple(full), tuple(map(tuple, got)))
+            BudgetRow(str(part), _world(part, world), tuple(full), tuple(map(tuple, got)))
             for part, world, full, got in content["rows"]
         )
         tags = tuple(map(str, content["tags"]))
@@ -266,7 +299,11 @@ def result_of(content: Any, origin: str) -> BudgetResult:
     return result
 
 
-def references(detector: str, worlds: Sequence[tuple[str, int]]) -> list[BudgetResult]:
+def _world(part: str, world: Any) -> int | str:
+    return str(world) if part == RECORDED else int(world)
+
+
+def references(detector: str, worlds: Sequence[tuple[str, int | str]]) -> list[BudgetResult]:
     """Return the published entries in these worlds under a detector; none without such plays."""
     listed = parsed_json(_REFERENCES.read_text(encoding="utf-8"))
     results = [result_of(content, _REFERENCES.name) for content in listed]

@@ -1,0 +1,114 @@
+"""The published plays of B90: `results/data/b90`, and the entries that stand beside everybody's.
+
+    python docs/b90_results.py --recorded nuscenes:DATA argoverse2:DATA kitti:DATA boreas
+
+plays the published entries under every detector, and writes result files, tables and figure. The
+folder `--plays` keeps what is finished: the same command resumes. With `--tables` nothing plays;
+tables, figure and the entries of the package are made from the result files.
+"""
+
+import re
+from argparse import ArgumentParser, Namespace
+from collections.abc import Sequence
+from pathlib import Path
+
+from care_sim.base.files import write_text
+from care_sim.reports.budgets import budget_tables
+from care_sim.reports.figures.budgets import BUDGETS_FIGURE, budgets_figure
+from care_sim.reports.figures.styles import save
+from care_sim.reports.recorded import sources_table
+from care_sim.reports.statements import columns_table, statements_table
+from care_sim.study.benchmark.budgets import (
+    MAIN_DETECTOR,
+    REFERENCE_ENTRIES,
+    BudgetResult,
+    budget_worlds,
+    play_budgets,
+    publish_references,
+    read_budget_result,
+)
+from care_sim.study.benchmark.play import player_in
+from care_sim.study.benchmark.recorded import RECORDED, recorded_drives
+from care_sim.study.benchmark.suite import STREETS, Entry
+
+FOLDER = Path(__file__).parents[1] / "results" / "data" / "b90"
+DETECTORS = (MAIN_DETECTOR, "megvii", "pointrcnn", "returns")
+"""The main one first. The files of the others are in folders by their names."""
+DRAWN = ("care-sector", "care-sightlines", "after-ancha", "tuned-place", "learned-sets", "care")
+"""The policies of the figure, without parameters."""
+COMMAND = "python docs/b90_results.py --recorded nuscenes:DATA argoverse2:DATA kitti:DATA boreas"
+
+
+def folder_of(detector: str) -> Path:
+    """Return the folder of the result files under a detector."""
+    return FOLDER if detector == MAIN_DETECTOR else FOLDER / detector
+
+
+def results_of(detector: str) -> list[BudgetResult]:
+    """Read the published results under a detector, in the order of the entries."""
+    found = [read_budget_result(path) for path in folder_of(detector).glob("*.json")]
+    return sorted(found, key=lambda one: REFERENCE_ENTRIES.index(one.entry))
+
+
+def written() -> str:
+    """Return the text of `tables.md` as the result files are now."""
+    columns = {detector: results_of(detector) for detector in DETECTORS}
+    main = columns[MAIN_DETECTOR]
+    streets = {
+        name: [one.of_part(STREETS) for one in results]
+        for name, results in columns.items()
+        if results
+    }
+    tables = [*budget_tables(main), sources_table(main)]
+    tables += [columns_table(streets), statements_table(streets)]
+    told = "\n".join(table.markdown() for table in tables)
+    return f"# B90\n\nMade by `{COMMAND}`.\n\n{told}"
+
+
+def play(options: Namespace) -> None:
+    """Play the published entries under the detectors, and write their files."""
+    worlds = budget_worlds(recorded=recorded_drives(options.recorded))
+    worlds[STREETS] = worlds[STREETS][: options.streets]
+    for detector in options.detectors:
+        folder = folder_of(detector)
+        with player_in(options.plays / detector, options.workers) as player:
+            # Other detectors are columns over streets alone.
+            parts = {
+                part: own
+                for part, own in worlds.items()
+                if detector == MAIN_DETECTOR or part != RECORDED
+            }
+            results = play_budgets(REFERENCE_ENTRIES, player, detector, parts)
+        for failure in player.failures:
+            print(f"failed: {failure}")
+        folder.mkdir(parents=True, exist_ok=True)
+        for result in results:
+            result.write(folder / f"{stem_of(result.entry)}.json")
+
+
+def stem_of(entry: Entry) -> str:
+    """Return the name of the result file of an entry."""
+    return re.sub(r"[^\w.=-]+", "-", entry.full_name)
+
+
+def main(words: Sequence[str] | None = None) -> None:
+    """Play what `words` say, and write tables, figure and the entries of the package."""
+    parser = ArgumentParser(description=__doc__)
+    parser.add_argument("--recorded", nargs="+", default=[])
+    parser.add_argument("--detectors", nargs="+", default=DETECTORS, choices=DETECTORS)
+    parser.add_argument("--streets", type=int, default=None, help="the first so many alone")
+    parser.add_argument("--plays", type=Path, default=Path("runs/b90"))
+    parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--tables", action="store_true")
+    options = parser.parse_args(words)
+    if not options.tables:
+        play(options)
+    results = results_of(MAIN_DETECTOR)
+    publish_references(results)
+    drawn = [one for one in results if one.entry.policy in DRAWN]
+    save(budgets_figure(drawn), FOLDER / BUDGETS_FIGURE)
+    write_text(FOLDER / "tables.md", written())
+
+
+if __name__ == "__main__":
+    main()
