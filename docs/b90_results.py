@@ -12,6 +12,7 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from pathlib import Path
 
+from care_sim.base.errors import report_problems
 from care_sim.base.files import write_text
 from care_sim.reports.budgets import budget_tables
 from care_sim.reports.figures.budgets import BUDGETS_FIGURE, budgets_figure
@@ -28,8 +29,9 @@ from care_sim.study.benchmark.budgets import (
     read_budget_result,
 )
 from care_sim.study.benchmark.play import player_in
-from care_sim.study.benchmark.recorded import RECORDED, recorded_drives
+from care_sim.study.benchmark.recorded import recorded_drives
 from care_sim.study.benchmark.suite import STREETS, Entry
+from care_sim.study.runner import by_reason
 
 FOLDER = Path(__file__).parents[1] / "results" / "data" / "b90"
 DETECTORS = (MAIN_DETECTOR, "megvii", "pointrcnn", "returns")
@@ -68,22 +70,14 @@ def written() -> str:
 def play(options: Namespace) -> None:
     """Play the published entries under the detectors, and write their files."""
     worlds = budget_worlds(recorded=recorded_drives(options.recorded))
-    worlds[STREETS] = worlds[STREETS][: options.streets]
-    for detector in options.detectors:
-        folder = folder_of(detector)
-        with player_in(options.plays / detector, options.workers) as player:
+    streets = {STREETS: worlds[STREETS][: options.streets]}
+    with player_in(options.plays, options.workers) as player:
+        for detector in options.detectors:
             # Other detectors are columns over streets alone.
-            parts = {
-                part: own
-                for part, own in worlds.items()
-                if detector == MAIN_DETECTOR or part != RECORDED
-            }
-            results = play_budgets(REFERENCE_ENTRIES, player, detector, parts)
-        for failure in player.failures:
-            print(f"failed: {failure}")
-        folder.mkdir(parents=True, exist_ok=True)
-        for result in results:
-            result.write(folder / f"{stem_of(result.entry)}.json")
+            played = worlds | streets if detector == MAIN_DETECTOR else streets
+            for result in play_budgets(REFERENCE_ENTRIES, player, detector, played):
+                result.write(folder_of(detector) / f"{stem_of(result.entry)}.json")
+    report_problems(by_reason(player.failures, "plays"))
 
 
 def stem_of(entry: Entry) -> str:

@@ -19,9 +19,9 @@ tables and figures again. [How to read the rows](../../docs/rows.md).
 
 Beside them lie `leaderboard`, the result files of the [benchmark](../benchmark.md)
 (`care-sim benchmark --policy NAME`; three with `--cell-order core-spread`), `b90`, those of
-[B90](../b90.md) (`python docs/b90_results.py`; folders in it are of other detectors), `judge-streets` and
-`judge-logs`, what `care-sim judge` says of [detectors](../detectors.md), and `bench.json` and
-`parity.json`, of `make bench` and `make parity`.
+[B90](../b90.md) (`python docs/b90_results.py`; folders in it are of other detectors),
+`judge-streets` and `judge-logs`, what `care-sim judge` says of [detectors](../detectors.md), and
+`bench.json` and `parity.json`, of `make bench` and `make parity`.
 
 | folder | command | rows | pages |
 |---|---|---|---|

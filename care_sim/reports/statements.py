@@ -83,8 +83,8 @@ def statement(columns: Columns, first: str, second: str) -> Statement:
 
 
 def statements_table(columns: Columns, pairs: Iterable[Pair] = QUESTIONS) -> Table:
-    """Return a table with a line per statement: of those `pairs` that played, then of the neighbours
-    in the ranking under the first detector.
+    """Return a table with a line per statement: of those `pairs` that played, then of neighbours in
+    the ranking under the first detector.
     """
     alike = _in_common(columns)
     main, *_ = alike.values()
