@@ -19,6 +19,7 @@ from care_sim.reports.figures.budgets import BUDGETS_FIGURE, budgets_figure
 from care_sim.reports.figures.styles import save
 from care_sim.reports.recorded import sources_table
 from care_sim.reports.statements import columns_table, statements_table
+from care_sim.reports.table import Table
 from care_sim.study.benchmark.budgets import (
     MAIN_DETECTOR,
     REFERENCE_ENTRIES,
@@ -52,17 +53,21 @@ def results_of(detector: str) -> list[BudgetResult]:
     return sorted(found, key=lambda one: REFERENCE_ENTRIES.index(one.entry))
 
 
-def written() -> str:
-    """Return the text of `tables.md` as the result files are now."""
+def statements() -> list[Table]:
+    """Return the tables over all detectors that have played, on streets; none for the main one."""
     columns = {detector: results_of(detector) for detector in DETECTORS}
-    main = columns[MAIN_DETECTOR]
     streets = {
-        name: [one.of_part(STREETS) for one in results]
-        for name, results in columns.items()
+        detector: [one.of_part(STREETS) for one in results]
+        for detector, results in columns.items()
         if results
     }
-    tables = [*budget_tables(main), sources_table(main)]
-    tables += [columns_table(streets), statements_table(streets)]
+    return [columns_table(streets), statements_table(streets)] if len(streets) > 1 else []
+
+
+def written() -> str:
+    """Return the text of `tables.md` as the result files are now."""
+    main = results_of(MAIN_DETECTOR)
+    tables = [*budget_tables(main), sources_table(main), *statements()]
     told = "\n".join(table.markdown() for table in tables)
     return f"# B90\n\nMade by `{COMMAND}`.\n\n{told}"
 

@@ -8,7 +8,7 @@ from care_sim.reports.budgets import format_smallest, sorted_by_budget
 from care_sim.reports.formatting import marked, tag_notes
 from care_sim.reports.table import Table
 from care_sim.study.benchmark.budgets import BudgetResult
-from care_sim.study.benchmark.recorded import RECORDED, source_of_world
+from care_sim.study.benchmark.recorded import RECORDED, RECORDED_PARTS, source_of_world
 
 _NOTE = (
     "B90 in % of all cells, over all drives and over those of each source alone. Few drives carry "
@@ -20,7 +20,7 @@ def sources_table(results: Sequence[BudgetResult]) -> Table:
     """Return a table with a line per result, the smallest B90 first, and a column per source of
     recorded drives. All results must be of the same worlds, and have recorded ones.
     """
-    ordered = sorted_by_budget([one.of_part(RECORDED) for one in results])
+    ordered = sorted_by_budget([_together(one) for one in results])
     rows = [
         (
             marked(one.entry.name, one.tags),
@@ -36,6 +36,12 @@ def sources_table(results: Sequence[BudgetResult]) -> Table:
         (_NOTE, *told, *tag_notes(one.tags for one in ordered)),
         whole=("all",),
     )
+
+
+def _together(result: BudgetResult) -> BudgetResult:
+    """Return the result on all recorded drives as one part."""
+    rows = (row._replace(part=RECORDED) for row in result.rows if row.part in RECORDED_PARTS)
+    return replace(result, rows=tuple(rows))
 
 
 def _by_source(result: BudgetResult) -> dict[str, BudgetResult]:

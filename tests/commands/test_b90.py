@@ -5,7 +5,7 @@ import pytest
 from care_sim.evaluation.smallest_budget import BUDGETS
 from care_sim.study.benchmark import budgets
 from care_sim.study.benchmark.budgets import read_budget_result
-from care_sim.study.benchmark.recorded import RECORDED
+from care_sim.study.benchmark.recorded import AHEAD
 from care_sim.study.benchmark.suite import STREETS, TESTS
 from tests.helpers import kitti_drive
 from tests.helpers.commands import run
@@ -84,7 +84,7 @@ def test_recorded_drives_are_a_part_of_their_own(capsys, here, monkeypatch, tmp_
     words = "--recorded", "kitti:DATA", "--without-streets", "--workers", 1
     code, out, err = run(capsys, "benchmark", "--score", "b90", "--policy", "boxes", *words)
     assert (code, "16 plays took" in err) == (0, True)
-    assert "B90, 2 worlds (recorded), centerpoint" in out
+    assert "B90, 2 worlds (recorded ahead), centerpoint" in out
     assert "B90 on recorded drives by source" in out
     # Fewer than five drives.
     assert "carry no interval" in out
@@ -92,7 +92,7 @@ def test_recorded_drives_are_a_part_of_their_own(capsys, here, monkeypatch, tmp_
     assert "care-sector" in out
     path = here / "runs/benchmark/boxes.b90.centerpoint.recorded.without-streets.json"
     result = read_budget_result(path)
-    assert result.worlds == tuple((RECORDED, drive) for drive in drives)
+    assert result.worlds == tuple((AHEAD, drive) for drive in drives)
     assert "DATA" not in path.read_text()
     row = result.rows[0]
     # One person comes into view; two cars and a cyclist stand there from the first keyframe on.

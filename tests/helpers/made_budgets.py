@@ -3,7 +3,7 @@
 from care_sim.evaluation.smallest_budget import BUDGETS
 from care_sim.policies import tags_of
 from care_sim.study.benchmark.budgets import COUNTS, BudgetResult, BudgetRow
-from care_sim.study.benchmark.recorded import RECORDED
+from care_sim.study.benchmark.recorded import AHEAD, LABELLED_AHEAD, RECORDED, source_of_world
 from care_sim.study.benchmark.suite import STREETS, Entry
 
 HALF_WAY = (0.1, 0.2, 0.8, 1.0, 1.0, 1.0, 1.0)
@@ -25,9 +25,13 @@ def made_budgets(
     there = _got([later or curves[-1]] * len(names))
     rows = (
         *(BudgetRow(STREETS, 200 + n, full, got) for n in range(streets)),
-        *(BudgetRow(RECORDED, name, full, there) for name in recorded),
+        *(BudgetRow(_part(name), name, full, there) for name in recorded),
     )
     return BudgetResult(entry, tags_of(entry.policy), detector, rows, quick, {"versions": {}})
+
+
+def _part(name):
+    return AHEAD if source_of_world(name) in LABELLED_AHEAD else RECORDED
 
 
 def _got(curves):

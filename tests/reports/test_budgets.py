@@ -62,7 +62,7 @@ def test_budgets_in_percent(budget, text):
     assert format_budget(budget) == text
 
 
-DRIVES = [f"kitti/{n:04d}" for n in range(5)]
+DRIVES = [f"nuscenes/scene-{n:04d}" for n in range(5)]
 
 
 def test_parts_stand_side_by_side_and_the_worse_one_is_the_score():
@@ -112,7 +112,7 @@ def test_fewer_than_five_worlds_of_a_part_carry_no_interval():
 
 
 def test_recorded_drives_by_source():
-    names = [*DRIVES, "nuscenes/scene-0103", "nuscenes/scene-0916"]
+    names = [*(f"kitti/{n:04d}" for n in range(5)), *DRIVES[:2]]
     early, late = ALWAYS, HALF_WAY
     one = made_budgets("care", HALF_WAY, recorded=names, later=early)
     two = made_budgets("boxes", HALF_WAY, recorded=names, later=late)

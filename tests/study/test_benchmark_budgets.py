@@ -18,7 +18,7 @@ from care_sim.study.benchmark.budgets import (
     read_budget_result,
     references,
 )
-from care_sim.study.benchmark.recorded import RECORDED, recorded_drives
+from care_sim.study.benchmark.recorded import AHEAD, RECORDED, recorded_drives
 from care_sim.study.benchmark.suite import DRIVES, STREETS, TESTS, Entry
 from tests.helpers import kitti_drive
 from tests.helpers.made_budgets import ALWAYS, HALF_WAY, NEVER, made_budgets
@@ -59,8 +59,9 @@ def test_a_recorded_drive_is_played_as_a_street_is(tmp_path):
     drives = recorded_drives([f"kitti:{tmp_path}", "boreas"])
     assert [drive.name for drive in drives] == ["kitti/0000", "boreas/boreas-objects-v1"]
     worlds = budget_worlds(recorded=drives, without_streets=True)
-    assert worlds == {RECORDED: drives}
-    assert [*budget_worlds(recorded=drives)] == [STREETS, RECORDED]
+    # KITTI labels what its front camera sees.
+    assert worlds == {RECORDED: drives[1:], AHEAD: drives[:1]}
+    assert [*budget_worlds(recorded=drives)] == [STREETS, RECORDED, AHEAD]
     entry = Entry("care", cell_order="core-spread")
     tasks = budget_tasks(entry, RECORDED, drives, "megvii")
     assert [len(task) for task in tasks] == [1 + len(BUDGETS)] * 2
@@ -84,14 +85,14 @@ def test_drives_of_one_name_are_refused(tmp_path):
 
 
 def test_a_file_holds_streets_and_drives(tmp_path):
-    result = made_budgets("care", HALF_WAY, recorded=["kitti/0000"], later=NEVER)
+    result = made_budgets("care", HALF_WAY, recorded=["kitti/0000", "boreas/b"], later=NEVER)
     result.write(tmp_path / "mine.json")
     assert read_budget_result(tmp_path / "mine.json") == result
     content = json.loads((tmp_path / "mine.json").read_text())
-    assert [*content["counts"]] == ["streets", "recorded"]
+    assert [*content["counts"]] == ["streets", "recorded ahead", "recorded"]
     assert content["b90_percent"][0] == "never"
     assert result.of_part(STREETS).score.budget < 0.03
-    assert result.of_part(RECORDED).worlds == (("recorded", "kitti/0000"),)
+    assert result.of_part(AHEAD).worlds == ((AHEAD, "kitti/0000"),)
 
 
 def test_entries_share_the_full_scan():

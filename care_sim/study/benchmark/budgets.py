@@ -27,7 +27,7 @@ from care_sim.evaluation.smallest_budget import (
 )
 from care_sim.policies import tags_of
 from care_sim.study.benchmark.play import Player
-from care_sim.study.benchmark.recorded import RECORDED, RecordedDrive, drive_plays
+from care_sim.study.benchmark.recorded import RECORDED_PARTS, RecordedDrive, drive_plays
 from care_sim.study.benchmark.result import made_by
 from care_sim.study.benchmark.suite import (
     DRIVES,
@@ -70,14 +70,9 @@ REFERENCE_ENTRIES = (
     Entry("after-gofer"),
 )
 """The entries that stand beside everybody's."""
-FILMED = (STREETS, RECORDED)
+FILMED = (STREETS, *RECORDED_PARTS)
 """Parts of the open loop."""
-COUNTS = {
-    STREETS: SCENE_COUNTS,
-    RECORDED: SCENE_COUNTS,
-    DRIVES: EPISODE_COUNTS,
-    TESTS: EPISODE_COUNTS,
-}
+COUNTS = dict.fromkeys(FILMED, SCENE_COUNTS) | dict.fromkeys((DRIVES, TESTS), EPISODE_COUNTS)
 _REFERENCES = Path(__file__).with_name("references.json")
 _DECIMALS = 3
 _MOST_BYTES = 2**24
@@ -197,7 +192,7 @@ def budget_worlds(
     }
     worlds: Worlds = {
         STREETS: [] if without_streets else [FIRST_SEED + n for n in range(streets)],
-        RECORDED: recorded,
+        **{part: [each for each in recorded if each.part == part] for part in RECORDED_PARTS},
         **(episodes if closed_loop else {}),
     }
     return {part: own for part, own in worlds.items() if own}
@@ -212,7 +207,7 @@ def budget_tasks(
     common: dict[str, Any] = {"detector": detector, "camera_profile": KITTI_CAMERA}
     # Films have a picture every 0.5 s and none that is 0.12 s old.
     common |= {} if part in FILMED else LATE
-    plays = drive_plays if part == RECORDED else partial(configurations, part)
+    plays = drive_plays if part in RECORDED_PARTS else partial(configurations, part)
     full = plays(worlds, FULL, **common)
     own = [plays(worlds, entry.policy, budget, **common, **entry.conditions) for budget in BUDGETS]
     return [[*world] for world in zip(full, *own, strict=True)]
@@ -300,7 +295,7 @@ def result_of(content: Any, origin: str) -> BudgetResult:
 
 
 def _world(part: str, world: Any) -> int | str:
-    return str(world) if part == RECORDED else int(world)
+    return str(world) if part in RECORDED_PARTS else int(world)
 
 
 def references(detector: str, worlds: Sequence[tuple[str, int | str]]) -> list[BudgetResult]:
