@@ -65,7 +65,7 @@ class Benchmark(WorkerOptions):
     """For --score b90: play drives and Euro NCAP tests too. Collisions avoided and needless stops
     then count as well."""
     recorded: tuple[str, ...] = ()
-    """For --score b90: play recorded drives too, as a part of their own. nuscenes:FOLDER,
+    """For --score b90: play recorded drives too, as parts of their own. nuscenes:FOLDER,
     argoverse2:FOLDER, kitti:FOLDER, boreas (comes with the package), or a source of your own."""
     without_streets: Flag = False
     """For --score b90 with --recorded: play no streets."""
