@@ -60,6 +60,9 @@ report a --minus care -o x.html           | --minus has no meaning with --page
 benchmark --policy care --cell-order best | cell_order
 benchmark --policy care --quick --fresh 2 | remove quick and sealed
 benchmark --policy care --fresh 2 --closed-loop | fresh and sealed worlds are streets alone
+benchmark --policy care --without-streets | give recorded too
+benchmark --policy care --recorded streets | source must be
+benchmark --policy care --recorded kitti:absent | absent is no folder
 benchmark --policy care --sealed x        | give --out a folder that only you read
 benchmark --policy care --detector absent | detector
 benchmark --policy care --sealed none.txt --out s | none.txt holds no salt

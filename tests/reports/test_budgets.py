@@ -115,7 +115,7 @@ def test_parts_stand_side_by_side_and_the_worse_one_is_the_score():
             "≤0.5 [≤0.5, ≤0.5]",
         ),
     ]
-    assert "10 worlds (streets 5, recorded 5)" in whole.title
+    assert "85 worlds (streets 80, recorded 5)" in whole.title
     assert "5 worlds (recorded)" in drives.title
     assert [row[1] for row in streets.rows] == ["tuned-place", "care-sector", "boxes"]
     assert [row[1] for row in drives.rows] == ["boxes", "care-sector", "tuned-place"]

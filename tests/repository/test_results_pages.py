@@ -13,14 +13,14 @@ from care_sim import cli
 from care_sim.core.defaults import AS_DEMANDED
 from care_sim.evaluation.smallest_budget import budget_ratio
 from care_sim.policies import BUILT_IN
-from care_sim.reports.budgets import parts_table
+from care_sim.reports.budgets import format_budget, parts_table
 from care_sim.reports.recorded import sources_table
 from care_sim.study.benchmark.budgets import (
     MAIN_DETECTOR,
     REFERENCE_ENTRIES,
     budget_worlds,
 )
-from care_sim.study.benchmark.result import read_result, references
+from care_sim.study.benchmark.result import references
 from care_sim.study.benchmark.suite import STREETS, Entry
 from care_sim.study.results_formats import EPISODES
 from care_sim.study.rows.parquet import read_rows
@@ -83,10 +83,10 @@ def test_the_index_and_the_site_lead_to_every_page(page):
 def test_the_first_page_names_scores_as_they_are(page):
     text = " ".join((ROOT / page).read_text().split())
     told = dict(re.findall(r"`([\w-]+)` \(([\d.]+%|never)\)", text))
-    streets = [(STREETS, seed) for seed in budget_worlds()[STREETS]]
+    script = loaded(ROOT / "docs" / "b90_results.py")
     scores = {
         one.entry.name: f"{format_budget(one.score.budget)}%".replace("never%", "never")
-        for one in references(MAIN_DETECTOR, streets)
+        for one in script.results_of(MAIN_DETECTOR)
     }
     assert len(told) >= 5
     assert told.items() <= scores.items()

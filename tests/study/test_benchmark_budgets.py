@@ -1,14 +1,18 @@
 """B90 of entries: which worlds are played at which budgets."""
 
+import json
+
 import pytest
 
+from care_sim.base.errors import InvalidInput
 from care_sim.base.seeds import split_of
 from care_sim.evaluation.smallest_budget import BUDGETS
 from care_sim.study.benchmark.budgets import budget_tasks, budget_worlds, counts_of
 from care_sim.study.benchmark.recorded import AHEAD, RECORDED, recorded_drives
+from care_sim.study.benchmark.result import read_result
 from care_sim.study.benchmark.suite import DRIVES, STREETS, TESTS, Entry
 from tests.helpers import kitti_drive
-from tests.helpers.made_budgets import ALWAYS, HALF_WAY, NEVER, made_budgets
+from tests.helpers.made_budgets import HALF_WAY, NEVER, made_budgets
 
 
 def test_streets_are_test_seeds_and_a_trial_plays_the_first_of_them():
@@ -74,7 +78,7 @@ def test_drives_of_one_name_are_refused(tmp_path):
 def test_a_file_holds_streets_and_drives(tmp_path):
     result = made_budgets("care", HALF_WAY, recorded=["kitti/0000", "boreas/b"], later=NEVER)
     result.write(tmp_path / "mine.json")
-    assert read_budget_result(tmp_path / "mine.json") == result
+    assert read_result(tmp_path / "mine.json") == result
     content = json.loads((tmp_path / "mine.json").read_text())
     assert [*content["counts"]] == ["streets", "recorded ahead", "recorded"]
     assert content["b90_percent"][0] == "never"
