@@ -65,7 +65,7 @@ def _described(path: str) -> str:
 
 
 def _field_lines(one: Any) -> list[str]:
-    """Return a list item per field: default, allowed values, docstring. Includes inherited fields."""
+    """Return a list item per field, also inherited: default, allowed values, docstring."""
     told: dict[str, str] = {}
     for kind in filter(is_dataclass, reversed(one.__mro__)):
         for each in docstring_parser.parse_from_object(kind).params:

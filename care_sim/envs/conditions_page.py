@@ -11,13 +11,13 @@ _ROWS = (
     ("floor_seed", "allocator", "number of the random floor of the seed"),
     ("azimuth_margin elevation_margin", "allocator", "cells by which hulls and wedges are dilated"),
     ("cell_order", "allocator", "order of the cells inside a set"),
-    ("firing", "LiDAR", 'unit that fires as a whole, "cells", "tiles:4x8", ... (3)'),
+    ("firing", "LiDAR", 'unit that fires as a whole, "tiles:4x8", ... (`care_sim.core.firing`)'),
     ("engine", "sensors", 'ray caster, "fast" or "bullet"'),
     ("min_returns", "LiDAR detector", "returns that detect an object"),
     ("velocity_keyframes", "tracker", "detections that a track's velocity is fitted to"),
     ("camera_confidence", "camera detector", "least confidence of a camera detection"),
     ("sweep_mask", "open loop", "mask of the sweeps between two keyframes"),
-    ("clutter", "streets of the open loop", "kerbs, plants, poles and lost returns (6)"),
+    ("clutter", "streets of the open loop", "kerbs, plants, poles and lost returns"),
     ("camera_profile", "camera", "measured detector that it imitates"),
     ("false_negative_rate", "camera", "share of missed objects"),
     ("false_negative_per_m", "camera", "growth of that share per metre, 1/m"),
@@ -36,7 +36,7 @@ _ROWS = (
     ("lidar_range_sigma", "LiDAR", "standard deviation of the range noise, m"),
     ("lidar_dropout", "LiDAR", "share of lost returns"),
     ("lidar_dead_rows", "LiDAR", "rows without returns; row 0 is the highest"),
-    ("lidar_stated_range_m", "returns", "range that the data sheet states, m (5)"),
+    ("lidar_stated_range_m", "returns", "range that the data sheet states, m; 0 is off"),
     ("lidar_stated_reflectance", "returns", "target reflectance at that range"),
     ("visibility_m", "returns", "meteorological visibility in fog, m"),
     ("rain_mm_h", "returns", "rain, mm/h"),
@@ -48,7 +48,7 @@ _ROWS = (
     ("ego_speed_sigma", "odometry", "noise on the ego speed, m/s"),
     ("ego_position_sigma_m ego_yaw_sigma_deg", "localisation", "pose errors, m, degrees"),
     ("ego_pose_correlation_s", "localisation", "correlation time of the pose errors, s"),
-    ("driver", "driver", "braking rule (4)"),
+    ("driver", "driver", "braking rule (`care_sim.driving.drivers`)"),
     ("brake_mps2", "fixed driver", "deceleration, m/s^2"),
     ("brake_reaction_s", "fixed driver", "from decision to full braking, s"),
     ("brake_standstill_m", "fixed driver", "gap at standstill, m"),
@@ -80,8 +80,4 @@ by default, and the seed draws them.
 | condition | default | values | of | meaning |
 |---|---|---|---|---|
 {_TABLE}
-
-(3) `care_sim.core.firing`; the budget then buys units. (4) `care_sim.driving.braking` and
-`care_sim.driving.drivers`; only `fixed` has settings that begin with `brake_`. (5) At 0 every hit
-within range returns. (6) `docs/clutter.md`.
 """

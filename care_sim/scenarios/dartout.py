@@ -153,7 +153,7 @@ class Dartout(CrossingScenario):
 # lies inside its hull, where every policy fires, and would be no first sighting to tell policies
 # apart.
 #
-# How this layout was chosen: docs/environments/dense.md.
+# docs/environments/dense.md says how this layout was chosen.
 
 DOUBLE_PARKED_Y = LANE_WIDTH_M
 KERBS = {"left": LEFT_PARKING_Y, "right": RIGHT_PARKING_Y, "oncoming": DOUBLE_PARKED_Y}
@@ -192,7 +192,7 @@ class Dense(CrossingScenario):
 
     vehicles: int = bounded(7, 0, len(VEHICLE_PLACES))
     place_jitter_m: Range = bounded((-0.4, 0.4), -3, 3)
-    """Offset of a standing vehicle along the street. Its offset across is a quarter of such a draw."""
+    """Offset of a standing vehicle along the street; across, a quarter of such a draw."""
 
     def furnish(self, world: World, crossing_x: float, rng: np.random.Generator) -> None:
         """Line the street."""
