@@ -93,13 +93,13 @@ class ClosedLoopEnv(SensingEnv[OneWorld]):
     Entries "for scoring alone" contain truth and must never reach a policy. `scoring_info=False`
     removes them, except for `outcome`.
 
-    | key | content | for |
+    | key | content | whose |
     |---|---|---|
-    | `fired` | cells of this keyframe, each as often as it fired (1) | the car |
-    | `intensities` | return strength per fired cell, 0 without a return (1) | the car |
-    | `times_s` | time of each fired cell from the keyframe, s, in a rolling sweep (1) | the car |
-    | `braking` | whether the brake is on | the car |
-    | `time_s` | time of the keyframe, s from the start | the car |
+    | `fired` | cells of this keyframe, each as often as it fired (1) | the car's own |
+    | `intensities` | return strength per fired cell, 0 without a return (1) | the car's own |
+    | `times_s` | time per fired cell from the keyframe, s, in a rolling sweep (1) | the car's own |
+    | `braking` | whether the brake is on | the car's own |
+    | `time_s` | time of the keyframe, s from the start | the car's own |
     | `detected` | whether this keyframe detected the first-sighting actor (2) | scoring alone |
     | `in_view` | whether a faultless camera shows that actor | scoring alone |
     | `clearance_m` | least distance to it, hull to hull, until the next keyframe | scoring alone |

@@ -54,12 +54,12 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
     Entries "for scoring alone" contain truth and must never reach a policy. `scoring_info=False`
     removes them, except for `outcome`.
 
-    | key | content | for |
+    | key | content | whose |
     |---|---|---|
-    | `fired` | cells of this keyframe, each as often as it fired | the car |
-    | `intensities` | return strength per fired cell, 0 without a return | the car |
-    | `times_s` | time of each fired cell from the keyframe, s, in a rolling sweep | the car |
-    | `time_s` | time of the keyframe, s from the start | the car |
+    | `fired` | cells of this keyframe, each as often as it fired | the car's own |
+    | `intensities` | return strength per fired cell, 0 without a return | the car's own |
+    | `times_s` | time of each fired cell from the keyframe, s, in a rolling sweep | the car's own |
+    | `time_s` | time of the keyframe, s from the start | the car's own |
     | `objects` | number of annotated objects within 50 m | scoring alone |
     | `found` | number of them detected at this keyframe | scoring alone |
     | `seed`, `scene` | from `reset`; they repeat the episode | scoring alone |

@@ -13,8 +13,8 @@ from care_sim.scenarios.base import Scenario
 class DartoutEnv(ClosedLoopEnv):
     """`CARE-Dartout-v0`: a person runs out from behind a parked trailer into an empty street.
 
-    The paper's first closed-loop scene, at 30 km/h. The trailer stands in the right parking lane
-    of a two-way street, and the person runs straight across. Perception does not report the
+    The paper's first closed-loop scene, at 30 km/h. The trailer parks at the right side of a
+    two-way street, and the person runs straight across. Perception does not report the
     trailer, which is none of the five classes. `occluder="truck", occluder_reported=True` parks a
     vehicle that perception reports: the person then emerges inside the hull of its track. The seed
     draws speeds, place and timing.
@@ -38,7 +38,7 @@ class DenseEnv(ClosedLoopEnv):
 class CutInEnv(ClosedLoopEnv):
     """`CARE-CutIn-v0`: a car pulls out into the ego's lane from in front of a standing bus.
 
-    The car stands hidden in front of the bus, in the right one of two lanes, and changes to the
+    The car waits hidden in front of the bus, in the right one of two lanes, and changes to the
     ego's lane (highway-env). A large vehicle returns enough points even with few rays. The paper
     found no difference between policies here.
     """
