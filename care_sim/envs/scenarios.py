@@ -28,7 +28,7 @@ class DenseEnv(ClosedLoopEnv):
     """`CARE-Dense-v0`: the dart-out in a street lined with tracked vehicles.
 
     The camera shows five of the `vehicles` (7). At 3% of the cells a reserve for every camera box
-    starves the person; `care_sim.scenarios.dartout` explains why, cell by cell.
+    starves the person. `care_sim.scenarios.dartout` explains why, cell by cell.
     """
 
     __doc__ = f"{__doc__}\n    {ClosedLoopEnv.__doc__}"
