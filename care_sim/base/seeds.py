@@ -12,7 +12,8 @@ by what it begins with. A secret enters everything that is drawn: no observation
 seed, nor a seed the episode, but what a guess among all that the ranges of a scenario allow tells.
 NumPy's generators are not made for cryptography; to tell from the first numbers that a stream gave
 those that follow is years of computing (Bouillaguet, Martinez and Sauvage, ToSC 2020, on PCG64), no
-proof that it cannot be done.
+proof that it cannot be done. The random floor has a key of 64 bits (`care_sim.core.firing.floor`);
+trying all keys is years of computing, too.
 """
 
 import hmac
@@ -34,6 +35,10 @@ SPLITS = {
     "validation": range(VALIDATION, TRAINING),
     "train": range(TRAINING, LAST),
 }
+FRESH = range(2**31, 2**32)
+"""`care-sim benchmark --fresh N` draws from it: nothing is learned, chosen or published by it."""
+SEALED_FROM = 2**32
+"""Seeds that a secret salt draws lie from here on."""
 
 
 def split_of(seeds: Iterable[int]) -> str:
