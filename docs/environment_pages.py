@@ -1,16 +1,13 @@
-"""Pages that are read in a clone and on the site: what the site makes of a docstring stands in a
-page as text, too.
+"""Write docstrings into pages, so that a clone and the site show the same text.
 
-A page holds the directive in a comment, which no file view shows, and behind it the text:
+A page marks the place of a docstring with comments, which no file view shows:
 
-    <!-- site
-    ::: care_sim.envs.scenarios.DenseEnv
-    -->
+    <!-- from care_sim.envs.scenarios.DenseEnv -->
     text
     <!-- end -->
 
-`python docs/environment_pages.py` writes the texts anew; a test says where one is not as its
-docstring. As an mkdocs hook this module puts the directive in the place of both.
+`python docs/environment_pages.py` rewrites all texts. A test fails where a text differs from its
+docstring.
 """
 
 import importlib
@@ -25,60 +22,57 @@ import docstring_parser
 
 from care_sim.base.checks import allowed
 
-PAGES = Path(__file__).parent / "environments"
-_REGION = re.compile(r"<!-- site\n(?P<directive>::: (?P<path>\S+)\n.*?)-->\n.*?<!-- end -->", re.S)
-_SHARED = {"ClosedLoopEnv": "dartout.md", "OpenLoopEnv": "street.md"}
-"""The pages that hold what all environments of a loop share."""
+DOCS = Path(__file__).parent
+PAGES = (*sorted((DOCS / "environments").glob("*.md")), DOCS / "api" / "conditions.md")
+_REGION = re.compile(r"<!-- from (?P<path>\S+) -->\n.*?<!-- end -->", re.S)
+_SHARED = {
+    "care_sim.envs.closed_loop.ClosedLoopEnv": "care_sim.envs.conditions_page.CONDITIONS",
+    "care_sim.envs.open_loop.OpenLoopEnv": "",
+}
+"""Environments whose whole docstring a page shows, but for the text that another page shows."""
 _COLUMNS = 118
 
 
-def on_page_markdown(markdown: str, **_: Any) -> str:
-    """The page as the site needs it: mkdocs calls this."""
-    return _REGION.sub(lambda region: region["directive"], markdown)
-
-
 def written(page: Path) -> str:
-    """The page with its texts as the docstrings are now."""
+    """Return the page with its texts as the docstrings are now."""
 
     def text_of(region: re.Match[str]) -> str:
-        text = _described(_found(region["path"]), page.name).strip()
-        return f"<!-- site\n{region['directive']}-->\n{text}\n<!-- end -->"
+        text = _described(region["path"]).strip()
+        return f"<!-- from {region['path']} -->\n{text}\n<!-- end -->"
 
     return _REGION.sub(text_of, page.read_text(encoding="utf-8"))
 
 
 def _found(path: str) -> Any:
-    """The module or class of a dotted path."""
-    try:
-        return importlib.import_module(path)
-    except ModuleNotFoundError:
-        module, _, name = path.rpartition(".")
-        return getattr(importlib.import_module(module), name)
+    """Return the class or text of a dotted path."""
+    module, _, name = path.rpartition(".")
+    return getattr(importlib.import_module(module), name)
 
 
-def _described(one: Any, page: str) -> str:
-    if inspect.ismodule(one):
-        return inspect.getdoc(one) or ""
-    about = inspect.cleandoc(one.__doc__ or "")
+def _described(path: str) -> str:
+    one = _found(path)
+    if isinstance(one, str):
+        return one
     if is_dataclass(one):
-        return "\n\n".join([about, "\n".join(_field_lines(one))])
-    # Of environments: their own part, and the page of the one that tells what all share.
-    shared = next(_SHARED[kind.__name__] for kind in one.__mro__ if kind.__name__ in _SHARED)
-    if page == shared:
-        return about
-    own = about.partition("\n### ")[0].strip()
-    return (
-        f"{own}\n\nAction, observation, reward, episode end, info and the arguments that all such "
-        f"environments\nhave stand on [this page]({shared})."
-    )
+        return "\n".join(_field_lines(one))
+    about = inspect.cleandoc(one.__doc__ or "")
+    if path not in _SHARED:
+        # The summary and sections of the loop follow, which have a page of their own.
+        return about.partition("\n### ")[0].rstrip().rpartition("\n\n")[0]
+    if _SHARED[path]:
+        about = about.removesuffix(inspect.cleandoc(_found(_SHARED[path])))
+    return about.partition("\n\n")[2].replace("\n### ", "\n## ").replace("### ", "## ", 1)
 
 
 def _field_lines(one: Any) -> list[str]:
-    """A point for every field that the class itself has, with default and docstring."""
-    params = docstring_parser.parse_from_object(one).params
-    told = {each.arg_name: " ".join((each.description or "").split()) for each in params}
-    own = [field for field in fields(one) if field.name in inspect.get_annotations(one)]
-    points = [": ".join(filter(None, [_headed(field), told.get(field.name)])) for field in own]
+    """Return a list item per field, also inherited: default, allowed values, docstring."""
+    told: dict[str, str] = {}
+    for kind in filter(is_dataclass, reversed(one.__mro__)):
+        for each in docstring_parser.parse_from_object(kind).params:
+            told[each.arg_name] = " ".join((each.description or "").split())
+    points = [
+        ": ".join(filter(None, [_headed(field), told.get(field.name)])) for field in fields(one)
+    ]
     wrapped = textwrap.TextWrapper(
         _COLUMNS, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False
     )
@@ -86,26 +80,26 @@ def _field_lines(one: Any) -> list[str]:
 
 
 def _headed(field: Field[Any]) -> str:
-    """The name of a field, what it is unless given, and in brackets what it may be."""
+    """Return a field's name and default, and its allowed values in brackets."""
     values = allowed(field)
     return f"- `{field.name}{_default(field)}`" + (f" ({values})" if values else "")
 
 
 def _default(field: Field[Any]) -> str:
-    """What a field is unless it is given; empty where there is no such value."""
+    """Return `=DEFAULT`, or nothing for a field without a default."""
     return "" if field.default is MISSING else f"={_rounded(field.default)}"
 
 
 def _rounded(value: Any) -> str:
-    """A default, numbers to four digits."""
+    """Return a default as text, numbers to four digits."""
     if isinstance(value, tuple):
         return f"({', '.join(map(_rounded, value))})"
     return f"{value:.4g}" if isinstance(value, float) else repr(value)
 
 
 def main() -> None:
-    """Write all pages."""
-    for page in sorted(PAGES.glob("*.md")):
+    """Rewrite all pages."""
+    for page in PAGES:
         page.write_text(written(page), encoding="utf-8")
 
 

@@ -1,6 +1,6 @@
 """Seeds: which are for what, and the independent streams of random numbers that each holds.
 
-The splits of seeds are disjoint by construction; the table is in docs/environments/index.md. No
+The splits of seeds are disjoint by construction; the table is in docs/seeds.md. No
 training episode can have a seed below 10,000, whatever `--seed` is, and nothing is chosen by a seed
 below 1,000 but `care-sector` and `place-hulls`, which were first tried on the streets 0 to 19. A
 study of several seeds takes them of one split; one episode, of a command or of an environment that

@@ -35,110 +35,101 @@ _HERE = np.ones(1, np.bool_)
 
 
 class ClosedLoopEnv(SensingEnv[OneWorld]):
-    """A scenario in which the agent chooses the LiDAR's cells and a driver brakes by fixed rules.
+    """A driving scene: the agent chooses the LiDAR's cells, and a driver brakes by fixed rules.
 
     ### Action
-    `Box(0, 1, (E, A), float32)`: a score for every cell of the angular grid. The `B` highest
-    strictly positive scores fire, ties by ascending cell index. If there are fewer, the random
-    floor that all policies share fills up (`floor=False` leaves the rest unspent). No action can
-    overspend. Other hardware than free cells (`firing`) fires whole units for them, in that order,
-    or cells several times.
+    `Box(0, 1, (E, A), float32)`: a score per cell of the grid, E rows and A columns. The `B`
+    highest strictly positive scores fire, ties by ascending cell index. A random floor, the same
+    for all policies, fills the rest of the budget. `floor=False` leaves the rest unspent. Every
+    action is valid, a boolean mask too, and no action can overspend. With another `firing` the
+    scores buy whole units, or several shots per cell.
 
     ### Observation
-    A `Dict` of float32 arrays, padded to fixed shapes, that `care_sim.Belief.from_observation`
-    reads:
+    A `Dict` of float32 arrays with fixed shapes. `care_sim.Belief.from_observation` reads it.
 
     | key | shape | content |
     |---|---|---|
-    | `ego` | (3,) | speed m/s (below 0 backwards), yaw rate rad/s, acceleration m/s^2 |
+    | `ego` | (3,) | speed m/s (negative backwards), yaw rate rad/s, acceleration m/s^2 |
     | `budget` | (1,) | B / N, the share of cells that may fire |
-    | `detections` | (128, 9) | detections, columns `ImageDetections.COLUMNS`; class -1 pads |
+    | `detections` | (128, 9) | camera boxes, columns `ImageDetections.COLUMNS`; class -1 pads |
     | `tracks` | (256, 13) | forecasts in the sensor frame, columns `Tracks.COLUMNS`; id -1 pads |
     | `ranges` | (E, A) | last scan in metres, 0 not fired, maximum range without a return |
 
     | column of `detections` | meaning |
     |---|---|
-    | `class` | place in `care_sim.core.types.CLASSES` |
+    | `class` | index in `care_sim.core.types.CLASSES` |
     | `confidence` | 0 to 1 |
-    | `left`, `top`, `right`, `bottom` | the box in its picture, pixels from the upper left corner |
-    | `camera` | which of the cameras, counted from 0 |
-    | `age` | of the picture, s |
-    | `yaw_change` | how far the car has turned since, rad |
+    | `left`, `top`, `right`, `bottom` | box in its picture, pixels from the upper left corner |
+    | `camera` | index of the camera |
+    | `age` | age of the picture, s |
+    | `yaw_change` | rotation of the car since the picture, rad |
 
     | column of `tracks` | meaning |
     |---|---|
-    | `id` | never given to a second object within an episode |
-    | `class` | place in `care_sim.core.types.CLASSES` |
+    | `id` | unique within an episode |
+    | `class` | index in `care_sim.core.types.CLASSES` |
     | `x`, `y`, `z` | centre in the sensor frame (forward, left, up), m |
     | `length`, `width`, `height` | m |
-    | `yaw` | of the length's direction from x towards y, rad |
+    | `yaw` | direction of the length, from x towards y, rad |
     | `vx`, `vy` | velocity over ground along the sensor's axes, m/s; 0 after one hit |
-    | `misses` | keyframes since it was last detected |
-    | `hits` | keyframes at which it was detected |
+    | `misses` | keyframes since the last detection |
+    | `hits` | keyframes with a detection |
 
-    `care_sim.loops.observation_limits` says which rows are kept if there are more, and what becomes
-    of numbers that no sensor can tell.
+    `care_sim.loops.observation_limits` says which rows remain if there are more, and how
+    out-of-range numbers are clipped.
 
     ### Reward
     A weighted sum of the terms of `care_sim.envs.reward.Rewards`: undetected time in view,
-    clearance, collision, needless braking, and, with `reward_weights={"gain": ...}`, the
-    first-detection distance against the full-scan bound. Every term is at most 0, and so is the
-    best return. The reward knows what no observation shows. A learner may learn from it; no policy
-    may read it while it plays.
+    clearance, collision and needless braking. `reward_weights={"gain": ...}` adds the
+    first-detection distance against the full-scan bound. Every term is at most 0. The reward
+    contains truth that no observation shows: a learner may learn from it, but a policy must not
+    read it while it plays.
 
     ### Episode end
-    Terminated at a collision, and where the scenario knows that nothing can happen any more;
-    truncated after the scenario's duration (6 s, 60 keyframes, unless it states another).
+    Terminated at a collision, or when the scenario is over. Truncated after the scenario's
+    duration (6 s, 60 keyframes, unless the scenario sets another).
 
     ### Info
-    What is for scoring alone must never become a policy's input: it tells of the world what no
-    observation tells, even with a blind camera. `scoring_info=False` leaves it out, except for the
-    `outcome`.
+    Entries "for scoring alone" contain truth and must never reach a policy. `scoring_info=False`
+    removes them, except for `outcome`.
 
     | key | content | whose |
     |---|---|---|
-    | `fired` | the cells of this keyframe, each as often as it was fired (1) | the car's own |
-    | `intensities` | of each, where pulses have strength, 0 without a return (1) | the car's own |
-    | `times_s` | of each, where columns fire one by one, s from the keyframe (1) | the car's own |
+    | `fired` | cells of this keyframe, each as often as it fired (1) | the car's own |
+    | `intensities` | return strength per fired cell, 0 without a return (1) | the car's own |
+    | `times_s` | time per fired cell from the keyframe, s, in a rolling sweep (1) | the car's own |
     | `braking` | whether the brake is on | the car's own |
-    | `time_s` | time of the keyframe, seconds from the start | the car's own |
+    | `time_s` | time of the keyframe, s from the start | the car's own |
     | `detected` | whether this keyframe detected the first-sighting actor (2) | scoring alone |
     | `in_view` | whether a faultless camera shows that actor | scoring alone |
     | `clearance_m` | least distance to it, hull to hull, until the next keyframe | scoring alone |
-    | `speed_mps` | the car's true speed; the observation's is what odometry reads | scoring alone |
+    | `speed_mps` | true speed; the observation has the odometry's | scoring alone |
     | `reward_terms` | `care_sim.envs.reward.Rewards` | scoring alone |
-    | `seed` | from `reset`: it repeats the episode, and so tells all of it | scoring alone |
+    | `seed` | from `reset`; it repeats the episode | scoring alone |
     | `drawn` | from `reset`: scenario parameters that the seed drew, if any | scoring alone |
     | `outcome` | at the end: a dict of `care_sim.loops.records.Outcome` | scoring alone |
 
-    (1) An array of B, with `floor=False` a list of at most B, because Gymnasium's vector
-    environments stack arrays of one length. (2) A car has what it detected as tracks. It does not
-    know which of them the episode is about.
+    (1) An array of length B, or a list of at most B with `floor=False`. Gymnasium's vectors stack
+    arrays of one length only. (2) A car has its detections as tracks, but cannot know which of
+    them the episode is about.
 
     ### Arguments
-    The arguments are these, any field of the scenario, and the conditions below. A value that is
-    not allowed raises `care_sim.InvalidInput`.
+    All fields of the scenario, all conditions, and the arguments below. A forbidden value raises
+    `care_sim.InvalidInput`.
 
     | argument | default | meaning |
     |---|---|---|
     | `budget` | 0.10 | beta, the share of the cells that may fire, in (0, 1] |
-    | `sensor` | "hdl-32e" | LiDAR and cameras, see below |
+    | `sensor` | "hdl-32e" | LiDAR and cameras: a name, a TOML file or a `care_sim.SensorSetup` |
     | `detector` | "returns" | by name (`care_sim.perception.detectors.detector_names`) |
     | `detector_parameters` | None | a mapping of the detector's own parameters |
     | `keyframe_s` | 0.1 | seconds between two decisions, at most 1 |
     | `reward_weights` | None | a mapping of changes to `care_sim.envs.reward.REWARD_WEIGHTS` |
     | `render_mode` | None | None or "rgb_array" |
-    | `secret` | False | a text that enters everything that a seed draws, see below |
-    | `scoring_info` | True | whether `info` holds what is for scoring alone |
+    | `secret` | False | a text that changes everything a seed draws (`care_sim.base.seeds`) |
+    | `scoring_info` | True | whether `info` holds entries for scoring alone |
 
-    A `sensor` is the name of a set-up (`care_sim.sensors.setups.setup_names`), the path of a TOML
-    file of one, or a `care_sim.SensorSetup`. It says the grid of every LiDAR, where it stands, and
-    the cameras, if it has its own.
-
-    A `secret` is a text that enters everything that a seed draws
-    (`care_sim.base.seeds`). An agent that holds this package can then not look its
-    episodes up. Take at least 16 random bytes, since a word can be tried like a seed. False, the
-    default, means none.
+    A secret prevents agents from looking up public seeds. Take at least 16 random bytes.
     """
 
     __doc__ = f"{__doc__}{indent(CONDITIONS, '    ')}"

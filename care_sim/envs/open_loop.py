@@ -32,48 +32,46 @@ UNFILMED = ("camera_rotation_sigma_deg", "camera_position_sigma_m", "engine")
 
 
 class OpenLoopEnv(SensingEnv[OpenLoop]):
-    """A scene in which the agent chooses the LiDAR's cells and nothing reacts to what is seen.
+    """A filmed scene: the agent chooses the LiDAR's cells, and nothing reacts.
 
     ### Action
-    As in `care_sim.envs.closed_loop.ClosedLoopEnv`: `Box(0, 1, (E, A), float32)`, a score for every
-    cell.
+    As in `care_sim.envs.closed_loop.ClosedLoopEnv`: `Box(0, 1, (E, A), float32)`, a score per cell.
 
     ### Observation
-    As in `care_sim.envs.closed_loop.ClosedLoopEnv`, with the cameras of the scene: one policy runs
-    in both loops.
+    As in `care_sim.envs.closed_loop.ClosedLoopEnv`, with the cameras of the scene. One policy
+    plays both loops.
 
     ### Reward
-    Minus the share of the annotated objects within 50 m that this keyframe does not find: 0 at
-    best. The reward knows what no observation shows. A learner may learn from it; no policy may
-    read it while it plays.
+    Minus the share of the annotated objects within 50 m that this keyframe does not detect. The
+    reward contains truth: a learner may learn from it, but a policy must not read it while it
+    plays.
 
     ### Episode end
-    Truncated after the last keyframe. `env.unwrapped.score` then holds event by event what was
-    found.
+    Truncated after the last keyframe. `env.unwrapped.score` then holds the result of every
+    first-sighting event.
 
     ### Info
-    What is for scoring alone must never become a policy's input. `scoring_info=False` leaves it
-    out, except for the `outcome`.
+    Entries "for scoring alone" contain truth and must never reach a policy. `scoring_info=False`
+    removes them, except for `outcome`.
 
     | key | content | whose |
     |---|---|---|
-    | `fired` | the cells of this keyframe, each as often as it was fired | the car's own |
-    | `intensities` | of each, where pulses have strength, 0 without a return | the car's own |
-    | `times_s` | of each, where columns fire one by one, s from the keyframe | the car's own |
-    | `time_s` | time of the keyframe, seconds from the start | the car's own |
-    | `objects` | how many annotated objects are within 50 m | scoring alone |
-    | `found` | how many of them were found at this keyframe | scoring alone |
-    | `seed`, `scene` | from `reset`: they repeat the episode, so they tell all | scoring alone |
+    | `fired` | cells of this keyframe, each as often as it fired | the car's own |
+    | `intensities` | return strength per fired cell, 0 without a return | the car's own |
+    | `times_s` | time of each fired cell from the keyframe, s, in a rolling sweep | the car's own |
+    | `time_s` | time of the keyframe, s from the start | the car's own |
+    | `objects` | number of annotated objects within 50 m | scoring alone |
+    | `found` | number of them detected at this keyframe | scoring alone |
+    | `seed`, `scene` | from `reset`; they repeat the episode | scoring alone |
     | `outcome` | at the end: a dict of `care_sim.evaluation.recall.SceneOutcome` | scoring alone |
 
     ### Arguments
-    `budget` beta in (0, 1]; `render_mode` None or "rgb_array"; `secret` and `scoring_info` as in
-    the closed loop; `detector` by name (`care_sim.perception.detectors.detector_names`) and
-    `detector_parameters`; `presence` "annotated" or "visible", which says who is present at scene
-    start and so never a first sighting (`care_sim.evaluation.sightings`); any field of
-    `care_sim.core.conditions.Conditions`, except those for which the scene would have to be filmed
-    anew: an error of the cameras' mount, and the engine. `min_returns` belongs to the detector
-    `returns`. A value that is not allowed raises `care_sim.InvalidInput`.
+    `budget`, `render_mode`, `secret`, `scoring_info`, `detector` and `detector_parameters` as in
+    the closed loop. `presence` is "annotated" or "visible": it says which objects are present at
+    scene start and are therefore no first sighting (`care_sim.evaluation.sightings`). The fields
+    of `care_sim.core.conditions.Conditions`, except errors of the cameras' mount and the engine,
+    because they would change the film. `min_returns` belongs to the detector `returns`. A
+    forbidden value raises `care_sim.InvalidInput`.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 2}  # noqa: RUF012 (Gymnasium's)

@@ -13,10 +13,11 @@ from care_sim.scenarios.base import Scenario
 class DartoutEnv(ClosedLoopEnv):
     """`CARE-Dartout-v0`: a person runs out from behind a parked trailer into an empty street.
 
-    The paper's first closed-loop scene, at 30 km/h. The seed draws the speeds, the place and the
-    timing; see `care_sim.scenarios.dartout.CrossingScenario` for the physics and their sources,
-    all of which can be passed as arguments. `occluder="truck", occluder_reported=True` parks a
-    vehicle that perception reports instead.
+    The paper's first closed-loop scene, at 30 km/h. The trailer parks at the right side of a
+    two-way street, and the person runs straight across. Perception does not report the
+    trailer, which is none of the five classes. `occluder="truck", occluder_reported=True` parks a
+    vehicle that perception reports: the person then emerges inside the hull of its track. The seed
+    draws speeds, place and timing.
     """
 
     __doc__ = f"{__doc__}\n    {ClosedLoopEnv.__doc__}"
@@ -26,8 +27,8 @@ class DartoutEnv(ClosedLoopEnv):
 class DenseEnv(ClosedLoopEnv):
     """`CARE-Dense-v0`: the dart-out in a street lined with tracked vehicles.
 
-    There are `vehicles` (7) of them, five in the camera's view. At 3% of the cells a reserve for
-    every camera box starves the person; `care_sim.scenarios.dartout` reckons why, cell by cell.
+    The camera shows five of the `vehicles` (7). At 3% of the cells a reserve for every camera box
+    starves the person. `care_sim.scenarios.dartout` explains why, cell by cell.
     """
 
     __doc__ = f"{__doc__}\n    {ClosedLoopEnv.__doc__}"
@@ -37,7 +38,9 @@ class DenseEnv(ClosedLoopEnv):
 class CutInEnv(ClosedLoopEnv):
     """`CARE-CutIn-v0`: a car pulls out into the ego's lane from in front of a standing bus.
 
-    A large vehicle returns enough points even when starved; the paper found no separation here.
+    The car waits hidden in front of the bus, in the right one of two lanes, and changes to the
+    ego's lane (highway-env). A large vehicle returns enough points even with few rays. The paper
+    found no difference between policies here.
     """
 
     __doc__ = f"{__doc__}\n    {ClosedLoopEnv.__doc__}"
@@ -47,9 +50,9 @@ class CutInEnv(ClosedLoopEnv):
 class R157Env(ClosedLoopEnv):
     """`CARE-R157-v0`: a slower vehicle changes over into the ego's lane (UN Regulation 157).
 
-    `ego_kph`, `relative_kph`, `gap_m`, `lateral_mps`, `kind` and `side` set a case; what is not
-    given the seed draws among the cases that the regulation's careful human driver prevents from
-    ending in a collision (`care_sim.scenarios.r157`). Nothing hides the vehicle.
+    `ego_kph`, `relative_kph`, `gap_m`, `lateral_mps`, `kind` and `side` set a case. The seed draws
+    the other values, among cases that the regulation's careful human driver prevents from ending
+    in a collision (`care_sim.scenarios.r157`). Nothing hides the vehicle.
     """
 
     __doc__ = f"{__doc__}\n    {ClosedLoopEnv.__doc__}"
@@ -59,13 +62,12 @@ class R157Env(ClosedLoopEnv):
 class NcapEnv(ClosedLoopEnv):
     """`CARE-NCAP-v0`: a test of Euro NCAP's protocols of emergency braking.
 
-    `test`, `speed_kph` and `target_kph` say which: a child who steps out from behind two parked
-    cars (`CPNCO-50`, the default), pedestrians, bicyclists and cars that cross, go ahead, brake or
-    come towards the ego, which turns in some. An ego that does not brake hits the target. The seed
-    draws what the protocol leaves open, and the side; with `test="drawn", speed_kph=0` the test and
-    its speeds, too. The test is over, and the episode terminated,
-    when the ego stands before the target's way, the ways have parted, or the ego is no faster than
-    the target ahead.
+    `test`, `speed_kph` and `target_kph` choose the test. The default `CPNCO-50` is a child who
+    steps out from behind two parked cars. An ego that does not brake hits the target. The seed
+    draws the side and everything that the protocol leaves open. `test="drawn", speed_kph=0` lets
+    the seed draw the test and its speeds too. The episode terminates when the ego has stopped
+    before the target's way, when the ways have parted, or when the ego is no faster than a target
+    ahead.
     """
 
     __doc__ = f"{__doc__}\n    {ClosedLoopEnv.__doc__}"
@@ -75,12 +77,11 @@ class NcapEnv(ClosedLoopEnv):
 class DriveEnv(ClosedLoopEnv):
     """`CARE-Drive-v0`: a drive through a generated street, with bends, traffic and conflicts.
 
-    The ego follows a route of 160 to 260 m, straight on, round a bend or off into a side street,
-    with six cameras. Up to three times somebody comes out of hiding, from either side: to a
-    conflict, a near miss or a stop at the edge of the lanes. The episode ends at the end of the
-    way, too. The outcome is a `care_sim.loops.records.DriveOutcome`: what the contract says of the
-    first-sighting actor is of the first encounter that is a conflict, else of the first; without an
-    encounter there is none, and `undetected_to_m` is None, too. See `care_sim.scenarios.drive`.
+    The ego has six cameras and follows a route of 160 to 260 m: straight, round a bend or into a
+    side street. Up to three times somebody comes out of hiding. An encounter is a conflict, a near
+    miss or a stop before the lanes. The episode also ends at the end of the route. The outcome is
+    a `care_sim.loops.records.DriveOutcome`. Its first-sighting actor is the first conflict, or
+    else the first encounter. A drive without an encounter has none.
     """
 
     __doc__ = f"{__doc__}\n    {ClosedLoopEnv.__doc__}"

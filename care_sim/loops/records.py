@@ -114,33 +114,33 @@ class Outcome:
 
 @dataclass(frozen=True)
 class EncounterOutcome:
-    """What came of one planned encounter of a drive."""
+    """Result of one planned encounter of a drive."""
 
     who: str
-    """Its kind in the catalogue of bodies."""
+    """Kind in the catalogue of bodies."""
     side: str
-    """From which it comes, "left" or "right"."""
+    """Side from which it comes, "left" or "right"."""
     along_m: float
-    """Where on the route its line is."""
+    """Position of its line on the route."""
     way: str
-    """How the route runs while it is due in sight: "straight", "bend" or "turn"."""
+    """Shape of the route where it comes into view: "straight", "bend" or "turn"."""
     course: str
-    """"conflict", "near-miss" or "stop": what comes of it if the ego drives on as it means to."""
+    """Result without braking: "conflict", "near-miss" or "stop"."""
     occluder: str
-    """The kind of what hides it."""
+    """Kind of the body that hides it."""
     occluder_reported: bool
     """Whether perception knows the occluder's class."""
     set_off: bool
-    """Whether it came out at all; not where other traffic would have run it over, nor where the ego
-    never came near."""
+    """Whether it came out. It stays hidden if other traffic would hit it, or if the ego never comes
+    near."""
     view_keyframe: int | None
-    """The first keyframe at which the unimpaired cameras show it, None if never."""
+    """First keyframe at which faultless cameras show it, None if never."""
     detection_keyframe: int | None
-    """The first keyframe at which it is detected, None if never."""
+    """First keyframe at which it is detected, None if never."""
     detection_distance_m: float | None
-    """From the sensor to its centre, in the plane, at that keyframe."""
+    """Planar distance from the sensor to its centre at that keyframe."""
     hit: bool
-    """Whether the episode ended with its contact."""
+    """Whether the car touched it."""
 
 
 @dataclass(frozen=True)

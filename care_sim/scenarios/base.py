@@ -63,6 +63,7 @@ class Scenario(ABC):
     cameras: ClassVar[tuple[PinholeCamera, ...]] = (FRONT_CAMERA,)
     """What the car has."""
     duration_s: float = bounded(6.0, 0.05, LONGEST_EPISODE_S)
+    """Longest duration of an episode."""
 
     def __post_init__(self) -> None:
         check_fields(self, f" of {type(self).__name__.removesuffix('Scenario').lower()}")
@@ -118,13 +119,13 @@ MIRRORED = ("never", "drawn", "always")
 @dataclass(frozen=True)
 class MirrorableScenario(Scenario):
     """A scenario whose world may be reflected at the middle of the ego's lane, as in left-hand
-    traffic: what stood on the right stands on the left.
+    traffic.
 
-    `mirrored="drawn"` reflects the worlds of half of the seeds. A world and its reflection share
-    every other draw of the seed.
+    A world and its reflection share every other draw of the seed.
     """
 
     mirrored: str = one_of("never", MIRRORED)
+    """Reflect the world as in left-hand traffic: never, always, or for half of the seeds."""
 
     def empty_world(self, traffic: Traffic, ego_speed: float, rng: np.random.Generator) -> World:
         """The world to be filled, at time zero; `ego_speed` in m/s."""

@@ -33,23 +33,21 @@ of 4.25 m on the right, where the stop is, and of 4.75 m on the left.
 class CutIn(MirrorableScenario):
     """A car pulls out into the ego's lane from in front of a standing bus.
 
-    Two lanes in the ego's direction, the ego in the left one. A bus stands at its stop in the
-    right lane. A car stands hidden before the bus and pulls out ahead of the ego (highway-env lane
-    change, IDM).
-
-    The bus is one of the five classes. With `occluder_reported=False` perception does not report
-    it. Ranges are drawn uniformly by the seed.
+    The street has two lanes in the ego's direction, and the ego drives in the left one. A bus
+    stands at its stop in the right lane. A car stands hidden in front of the bus and pulls out
+    ahead of the ego (lane change and IDM of highway-env). `occluder_reported=False` hides the bus
+    from perception. The seed draws uniformly from ranges.
     """
 
     occluder_reported: bool = True
     ego_speed_mps: Range = bounded(USUAL_EGO_SPEED_MPS, *EGO_SPEED_BOUNDS_MPS)
     stop_m: Range = bounded((42.0, 46.0), 5, 200)
-    """From the ego's first position to the front of the bus: so far that the bus hides the car."""
+    """From the ego's first position to the front of the bus, far enough to hide the car."""
     gap_m: Range = bounded((2.0, 3.0), 0.05, 50)
-    """Between bus and car, as behind a bus that has closed up at its stop."""
+    """Gap between bus and car."""
     pull_out_s: Range = bounded((2.0, 2.5), -10, 20)
-    """Time gap of the ego to the car's rear when it pulls out. UN Regulation 157 (5.2.5.2) counts a
-    cut-in at this closing speed as avoidable down to about 1 s."""
+    """Time gap of the ego to the car's rear when the car pulls out. UN Regulation 157 (5.2.5.2)
+    counts a cut-in at this closing speed as avoidable down to about 1 s."""
 
     def build(self, rng: np.random.Generator) -> World:
         """A fresh world at time zero."""

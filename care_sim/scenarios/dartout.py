@@ -35,21 +35,21 @@ OCCLUDERS = ("trailer", "truck", "van", "hoarding")
 
 @dataclass(frozen=True)
 class CrossingScenario(MirrorableScenario):
-    """A two-way street with a parking lane on each side. The occluder stands in the right one. The
-    person waits hidden behind its far end, then runs straight across to the far kerb.
+    """A person runs out from behind an occluder in a two-way street with parking lanes.
 
-    Perception does not report the occluder: a trailer or a hoarding is none of the five classes.
-    With `occluder="truck"` (or "van") and `occluder_reported=True` it does, and the person emerges
-    inside that track's dilated hull: the second reading of the scene. Ranges are drawn uniformly by
-    the seed.
+    The occluder stands in the right parking lane. The person waits hidden behind its far end, then
+    runs straight across to the far kerb. Perception does not report a trailer or a hoarding, which
+    are none of the five classes. `occluder="truck"` (or "van") with `occluder_reported=True` is
+    the second reading of the scene: the person emerges inside the dilated hull of a track. The
+    seed draws uniformly from ranges.
     """
 
     occluder: str = one_of("trailer", OCCLUDERS)
     occluder_reported: bool = False
     ego_speed_mps: Range = bounded(USUAL_EGO_SPEED_MPS, *EGO_SPEED_BOUNDS_MPS)
     crossing_m: Range = bounded((37.0, 41.0), 5, 200)
-    """From the ego's first position to the person's line. That is four to five seconds of approach,
-    in which every track settles."""
+    """From the ego's first position to the person's line: four to five seconds of approach, in
+    which every track settles."""
     gap_m: Range = bounded((0.8, 1.2), 0.05, 20)
     """From the end of the occluder to the person's line: about a step."""
     run_mps: Range = bounded((2.6, 2.8), 0.1, 12.5)
@@ -58,12 +58,12 @@ class CrossingScenario(MirrorableScenario):
     run_up_mps2: float = bounded(5.0, 0.1, 20)
     """Full speed after half a second and 0.7 m, all of it in the occluder's shade."""
     kerb_offset_m: Range = bounded((-0.2, 0.2), -1, 1)
-    """How far the occluder stands off the middle of the parking lane."""
+    """Offset of the occluder from the middle of the parking lane."""
     encroachment_s: Range = bounded((0.3, 0.6), -10, 10)
-    """Post-encroachment time (Allen, Shin and Cooper 1978) of an ego that never brakes: a near
-    miss. Above 0 nobody is hit by a car that does nothing, so a collision can only come from the
-    braking. Below 0 is a collision course. Both bounds were picked, from geometry alone, so that a
-    full scan sees the person at about the paper's distance, 15 m.
+    """Post-encroachment time (Allen, Shin and Cooper 1978) of an ego that never brakes. Above 0 it
+    is a near miss, so only braking can cause a collision. Below 0 it is a collision course. The
+    bounds were picked from geometry alone: a full scan detects the person at about the paper's
+    distance, 15 m.
     """
 
     def __post_init__(self) -> None:
@@ -153,7 +153,7 @@ class Dartout(CrossingScenario):
 # lies inside its hull, where every policy fires, and would be no first sighting to tell policies
 # apart.
 #
-# How this layout was chosen: docs/environments/dense.md.
+# docs/environments/dense.md says how this layout was chosen.
 
 DOUBLE_PARKED_Y = LANE_WIDTH_M
 KERBS = {"left": LEFT_PARKING_Y, "right": RIGHT_PARKING_Y, "oncoming": DOUBLE_PARKED_Y}
@@ -186,13 +186,13 @@ s.
 class Dense(CrossingScenario):
     """The dart-out in a street lined with tracked vehicles.
 
-    `vehicles` stand along the street, and a driver follows the ego. The camera sees five of the
-    vehicles when the person appears.
+    `vehicles` stand along the street, and a driver follows the ego. The camera shows five of them
+    when the person appears.
     """
 
     vehicles: int = bounded(7, 0, len(VEHICLE_PLACES))
     place_jitter_m: Range = bounded((-0.4, 0.4), -3, 3)
-    """How far a standing vehicle is off its place along the street; across, a quarter of that."""
+    """Offset of a standing vehicle along the street; across, a quarter of such a draw."""
 
     def furnish(self, world: World, crossing_x: float, rng: np.random.Generator) -> None:
         """Line the street."""

@@ -42,28 +42,25 @@ SIDES = {"left": 1, "right": -1}
 class DriveScenario(Scenario):
     """A drive through a generated street, with traffic that reacts and people who come out.
 
-    The way is 160 to 260 m long, straight, round a bend or off into a side street. The ego follows
-    its route, slows for bends and follows who drives ahead.
-
-    Up to three times somebody comes out of hiding: an adult, a child, a cyclist or a car, from
-    either side. See `care_sim.streets.encounters` for who, whence and how it would end. What is
-    None is drawn by the seed.
+    The route is 160 to 260 m long: straight, round a bend or into a side street. The ego slows for
+    bends and follows vehicles ahead. Up to three times an adult, a child, a cyclist or a car comes
+    out of hiding (`care_sim.streets.encounters`). The seed draws every value that is None.
     """
 
     cameras = SURROUND_CAMERAS
     duration_s: float = bounded(LONGEST_EPISODE_S, 0.05, LONGEST_EPISODE_S)
     encounters: int = bounded(3, 0, 3)
-    """The most that a drive holds; how many is drawn evenly from 0 on."""
+    """Largest number of encounters. The seed draws the number evenly from 0 on."""
     side: str | None = one_of(None, SIDES)
-    """Where all come from. Few cars and cyclists can come from the left: they would
-    be in sight for too long."""
+    """Side from which all come. Few cars and cyclists can come from the left, because they would be
+    in view for too long."""
     who: str | None = one_of(None, COMERS)
-    """Who comes."""
+    """Kind of the person or vehicle that comes out."""
     occluder_reported: bool | None = None
-    """Whether perception reports what hides them. Cyclists and cars come from behind what it does
-    not report, so that with True adults and children alone come."""
+    """Whether perception reports the occluder. Cyclists and cars always come from behind unreported
+    occluders, so True leaves adults and children."""
     turn_chance: float = bounded(TURN_CHANCE, 0, 1)
-    """With which the ego turns off where there is a side street."""
+    """Probability that the ego turns off where there is a side street."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -157,31 +157,28 @@ _ROAD_LIMIT_MPS = 130 * KPH
 
 @dataclass(frozen=True)
 class R157(Scenario):
-    """A slower vehicle changes over from the lane beside into the ego's (UN Regulation 157).
+    """A slower vehicle changes over from the next lane into the ego's (UN Regulation 157).
 
-    Three lanes, the ego in the middle one. A slower vehicle in the lane beside changes over into
-    it. Nothing hides it, and nobody else is on the road, as in the regulation.
-
-    What is None is drawn by the seed: kind and side first, then among the preventable cases of the
-    grid (`care_sim.scenarios.r157`) that have the values that are given; among all of them
-    where none is preventable. What may be given is beyond the grid on both sides.
+    The ego drives in the middle one of three lanes, and nobody else is on the road. The seed draws
+    every value that is None: kind and side first, then a preventable case of the grid with the
+    given values (`care_sim.scenarios.r157`). If none is preventable, it draws from all cases.
     """
 
     duration_s: float = bounded(10.0, 0.05, LONGEST_EPISODE_S)
     ego_kph: float | None = bounded(None, 10.1, 130)
     """Speed of the ego, km/h."""
     relative_kph: float | None = bounded(None, 0.1, 120)
-    """By how much the other is slower, km/h."""
+    """Speed of the ego minus speed of the other vehicle, km/h."""
     gap_m: float | None = bounded(None, 0.1, 200)
-    """From the ego's front to the other's rear when the lane change begins, if nobody brakes."""
+    """Gap from bumper to bumper when the lane change begins, if nobody brakes."""
     lateral_mps: float | None = bounded(None, 0.1, 5)
-    """Lateral speed of the other, m/s."""
+    """Lateral speed of the other vehicle, m/s."""
     kind: str | None = one_of(None, KINDS)
-    """What the other is."""
+    """Kind of the other vehicle."""
     side: str | None = one_of(None, SIDES)
-    """Where it comes from."""
+    """Side from which it comes."""
     lead_s: Range = bounded((1.0, 1.5), 0, 30)
-    """Time before the lane change, in which tracks settle; the regulation leaves it open."""
+    """Time before the lane change, in which tracks settle. The regulation leaves it open."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

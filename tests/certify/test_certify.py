@@ -337,7 +337,7 @@ def test_an_episode_of_a_street_goes_as_published():
     assert verdict.as_published, "\n".join(verdict.lines())
 
 
-def test_the_concepts_tell_the_hash_of_the_list():
-    concepts = (ROOT / "docs" / "concepts.md").read_text()
+def test_the_page_tells_the_hash_of_the_list():
+    page = (ROOT / "docs" / "reproducibility.md").read_text()
     told = published.combined(published.read()[:CERTIFIED_EPISODES])
-    assert f"{CERTIFIED_EPISODES:,} episodes: {told}" in concepts
+    assert f"{CERTIFIED_EPISODES:,} episodes: {told}" in page

@@ -1,4 +1,4 @@
-"""A policy from outside: twenty lines, found by its entry point, through the same door as ours."""
+"""A policy from outside, found by its entry point, through the same door as ours."""
 
 import sys
 

@@ -54,40 +54,34 @@ DRAWN = "drawn"
 class Ncap(Scenario):
     """A test of Euro NCAP's protocols of emergency braking, on an empty proving ground.
 
-    There are the ego at the test's speed, the target, and the cars that hide the target where the
-    test has them.
-    An ego that does not brake hits the target as the protocol wants it. The seed draws only what
-    the protocol leaves open: within its tolerance the ego's speed, when the sensor begins, the
-    sizes of the cars that stand there, and, unless `mirrored` says, the side.
-
-    With `test="drawn", speed_kph=0` the seed draws a test too, each as often as the others, and one
-    of its pairs of speeds, so that a map of a single test does not fit.
-
-    These cars are of one of the five classes. With `occluder_reported=False` perception does not
-    report them. Ranges are drawn uniformly by the seed.
+    The world holds the ego at the test's speed, the target, and the cars that hide the target in
+    some tests. The seed draws what the protocol leaves open: the ego's speed within the tolerance,
+    the start time, the sizes of the standing cars, and the side. `test="drawn", speed_kph=0` also
+    draws the test and one of its pairs of speeds, all equally likely. `occluder_reported=False`
+    hides the standing cars from perception.
     """
 
     duration_s: float = bounded(20.0, 0.05, LONGEST_EPISODE_S)
     test: str = one_of("CPNCO-50", (*TESTS, DRAWN))
-    """One of `care_sim.scenarios.ncap.table.TESTS`, or drawn."""
+    """The test, or drawn."""
     speed_kph: float = bounded(40.0, 0, 140)
-    """The ego's, km/h. 0 stands for a pair of the protocol's speeds that the seed draws. Tests in
-    which it turns have a line for each of the protocol's speeds and take no other."""
+    """Speed of the ego, km/h. At 0 the seed draws one of the protocol's pairs of speeds. Tests in
+    which the ego turns allow the protocol's speeds only."""
     target_kph: float = bounded(0.0, 0, 140)
-    """The target's, km/h. 0 stands for the protocol's at the ego's speed: the first where it has
-    several, unless the pair is drawn."""
+    """Speed of the target, km/h. 0 takes the protocol's speed at this ego speed, the first one of
+    several unless the pair is drawn."""
     mirrored: str = one_of("drawn", MIRRORED)
-    """never, always, or half of the seeds: reflected at the ego's way, as in left-hand traffic."""
+    """Reflect the world as in left-hand traffic: never, always, or for half of the seeds."""
     occluder_reported: bool = True
     excess_kph: Range = bounded((0.0, 1.0), 0, 4)
-    """By how much the ego is faster than the test's speed: the protocol's tolerance."""
+    """Extra speed of the ego, within the protocol's tolerance."""
     phase_s: Range = bounded((0.0, 0.1), 0, 2)
-    """How much earlier the episode begins: anywhere within a keyframe."""
+    """Shift of the start, within a keyframe."""
     small_length_m: Range = bounded(SMALL_LENGTH_M, 3, 6)
     small_width_m: Range = bounded(SMALL_WIDTH_M, 1.5, 2.5)
     large_length_m: Range = bounded(LARGE_LENGTH_M, 3, 6)
     large_width_m: Range = bounded(LARGE_WIDTH_M, 1.5, 2.5)
-    """Of the cars that hide the target: the protocol's ranges."""
+    """Sizes of the cars that hide the target, as in the protocol."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
