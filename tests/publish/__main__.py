@@ -127,7 +127,8 @@ def published(folder, made):
     print(f"{folder.name}: {other:,} of {len(after):,} rows differ; there were {len(before):,}")
     tables = [(each / TABLES).read_text() for each in (folder, made)]
     changed = [*changed_lines(*tables)]
-    print(*(f"  {line}" for line in changed[:SHOWN]), sep="\n")
+    for line in changed[:SHOWN]:
+        print(f"  {line}")
     if len(changed) > SHOWN:
         print(f"  and {len(changed) - SHOWN} further lines of {TABLES}")
     # The configuration comes last: what it says of the code is said of all files beside it.
