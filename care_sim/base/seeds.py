@@ -12,7 +12,8 @@ by what it begins with. A secret enters everything that is drawn: no observation
 seed, nor a seed the episode, but what a guess among all that the ranges of a scenario allow tells.
 NumPy's generators are not made for cryptography; to tell from the first numbers that a stream gave
 those that follow is years of computing (Bouillaguet, Martinez and Sauvage, ToSC 2020, on PCG64), no
-proof that it cannot be done.
+proof that it cannot be done. The random floor has a key of 64 bits (`care_sim.core.firing.floor`);
+trying all keys is years of computing, too.
 """
 
 import hmac

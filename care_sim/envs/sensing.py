@@ -5,7 +5,6 @@ No action can overspend that budget.
 
 import inspect
 from collections.abc import Mapping
-from functools import partial
 from typing import Any, ClassVar, Generic, TypeVar
 
 import gymnasium
@@ -20,7 +19,7 @@ from care_sim.core.arrays import Floats
 from care_sim.core.belief import MAX_DETECTIONS, MAX_TRACKS, OBSERVED
 from care_sim.core.cells.stack import Grid
 from care_sim.core.conditions import MIN_RETURNS, Conditions
-from care_sim.core.firing.floor import RandomFloor
+from care_sim.core.firing.floor import Floor, floor_key
 from care_sim.core.firing.listing import hardware_of
 from care_sim.core.grid import Cells, Place
 from care_sim.core.pinhole import PinholeCamera
@@ -223,7 +222,7 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         """Start an episode over a loop and a floor."""
         self._running = loop
         self._over = False
-        self._floors = RandomFloor(floor, self.conditions.floor_seed, self.rig.grid.size)
+        self._floor_key = floor_key(floor, self.conditions.floor_seed)
         self._keyframe = 0
         self._last_fired = np.empty(0, np.int64)
 
@@ -250,7 +249,7 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         return self._fired(checked_scores(action, self.rig.grid.shape))
 
     def _fired(self, scores: Action) -> Cells:
-        floor = partial(self._floors.at, self._keyframe) if self.conditions.floor else None
+        floor = Floor(*self._floor_key, self._keyframe) if self.conditions.floor else None
         return self.rig.hardware.fire(scores, self.rig.budget, floor, self._last_fired)
 
     def _scan_info(self, fired: Cells) -> dict[str, Any]:

@@ -17,13 +17,15 @@ from care_sim.core.firing.actions import (
     shares_of,
 )
 from care_sim.core.firing.base import fired_cells
+from care_sim.core.firing.floor import Floor
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 
 GRID = AngularGrid(columns=4, rows=3)
 RIG = Rig(GRID, budget=6, reserve_fraction=0.5)
-FLOOR_ORDER = np.array([11, 10, 0, 9, 8, 7, 6, 5, 4, 3, 2, 1])
+DRAWN = Floor(1, 2, 50)
+"""Its first two cells of twelve are 11 and 10."""
 DEMAND = Demand([np.array([0, 1, 2, 3, 4])], [[np.array([2, 3])]])
 """Three of six cells are for exploitation: 0, 1, 2. The reserve wants 2, which is taken, and 3."""
 
@@ -31,7 +33,7 @@ DEMAND = Demand([np.array([0, 1, 2, 3, 4])], [[np.array([2, 3])]])
 def shares(demand, behind, rig=RIG):
     """Of the cells that `demand` fires; `behind` is the demand that the watcher believes in."""
     action = scores_of(allocate(demand, rig.budget, rig.reserve_fraction), rig.grid.shape)
-    return shares_of(fired_cells(action, rig.budget, lambda: FLOOR_ORDER), action, behind, rig)
+    return shares_of(fired_cells(action, rig.budget, DRAWN), action, behind, rig)
 
 
 def test_every_cell_has_the_share_that_took_it():
@@ -79,7 +81,7 @@ def test_what_fires_along_has_the_share_of_the_first_of_its_unit():
     rig = Rig(GRID, budget=8, reserve_fraction=0.5, firing="segments:2")
     demand = Demand([np.array([0, 2])], [[np.array([7, 3])]])
     action = scores_of(allocate(demand, rig.budget, rig.reserve_fraction), GRID.shape)
-    fired = rig.hardware.fire(action, rig.budget, lambda: FLOOR_ORDER, np.empty(0, np.int64))
+    fired = rig.hardware.fire(action, rig.budget, DRAWN, np.empty(0, np.int64))
     expected = np.full(12, NOT_FIRED)
     expected[:4], expected[6:8], expected[10:] = EXPLOITATION, RESERVE, FLOOR
     np.testing.assert_array_equal(shares_of(fired, action, demand, rig).ravel(), expected)

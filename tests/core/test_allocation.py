@@ -10,6 +10,7 @@ from care_sim.core.firing.actions import Allocator, scores_of
 from care_sim.core.firing.base import fired_cells
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
+from tests.helpers.floors import FLOOR, drawn_floors, floor_order
 
 CELLS = 40
 sets = st.lists(st.lists(st.integers(0, CELLS - 1), max_size=12), max_size=4)
@@ -102,11 +103,12 @@ def test_agrees_with_the_algorithm_by_the_letter(demand, budget, rho, floor):
 
 
 @pytest.mark.smoke
-@given(demands, budgets, fractions, floors)
+@given(demands, budgets, fractions, drawn_floors)
 def test_an_allocation_survives_the_way_through_an_action(demand, budget, rho, floor):
     scores = scores_of(allocate(demand, budget, rho), (4, 10))
-    fired = fired_cells(scores, budget, lambda: np.array(floor))
-    assert fired.tolist() == sorted(allocate(demand, budget, rho, floor).tolist())
+    fired = fired_cells(scores, budget, floor)
+    order = floor_order(floor, CELLS)
+    assert fired.tolist() == sorted(allocate(demand, budget, rho, order).tolist())
 
 
 def test_a_full_size_allocation_survives_the_way_through_an_action(grid):
@@ -134,16 +136,17 @@ def test_only_strictly_positive_scores_count():
 
 def test_too_few_scores_are_topped_up_from_the_floor_in_its_order():
     scores = np.zeros((4, 10), np.float32)
-    scores[0, 3] = 1.0
-    floor = np.array([3, 39, 20, 0, *[n for n in range(40) if n not in (3, 39, 20, 0)]])
-    assert fired_cells(scores, 3, lambda: floor).tolist() == [3, 20, 39]
+    first, second, third = floor_order(FLOOR, 40)[:3].tolist()
+    scores.flat[second] = 1.0
+    assert fired_cells(scores, 3, FLOOR).tolist() == sorted([first, second, third])
 
 
 def test_a_boolean_mask_within_the_budget_is_an_action():
     mask = np.zeros((4, 10), bool)
     mask[1, 2:5] = True
     assert fired_cells(mask, 3, None).tolist() == [12, 13, 14]
-    assert fired_cells(mask, 4, lambda: np.arange(40)).tolist() == [0, 12, 13, 14]
+    free = [cell for cell in floor_order(FLOOR, 40).tolist() if cell not in (12, 13, 14)]
+    assert fired_cells(mask, 4, FLOOR).tolist() == sorted([12, 13, 14, free[0]])
 
 
 @pytest.mark.parametrize(

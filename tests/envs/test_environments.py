@@ -103,6 +103,7 @@ def test_the_floor_of_a_seed_and_keyframe_is_the_same_whatever_was_fired_before(
     some[5, :30] = 1.0
     after_nothing = floors(4, NOTHING, NOTHING)
     assert floors(4, some, EVERYTHING) == after_nothing
+    assert len({*map(tuple, after_nothing)}) == 3
     assert floors(4)[2] == after_nothing[0]
 
 

@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 
 from care_sim.core.firing.base import demanded
+from care_sim.core.firing.floor import Floor, floor_key
 from care_sim.core.types import ImageDetections
 from care_sim.loops.episode import EpisodeSeeds
 from care_sim.loops.stages.tracking import Tracking
 from care_sim.study.designs.paper import paper_study
 from care_sim.study.episode_config import EpisodeConfig
+from tests.helpers.floors import floor_order
 from tests.helpers.places import EXAMPLES, loaded
 
 FILE = EXAMPLES / "care_in_one_file.py"
@@ -67,7 +69,7 @@ def play(config, one_file, detector_output):
         observation, _ = env.reset(seed=config.seed)
         policy.reset()
         cameras = [camera_of(camera, one_file) for camera in env.rig.cameras]
-        floors = np.random.default_rng(EpisodeSeeds.of(config.seed).floor)
+        key = floor_key(EpisodeSeeds.of(config.seed).floor, 0)
         # With a budget of all cells, CARE is the full scan.
         name = "care" if config.policy == "full" else config.policy
         scanner = one_file.Scanner(name, config.budget, config.reserve_fraction, config.keyframe_s)
@@ -87,7 +89,7 @@ def play(config, one_file, detector_output):
                 for row in observation["detections"]
                 if row[ImageDetections.CLASS] >= 0
             ]
-            floor = floors.permutation(env.rig.grid.size)
+            floor = floor_order(Floor(*key, keyframes), env.rig.grid.size)
             shares = scanner.choose(seen, ego, floor)
             chosen = np.array([*shares])
             action = policy(observation)

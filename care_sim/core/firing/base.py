@@ -4,9 +4,8 @@ Hardware may fire a cell more than once: it then stands as often among what fire
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 from functools import cached_property
-from typing import Any, ClassVar, TypeAlias
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +16,8 @@ from care_sim.core.allocation import budget_cells
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.cells.stack import Grid
 from care_sim.core.defaults import CELLS
+from care_sim.core.firing.floor import Floor, draw_cells
 from care_sim.core.grid import Cells
-
-Floor: TypeAlias = Callable[[], NDArray[np.integer]] | None
-"""Draws the random floor of a keyframe, a permutation of all cells; None of an environment without
-one."""
 
 
 class Hardware(ABC):
@@ -66,13 +62,13 @@ class Hardware(ABC):
         return self.unit_cells * budget_cells(budget, self.units, self.unit)
 
     @abstractmethod
-    def fire(self, scores: NDArray[Any], budget: int, floor: Floor, last: Cells) -> Cells:
+    def fire(self, scores: NDArray[Any], budget: int, floor: Floor | None, last: Cells) -> Cells:
         """The cells that fire, ascending, never more than `budget`; where one may be fired more
         than once, it stands there once for every shot.
 
         Cells with strictly positive `scores` (E, A) are demanded, the highest score first, ties by
-        ascending index. Then the `floor` spends what is left. `last` are the cells that fired at
-        the keyframe before, none at the first one.
+        ascending index. Then the `floor` spends what is left; None leaves the rest unspent. `last`
+        are the cells that fired at the keyframe before, none at the first one.
         """
 
     @abstractmethod
@@ -147,7 +143,7 @@ class FreeCells(Hardware):
         """(N,) the cells themselves."""
         return np.arange(self.grid.size)
 
-    def fire(self, scores: NDArray[Any], budget: int, floor: Floor, last: Cells) -> Cells:
+    def fire(self, scores: NDArray[Any], budget: int, floor: Floor | None, last: Cells) -> Cells:
         """The demanded cells up to the budget, then the floor."""
         return fired_cells(scores, budget, floor)
 
@@ -156,7 +152,7 @@ class FreeCells(Hardware):
         return ranked(worth)[:budget]
 
 
-def fired_cells(scores: NDArray[np.floating] | Mask, budget: int, floor: Floor) -> Cells:
+def fired_cells(scores: NDArray[np.floating] | Mask, budget: int, floor: Floor | None) -> Cells:
     """The cells that an action fires, ascending.
 
     They are the `budget` highest strictly positive `scores` (E, A), ties by ascending index. Where
@@ -165,10 +161,8 @@ def fired_cells(scores: NDArray[np.floating] | Mask, budget: int, floor: Floor) 
     flat = scores.ravel().astype(np.float32, copy=False)
     chosen = np.empty(len(flat), np.bool_)
     count = choose_demanded(flat, budget, chosen)
-    # An action that spends the budget itself needs no floor, and a floor takes longer to draw than
-    # a scan of its cells.
-    if floor is not None and count < budget:
-        count = top_up(chosen, count, floor(), budget)
+    if floor is not None:
+        count = top_up(chosen, count, floor, budget)
     cells = np.empty(count + 1, np.int64)
     list_chosen(chosen, cells)
     return cells[:count]
@@ -199,15 +193,18 @@ def choose_demanded(scores: NDArray[np.float32], budget: int, chosen: Mask) -> i
 
 
 @compiled()
-def top_up(chosen: Mask, count: int, floor: NDArray[np.integer], budget: int) -> int:
-    """Choose the first of the `floor` besides, up to the budget; `count` are chosen before. Returns
-    how many are afterwards.
+def top_up(chosen: Mask, count: int, floor: Floor, budget: int) -> int:
+    """Choose the first free cells of the `floor` besides, up to the budget; `count` are chosen
+    before. Returns how many are afterwards.
     """
-    for cell in floor:
-        if count >= budget:
-            break
-        count += not chosen[cell]
-        chosen[cell] = True
+    batch = 0
+    while count < budget:
+        for cell in draw_cells(floor, batch, len(chosen)):
+            if count >= budget:
+                break
+            count += not chosen[cell]
+            chosen[cell] = True
+        batch += 1
     return count
 
 
@@ -286,7 +283,7 @@ class Energy(FreeCells):
         super().__init__(grid)
         self.most_shots = shots
 
-    def fire(self, scores: NDArray[Any], budget: int, floor: Floor, last: Cells) -> Cells:
+    def fire(self, scores: NDArray[Any], budget: int, floor: Floor | None, last: Cells) -> Cells:
         """A cell for every shot, ascending: one that is fired n times stands there n times."""
         # A score is what an action holds, float32; a share of it needs more bits.
         flat = scores.ravel().astype(np.float32).astype(np.float64)
@@ -299,7 +296,9 @@ class Energy(FreeCells):
         # Equal claims are ranked by the number of the shot, then by the cell, lower first.
         dealt = np.argsort(-np.concatenate(claims), kind="stable")[:budget]
         fired = np.concatenate(rounds)[dealt]
-        if floor is not None and len(fired) < budget:
-            free = floor()
-            fired = np.concatenate([fired, free[flat[free] <= 0][: budget - len(fired)]])
+        if floor is not None:
+            asked = flat > 0
+            chosen = asked.copy()
+            top_up(chosen, len(fired), floor, budget)
+            fired = np.concatenate([fired, np.flatnonzero(chosen & ~asked)])
         return np.sort(fired)

@@ -13,7 +13,8 @@ from care_sim.base.compiled import compiled
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.cells.stack import Grid
-from care_sim.core.firing.base import Floor, Hardware, demanded, ranked
+from care_sim.core.firing.base import Hardware, demanded, ranked
+from care_sim.core.firing.floor import Floor, draw_cells
 from care_sim.core.grid import Cells
 
 
@@ -52,13 +53,13 @@ class Blocks(Hardware):
         unit_of.flags.writeable = False
         return unit_of
 
-    def fire(self, scores: NDArray[Any], budget: int, floor: Floor, last: Cells) -> Cells:
+    def fire(self, scores: NDArray[Any], budget: int, floor: Floor | None, last: Cells) -> Cells:
         """The blocks of the demanded cells in their order, then those of the floor."""
         taken = np.zeros(self.units, np.bool_)
         most = budget // self.unit_cells
         count = _take(demanded(scores), self.unit_of, taken, 0, most)
-        if floor is not None and count < most:
-            _take(floor(), self.unit_of, taken, count, most)
+        if floor is not None:
+            _take_floor(floor, self.unit_of, taken, count, most)
         return np.flatnonzero(taken[self.unit_of])
 
     def best(self, worth: Floats, budget: int, last: Cells) -> Integers:
@@ -73,7 +74,7 @@ def _nearest_divisor(size: int, whole: int) -> int:
 
 
 @compiled()
-def _take(order: NDArray[np.integer], unit_of: Integers, taken: Mask, count: int, most: int) -> int:
+def _take(order: Cells, unit_of: Integers, taken: Mask, count: int, most: int) -> int:
     """Mark the units of the cells `order` as taken, in its order, until `most` of them are;
     `count` are before. Returns how many are afterwards.
     """
@@ -84,6 +85,15 @@ def _take(order: NDArray[np.integer], unit_of: Integers, taken: Mask, count: int
         count += not taken[unit]
         taken[unit] = True
     return count
+
+
+@compiled()
+def _take_floor(floor: Floor, unit_of: Integers, taken: Mask, count: int, most: int) -> None:
+    """As `_take`, of the cells of a floor."""
+    batch = 0
+    while count < most:
+        count = _take(draw_cells(floor, batch, len(unit_of)), unit_of, taken, count, most)
+        batch += 1
 
 
 class Tiles(Blocks):
@@ -177,7 +187,7 @@ class Window(Hardware):
         super().__init__(grid, unit_cells)
         self.lidar = grid.heads[0].grid
 
-    def fire(self, scores: NDArray[Any], budget: int, floor: Floor, last: Cells) -> Cells:
+    def fire(self, scores: NDArray[Any], budget: int, floor: Floor | None, last: Cells) -> Cells:
         """The window that serves the demand."""
         width = budget // self.unit_cells
         places = self._reached(width, last)

@@ -5,7 +5,6 @@ world by world.
 """
 
 from collections.abc import Sequence
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,16 +14,7 @@ from care_sim.core.arrays import Integers, Mask
 from care_sim.core.conditions import Conditions
 from care_sim.core.defaults import CELLS
 from care_sim.core.firing.base import choose_demanded, list_chosen, top_up
-from care_sim.core.firing.floor import (
-    FloorCells,
-    RandomFloor,
-    WordStreams,
-    draw_floor,
-    floor_cells,
-    floor_seed,
-    seed_stream,
-    word_streams,
-)
+from care_sim.core.firing.floor import Floor, floor_key
 from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
 from care_sim.loops.stages.state import Fired
@@ -44,36 +34,29 @@ class Choice:
         self._rig = rig
         self._size = rig.grid.size
         self._is_free = rig.firing == CELLS
-        self._streams = word_streams(worlds)
-        self._drawn = np.full(worlds, -1)
-        self._floor = floor_cells(rig.grid.size)
+        # The keys of the floors.
+        self._keys = np.zeros((worlds, 2), np.int64)
         # A row has room for one cell more, which `list_chosen` may write over and over.
         self._fired = Fired(np.zeros(worlds, np.int64), np.zeros((worlds, most + 1), int))
-        # Of hardware in units: the floor of each world, and what it has fired last.
-        self._floors: list[RandomFloor | None] = [None] * worlds
+        # What hardware in units has fired last in each world.
         self._last: list[Cells] = [_NOTHING] * worlds
 
     def begin(self, world: int, floor: np.random.SeedSequence) -> None:
         """Begin the episode of a world with the seed of its floors."""
-        number = self._conditions.floor_seed
-        if not self._is_free:
-            self._floors[world] = RandomFloor(floor, number, self._size)
-            self._last[world] = _NOTHING
-            return
-        seed_stream(self._streams, world, floor_seed(floor, number))
-        self._drawn[world] = -1
+        self._keys[world] = floor_key(floor, self._conditions.floor_seed)
+        self._last[world] = _NOTHING
 
     def fired(self, scores: NDArray[np.float32], live: Mask, keyframes: Integers) -> Fired:
         """The cells that fire by `scores` (W, E, A), finite numbers, in the worlds that are `live`
-        (W,), at their `keyframes` (W,), each later than the last one asked for; none in the others.
+        (W,), at their `keyframes` (W,); none in the others.
 
         The tables of free cells are the same at every call, and hold its cells till the next.
         """
         if not self._is_free:
             return Fired.of(self._in_units(scores, live, keyframes))
         flat = scores.reshape(len(scores), self._size)
-        floor = self._conditions.floor, self._streams, self._drawn, self._floor
-        _fire(flat, live, keyframes, self._budgets, *floor, self._fired)
+        has_floor = self._conditions.floor
+        _fire(flat, live, keyframes, self._budgets, has_floor, self._keys, self._fired)
         return self._fired
 
     def _in_units(
@@ -81,9 +64,9 @@ class Choice:
     ) -> Sequence[Cells]:
         rows = [_NOTHING] * len(live)
         for world in np.flatnonzero(live).tolist():
-            own = self._floors[world]
-            assert own is not None
-            floor = partial(own.at, int(keyframes[world])) if self._conditions.floor else None
+            first, second = self._keys[world].tolist()
+            own = Floor(first, second, int(keyframes[world]))
+            floor = own if self._conditions.floor else None
             given = scores[world], int(self._budgets[world]), floor, self._last[world]
             rows[world] = self._last[world] = self._rig.hardware.fire(*given)
         return rows
@@ -96,24 +79,17 @@ def _fire(
     keyframes: Integers,
     budgets: Integers,
     has_floor: bool,
-    streams: WordStreams,
-    drawn: Integers,
-    floor: FloorCells,
+    keys: Integers,
     fired: Fired,
 ) -> None:
-    """Fill `fired`; see `Choice.fired`. `drawn` (W,) is the keyframe of the last floor that was
-    drawn in each world, `floor` (N,) room for one.
-    """
+    """Fill `fired`; see `Choice.fired`."""
     chosen = np.empty(scores.shape[1], np.bool_)
     for world in range(len(scores)):
         count, budget = 0, budgets[world]
         if live[world]:
             count = choose_demanded(scores[world], budget, chosen)
-            if has_floor and count < budget:
-                # Unspent ones are drawn as well: no action moves the later ones.
-                for _ in range(drawn[world], keyframes[world]):
-                    draw_floor(streams, world, floor)
-                drawn[world] = keyframes[world]
+            if has_floor:
+                floor = Floor(keys[world, 0], keys[world, 1], keyframes[world])
                 count = top_up(chosen, count, floor, budget)
             list_chosen(chosen, fired.cells[world])
         fired.counts[world] = count

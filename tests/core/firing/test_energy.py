@@ -14,6 +14,7 @@ from care_sim.core.firing.actions import scores_of
 from care_sim.core.firing.base import shots_by_cell
 from care_sim.core.firing.listing import hardware_of
 from care_sim.core.grid import AngularGrid
+from tests.helpers.floors import FLOOR, drawn_floors, floor_order
 
 GRID = AngularGrid(columns=6, rows=3)
 NOTHING = np.empty(0, np.int64)
@@ -21,12 +22,11 @@ scored = arrays(
     np.float32, GRID.shape, elements=st.sampled_from([-1.0, 0.0, 0.1, 0.2, 0.25, 0.5, 0.75, 1.0])
 )
 budgets = st.integers(0, GRID.size)
-floors = st.none() | st.permutations(range(GRID.size)).map(np.array)
+floors = st.none() | drawn_floors
 
 
 def fire(name, scores, budget, floor=None):
-    draw = None if floor is None else lambda: floor
-    return hardware_of(name, GRID).fire(scores, budget, draw, NOTHING)
+    return hardware_of(name, GRID).fire(scores, budget, floor, NOTHING)
 
 
 def shots(name, scores, budget, floor=None):
@@ -71,8 +71,9 @@ def test_every_shot_goes_to_the_highest_score_per_shot(action, budget, most):
 
 
 def test_the_floor_comes_after_the_last_shot_of_the_last_demanded_cell():
-    floor = np.arange(GRID.size)
-    assert shots("energy:3", scores(c1=1, c4=0.1), 8, floor) == {1: 3, 4: 3, 0: 1, 2: 1}
+    free = [cell for cell in floor_order(FLOOR, GRID.size).tolist() if cell not in (1, 4)]
+    expected = {1: 3, 4: 3, free[0]: 1, free[1]: 1}
+    assert shots("energy:3", scores(c1=1, c4=0.1), 8, FLOOR) == expected
 
 
 @given(

@@ -1,67 +1,96 @@
-"""The random floor is NumPy's, to the last cell."""
+"""The random floor: words of Philox, uniform cells, the same order for every reader."""
+
+from collections import Counter
+from itertools import permutations
 
 import numpy as np
-from hypothesis import given, settings
+import pytest
+from hypothesis import example, given
 from hypothesis import strategies as st
 
-from care_sim.core.firing.floor import RandomFloor, refill, seed_stream, word_streams
+from care_sim.core.firing.base import top_up
+from care_sim.core.firing.floor import Floor, draw_cells, floor_key
+from tests.helpers.floors import drawn_cells, drawn_floors, floor_order, philox
+
+LIKELY = 4.0
+"""Chi-square goes beyond so many standard deviations once in thousands of draws."""
 
 
-@given(st.integers(0, 2**128 - 1), st.integers(1, 60))
-def test_the_numbers_are_those_of_numpy(seed, times):
-    streams = word_streams(1)
-    seed_stream(streams, 0, np.random.SeedSequence(seed))
-    wanted = np.random.PCG64(np.random.SeedSequence(seed))
-    for _ in range(times):
-        refill(streams, 0)
-        assert np.array_equal(streams.numbers[0], wanted.random_raw(streams.numbers.shape[1]))
+@pytest.mark.parametrize(
+    ("counter", "key", "words"),
+    [
+        ((0,) * 4, (0,) * 2, "6627e8d5 e169c58d bc57ac4c 9b00dbd8"),
+        ((2**32 - 1,) * 4, (2**32 - 1,) * 2, "408f276d 41c83b0e a20bc7c6 6d5451fd"),
+        (
+            (0x243F6A88, 0x85A308D3, 0x13198A2E, 0x03707344),
+            (0xA4093822, 0x299F31D0),
+            "d16cfe09 94fdcceb 5001e420 24126ea1",
+        ),
+    ],
+)
+def test_the_reference_gives_the_known_answers_of_philox(counter, key, words):
+    """`kat_vectors` of Random123, the library of the paper's authors."""
+    assert " ".join(f"{int(word):08x}" for word in philox(counter, key)) == words
 
 
-@given(st.lists(st.integers(0, 2), max_size=8))
-def test_worlds_do_not_disturb_each_other(order):
-    streams = word_streams(3)
-    wanted = [np.random.PCG64(np.random.SeedSequence(seed)) for seed in range(3)]
-    for world in range(3):
-        seed_stream(streams, world, np.random.SeedSequence(world))
-    for world in order:
-        refill(streams, world)
-        numbers = wanted[world].random_raw(streams.numbers.shape[1])
-        assert np.array_equal(streams.numbers[world], numbers)
+@given(
+    drawn_floors,
+    st.integers(1, 70) | st.sampled_from([16384, 2**16 + 1, 262144, 2**24, 3 * 2**29]),
+    st.integers(1, 5),
+)
+def test_cells_are_those_of_the_reference(floor, size, batches):
+    found = np.concatenate([draw_cells(floor, batch, size) for batch in range(batches)])
+    assert found.tolist() == drawn_cells(floor, size, batches).tolist()
 
 
-def of_numpy(seed, number, cells, count):
-    """The floors as NumPy draws them, from the seed itself or from one of its children."""
-    own = seed.spawn(number)[-1] if number else seed
-    rng = np.random.default_rng(own)
-    return [rng.permutation(cells).tolist() for _ in range(count)]
+@given(drawn_floors, st.sets(st.integers(0, 399)), st.integers(0, 400))
+@example(Floor(1, 2, 3), {5, 6}, 400)
+def test_a_reader_takes_the_first_free_cells_of_the_order(floor, demanded, budget):
+    """Of so many cells that a whole order takes many batches."""
+    order = floor_order(floor, 400).tolist()
+    assert sorted(order) == [*range(400)]
+    chosen = np.isin(np.arange(400), [*demanded])
+    count = top_up(chosen, len(demanded), floor, budget)
+    free = [cell for cell in order if cell not in demanded]
+    expected = demanded.union(free[: max(0, budget - len(demanded))])
+    assert set(np.flatnonzero(chosen).tolist()) == expected
+    assert count == len(expected)
 
 
-@settings(deadline=None)
-@given(st.integers(0, 2**64), st.integers(0, 3), st.integers(1, 70), st.integers(1, 5))
-def test_floors_of_few_cells_are_those_of_numpy(seed, number, cells, count):
-    """So few that every size of the mask, and its edges, are met."""
-    floor = RandomFloor(np.random.SeedSequence(seed), number, cells)
-    ours = [floor.at(keyframe).tolist() for keyframe in range(count)]
-    assert ours == of_numpy(np.random.SeedSequence(seed), number, cells, count)
+def deviation(counts, kinds):
+    """By how many standard deviations the chi-square of counts exceeds that of equal chances."""
+    expected = sum(counts.values()) / kinds
+    squares = sum((count - expected) ** 2 / expected for count in counts.values())
+    squares += expected * (kinds - len(counts))
+    return (squares - (kinds - 1)) / np.sqrt(2 * (kinds - 1))
 
 
-@settings(deadline=None, max_examples=30)
-@given(st.integers(0, 2**64), st.sampled_from([4095, 4096, 4097, 16384, 20000, 65536]))
-def test_floors_of_whole_grids_are_those_of_numpy(seed, cells):
-    """Each takes several draws of the generator, and begins with what the one before left over."""
-    floor = RandomFloor(np.random.SeedSequence(seed), 0, cells)
-    ours = [floor.at(keyframe).tolist() for keyframe in range(3)]
-    assert ours == of_numpy(np.random.SeedSequence(seed), 0, cells, 3)
+def test_every_order_of_four_cells_is_equally_frequent():
+    """Over keyframes, and over the first and the second word of the key."""
+    kinds = len([*permutations(range(4))])
+    for turn in range(3):
+        floors = (Floor(*np.roll([number, 5, 6], turn).tolist()) for number in range(960))
+        counts = Counter(tuple(floor_order(floor, 4).tolist()) for floor in floors)
+        assert abs(deviation(counts, kinds)) < LIKELY
 
 
-def test_a_floor_of_more_cells_than_16_bits_count_is_that_of_numpy():
-    floor = RandomFloor(np.random.SeedSequence(3), 0, 2**16 + 1)
-    (wanted,) = of_numpy(np.random.SeedSequence(3), 0, 2**16 + 1, 1)
-    assert floor.at(0).tolist() == wanted
+def test_every_cell_of_a_grid_is_equally_frequent():
+    cells = np.concatenate([draw_cells(Floor(7, 8, k), 0, 16384) for k in range(1280)])
+    counts = Counter(cells.tolist())
+    assert len(cells) == 10 * 16384
+    assert abs(deviation(counts, 16384)) < LIKELY
 
 
-def test_a_floor_that_nobody_asked_for_is_drawn_all_the_same():
-    every, late = (RandomFloor(np.random.SeedSequence(5), 1, 100) for _ in range(2))
-    floors = [every.at(keyframe).tolist() for keyframe in range(4)]
-    assert late.at(3).tolist() == floors[3]
-    assert late.at(3).tolist() == floors[3]
+def test_no_cell_is_drawn_more_often_because_the_words_do_not_divide():
+    """Of 2^32 words each third cell of so many would have 2, and the others 3."""
+    cells = np.concatenate([draw_cells(Floor(7, 8, k), 0, 3 * 2**29) for k in range(40)])
+    assert abs(deviation(Counter((cells % 3).tolist()), 3)) < LIKELY
+
+
+@given(st.integers(0, 2**64), st.integers(1, 4))
+def test_number_0_is_the_floor_of_the_seed_and_others_those_of_its_children(entropy, number):
+    seed = np.random.SeedSequence(entropy, spawn_key=(2,))
+    assert [*floor_key(seed, 0)] == seed.generate_state(2).tolist()
+    own = floor_key(seed, number)
+    assert seed.n_children_spawned == 0
+    assert [*own] == seed.spawn(number)[-1].generate_state(2).tolist()

@@ -11,6 +11,7 @@ from care_sim.core.firing.actions import scores_of
 from care_sim.core.firing.base import demanded, ranked
 from care_sim.core.firing.listing import hardware_of, settled
 from care_sim.core.grid import AngularGrid
+from tests.helpers.floors import drawn_floors, floor_order
 
 GRID = AngularGrid(columns=12, rows=6)
 NOTHING = np.empty(0, np.int64)
@@ -30,7 +31,6 @@ ALL = (
 )
 BLOCKS = tuple(name for name in ALL if "window" not in name and "energy" not in name)
 demands = st.lists(st.integers(0, GRID.size - 1), unique=True).map(lambda c: np.array(c, np.int64))
-floors = st.permutations(range(GRID.size)).map(np.array)
 shares = st.integers(0, 12).map(lambda twelfths: twelfths / 12)
 
 
@@ -42,9 +42,8 @@ def at(*places, grid=GRID):
 def fired(name, demand, units, floor=None, last=NOTHING, grid=GRID):
     """What the hardware fires of cells in their order, with a budget of so many units."""
     hardware = hardware_of(name, grid)
-    draw = None if floor is None else lambda: floor
     return hardware.fire(
-        scores_of(demand, grid.shape), units * hardware.unit_cells, draw, last
+        scores_of(demand, grid.shape), units * hardware.unit_cells, floor, last
     ).tolist()
 
 
@@ -56,15 +55,15 @@ def rows_of(cells, grid=GRID):
     return sorted({cell // grid.columns for cell in cells})
 
 
-@given(name=st.sampled_from(ALL), demand=demands, floor=floors, share=shares, last=demands)
+@given(name=st.sampled_from(ALL), demand=demands, floor=drawn_floors, share=shares, last=demands)
 def test_it_fires_whole_units_ascending_and_never_above_its_budget(
     name, demand, floor, share, last
 ):
     hardware = hardware_of(name, GRID)
     units = round(share * hardware.units)
     before = fired(name, last, units)
-    for draw in (None, floor):
-        cells = fired(name, demand, units, draw, np.array(before, np.int64))
+    for spent in (None, floor):
+        cells = fired(name, demand, units, spent, np.array(before, np.int64))
         assert cells == sorted(cells)
         shots = np.bincount(np.array(cells, np.int64), minlength=GRID.size)
         assert shots.max() <= hardware.most_shots
@@ -75,20 +74,21 @@ def test_it_fires_whole_units_ascending_and_never_above_its_budget(
     assert len(cells) == units * hardware.unit_cells
 
 
-@given(demand=demands, floor=st.none() | floors, budget=st.integers(0, GRID.size))
+@given(demand=demands, floor=st.none() | drawn_floors, budget=st.integers(0, GRID.size))
 def test_a_unit_of_one_cell_is_a_free_cell(demand, floor, budget):
     free = fired("cells", demand, budget, floor)
     assert fired("tiles:1x1", demand, budget, floor) == free
     assert fired("segments:1", demand, budget, floor) == free
 
 
-@given(name=st.sampled_from(BLOCKS), demand=demands, floor=floors, share=shares)
+@given(name=st.sampled_from(BLOCKS), demand=demands, floor=drawn_floors, share=shares)
 def test_units_are_taken_in_the_order_of_the_demand_and_then_of_the_floor(
     name, demand, floor, share
 ):
     hardware = hardware_of(name, GRID)
     units = round(share * hardware.units)
-    order = [*dict.fromkeys(hardware.unit_of[np.concatenate([demand, floor])].tolist())]
+    cells = np.concatenate([demand, floor_order(floor, GRID.size)])
+    order = [*dict.fromkeys(hardware.unit_of[cells].tolist())]
     found = hardware.unit_of[fired(name, demand, units, floor)]
     assert {*found.tolist()} == {*order[:units]}
 

@@ -1,13 +1,11 @@
 """What all worlds fire is what each fires alone, with any hardware."""
 
-from functools import partial
-
 import numpy as np
 from hypothesis import example, given
 from hypothesis import strategies as st
 
 from care_sim.core.conditions import ClosedLoopConditions
-from care_sim.core.firing.floor import RandomFloor
+from care_sim.core.firing.floor import Floor, floor_key
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
 from care_sim.loops.stages.choice import Choice
@@ -49,22 +47,28 @@ def at(*cells):
 STANDING = [([at(0), at(16), at(32)], [True] * 3), ([at()] * 3, [True] * 3)]
 
 
+# The floor of a later keyframe, of free cells and of whole units.
+UNASKED = [([at()] * 3, [True, False, True])] * 3
+
+
 @example(STANDING, [16] * 3, False, 0, "vertical-window")
+@example(UNASKED, [5, 8, 9], True, 1, "cells")
+@example(UNASKED, [16] * 3, True, 0, "rows")
 @given(keyframes, budgets, st.booleans(), st.integers(0, 2), HARDWARE)
 def test_every_world_fires_as_if_alone(played, budgets, floor, floor_seed, firing):
     rig = Rig(GRID, firing=firing)
     conditions = ClosedLoopConditions(floor=floor, floor_seed=floor_seed)
     choice = Choice(rig, conditions, np.array(budgets))
-    floors, last = [], [NOTHING] * WORLDS
+    keys, last = [], [NOTHING] * WORLDS
     for world in range(WORLDS):
         choice.begin(world, np.random.SeedSequence(world))
-        floors.append(RandomFloor(np.random.SeedSequence(world), floor_seed, GRID.size))
+        keys.append(floor_key(np.random.SeedSequence(world), floor_seed))
     now = np.zeros(WORLDS, np.int64)
     for given_scores, live in played:
         action = np.array(given_scores, np.float32).reshape(WORLDS, *GRID.shape)
         alone = [[]] * WORLDS
         for world in np.flatnonzero(live).tolist():
-            drawn = partial(floors[world].at, now[world]) if floor else None
+            drawn = Floor(*keys[world], now[world]) if floor else None
             given_ones = action[world], budgets[world], drawn, last[world]
             last[world] = rig.hardware.fire(*given_ones)
             alone[world] = last[world].tolist()
