@@ -17,11 +17,10 @@ Every folder holds the rows of one study, its tables, and `config.json`: the com
 configurations, seeds, versions, a hash of the code, the machine. `care-sim report FOLDER` makes all
 tables and figures again. [How to read the rows](../../docs/rows.md).
 
-Beside them lie `leaderboard`, the result files of the [benchmark](../benchmark.md)
-(`care-sim benchmark --policy NAME`; three with `--cell-order core-spread`), `b90`, those of
-[B90](../b90.md) (`care-sim benchmark --score b90 --policy NAME`), `judge-streets` and
-`judge-logs`, what `care-sim judge` says of [detectors](../detectors.md), and `bench.json` and
-`parity.json`, of `make bench` and `make parity`.
+Beside them lie `b90`, the result files of the [benchmark](../b90.md)
+(`care-sim benchmark --policy NAME`), `judge-streets` and `judge-logs`, what `care-sim judge` says
+of [detectors](../detectors.md), and `bench.json` and `parity.json`, of `make bench` and `make
+parity`.
 
 The column *version* names the version of CARE-Sim that played the rows. Version 0.3.0 draws another
 random floor, so rows of earlier versions differ from what their commands play today. `make publish`

@@ -35,6 +35,10 @@ SPLITS = {
     "validation": range(VALIDATION, TRAINING),
     "train": range(TRAINING, LAST),
 }
+FRESH = range(2**31, 2**32)
+"""`care-sim benchmark --fresh N` draws from it: nothing is learned, chosen or published by it."""
+SEALED_FROM = 2**32
+"""Seeds that a secret salt draws lie from here on."""
 
 
 def split_of(seeds: Iterable[int]) -> str:

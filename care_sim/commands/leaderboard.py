@@ -1,224 +1,143 @@
-"""`care-sim leaderboard`: results of the benchmark in one table, or a tenth of them again."""
+"""`care-sim leaderboard`: results of the benchmark in a table, or a tenth of them again."""
 
-import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from pathlib import Path
 from random import SystemRandom
 from tempfile import TemporaryDirectory
 
-from care_sim.base.checks import check_known
 from care_sim.base.errors import (
     InvalidInput,
     MissingExtra,
     counted,
+    percent,
     print_lines,
     report_problems,
-    unknown,
 )
-from care_sim.base.files import check_output, json_content, told_if_replaced, write_text
+from care_sim.base.files import check_output, told_if_replaced, write_text
 from care_sim.base.interrupts import DONE, FAILED
 from care_sim.commands.options.results import Leaderboard
 from care_sim.commands.shared.console import TableConsole
 from care_sim.policies.isolation import isolated_policies
-from care_sim.reports.figures.leaderboard import (
-    LEADERBOARD_FIGURE,
-    leaderboard_figure,
-    score_chart,
-)
-from care_sim.reports.figures.styles import FORMATS, check_figure, save, stem_of
-from care_sim.reports.leaderboard import CONTROL, leaderboard_table, leads_table, names_in
-from care_sim.study.benchmark.play import Player, player_in, replayed, screened_worlds
-from care_sim.study.benchmark.result import (
-    BenchmarkResult,
-    elsewhere,
-    is_result,
-    own_code_of,
-    read_result,
-)
-from care_sim.study.benchmark.suite import Salt, World
+from care_sim.reports.budgets import budgets_table
+from care_sim.reports.figures.leaderboard import LEADERBOARD_FIGURE, leaderboard_figure
+from care_sim.reports.figures.styles import check_figure, save
+from care_sim.study.benchmark.budgets import MAIN_DETECTOR, BudgetResult, budget_worlds
+from care_sim.study.benchmark.maker import elsewhere, own_code_of
+from care_sim.study.benchmark.play import player_in
+from care_sim.study.benchmark.replay import replayed
+from care_sim.study.benchmark.result import is_result, read_result, references, with_references
+from care_sim.study.benchmark.suite import STREETS, Salt
 
 _HEAD = (
-    "# Leaderboard\n\nWhat is played and why, and how to enter: the page *Report a result* of the "
-    "documentation. Made by `care-sim leaderboard`.\n"
+    "# Leaderboard\n\nThe page *Submit a score* of the documentation says what is played. Made by "
+    "`care-sim leaderboard`.\n"
 )
-_FIGURE = f"![Scores with their intervals, and their parts]({LEADERBOARD_FIGURE}.svg)\n"
-_TABLES, _TRIALS = Path("runs/leaderboard"), Path("runs/leaderboard-quick")
 
 
 def leaderboard(options: Leaderboard) -> int:
     """Print the table of result files, or verify them."""
-    if options.chart:
-        check_known("ending of a chart", options.chart.suffix, FORMATS)
     found, problems = _read(options.results)
     if options.verify:
         problems += _verified(options, found)
     else:
-        kept, trials = _of_whole(found, options.quick)
-        problems += trials
-        if not kept:
-            raise _all_bad(problems)
-        _show(options, kept)
+        _show(options, _tables(found))
     report_problems(problems)
     return FAILED if problems else DONE
 
 
-def _show(options: Leaderboard, results: Sequence[BenchmarkResult]) -> None:
-    # One table for the published worlds, one for every sealed set.
-    sets: dict[object, list[BenchmarkResult]] = {}
-    for each in results:
-        sets.setdefault((each.sealed, each.worlds), []).append(each)
-    known = names_in(results)
-    # The control may be missing: then nobody's lead is told.
-    if options.minus != CONTROL.name and options.minus not in known:
-        raise unknown("entry", options.minus, known)
-    folder = options.out or (_TRIALS if options.quick else _TABLES)
-    page = folder / f"{LEADERBOARD_FIGURE}.md"
+def _tables(found: dict[Path, BudgetResult]) -> list[list[BudgetResult]]:
+    """Return the results, a list per set of worlds and detector, with the published entries."""
+    if not found:
+        streets = [(STREETS, seed) for seed in budget_worlds()[STREETS]]
+        return [references(MAIN_DETECTOR, streets)]
+    sets: dict[object, list[BudgetResult]] = {}
+    for each in found.values():
+        sets.setdefault((each.detector, each.sealed, each.worlds), []).append(each)
+    return [with_references(own) for own in sets.values()]
+
+
+def _show(options: Leaderboard, sets: Sequence[Sequence[BudgetResult]]) -> None:
+    names = [f"{LEADERBOARD_FIGURE}-{n}" if n else LEADERBOARD_FIGURE for n in range(len(sets))]
+    page = options.out / f"{LEADERBOARD_FIGURE}.md"
     check_output(page)
-    check_figure(folder / LEADERBOARD_FIGURE)
+    for name in names:
+        check_figure(options.out / name)
     told = told_if_replaced(page)
-    first = next(iter(sets.values()))
-    if options.chart:
-        check_figure(stem_of(options.chart))
-        save(score_chart(first), stem_of(options.chart))
-    save(leaderboard_figure(first), folder / LEADERBOARD_FIGURE)
-    tables = [leaderboard_table(own, options.minus) for own in sets.values()]
-    by_part = [leads_table(own, options.minus) for own in sets.values()]
-    shown = [*tables, *(table for table in by_part if table)]
-    write_text(page, "\n".join([_HEAD, *(table.markdown() for table in shown), _FIGURE]))
-    for table in tables:
+    blocks = [_HEAD]
+    for name, own in zip(names, sets, strict=True):
+        save(leaderboard_figure(own), options.out / name)
+        table = budgets_table(own)
         TableConsole().print(table.rich())
-    # Sealed results have a control of their own, which nobody has published.
-    if options.minus == CONTROL.name and any(
-        options.minus not in names_in(own) for own in sets.values() if own[0].sealed is None
-    ):
-        print(
-            f"no {options.minus} among these files: add a folder with its result for leads",
-            file=sys.stderr,
-        )
-    print_lines(f"Page: {told}", *([f"Chart: {options.chart}"] if options.chart else []))
+        blocks += [table.markdown(), f"![B90 with intervals]({name}.svg)\n"]
+    write_text(page, "\n".join(blocks))
+    print_lines(f"Page: {told}")
 
 
 @isolated_policies()
-def _verified(options: Leaderboard, results: dict[Path, BenchmarkResult]) -> list[str]:
+def _verified(options: Leaderboard, results: dict[Path, BudgetResult]) -> list[str]:
     """Print how each result holds; a line for each that does not, or cannot be played."""
     salt = Salt.read(options.sealed) if options.sealed else None
-    worlds: list[World] = []
-    if salt and any(result.sealed == salt.digest for result in results.values()):
-        # Which worlds count is worked out again, once for all results.
-        with _player(options) as player:
-            worlds = screened_worlds(player, salt)
     problems = []
     for path, result in results.items():
         try:
-            with _player(options) as player:
-                replay = replayed(result, player, SystemRandom(), salt, worlds)
+            # A journal that lasts would answer with what was played before.
+            with (
+                TemporaryDirectory(prefix="care-sim-") as folder,
+                player_in(Path(folder), options.workers) as player,
+            ):
+                replay = replayed(result, player, SystemRandom(), salt)
         except (InvalidInput, MissingExtra) as error:
             problems.append(f"{path} cannot be verified: {error}")
             continue
-        drawn = f"{counted(replay.played, 'episode')} of {len(result.rows)}, drawn by lot,"
-        made = elsewhere(result)
-        if replay.holds:
-            print_lines(f"{path}: {drawn} came out again as the file says")
-        if replay.detours:
+        made = elsewhere(result.entry, result.made_by)
+        maker = f"; played {made}" if made else ""
+        worlds = f"{counted(replay.played, 'world')} of {len(result.rows)}, drawn by lot,"
+        moved = f"sums move by up to {percent(round(replay.moved, 3))}"
+        if not replay.false:
             print_lines(
-                f"{path}: of {drawn} {replay.detours} reached as much with another hash; "
-                f"played {made}"
+                f"{path}: {worlds} "
+                + (f"differ in {len(replay.differing)}: {moved}" if replay.differing else "agree")
+                + maker
             )
-        differing = [
-            f"of {drawn} {len(replay.differing)} did not go as it says, the first world "
-            f"{row.world} of the {row.part} with the {row.camera} camera"
-            f"{f'; played {made}' if made else ''}"
-            for row in replay.differing[:1]
-        ]
-        told = [*replay.false, *differing, *map(str, replay.failures[:1])]
-        problems += [f"{path}: {problem}" for problem in told]
+        problems += [f"{path}: {line} ({moved}){maker}" for line in replay.false]
     return problems
 
 
-@contextmanager
-def _player(options: Leaderboard) -> Iterator[Player]:
-    # A journal that lasts would answer with what was played before.
-    with (
-        TemporaryDirectory(prefix="care-sim-") as folder,
-        player_in(Path(folder), options.workers) as player,
-    ):
-        yield player
+def _read(places: Sequence[Path]) -> tuple[dict[Path, BudgetResult], list[str]]:
+    """Return the results by file, and a line for every file that is left out.
 
-
-def _read(places: Sequence[Path]) -> tuple[dict[Path, BenchmarkResult], list[str]]:
-    """The results by file, and a line for every file that is left out.
-
-    Raises InvalidInput where there is none.
+    Raises InvalidInput where places hold no result.
     """
-    if not places:
-        raise InvalidInput("name a folder with results of care-sim benchmark, or several")
-    found: dict[Path, BenchmarkResult] = {}
+    found: dict[Path, BudgetResult] = {}
+    first: dict[object, Path] = {}
     problems = []
     for path in _files(places):
         try:
-            found[path] = read_result(path)
+            result = read_result(path)
         except InvalidInput as error:
             problems.append(f"left out: {error}")
-    if not found:
-        none = (
-            f"no result of care-sim benchmark in {', '.join(map(str, places))}: play one with "
-            "care-sim benchmark --policy NAME"
+            continue
+        # Two people may call theirs mine:Mine; one policy has the same code and files.
+        key = (
+            *(result.detector, result.sealed, result.worlds),
+            *(result.entry.full_name, own_code_of(result.made_by)),
         )
-        raise _all_bad(problems or [none])
+        if key in first:
+            problems.append(f"left out: {path}, since {first[key]} has its name and its code")
+        else:
+            first[key] = path
+            found[path] = result
+    if places and not found:
+        report_problems(problems[:-1])
+        none = f"no result of care-sim benchmark in {', '.join(map(str, places))}"
+        raise InvalidInput((problems or [none])[-1])
     return found, problems
 
 
-def _all_bad(problems: Sequence[str]) -> InvalidInput:
-    """The error where no file is of use: the last complaint, once all others are printed."""
-    report_problems(problems[:-1])
-    return InvalidInput(problems[-1])
-
-
 def _files(places: Sequence[Path]) -> Iterator[Path]:
-    """The result files of the folders, and the files that are named."""
+    """Yield the files that are named, and the result files of the folders."""
     for place in places:
-        if not place.is_dir():
+        if place.is_dir():
+            yield from filter(is_result, sorted(place.glob("*.json")))
+        else:
             yield place
-            continue
-        for path in sorted(place.glob("*.json")):
-            try:
-                mine = is_result(json_content(path))
-            # A damaged file may have been a result, and is named as one that cannot be read.
-            except (OSError, ValueError):
-                mine = True
-            if mine:
-                yield path
-
-
-def _of_whole(
-    found: dict[Path, BenchmarkResult], quick: bool
-) -> tuple[list[BenchmarkResult], list[str]]:
-    """Return the results that belong in tables, each entry once, and a line for each of the
-    others.
-    """
-    kept: dict[tuple[object, ...], tuple[Path, BenchmarkResult]] = {}
-    first_of: dict[str | None, tuple[Path, BenchmarkResult]] = {}
-    problems = []
-    for path, result in found.items():
-        if result.quick and not quick:
-            problems.append(
-                f"left out: {path} is of --quick, a tenth of the worlds: play the whole, or "
-                "compare tenths with care-sim leaderboard --quick"
-            )
-            continue
-        first, other = first_of.setdefault(result.sealed, (path, result))
-        if result.sealed and result.worlds != other.worlds:
-            problems.append(
-                f"{path} has a table of its own: its worlds are not those of {first}, which names "
-                "the same salt; verify both with it"
-            )
-        # Two people may call theirs mine:Mine; of one policy, code and files are the same.
-        key = result.sealed, result.entry.name, own_code_of(result)
-        if key in kept:
-            # The same policy, whole and as a trial, lies in one folder without harm.
-            if not quick:
-                problems.append(f"left out: {path}, since {kept[key][0]} has its name and its code")
-            continue
-        kept[key] = path, result.cut_to_tenth() if quick else result
-    return [result for _, result in kept.values()], problems

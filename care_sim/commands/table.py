@@ -115,7 +115,7 @@ GROUPS: dict[str, dict[str, Command]] = {
         "benchmark": _own(
             "results:Benchmark",
             "benchmark:benchmark",
-            "Play the official suite: one score, and a result file.",
+            "Play the benchmark: how few cells are enough, a result file.",
         ),
         "leaderboard": _own(
             "results:Leaderboard",

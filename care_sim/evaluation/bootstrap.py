@@ -73,28 +73,16 @@ def ratio_of_sums(group: Sums, *, less: Sums | None = None) -> Interval:
     # few. A scene is drawn as a whole, with its numerator and its denominator, since what happens
     # within one is not independent.
     second = () if less is None else (_group(*less),)
-    return _resampled_ratios((_group(*group), *second), is_difference=True)
-
-
-def mean_of_ratios(groups: Sequence[Sums]) -> Interval:
-    """Mean of the ratios of sums of several groups of scenes, all of one weight, with its interval;
-    scenes are drawn with replacement within each group.
-
-    With differences as numerators it is the mean difference of two policies, paired by scene.
-    Raises InvalidInput for no group, and as `ratio_of_sums` does.
-    """
-    if not groups:
-        raise InvalidInput("a mean of ratios must be of at least one group")
-    return _resampled_ratios(tuple(_group(*sums) for sums in groups), is_difference=False)
+    return _resampled_ratios((_group(*group), *second))
 
 
 @lru_cache(maxsize=10_000)
-def _resampled_ratios(groups: tuple[_Group, ...], is_difference: bool) -> Interval:
-    """The interval of the first group's ratio less those of the others, or of the mean of all."""
+def _resampled_ratios(groups: tuple[_Group, ...]) -> Interval:
+    """Return the first group's ratio minus those of the others, with its interval."""
     sums = [(np.array(numerators), np.array(denominators)) for numerators, denominators in groups]
 
     def combined(ratios: Sequence[Floats]) -> Floats:
-        return ratios[0] - sum(ratios[1:]) if is_difference else np.mean(ratios, axis=0)
+        return ratios[0] - sum(ratios[1:])
 
     value = float(combined([a.sum() / b.sum() for a, b in sums]))
     # Where all scenes of a group have one ratio, every resample of it has that ratio, too.

@@ -96,10 +96,12 @@ def reaching(counts: Counts) -> Floats:
     return budgets
 
 
-def smallest_budget(counts: Counts) -> SmallestBudget:
-    """Return B90 of an entry. A count of which the full scan has none needs no cell."""
+def smallest_budget(counts: Counts, draws: Floats | None = None) -> SmallestBudget:
+    """Return B90 of an entry; `draws` are its `resampled_budgets`, where they are at hand. A count
+    of which the full scan has none needs no cell.
+    """
     each = reaching(counts)
-    low, high = _interval(_resampled(counts))
+    low, high = _interval(resampled_budgets(counts) if draws is None else draws)
     return SmallestBudget(float(each.max()), low, high, names_of(counts)[int(each.argmax())])
 
 
@@ -114,8 +116,12 @@ def budget_ratio(ours: Counts, theirs: Counts) -> tuple[float, float, float]:
     if sizes[0] != sizes[1]:
         raise InvalidInput("a ratio of smallest budgets must be of the same worlds")
     ratio = _divided(reaching(ours).max(keepdims=True), reaching(theirs).max(keepdims=True))
-    low, high = _interval(_divided(_resampled(ours), _resampled(theirs)))
-    return float(ratio[0]), low, high
+    return float(ratio[0]), *ratio_interval(resampled_budgets(ours), resampled_budgets(theirs))
+
+
+def ratio_interval(ours: Floats, theirs: Floats) -> tuple[float, float]:
+    """Return the interval of the ratio of two `resampled_budgets` of the same worlds."""
+    return _interval(_divided(ours, theirs))
 
 
 def _divided(ours: Floats, theirs: Floats) -> Floats:
@@ -131,7 +137,7 @@ def _interval(values: Floats) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def _resampled(counts: Counts) -> Floats:
+def resampled_budgets(counts: Counts) -> Floats:
     """Return B90 (resamples,) of every draw of worlds."""
     weights = [_drawn(part, len(each.full)) for part, each in enumerate(counts)]
     budgets: Floats = _crossings(_margins(counts, weights)).max(axis=-1)

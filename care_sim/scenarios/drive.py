@@ -20,10 +20,10 @@ from care_sim.sensors.surround import SURROUND_CAMERAS
 from care_sim.streets.draft import footprints_meet
 from care_sim.streets.drive import SAMPLE_S, TURN_CHANCE, Drive, draw_drive
 from care_sim.streets.drivers import DrivenLane
-from care_sim.streets.encounters import AT_KERB, COMERS, Course, Wanted
+from care_sim.streets.encounters import AT_KERB, COMERS, Course, Encounter, Wanted
 from care_sim.streets.layouts import LANE_WIDTH_M, SPEED_LIMIT_MPS
 from care_sim.world.bodies import CATALOGUE
-from care_sim.world.lane_flow import FlowingLane, LaneFlow, StreetTraffic
+from care_sim.world.lane_flow import Crossing, FlowingLane, LaneFlow, StreetTraffic
 from care_sim.world.motions import Crosser, Meeting, Walk
 from care_sim.world.route import SpeedPlan
 from care_sim.world.traffic import Traffic
@@ -33,9 +33,6 @@ CLEAR_M = 0.5
 """Who sets off expects to keep at least this much from other traffic."""
 LOOK_AHEAD_STEP_S = 0.1
 """Between two times at which they look whether they will."""
-END_OF_TURN_M = 4.0
-"""The ego has left its lane when its middle is this far into a turn, and is in the next one this
-far before the turn's end."""
 
 
 SIDES = {"left": 1, "right": -1}
@@ -99,12 +96,12 @@ class DriveScenario(Scenario):
 def _flowing(drive: Drive, lane: DrivenLane) -> FlowingLane:
     """A lane with its drivers, and where the ego is in it."""
     flow = LaneFlow(lane.places, lane.speeds)
-    # The ego's own lanes are those along its roads whose middle is its route.
-    for number, stretch in enumerate(drive.stretches):
+    # The ego's own lanes are those along its roads whose middle is its route. While it turns, it is
+    # in both: its tail is in the way of who follows until the turn ends.
+    before = [-np.inf, *(one.to_m for one in drive.stretches[:-1])]
+    after = [*(one.from_m for one in drive.stretches[1:]), np.inf]
+    for stretch, begins, ends in zip(drive.stretches, before, after, strict=True):
         if stretch.road.curve == lane.curve and lane.d == 0.0:
-            begins = -np.inf if number == 0 else stretch.from_m - END_OF_TURN_M
-            last = number == len(drive.stretches) - 1
-            ends = np.inf if last else stretch.to_m + END_OF_TURN_M
             return FlowingLane(flow, lane.poses_at, lane.stop_m, begins, ends, -stretch.offset_m)
     return FlowingLane(flow, lane.poses_at, lane.stop_m)
 
@@ -151,7 +148,7 @@ def _add_vehicles(world: World, drive: Drive, traffic: StreetTraffic) -> None:
 
 
 def _drive_on(traffic: StreetTraffic, world: World) -> None:
-    traffic.step(WORLD_STEP_S, world.along_m, world.ego.speed)
+    traffic.step(WORLD_STEP_S, world.time, world.along_m, world.ego.speed)
 
 
 def _add_encounters(world: World, drive: Drive, traffic: StreetTraffic) -> None:
@@ -161,6 +158,9 @@ def _add_encounters(world: World, drive: Drive, traffic: StreetTraffic) -> None:
     for one in drive.encounters:
         free = _may_go(drive, traffic, CATALOGUE[one.who].size[:2])
         crosser = Crosser(one.walk, one.lead_s, free)
+        for flowing, lane in zip(traffic.lanes, drive.lanes, strict=True):
+            if lane.curve == one.curve:
+                flowing.crossings.append(_crossing(crosser, one, lane))
         actor = world.add(one.who, one.who, crosser.pose)
         world.at_every_step(partial(_look, crosser, drive.plan, one.arrival_m))
         side = "left" if one.side > 0 else "right"
@@ -182,6 +182,14 @@ def _add_encounters(world: World, drive: Drive, traffic: StreetTraffic) -> None:
     hits = [one for one in world.meetings if one.course == Course.CONFLICT]
     if hits:
         world.first_sighting = next(a for a in world.actors if a.body == hits[0].body)
+
+
+def _crossing(crosser: Crosser, one: Encounter, lane: DrivenLane) -> Crossing:
+    """The way of a crosser over a lane of the road that it crosses at a right angle."""
+    # In the lane is whoever reaches into it: not who stops before its edge.
+    to_middle = one.side * (one.from_d - lane.d)
+    reach = (LANE_WIDTH_M + CATALOGUE[one.who].size[0]) / 2
+    return Crossing(crosser, lane.direction * one.s, to_middle - reach, to_middle + reach)
 
 
 def _look(crosser: Crosser, plan: SpeedPlan, line_m: float, world: World) -> None:
@@ -211,7 +219,7 @@ def _may_go(
 def _is_free(
     lanes: Sequence[tuple[FlowingLane, Floats]], size: tuple[float, float], walk: Walk
 ) -> bool:
-    """Whether somebody of a `size` keeps clear of all traffic that drives on evenly."""
+    """Whether somebody of a `size` keeps clear of all traffic, should nobody brake for them."""
     times = np.arange(0.0, walk.duration_to(walk.length_m), LOOK_AHEAD_STEP_S)
     own = np.array([walk.pose(walk.starts_s + time) for time in times.tolist()])
     return not any(_meet(lane, sizes, times, own, size) for lane, sizes in lanes)
@@ -221,7 +229,7 @@ def _meet(
     lane: FlowingLane, sizes: Floats, times: Floats, own: Floats, size: tuple[float, float]
 ) -> bool:
     """Whether vehicles of `sizes` (n, 2) come close to `own` poses (t, 3) at `times` (t,)."""
-    places = lane.flow.places + lane.flow.speeds * times[:, None]
+    places = lane.foreseen(len(times), LOOK_AHEAD_STEP_S)
     poses = lane.poses_at(places.ravel())
     count = len(sizes)
     return bool(

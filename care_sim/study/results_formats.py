@@ -38,7 +38,7 @@ from care_sim.study.rows.schema import (
 )
 from care_sim.study.run_config import Row
 from care_sim.study.runner import PlayBatch
-from care_sim.study.scene_play import SUMS, event_columns, play_scene
+from care_sim.study.scene_play import DECISION_MS, SUMS, event_columns, play_scene
 from care_sim.study.vehicle_play import (
     VEHICLE_COUNTS,
     VEHICLE_LISTS,
@@ -230,7 +230,7 @@ MECHANISM = ResultsFormat(
 )
 RESULTS_FORMATS = (EPISODES, VEHICLE, PLAYS, MECHANISM)
 UNREAD = frozenset(
-    {"keyframes", "wall_s", "peak_rss_mb", "regret_m", "censored"}
+    {"keyframes", "wall_s", "peak_rss_mb", "regret_m", "censored", *DECISION_MS}
     | {field.name for field in fields(DriveOutcome)}
 )
 """Columns that this version writes and no report reads."""

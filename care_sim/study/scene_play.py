@@ -70,6 +70,8 @@ def event_columns(rows: Sequence[Row]) -> dict[str, Any]:
     return {**names, **seen, "detected": delays == 0, "ttfd": delays}
 
 
+DECISION_MS = ("policy_p50_ms", "policy_p99_ms")
+"""Columns of how long the policy took for a keyframe."""
 SUMS = tuple(field.name for field in fields(Tally))
 
 
@@ -88,7 +90,8 @@ class PlayRecord:
     `tracks`, `explained` and `released` are means per keyframe: tracks held, camera detections that
     a forecast explains, and cells of the full hulls that exploitation does not ask for; `released`
     is None of a policy that exploits no set. `expected` are the columns of expected counts, empty
-    for a detector that does not detect by chance. `wall_s` is in seconds.
+    for a detector that does not detect by chance. `decisions_ms` are the milliseconds of every call
+    of the policy, its process included. `wall_s` is in seconds.
     """
 
     score: SceneScore
@@ -97,6 +100,7 @@ class PlayRecord:
     explained: float
     released: float | None
     expected: dict[str, float]
+    decisions_ms: list[float]
     wall_s: float
 
     @property
@@ -129,8 +133,9 @@ class ScenePlayer:
         (`care_sim.evaluation.sightings`); `tracks`, `explained` and `released`;
         `expected/COUNT` of newcomers where the detector detects by chance
         (`care_sim.evaluation.counts`);
-        `differing_keyframes` and `differing_cells` against the reference; `keyframes`,
-        `peak_rss_mb`, and `wall_s` with the share of the film's that falls to one of so many plays.
+        `differing_keyframes` and `differing_cells` against the reference; `keyframes`;
+        `DECISION_MS`; `peak_rss_mb`, and `wall_s` with the share of the film's that falls to one of
+        so many plays.
         """
         record = self._record(config)
         score = record.score
@@ -151,6 +156,7 @@ class ScenePlayer:
             "released": record.released,
             **record.expected,
             **self._difference(config, record),
+            **_decision_columns(record.decisions_ms),
             "wall_s": record.wall_s + self._film_s / sharers,
             "peak_rss_mb": peak_rss_mb(),
         }
@@ -184,6 +190,7 @@ def play_through_film(config: PlayConfig, film: Film) -> PlayRecord:
         loop = env.loop
         chances = Chances.of(config.detector, dict(config.detector_parameters), env.rig)
         counts = []
+        decisions_ms = []
         released = []
         while not loop.over:
             belief = loop.belief
@@ -194,7 +201,10 @@ def play_through_film(config: PlayConfig, film: Film) -> PlayRecord:
                     int(explained(belief.detections, belief.tracks, loop.rig).sum()),
                 )
             )
-            observation, *_ = env.step(policy(observation))
+            asked = time.perf_counter()
+            action = policy(observation)
+            decisions_ms.append(1e3 * (time.perf_counter() - asked))
+            observation, *_ = env.step(action)
             if chances:
                 chances.note(loop)
             if (count := _released(policy, belief)) is not None:
@@ -206,7 +216,13 @@ def play_through_film(config: PlayConfig, film: Film) -> PlayRecord:
     tracks, explanations = np.mean(counts, axis=0).tolist()
     mean_released = float(np.mean(released)) if released else None
     wall_s = time.perf_counter() - started
-    return PlayRecord(score, keyframes, tracks, explanations, mean_released, expected, wall_s)
+    means = tracks, explanations, mean_released
+    return PlayRecord(score, keyframes, *means, expected, decisions_ms, wall_s)
+
+
+def _decision_columns(decisions_ms: Sequence[float]) -> Row:
+    values = np.percentile(decisions_ms, (50, 99)).round(4).tolist()
+    return dict(zip(DECISION_MS, values, strict=True))
 
 
 def _released(policy: Policy, belief: Belief) -> int | None:

@@ -1,21 +1,24 @@
 """The vehicles of one lane, each driven by the intelligent driver model (IDM), all at once. The
 traffic of a street with bends and side streets is a flow per lane, laid along its road.
 
-The model (Treiber, Hennecke and Helbing 2000) and its numbers are those of highway-env's
-`IDMVehicle`, which `care_sim.world.traffic` asks vehicle by vehicle. Where nobody changes lanes the
-motion is the same but for the last bits, and a whole street costs less than one vehicle there. One
-rule is ours: a driver who comes to rest stays there. Those of highway-env roll back at some cm/s.
+The model (Treiber, Hennecke and Helbing 2000), its numbers and its order of operations are those of
+highway-env's `IDMVehicle`, which `care_sim.world.traffic` asks vehicle by vehicle. Where nobody
+changes lanes the motion is the same to the last bit, and a whole street costs less than one vehicle
+there. One rule is ours: a driver who comes to rest stays there. Those of highway-env roll back at
+some cm/s.
 """
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from copy import deepcopy
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats
 from care_sim.core.frames import Pose
+from care_sim.world.motions import Crosser
 
 MOST_MPS2 = 6.0
 GAINING_MPS2 = 3.0
@@ -81,9 +84,26 @@ def _following(free: Floats, places: Floats, speeds: Floats, others: Floats) -> 
             + speeds[n] * TIME_GAP_S
             + closing / (2 * math.sqrt(GAINING_MPS2 * BRAKING_MPS2))
         )
-        wanted = GAINING_MPS2 * (free[n] - (wished / gap) ** 2)
+        wanted = GAINING_MPS2 * free[n] - GAINING_MPS2 * (wished / gap) ** 2
         accelerations[n] = min(max(wanted, -MOST_MPS2), MOST_MPS2)
     return accelerations
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Where a `crosser` crosses a lane: at `place_m` along it. The crosser is in the lane from
+    `from_m` to `to_m` of the crosser's own way. Metres.
+    """
+
+    crosser: Crosser
+    place_m: float
+    from_m: float
+    to_m: float
+
+    def is_taken(self, time: float) -> bool:
+        """Whether the crosser is in the lane at `time`."""
+        walk = self.crosser.walk
+        return bool(self.crosser.went) and self.from_m < walk.covered(time) < self.to_m
 
 
 @dataclass(frozen=True)
@@ -93,6 +113,7 @@ class FlowingLane:
     `poses_at` gives the world poses (n, 3) of places (n,) along the lane. `stop_m` is where its
     drivers give way, inf where they need not. The ego is in the lane while it is between
     `ego_from_m` and `ego_to_m` along its route, and its place is then `ego_ahead_m` farther.
+    Drivers stop before whoever is in one of the `crossings`.
     """
 
     flow: LaneFlow
@@ -101,19 +122,39 @@ class FlowingLane:
     ego_from_m: float = np.inf
     ego_to_m: float = np.inf
     ego_ahead_m: float = 0.0
+    crossings: list[Crossing] = field(default_factory=list)
 
-    def others(self, ego_m: float, ego_speed: float) -> list[tuple[float, float]]:
-        """Place and speed of what is in the lane besides its drivers, for an ego `ego_m` along its
-        route.
+    def others(self, time: float, ego_m: float, ego_speed: float) -> list[tuple[float, float]]:
+        """Place and speed of what is in the lane at `time` besides its drivers, for an ego `ego_m`
+        along its route.
         """
-        found = [(self.stop_m, 0.0)] if np.isfinite(self.stop_m) else []
+        found = self._stop_line()
         if self.ego_from_m <= ego_m < self.ego_to_m:
             found.append((ego_m + self.ego_ahead_m, ego_speed))
+        # Who crosses goes straight across: their speed along the lane is 0.
+        found += [(one.place_m, 0.0) for one in self.crossings if one.is_taken(time)]
         return found
+
+    def foreseen(self, steps: int, dt: float) -> Floats:
+        """(steps, n) places of the drivers from now on, every `dt` seconds, if neither the ego nor
+        anybody who crosses makes them brake.
+        """
+        flow = deepcopy(self.flow)
+        places = np.empty((steps, len(flow.places)))
+        for row in places:
+            row[:] = flow.places
+            flow.step(dt, self._stop_line())
+        return places
+
+    def _stop_line(self) -> list[tuple[float, float]]:
+        """Place and speed of what stands where drivers give way, if they do."""
+        return [(self.stop_m, 0.0)] if np.isfinite(self.stop_m) else []
 
 
 class StreetTraffic:
-    """All lanes of a street. Drivers follow whom they have ahead in their lane, the ego too."""
+    """All lanes of a street. Drivers follow whom they have ahead in their lane, the ego too, and
+    stop before who crosses it.
+    """
 
     def __init__(self, lanes: Sequence[FlowingLane]):
         self.lanes = tuple(lanes)
@@ -124,10 +165,10 @@ class StreetTraffic:
         x, y, heading = self._poses[lane][number]
         return x, y, heading
 
-    def step(self, dt: float, ego_m: float, ego_speed: float) -> None:
-        """Move all by `dt` seconds, with the ego `ego_m` along its route."""
+    def step(self, dt: float, time: float, ego_m: float, ego_speed: float) -> None:
+        """Move all by `dt` seconds, to `time`, with the ego `ego_m` along its route."""
         for lane in self.lanes:
-            lane.flow.step(dt, lane.others(ego_m, ego_speed))
+            lane.flow.step(dt, lane.others(time, ego_m, ego_speed))
         self._poses = self._poses_now()
 
     def _poses_now(self) -> list[list[list[float]]]:

@@ -1,8 +1,11 @@
-"""A folder of one's own with results of the benchmark."""
+"""A folder of one's own, and a benchmark that is small."""
 
 import pytest
 
-from tests.helpers.made_results import made_result
+from care_sim.study.benchmark import budgets, result
+from care_sim.study.benchmark.budgets import REFERENCE_ENTRIES
+from care_sim.study.benchmark.result import publish_references
+from tests.helpers.made_budgets import HALF_WAY, made_budgets
 
 
 @pytest.fixture
@@ -12,9 +15,9 @@ def here(tmp_path, monkeypatch):
 
 
 @pytest.fixture
-def library(here):
-    """What the repository's own policies reached."""
-    folder = here / "results" / "data" / "leaderboard"
-    for policy, share in (("place", 0.5), ("care", 0.7)):
-        made_result(policy, share).write(folder / f"{policy}.json")
-    return folder
+def one_street(monkeypatch, tmp_path):
+    """One street, with one published entry; a trial is the whole."""
+    for name in ("QUICK_STREETS", "STREETS_PLAYED"):
+        monkeypatch.setattr(budgets, name, 1)
+    monkeypatch.setattr(result, "_REFERENCES", tmp_path / "published" / "references.json")
+    publish_references([made_budgets(REFERENCE_ENTRIES[0], HALF_WAY, streets=1)])

@@ -14,8 +14,8 @@ from care_sim.commands.parsing import option_names
 from care_sim.commands.table import COMMANDS, FAMILIES, RENAMED
 from care_sim.core.conditions import DEFAULTS
 from care_sim.perception.detectors import CLUSTER, PILLARS, PROXY
-from care_sim.reports.leaderboard import CONTROL
 from care_sim.sensors.setups import DEFAULT_SETUP
+from care_sim.study.benchmark.budgets import MAIN_DETECTOR
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.run_config import MOST_TASKS
 from tests.helpers.commands import run
@@ -113,7 +113,7 @@ def test_the_defaults_of_options_are_those_of_the_simulator():
     assert all(getattr(usual, name) == value for name, value in given.items())
     assert (shared.SensingOptions.sensor, shared.PlayOptions.detector) == (DEFAULT_SETUP, PROXY)
     assert results.Judge.detectors == (PROXY, CLUSTER, PILLARS)
-    assert CONTROL.name == results.CONTROL
+    assert results.Benchmark.detector == MAIN_DETECTOR
     assert results.ExportMinari.__dataclass_fields__["episodes"].metadata["bounds"][1] == MOST_TASKS
 
 

@@ -58,15 +58,16 @@ report a b --page x.html                  | --page and --minus take one folder
 report a -o x --source streets --episodes 0 | --source has no meaning without --page and --episodes
 report a --minus care -o x.html           | --minus has no meaning with --page
 benchmark --policy care --cell-order best | cell_order
-benchmark --policy care --quick --sealed x | either quick or sealed
+benchmark --policy care --quick --fresh 2 | remove quick and sealed
+benchmark --policy care --fresh 2 --closed-loop | fresh and sealed worlds are streets alone
+benchmark --policy care --sealed x        | give --out a folder that only you read
+benchmark --policy care --detector absent | detector
 benchmark --policy care --sealed none.txt --out s | none.txt holds no salt
 benchmark --policy care place --name Ours | names one entry
 benchmark --policy care --name 'a|b'      | without | <
-leaderboard                               | name a folder
+leaderboard --verify                      | name the results to verify
 leaderboard .                             | no result of care-sim benchmark in .
 leaderboard . --sealed x                  | give verify too
-leaderboard . --verify --minus care       | minus is for a table
-leaderboard . --chart mine.pdf            | unknown ending of a chart '.pdf'; known: .png, .svg
 judge --detectors cluster --against nobody | unknown detector 'nobody'
 judge --least-scores 2                    | least_scores must be from 0 to 1, got 2
 judge --detectors cluster --detector-parameters min_points=3 | DETECTOR.NAME=VALUE of one of cluster, got min_points

@@ -9,7 +9,7 @@ import pytest
 from care_sim.core.types import CLASSES, Detections
 from care_sim.envs.scenarios import ScenarioEnv
 from care_sim.scenarios.base import Scenario
-from care_sim.study.benchmark.suite import reached
+from care_sim.study.rows.reading import is_avoided
 from care_sim.world.traffic import Traffic
 from care_sim.world.world import World
 from tests.helpers.episodes import outcome
@@ -92,7 +92,7 @@ def test_a_stop_for_a_car_that_a_detector_made_up_avoids_nothing():
     stopped = played(Hidden, detector=MADE_UP)
     assert (stopped["braked"], stopped["collision"]) == (True, False)
     assert stopped["braked_before_view"]
-    assert reached("drives", stopped) == 0
+    assert not is_avoided(stopped)
 
 
 @pytest.mark.parametrize("given", [{}, {"detector": SILENT}])
@@ -100,7 +100,7 @@ def test_a_stop_for_what_is_there_is_no_stop_for_nothing(given):
     came_of = played(Hidden, **given)
     assert came_of["braked"] == (not given)
     assert not came_of["braked_before_view"]
-    assert reached("drives", came_of) == (not came_of["collision"])
+    assert is_avoided(came_of) == (not came_of["collision"])
 
 
 def test_a_brake_behind_a_car_is_founded():

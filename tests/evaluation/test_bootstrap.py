@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from care_sim.base.errors import InvalidInput
-from care_sim.evaluation.bootstrap import mean_of_ratios, paired_difference, ratio_of_sums
+from care_sim.evaluation.bootstrap import paired_difference, ratio_of_sums
 
 
 def test_two_differences_have_a_distribution_known_by_hand():
@@ -148,26 +148,3 @@ def test_how_often_the_interval_holds_the_truth(draw, truth, n, least, most):
         _, low, high = paired_difference(draw(rng, n), np.zeros(n))
         held += low - 1e-9 <= truth <= high + 1e-9
     assert least <= held / trials <= most
-
-
-def test_a_mean_of_one_ratio_is_that_ratio():
-    group = ([3.0, 0.0, 2.0, 5.0], [4.0, 1.0, 2.0, 9.0])
-    assert mean_of_ratios([group]) == ratio_of_sums(group)
-
-
-def test_groups_weigh_alike_however_large_they_are():
-    small, large = ([1.0], [2.0]), ([0.0] * 50, [10.0] * 50)
-    assert mean_of_ratios([small, large]) == (0.25, 0.25, 0.25)
-
-
-def test_groups_are_drawn_apart():
-    groups = [([1.0, 0.0] * 5, [1.0] * 10), ([0.0, 1.0] * 5, [1.0] * 10)]
-    apart, once = mean_of_ratios(groups), mean_of_ratios(groups[:1])
-    assert apart.mean == once.mean == 0.5
-    # The spread of a mean of two is that of one over the root of two.
-    assert (apart.high - apart.low) / (once.high - once.low) == pytest.approx(2**-0.5, abs=0.08)
-
-
-def test_a_mean_of_no_ratio_is_refused():
-    with pytest.raises(InvalidInput, match="at least one group"):
-        mean_of_ratios([])

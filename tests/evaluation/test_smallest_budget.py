@@ -115,7 +115,7 @@ def test_intervals_are_those_of_worlds_drawn_one_by_one(monkeypatch):
         rows = np.repeat(np.arange(12), weights.astype(int))
         assert len(rows) == 12
         budgets.append(reaching([PartCounts(part.names, part.got[rows], part.full[rows])]).max())
-    assert module._resampled(counts) == pytest.approx(budgets)
+    assert module.resampled_budgets(counts) == pytest.approx(budgets)
     low, high = np.quantile(budgets, (0.025, 0.975), method="inverted_cdf")
     assert smallest_budget(counts)[1:3] == pytest.approx((low, high))
     module._drawn.cache_clear()

@@ -14,10 +14,8 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from care_sim.reports.leaderboard import leaderboard_table, leads_table
 from care_sim.reports.report import CONFIG, read_results
 from care_sim.reports.table import Table
-from care_sim.study.benchmark.result import read_result
 from care_sim.study.rows.reading import policy_of
 from care_sim.study.run_config import FULL
 from tests.golden.cells import Cell, cells
@@ -47,20 +45,7 @@ def cells_of(folder: str) -> list[Cell]:
 
 
 def tables_of(folder: Path) -> Iterator[Table]:
-    """The tables of a folder: of its rows, with the closing sentences and one policy minus each; of
-    the leaderboard; of training runs.
-    """
-    if folder.name == "leaderboard":
-        results = [read_result(path) for path in sorted(folder.glob("*.json"))]
-        yield leaderboard_table(results)
-        leads = leads_table(results, "place")
-        assert leads is not None
-        yield leads
-    else:
-        yield from _tables_of_rows(folder)
-
-
-def _tables_of_rows(folder: Path) -> Iterator[Table]:
+    """The tables of the rows of a folder, with the closing sentences and one policy minus each."""
     assert (folder / CONFIG).is_file(), f"{folder.name} holds no study: is it new?"
     rows, study, left_out = read_results(folder)
     assert not left_out

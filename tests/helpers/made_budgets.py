@@ -1,8 +1,8 @@
 """Results of B90 made by hand: every count has one curve."""
 
 from care_sim.evaluation.smallest_budget import BUDGETS
-from care_sim.policies import tags_of
-from care_sim.study.benchmark.budgets import COUNTS, BudgetResult, BudgetRow
+from care_sim.policies import BUILT_IN, tags_of
+from care_sim.study.benchmark.budgets import COUNTS, STREETS_PLAYED, BudgetResult, BudgetRow
 from care_sim.study.benchmark.suite import STREETS, Entry
 
 HALF_WAY = (0.1, 0.2, 0.8, 1.0, 1.0, 1.0, 1.0)
@@ -11,11 +11,17 @@ ALWAYS, NEVER = (1.0,) * len(BUDGETS), (0.5,) * len(BUDGETS)
 FULL = 8.0
 
 
-def made_budgets(entry="care", *curves, detector="centerpoint", streets=3, quick=False):
-    """The result of an entry whose four counts have these curves, the last one for all others."""
+def made_budgets(
+    entry="care", *curves, detector="centerpoint", streets=STREETS_PLAYED, first=200, **given
+):
+    """The result of an entry whose four counts have these curves, the last one for all others, on
+    streets from the seed `first` on.
+    """
     entry = entry if isinstance(entry, Entry) else Entry(entry)
     names = COUNTS[STREETS]
     each = [curves[min(n, len(curves) - 1)] for n in range(len(names))]
     got = tuple(tuple(FULL * curve[n] for curve in each) for n in range(len(BUDGETS)))
-    rows = tuple(BudgetRow(STREETS, 200 + n, (FULL,) * len(names), got) for n in range(streets))
-    return BudgetResult(entry, tags_of(entry.policy), detector, rows, quick, {"versions": {}})
+    rows = tuple(BudgetRow(STREETS, first + n, (FULL,) * len(names), got) for n in range(streets))
+    tags = tags_of(entry.policy) if entry.policy in BUILT_IN else ("causal",)
+    told = {"tags": tags, "quick": False, "made_by": {"versions": {}}} | given
+    return BudgetResult(entry, detector=detector, rows=rows, **told)

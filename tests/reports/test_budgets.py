@@ -1,10 +1,13 @@
 """The table and the figure of B90, by results made by hand."""
 
+from dataclasses import replace
+
 import pytest
 
 from care_sim.evaluation.smallest_budget import BUDGETS
 from care_sim.reports.budgets import budgets_table, format_budget
 from care_sim.reports.figures.budgets import budgets_figure
+from care_sim.reports.figures.leaderboard import leaderboard_figure
 from care_sim.study.benchmark.suite import Entry
 from tests.helpers.made_budgets import ALWAYS, HALF_WAY, NEVER, made_budgets
 
@@ -21,7 +24,7 @@ RESULTS = (
 def test_the_smallest_budget_comes_first_with_what_holds_it_back():
     rows = [tuple(map(str, row)) for row in budgets_table(RESULTS).rows]
     assert rows == [
-        # The full scan takes no place.
+        # The full scan takes no rank.
         ("", "full", "≤0.5 [≤0.5, ≤0.5]", "emerging", *["≤0.5"] * 4, "0.20 [0.20, 0.20]"),
         ("1", "care-sector", "2.4 [2.4, 2.4]", "emerging", "2.4", *["≤0.5"] * 3, ""),
         (
@@ -33,8 +36,32 @@ def test_the_smallest_budget_comes_first_with_what_holds_it_back():
             *["≤0.5"] * 3,
             "1.58 [1.58, 1.58]",
         ),
-        ("3", "boxes", "never [never, never]", "emerging", "never", *["≤0.5"] * 3, "never"),
-        ("4", "place", "never [never, never]", "kept", *["≤0.5"] * 2, *["never"] * 2, "never"),
+        # Entries that never get there are tied.
+        ("3-4", "boxes", "never [never, never]", "emerging", "never", *["≤0.5"] * 3, "never"),
+        ("3-4", "place", "never [never, never]", "kept", *["≤0.5"] * 2, *["never"] * 2, "never"),
+    ]
+
+
+def test_entries_whose_paired_ratio_includes_1_share_ranks():
+    """In every second street one is ahead, in the others the other one; both are behind a third."""
+    late = made_budgets("care", (0.1, 0.2, 0.3, 0.8, 1.0, 1.0, 1.0), streets=20)
+    early = made_budgets("boxes", HALF_WAY, streets=20)
+    pairs = list(zip(early.rows, late.rows, strict=True))
+    rows = [tuple(pair[(n + k) % 2] for n, pair in enumerate(pairs)) for k in (0, 1)]
+    tied = [replace(early, rows=rows[0]), replace(late, rows=rows[1])]
+    table = budgets_table([*tied, made_budgets("place", ALWAYS, streets=20)])
+    assert [row[0] for row in table.rows] == ["1", "2-3", "2-3"]
+
+
+def test_times_and_names_tell_entries_apart():
+    slow = made_budgets(
+        "mine:Mine", HALF_WAY, policy_ms=(1.25, 40.0), made_by={"policy_code": "ab"}
+    )
+    table = budgets_table([slow, made_budgets("mine:Mine", ALWAYS)])
+    assert table.columns[-1] == "ms"
+    assert [(row[1], row[-1]) for row in table.rows] == [
+        ("mine:Mine #", ""),
+        ("mine:Mine #ab", "1.2 / 40.0"),
     ]
 
 
@@ -42,7 +69,7 @@ def test_without_the_yardstick_there_are_no_ratios():
     table = budgets_table(RESULTS[:2])
     assert table.columns[-1] == "people kept"
     assert {len(row) for row in table.rows} == {len(table.columns)}
-    assert "3 worlds, centerpoint" in table.title
+    assert "80 worlds, centerpoint" in table.title
 
 
 def test_a_trial_is_named_as_one():
@@ -78,3 +105,14 @@ def test_every_count_has_a_panel_and_every_entry_a_curve():
     one, other = drawn["care-sector"], drawn["care-sector residual=False"]
     assert one.get_color() == other.get_color() != drawn["boxes"].get_color()
     assert one.get_linestyle() != other.get_linestyle()
+
+
+def test_the_figure_of_the_leaderboard_has_a_line_per_entry_and_never_at_its_end():
+    (axes,) = leaderboard_figure(RESULTS).axes
+    names = [label.get_text() for label in axes.get_yticklabels()]
+    assert names == ["place", "boxes", "care-sector residual=False", "care-sector", "full"]
+    emerging, *_ = (dots.get_offsets() for dots in axes.collections)
+    assert [*emerging[:, 0]] == pytest.approx([0.5, 32.0, 3.87, 2.45, 0.5], abs=0.01)
+    assert axes.get_xticklabels()[-1].get_text() == "never"
+    budgets = axes.lines[0].get_xdata()
+    assert [*budgets] == pytest.approx([32.0, 32.0, 3.87, 2.45, 0.5], abs=0.01)

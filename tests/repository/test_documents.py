@@ -21,9 +21,6 @@ from care_sim.core.conditions import DEFAULTS
 from care_sim.core.types import CLASSES, ImageDetections, Tracks
 from care_sim.envs import IDS
 from care_sim.sources.street_films import street_film
-from care_sim.study.benchmark.play import player_in
-from care_sim.study.benchmark.result import read_result
-from care_sim.study.benchmark.suite import PARTS, published_worlds
 from care_sim.study.results_formats import RESULTS_FORMATS
 from care_sim.training.config import PpoConfig
 from care_sim.training.folder import read_table
@@ -172,46 +169,6 @@ def test_other_ways_through_the_network_of_pillars_answer_alike():
 def test_by_the_proxy_the_car_brakes_for_somebody_in_view():
     example = loaded(EXAMPLES / "early_brakes.py")
     assert -1 < example.early_s("CARE-Dartout-v0", "returns", 0) < 0
-
-
-BLIND = re.compile(r"blind_camera\.py results/data/leaderboard/\{([^}]+)\}\.json")
-"""The files of which a page says that they were played with a blind camera."""
-
-
-def test_a_blind_camera_takes_nothing_from_who_asks_none(tmp_path):
-    example = loaded(EXAMPLES / "blind_camera.py")
-    worlds = [next(world for world in published_worlds() if world.part == part) for part in PARTS]
-    told = [read_result(ROOT / f"results/data/leaderboard/{name}.json") for name in ("fan", "care")]
-    with player_in(tmp_path, 2) as player:
-        fan, care = example.blinded(told, worlds, player)
-
-    def hashes(result, camera):
-        kept = [row for row in result.rows if row.camera == camera]
-        return {row.part: row.hash for row in kept if (row.part, row.world) in played}
-
-    played = {(world.part, world.number) for world in worlds}
-    assert set(hashes(fan, "blind")) == set(PARTS)
-    assert hashes(fan, "blind") == hashes(told[0], "ideal")
-    for part, blind in hashes(care, "blind").items():
-        assert blind != hashes(told[1], "ideal")[part], part
-
-    # What was played is read back, and told as it is.
-    table = tmp_path / "plays.csv"
-    example.write_plays(table, [fan, care])
-    assert example.read_plays(table, told) == [fan, care]
-    with pytest.raises(SystemExit, match="has no plays of place"):
-        example.read_plays(table, [read_result(ROOT / "results/data/leaderboard/place.json")])
-
-
-def test_the_published_plays_with_a_blind_camera_make_the_table_of_their_page(capsys):
-    page = (ROOT / "results" / "benchmark.md").read_text()
-    plays = ROOT / "results" / "data" / "leaderboard" / "blind-camera.csv"
-    files = BLIND.findall(page)[0].replace("\\\n", "").split(",")
-    paths = [str(ROOT / f"results/data/leaderboard/{name}.json") for name in files]
-    loaded(EXAMPLES / "blind_camera.py").main([str(plays), *paths])
-    table = capsys.readouterr().out.replace("blind, minus the last", "blind, minus `place`")
-    assert table.count("\n") == 2 + len(files)
-    assert table in page
 
 
 def test_the_readme_is_read_in_three_minutes():

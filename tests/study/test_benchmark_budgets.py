@@ -1,25 +1,12 @@
-"""B90 of entries: what is played, the result file, and the published entries."""
-
-import json
-import math
-from dataclasses import replace
+"""B90 of entries: which worlds are played at which budgets."""
 
 import pytest
 
-from care_sim.base.errors import InvalidInput
 from care_sim.base.seeds import split_of
 from care_sim.evaluation.smallest_budget import BUDGETS
-from care_sim.study.benchmark import budgets
-from care_sim.study.benchmark.budgets import (
-    BudgetRow,
-    budget_tasks,
-    budget_worlds,
-    counts_of,
-    read_budget_result,
-    references,
-)
+from care_sim.study.benchmark.budgets import budget_tasks, budget_worlds, counts_of
 from care_sim.study.benchmark.suite import DRIVES, STREETS, TESTS, Entry
-from tests.helpers.made_budgets import ALWAYS, HALF_WAY, NEVER, made_budgets
+from tests.helpers.made_budgets import HALF_WAY, made_budgets
 
 
 def test_streets_are_test_seeds_and_a_trial_plays_the_first_of_them():
@@ -66,80 +53,8 @@ def test_the_counts_of_an_episode():
     assert counts_of(DRIVES, row | {"braked_before_view": True}) == (0.0, 1.0)
 
 
-@pytest.mark.parametrize("curve", [ALWAYS, HALF_WAY, NEVER])
-def test_a_file_holds_all_of_a_result(tmp_path, curve):
-    entry = Entry("care-sector", (("residual", False),), "core-spread", "Ours")
-    result = made_budgets(entry, HALF_WAY, curve)
-    result.write(tmp_path / "mine.json")
-    again = read_budget_result(tmp_path / "mine.json")
-    assert again == result
-    assert again.score == result.score
-    told = json.loads((tmp_path / "mine.json").read_text())["b90_percent"]
-    assert told[0] == ("never" if math.isinf(result.score.budget) else 2.45)
-
-
-def spoiled(content, **values):
-    return content | values
-
-
-@pytest.mark.parametrize(
-    ("values", "told"),
-    [
-        ({"care_sim_b90": 99}, "holds no B90 of version 1"),
-        ({"rows": []}, "it has no rows"),
-        ({"rows": [["streets", 200, [1, 2], []]]}, "is damaged"),
-        ({"rows": [["streets", 200, [1, 1, 1, -1], [[1, 1, 1, 1]] * 7]]}, "0 or more"),
-        ({"rows": [["nowhere", 200, [1], [[1]] * 7]]}, "is damaged"),
-        ({"rows": "none"}, "is damaged"),
-        ({"parameters": 3}, "is damaged"),
-        ({"policy": "a b"}, "policy must be a name"),
-    ],
-)
-def test_a_damaged_file_is_refused_in_one_line(tmp_path, values, told):
-    path = tmp_path / "mine.json"
-    made_budgets("care", HALF_WAY).write(path)
-    path.write_text(json.dumps(json.loads(path.read_text()) | values))
-    with pytest.raises(InvalidInput, match=told) as refused:
-        read_budget_result(path)
-    assert "\n" not in str(refused.value)
-
-
-def test_a_file_that_lacks_something_or_is_none_is_refused(tmp_path):
-    path = tmp_path / "mine.json"
-    made_budgets("care", HALF_WAY).write(path)
-    content = json.loads(path.read_text())
-    del content["detector"]
-    path.write_text(json.dumps(content))
-    with pytest.raises(InvalidInput, match="detector' is missing"):
-        read_budget_result(path)
-    path.write_text("{")
-    with pytest.raises(InvalidInput, match="cannot be read"):
-        read_budget_result(path)
-    with pytest.raises(InvalidInput, match="cannot be read"):
-        read_budget_result(tmp_path / "absent.json")
-
-
 def test_a_result_is_cut_to_worlds_in_their_order():
     result = made_budgets("care", HALF_WAY, streets=4)
     cut = result.cut_to([(STREETS, 202), (STREETS, 200)])
     assert cut.worlds == ((STREETS, 202), (STREETS, 200))
     assert result.cut_to([(STREETS, 202), (STREETS, 999)]) is None
-
-
-def test_published_entries_stand_beside_results_of_the_same_worlds(tmp_path, monkeypatch):
-    monkeypatch.setattr(budgets, "_REFERENCES", tmp_path / "references.json")
-    wide = made_budgets("care", HALF_WAY, streets=4)
-    narrow = made_budgets("boxes", HALF_WAY, streets=2)
-    other = made_budgets("place", HALF_WAY, detector="returns")
-    budgets.publish_references([wide, narrow, other])
-    worlds = [(STREETS, 200), (STREETS, 201), (STREETS, 202)]
-    assert references("centerpoint", worlds) == [wide.cut_to(worlds)]
-    assert references("returns", worlds) == [other]
-    assert references("megvii", worlds) == []
-
-
-def test_numbers_that_are_no_counts_have_no_score():
-    result = made_budgets("care", HALF_WAY)
-    damaged = BudgetRow(STREETS, 203, (1.0,) * 4, ((math.nan,) * 4,) * 7)
-    with pytest.raises(InvalidInput, match="finite"):
-        replace(result, rows=(*result.rows, damaged)).score  # noqa: B018

@@ -1,9 +1,8 @@
-"""The result file of the benchmark: what its score is, and what is refused."""
+"""The result file of the benchmark: what it holds, what is refused, and the published entries."""
 
 import json
-import re
+import math
 from dataclasses import replace
-from math import comb
 
 import pytest
 from hypothesis import given, settings
@@ -12,26 +11,31 @@ from hypothesis import strategies as st
 from care_sim.base.errors import InvalidInput
 from care_sim.core.defaults import CELL_ORDERS
 from care_sim.policies import tags_of
-from care_sim.study.benchmark.play import ONE_IN
-from care_sim.study.benchmark.result import is_of_this_code, made_by, own_code_of, read_result
-from care_sim.study.benchmark.suite import (
-    BENCHMARK_VERSION,
-    PARTS,
-    SIZES,
-    STREETS,
-    Entry,
-    published_worlds,
+from care_sim.study.benchmark import result as module
+from care_sim.study.benchmark.budgets import BudgetRow, budget_worlds
+from care_sim.study.benchmark.maker import elsewhere, made_by, own_code_of
+from care_sim.study.benchmark.result import (
+    publish_references,
+    read_result,
+    references,
+    with_references,
 )
-from tests.helpers.made_results import made_result
-from tests.helpers.places import ROOT
+from care_sim.study.benchmark.suite import STREETS, Entry
+from tests.helpers.made_budgets import ALWAYS, HALF_WAY, NEVER, made_budgets
 
-SEAL = "5" * 64
+MINE = "mine:Mine"
+
+
+@pytest.fixture
+def file(tmp_path):
+    path = tmp_path / "mine.json"
+    made_budgets(MINE, HALF_WAY).write(path)
+    return path
 
 
 def changed(path, **values):
     """The file with other values."""
-    content = json.loads(path.read_text())
-    path.write_text(json.dumps(content | values))
+    path.write_text(json.dumps(json.loads(path.read_text()) | values))
     return path
 
 
@@ -42,199 +46,125 @@ def refusal(path):
     return str(refused.value)
 
 
-@pytest.fixture
-def file(tmp_path):
-    path = tmp_path / "mine.json"
-    made_result().write(path)
-    return path
-
-
-def test_all_of_the_reachable_is_one_hundred_and_nothing_is_nothing():
-    assert made_result(share=1).score() == (100, 100, 100)
-    assert made_result(share=0).score() == (0, 0, 0)
-
-
-def test_the_score_is_the_mean_of_three_shares():
-    """Half of the drives, half of the tests, and on streets what the first half of them holds."""
-    result = made_result(share=0.5)
-    streets = [row.reachable for row in result.of_part(STREETS, "measured")]
-    expected = 100 * sum(streets[: len(streets) // 2]) / sum(streets)
-    assert [result.part_score(part) for part in PARTS] == [50, 50, expected]
-    mean, low, high = result.score()
-    assert mean == pytest.approx((100 + expected) / 3)
-    assert 35 < low < mean < high < 65
-
-
-def test_a_lead_is_paired_by_world():
-    """One world of every part apart, whatever the others hold: nearly certain."""
-    ours, theirs = made_result(share=0.5), made_result(share=0.49)
-    mean, low, high = ours.lead(theirs)
-    assert 0 <= low < mean < high < 4
-    assert ours.score().high - ours.score().low > 2 * (high - low)
-    assert ours.lead(ours) == (0, 0, 0)
+@pytest.mark.parametrize("curve", [ALWAYS, HALF_WAY, NEVER])
+def test_a_file_holds_all_of_a_result(tmp_path, curve):
+    entry = Entry("care-sector", (("residual", False),), "core-spread", "Ours")
+    result = made_budgets(entry, HALF_WAY, curve, policy_ms=(0.5, 1.25))
+    result.write(tmp_path / "mine.json")
+    again = read_result(tmp_path / "mine.json")
+    assert again == result
+    assert again.score == result.score
+    told = json.loads((tmp_path / "mine.json").read_text())["b90_percent"]
+    assert told[0] == ("never" if math.isinf(result.score.budget) else 2.45)
 
 
 @settings(max_examples=15)
-@given(share=st.floats(0, 1), parameter=st.one_of(st.integers(-9, 9), st.text("ab", max_size=3)))
-def test_a_file_gives_back_what_was_written(tmp_path_factory, share, parameter):
+@given(
+    number=st.one_of(st.integers(-9, 9), st.text("ab", max_size=3)),
+    given_=st.sampled_from(
+        [{"quick": True, "streets": 24}, {"first": 2**31}, {"sealed": "5" * 64}]
+    ),
+)
+def test_trials_fresh_and_sealed_results_are_read_as_they_were_written(
+    tmp_path_factory, number, given_
+):
     path = tmp_path_factory.mktemp("results") / "mine.json"
-    result = made_result(share=share, tags=("causal", "learned"), made_by={"machine": "here"})
-    result = replace(result, entry=Entry("mine", (("k", parameter),), "core-spread"))
+    first = {"first": 0} if "sealed" in given_ else {}
+    result = made_budgets(Entry("mine", (("k", number),)), HALF_WAY, **given_, **first)
     result.write(path)
     assert read_result(path) == result
 
 
-def test_another_version_is_refused_with_the_command_that_plays_it_again(file):
-    version = BENCHMARK_VERSION + 1
-    told = refusal(changed(file, care_sim_benchmark=version))
-    assert f"version {version!r} of the benchmark, this care-sim scores version 1" in told
-    assert "care-sim benchmark --policy mine" in told
+FULL, GOT = [1.0] * 4, [[1.0] * 4] * 7
 
 
 @pytest.mark.parametrize(
-    "spoil",
+    ("values", "told"),
     [
-        lambda rows: rows[::-1],
-        lambda rows: [*rows, rows[0]],
-        lambda rows: [[*rows[0][:2], 3, *rows[0][3:]], *rows[1:]],
-        lambda rows: [[*rows[0][:4], 2, rows[0][5]], *rows[1:]],
+        ({"care_sim_b90": 99}, "is of version 99 of the benchmark, and this is version 1"),
+        ({"rows": []}, "is damaged: it has no rows"),
+        ({"rows": [[STREETS, 200, [1, 2], []]]}, "is damaged: counts must be"),
+        ({"rows": [[STREETS, 200, [1, 1, 1, -1], GOT]]}, "0 or more"),
+        ({"rows": [["nowhere", 200, [1], [[1]] * 7]]}, "is damaged: its counts of 'nowhere'"),
+        ({"rows": [[STREETS, None, FULL, GOT]]}, "name its part and its world"),
+        ({"rows": "none"}, "is damaged"),
+        ({"rows": [[1]]}, "is damaged"),
+        ({"parameters": 3}, "is damaged"),
+        ({"policy": "a b"}, "is damaged: the policy must be a name"),
+        ({"policy": 7}, "is damaged: policy, cell_order, label and detector must be texts"),
+        ({"label": "a | b"}, "is damaged: the name of an entry must be"),
+        ({"made_by": None}, "is damaged"),
+        ({"columns": []}, "is damaged: its budgets must be"),
+        ({"budgets": [0.01, 0.1]}, "is damaged: its budgets must be"),
+        ({"counts": {STREETS: ["kept"]}}, "is damaged: its counts of 'streets' must be"),
+        ({"rows": [[STREETS, 200, FULL, GOT]] * 2}, "holds a world of the streets twice"),
+        ({"rows": [[STREETS, 201, FULL, GOT]]}, "holds other streets than the 80 worlds of"),
+        ({"quick": True}, "holds other streets than the 24 worlds of"),
+        ({"sealed": "5" * 64}, "holds other streets"),
+        ({"tags": ["best"]}, "has unknown tags ['best']"),
+        ({"cell_order": "best"}, f"has the unknown cell_order 'best'; known: {CELL_ORDERS[0]}"),
     ],
 )
-def test_other_worlds_are_refused(file, spoil):
-    rows = json.loads(file.read_text())["rows"]
-    assert "holds other worlds than version 1" in refusal(changed(file, rows=spoil(rows)))
+def test_what_is_no_result_of_this_benchmark_is_refused_in_one_line(file, values, told):
+    message = refusal(changed(file, **values))
+    assert message.startswith(f"{file} ")
+    assert told in message
+    assert not any(word in message for word in ("Error", "object", "argument"))
 
 
-def test_missing_rows_are_counted(file):
-    lost = slice(0, None, 2)
-    rows = json.loads(file.read_text())["rows"]
-    missing, number = len(rows[lost]), len(rows)
-    del rows[lost]
-    told = f"{file} lacks {missing:,} of the {number:,} rows of version 1 of the benchmark: play it"
-    assert refusal(changed(file, rows=rows)).startswith(told)
+def test_a_file_that_lacks_something_or_is_none_is_named(file, tmp_path):
+    content = json.loads(file.read_text())
+    del content["detector"]
+    file.write_text(json.dumps(content))
+    assert refusal(file) == f"{file} is damaged: 'detector' is missing"
+    file.write_text("[" * 100_000)
+    assert "cannot be read: it is nested too deep" in refusal(file)
+    file.write_text("[1]")
+    assert refusal(file) == f"{file} holds no result of care-sim benchmark"
+    absent = tmp_path / "absent.json"
+    assert refusal(absent) == f"{absent} cannot be read: No such file or directory"
 
 
-@pytest.mark.parametrize(
-    "values",
-    [
-        {"rows": [[1]]},
-        {"columns": []},
-        {"policy": 7},
-        {"parameters": [["a"]]},
-        {"rows": [["drives", "measured", -1, 0, 1, "h"]]},
-        {"rows": [["drives", "measured", 201, 0, 0, "h"]]},
-        {"made_by": None},
-        {"rows": [[{}, [], 1, 0, 1, "h"]]},
-        {"rows": [["drives", "measured", 201, 2, 1, "h"]]},
-        {"policy": "# care"},
-        {"label": "a | b"},
-        {"label": "long" * 40},
-        {"parameters": [["k", "<img src=x>"]]},
-    ],
-)
-def test_a_damaged_file_is_named(file, values):
-    told = refusal(changed(file, **values))
-    assert told.startswith(f"{file} is damaged: ")
-    assert not any(word in told for word in ("Error", "object", "argument", "\n"))
-
-
-def test_a_parameter_that_a_built_in_policy_lacks_is_refused(file):
-    """What another policy has is that policy's own word."""
-    assert read_result(changed(file, parameters=[["speed", 2]])).entry.parameters
-    assert refusal(changed(file, policy="care")).startswith(
-        f"{file} cannot be played: unknown parameter of policy care 'speed'"
-    )
-    known = ", ".join(CELL_ORDERS)
-    told = refusal(changed(file, policy="mine", cell_order="best"))
-    assert told == f"{file} has the unknown cell_order 'best'; known: {known}"
-
-
-def test_a_built_in_policy_has_its_own_tags_and_nobody_others_than_there_are(tmp_path, file):
+def test_a_built_in_policy_has_its_own_tags_and_parameters(file):
     """Without its tag the oracle would take the first place."""
-    path = tmp_path / "oracle.json"
-    made_result("history-oracle", tags=("causal",)).write(path)
-    assert "history-oracle" in refusal(path)
-    assert "it is" in refusal(path)
-    made_result("history-oracle").write(path)
-    assert read_result(path).tags == tags_of("history-oracle")
-    assert "unknown tags ['best']" in refusal(changed(file, tags=["best"]))
+    assert read_result(changed(file, parameters=[["speed", 2]])).entry.parameters
+    assert "says that history-oracle is" in refusal(changed(file, policy="history-oracle"))
+    tags = tags_of("history-oracle")
+    assert read_result(changed(file, tags=tags, parameters=[])).tags == tags
+    told = refusal(changed(file, policy="care", tags=tags_of("care"), parameters=[["speed", 2]]))
+    assert told.startswith(f"{file} cannot be played: unknown parameter of policy care 'speed'")
 
 
-def test_an_entry_shows_the_name_of_a_file_and_not_where_it_lies():
-    entry = Entry("mine:Mine", (("weights", "/home/me/w.npz"), ("maps", ("a/b.npz", "c"))))
-    assert entry.name == "mine:Mine weights=w.npz maps=('b.npz', 'c')"
-    assert "/home/me/w.npz" in entry.full_name
-    assert replace(entry, parameters=(), label="Ours").name == "Ours (mine:Mine)"
-
-
-def test_a_result_is_of_the_files_that_its_parameters_name(tmp_path):
+def test_a_result_names_the_code_and_the_files_that_made_it(tmp_path):
     weights = tmp_path / "w.txt"
     weights.write_text("1")
     entry = Entry("learned-sets", (("path", str(weights)),))
-    result = replace(made_result("learned-sets"), entry=entry, made_by=made_by(entry))
-    result.write(tmp_path / "mine.json")
-    assert is_of_this_code(read_result(tmp_path / "mine.json"))
+    made = made_by(entry)
+    assert elsewhere(entry, made) == ""
+    assert elsewhere(entry, made | {"machine": {}}).startswith("by other libraries or another")
+    for other in ({"policy_code": "5"}, {"versions": {"code": "0"}}, {"versions": None}):
+        assert elsewhere(entry, made | other) == "by other code than here"
     weights.write_text("2")
-    assert not is_of_this_code(result)
-    assert own_code_of(replace(result, made_by=made_by(entry))) != own_code_of(result)
+    assert elsewhere(entry, made) == "by other code than here"
+    assert own_code_of(made_by(entry)) != own_code_of(made)
 
 
-def test_a_result_is_of_the_code_of_its_policy(tmp_path):
-    made = made_by(Entry("care"))
-    assert is_of_this_code(made_result("care", made_by=made))
-    assert not is_of_this_code(made_result("care", made_by=made | {"policy_code": "5"}))
-    assert not is_of_this_code(made_result("care"))
+def test_published_entries_stand_beside_results_of_the_same_worlds(tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "_REFERENCES", tmp_path / "references.json")
+    wide, other = made_budgets("care", HALF_WAY), made_budgets("place", ALWAYS, detector="returns")
+    publish_references([wide, other])
+    worlds = [(STREETS, seed) for seed in budget_worlds(quick=True)[STREETS]]
+    assert references("centerpoint", worlds) == [wide.cut_to(worlds)]
+    assert references("megvii", worlds) == []
+    mine = made_budgets(MINE, HALF_WAY, quick=True, streets=24)
+    assert with_references([mine]) == [mine, wide.cut_to(worlds)]
+    # A result of the name of a published entry stands in its place; a sealed number is no seed.
+    assert with_references([made_budgets("care", NEVER)]) == [made_budgets("care", NEVER)]
+    assert len(with_references([replace(mine, sealed="5" * 64)])) == 1
 
 
-def test_what_is_no_result_is_named(tmp_path):
-    path = tmp_path / "mine.json"
-    assert refusal(path) == f"{path} cannot be read: No such file or directory"
-    path.write_text('{"rows": [')
-    assert refusal(path).startswith(f"{path} is cut off or no JSON: Expecting value: line 1")
-    path.write_text("[" * 100_000)
-    assert "it is nested too deep" in refusal(path)
-    path.write_text("[1]")
-    assert "holds no result of care-sim benchmark" in refusal(path)
-
-
-def test_a_trial_is_read_as_one_and_a_whole_is_cut_to_it(tmp_path):
-    whole = made_result(share=0.04)
-    trial = whole.cut_to_tenth()
-    assert [trial.part_score(part) for part in PARTS[:2]] == [50, pytest.approx(500 / 12)]
-    trial.write(tmp_path / "mine.json")
-    assert read_result(tmp_path / "mine.json") == trial
-    assert trial.cut_to_tenth() is trial
-
-
-def test_a_sealed_result_holds_no_seed_and_must_be_whole(tmp_path):
-    worlds = [world._replace(number=n) for n, world in enumerate(published_worlds())]
-    sealed = made_result(sealed=SEAL, worlds=worlds)
-    sealed.write(tmp_path / "mine.json")
-    assert read_result(tmp_path / "mine.json").sealed == SEAL
-    made_result(sealed=SEAL, worlds=worlds[1:]).write(tmp_path / "less.json")
-    assert "lacks sealed worlds" in refusal(tmp_path / "less.json")
-
-
-@pytest.mark.parametrize("spoil", [lambda own: [own[0], *own[:-1]], lambda own: own[::-1]])
-def test_the_numbers_of_sealed_worlds_ascend(tmp_path, spoil):
-    """One good world, told again and again, would make a score."""
-    worlds = [world._replace(number=n) for n, world in enumerate(published_worlds())]
-    streets = [world for world in worlds if world.part == STREETS]
-    others = [world for world in worlds if world.part != STREETS]
-    made_result(sealed=SEAL, worlds=[*others, *spoil(streets)]).write(tmp_path / "mine.json")
-    assert "must ascend" in refusal(tmp_path / "mine.json")
-
-
-def test_the_page_tells_how_often_made_up_rows_pass():
-    """Drawn without being put back, of the rows that make the score."""
-    rows = sum(SIZES.values())
-    drawn = -(-rows // ONE_IN["measured"])
-    assert drawn + -(-rows // ONE_IN["ideal"]) == 2 * rows // 10
-    page = (ROOT / "docs" / "benchmark.md").read_text()
-    told = re.findall(r"^\| (\d+) \| ([\d.,]+) times \|$", page, re.M)
-    assert len(told) == 3
-    for made_up, times in told:
-        chance = comb(rows - int(made_up), drawn) / comb(rows, drawn)
-        assert float(times.replace(",", "")) == pytest.approx(1 / chance, rel=0.01)
-    ten = comb(rows - 10, drawn) / comb(rows, drawn)
-    assert f"three calls once in {ten**-3:.0f} times" in page
+def test_numbers_that_are_no_counts_have_no_score():
+    result = made_budgets("care", HALF_WAY)
+    damaged = BudgetRow(STREETS, 203, (1.0,) * 4, ((math.nan,) * 4,) * 7)
+    with pytest.raises(InvalidInput, match="finite"):
+        replace(result, rows=(*result.rows, damaged)).score  # noqa: B018

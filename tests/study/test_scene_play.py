@@ -23,7 +23,7 @@ from care_sim.study.play_config import PLAY_FIELDS, listed_plays, play_grid
 from care_sim.study.runner import in_batches
 from tests.helpers.av2_log import at, box, write
 
-MEASURED = {"wall_s", "peak_rss_mb"}
+MEASURED = {"wall_s", "peak_rss_mb", *plays.DECISION_MS}
 PROTOCOL = STUDIES["protocol"]
 
 

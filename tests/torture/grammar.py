@@ -32,7 +32,7 @@ SOURCES = [
     *(":", "nuscenes", "argoverse2:text", "nuscenes:\x00"),
 ]
 WORK = {
-    *words("seeds scenes episodes steps repeats samples resets seconds floor_seeds"),
+    *words("seeds scenes fresh episodes steps repeats samples resets seconds floor_seeds"),
     *words("evaluate_every environments rollout epochs batch memory"),
 }
 """Options that say how much is to be done; a large value honestly takes its time."""

@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 
 from care_sim.world.bodies import CATALOGUE
-from care_sim.world.lane_flow import STANDING_GAP_M, FlowingLane, LaneFlow, StreetTraffic
+from care_sim.world.lane_flow import (
+    STANDING_GAP_M,
+    Crossing,
+    FlowingLane,
+    LaneFlow,
+    StreetTraffic,
+)
+from care_sim.world.motions import Crosser, Walk
 from care_sim.world.traffic import Traffic
 
 STEP = 0.05
@@ -27,7 +34,9 @@ def test_drivers_move_as_those_of_highway_env_do():
         flow.step(STEP, [(x, speed)])
         assert flow.places == pytest.approx([one.pose[0] for one in drivers], abs=1e-9)
         assert flow.speeds == pytest.approx([one.speed for one in drivers], abs=1e-9)
-    assert flow.places[1] < ego.pose[0]
+        # The car behind never comes nearer than the standing gap, less what the model overshoots.
+        assert ego.pose[0] - flow.places[1] > STANDING_GAP_M - 1.0
+        assert np.diff(flow.places)[[0, 2]].min() > STANDING_GAP_M
 
 
 def test_the_first_driver_stops_before_what_stands():
@@ -48,8 +57,8 @@ def lane(places, **ego):
 
 
 def driven(street, seconds, ego_m, ego_speed=0.0):
-    for _ in range(round(seconds / 0.05)):
-        street.step(0.05, ego_m, ego_speed)
+    for step in range(1, round(seconds / STEP) + 1):
+        street.step(STEP, step * STEP, ego_m, ego_speed)
     return street.pose_at(0, 0, 0.0)[0]
 
 
@@ -65,5 +74,49 @@ def test_the_egos_place_in_a_lane_is_shifted():
 
 def test_poses_are_those_of_the_lane():
     street = StreetTraffic([lane([]), lane([3.0, 30.0])])
-    street.step(0.05, 0.0, 0.0)
+    street.step(STEP, STEP, 0.0, 0.0)
     assert street.pose_at(1, 0, 0.0) == (pytest.approx(3.4), 0.0, 0.0)
+
+
+def crossing(from_m, to_m, went=True):
+    """Over x = 0 goes somebody at 1 m/s, from the start on: `went` is what they decided."""
+    crosser = Crosser(Walk((0.0, -30.0), np.pi / 2, 1.0, 1e6, 60.0), 0.0, lambda _: went)
+    crosser.look(0.0, lambda: 0.0)
+    return Crossing(crosser, 0.0, from_m, to_m)
+
+
+@pytest.mark.parametrize(
+    ("crossings", "place"),
+    [
+        # On the lane from 5 s on: 40 m are driven in them.
+        ([crossing(5.0, np.inf)], -STANDING_GAP_M),
+        ([crossing(5.0, 30.0)], None),
+        ([crossing(20.0, np.inf)], 60.0),
+        ([crossing(5.0, np.inf, went=False)], 60.0),
+        ([], 60.0),
+    ],
+)
+def test_drivers_stop_before_who_crosses_until_they_are_over(crossings, place):
+    street = StreetTraffic([lane([-100.0], crossings=crossings)])
+    reached = driven(street, 20.0, 0.0)
+    assert reached == pytest.approx(place, abs=1.0) if place else reached < -STANDING_GAP_M + 1.0
+    # Who is over the lane holds nobody up.
+    for step in range(401, 1201):
+        street.step(STEP, step * STEP, 0.0, 0.0)
+    assert (street.pose_at(0, 0, 0.0)[0] > 50.0) is (place != -STANDING_GAP_M)
+
+
+def test_who_has_passed_a_crossing_drives_on():
+    street = StreetTraffic([lane([-3.9], crossings=[crossing(0.5, np.inf)])])
+    assert driven(street, 10.0, 0.0) == pytest.approx(76.1)
+
+
+def test_places_are_foreseen_before_the_stop_line_without_ego_and_crossers():
+    foreseen = lane([-40.0], stop_m=0.0).foreseen(300, STEP)
+    flow = LaneFlow([-40.0], [8.0])
+    for row in foreseen:
+        assert row == flow.places
+        flow.step(STEP, [(0.0, 0.0)])
+    free = lane([-40.0], crossings=[crossing(0.0, np.inf)], ego_from_m=-np.inf, ego_to_m=np.inf)
+    assert free.foreseen(2, STEP).tolist() == [[-40.0], [pytest.approx(-39.6)]]
+    assert free.flow.places == [-40.0]

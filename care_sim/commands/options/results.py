@@ -6,7 +6,7 @@ from typing import Annotated
 
 import tyro
 
-from care_sim.base.checks import LARGEST_INTEGER, bounded, check_fields, check_whole, one_of
+from care_sim.base.checks import LARGEST_INTEGER, bounded, check_fields, check_whole
 from care_sim.base.errors import InvalidInput
 from care_sim.certify import ALL_EPISODES
 from care_sim.commands.options.shared import (
@@ -20,12 +20,10 @@ from care_sim.commands.options.shared import (
 )
 from care_sim.core.defaults import AS_DEMANDED
 
-SHARE, B90 = "share", "b90"
-"""The scores of the benchmark."""
-CONTROL = "place"
-"""The entry of the leaderboard over which leads are measured."""
 _MOST_EPISODES = 100_000
 """As many as a study may have."""
+_MOST_STREETS = 1_000
+"""A draw of more would be a study."""
 
 
 def _refuse(*cases: tuple[object, str]) -> None:
@@ -37,13 +35,11 @@ def _refuse(*cases: tuple[object, str]) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class Benchmark(WorkerOptions):
-    """Play the official suite: one score, and a result file.
+    """Play the benchmark: B90, how few cells are enough.
 
-    The suite is drives, Euro NCAP tests and streets at 1% of the cells: 480 plays an entry, 48 with
-    --quick. `care-sim leaderboard` makes the table.
-
-    With --score b90 it plays streets at seven budgets, and prints the smallest one at which the
-    policy has 90% of what a full scan has, beside published entries.
+    B90 is the smallest budget at which a policy has 90% of what a full scan has, on every count.
+    Streets are played at seven budgets: 560 plays per entry, 168 with --quick. A result file per
+    entry, a figure, and a line beside the published entries.
     """
 
     policy: tuple[str, ...] = ()
@@ -56,19 +52,18 @@ class Benchmark(WorkerOptions):
     rows-down, rows-up, columns, random, spread, core-spread."""
     name: str = ""
     """What you call the entry, for its line in tables, if one policy is played alone."""
-    score: str = one_of(SHARE, (SHARE, B90))
-    """share: what the policy reaches with 1% of the cells; b90: how few cells are enough."""
-    detector: str | None = None
-    """For --score b90: the detector, centerpoint unless given. Published entries use
-    centerpoint only."""
+    detector: str = "centerpoint"
+    """The detector. Published entries use centerpoint only."""
     closed_loop: Flag = False
-    """For --score b90: play drives and Euro NCAP tests too. Collisions avoided and needless stops
-    then count as well."""
+    """Play drives and Euro NCAP tests too. Collisions avoided and needless stops then count as
+    well."""
     quick: Flag = False
-    """The first tenth of the worlds alone: a trial, and no line of the leaderboard. With --score
-    b90 the first 24 streets."""
+    """Play the first 24 streets alone: a trial."""
+    fresh: int = bounded(0, 0, _MOST_STREETS)
+    """Play this many streets that nobody has played, drawn by lot from seeds 2147483648 to
+    4294967295. The folder keeps the draw: further entries meet the same streets."""
     sealed: Path | None = None
-    """For organisers of a competition: a file with a secret salt, which draws other worlds. The
+    """For organisers of a competition: a file with a secret salt, which draws the streets. The
     journal in the folder holds their seeds; the result files do not."""
     out: Path = Path("runs/benchmark")
     """Folder of the result files; what is finished stays there, and the same command resumes."""
@@ -76,38 +71,43 @@ class Benchmark(WorkerOptions):
     def __post_init__(self) -> None:
         super().__post_init__()
         _refuse(
-            (self.detector and self.score != B90, "detector is for --score b90"),
-            (self.closed_loop and self.score != B90, "closed_loop is for --score b90"),
-            (self.sealed and self.score == B90, "--score b90 plays no sealed set yet"),
+            (
+                self.fresh and (self.quick or self.sealed),
+                "fresh streets are neither the published nor sealed ones: remove quick and sealed",
+            ),
+            (
+                self.closed_loop and (self.fresh or self.sealed),
+                "fresh and sealed worlds are streets alone: remove closed_loop",
+            ),
+            (
+                self.sealed and self.out == Benchmark.out,
+                "a sealed set leaves its seeds in the folder: give --out a folder that only you "
+                "read",
+            ),
         )
 
 
 @dataclass(frozen=True, kw_only=True)
 class Leaderboard(WorkerOptions):
-    """Put result files in one table, or verify them.
+    """Put result files in a table, or verify them.
 
-    To verify one is to play a random tenth of its episodes again.
+    Published entries stand beside them, in the same worlds under the same detector. To verify a
+    file is to play a random tenth of its worlds again.
     """
 
     results: Annotated[
-        tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER...")
+        tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RESULTS...")
     ] = ()
-    """Folders with result files, or such files. Of two with one name and code the first counts."""
-    quick: Flag = False
-    """Compare on the tenth of the worlds that `benchmark --quick` plays: a trial."""
-    minus: str = CONTROL
-    """The entry over which the leads of all others are shown, by its name in the table."""
+    """Result files, or folders of them; without any, the published entries alone. Of two with one
+    name and code the first counts."""
     verify: Flag = False
-    """Play a random tenth of the episodes of every result again, instead of a table. Their policies
+    """Play a random tenth of the worlds of every result again, instead of a table. Their policies
     must be installed here."""
     sealed: Path | None = None
     """With --verify: the file with the salt of sealed results."""
-    out: Path | None = None
-    """Folder for the page and the figure; without it runs/leaderboard, and runs/leaderboard-quick
-    with --quick. A table that is there already is replaced, and a line says so."""
-    chart: Path | None = None
-    """PNG or SVG file for a bar chart of the scores alone; the other format is written beside
-    it."""
+    out: Path = Path("runs/leaderboard")
+    """Folder for the page and the figures. A page that is there already is replaced, and a line
+    says so."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -116,11 +116,7 @@ class Leaderboard(WorkerOptions):
                 self.sealed and not self.verify,
                 "sealed is for results that are verified: give verify too",
             ),
-            (self.verify and self.chart, "chart is for a table, which verify does not make"),
-            (
-                self.verify and self.minus != CONTROL,
-                "minus is for a table, which verify does not make",
-            ),
+            (self.verify and not self.results, "name the results to verify"),
         )
 
 

@@ -1,1 +1,1 @@
-"""The official suite: which worlds it plays, its result file, and playing one again."""
+"""The benchmark: which worlds it plays, its result file, and playing one again."""

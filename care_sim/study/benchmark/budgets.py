@@ -1,20 +1,20 @@
-"""B90 of entries: which worlds are played at which budgets, and the result file.
+"""B90 of entries: which worlds are played at which budgets, and the result of an entry.
 
-The worlds are those of the suite (`care_sim.study.benchmark.suite`) with more streets, and the
-score is `care_sim.evaluation.smallest_budget`. A street needs no screening: one in which a full
+The score is `care_sim.evaluation.smallest_budget`. A street needs no screening: one in which a full
 scan detects nothing adds nothing to any count.
 """
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from care_sim.base.errors import InvalidInput, printable, shown
-from care_sim.base.files import JSON, json_content, parsed_json, replacing, write_text
+from care_sim.base.files import JSON, replacing
+from care_sim.core.arrays import Floats
 from care_sim.core.conditions import KITTI_CAMERA
 from care_sim.evaluation.counts import EPISODE_COUNTS, SCENE_COUNTS, scene_counts
 from care_sim.evaluation.smallest_budget import (
@@ -22,11 +22,12 @@ from care_sim.evaluation.smallest_budget import (
     Counts,
     PartCounts,
     SmallestBudget,
+    resampled_budgets,
     smallest_budget,
 )
 from care_sim.policies import tags_of
+from care_sim.study.benchmark.maker import made_by
 from care_sim.study.benchmark.play import Player
-from care_sim.study.benchmark.result import made_by
 from care_sim.study.benchmark.suite import (
     DRIVES,
     FIRST_SEED,
@@ -34,12 +35,13 @@ from care_sim.study.benchmark.suite import (
     STREETS,
     TESTS,
     Entry,
+    Salt,
     configurations,
-    published_worlds,
+    episode_seeds,
 )
-from care_sim.study.rows.parquet import with_tuples
 from care_sim.study.rows.reading import is_avoided, stops_for_nothing
 from care_sim.study.run_config import FULL, Row, RunConfig
+from care_sim.study.scene_play import DECISION_MS
 
 BUDGET_MARK = "care_sim_b90"
 """The key by which a file is known; its value is the version of the score."""
@@ -69,24 +71,27 @@ REFERENCE_ENTRIES = (
 )
 """The entries that stand beside everybody's."""
 COUNTS = {STREETS: SCENE_COUNTS, DRIVES: EPISODE_COUNTS, TESTS: EPISODE_COUNTS}
-_REFERENCES = Path(__file__).with_name("references.json")
 _DECIMALS = 3
-_MOST_BYTES = 2**24
 
 
 class BudgetRow(NamedTuple):
-    """The counts (k) of a world: of the full scan, and of the entry at every budget."""
+    """The counts (k) of a world: of the full scan, and of the entry at every budget. The world is a
+    seed, a number of a sealed set, or the name of a scene.
+    """
 
     part: str
-    world: int
+    world: int | str
     full: tuple[float, ...]
     got: tuple[tuple[float, ...], ...]
 
 
 @dataclass(frozen=True)
 class BudgetResult:
-    """What an entry has at every budget, world by world, under a detector. `quick` is a trial on a
-    few streets; `made_by` are versions and machine.
+    """What an entry has at every budget, world by world, under a detector.
+
+    `quick` is a trial on a few streets; `made_by` are versions and machine; `sealed` is the digest
+    of the salt that drew the worlds; `policy_ms` are p50 and p99 of a decision of the policy on
+    streets, each the median over its plays, in milliseconds.
     """
 
     entry: Entry
@@ -95,13 +100,15 @@ class BudgetResult:
     rows: tuple[BudgetRow, ...]
     quick: bool
     made_by: Mapping[str, Any]
+    sealed: str | None = None
+    policy_ms: tuple[float, ...] = ()
 
     @property
-    def worlds(self) -> tuple[tuple[str, int], ...]:
-        """Part and number of its worlds."""
+    def worlds(self) -> tuple[tuple[str, int | str], ...]:
+        """Part and name of its worlds."""
         return tuple((row.part, row.world) for row in self.rows)
 
-    @property
+    @cached_property
     def counts(self) -> Counts:
         """Counts of all parts, from which the score follows."""
         return [
@@ -113,12 +120,17 @@ class BudgetResult:
             for part in dict.fromkeys(row.part for row in self.rows)
         ]
 
-    @property
+    @cached_property
+    def draws(self) -> Floats:
+        """B90 (resamples,) of drawn worlds."""
+        return resampled_budgets(self.counts)
+
+    @cached_property
     def score(self) -> SmallestBudget:
         """B90 of the entry."""
-        return smallest_budget(self.counts)
+        return smallest_budget(self.counts, self.draws)
 
-    def cut_to(self, worlds: Iterable[tuple[str, int]]) -> "BudgetResult | None":
+    def cut_to(self, worlds: Iterable[tuple[str, int | str]]) -> "BudgetResult | None":
         """Return the result in these worlds, in their order; None where one is missing."""
         own = dict(zip(self.worlds, self.rows, strict=True))
         kept = [own.get(world) for world in worlds]
@@ -137,6 +149,8 @@ class BudgetResult:
             "tags": self.tags,
             "detector": self.detector,
             "quick": self.quick,
+            "sealed": self.sealed,
+            "policy_ms": self.policy_ms,
             "made_by": self.made_by,
             "budgets": BUDGETS,
             "counts": {part: COUNTS[part] for part in COUNTS},
@@ -164,10 +178,7 @@ Worlds = dict[str, list[int]]
 def budget_worlds(quick: bool = False, closed_loop: bool = False) -> Worlds:
     """Return the streets, fewer for a trial; with `closed_loop` the first drives and tests too."""
     streets = QUICK_STREETS if quick else STREETS_PLAYED
-    episodes = {
-        part: [world.seed for world in published_worlds() if world.part == part][:number]
-        for part, number in EPISODES_PLAYED.items()
-    }
+    episodes = {part: [*episode_seeds(part)[:number]] for part, number in EPISODES_PLAYED.items()}
     street_seeds = {STREETS: [FIRST_SEED + n for n in range(streets)]}
     return street_seeds | (episodes if closed_loop else {})
 
@@ -190,15 +201,24 @@ def budget_tasks(
 
 
 def play_budgets(
-    entries: Sequence[Entry], player: Player, detector: str, worlds: Worlds, quick: bool = False
+    entries: Sequence[Entry],
+    player: Player,
+    detector: str,
+    worlds: Worlds,
+    quick: bool = False,
+    salt: Salt | None = None,
 ) -> list[BudgetResult]:
-    """Play the entries; return the results of those that finished every play, in their order."""
-    named = [(part, seed) for part, seeds in worlds.items() for seed in seeds]
+    """Play the entries; return the results of those that finished every play, in their order. With
+    a `salt` the worlds are numbers, whose seeds the salt draws.
+    """
+    named = [(part, world) for part, own in worlds.items() for world in own]
+    seeds = {
+        part: [salt.seed(part, number) for number in own] if salt else own
+        for part, own in worlds.items()
+    }
     tasks = {
         entry: [
-            task
-            for part, seeds in worlds.items()
-            for task in budget_tasks(entry, part, seeds, detector)
+            task for part, own in seeds.items() for task in budget_tasks(entry, part, own, detector)
         ]
         for entry in entries
     }
@@ -207,17 +227,34 @@ def play_budgets(
     row_of = dict(zip(configs, player.rows(configs), strict=True))
     results = []
     for entry, own in tasks.items():
-        rows = [[row_of[config] for config in task] for task in own]
-        if all(row for world in rows for row in world):
-            kept = tuple(_row(*world, own) for world, own in zip(named, rows, strict=True))
-            tags = tags_of(entry.policy)
-            results.append(BudgetResult(entry, tags, detector, kept, quick, made_by(entry)))
+        rows = [[row for config in task if (row := row_of[config])] for task in own]
+        if all(len(played) == len(task) for played, task in zip(rows, own, strict=True)):
+            results.append(
+                BudgetResult(
+                    entry,
+                    tags_of(entry.policy),
+                    detector,
+                    tuple(_row(*world, played) for world, played in zip(named, rows, strict=True)),
+                    quick,
+                    made_by(entry),
+                    salt.digest if salt else None,
+                    _policy_ms([row for _, *played in rows for row in played]),
+                )
+            )
     return results
 
 
-def _row(part: str, world: int, rows: Sequence[Row | None]) -> BudgetRow:
-    full, *got = (counts_of(part, row) for row in rows if row)
+def _row(part: str, world: int | str, rows: Sequence[Row]) -> BudgetRow:
+    full, *got = (counts_of(part, row) for row in rows)
     return BudgetRow(part, world, full, tuple(got))
+
+
+def _policy_ms(rows: Sequence[Row]) -> tuple[float, ...]:
+    """Return p50 and p99 of a decision, medians over plays; nothing without a play that has them.
+    The first play of a process compiles code, which the median leaves out.
+    """
+    times = [[row[name] for name in DECISION_MS] for row in rows if DECISION_MS[0] in row]
+    return tuple(np.median(times, axis=0).round(_DECIMALS).tolist()) if times else ()
 
 
 def counts_of(part: str, row: Row) -> tuple[float, ...]:
@@ -225,56 +262,3 @@ def counts_of(part: str, row: Row) -> tuple[float, ...]:
     if part == STREETS:
         return tuple(round(value, _DECIMALS) for value in scene_counts(row).values())
     return float(is_avoided(row)), float(stops_for_nothing(row))
-
-
-def read_budget_result(path: Path) -> BudgetResult:
-    """Read the result in a file. Raises InvalidInput for a file that holds none or is damaged."""
-    try:
-        content = json_content(path, _MOST_BYTES)
-    except (OSError, ValueError) as error:
-        reason = printable(getattr(error, "strerror", None) or str(error))
-        raise InvalidInput(f"{path} cannot be read: {reason}") from error
-    return result_of(content, str(path))
-
-
-def result_of(content: Any, origin: str) -> BudgetResult:
-    """Return the result that parsed JSON holds; `origin` names its place. Raises InvalidInput."""
-    if not isinstance(content, dict) or content.get(BUDGET_MARK) != BUDGET_VERSION:
-        raise InvalidInput(f"{origin} holds no B90 of version {BUDGET_VERSION}: play it again")
-    try:
-        given = with_tuples({"given": content["parameters"]})["given"]
-        parameters = tuple((str(name), value) for name, value in given)
-        texts = (content[name] for name in ("cell_order", "label"))
-        entry = Entry(str(content["policy"]), parameters, *map(str, texts))
-        rows = tuple(
-            BudgetRow(str(part), int(world), tuple(full), tuple(map(tuple, got)))
-            for part, world, full, got in content["rows"]
-        )
-        tags = tuple(map(str, content["tags"]))
-        maker = dict(content["made_by"])
-        result = BudgetResult(
-            entry, tags, str(content["detector"]), rows, bool(content["quick"]), maker
-        )
-        # Its shapes and numbers are checked where its counts are made.
-        if not result.counts:
-            raise ValueError("it has no rows")
-    except KeyError as error:
-        raise InvalidInput(f"{origin} is damaged: {shown(error.args[0])} is missing") from error
-    except (InvalidInput, TypeError, ValueError, OverflowError) as error:
-        raise InvalidInput(f"{origin} is damaged: {printable(str(error))}") from error
-    entry.check()
-    return result
-
-
-def references(detector: str, worlds: Sequence[tuple[str, int]]) -> list[BudgetResult]:
-    """Return the published entries in these worlds under a detector; none without such plays."""
-    listed = parsed_json(_REFERENCES.read_text(encoding="utf-8"))
-    results = [result_of(content, _REFERENCES.name) for content in listed]
-    cut = (result.cut_to(worlds) for result in results if result.detector == detector)
-    return [result for result in cut if result]
-
-
-def publish_references(results: Sequence[BudgetResult]) -> None:
-    """For maintainers: make these the published entries."""
-    told = ",\n".join(json.dumps(result.content()) for result in results)
-    write_text(_REFERENCES, f"[\n{told}\n]\n")

@@ -1,313 +1,125 @@
-"""Results of entries: what an entry reached world by world, what made it, and its file.
+"""Result files of the benchmark: read, checked, and the published ones.
 
-The score is worked out of the rows whenever a file is read; the one that stands in it is for
-people. A file that cannot be so is refused in one line.
+The score is computed from the rows whenever a file is read; the score in the file is for people.
 """
 
 import json
-from collections import Counter
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
-from itertools import pairwise
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple, Self
+from typing import Any
 
-from care_sim.base.checks import LARGEST_INTEGER
 from care_sim.base.errors import InvalidInput, counted, printable, shown
-from care_sim.base.files import JSON, json_content, replacing
+from care_sim.base.files import json_content, parsed_json, write_text
+from care_sim.base.seeds import FRESH
 from care_sim.core.defaults import CELL_ORDERS
-from care_sim.evaluation.bootstrap import Interval, mean_of_ratios
+from care_sim.evaluation.smallest_budget import BUDGETS
 from care_sim.policies import POLICIES, maker, tags_of
 from care_sim.policies.base import TAGS
 from care_sim.policies.makers import check_parameters
-from care_sim.study.benchmark.suite import (
-    BENCHMARK_VERSION,
-    CAMERAS,
-    MEASURED,
-    PARTS,
-    SIZES,
-    Entry,
-    Task,
-    published_worlds,
-    quick_tenth,
-    reached,
+from care_sim.study.benchmark.budgets import (
+    BUDGET_MARK,
+    BUDGET_VERSION,
+    COUNTS,
+    BudgetResult,
+    BudgetRow,
+    budget_worlds,
 )
-from care_sim.study.provenance import code_digest, machine, policy_digest, versions
+from care_sim.study.benchmark.suite import STREETS, Entry
 from care_sim.study.rows.parquet import with_tuples
-from care_sim.study.run_config import Row, files_in
 
-RESULT_MARK = "care_sim_benchmark"
-"""The key by which a file is known; its value is the version."""
-
-
-class ResultRow(NamedTuple):
-    """What was reached in a world under a camera, of what there is to reach; `hash` is that of the
-    episode.
-    """
-
-    part: str
-    camera: str
-    world: int
-    reached: int
-    reachable: int
-    hash: str
-
-    @classmethod
-    def of(cls, task: Task, row: Row) -> Self:
-        """That of a play."""
-        world = task.world
-        got = reached(world.part, row)
-        return cls(world.part, task.camera, world.number, got, world.reachable, row["episode_hash"])
-
-
-@dataclass(frozen=True)
-class BenchmarkResult:
-    """What an entry reached. `quick` of a tenth of the worlds; `sealed` is the digest of the salt
-    that drew them, None of the published ones. `made_by` are versions and machine.
-    """
-
-    entry: Entry
-    tags: tuple[str, ...]
-    rows: tuple[ResultRow, ...]
-    quick: bool
-    sealed: str | None
-    made_by: Mapping[str, Any]
-
-    @property
-    def parts(self) -> list[str]:
-        """The parts of the benchmark that its rows are of: all, where it is whole."""
-        return [*dict.fromkeys(row.part for row in self.rows)]
-
-    @property
-    def worlds(self) -> tuple[tuple[str, int, int], ...]:
-        """Part, number and reachable of the worlds that it says it was played in, in order."""
-        seen = [row for row in self.rows if row.camera == MEASURED]
-        return tuple((row.part, row.world, row.reachable) for row in seen)
-
-    @property
-    def uses_camera(self) -> bool:
-        """Whether any play differs between the cameras; without a camera all are alike."""
-        hashes: dict[tuple[str, int], set[str]] = {}
-        for row in self.rows:
-            hashes.setdefault((row.part, row.world), set()).add(row.hash)
-        return any(len(alike) > 1 for alike in hashes.values())
-
-    def of_part(self, part: str, camera: str) -> list[ResultRow]:
-        """Its rows, in the order of their worlds."""
-        return [row for row in self.rows if (row.part, row.camera) == (part, camera)]
-
-    def part_score(self, part: str, camera: str = MEASURED) -> float:
-        """Of what a full scan reaches, the share that the entry reached, in percent."""
-        rows = self.of_part(part, camera)
-        return 100 * sum(row.reached for row in rows) / sum(row.reachable for row in rows)
-
-    def score(self, camera: str = MEASURED) -> Interval:
-        """The mean of the parts, in percent; worlds are drawn for its interval."""
-        return mean_of_ratios(
-            [
-                ([100 * row.reached for row in rows], [row.reachable for row in rows])
-                for rows in (self.of_part(part, camera) for part in self.parts)
-            ]
-        )
-
-    def lead(
-        self, other: "BenchmarkResult", camera: str = MEASURED, part: str | None = None
-    ) -> Interval:
-        """Its score less that of another in the same worlds, in points, paired by world; of one
-        `part` alone where it is given.
-        """
-        pairs = [
-            list(zip(self.of_part(one, camera), other.of_part(one, camera), strict=True))
-            for one in ([part] if part else self.parts)
-        ]
-        return mean_of_ratios(
-            [
-                ([100 * (a.reached - b.reached) for a, b in own], [a.reachable for a, _ in own])
-                for own in pairs
-            ]
-        )
-
-    def cut_to_tenth(self) -> "BenchmarkResult":
-        """What it reached in the worlds of `--quick`."""
-        if self.quick:
-            return self
-        first = quick_tenth([row for row in self.rows if row.camera == MEASURED])
-        kept = {(row.part, row.world) for row in first}
-        rows = tuple(row for row in self.rows if (row.part, row.world) in kept)
-        return replace(self, rows=rows, quick=True)
-
-    def write(self, path: Path) -> None:
-        """Write it, a row a line."""
-        head = {
-            RESULT_MARK: BENCHMARK_VERSION,
-            "entry": self.entry.name,
-            "score": {camera: self._told(camera) for camera in CAMERAS},
-            **asdict(self.entry),
-            "tags": self.tags,
-            "quick": self.quick,
-            "sealed": self.sealed,
-            "made_by": self.made_by,
-            "columns": ResultRow._fields,
-        }
-        rows = ",\n  ".join(json.dumps(row) for row in self.rows)
-        opened = json.dumps(head, indent=1).removesuffix("\n}")
-        with replacing(path, JSON) as unfinished:
-            unfinished.write_text(f'{opened},\n "rows": [\n  {rows}\n ]\n}}\n', encoding="utf-8")
-
-    def _told(self, camera: str) -> dict[str, Any]:
-        mean, low, high = (round(value, 2) for value in self.score(camera))
-        parts = {part: round(self.part_score(part, camera), 2) for part in self.parts}
-        return {"score": mean, "interval": [low, high], **parts}
-
-
-def made_by(entry: Entry) -> dict[str, Any]:
-    """What makes the results of an entry here."""
-    return {"versions": versions(), **_own_code(entry), "machine": machine()}
-
-
-def code_of(result: BenchmarkResult) -> str:
-    """The hash of CARE-Sim's code that a result names; empty where it names none."""
-    told = result.made_by.get("versions")
-    return str(told.get("code", "")) if isinstance(told, dict) else ""
-
-
-def processor_of(result: BenchmarkResult) -> str:
-    """The processor that a result names, on one line; empty where it names none."""
-    told = result.made_by.get("machine")
-    named = told.get("processor") if isinstance(told, dict) else None
-    return printable(named) if isinstance(named, str) else ""
-
-
-def is_made_alike(result: BenchmarkResult) -> bool:
-    """Whether all that a result names as its maker is here: code, policy, libraries and machine."""
-    return result.made_by == made_by(result.entry)
-
-
-def elsewhere(result: BenchmarkResult) -> str:
-    """What made a result where that is not what is here, in words; empty where all is."""
-    if is_made_alike(result):
-        return ""
-    by = "other libraries or another system" if is_of_this_code(result) else "other code"
-    on = processor_of(result)
-    return f"by {by} than here{f', on {on}' if on and on != machine()['processor'] else ''}"
-
-
-def own_code_of(result: BenchmarkResult) -> str:
-    """The hashes of the policy's code and files that a result names, as one text."""
-    told = result.made_by
-    return f"{told.get('policy_code', '')} {told.get('parameter_files', [])}"
-
-
-def is_of_this_code(result: BenchmarkResult) -> bool:
-    """Whether CARE-Sim and the policy, with its files, are here what made the result."""
-    here = _own_code(result.entry)
-    return code_of(result) == code_digest() and all(
-        result.made_by.get(name) == value for name, value in here.items()
-    )
-
-
-def _own_code(entry: Entry) -> dict[str, Any]:
-    """Hashes of the policy's own code, empty for a built-in one, and of the files that its
-    parameters name.
-    """
-    files = files_in(entry.parameters)
-    return {
-        "policy_code": policy_digest(entry.policy) or "",
-        **({"parameter_files": files} if files else {}),
-    }
-
-
+_REFERENCES = Path(__file__).with_name("references.json")
 _MOST_BYTES = 2**24
 
 
-def read_result(path: Path) -> BenchmarkResult:
-    """The result in a file. Raises InvalidInput for a file that holds none, is of another version
-    of the benchmark, or lacks worlds.
+def read_result(path: Path) -> BudgetResult:
+    """Read the result in a file. Raises InvalidInput for a file that holds none, is damaged, or is
+    of other budgets, counts or worlds than this version's.
     """
-    content = _content(path)
+    return result_of(_content(path), str(path))
+
+
+def is_result(path: Path) -> bool:
+    """Return whether a file is meant as a result; a file that cannot be read may have been one."""
     try:
-        result = _result(content)
-    except KeyError as error:
-        raise InvalidInput(f"{path} is damaged: {shown(error.args[0])} is missing") from error
-    except ValueError as error:
-        raise InvalidInput(f"{path} is damaged: {printable(str(error))}") from error
-    except (TypeError, OverflowError) as error:
-        # What Python says of a type is for nobody else.
+        content = _content(path)
+    except InvalidInput:
+        return True
+    return isinstance(content, dict) and BUDGET_MARK in content
+
+
+def _content(path: Path) -> Any:
+    try:
+        return json_content(path, _MOST_BYTES)
+    except (OSError, ValueError) as error:
+        reason = printable(getattr(error, "strerror", None) or str(error))
+        raise InvalidInput(f"{path} cannot be read: {reason}") from error
+
+
+def result_of(content: Any, origin: str) -> BudgetResult:
+    """Return the result that parsed JSON holds; `origin` names its place. Raises InvalidInput."""
+    if not isinstance(content, dict) or BUDGET_MARK not in content:
+        raise InvalidInput(f"{origin} holds no result of care-sim benchmark")
+    if content[BUDGET_MARK] != BUDGET_VERSION:
         raise InvalidInput(
-            f"{path} is damaged: it holds values of another kind than a result does"
-        ) from error
+            f"{origin} is of version {shown(content[BUDGET_MARK])} of the benchmark, and this is "
+            f"version {BUDGET_VERSION}: play it again"
+        )
     try:
-        _check_policy(result)
-        _check_worlds(result)
-    except InvalidInput as error:
-        raise InvalidInput(f"{path} {error}") from error
+        result = _parsed(content)
+    except KeyError as error:
+        raise InvalidInput(f"{origin} is damaged: {shown(error.args[0])} is missing") from error
+    except (InvalidInput, ValueError) as error:
+        raise InvalidInput(f"{origin} is damaged: {printable(str(error))}") from error
+    except (TypeError, OverflowError) as error:
+        # Python's own words about types help nobody.
+        raise InvalidInput(f"{origin} is damaged: it holds values of another kind") from error
+    for check in (_check_policy, _check_worlds):
+        try:
+            check(result)
+        except InvalidInput as error:
+            raise InvalidInput(f"{origin} {error}") from error
     return result
 
 
-def _content(path: Path) -> dict[str, Any]:
-    """What a file of this version of the benchmark holds."""
-    try:
-        content = json_content(path, _MOST_BYTES)
-    except json.JSONDecodeError as error:
-        raise InvalidInput(f"{path} is cut off or no JSON: {error}") from error
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InvalidInput(f"{path} cannot be read: {reason}") from error
-    if not is_result(content):
-        raise InvalidInput(f"{path} holds no result of care-sim benchmark")
-    version = content[RESULT_MARK]
-    if version != BENCHMARK_VERSION:
-        raise InvalidInput(
-            f"{path} is of version {shown(version)} of the benchmark, this care-sim scores version "
-            f"{BENCHMARK_VERSION}: play it again with care-sim benchmark --policy "
-            f"{content.get('policy', 'NAME')}"
-        )
-    return dict(content)
-
-
-def is_result(content: object) -> bool:
-    """Whether a file of this content is meant as a result."""
-    return isinstance(content, dict) and RESULT_MARK in content
-
-
-def _result(content: Mapping[str, Any]) -> BenchmarkResult:
-    """The result as it is told. Raises KeyError, TypeError or ValueError where it is damaged."""
-    if content["columns"] != list(ResultRow._fields):
-        raise ValueError("its columns are others")
+def _parsed(content: Mapping[str, Any]) -> BudgetResult:
+    """Return the result. Raises KeyError, TypeError, ValueError or InvalidInput where damaged."""
+    if content["columns"] != list(BudgetRow._fields) or content["budgets"] != list(BUDGETS):
+        raise ValueError(f"its budgets must be {BUDGETS}, its columns {BudgetRow._fields}")
     given = with_tuples({"given": content["parameters"]})["given"]
-    texts = content["policy"], content["cell_order"], content.get("label", "")
+    texts = content["policy"], content["cell_order"], content["label"], content["detector"]
     if not all(isinstance(text, str) for text in texts):
-        raise ValueError("policy, cell_order and label must be texts")
-    policy, order, label = texts
+        raise ValueError("policy, cell_order, label and detector must be texts")
+    policy, order, label, detector = texts
     entry = Entry(policy, tuple((str(name), value) for name, value in given), order, label)
     entry.check()
-    if not isinstance(content["made_by"], dict):
-        raise ValueError("made_by must be a table of names and values")
-    return BenchmarkResult(
+    rows = tuple(_row(*values) for values in content["rows"])
+    for part in dict.fromkeys(row.part for row in rows):
+        if content["counts"].get(part) != list(COUNTS.get(part, ())):
+            raise ValueError(f"its counts of {shown(part)} must be {COUNTS.get(part, ())}")
+    sealed = content.get("sealed")
+    result = BudgetResult(
         entry,
         tuple(map(str, content["tags"])),
-        tuple(_row(values) for values in content["rows"]),
+        detector,
+        rows,
         bool(content["quick"]),
-        None if content["sealed"] is None else str(content["sealed"]),
         dict(content["made_by"]),
+        None if sealed is None else str(sealed),
+        tuple(map(float, content.get("policy_ms", ()))),
     )
+    # The shapes and numbers of rows are checked where their counts are made.
+    if not result.counts:
+        raise ValueError("it has no rows")
+    return result
 
 
-def _row(values: Any) -> ResultRow:
-    if not (isinstance(values, list) and len(values) == len(ResultRow._fields)):
-        raise ValueError(f"a row must be a list of {', '.join(ResultRow._fields)}")
-    row = ResultRow(*values)
-    counts = row.world, row.reached, row.reachable
-    if not all(isinstance(text, str) for text in (row.part, row.camera, row.hash)):
-        raise ValueError(f"a row must name its part, camera and hash, got {shown(values)}")
-    if not all(type(count) is int and 0 <= count <= LARGEST_INTEGER for count in counts):
-        raise ValueError(f"a row must hold whole numbers, got {shown(values)}")
-    if row.reached > row.reachable or not row.reachable:
-        raise ValueError(f"a row must reach at most what there is, got {shown(values)}")
-    return row
+def _row(part: Any, world: Any, full: Any, got: Any) -> BudgetRow:
+    if not (isinstance(part, str) and isinstance(world, int | str)):
+        raise ValueError("a row must name its part and its world")
+    return BudgetRow(part, world, tuple(full), tuple(map(tuple, got)))
 
 
-def _check_policy(result: BenchmarkResult) -> None:
+def _check_policy(result: BudgetResult) -> None:
     """Raise InvalidInput for unknown tags or an unknown order of cells, and for tags and parameters
     that a built-in policy does not have.
     """
@@ -326,42 +138,51 @@ def _check_policy(result: BenchmarkResult) -> None:
             raise InvalidInput(f"cannot be played: {error}") from error
 
 
-def _check_worlds(result: BenchmarkResult) -> None:
-    """Raise InvalidInput unless the result is of exactly the worlds that it should be of."""
-    if result.sealed is None:
-        worlds = quick_tenth(published_worlds()) if result.quick else published_worlds()
-        due = [(world.part, world.number, world.reachable) for world in worlds]
-    else:
-        # Which they are the salt alone tells; there are as many, the same under every camera, each
-        # once and in the order in which the salt draws them.
-        due = [*result.worlds]
-        if Counter(part for part, _, _ in due) != SIZES:
-            raise InvalidInput(f"lacks sealed worlds: there are {SIZES}")
-        for (part, number, _), (following, later, _) in pairwise(due):
-            if part == following and number >= later:
-                raise InvalidInput(
-                    f"is no sealed result: the numbers of sealed worlds must ascend, got {later} "
-                    f"after {number} in the {part}"
-                )
-    expected = [
-        (part, camera, number, most)
-        for part in PARTS
-        for camera in CAMERAS
-        for own, number, most in due
-        if own == part
-    ]
-    there = [(row.part, row.camera, row.world, row.reachable) for row in result.rows]
-    if there == expected:
-        return
-    version = f"version {BENCHMARK_VERSION} of the benchmark"
-    missing = len({*expected} - {*there})
-    # A file that has lost rows holds no others.
-    wrong = (
-        f"lacks {missing:,} of the {counted(len(expected), 'row')} of {version}"
-        if missing and {*there} <= {*expected}
-        else f"holds other worlds than {version}"
-    )
-    trial = " --quick" if result.quick else ""
-    raise InvalidInput(
-        f"{wrong}: play it again with care-sim benchmark{trial} --policy {result.entry.policy}"
-    )
+def _check_worlds(result: BudgetResult) -> None:
+    """Raise InvalidInput unless the worlds are all that are published, drawn afresh, or sealed. A
+    choice among them would favour the entry.
+    """
+    by_part: dict[str, list[Any]] = {}
+    for part, world in result.worlds:
+        by_part.setdefault(part, []).append(world)
+    for part, worlds in by_part.items():
+        if len({*worlds}) < len(worlds):
+            raise InvalidInput(f"holds a world of the {part} twice")
+    published: Mapping[str, Sequence[Any]] = budget_worlds(result.quick, closed_loop=True)
+    if result.sealed:
+        published = {STREETS: range(len(by_part.get(STREETS, ())))}
+    elif is_fresh(result):
+        published = {STREETS: by_part[STREETS]}
+    for part, due in published.items():
+        if part in by_part and by_part[part] != [*due]:
+            raise InvalidInput(
+                f"holds other {part} than the {counted(len(due), 'world')} of the benchmark: play "
+                f"it again with care-sim benchmark --policy {result.entry.policy}"
+            )
+
+
+def is_fresh(result: BudgetResult) -> bool:
+    """Return whether the result is of streets that `--fresh` drew."""
+    streets = [world for part, world in result.worlds if part == STREETS]
+    return bool(streets) and all(world in FRESH for world in streets)
+
+
+def references(detector: str, worlds: Sequence[tuple[str, int | str]]) -> list[BudgetResult]:
+    """Return the published entries in these worlds under a detector; none without such plays."""
+    listed = parsed_json(_REFERENCES.read_text(encoding="utf-8"))
+    results = [result_of(content, _REFERENCES.name) for content in listed]
+    cut = (result.cut_to(worlds) for result in results if result.detector == detector)
+    return [result for result in cut if result]
+
+
+def with_references(results: Sequence[BudgetResult]) -> list[BudgetResult]:
+    """Return results of the same worlds and detector with the other published entries there."""
+    own = {result.entry.full_name for result in results}
+    published = [] if results[0].sealed else references(results[0].detector, results[0].worlds)
+    return [*results, *(each for each in published if each.entry.full_name not in own)]
+
+
+def publish_references(results: Sequence[BudgetResult]) -> None:
+    """For maintainers: make these the published entries."""
+    listed = ",\n".join(json.dumps(result.content()) for result in results)
+    write_text(_REFERENCES, f"[\n{listed}\n]\n")

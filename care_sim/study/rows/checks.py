@@ -15,6 +15,7 @@ from care_sim.study.results_formats import UNREAD, is_parameter
 from care_sim.study.rows.reading import setting_of
 from care_sim.study.rows.schema import Schema
 from care_sim.study.run_config import Row
+from care_sim.study.scene_play import DECISION_MS
 
 USUAL = DEFAULTS | {"presence": ANNOTATED}
 """Parameters of a row that does not name them: rows of older versions lack what was added since."""
@@ -24,7 +25,7 @@ _LABEL_NAMES = ("scene", "scenario", "policy", "budget")
 _LABEL_SEEDS = ("seed", "floor_seed")
 _MAY_DIFFER = {
     # Who played it and how fast.
-    *("version", "digest", "wall_s", "peak_rss_mb"),
+    *("version", "digest", "wall_s", "peak_rss_mb", *DECISION_MS),
     # What was worked out beside the other rows of its folder.
     *("tags", "regret_m", "censored", "differing_keyframes", "differing_cells"),
 }

@@ -1,0 +1,47 @@
+"""Who made a result: code, libraries and machine, as its file names them and as they are here."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from care_sim.base.errors import printable
+from care_sim.study.benchmark.suite import Entry
+from care_sim.study.provenance import code_digest, machine, policy_digest, versions
+from care_sim.study.run_config import files_in
+
+MadeBy = Mapping[str, Any]
+
+
+def made_by(entry: Entry) -> dict[str, Any]:
+    """Return what makes the results of an entry here."""
+    return {"versions": versions(), **_own_code(entry), "machine": machine()}
+
+
+def own_code_of(maker: MadeBy) -> str:
+    """Return the hashes of the policy's code and files that a result names, as one text."""
+    return f"{maker.get('policy_code', '')} {maker.get('parameter_files', [])}"
+
+
+def elsewhere(entry: Entry, maker: MadeBy) -> str:
+    """Return in words what made a result of the entry, and an empty text if all of it is here."""
+    if maker == made_by(entry):
+        return ""
+    versions_there, there = (maker.get(name) for name in ("versions", "machine"))
+    code = versions_there.get("code") if isinstance(versions_there, dict) else ""
+    processor = printable(str(there.get("processor", ""))) if isinstance(there, dict) else ""
+    is_of_this_code = code == code_digest() and all(
+        maker.get(name) == value for name, value in _own_code(entry).items()
+    )
+    by = "other libraries or another system" if is_of_this_code else "other code"
+    on = f", on {processor}" if processor not in ("", machine()["processor"]) else ""
+    return f"by {by} than here{on}"
+
+
+def _own_code(entry: Entry) -> dict[str, Any]:
+    """Return hashes of the policy's own code, empty for a built-in one, and of the files that its
+    parameters name.
+    """
+    files = files_in(entry.parameters)
+    return {
+        "policy_code": policy_digest(entry.policy) or "",
+        **({"parameter_files": files} if files else {}),
+    }

@@ -1,0 +1,81 @@
+"""Replay of results: whether a file is what its policy does, by a tenth of its worlds."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from random import Random
+from typing import Any
+
+import numpy as np
+
+from care_sim.base.errors import InvalidInput
+from care_sim.policies import tags_of
+from care_sim.study.benchmark.budgets import BudgetResult, budget_tasks, play_budgets
+from care_sim.study.benchmark.maker import made_by
+from care_sim.study.benchmark.play import Player
+from care_sim.study.benchmark.suite import FIRST_SEED, STREETS, Salt
+
+ONE_IN = 10
+"""One world in so many is played again."""
+ROUNDING = 0.01
+"""What another machine or library may move the sum of a count by, as a share of the full scan's: it
+rounds the last bit of a direction otherwise, and fires other cells."""
+
+
+@dataclass(frozen=True)
+class Replay:
+    """The number of worlds that were played again, those with other counts, the largest move of the
+    sum of a count as a share of the full scan's, and what else is false in the file.
+    """
+
+    played: int
+    differing: tuple[tuple[str, int | str], ...]
+    moved: float
+    false: tuple[str, ...]
+
+
+def replayed(result: BudgetResult, player: Player, rng: Random, salt: Salt | None = None) -> Replay:
+    """Play a random tenth of the worlds of a result again.
+
+    A world differs where any count differs. By the code, libraries and machine that the file names
+    every difference is false; by others, differences that move a sum by more than `ROUNDING` are.
+
+    Raises InvalidInput for a sealed result without its salt, and where a play fails.
+    """
+    if result.sealed != (salt.digest if salt else None):
+        of = f"sealed by the salt {result.sealed[:12]}" if result.sealed else "published or fresh"
+        raise InvalidInput(f"its worlds are {of}: give --sealed the file of that salt, or none")
+    # A policy that cannot be loaded here has its line before anything is played.
+    budget_tasks(result.entry, STREETS, [FIRST_SEED], result.detector)[0][-1].try_out()
+    drawn = result.cut_to(rng.sample(result.worlds, -(-len(result.rows) // ONE_IN)))
+    assert drawn is not None
+    worlds: dict[str, list[Any]] = {}
+    for part, world in sorted(drawn.worlds, key=result.worlds.index):
+        worlds.setdefault(part, []).append(world)
+    found = play_budgets([result.entry], player, result.detector, worlds, salt=salt)
+    if player.failures:
+        raise InvalidInput(str(player.failures[0]))
+    (again,) = found
+    told = result.cut_to(again.worlds)
+    assert told is not None
+    pairs = zip(told.rows, again.rows, strict=True)
+    differing = tuple((one.part, one.world) for one, other in pairs if one != other)
+    moved = _moved(told, again)
+    is_false = moved > ROUNDING or (differing and result.made_by == made_by(result.entry))
+    false = [f"{len(differing)} of {len(told.rows)} worlds have other counts"] if is_false else []
+    return Replay(len(told.rows), differing, moved, (*_false_tags(result), *false))
+
+
+def _moved(told: BudgetResult, again: BudgetResult) -> float:
+    moves = [0.0]
+    for one, other in zip(told.counts, again.counts, strict=True):
+        full = np.maximum(one.full.sum(axis=0), 1.0)
+        for mine, theirs in ((one.full, other.full), (one.got, other.got)):
+            moves.append(float(np.max(np.abs(mine.sum(axis=0) - theirs.sum(axis=0)) / full)))
+    return max(moves)
+
+
+def _false_tags(result: BudgetResult) -> Sequence[str]:
+    tags = tags_of(result.entry.policy)
+    if {*tags} == {*result.tags}:
+        return []
+    return [f"it says that the policy is {', '.join(result.tags)}, and it is {', '.join(tags)}"]
