@@ -1,8 +1,9 @@
 """Play published studies again with the code of today, and replace their rows: `make publish`.
 
-Every folder of `results/data` is played by the command in its `config.json`, in a folder per code
-and study below `--work`. A study keeps a journal there, so the same line resumes after an
-interrupt. A folder that the code of today has played stays as it is.
+Every folder of `results/data` is played by the command in its `config.json`, and `b90` entry by
+entry (`tests.publish.entries`), in a folder per code and study below `--work`. A study keeps a
+journal there, so the same line resumes after an interrupt. A folder that the code of today has
+played stays as it is.
 """
 
 import argparse
@@ -24,6 +25,7 @@ from care_sim.base.limits import WORKERS
 from care_sim.study.provenance import code_digest
 from tests.golden.published import cells_of, folders, read_golden, write_golden
 from tests.helpers.places import EXAMPLES, PUBLISHED, ROOT, loaded
+from tests.publish import entries
 
 CONFIG, TABLES = "config.json", "tables.md"
 ROWS = ("episodes.parquet", "plays.parquet", "vehicle.parquet")
@@ -42,7 +44,9 @@ SHOWN = 60
 def main(arguments=None):
     """Publish folders; 1 where one of them was not published."""
     parser = argparse.ArgumentParser(prog="make publish", description=__doc__.partition("\n")[0])
-    parser.add_argument("folders", nargs="*", help="of results/data, in this order; else all")
+    parser.add_argument(
+        "folders", nargs="*", help="of results/data, in this order; else all but b90"
+    )
     parser.add_argument("--data", type=Path, help="holds the recordings: " + str(RECORDINGS))
     parser.add_argument("--work", type=Path, default=ROOT / "runs" / "publish")
     parser.add_argument("--workers", type=int, default=WORKERS)
@@ -51,12 +55,14 @@ def main(arguments=None):
     code = code_digest()
     refused = 0
     for folder in map(PUBLISHED.joinpath, given.folders) if given.folders else by_cost():
-        if json.loads((folder / CONFIG).read_text())["versions"]["code"] == code:
+        made = given.work.resolve() / code / folder.name
+        if folder == entries.FOLDER:
+            refused |= entries_anew(made, given.workers)
+        elif json.loads((folder / CONFIG).read_text())["versions"]["code"] == code:
             print(f"{folder.name}: published with this code")
         elif given.list:
             print(f"{folder.name}: {len(rows(folder)):,} rows, {seconds(folder) / 60:.1f} minutes")
         else:
-            made = given.work.resolve() / code / folder.name
             fault = played(folder, made, given.data, given.workers) or published(folder, made)
             refused |= bool(fault)
             print(fault or f"{folder.name}: published", flush=True)
@@ -85,16 +91,37 @@ def played(folder, out, data, workers):
         return f"{folder.name}: not published, give --data with the folder of its recordings"
     print(f"{folder.name}: {shlex.join(words)}", flush=True)
     began = time.monotonic()
+    ended = run([*words, "--out", out, "--workers", str(workers)])
+    print(f"{folder.name}: {(time.monotonic() - began) / 60:.1f} minutes")
+    return ended and f"{folder.name}: not published, it ended with {ended}"
+
+
+def run(words):
+    """Run a command of this tree, whatever it prints; returns how it ended."""
     # Policies of examples are files of the folder that the command is run in.
-    done = subprocess.run(
-        [sys.executable, "-m", *words, "--out", out, "--workers", str(workers)],
+    return subprocess.run(
+        [sys.executable, "-m", *words],
         cwd=EXAMPLES,
         env=os.environ | {"PYTHONPATH": str(ROOT)},
         stdout=subprocess.DEVNULL,
         check=False,
-    )
-    print(f"{folder.name}: {(time.monotonic() - began) / 60:.1f} minutes")
-    return done.returncode and f"{folder.name}: not published, it ended with {done.returncode}"
+    ).returncode
+
+
+def entries_anew(made, workers):
+    """Play and publish the entries of the benchmark; 1 where one was not played."""
+    for words in entries.commands():
+        print(f"b90: {shlex.join(words)}", flush=True)
+        if ended := run([*words, "--out", made, "--workers", str(workers)]):
+            print(f"b90: not published, it ended with {ended}")
+            return 1
+    print(*entries.publish_entries(made), sep="\n")
+    if ended := run(["care_sim", "leaderboard", "--out", made]):
+        print(f"b90: its page is not published, care-sim leaderboard ended with {ended}")
+        return 1
+    for name in ("leaderboard.md", "leaderboard.svg"):
+        entries.copy_to_folder(made / name)
+    return 0
 
 
 def words_of(command, data):
