@@ -18,9 +18,9 @@ configurations, seeds, versions, a hash of the code, the machine. `care-sim repo
 tables and figures again. [How to read the rows](../../docs/rows.md).
 
 Beside them lie `b90`, the result files of the [benchmark](../b90.md)
-(`care-sim benchmark --policy NAME`), `judge-streets` and `judge-logs`, what `care-sim judge` says
-of [detectors](../detectors.md), and `bench.json` and `parity.json`, of `make bench` and `make
-parity`.
+(`python docs/b90_results.py`; folders in it are of other detectors), `judge-streets` and
+`judge-logs`, what `care-sim judge` says of [detectors](../detectors.md), and `bench.json` and
+`parity.json`, of `make bench` and `make parity`.
 
 The column *version* names the version of CARE-Sim that played the rows. Version 0.3.0 draws another
 random floor, so rows of earlier versions differ from what their commands play today. `make publish`

@@ -13,11 +13,13 @@ from care_sim.commands.shared.console import TableConsole
 from care_sim.commands.shared.entries import entries_of
 from care_sim.commands.shared.selection import check_values
 from care_sim.policies.isolation import isolated_policies
-from care_sim.reports.budgets import budgets_table
+from care_sim.reports.budgets import budget_tables
 from care_sim.reports.figures.budgets import BUDGETS_FIGURE, budgets_figure
 from care_sim.reports.figures.styles import check_figure, save
+from care_sim.reports.recorded import sources_table
 from care_sim.study.benchmark.budgets import Worlds, budget_tasks, budget_worlds, play_budgets
 from care_sim.study.benchmark.play import player_in
+from care_sim.study.benchmark.recorded import recorded_drives
 from care_sim.study.benchmark.result import with_references
 from care_sim.study.benchmark.suite import STREETS, Entry, Salt, fresh_seeds
 from care_sim.study.executors import processes
@@ -30,12 +32,13 @@ def benchmark(options: Benchmark) -> int:
     """Play all budgets; write a result file per policy, a table and a figure."""
     check_values(options, "policy")
     salt = Salt.read(options.sealed) if options.sealed else None
+    worlds = _worlds(options)
 
     def first_tasks(entry: Entry) -> Sequence[RunConfig]:
         # One world of every part is enough to see whether a policy can be made.
         return [
-            budget_tasks(entry, part, seeds[:1], options.detector)[0][-1]
-            for part, seeds in budget_worlds(options.quick, options.closed_loop).items()
+            budget_tasks(entry, part, own[:1], options.detector)[0][-1]
+            for part, own in worlds.items()
         ]
 
     entries, left_out = entries_of(options, first_tasks)
@@ -46,7 +49,6 @@ def benchmark(options: Benchmark) -> int:
         check_output(path, JSON)
     check_figure(figure)
     print_lines(f"Results go to {options.out}", file=sys.stderr)
-    worlds = _worlds(options)
     with player_in(options.out, options.workers, processes) as player:
         results = play_budgets(entries, player, options.detector, worlds, options.quick, salt)
     for result in results:
@@ -54,7 +56,8 @@ def benchmark(options: Benchmark) -> int:
     if results:
         shown = with_references(results)
         save(budgets_figure(shown), figure)
-        TableConsole().print(budgets_table(shown).rich())
+        sources = [sources_table(shown)] if options.recorded else []
+        TableConsole().print(*(table.rich() for table in [*budget_tables(shown), *sources]))
         print_lines(*(f"Result: {files[result.entry]}" for result in results))
         print_lines(f"Figure: {figure}.svg")
     failed = [f"failed: {line}" for line in by_reason(player.failures, "plays")]
@@ -65,7 +68,8 @@ def benchmark(options: Benchmark) -> int:
 def _worlds(options: Benchmark) -> Worlds:
     if options.fresh:
         return {STREETS: fresh_seeds(options.out, options.fresh)}
-    worlds = budget_worlds(options.quick, options.closed_loop)
+    drives = recorded_drives(options.recorded)
+    worlds = budget_worlds(options.quick, options.closed_loop, drives, options.without_streets)
     # Sealed worlds are numbers, from which the salt draws seeds.
     return {STREETS: [*range(len(worlds[STREETS]))]} if options.sealed else worlds
 
@@ -75,6 +79,8 @@ def _kind(options: Benchmark) -> str:
     marks = {
         "quick": options.quick,
         "closed-loop": options.closed_loop,
+        "recorded": options.recorded,
+        "without-streets": options.without_streets,
         f"fresh-{options.fresh}": options.fresh,
         "sealed": options.sealed,
     }

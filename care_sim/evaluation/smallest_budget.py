@@ -11,7 +11,8 @@ or above, at every budget that was played. B90 is `BUDGETS[0]` where that holds 
 budget on ("at most"), and infinite where it does not hold at the largest one ("never").
 
 Intervals are over worlds: 10,000 times as many worlds are drawn with replacement, part by part. All
-entries of the same worlds meet the same draws, so that a ratio of two entries is paired.
+entries of the same worlds meet the same draws, so that a ratio of two entries is paired. Draws of a
+part with fewer than `LEAST_WORLDS` say little: tables then print no interval (`has_interval`).
 """
 
 from collections.abc import Sequence
@@ -32,6 +33,8 @@ ENOUGH = 0.90
 """The share of a full scan's count that is enough."""
 MORE_STOPS = 0.05
 """Needless stops per world that an entry may have more than the full scan."""
+LEAST_WORLDS = 5
+"""Worlds of a part from which on an interval is printed."""
 _ROUNDING = 1e-9
 """What rounding may take off a share of exactly 90%."""
 
@@ -78,6 +81,11 @@ class SmallestBudget(NamedTuple):
 def names_of(counts: Counts) -> tuple[str, ...]:
     """Return the names of all counts, in the order of the arrays of this module."""
     return tuple(name for part in counts for name in part.names)
+
+
+def has_interval(counts: Counts) -> bool:
+    """Whether every part has worlds enough for an interval over worlds."""
+    return all(len(part.full) >= LEAST_WORLDS for part in counts)
 
 
 def shares(counts: Counts) -> Floats:

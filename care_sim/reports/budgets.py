@@ -1,14 +1,16 @@
-"""The table of B90: how few cells each entry needs, and which count holds it back."""
+"""The tables of B90: how few cells each entry needs, and which count holds it back."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import isinf
 
 from care_sim.base.errors import counted
 from care_sim.evaluation.smallest_budget import (
     BUDGETS,
     ENOUGH,
+    LEAST_WORLDS,
     budget_ratio,
+    has_interval,
     names_of,
     ratio_interval,
     reaching,
@@ -21,13 +23,27 @@ from care_sim.study.run_config import FULL
 
 YARDSTICK = "care-sector"
 """The entry by whose B90 those of all others are divided."""
-_NOTES = (
+NOTE = (
     f"Cells needed for {ENOUGH:.0%} of what a full scan has, in % of all cells; B90 is for all "
-    "counts. Intervals are over worlds.",
-    "Tied entries share ranks, such as 1-3: the interval of their paired ratio includes 1.",
+    "counts."
 )
+"""What the numbers are."""
+_INTERVALS = "Intervals are over worlds."
+_NO_INTERVAL = f"Fewer than {LEAST_WORLDS} worlds carry no interval."
+_TIED = "Tied entries share ranks, such as 1-3: the interval of their paired ratio includes 1."
 _TIMED = "ms: p50 / p99 of a decision of the policy on streets, on the machine of its file."
 _TRIAL = "A trial on the streets that --quick plays."
+
+
+def budget_tables(results: Sequence[BudgetResult]) -> list[Table]:
+    """Return the tables of results of the same worlds: of several parts one of all parts side by
+    side, and then the counts of every part.
+    """
+    parts = results[0].parts
+    if len(parts) == 1:
+        return [budgets_table(results)]
+    each = [budgets_table([one.of_part(part) for one in results]) for part in parts]
+    return [parts_table(results), *each]
 
 
 def budgets_table(results: Sequence[BudgetResult]) -> Table:
@@ -36,36 +52,64 @@ def budgets_table(results: Sequence[BudgetResult]) -> Table:
     A line has the rank, what each count alone needs, the ratio to `YARDSTICK` and the time of a
     decision, where results have these. All results must be of the same worlds.
     """
+
+    def cells(one: BudgetResult) -> TableRow:
+        return one.score.held_back_by, *map(format_budget, reaching(one.counts))
+
+    return _table(results, ("held back by", *names_of(results[0].counts)), cells)
+
+
+def parts_table(results: Sequence[BudgetResult]) -> Table:
+    """Return a table as `budgets_table` does, with B90 of every part alone in place of the
+    counts.
+    """
+
+    def cells(one: BudgetResult) -> TableRow:
+        alone = {part: one.of_part(part) for part in one.parts}
+        worst = max(alone, key=lambda part: alone[part].score.budget)
+        last = f"{worst}: {alone[worst].score.held_back_by}"
+        return last, *(format_smallest(own) for own in alone.values())
+
+    return _table(results, ("held back by", *results[0].parts), cells)
+
+
+def _table(
+    results: Sequence[BudgetResult],
+    columns: TableRow,
+    cells: Callable[[BudgetResult], TableRow],
+) -> Table:
     yardstick = next((each for each in results if each.entry.name == YARDSTICK), None)
     is_timed = any(each.policy_ms for each in results)
     ordered = sorted_by_budget(results)
     ranks = _ranks(ordered)
     rows: list[TableRow] = []
     for name, each in zip(names_in(ordered), ordered, strict=True):
-        budget, low, high = map(format_budget, each.score[:3])
         rows.append(
             (
                 ranks.get(id(each), ""),
                 name,
-                f"{budget} [{low}, {high}]",
-                each.score.held_back_by,
-                *map(format_budget, reaching(each.counts)),
-                *([] if yardstick is None else [_ratio(each, yardstick)]),
+                format_smallest(each),
+                *cells(each),
+                *([] if yardstick is None else [_ratio_cell(each, yardstick)]),
                 *([" / ".join(f"{value:.1f}" for value in each.policy_ms)] if is_timed else []),
             )
         )
     last = () if yardstick is None else (f"times {YARDSTICK}",)
-    columns = ("rank", "policy", "B90", "held back by", *names_of(results[0].counts), *last)
-    notes = (*_NOTES, *((_TIMED,) if is_timed else ()))
-    notes += (_TRIAL,) if any(each.quick for each in results) else ()
     return Table(
         f"How few cells are enough: B90, {_worlds(results[0])}, {results[0].detector}",
-        (*columns, *(("ms",) if is_timed else ())),
+        ("rank", "policy", "B90", *columns, *last, *(("ms",) if is_timed else ())),
         tuple(rows),
-        (*notes, *tag_notes(each.tags for each in results)),
+        (*_notes(results, is_timed), *tag_notes(each.tags for each in results)),
         whole=("rank", "B90"),
         names=2,
     )
+
+
+def _notes(results: Sequence[BudgetResult], is_timed: bool) -> list[str]:
+    intervals = _INTERVALS if has_interval(results[0].counts) else _NO_INTERVAL
+    is_trial = any(each.quick for each in results)
+    notes = {f"{NOTE} {intervals}": True, _TIED: True, _TIMED: is_timed, _TRIAL: is_trial}
+    return [note for note, is_due in notes.items() if is_due]
 
 
 def sorted_by_budget(results: Sequence[BudgetResult]) -> list[BudgetResult]:
@@ -100,9 +144,18 @@ def _ranks(ordered: Sequence[BudgetResult]) -> dict[int, str]:
 
 
 def _worlds(result: BudgetResult) -> str:
+    """Return the number of worlds, and of which parts they are."""
     kind = f" sealed by {result.sealed[:12]}" if result.sealed else ""
     fresh = "fresh " if not kind and is_fresh(result) else ""
-    return f"{counted(len(result.rows), f'{fresh}world')}{kind}"
+    sizes = [f"{part} {len(result.of_part(part).rows)}" for part in result.parts]
+    parts = ", ".join(sizes) if len(sizes) > 1 else result.parts[0]
+    return f"{counted(len(result.rows), f'{fresh}world')}{kind} ({parts})"
+
+
+def format_smallest(result: BudgetResult) -> str:
+    """Format B90 of a result, with its interval where there are worlds enough for one."""
+    budget, low, high = map(format_budget, result.score[:3])
+    return f"{budget} [{low}, {high}]" if has_interval(result.counts) else budget
 
 
 def format_budget(budget: float) -> str:
@@ -112,11 +165,18 @@ def format_budget(budget: float) -> str:
     return f"≤{100 * budget:.1f}" if budget <= BUDGETS[0] else f"{100 * budget:.1f}"
 
 
-def _ratio(result: BudgetResult, yardstick: BudgetResult) -> str:
-    if result is yardstick:
-        return ""
-    mean, low, high = budget_ratio(result.counts, yardstick.counts)
+def _ratio_cell(result: BudgetResult, yardstick: BudgetResult) -> str:
+    return "" if result is yardstick else format_ratio(result, yardstick)
+
+
+def format_ratio(ours: BudgetResult, theirs: BudgetResult) -> str:
+    """Format the ratio of two B90 with its interval, bold where the interval excludes 1."""
+    if all(isinf(one.score.budget) for one in (ours, theirs)):
+        return "both never"
+    mean, low, high = budget_ratio(ours.counts, theirs.counts)
+    if (isinf(mean) and isinf(low)) or not has_interval(ours.counts):
+        return "never" if isinf(mean) else f"{mean:.2f}"
     if isinf(mean):
-        return "never" if isinf(low) else f"never [{low:.2f}, never]"
+        return f"never [{low:.2f}, never]"
     text = f"{mean:.2f} [{low:.2f}, {'never' if isinf(high) else f'{high:.2f}'}]"
     return Bold(text) if low > 1 or high < 1 else text

@@ -9,9 +9,13 @@ import pytest
 from care_sim.base.seeds import FRESH
 from care_sim.evaluation.smallest_budget import BUDGETS
 from care_sim.study.benchmark import budgets
+from care_sim.study.benchmark import result as result_files
+from care_sim.study.benchmark.recorded import AHEAD
 from care_sim.study.benchmark.result import read_result
 from care_sim.study.benchmark.suite import STREETS, TESTS, Salt
+from tests.helpers import kitti_drive
 from tests.helpers.commands import run
+from tests.helpers.made_budgets import HALF_WAY, made_budgets
 from tests.helpers.places import ROOT
 
 PAGE = (ROOT / "docs" / "benchmark.md").read_text()
@@ -49,7 +53,7 @@ def test_a_policy_of_ones_own_gets_a_line(capsys, here, one_street):
     quick, whole, table, verify = TRANSCRIPT
     code, out, err = run(capsys, *quick)
     assert (code, "8 plays took" in err) == (0, True)
-    assert "B90, 1 world, centerpoint" in out
+    assert "B90, 1 world (streets), centerpoint" in out
     assert {*re.findall(r"^\d\S* +(\S+)", out, re.M)} >= {"corridor:Corridor", "care-sector"}
     folder = here / "runs" / "benchmark"
     path = folder / "corridor-Corridor.centerpoint.quick.json"
@@ -89,7 +93,7 @@ def test_drives_and_tests_count_collisions_and_needless_stops(
     monkeypatch.setattr(budgets, "EPISODES_PLAYED", {TESTS: 1})
     words = "--quick", "--closed-loop", "--workers", 1, "--detector", "returns"
     code, out, _ = run(capsys, "benchmark", "--policy", "boxes", *words)
-    assert (code, "B90, 2 worlds, returns" in out) == (0, True)
+    assert (code, "B90, 2 worlds (streets 1, tests 1), returns" in out) == (0, True)
     # Published entries play streets alone.
     assert "care-sector" not in out
     result = read_result(here / "runs" / "benchmark" / "boxes.returns.quick.closed-loop.json")
@@ -97,6 +101,33 @@ def test_drives_and_tests_count_collisions_and_needless_stops(
     assert (street.part, test.part, test.full) == (STREETS, TESTS, (1.0, 0.0))
     assert {len(counts) for counts in test.got} == {2}
     assert len(result.counts) == 2
+
+
+def test_recorded_drives_are_a_part_of_their_own(capsys, here, monkeypatch, tmp_path):
+    monkeypatch.setattr(result_files, "_REFERENCES", tmp_path / "references.json")
+    drives = ["kitti/0000", "kitti/0004"]
+    published = made_budgets("care-sector", HALF_WAY, recorded=drives)
+    result_files.publish_references([published])
+    for drive in ("0000", "0004"):
+        kitti_drive.write(here / "DATA", drive)
+    words = "--recorded", "kitti:DATA", "--without-streets", "--workers", 1
+    code, out, err = run(capsys, "benchmark", "--policy", "boxes", *words)
+    assert (code, "16 plays took" in err) == (0, True)
+    assert "B90, 2 worlds (recorded ahead), centerpoint" in out
+    assert "B90 on recorded drives by source" in out
+    # Fewer than five drives.
+    assert "carry no interval" in out
+    assert "[" not in out.partition("B90, 2 worlds")[2].partition("\n\n")[0]
+    assert "care-sector" in out
+    path = here / "runs/benchmark/boxes.centerpoint.recorded.without-streets.json"
+    result = read_result(path)
+    assert result.worlds == tuple((AHEAD, drive) for drive in drives)
+    assert "DATA" not in path.read_text()
+    row = result.rows[0]
+    # One person comes into view; two cars and a cyclist stand there from the first keyframe on.
+    assert row.full[0] > 0.5
+    assert row.full[2] > row.full[3] > 0
+    assert row.got[-1][2] <= row.full[2] * 1.1
 
 
 def test_others_cannot_reach_the_environment_and_one_that_throws_is_named(capsys, here, one_street):

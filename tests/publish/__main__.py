@@ -1,9 +1,8 @@
 """Play published studies again with the code of today, and replace their rows: `make publish`.
 
-Every folder of `results/data` is played by the command in its `config.json`, and `b90` entry by
-entry (`tests.publish.entries`), in a folder per code and study below `--work`. A study keeps a
-journal there, so the same line resumes after an interrupt. A folder that the code of today has
-played stays as it is.
+Every folder of `results/data` is played by the command in its `config.json`, and `b90` by
+`docs/b90_results.py`, in a folder per code and study below `--work`. A study keeps a journal there,
+so the same line resumes after an interrupt. A folder that the code of today has played stays.
 """
 
 import argparse
@@ -25,7 +24,6 @@ from care_sim.base.limits import WORKERS
 from care_sim.study.provenance import code_digest
 from tests.golden.published import cells_of, folders, read_golden, write_golden
 from tests.helpers.places import EXAMPLES, PUBLISHED, ROOT, loaded
-from tests.publish import entries
 
 CONFIG, TABLES = "config.json", "tables.md"
 ROWS = ("episodes.parquet", "plays.parquet", "vehicle.parquet")
@@ -56,8 +54,8 @@ def main(arguments=None):
     refused = 0
     for folder in map(PUBLISHED.joinpath, given.folders) if given.folders else by_cost():
         made = given.work.resolve() / code / folder.name
-        if folder == entries.FOLDER:
-            refused |= entries_anew(made, given.workers)
+        if folder.name == "b90":
+            refused |= b90_anew(made, given.data, given.workers)
         elif json.loads((folder / CONFIG).read_text())["versions"]["code"] == code:
             print(f"{folder.name}: published with this code")
         elif given.list:
@@ -97,10 +95,10 @@ def played(folder, out, data, workers):
 
 
 def run(words):
-    """Run a command of this tree, whatever it prints; returns how it ended."""
+    """Run Python with these words in this tree, whatever they print; returns how it ended."""
     # Policies of examples are files of the folder that the command is run in.
     return subprocess.run(
-        [sys.executable, "-m", *words],
+        [sys.executable, *words],
         cwd=EXAMPLES,
         env=os.environ | {"PYTHONPATH": str(ROOT)},
         stdout=subprocess.DEVNULL,
@@ -108,24 +106,18 @@ def run(words):
     ).returncode
 
 
-def entries_anew(made, workers):
-    """Play and publish the entries of the benchmark; 1 where one was not played."""
-    for words in entries.commands():
-        print(f"b90: {shlex.join(words)}", flush=True)
-        if ended := run([*words, "--out", made, "--workers", str(workers)]):
-            print(f"b90: not published, it ended with {ended}")
-            return 1
-    print(*entries.publish_entries(made), sep="\n")
-    if ended := run(["care_sim", "leaderboard", "--out", made]):
-        print(f"b90: its page is not published, care-sim leaderboard ended with {ended}")
+def b90_anew(made, data, workers):
+    """Play and publish the entries of the benchmark; 1 where recordings or plays are missing."""
+    if data is None:
+        print("b90: not published, give --data with the folder of its recordings")
         return 1
-    for name in ("leaderboard.md", "leaderboard.svg"):
-        entries.copy_to_folder(made / name)
-    return 0
+    recorded = [f"{kind}:{data.resolve() / name}" for kind, name in RECORDINGS.items()]
+    script = [ROOT / "docs" / "b90_results.py", "--recorded", *recorded, "boreas"]
+    return int(run([*script, "--plays", made, "--workers", str(workers)]) != 0)
 
 
 def words_of(command, data):
-    """The words of a published command for `python -m`; None where recordings are not at hand."""
+    """The words of a published command after `python`; None where recordings are not at hand."""
 
     def numbers(sequence):
         first, last = map(int, sequence.groups())
@@ -138,7 +130,7 @@ def words_of(command, data):
             if data is None or not (data / RECORDINGS[kind]).is_dir():
                 return None
             words[at] = f"{kind}:{(data / RECORDINGS[kind]).resolve()}"
-    return ["care_sim", *words[1:]]
+    return ["-m", "care_sim", *words[1:]]
 
 
 def published(folder, made):

@@ -1,19 +1,15 @@
 """Publishing anew: the command, what is replaced, what is printed."""
 
 import json
-import shutil
 from pathlib import Path
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from care_sim.study.benchmark import result
 from care_sim.study.provenance import code_digest
 from tests.golden import published as golden
-from tests.helpers.places import PUBLISHED
 from tests.publish import __main__ as publish
-from tests.publish import entries
 
 COMMAND = "care-sim sweep --policies care --scenarios dartout --budgets 0.1 --seeds $(seq 3 4)"
 
@@ -24,7 +20,7 @@ def test_a_command_gets_its_seeds_and_recordings(tmp_path):
     assert publish.words_of(line, None) is None
     assert publish.words_of(line, tmp_path / "elsewhere") is None
     assert publish.words_of(line, tmp_path) == [
-        *("care_sim", "protocol", "--source", f"kitti:{tmp_path.resolve()}/kitti-tracking"),
+        *("-m", "care_sim", "protocol", "--source", f"kitti:{tmp_path.resolve()}/kitti-tracking"),
         *("--seeds", "8", "9", "10", "--policies", "mine:Mine"),
     ]
 
@@ -95,38 +91,13 @@ def test_a_folder_is_played_again_and_replaced_whole(folder, tmp_path, capfd):
     assert capfd.readouterr().out == "tiny: published with this code\n"
 
 
-def test_every_entry_has_its_command():
-    given = [words[2:] for words in entries.commands()]
-    assert ["--policy", "care", "--cell-order", "core-spread"] in given
-    flags = ["--policy-parameters", "residual=False", "--cell-order", "as-demanded"]
-    assert ["--policy", "care-sector", *flags] in given
-    assert len({*map(tuple, given)}) == len(entries.REFERENCE_ENTRIES)
-
-
-def test_entries_are_replaced_together(tmp_path, monkeypatch):
-    folder, made = tmp_path / "b90", tmp_path / "made"
-    monkeypatch.setattr(entries, "FOLDER", folder)
-    monkeypatch.setattr(result, "_REFERENCES", tmp_path / "references.json")
-    shutil.copytree(PUBLISHED / "b90", folder)
-    made.mkdir()
-    for path in folder.glob("*.json"):
-        shutil.copy(path, made / f"{path.stem}.centerpoint.json")
-
-    # An entry that was not played: nothing is replaced.
-    history = made / "history.centerpoint.json"
-    content = json.loads(history.read_text())
-    history.unlink()
-    with pytest.raises(KeyError):
-        entries.publish_entries(made)
-
-    content["rows"][0][3][0][2] += 1
-    history.write_text(json.dumps(content))
-    told = entries.publish_entries(made)
-    assert "history: 1 of 80 rows differ" in told
-    assert "care: 0 of 80 rows differ" in told
-    assert (folder / "history.json").read_bytes() == history.read_bytes()
-    assert {path.name for path in folder.iterdir()} == {
-        path.name for path in (PUBLISHED / "b90").iterdir()
-    }
-    listed = json.loads((tmp_path / "references.json").read_text())
-    assert content["rows"] in [one["rows"] for one in listed]
+def test_b90_is_played_with_all_recordings(tmp_path, monkeypatch, capsys):
+    asked = []
+    monkeypatch.setattr(publish, "run", lambda words: asked.extend(map(str, words)) or 0)
+    assert publish.main(["b90"]) == 1
+    assert "give --data" in capsys.readouterr().out
+    assert publish.main(["b90", "--data", str(tmp_path), "--workers", "1"]) == 0
+    words = " ".join(asked)
+    recorded = [f"{kind}:{tmp_path.resolve()}/{name}" for kind, name in publish.RECORDINGS.items()]
+    assert f"docs/b90_results.py --recorded {' '.join(recorded)} boreas --plays " in words
+    assert words.endswith("b90 --workers 1")

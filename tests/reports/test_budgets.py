@@ -5,9 +5,11 @@ from dataclasses import replace
 import pytest
 
 from care_sim.evaluation.smallest_budget import BUDGETS
-from care_sim.reports.budgets import budgets_table, format_budget
+from care_sim.reports.budgets import budget_tables, budgets_table, format_budget
 from care_sim.reports.figures.budgets import budgets_figure
 from care_sim.reports.figures.leaderboard import leaderboard_figure
+from care_sim.reports.recorded import sources_table
+from care_sim.reports.table import Bold
 from care_sim.study.benchmark.suite import Entry
 from tests.helpers.made_budgets import ALWAYS, HALF_WAY, NEVER, made_budgets
 
@@ -69,7 +71,7 @@ def test_without_the_yardstick_there_are_no_ratios():
     table = budgets_table(RESULTS[:2])
     assert table.columns[-1] == "people kept"
     assert {len(row) for row in table.rows} == {len(table.columns)}
-    assert "80 worlds, centerpoint" in table.title
+    assert "80 worlds (streets), centerpoint" in table.title
 
 
 def test_a_trial_is_named_as_one():
@@ -83,6 +85,88 @@ def test_a_trial_is_named_as_one():
 )
 def test_budgets_in_percent(budget, text):
     assert format_budget(budget) == text
+
+
+DRIVES = [f"nuscenes/scene-{n:04d}" for n in range(5)]
+
+
+def test_parts_stand_side_by_side_and_the_worse_one_is_the_score():
+    results = [
+        made_budgets("care-sector", HALF_WAY, recorded=DRIVES),
+        made_budgets("tuned-place", ALWAYS, recorded=DRIVES, later=NEVER),
+        made_budgets("boxes", NEVER, recorded=DRIVES, later=ALWAYS),
+    ]
+    whole, streets, drives = budget_tables(results)
+    assert whole.columns[3:] == ("held back by", "streets", "recorded", "times care-sector")
+    assert [tuple(map(str, row[1:6])) for row in whole.rows] == [
+        ("care-sector", "2.4 [2.4, 2.4]", "streets: emerging", *["2.4 [2.4, 2.4]"] * 2),
+        (
+            "tuned-place",
+            "never [never, never]",
+            "recorded: emerging",
+            "≤0.5 [≤0.5, ≤0.5]",
+            "never [never, never]",
+        ),
+        (
+            "boxes",
+            "never [never, never]",
+            "streets: emerging",
+            "never [never, never]",
+            "≤0.5 [≤0.5, ≤0.5]",
+        ),
+    ]
+    assert "10 worlds (streets 5, recorded 5)" in whole.title
+    assert "5 worlds (recorded)" in drives.title
+    assert [row[1] for row in streets.rows] == ["tuned-place", "care-sector", "boxes"]
+    assert [row[1] for row in drives.rows] == ["boxes", "care-sector", "tuned-place"]
+
+
+def test_fewer_than_five_worlds_of_a_part_carry_no_interval():
+    results = [
+        made_budgets("care-sector", HALF_WAY, recorded=DRIVES[:4]),
+        made_budgets(PLAIN, (0.1, 0.2, 0.3, 0.8, 1.0, 1.0, 1.0), ALWAYS, recorded=DRIVES[:4]),
+    ]
+    whole, streets, drives = budget_tables(results)
+    assert [row[2] for row in whole.rows] == ["2.4", "3.9"]
+    assert whole.rows[1][-1] == "1.58"
+    assert not isinstance(whole.rows[1][-1], Bold)
+    assert whole.rows[0][4:6] == ("2.4 [2.4, 2.4]", "2.4")
+    assert [row[2] for row in streets.rows] == ["2.4 [2.4, 2.4]", "3.9 [3.9, 3.9]"]
+    told = "Fewer than 5 worlds carry no interval."
+    assert [told in table.notes[0] for table in (whole, streets, drives)] == [True, False, True]
+
+
+def test_recorded_drives_by_source():
+    names = [*(f"kitti/{n:04d}" for n in range(5)), *DRIVES[:2]]
+    early, late = ALWAYS, HALF_WAY
+    one = made_budgets("care", HALF_WAY, recorded=names, later=early)
+    two = made_budgets("boxes", HALF_WAY, recorded=names, later=late)
+    # In nuScenes alone the first one is late.
+    rows = tuple(
+        row._replace(got=other.got) if str(row.world).startswith("nuscenes") else row
+        for row, other in zip(one.rows, two.rows, strict=True)
+    )
+    table = sources_table([replace(one, rows=rows), two])
+    assert table.columns == ("policy", "all", "kitti", "nuscenes")
+    assert [row[0] for row in table.rows] == ["care", "boxes"]
+    assert [row[2:] for row in table.rows] == [
+        ("≤0.5 [≤0.5, ≤0.5]", "2.4"),
+        ("2.4 [2.4, 2.4]", "2.4"),
+    ]
+    # 5 drives have all, and 2 have 20% at 1% and 80% at 2%: 77 and 94% of all.
+    assert table.rows[0][1].startswith("1.7 [")
+    assert "nuscenes: 2 drives, a full scan has 16 emerging" in " ".join(table.notes)
+
+
+def test_a_figure_has_a_row_of_panels_per_part():
+    figure = budgets_figure([made_budgets("care", HALF_WAY, recorded=DRIVES, later=NEVER)])
+    assert len(figure.axes) == 8
+    assert [axes.get_ylabel() for axes in figure.axes[::4]] == [
+        "streets, % of a full scan's",
+        "recorded, % of a full scan's",
+    ]
+    heights = [axes.get_lines()[1].get_ydata()[-1] for axes in figure.axes[::4]]
+    assert heights == pytest.approx([100, 50])
 
 
 def test_every_count_has_a_panel_and_every_entry_a_curve():

@@ -13,7 +13,8 @@ from care_sim import cli
 from care_sim.core.defaults import AS_DEMANDED
 from care_sim.evaluation.smallest_budget import budget_ratio
 from care_sim.policies import BUILT_IN
-from care_sim.reports.budgets import budgets_table, format_budget
+from care_sim.reports.budgets import parts_table
+from care_sim.reports.recorded import sources_table
 from care_sim.study.benchmark.budgets import (
     MAIN_DETECTOR,
     REFERENCE_ENTRIES,
@@ -92,14 +93,20 @@ def test_the_first_page_names_scores_as_they_are(page):
 
 
 def test_the_table_of_b90_is_of_its_files_which_are_the_published_entries():
-    results = {one.entry: one for one in map(read_result, (DATA / "b90").glob("*.json"))}
-    assert {*results} == {*REFERENCE_ENTRIES}
-    ordered = [results[entry] for entry in REFERENCE_ENTRIES]
-    worlds = [(STREETS, seed) for seed in budget_worlds()[STREETS]]
-    assert [one.rows for one in references(MAIN_DETECTOR, worlds)] == [one.rows for one in ordered]
-    table = budgets_table(ordered).markdown()
+    script = loaded(ROOT / "docs" / "b90_results.py")
+    ordered = script.results_of(MAIN_DETECTOR)
+    results = {one.entry: one.of_part(STREETS) for one in ordered}
+    assert [*results] == [*REFERENCE_ENTRIES]
+    streets = tuple((STREETS, seed) for seed in budget_worlds()[STREETS])
+    assert {one.worlds for one in results.values()} == {streets}
+    assert [one.rows for one in references(MAIN_DETECTOR, ordered[0].worlds)] == [
+        one.rows for one in ordered
+    ]
+    assert (DATA / "b90" / "tables.md").read_text() == script.written()
     page = (FOLDER / "b90.md").read_text()
-    assert all(line in page for line in table.splitlines() if line.startswith("|"))
+    shown = [parts_table(ordered), sources_table(ordered), *script.statements()[1:]]
+    lines = [line for table in shown for line in table.markdown().splitlines()]
+    assert all(line in page for line in lines if line.startswith("|"))
     # Ratios to other entries than the table's, and what a full scan has.
     care, core_first, all_camera = (
         results[Entry(name, cell_order=order)].counts
@@ -113,8 +120,9 @@ def test_the_table_of_b90_is_of_its_files_which_are_the_published_entries():
         ratio, low, high = budget_ratio(core_first, other)
         assert np.isinf(high)
         assert f"{ratio:.2f} [{low:.2f}, never]" in page
-    emerging, entering, *_ = ordered[0].counts[0].full.sum(axis=0)
-    assert f"{emerging:.0f} emerging and {entering:.0f} entering newcomers" in page
+    for part in ordered[0].counts:
+        emerging, entering, *_ = part.full.sum(axis=0)
+        assert f"{emerging:.0f} emerging and {entering:.0f} entering newcomers" in page
 
 
 def test_the_page_of_the_leaderboard_is_that_of_the_published_entries(tmp_path, capsys):

@@ -5,8 +5,10 @@ import pytest
 from care_sim.base.seeds import split_of
 from care_sim.evaluation.smallest_budget import BUDGETS
 from care_sim.study.benchmark.budgets import budget_tasks, budget_worlds, counts_of
+from care_sim.study.benchmark.recorded import AHEAD, RECORDED, recorded_drives
 from care_sim.study.benchmark.suite import DRIVES, STREETS, TESTS, Entry
-from tests.helpers.made_budgets import HALF_WAY, made_budgets
+from tests.helpers import kitti_drive
+from tests.helpers.made_budgets import ALWAYS, HALF_WAY, NEVER, made_budgets
 
 
 def test_streets_are_test_seeds_and_a_trial_plays_the_first_of_them():
@@ -37,6 +39,47 @@ def test_a_world_is_played_by_the_full_scan_and_at_every_budget(part, latency):
         assert {config.detector for config in (full, *own)} == {"megvii"}
     scenes = [getattr(task[0], "scene", None) or task[0].seed for task in worlds]
     assert len({*scenes}) == 2
+
+
+def test_a_recorded_drive_is_played_as_a_street_is(tmp_path):
+    kitti_drive.write(tmp_path)
+    drives = recorded_drives([f"kitti:{tmp_path}", "boreas"])
+    assert [drive.name for drive in drives] == ["kitti/0000", "boreas/boreas-objects-v1"]
+    worlds = budget_worlds(recorded=drives, without_streets=True)
+    # KITTI labels what its front camera sees.
+    assert worlds == {RECORDED: drives[1:], AHEAD: drives[:1]}
+    assert [*budget_worlds(recorded=drives)] == [STREETS, RECORDED, AHEAD]
+    entry = Entry("care", cell_order="core-spread")
+    tasks = budget_tasks(entry, RECORDED, drives, "megvii")
+    assert [len(task) for task in tasks] == [1 + len(BUDGETS)] * 2
+    for drive, (full, *own) in zip(drives, tasks, strict=True):
+        assert {(config.source, config.scene) for config in (full, *own)} == {drive}
+        assert (full.policy, full.budget) == ("full", 1.0)
+        assert [config.budget for config in own] == [*BUDGETS]
+        assert {(each.policy, each.cell_order) for each in own} == {("care", "core-spread")}
+        assert {each.camera_profile for each in own} == {"kitti"}
+        assert {each.camera_latency_s for each in own} == {0.0}
+        assert {each.detector for each in (full, *own)} == {"megvii"}
+
+
+def test_drives_of_one_name_are_refused(tmp_path):
+    for folder in ("one", "other"):
+        kitti_drive.write(tmp_path / folder)
+    with pytest.raises(InvalidInput, match="kitti/0000 twice"):
+        recorded_drives([f"kitti:{tmp_path}/one", f"kitti:{tmp_path}/other"])
+    # A source that is given twice plays once.
+    assert len(recorded_drives([f"kitti:{tmp_path}/one"] * 2)) == 1
+
+
+def test_a_file_holds_streets_and_drives(tmp_path):
+    result = made_budgets("care", HALF_WAY, recorded=["kitti/0000", "boreas/b"], later=NEVER)
+    result.write(tmp_path / "mine.json")
+    assert read_budget_result(tmp_path / "mine.json") == result
+    content = json.loads((tmp_path / "mine.json").read_text())
+    assert [*content["counts"]] == ["streets", "recorded ahead", "recorded"]
+    assert content["b90_percent"][0] == "never"
+    assert result.of_part(STREETS).score.budget < 0.03
+    assert result.of_part(AHEAD).worlds == ((AHEAD, "kitti/0000"),)
 
 
 def test_entries_share_the_full_scan():

@@ -57,6 +57,11 @@ class Benchmark(WorkerOptions):
     closed_loop: Flag = False
     """Play drives and Euro NCAP tests too. Collisions avoided and needless stops then count as
     well."""
+    recorded: tuple[str, ...] = ()
+    """Play recorded drives too, as parts of their own. nuscenes:FOLDER, argoverse2:FOLDER,
+    kitti:FOLDER, boreas (comes with the package), or a source of your own."""
+    without_streets: Flag = False
+    """With --recorded: play no streets."""
     quick: Flag = False
     """Play the first 24 streets alone: a trial."""
     fresh: int = bounded(0, 0, _MOST_STREETS)
@@ -76,8 +81,12 @@ class Benchmark(WorkerOptions):
                 "fresh streets are neither the published nor sealed ones: remove quick and sealed",
             ),
             (
-                self.closed_loop and (self.fresh or self.sealed),
-                "fresh and sealed worlds are streets alone: remove closed_loop",
+                (self.closed_loop or self.recorded) and (self.fresh or self.sealed),
+                "fresh and sealed worlds are streets alone: remove closed_loop and recorded",
+            ),
+            (
+                self.without_streets and not self.recorded,
+                "without_streets leaves nothing to play: give recorded too",
             ),
             (
                 self.sealed and self.out == Benchmark.out,

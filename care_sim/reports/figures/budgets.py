@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Sequence
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from care_sim.evaluation.counts import NEEDLESS
@@ -19,16 +20,33 @@ _LINES = ("-", "--", ":", "-.")
 
 @default_style()
 def budgets_figure(results: Sequence[BudgetResult]) -> Figure:
-    """Draw a panel per count and a curve per result: the share of a full scan's count over the
-    share of the cells that fire.
+    """Draw a row of panels per part, a panel per count and a curve per result: the share of a full
+    scan's count over the share of the cells that fire.
     """
     ordered = sorted_by_budget(results)
+    parts = ordered[0].parts
+    widest = max(len(counts.names) for counts in ordered[0].counts)
+    figure = Figure(figsize=(2.4 * widest + 2.4, 0.8 + 2.6 * len(parts)), layout="constrained")
+    panels = figure.subplots(len(parts), widest, sharex=True, squeeze=False)
+    for part, row in zip(parts, panels, strict=True):
+        told = f"{part}, " if len(parts) > 1 else ""
+        row[0].set_ylabel(f"{told}% of a full scan's")
+        _draw([one.of_part(part) for one in ordered], row)
+    for curve, one in zip(panels[0, 0].get_lines()[1:], ordered, strict=True):
+        curve.set_label(marked(one.entry.name, one.tags))
+    figure.supxlabel("% of the cells", fontsize=9)
+    figure.legend(loc="outside right upper")
+    return figure
+
+
+def _draw(ordered: Sequence[BudgetResult], row: Sequence[Axes]) -> None:
+    """Draw the panels of one part; what is left of the row disappears."""
     names = names_of(ordered[0].counts)
-    figure = Figure(figsize=(2.4 * len(names) + 2.4, 3.4), layout="constrained")
-    panels = figure.subplots(1, len(names), sharex=True, squeeze=False)[0]
+    for axes in row[len(names) :]:
+        axes.remove()
     hues = colours(dict.fromkeys(result.entry.policy for result in ordered))
     percents = [100 * budget for budget in BUDGETS]
-    for place, (axes, name) in enumerate(zip(panels, names, strict=True)):
+    for place, (axes, name) in enumerate(zip(row, names, strict=False)):
         is_stop = name == NEEDLESS
         axes.axhline(-100 * MORE_STOPS if is_stop else 100 * ENOUGH, color=INK, lw=1, ls=":")
         drawn: Counter[str] = Counter()
@@ -37,16 +55,10 @@ def budgets_figure(results: Sequence[BudgetResult]) -> Figure:
             line = _LINES[drawn[policy] % len(_LINES)]
             drawn[policy] += 1
             heights = 100 * shares(result.counts)[:, place]
-            label = marked(result.entry.name, result.tags) if place == 0 else None
-            look = {"marker": "o", "ms": 3, "lw": 1.3, "color": hues[policy], "label": label}
-            axes.plot(percents, heights, line, **look)
+            axes.plot(percents, heights, line, marker="o", ms=3, lw=1.3, color=hues[policy])
         axes.set_xscale("log")
         axes.set_xticks(percents, [f"{percent:g}" for percent in percents])
         axes.minorticks_off()
         axes.set_title(name)
         if not is_stop:
             axes.set_ylim(0, 105)
-    panels[0].set_ylabel("% of a full scan's")
-    figure.supxlabel("% of the cells", fontsize=9)
-    figure.legend(loc="outside right upper")
-    return figure

@@ -1,13 +1,14 @@
 """B90 of entries: which worlds are played at which budgets, and the result of an entry.
 
-The score is `care_sim.evaluation.smallest_budget`. A street needs no screening: one in which a full
-scan detects nothing adds nothing to any count.
+The worlds are streets, drives and tests of the closed loop, and recorded drives
+(`care_sim.study.benchmark.recorded`). The score is `care_sim.evaluation.smallest_budget`. A street
+needs no screening: one in which a full scan detects nothing adds nothing to any count.
 """
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -28,6 +29,7 @@ from care_sim.evaluation.smallest_budget import (
 from care_sim.policies import tags_of
 from care_sim.study.benchmark.maker import made_by
 from care_sim.study.benchmark.play import Player
+from care_sim.study.benchmark.recorded import RECORDED_PARTS, RecordedDrive, drive_plays
 from care_sim.study.benchmark.suite import (
     DRIVES,
     FIRST_SEED,
@@ -70,13 +72,15 @@ REFERENCE_ENTRIES = (
     Entry("after-gofer"),
 )
 """The entries that stand beside everybody's."""
-COUNTS = {STREETS: SCENE_COUNTS, DRIVES: EPISODE_COUNTS, TESTS: EPISODE_COUNTS}
+FILMED = (STREETS, *RECORDED_PARTS)
+"""Parts of the open loop."""
+COUNTS = dict.fromkeys(FILMED, SCENE_COUNTS) | dict.fromkeys((DRIVES, TESTS), EPISODE_COUNTS)
 _DECIMALS = 3
 
 
 class BudgetRow(NamedTuple):
     """The counts (k) of a world: of the full scan, and of the entry at every budget. The world is a
-    seed, a number of a sealed set, or the name of a scene.
+    seed, a number of a sealed set, or the name of a recorded drive.
     """
 
     part: str
@@ -117,8 +121,17 @@ class BudgetResult:
                 np.array([row.got for row in self.rows if row.part == part], float),
                 np.array([row.full for row in self.rows if row.part == part], float),
             )
-            for part in dict.fromkeys(row.part for row in self.rows)
+            for part in self.parts
         ]
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """Its parts, in their order."""
+        return tuple(dict.fromkeys(part for part, _ in self.worlds))
+
+    def of_part(self, part: str) -> "BudgetResult":
+        """Return the result in the worlds of one of its parts."""
+        return replace(self, rows=tuple(row for row in self.rows if row.part == part))
 
     @cached_property
     def draws(self) -> Floats:
@@ -153,7 +166,7 @@ class BudgetResult:
             "policy_ms": self.policy_ms,
             "made_by": self.made_by,
             "budgets": BUDGETS,
-            "counts": {part: COUNTS[part] for part in COUNTS},
+            "counts": {part: COUNTS[part] for part in self.parts},
             "columns": BudgetRow._fields,
             "rows": self.rows,
         }
@@ -171,32 +184,41 @@ def _percent(budget: float) -> float | str:
     return round(100 * budget, 2) if np.isfinite(budget) else "never"
 
 
-Worlds = dict[str, list[int]]
-"""The seeds of every part that is played."""
+Worlds = Mapping[str, Sequence[Any]]
+"""The seeds or drives of every part that is played."""
 
 
-def budget_worlds(quick: bool = False, closed_loop: bool = False) -> Worlds:
-    """Return the streets, fewer for a trial; with `closed_loop` the first drives and tests too."""
+def budget_worlds(
+    quick: bool = False,
+    closed_loop: bool = False,
+    recorded: Sequence[RecordedDrive] = (),
+    without_streets: bool = False,
+) -> Worlds:
+    """Return the streets, fewer for a trial, and the recorded drives; with `closed_loop` the first
+    drives and tests too.
+    """
     streets = QUICK_STREETS if quick else STREETS_PLAYED
     episodes = {part: [*episode_seeds(part)[:number]] for part, number in EPISODES_PLAYED.items()}
-    street_seeds = {STREETS: [FIRST_SEED + n for n in range(streets)]}
-    return street_seeds | (episodes if closed_loop else {})
+    worlds: Worlds = {
+        STREETS: [] if without_streets else [FIRST_SEED + n for n in range(streets)],
+        **{part: [each for each in recorded if each.part == part] for part in RECORDED_PARTS},
+        **(episodes if closed_loop else {}),
+    }
+    return {part: own for part, own in worlds.items() if own}
 
 
 def budget_tasks(
-    entry: Entry, part: str, seeds: Sequence[int], detector: str
+    entry: Entry, part: str, worlds: Sequence[Any], detector: str
 ) -> list[list[RunConfig]]:
     """Return per world the full scan and the entry at every budget. Raises InvalidInput for an
     entry or a detector that cannot be played.
     """
     common: dict[str, Any] = {"detector": detector, "camera_profile": KITTI_CAMERA}
     # Films have a picture every 0.5 s and none that is 0.12 s old.
-    common |= {} if part == STREETS else LATE
-    full = configurations(part, seeds, FULL, **common)
-    own = [
-        configurations(part, seeds, entry.policy, budget, **common, **entry.conditions)
-        for budget in BUDGETS
-    ]
+    common |= {} if part in FILMED else LATE
+    plays = drive_plays if part in RECORDED_PARTS else partial(configurations, part)
+    full = plays(worlds, FULL, **common)
+    own = [plays(worlds, entry.policy, budget, **common, **entry.conditions) for budget in BUDGETS]
     return [[*world] for world in zip(full, *own, strict=True)]
 
 
@@ -211,14 +233,20 @@ def play_budgets(
     """Play the entries; return the results of those that finished every play, in their order. With
     a `salt` the worlds are numbers, whose seeds the salt draws.
     """
-    named = [(part, world) for part, own in worlds.items() for world in own]
-    seeds = {
+    named = [
+        (part, world.name if isinstance(world, RecordedDrive) else world)
+        for part, own in worlds.items()
+        for world in own
+    ]
+    played = {
         part: [salt.seed(part, number) for number in own] if salt else own
         for part, own in worlds.items()
     }
     tasks = {
         entry: [
-            task for part, own in seeds.items() for task in budget_tasks(entry, part, own, detector)
+            task
+            for part, own in played.items()
+            for task in budget_tasks(entry, part, own, detector)
         ]
         for entry in entries
     }
@@ -228,13 +256,13 @@ def play_budgets(
     results = []
     for entry, own in tasks.items():
         rows = [[row for config in task if (row := row_of[config])] for task in own]
-        if all(len(played) == len(task) for played, task in zip(rows, own, strict=True)):
+        if all(len(world) == len(task) for world, task in zip(rows, own, strict=True)):
             results.append(
                 BudgetResult(
                     entry,
                     tags_of(entry.policy),
                     detector,
-                    tuple(_row(*world, played) for world, played in zip(named, rows, strict=True)),
+                    tuple(_row(*world, got) for world, got in zip(named, rows, strict=True)),
                     quick,
                     made_by(entry),
                     salt.digest if salt else None,
@@ -259,6 +287,6 @@ def _policy_ms(rows: Sequence[Row]) -> tuple[float, ...]:
 
 def counts_of(part: str, row: Row) -> tuple[float, ...]:
     """Return the counts of a play, in the order of `COUNTS`."""
-    if part == STREETS:
+    if part in FILMED:
         return tuple(round(value, _DECIMALS) for value in scene_counts(row).values())
     return float(is_avoided(row)), float(stops_for_nothing(row))
