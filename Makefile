@@ -9,6 +9,8 @@
 # make test-extras   install that wheel with one extra after the other, each alone, and use it; EXTRAS="viewer video"
 # make bench      measure speed beside other engines and environments; ARGS="--seconds 0.3 --repeats 1" is short
 # make parity     hold the engine `fast` against Bullet, ray by ray; ARGS="--scenes 1000 --episodes 1" is short
+# make publish DATA=FOLDER   play published studies again and replace their rows, the cheapest first; it resumes.
+#                 FOLDER holds recordings; ARGS="order ablate" plays these two, ARGS=--list prints order and costs
 # make test-speed   hold the ratios of speed to the published ones; nothing else may run meanwhile
 # make docs       build the documentation's site into build/site
 # make check      format, lint, types, tests
@@ -65,7 +67,7 @@ endef
 IS_FIT := "import ensurepip, sys; print('yes' if (3, 11) <= sys.version_info < (3, 14) else 'no')"
 comma := ,
 
-.PHONY: setup reproduce smoke test test-long test-installed test-extras bench parity test-speed dist check docs lint torture official official-precision test-official clean
+.PHONY: setup reproduce smoke test test-long test-installed test-extras bench parity publish test-speed dist check docs lint torture official official-precision test-official clean
 
 setup: $(VENV)/.installed
 
@@ -123,6 +125,9 @@ test-extras: dist
 
 bench parity: $(VENV)/.developing
 	$(BIN)/python -m tests.$@ $(ARGS)
+
+publish: $(VENV)/.developing
+	$(BIN)/python -m tests.publish $(if $(DATA),--data "$(DATA)") $(ARGS)
 
 test-speed: $(VENV)/.developing
 	$(BIN)/python -m pytest -m speed

@@ -22,8 +22,12 @@ Beside them lie `b90`, the result files of the [benchmark](../b90.md)
 `judge-logs`, what `care-sim judge` says of [detectors](../detectors.md), and `bench.json` and
 `parity.json`, of `make bench` and `make parity`.
 
-| folder | command | rows | pages |
-|---|---|---|---|
+The column *version* names the version of CARE-Sim that played the rows. Version 0.3.0 draws another
+random floor, so rows of earlier versions differ from what their commands play today. `make publish`
+plays them again.
+
+| folder | command | version | rows | pages |
+|---|---|---|---|---|
 """
 _ROWS = ("episodes.parquet", "plays.parquet", "vehicle.parquet")
 
@@ -38,7 +42,8 @@ def written() -> str:
     lines = []
     for path in sorted(PAGE.parent.glob("*/config.json")):
         folder = path.parent
-        command = json.loads(path.read_text(encoding="utf-8"))["command"]
+        config = json.loads(path.read_text(encoding="utf-8"))
+        command, version = config["command"], config["versions"]["care-sim"]
         (rows,) = (
             read_metadata(file).num_rows for file in map(folder.joinpath, _ROWS) if file.is_file()
         )
@@ -47,7 +52,7 @@ def written() -> str:
             f"[{page.stem}](../{page.name})" for page, text in pages.items() if cites.search(text)
         ]
         name = f"[{folder.name}]({folder.name}/tables.md)"
-        lines.append(f"| {name} | `{command}` | {rows:,} | {', '.join(cited)} |\n")
+        lines.append(f"| {name} | `{command}` | {version} | {rows:,} | {', '.join(cited)} |\n")
     return _HEAD + "".join(lines)
 
 

@@ -36,7 +36,7 @@ def pytest_collection_modifyitems(items):
 
 # An unpacked sdist holds no published results, nor what else only a clone has: what is tested there
 # is the installed package (`make test-installed`).
-collect_ignore = [] if PUBLISHED.is_dir() else ["golden", "repository"]
+collect_ignore = [] if PUBLISHED.is_dir() else ["golden", "publish", "repository"]
 
 settings.register_profile(
     "repeatable", deadline=None, derandomize=True, database=None, max_examples=60

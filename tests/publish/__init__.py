@@ -1,0 +1,1 @@
+"""Publish the rows of `results/data` anew: `make publish`."""
