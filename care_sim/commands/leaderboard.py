@@ -18,15 +18,16 @@ from care_sim.base.interrupts import DONE, FAILED
 from care_sim.commands.options.results import Leaderboard
 from care_sim.commands.shared.console import TableConsole
 from care_sim.policies.isolation import isolated_policies
-from care_sim.reports.budgets import budgets_table
+from care_sim.reports.budgets import budget_tables
 from care_sim.reports.figures.leaderboard import LEADERBOARD_FIGURE, leaderboard_figure
 from care_sim.reports.figures.styles import check_figure, save
-from care_sim.study.benchmark.budgets import MAIN_DETECTOR, BudgetResult, budget_worlds
+from care_sim.study.benchmark.budgets import MAIN_DETECTOR, BudgetResult
 from care_sim.study.benchmark.maker import elsewhere, own_code_of
 from care_sim.study.benchmark.play import player_in
+from care_sim.study.benchmark.recorded import recorded_drives
 from care_sim.study.benchmark.replay import replayed
 from care_sim.study.benchmark.result import is_result, read_result, references, with_references
-from care_sim.study.benchmark.suite import STREETS, Salt
+from care_sim.study.benchmark.suite import Salt
 
 _HEAD = (
     "# Leaderboard\n\nThe page *Submit a score* of the documentation says what is played. Made by "
@@ -48,8 +49,7 @@ def leaderboard(options: Leaderboard) -> int:
 def _tables(found: dict[Path, BudgetResult]) -> list[list[BudgetResult]]:
     """Return the results, a list per set of worlds and detector, with the published entries."""
     if not found:
-        streets = [(STREETS, seed) for seed in budget_worlds()[STREETS]]
-        return [references(MAIN_DETECTOR, streets)]
+        return [references(MAIN_DETECTOR)]
     sets: dict[object, list[BudgetResult]] = {}
     for each in found.values():
         sets.setdefault((each.detector, each.sealed, each.worlds), []).append(each)
@@ -66,9 +66,9 @@ def _show(options: Leaderboard, sets: Sequence[Sequence[BudgetResult]]) -> None:
     blocks = [_HEAD]
     for name, own in zip(names, sets, strict=True):
         save(leaderboard_figure(own), options.out / name)
-        table = budgets_table(own)
-        TableConsole().print(table.rich())
-        blocks += [table.markdown(), f"![B90 with intervals]({name}.svg)\n"]
+        tables = budget_tables(own)
+        TableConsole().print(*(table.rich() for table in tables))
+        blocks += [*(table.markdown() for table in tables), f"![B90 with intervals]({name}.svg)\n"]
     write_text(page, "\n".join(blocks))
     print_lines(f"Page: {told}")
 
@@ -77,6 +77,7 @@ def _show(options: Leaderboard, sets: Sequence[Sequence[BudgetResult]]) -> None:
 def _verified(options: Leaderboard, results: dict[Path, BudgetResult]) -> list[str]:
     """Print how each result holds; a line for each that does not, or cannot be played."""
     salt = Salt.read(options.sealed) if options.sealed else None
+    drives = recorded_drives(options.recorded)
     problems = []
     for path, result in results.items():
         try:
@@ -85,7 +86,7 @@ def _verified(options: Leaderboard, results: dict[Path, BudgetResult]) -> list[s
                 TemporaryDirectory(prefix="care-sim-") as folder,
                 player_in(Path(folder), options.workers) as player,
             ):
-                replay = replayed(result, player, SystemRandom(), salt)
+                replay = replayed(result, player, SystemRandom(), salt, drives)
         except (InvalidInput, MissingExtra) as error:
             problems.append(f"{path} cannot be verified: {error}")
             continue

@@ -34,11 +34,11 @@ def test_every_set_of_worlds_and_every_detector_has_its_table(capsys, here):
     assert (code, err) == (0, "")
     titles = re.findall(r"^How few cells are enough: B90, (.*)", out, re.M)
     assert {*titles} == {
-        "80 worlds, centerpoint",
-        "24 worlds, centerpoint",
-        "80 worlds, megvii",
-        "80 worlds sealed by 555555555555, centerpoint",
-        "80 fresh worlds, centerpoint",
+        "80 worlds (streets), centerpoint",
+        "24 worlds (streets), centerpoint",
+        "80 worlds (streets), megvii",
+        "80 worlds sealed by 555555555555 (streets), centerpoint",
+        "80 fresh worlds (streets), centerpoint",
     }
     # Published entries are of published streets and one detector.
     page = (here / "runs" / "leaderboard" / "leaderboard.md").read_text()

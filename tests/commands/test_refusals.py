@@ -71,6 +71,7 @@ benchmark --policy care --name 'a|b'      | without | <
 leaderboard --verify                      | name the results to verify
 leaderboard .                             | no result of care-sim benchmark in .
 leaderboard . --sealed x                  | give verify too
+leaderboard . --recorded boreas           | give verify too
 judge --detectors cluster --against nobody | unknown detector 'nobody'
 judge --least-scores 2                    | least_scores must be from 0 to 1, got 2
 judge --detectors cluster --detector-parameters min_points=3 | DETECTOR.NAME=VALUE of one of cluster, got min_points

@@ -114,6 +114,8 @@ class Leaderboard(WorkerOptions):
     must be installed here."""
     sealed: Path | None = None
     """With --verify: the file with the salt of sealed results."""
+    recorded: tuple[str, ...] = ()
+    """With --verify: the sources of the recorded drives, as for benchmark."""
     out: Path = Path("runs/leaderboard")
     """Folder for the page and the figures. A page that is there already is replaced, and a line
     says so."""
@@ -124,6 +126,10 @@ class Leaderboard(WorkerOptions):
             (
                 self.sealed and not self.verify,
                 "sealed is for results that are verified: give verify too",
+            ),
+            (
+                self.recorded and not self.verify,
+                "recorded is for results that are verified: give verify too",
             ),
             (self.verify and not self.results, "name the results to verify"),
         )

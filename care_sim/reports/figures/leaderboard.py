@@ -1,6 +1,6 @@
-"""Figure of the leaderboard: the B90 of every entry with its interval, and each count's needs."""
+"""Figure of the leaderboard: B90 of every entry with its interval, and of each part or count."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from math import isinf
 from typing import Any
 
@@ -21,15 +21,16 @@ _LINE_INCHES = 0.26
 @default_style()
 def leaderboard_figure(results: Sequence[BudgetResult]) -> Figure:
     """Draw a line per result, the smallest B90 on top: B90 with its interval, and the budget that
-    each count alone needs.
+    each part alone needs, or each count of a single part.
     """
     # Lines are counted from below.
     upwards = sorted_by_budget(results)[::-1]
     lines = range(len(upwards))
     figure = Figure(figsize=(8.0, 1.5 + _LINE_INCHES * len(upwards)), layout="constrained")
     axes = figure.subplots()
-    names = names_of(upwards[0].counts)
-    needs = [[_place(budget) for budget in reaching(each.counts)] for each in upwards]
+    parts = upwards[0].parts
+    names = parts if len(parts) > 1 else names_of(upwards[0].counts)
+    needs = [[_place(budget) for budget in _needs(each)] for each in upwards]
     hues = colours(dict.fromkeys(names))
     for n, name in enumerate(names):
         look: dict[str, Any] = {
@@ -55,6 +56,12 @@ def leaderboard_figure(results: Sequence[BudgetResult]) -> Figure:
     axes.grid(axis="x")
     figure.legend(*axes.get_legend_handles_labels(), loc="outside upper left", ncols=5)
     return figure
+
+
+def _needs(result: BudgetResult) -> Iterable[float]:
+    if len(result.parts) == 1:
+        return reaching(result.counts)
+    return [result.of_part(part).score.budget for part in result.parts]
 
 
 def _place(budget: float) -> float:

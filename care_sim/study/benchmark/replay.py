@@ -12,6 +12,7 @@ from care_sim.policies import tags_of
 from care_sim.study.benchmark.budgets import BudgetResult, budget_tasks, play_budgets
 from care_sim.study.benchmark.maker import made_by
 from care_sim.study.benchmark.play import Player
+from care_sim.study.benchmark.recorded import RECORDED_PARTS, RecordedDrive
 from care_sim.study.benchmark.suite import FIRST_SEED, STREETS, Salt
 
 ONE_IN = 10
@@ -33,24 +34,35 @@ class Replay:
     false: tuple[str, ...]
 
 
-def replayed(result: BudgetResult, player: Player, rng: Random, salt: Salt | None = None) -> Replay:
-    """Play a random tenth of the worlds of a result again.
+def replayed(
+    result: BudgetResult,
+    player: Player,
+    rng: Random,
+    salt: Salt | None = None,
+    drives: Sequence[RecordedDrive] = (),
+) -> Replay:
+    """Play a random tenth of the worlds of a result again; recorded ones are among the `drives`.
 
     A world differs where any count differs. By the code, libraries and machine that the file names
     every difference is false; by others, differences that move a sum by more than `ROUNDING` are.
 
-    Raises InvalidInput for a sealed result without its salt, and where a play fails.
+    Raises InvalidInput for a sealed result without its salt, for a recorded drive that is not
+    given, and where a play fails.
     """
     if result.sealed != (salt.digest if salt else None):
         of = f"sealed by the salt {result.sealed[:12]}" if result.sealed else "published or fresh"
         raise InvalidInput(f"its worlds are {of}: give --sealed the file of that salt, or none")
+    at_hand = {drive.name: drive for drive in drives}
+    for part, world in result.worlds:
+        if part in RECORDED_PARTS and world not in at_hand:
+            raise InvalidInput(f"it plays {world}: give --recorded the sources of its drives")
     # A policy that cannot be loaded here has its line before anything is played.
     budget_tasks(result.entry, STREETS, [FIRST_SEED], result.detector)[0][-1].try_out()
     drawn = result.cut_to(rng.sample(result.worlds, -(-len(result.rows) // ONE_IN)))
     assert drawn is not None
     worlds: dict[str, list[Any]] = {}
     for part, world in sorted(drawn.worlds, key=result.worlds.index):
-        worlds.setdefault(part, []).append(world)
+        worlds.setdefault(part, []).append(at_hand.get(str(world), world))
     found = play_budgets([result.entry], player, result.detector, worlds, salt=salt)
     if player.failures:
         raise InvalidInput(str(player.failures[0]))

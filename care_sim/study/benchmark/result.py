@@ -167,11 +167,18 @@ def is_fresh(result: BudgetResult) -> bool:
     return bool(streets) and all(world in FRESH for world in streets)
 
 
-def references(detector: str, worlds: Sequence[tuple[str, int | str]]) -> list[BudgetResult]:
-    """Return the published entries in these worlds under a detector; none without such plays."""
+def references(
+    detector: str, worlds: Sequence[tuple[str, int | str]] | None = None
+) -> list[BudgetResult]:
+    """Return the published entries under a detector in these worlds, or in all that they played;
+    none without such plays.
+    """
     listed = parsed_json(_REFERENCES.read_text(encoding="utf-8"))
     results = [result_of(content, _REFERENCES.name) for content in listed]
-    cut = (result.cut_to(worlds) for result in results if result.detector == detector)
+    results = [result for result in results if result.detector == detector]
+    if worlds is None:
+        return results
+    cut = (result.cut_to(worlds) for result in results)
     return [result for result in cut if result]
 
 
