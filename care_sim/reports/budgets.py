@@ -145,11 +145,12 @@ def _ranks(ordered: Sequence[BudgetResult]) -> dict[int, str]:
 
 def _worlds(result: BudgetResult) -> str:
     """Return the number of worlds, and of which parts they are."""
-    kind = f" sealed by {result.sealed[:12]}" if result.sealed else ""
-    fresh = "fresh " if not kind and is_fresh(result) else ""
+    if result.sealed:
+        return f"{counted(len(result.rows), 'world')} sealed by {result.sealed[:12]}"
+    fresh = "fresh " if is_fresh(result) else ""
     sizes = [f"{part} {len(result.of_part(part).rows)}" for part in result.parts]
     parts = ", ".join(sizes) if len(sizes) > 1 else result.parts[0]
-    return f"{counted(len(result.rows), f'{fresh}world')}{kind} ({parts})"
+    return f"{counted(len(result.rows), f'{fresh}world')} ({parts})"
 
 
 def format_smallest(result: BudgetResult) -> str:

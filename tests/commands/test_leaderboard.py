@@ -37,7 +37,7 @@ def test_every_set_of_worlds_and_every_detector_has_its_table(capsys, here):
         "80 worlds (streets), centerpoint",
         "24 worlds (streets), centerpoint",
         "80 worlds (streets), megvii",
-        "80 worlds sealed by 555555555555 (streets), centerpoint",
+        "80 worlds sealed by 555555555555, centerpoint",
         "80 fresh worlds (streets), centerpoint",
     }
     # Published entries are of published streets and one detector.
