@@ -68,7 +68,7 @@ def statement_tables(rows: Sequence[Row]) -> list[Table]:
         (each.text, each.paper, each.measured, each.verdict if each.agrees else Bold(each.verdict))
         for each in said
     )
-    notes = ("Medians in metres; results/paper-closed-loop.md explains what differs.",)
+    notes = ("Medians in metres; results/paper-replication.md explains what differs.",)
     columns = ("statement", "paper", "here", "verdict")
     title = "The paper's statements on the closed loop"
     return [Table(title, columns, lines, notes, (f'Paper: "{NO_COLLISION}"',))]

@@ -9,7 +9,7 @@ NCAP_STEP_KPH = 10.0
 
 R157_POLICIES = ("history", "all-camera", "care", "fan", "full")
 R157_BUDGETS = (0.01, 0.03)
-"""At 3% a pattern that looks ahead finds as much as a camera (`results/cut-ins.md`)."""
+"""At 3% a pattern that looks ahead finds as much as a camera (`results/camera.md`)."""
 
 FIRING_POLICIES = ("care", "care-sightlines", "care-units", "rows", "place", "full")
 

@@ -78,7 +78,7 @@ Pair = tuple[str, str]
 """Two policies, of which a headline says how the first stands to the second."""
 _MOST_KPH = 40.0
 """Up to here the full scan avoids all of the Euro NCAP tests but `CPNCO-50`, and above it not for
-what the car sees but for how it brakes (`results/euro-ncap.md`).
+what the car sees but for how it brakes (`results/camera.md`).
 """
 
 
