@@ -7,8 +7,8 @@ import pytest
 from care_sim.base.errors import InvalidInput
 from care_sim.base.seeds import split_of
 from care_sim.evaluation.smallest_budget import BUDGETS
-from care_sim.study.benchmark.budgets import budget_tasks, budget_worlds, counts_of
 from care_sim.study.benchmark import result as result_files
+from care_sim.study.benchmark.budgets import budget_tasks, budget_worlds, counts_of
 from care_sim.study.benchmark.recorded import AHEAD, RECORDED, recorded_drives
 from care_sim.study.benchmark.result import read_result
 from care_sim.study.benchmark.suite import DRIVES, STREETS, TESTS, Entry
