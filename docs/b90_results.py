@@ -14,6 +14,7 @@ from pathlib import Path
 
 from care_sim.base.errors import report_problems
 from care_sim.base.files import write_text
+from care_sim.base.interrupts import FAILED
 from care_sim.reports.budgets import budget_tables
 from care_sim.reports.figures.budgets import BUDGETS_FIGURE, budgets_figure
 from care_sim.reports.figures.styles import save
@@ -72,16 +73,21 @@ def written() -> str:
 
 
 def play(options: Namespace) -> None:
-    """Play the published entries under the detectors, and write their files."""
+    """Play the published entries under the detectors, and write their files. Exits with 1, and
+    writes no file of a detector, where one of its plays failed.
+    """
     worlds = budget_worlds(recorded=recorded_drives(options.recorded))
-    streets = {STREETS: worlds[STREETS][: options.streets]}
+    streets = {STREETS: worlds[STREETS]}
     with player_in(options.plays, options.workers) as player:
         for detector in options.detectors:
             # Other detectors are columns over streets alone.
             played = worlds | streets if detector == MAIN_DETECTOR else streets
-            for result in play_budgets(REFERENCE_ENTRIES, player, detector, played):
+            results = play_budgets(REFERENCE_ENTRIES, player, detector, played)
+            if player.failures:
+                report_problems(by_reason(player.failures, "plays"))
+                raise SystemExit(FAILED)
+            for result in results:
                 result.write(folder_of(detector) / f"{stem_of(result.entry)}.json")
-    report_problems(by_reason(player.failures, "plays"))
 
 
 def stem_of(entry: Entry) -> str:
@@ -94,11 +100,12 @@ def main(words: Sequence[str] | None = None) -> None:
     parser = ArgumentParser(description=__doc__)
     parser.add_argument("--recorded", nargs="+", default=[])
     parser.add_argument("--detectors", nargs="+", default=DETECTORS, choices=DETECTORS)
-    parser.add_argument("--streets", type=int, default=None, help="the first so many alone")
     parser.add_argument("--plays", type=Path, default=Path("runs/b90"))
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--tables", action="store_true")
     options = parser.parse_args(words)
+    if not (options.tables or options.recorded):
+        parser.error("give --recorded the recorded drives of the published entries, or --tables")
     if not options.tables:
         play(options)
     results = results_of(MAIN_DETECTOR)

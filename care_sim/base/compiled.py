@@ -7,7 +7,6 @@ also told by those.
 
 import hashlib
 import inspect
-import pickle
 import sys
 from collections.abc import Callable, Iterator
 from functools import cache
@@ -47,16 +46,6 @@ def compiled(*, brief: bool = False, **options: Any) -> Callable[[_F], _F]:
         return kernel
 
     return make
-
-
-def lacks_code(kernel: Any) -> bool:
-    """Return True if the machine code of a compiled function can be kept, but is not yet."""
-    kept = getattr(getattr(kernel, "_cache", None), "_cache_file", None)
-    try:
-        return kept is not None and not kept._load_index()
-    # A damaged index is named by the first task that reads it.
-    except (OSError, EOFError, pickle.UnpicklingError):
-        return False
 
 
 @cache

@@ -306,7 +306,7 @@ class Sensing(CameraFaults, LidarFaults, ReturnSettings):
     """Detections through which the tracker lays a straight line of least squares, for place and
     velocity of a track (`care_sim.perception.tracker`). 2 takes both as detected. More smooth the
     errors of a measured detector, and follow later who starts or brakes: with 10 the car hits a
-    leading car that brakes (`results/proxy.md`).
+    leading car that brakes (`results/detectors.md`).
     """
     sweep_mask: str = one_of(BEFORE, SWEEP_MASKS)
     """Which cells the sweeps between two keyframes fire, of a film that has them: those of the mask

@@ -46,7 +46,7 @@ def _together(result: BudgetResult) -> BudgetResult:
 
 def _by_source(result: BudgetResult) -> dict[str, BudgetResult]:
     """Return the result on the drives of each source."""
-    of = {row: source_of_world(str(row.world)) for row in result.rows}
+    of = {row: source_of_world(row.world) for row in result.rows}
     return {
         source: replace(result, rows=tuple(row for row in result.rows if of[row] == source))
         for source in dict.fromkeys(of.values())

@@ -14,8 +14,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
+import numpy as np
+
 from care_sim.base.errors import counted
-from care_sim.evaluation.smallest_budget import budget_ratio
+from care_sim.evaluation.smallest_budget import budget_ratio, has_interval
 from care_sim.reports.budgets import NOTE, format_ratio, format_smallest, sorted_by_budget
 from care_sim.reports.table import Table
 from care_sim.study.benchmark.budgets import BudgetResult
@@ -74,7 +76,7 @@ def statement(columns: Columns, first: str, second: str) -> Statement:
     found: dict[str, list[str]] = {"fewer": [], "more": [], "tied": []}
     for detector, results in columns.items():
         ours, theirs = (_named(results, name).counts for name in (first, second))
-        _, low, high = budget_ratio(ours, theirs)
+        _, low, high = budget_ratio(ours, theirs) if has_interval(ours) else (1.0, 0.0, np.inf)
         found["fewer" if high < 1 else "more" if low > 1 else "tied"].append(detector)
     fewer, more, tied = map(tuple, found.values())
     if len(more) > len(fewer):
@@ -131,11 +133,12 @@ def _named(results: Sequence[BudgetResult], name: str) -> BudgetResult:
 
 
 def _in_common(columns: Columns) -> dict[str, list[BudgetResult]]:
-    """Return the results in the worlds that all detectors have."""
+    """Return the results of the entries and in the worlds that all detectors have."""
     (first, *_), *others = columns.values()
     held = set(first.worlds).intersection(*(results[0].worlds for results in others))
     worlds = [world for world in first.worlds if world in held]
+    names = set.intersection(*({one.entry.name for one in own} for own in columns.values()))
     return {
-        detector: [cut for one in results if (cut := one.cut_to(worlds))]
-        for detector, results in columns.items()
+        detector: [cut for one in own if one.entry.name in names and (cut := one.cut_to(worlds))]
+        for detector, own in columns.items()
     }

@@ -54,7 +54,11 @@ def main(arguments=None):
     refused = 0
     for folder in map(PUBLISHED.joinpath, given.folders) if given.folders else by_cost():
         made = given.work.resolve() / code / folder.name
-        if folder.name == "b90":
+        if not folder.is_dir():
+            parser.error(f"results/data has no folder {folder.name}")
+        if folder.name == "b90" and given.list:
+            print("b90: see docs/b90_results.py")
+        elif folder.name == "b90":
             refused |= b90_anew(made, given.data, given.workers)
         elif json.loads((folder / CONFIG).read_text())["versions"]["code"] == code:
             print(f"{folder.name}: published with this code")

@@ -248,7 +248,7 @@ def streets():
 @pytest.mark.parametrize("world", ["dense", "streets"])
 def test_small_classifiers_of_single_boxes_tell_no_more_than_they_did(world, request):
     """With 300 boxes of each kind. What else tells them apart, and how well, is in
-    `results/faults.md`.
+    `results/degraded-sensing.md`.
     """
     episodes = request.getfixturevalue(world)
     areas = areas_under_the_curve(

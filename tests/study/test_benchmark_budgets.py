@@ -7,6 +7,7 @@ import pytest
 from care_sim.base.errors import InvalidInput
 from care_sim.base.seeds import split_of
 from care_sim.evaluation.smallest_budget import BUDGETS
+from care_sim.study.benchmark import result as result_files
 from care_sim.study.benchmark.budgets import budget_tasks, budget_worlds, counts_of
 from care_sim.study.benchmark.recorded import AHEAD, RECORDED, recorded_drives
 from care_sim.study.benchmark.result import read_result
@@ -75,9 +76,16 @@ def test_drives_of_one_name_are_refused(tmp_path):
     assert len(recorded_drives([f"kitti:{tmp_path}/one"] * 2)) == 1
 
 
-def test_a_file_holds_streets_and_drives(tmp_path):
+def test_a_file_holds_streets_and_drives(tmp_path, monkeypatch):
+    monkeypatch.setattr(result_files, "_REFERENCES", tmp_path / "references.json")
     result = made_budgets("care", HALF_WAY, recorded=["kitti/0000", "boreas/b"], later=NEVER)
+    wider = made_budgets("care", HALF_WAY, recorded=["kitti/0000", "kitti/0001"])
     result.write(tmp_path / "mine.json")
+    # All drives of a published source are played, or none.
+    result_files.publish_references([wider])
+    with pytest.raises(InvalidInput, match="lacks the recorded drive kitti/0001"):
+        read_result(tmp_path / "mine.json")
+    result_files.publish_references([result])
     assert read_result(tmp_path / "mine.json") == result
     content = json.loads((tmp_path / "mine.json").read_text())
     assert [*content["counts"]] == ["streets", "recorded ahead", "recorded"]

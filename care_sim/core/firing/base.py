@@ -198,6 +198,7 @@ def top_up(chosen: Mask, count: int, floor: Floor, budget: int) -> int:
     before. Returns how many are afterwards.
     """
     batch = 0
+    budget = min(budget, len(chosen))
     while count < budget:
         for cell in draw_cells(floor, batch, len(chosen)):
             if count >= budget:

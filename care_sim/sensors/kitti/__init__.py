@@ -2,7 +2,7 @@
 
 The detector's boxes with scores on 1,895 pictures of the benchmark's validation half were compared
 with KITTI's labels (Geiger et al. 2012). `measured.json` holds the fitted numbers, and
-`results/weaker-sensing.md` the comparison. Lengths are in pixels of a picture of
+`results/degraded-sensing.md` the comparison. Lengths are in pixels of a picture of
 KITTI's focal length, 721.5 pixels.
 """
 

@@ -266,7 +266,14 @@ def play_budgets(
                     quick,
                     made_by(entry),
                     salt.digest if salt else None,
-                    _policy_ms([row for _, *played in rows for row in played]),
+                    _policy_ms(
+                        [
+                            row
+                            for (part, _), (_, *got) in zip(named, rows, strict=True)
+                            for row in got
+                            if part == STREETS
+                        ]
+                    ),
                 )
             )
     return results

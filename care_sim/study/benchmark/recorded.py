@@ -72,6 +72,6 @@ def drive_plays(
     ]
 
 
-def source_of_world(world: str) -> str:
+def source_of_world(world: int | str) -> str:
     """Return the source in the name of a recorded world."""
-    return world.partition("/")[0]
+    return str(world).partition("/")[0]

@@ -18,8 +18,9 @@ from care_sim.study.benchmark.suite import FIRST_SEED, STREETS, Salt
 ONE_IN = 10
 """One world in so many is played again."""
 ROUNDING = 0.01
-"""What another machine or library may move the sum of a count by, as a share of the full scan's: it
-rounds the last bit of a direction otherwise, and fires other cells."""
+"""What another machine or library may move the sum of a count by, as a share of the full scan's,
+beside `ONE_OBJECT`: it rounds the last bit of a direction otherwise, and fires other cells."""
+ONE_OBJECT = 1.0
 
 
 @dataclass(frozen=True)
@@ -82,7 +83,9 @@ def _moved(told: BudgetResult, again: BudgetResult) -> float:
     for one, other in zip(told.counts, again.counts, strict=True):
         full = np.maximum(one.full.sum(axis=0), 1.0)
         for mine, theirs in ((one.full, other.full), (one.got, other.got)):
-            moves.append(float(np.max(np.abs(mine.sum(axis=0) - theirs.sum(axis=0)) / full)))
+            off = np.abs(mine.sum(axis=0) - theirs.sum(axis=0))
+            # A drawn drive may have a single newcomer.
+            moves.append(float(np.max(np.maximum(off - ONE_OBJECT, 0.0) / full)))
     return max(moves)
 
 

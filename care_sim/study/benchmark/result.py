@@ -24,6 +24,7 @@ from care_sim.study.benchmark.budgets import (
     BudgetRow,
     budget_worlds,
 )
+from care_sim.study.benchmark.recorded import RECORDED_PARTS, source_of_world
 from care_sim.study.benchmark.suite import STREETS, Entry
 from care_sim.study.rows.parquet import with_tuples
 
@@ -35,7 +36,12 @@ def read_result(path: Path) -> BudgetResult:
     """Read the result in a file. Raises InvalidInput for a file that holds none, is damaged, or is
     of other budgets, counts or worlds than this version's.
     """
-    return result_of(_content(path), str(path))
+    result = result_of(_content(path), str(path))
+    try:
+        _check_published(result)
+    except InvalidInput as error:
+        raise InvalidInput(f"{path} {error}") from error
+    return result
 
 
 def is_result(path: Path) -> bool:
@@ -93,8 +99,11 @@ def _parsed(content: Mapping[str, Any]) -> BudgetResult:
     entry = Entry(policy, tuple((str(name), value) for name, value in given), order, label)
     entry.check()
     rows = tuple(_row(*values) for values in content["rows"])
+    counts = content["counts"]
+    if not isinstance(counts, dict):
+        raise ValueError("its counts must be lists by part")
     for part in dict.fromkeys(row.part for row in rows):
-        if content["counts"].get(part) != list(COUNTS.get(part, ())):
+        if counts.get(part) != list(COUNTS.get(part, ())):
             raise ValueError(f"its counts of {shown(part)} must be {COUNTS.get(part, ())}")
     sealed = content.get("sealed")
     result = BudgetResult(
@@ -114,8 +123,8 @@ def _parsed(content: Mapping[str, Any]) -> BudgetResult:
 
 
 def _row(part: Any, world: Any, full: Any, got: Any) -> BudgetRow:
-    if not (isinstance(part, str) and isinstance(world, int | str)):
-        raise ValueError("a row must name its part and its world")
+    if type(world) is not (str if part in RECORDED_PARTS else int):
+        raise ValueError("a row must name its part, and its world by a seed or a drive")
     return BudgetRow(part, world, tuple(full), tuple(map(tuple, got)))
 
 
@@ -148,11 +157,12 @@ def _check_worlds(result: BudgetResult) -> None:
     for part, worlds in by_part.items():
         if len({*worlds}) < len(worlds):
             raise InvalidInput(f"holds a world of the {part} twice")
-    published: Mapping[str, Sequence[Any]] = budget_worlds(result.quick, closed_loop=True)
-    if result.sealed:
-        published = {STREETS: range(len(by_part.get(STREETS, ())))}
-    elif is_fresh(result):
-        published = {STREETS: by_part[STREETS]}
+    published = budget_worlds(result.quick, closed_loop=True)
+    if result.sealed or is_fresh(result):
+        if [*by_part] != [STREETS]:
+            raise InvalidInput("holds other parts than streets, and sealed and fresh worlds are")
+        numbers = range(len(published[STREETS]))
+        published = {STREETS: numbers if result.sealed else by_part[STREETS]}
     for part, due in published.items():
         if part in by_part and by_part[part] != [*due]:
             raise InvalidInput(
@@ -161,10 +171,24 @@ def _check_worlds(result: BudgetResult) -> None:
             )
 
 
+def _check_published(result: BudgetResult) -> None:
+    """Raise InvalidInput for a choice among the drives of a published source."""
+    known = references(result.detector)
+    published = known[0].worlds if known else ()
+    sources = {source_of_world(world) for part, world in result.worlds if part in RECORDED_PARTS}
+    due = {
+        world
+        for part, world in published
+        if part in RECORDED_PARTS and source_of_world(world) in sources
+    }
+    if lacking := sorted(due - {world for _, world in result.worlds}):
+        raise InvalidInput(f"lacks the recorded drive {lacking[0]}: play all of its source")
+
+
 def is_fresh(result: BudgetResult) -> bool:
     """Return whether the result is of streets that `--fresh` drew."""
     streets = [world for part, world in result.worlds if part == STREETS]
-    return bool(streets) and all(world in FRESH for world in streets)
+    return bool(streets) and all(type(world) is int and world in FRESH for world in streets)
 
 
 def references(
@@ -183,10 +207,12 @@ def references(
 
 
 def with_references(results: Sequence[BudgetResult]) -> list[BudgetResult]:
-    """Return results of the same worlds and detector with the other published entries there."""
-    own = {result.entry.full_name for result in results}
+    """Return results of the same worlds and detector with the published entries there. One that
+    reached other counts than the published entry of its name stands beside it.
+    """
+    own = [(result.entry, result.rows) for result in results]
     published = [] if results[0].sealed else references(results[0].detector, results[0].worlds)
-    return [*results, *(each for each in published if each.entry.full_name not in own)]
+    return [*results, *(each for each in published if (each.entry, each.rows) not in own)]
 
 
 def publish_references(results: Sequence[BudgetResult]) -> None:

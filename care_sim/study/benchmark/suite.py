@@ -145,8 +145,11 @@ def fresh_seeds(folder: Path, number: int) -> list[int]:
         seeds = json_content(path) if path.exists() else []
     except (OSError, ValueError) as error:
         raise InvalidInput(f"{path} cannot be read: {error}") from error
-    if not (isinstance(seeds, list) and all(type(each) is int and each in FRESH for each in seeds)):
-        raise InvalidInput(f"{path} is damaged: it must list seeds of {FRESH[0]} to {FRESH[-1]}")
+    is_list = isinstance(seeds, list) and all(type(each) is int for each in seeds)
+    if not (is_list and all(each in FRESH for each in seeds) and len({*seeds}) == len(seeds)):
+        raise InvalidInput(
+            f"{path} is damaged: it must list different seeds of {FRESH[0]} to {FRESH[-1]}"
+        )
     if len(seeds) < number:
         further = SystemRandom().sample(FRESH, number)
         seeds = [*seeds, *(each for each in further if each not in seeds)][:number]

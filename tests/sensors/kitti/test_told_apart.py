@@ -30,7 +30,7 @@ ON_FLAT_ROADS, FOOT_ON_FLAT_ROADS = 0.932, 0.776
 and by class, height and lower edge alone.
 """
 STREETS, FOOT_ON_STREETS = 0.959, 0.849
-"""The same of rendered streets, where roads are flat (`results/weaker-sensing.md`)."""
+"""The same of rendered streets, where roads are flat (`results/degraded-sensing.md`)."""
 
 
 def boxes_of(told, reported, excused):
