@@ -119,7 +119,7 @@ def test_recorded_drives_are_a_part_of_their_own(capsys, here, monkeypatch, tmp_
     assert "carry no interval" in out
     assert "[" not in out.partition("B90, 2 worlds")[2].partition("\n\n")[0]
     assert "care-sector" in out
-    path = here / "runs/benchmark/boxes.centerpoint.recorded.without-streets.json"
+    path = here / "runs/benchmark/boxes.centerpoint.recorded-kitti.without-streets.json"
     result = read_result(path)
     assert result.worlds == tuple((AHEAD, drive) for drive in drives)
     assert "DATA" not in path.read_text()
@@ -168,8 +168,8 @@ def test_a_sealed_set_is_played_and_verified_by_its_salt_alone(capsys, here, one
     sealed = "--sealed", "salt.txt"
     played = run(capsys, "benchmark", "--policy", "history", *sealed, "--out", "sealed")
     assert played[0] == 0
-    path = here / "sealed" / "history.centerpoint.sealed.json"
     salt = Salt.read(here / "salt.txt")
+    path = here / "sealed" / f"history.centerpoint.sealed-{salt.digest[:8]}.json"
     assert read_result(path).sealed == salt.digest
     assert read_result(path).worlds == ((STREETS, 0),)
     assert str(salt.seed(STREETS, 0)) not in path.read_text()
