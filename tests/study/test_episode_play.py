@@ -173,7 +173,8 @@ def test_a_system_that_does_not_tell_the_peak_is_asked_otherwise(monkeypatch):
 # Every death costs the start of a worker.
 @pytest.mark.slow
 def test_one_that_kills_its_worker_costs_only_itself(third_party, tmp_path):
-    configs = grid(["dartout"], ["dies-in-the-brake"], [0.03], range(2))
+    # Of seeds 1 and 2 the car brakes in the second.
+    configs = grid(["dartout"], ["dies-in-the-brake"], [0.03], range(1, 3))
     with Journal(tmp_path / JOURNAL) as journal:
         failures = run_all(configs, journal, 1)
         kept = {config for config in configs if config.key in journal}

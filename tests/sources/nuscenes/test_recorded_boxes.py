@@ -13,7 +13,7 @@ from care_sim.study.rows.parameters import parameters
 from care_sim.study.scene_play import play_scene
 
 FIRST_SIGHTINGS = {
-    ("history", 0.05): 17.6, ("history", 0.1): 38.7,
+    ("history", 0.05): 22.3, ("history", 0.1): 37.7,
     ("all-camera", 0.05): 31.6, ("all-camera", 0.1): 52.9,
     ("care", 0.05): 41.2, ("care", 0.1): 54.4,
     ("full", 1.0): 55.9,
