@@ -28,7 +28,7 @@ NOTE = (
     f"Cells needed for {ENOUGH:.0%} of what a full scan has, in % of all cells; B90 is for all "
     "counts."
 )
-"""What the numbers are."""
+"""The note below every table of B90."""
 _INTERVALS = "Intervals are over worlds."
 _NO_INTERVAL = f"Fewer than {LEAST_WORLDS} worlds carry no interval."
 _TIED = "Tied entries share ranks, such as 1-3: the interval of their paired ratio includes 1."

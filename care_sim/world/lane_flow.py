@@ -131,7 +131,7 @@ class FlowingLane:
         found = self._stop_line()
         if self.ego_from_m <= ego_m < self.ego_to_m:
             found.append((ego_m + self.ego_ahead_m, ego_speed))
-        # Who crosses goes straight across: their speed along the lane is 0.
+        # A crosser goes straight across: the speed along the lane is 0.
         found += [(one.place_m, 0.0) for one in self.crossings if one.is_taken(time)]
         return found
 

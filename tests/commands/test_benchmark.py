@@ -129,7 +129,7 @@ def test_recorded_drives_are_a_part_of_their_own(capsys, here, monkeypatch, tmp_
     code, _, err = run(capsys, "leaderboard", "--verify", path)
     assert (code, "it plays kitti/0000: give --recorded" in err) == (1, True)
     code, out, _ = run(capsys, "leaderboard", "--verify", path, "--recorded", "kitti:DATA")
-    assert (code, "1 world of 2, drawn by lot, agree" in out) == (0, True)
+    assert (code, "2 worlds of 2, drawn by lot, agree" in out) == (0, True)
     # One person comes into view; two cars and a cyclist stand there from the first keyframe on.
     assert row.full[0] > 0.5
     assert row.full[2] > row.full[3] > 0

@@ -200,3 +200,20 @@ def test_the_figure_of_the_leaderboard_has_a_line_per_entry_and_never_at_its_end
     assert axes.get_xticklabels()[-1].get_text() == "never"
     budgets = axes.lines[0].get_xdata()
     assert [*budgets] == pytest.approx([32.0, 32.0, 3.87, 2.45, 0.5], abs=0.01)
+
+
+def test_few_worlds_rank_nobody():
+    ranked, few = (
+        [made_budgets("care-sector", HALF_WAY, streets=n), made_budgets("boxes", NEVER, streets=n)]
+        for n in (5, 4)
+    )
+    assert [row[0] for row in budgets_table(ranked).rows] == ["1", "2"]
+    table = budgets_table(few)
+    assert [row[0] for row in table.rows] == ["", ""]
+    assert not any("Tied" in note for note in table.notes)
+
+
+def test_ratios_are_to_the_published_entry_of_the_name():
+    own, published = made_budgets("care-sector", NEVER), made_budgets("care-sector", HALF_WAY)
+    table = budgets_table([own, published])
+    assert [row[-1] for row in table.rows] == ["", "never"]

@@ -101,7 +101,7 @@ class Leaderboard(WorkerOptions):
     """Put result files in a table, or verify them.
 
     Published entries stand beside them, in the same worlds under the same detector. To verify a
-    file is to play a random tenth of its worlds again.
+    file is to play a random tenth of every part again, at least five worlds.
     """
 
     results: Annotated[

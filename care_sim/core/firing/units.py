@@ -56,7 +56,7 @@ class Blocks(Hardware):
     def fire(self, scores: NDArray[Any], budget: int, floor: Floor | None, last: Cells) -> Cells:
         """The blocks of the demanded cells in their order, then those of the floor."""
         taken = np.zeros(self.units, np.bool_)
-        most = budget // self.unit_cells
+        most = min(budget // self.unit_cells, self.units)
         count = _take(demanded(scores), self.unit_of, taken, 0, most)
         if floor is not None:
             _take_floor(floor, self.unit_of, taken, count, most)

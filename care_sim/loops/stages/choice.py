@@ -38,7 +38,7 @@ class Choice:
         self._keys = np.zeros((worlds, 2), np.int64)
         # A row has room for one cell more, which `list_chosen` may write over and over.
         self._fired = Fired(np.zeros(worlds, np.int64), np.zeros((worlds, most + 1), int))
-        # What hardware in units has fired last in each world.
+        # The last cells of hardware in units, world by world.
         self._last: list[Cells] = [_NOTHING] * worlds
 
     def begin(self, world: int, floor: np.random.SeedSequence) -> None:

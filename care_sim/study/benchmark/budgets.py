@@ -91,7 +91,7 @@ class BudgetRow(NamedTuple):
 
 @dataclass(frozen=True)
 class BudgetResult:
-    """What an entry has at every budget, world by world, under a detector.
+    """Counts of an entry at every budget, world by world, under a detector.
 
     `quick` is a trial on a few streets; `made_by` are versions and machine; `sealed` is the digest
     of the salt that drew the worlds; `policy_ms` are p50 and p99 of a decision of the policy on
@@ -267,12 +267,7 @@ def play_budgets(
                     made_by(entry),
                     salt.digest if salt else None,
                     _policy_ms(
-                        [
-                            row
-                            for (part, _), (_, *got) in zip(named, rows, strict=True)
-                            for row in got
-                            if part == STREETS
-                        ]
+                        [own for (part, _), own in zip(named, rows, strict=True) if part == STREETS]
                     ),
                 )
             )
@@ -284,11 +279,11 @@ def _row(part: str, world: int | str, rows: Sequence[Row]) -> BudgetRow:
     return BudgetRow(part, world, full, tuple(got))
 
 
-def _policy_ms(rows: Sequence[Row]) -> tuple[float, ...]:
-    """Return p50 and p99 of a decision, medians over plays; nothing without a play that has them.
-    The first play of a process compiles code, which the median leaves out.
+def _policy_ms(streets: Sequence[Sequence[Row]]) -> tuple[float, ...]:
+    """Return p50 and p99 of a decision on streets, medians over plays; nothing without streets. The
+    first play of a process compiles code, which the median leaves out.
     """
-    times = [[row[name] for name in DECISION_MS] for row in rows if DECISION_MS[0] in row]
+    times = [[row[name] for name in DECISION_MS] for _full, *got in streets for row in got]
     return tuple(np.median(times, axis=0).round(_DECIMALS).tolist()) if times else ()
 
 

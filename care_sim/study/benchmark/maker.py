@@ -1,4 +1,4 @@
-"""Who made a result: code, libraries and machine, as its file names them and as they are here."""
+"""The maker of a result: code, libraries and machine, in its file and here."""
 
 from collections.abc import Mapping
 from typing import Any

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from care_sim.base.errors import InvalidInput
+from care_sim.evaluation.smallest_budget import LEAST_WORLDS
 from care_sim.policies import tags_of
 from care_sim.study.benchmark.budgets import BudgetResult, budget_tasks, play_budgets
 from care_sim.study.benchmark.maker import made_by
@@ -16,11 +17,11 @@ from care_sim.study.benchmark.recorded import RECORDED_PARTS, RecordedDrive
 from care_sim.study.benchmark.suite import FIRST_SEED, STREETS, Salt
 
 ONE_IN = 10
-"""One world in so many is played again."""
+"""One world in so many of every part is played again, and at least `LEAST_WORLDS`: a single
+recorded drive may have one newcomer."""
 ROUNDING = 0.01
-"""What another machine or library may move the sum of a count by, as a share of the full scan's,
-beside `ONE_OBJECT`: it rounds the last bit of a direction otherwise, and fires other cells."""
-ONE_OBJECT = 1.0
+"""Share of the full scan's that the sum of a count may move by on another machine or library: it
+rounds the last bit of a direction otherwise, and fires other cells."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,8 @@ def replayed(
     salt: Salt | None = None,
     drives: Sequence[RecordedDrive] = (),
 ) -> Replay:
-    """Play a random tenth of the worlds of a result again; recorded ones are among the `drives`.
+    """Play a random tenth of the worlds of every part of a result again, at least `LEAST_WORLDS`;
+    recorded ones are among the `drives`.
 
     A world differs where any count differs. By the code, libraries and machine that the file names
     every difference is false; by others, differences that move a sum by more than `ROUNDING` are.
@@ -59,11 +61,12 @@ def replayed(
             raise InvalidInput(f"it plays {world}: give --recorded the sources of its drives")
     # A policy that cannot be loaded here has its line before anything is played.
     budget_tasks(result.entry, STREETS, [FIRST_SEED], result.detector)[0][-1].try_out()
-    drawn = result.cut_to(rng.sample(result.worlds, -(-len(result.rows) // ONE_IN)))
-    assert drawn is not None
     worlds: dict[str, list[Any]] = {}
-    for part, world in sorted(drawn.worlds, key=result.worlds.index):
-        worlds.setdefault(part, []).append(at_hand.get(str(world), world))
+    for part in result.parts:
+        own = [world for of, world in result.worlds if of == part]
+        count = min(max(-(-len(own) // ONE_IN), LEAST_WORLDS), len(own))
+        drawn = sorted(rng.sample(own, count), key=own.index)
+        worlds[part] = [at_hand.get(str(world), world) for world in drawn]
     found = play_budgets([result.entry], player, result.detector, worlds, salt=salt)
     if player.failures:
         raise InvalidInput(str(player.failures[0]))
@@ -83,9 +86,7 @@ def _moved(told: BudgetResult, again: BudgetResult) -> float:
     for one, other in zip(told.counts, again.counts, strict=True):
         full = np.maximum(one.full.sum(axis=0), 1.0)
         for mine, theirs in ((one.full, other.full), (one.got, other.got)):
-            off = np.abs(mine.sum(axis=0) - theirs.sum(axis=0))
-            # A drawn drive may have a single newcomer.
-            moves.append(float(np.max(np.maximum(off - ONE_OBJECT, 0.0) / full)))
+            moves.append(float(np.max(np.abs(mine.sum(axis=0) - theirs.sum(axis=0)) / full)))
     return max(moves)
 
 

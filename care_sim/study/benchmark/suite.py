@@ -1,4 +1,4 @@
-"""What the benchmark plays: entries, and the worlds that are published, drawn afresh or sealed."""
+"""Entries of the benchmark, and its worlds: published, drawn afresh or sealed."""
 
 import hashlib
 import json

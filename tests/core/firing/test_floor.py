@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 
 from care_sim.core.firing.base import top_up
 from care_sim.core.firing.floor import Floor, draw_cells, floor_key
+from care_sim.core.firing.listing import hardware_of
+from care_sim.core.grid import AngularGrid
 from tests.helpers.floors import drawn_cells, drawn_floors, floor_order, philox
 
 LIKELY = 4.0
@@ -94,3 +96,11 @@ def test_number_0_is_the_floor_of_the_seed_and_others_those_of_its_children(entr
     own = floor_key(seed, number)
     assert seed.n_children_spawned == 0
     assert [*own] == seed.spawn(number)[-1].generate_state(2).tolist()
+
+
+@pytest.mark.parametrize("name", ["cells", "tiles:2x2"])
+def test_a_budget_beyond_the_grid_fires_all_of_it(name):
+    grid = AngularGrid(columns=8, rows=4)
+    scores = np.zeros(grid.shape, np.float32)
+    fired = hardware_of(name, grid).fire(scores, grid.size + 9, Floor(1, 2, 3), np.empty(0, int))
+    assert fired.tolist() == [*range(grid.size)]
