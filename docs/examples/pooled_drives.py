@@ -9,6 +9,7 @@ policies that played all drives, into FILE.svg.
 """
 
 from argparse import ArgumentParser
+from collections.abc import Iterable
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -29,6 +30,11 @@ from care_sim.reports.figures.styles import default_style, save
 from care_sim.reports.protocol.rows import SettingPlays, plays_by_setting
 from care_sim.reports.report import read_results
 from care_sim.study.run_config import FULL
+
+
+def read_settings(folders: Iterable[Path]) -> list[SettingPlays]:
+    """Return the plays of the folders, one for each setting."""
+    return [plays for folder in folders for plays in plays_by_setting(read_results(folder)[0])]
 
 
 def pooled(
@@ -70,9 +76,7 @@ def levels_figure(settings: list[SettingPlays]) -> Figure:
 
 def main(reference: str, folders: list[str], figure: str | None = None) -> None:
     """Print a Markdown table for all newcomers, one for each kind, and one of overall recall."""
-    settings = [
-        plays for name in folders for plays in plays_by_setting(read_results(Path(name))[0])
-    ]
+    settings = read_settings(map(Path, folders))
     if figure:
         save(levels_figure(settings), Path(figure))
     budgets = sorted({budget for plays in settings for budget in plays.budgets})

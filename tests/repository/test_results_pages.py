@@ -9,7 +9,9 @@ from collections import Counter
 import pytest
 
 from care_sim import cli
+from care_sim.base.seeds import split_of
 from care_sim.core.defaults import AS_DEMANDED
+from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, ratio_level
 from care_sim.evaluation.smallest_budget import budget_ratio
 from care_sim.policies import BUILT_IN
 from care_sim.reports.budgets import format_budget, parts_table
@@ -23,7 +25,8 @@ from care_sim.study.benchmark.result import references
 from care_sim.study.benchmark.suite import STREETS, Entry
 from care_sim.study.results_formats import EPISODES
 from care_sim.study.rows.parquet import read_rows
-from tests.helpers.places import RESULTS, ROOT, fenced, links, loaded
+from care_sim.study.run_config import FULL
+from tests.helpers.places import EXAMPLES, RESULTS, ROOT, fenced, links, loaded
 
 FOLDER = ROOT / "results"
 DATA = FOLDER / "data"
@@ -159,3 +162,52 @@ def test_the_first_page_counts_the_collisions_of_other_drives(page):
         f"{hits['care']}, a fan straight ahead in {hits['fan']}."
     )
     assert told in " ".join((ROOT / page).read_text().split())
+
+
+def table_rows(page):
+    """The rows of the first table of a page, heading first, without bold and code."""
+    lines = re.search(r"(?:^\|.*\n)+", page.read_text(), re.M)[0].splitlines()
+    cells = [re.sub(r"[*`]", "", line).strip("|").split("|") for line in lines]
+    return [[cell.strip() for cell in row] for row in cells if "---" not in row]
+
+
+def test_newcomers_on_streets_are_those_of_the_rows():
+    levels = (DATA / "streets" / "tables.md").read_text()
+    (_, _, *budgets), (_, _, full, *_), *rows = table_rows(FOLDER / "first-sightings.md")
+    assert f"| 100% | full | {full} |" in levels
+    for policy, _, *own in rows:
+        for budget, level in zip(budgets, own, strict=True):
+            assert re.search(rf"^\| {budget} \| {policy} \| {level} \|", levels, re.M), policy
+
+
+def test_newcomers_on_recorded_drives_are_those_of_the_rows():
+    script = loaded(EXAMPLES / "pooled_drives.py")
+    settings = script.read_settings(sorted(DATA.glob("recorded-*-core-first")))
+    names = {name.rpartition(":")[2]: name for plays in settings for name in plays.tags}
+    (_, *budgets), (_, full, *_), *rows = table_rows(FOLDER / "recorded-drives.md")
+    told = {(FULL, 1.0): full} | {
+        (names[policy], float(budget.strip("%")) / 100): level
+        for policy, *own in rows
+        for budget, level in zip(budgets, own, strict=True)
+    }
+    for (policy, budget), level in told.items():
+        tallies = script.pooled(settings, policy, budget)
+        assert f"{ratio_level(FIRST_SIGHTING, tallies).by_event:.1f}" == level, policy
+
+
+def test_collisions_with_and_without_a_camera_are_those_of_the_rows():
+    world = ""
+    for name, budget, *both, _ in table_rows(FOLDER / "camera.md")[1:6]:
+        world = (name or world).partition(",")[0]
+        folder = {"drives": "validate-drive", "Euro NCAP": "validate-ncap"}[world]
+        rows = read_rows(DATA / folder / EPISODES.file)
+        for count, policy in map(str.split, both):
+            hits = [
+                row["seed"]
+                for row in rows
+                if row["policy"] == policy
+                and row["budget"] == float(budget.strip("%")) / 100
+                and row["collision"]
+                and split_of([row["seed"]]) == "test"
+            ]
+            assert len(hits) == int(count), (world, policy)
