@@ -15,7 +15,12 @@ from pathlib import Path
 from care_sim.base.errors import report_problems
 from care_sim.base.files import write_text
 from care_sim.base.interrupts import FAILED
-from care_sim.reports.budgets import budget_tables
+from care_sim.reports.budgets import (
+    budget_tables,
+    format_budget,
+    format_smallest,
+    sorted_by_budget,
+)
 from care_sim.reports.figures.budgets import BUDGETS_FIGURE, budgets_figure
 from care_sim.reports.figures.styles import save
 from care_sim.reports.recorded import sources_table
@@ -64,10 +69,37 @@ def statements() -> list[Table]:
     return [columns_table(streets), statements_table(streets)] if len(streets) > 1 else []
 
 
+def summary_table() -> Table:
+    """Return the table of `results/b90.md`: a line per entry with its B90, that of each part, and
+    that of the streets under each other detector that has played.
+    """
+    ordered = sorted_by_budget(results_of(MAIN_DETECTOR))
+    others = {
+        detector: {one.entry: one for one in results}
+        for detector in DETECTORS[1:]
+        if (results := results_of(detector))
+    }
+    parts = ordered[0].parts
+    rows = (
+        (
+            one.entry.name,
+            format_smallest(one),
+            *(format_budget(one.of_part(part).score.budget) for part in parts),
+            *(format_budget(played[one.entry].score.budget) for played in others.values()),
+        )
+        for one in ordered
+    )
+    return Table(
+        "B90 of every entry, of each part, and of streets under other detectors",
+        ("policy", "B90", *parts, *others),
+        tuple(rows),
+    )
+
+
 def written() -> str:
     """Return the text of `tables.md` as the result files are now."""
     main = results_of(MAIN_DETECTOR)
-    tables = [*budget_tables(main), sources_table(main), *statements()]
+    tables = [summary_table(), *budget_tables(main), sources_table(main), *statements()]
     told = "\n".join(table.markdown() for table in tables)
     return f"# B90\n\nMade by `{COMMAND}`.\n\n{told}"
 

@@ -13,21 +13,24 @@ RESULTS = Path(__file__).parents[1] / "results"
 PAGE = RESULTS / "data" / "README.md"
 _HEAD = """# Published rows
 
-Every folder holds the rows of one study, its tables, and `config.json`: the command,
-configurations, seeds, versions, a hash of the code, the machine. `care-sim report FOLDER` makes all
-tables and figures again. [How to read the rows](../../docs/rows.md).
+A folder holds the rows of one study, their tables, and `config.json`: command, settings, seeds,
+versions, a hash of the code, the machine. `care-sim report FOLDER` makes tables and figures again.
+[Columns](../../docs/rows.md).
 
-Beside them lie `b90`, the result files of the [benchmark](../b90.md)
-(`python docs/b90_results.py`; folders in it are of other detectors), `judge-streets` and
-`judge-logs`, what `care-sim judge` says of [detectors](../detectors.md), and `bench.json` and
-`parity.json`, of `make bench` and `make parity`.
+`b90` holds the result files of the [benchmark](../b90.md) (`python docs/b90_results.py`), with a
+folder per further detector. `judge-streets` and `judge-logs` hold results of `care-sim judge` on
+[detectors](../detectors.md). `make bench` and `make parity` write `bench.json` and `parity.json`.
 
-The column *version* names the version of CARE-Sim that played the rows. Version 0.3.0 draws another
-random floor, so rows of earlier versions differ from what their commands play today. `make publish`
-plays them again.
+*Version* is the version of CARE-Sim that played the rows. Version 0.3.0 draws another random floor,
+so older rows differ from a new run. `make publish` plays all rows again.
 
-| folder | command | version | rows | pages |
-|---|---|---|---|---|
+| folder | version | rows | pages |
+|---|---|---|---|
+"""
+_COMMANDS = """
+## Commands
+
+```bash
 """
 _ROWS = ("episodes.parquet", "plays.parquet", "vehicle.parquet")
 
@@ -39,7 +42,7 @@ def written() -> str:
         for page in sorted(RESULTS.glob("*.md"))
         if page.name not in ("README.md", "findings.md")
     }
-    lines = []
+    lines, commands = [], []
     for path in sorted(PAGE.parent.glob("*/config.json")):
         folder = path.parent
         config = json.loads(path.read_text(encoding="utf-8"))
@@ -52,8 +55,9 @@ def written() -> str:
             f"[{page.stem}](../{page.name})" for page, text in pages.items() if cites.search(text)
         ]
         name = f"[{folder.name}]({folder.name}/tables.md)"
-        lines.append(f"| {name} | `{command}` | {version} | {rows:,} | {', '.join(cited)} |\n")
-    return _HEAD + "".join(lines)
+        lines.append(f"| {name} | {version} | {rows:,} | {', '.join(cited)} |\n")
+        commands.append(f"# {folder.name}\n{command}\n")
+    return _HEAD + "".join(lines) + _COMMANDS + "".join(commands) + "```\n"
 
 
 if __name__ == "__main__":

@@ -1,23 +1,40 @@
 """First sightings over the drives of several sources: levels, and one policy less each other.
 
-    python docs/examples/pooled_drives.py care results/data/recorded-kitti ...
+    python docs/examples/pooled_drives.py care results/data/recorded-kitti ... --figure FILE
 
 The first argument is the policy that the others are held against; then folders of `care-sim
 protocol`, played under one set of conditions. Whole drives are resampled, as in the tables of the
-protocol: a drive is one sample, whatever source it is from.
+protocol: a drive is one sample, whatever source it is from. `--figure` draws the levels, of
+policies that played all drives, into FILE.svg.
 """
 
-import sys
+from argparse import ArgumentParser
+from collections.abc import Iterable
 from pathlib import Path
+
+from matplotlib.figure import Figure
 
 from care_sim.base.errors import percent
 from care_sim.evaluation.censoring import FEWEST_PAIRS
 from care_sim.evaluation.recall import Tally
-from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, ratio_level, scene_contrast
+from care_sim.evaluation.scene_contrasts import (
+    FIRST_SIGHTING,
+    OVERALL,
+    Ratio,
+    ratio_level,
+    scene_contrast,
+)
 from care_sim.evaluation.strata import NEWCOMERS
+from care_sim.reports.figures.curves import BUDGET, Panel, Point, curves_figure, point
+from care_sim.reports.figures.styles import default_style, save
 from care_sim.reports.protocol.rows import SettingPlays, plays_by_setting
 from care_sim.reports.report import read_results
 from care_sim.study.run_config import FULL
+
+
+def read_settings(folders: Iterable[Path]) -> list[SettingPlays]:
+    """Return the plays of the folders, one for each setting."""
+    return [plays for folder in folders for plays in plays_by_setting(read_results(folder)[0])]
 
 
 def pooled(
@@ -32,11 +49,36 @@ def pooled(
     return found
 
 
-def main(reference: str, folders: list[str]) -> None:
-    """Print a Markdown table for all newcomers, one for each kind, and one of overall recall."""
-    settings = [
-        plays for name in folders for plays in plays_by_setting(read_results(Path(name))[0])
+@default_style()
+def levels_figure(settings: list[SettingPlays]) -> Figure:
+    """Draw the newcomers and the object keyframes that each policy detects, over the budget."""
+    budgets = sorted({budget for plays in settings for budget in plays.budgets})
+    drives = len(pooled(settings, FULL, 1.0))
+    played = {name: tags for plays in settings for name, tags in plays.tags.items()}
+    # The module of a policy is not part of its name.
+    names = {name.rpartition(":")[2]: name for name in played}
+
+    def panel(ratio: Ratio, label: str) -> Panel:
+        def read(name: str, budget: float) -> Point | None:
+            own = pooled(settings, names.get(name, FULL), 1.0 if name == FULL else budget)
+            return point(ratio_level(ratio, own).by_event) if len(own) == drives else None
+
+        return Panel.by_budget("", [*names, FULL], budgets, read, label=label)
+
+    panels = [
+        panel(FIRST_SIGHTING, "newcomers detected (%)"),
+        panel(OVERALL, "object keyframes detected (%)"),
     ]
+    tags = {name: played[policy] for name, policy in names.items()}
+    title = f"{drives} recorded drives"
+    return curves_figure("levels", title, panels, tags, [BUDGET])["levels"]
+
+
+def main(reference: str, folders: list[str], figure: str | None = None) -> None:
+    """Print a Markdown table for all newcomers, one for each kind, and one of overall recall."""
+    settings = read_settings(map(Path, folders))
+    if figure:
+        save(levels_figure(settings), Path(figure))
     budgets = sorted({budget for plays in settings for budget in plays.budgets})
     policies = dict.fromkeys(policy for plays in settings for policy in plays.policies)
     for ratio, kind in (*((FIRST_SIGHTING, kind) for kind in ("", *NEWCOMERS)), (OVERALL, "")):
@@ -66,4 +108,9 @@ def main(reference: str, folders: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], sys.argv[2:])
+    parser = ArgumentParser(description=__doc__)
+    parser.add_argument("reference")
+    parser.add_argument("folders", nargs="+")
+    parser.add_argument("--figure")
+    given = parser.parse_args()
+    main(given.reference, given.folders, given.figure)

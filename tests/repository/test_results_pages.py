@@ -9,7 +9,9 @@ from collections import Counter
 import pytest
 
 from care_sim import cli
+from care_sim.base.seeds import split_of
 from care_sim.core.defaults import AS_DEMANDED
+from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, ratio_level
 from care_sim.evaluation.smallest_budget import budget_ratio
 from care_sim.policies import BUILT_IN
 from care_sim.reports.budgets import format_budget, parts_table
@@ -23,19 +25,25 @@ from care_sim.study.benchmark.result import references
 from care_sim.study.benchmark.suite import STREETS, Entry
 from care_sim.study.results_formats import EPISODES
 from care_sim.study.rows.parquet import read_rows
-from tests.helpers.places import RESULTS, ROOT, links, loaded
+from care_sim.study.run_config import FULL
+from tests.helpers.places import EXAMPLES, RESULTS, ROOT, fenced, links, loaded
 
 FOLDER = ROOT / "results"
 DATA = FOLDER / "data"
 INDEX = FOLDER / "README.md"
 QUESTIONS = [page for page in RESULTS if page.name not in ("README.md", "findings.md")]
-LINES = re.findall(r"^\| \[.*", INDEX.read_text(), re.M)
-"""Those of the pictures."""
 
 
-def test_every_picture_has_a_line_in_the_index():
+def commands(page):
+    """The commands of a page, one line each."""
+    lines = "".join(fenced(page, "bash")).replace("\\\n", " ").splitlines()
+    return [line for line in lines if line.startswith("care-sim ")]
+
+
+def test_every_picture_has_a_command_in_the_index():
     pictures = {file.name for ending in ("gif", "png") for file in FOLDER.glob(f"*.{ending}")}
-    assert {line.split("](")[0].removeprefix("| [") for line in LINES} == pictures
+    made = re.findall(r"--(?:video|picture) results/(\S+)", "\n".join(commands(INDEX)))
+    assert sorted(made) == sorted(pictures)
 
 
 @pytest.mark.parametrize("name", sorted(path.name for path in DATA.iterdir() if path.is_dir()))
@@ -50,10 +58,10 @@ def test_the_index_of_the_rows_is_of_the_folders():
 
 
 def test_commands_beside_pictures_and_rows_are_understood():
-    rows = re.findall(r"^\| \[.*", (DATA / "README.md").read_text(), re.M)
-    told = [re.findall(r"`(care-sim [^`]*)`", line) for line in (*LINES, *rows)]
-    assert all(told)
-    for command in (command for line in told for command in line):
+    rows = DATA / "README.md"
+    folders = re.findall(r"^\| \[([\w-]+)\]", rows.read_text(), re.M)
+    assert len(commands(rows)) == len(folders) > 5
+    for command in (*commands(INDEX), *commands(rows)):
         numbered = re.sub(r"\$\(seq (\d+) (\d+)\)", listed, command)
         cli.parsed_command(shlex.split(numbered)[1:])
 
@@ -65,11 +73,12 @@ def listed(sequence):
 
 
 @pytest.mark.parametrize("page", QUESTIONS, ids=lambda page: page.stem)
-def test_a_page_asks_answers_and_says_what_does_not_hold(page):
-    question, answer, *_ = page.read_text().split("\n\n")
+def test_a_page_asks_answers_and_has_limitations(page):
+    text = page.read_text()
+    question, answer, *_ = text.split("\n\n")
     assert re.fullmatch(r"# .*\?", question)
     assert answer.startswith("**")
-    assert "\n## What does not hold\n" in page.read_text()
+    assert re.search(r"^## (Limitations|What does not hold)$", text, re.M)
 
 
 @pytest.mark.parametrize("page", QUESTIONS, ids=lambda page: page.stem)
@@ -153,3 +162,52 @@ def test_the_first_page_counts_the_collisions_of_other_drives(page):
         f"{hits['care']}, a fan straight ahead in {hits['fan']}."
     )
     assert told in " ".join((ROOT / page).read_text().split())
+
+
+def table_rows(page):
+    """The rows of the first table of a page, heading first, without bold and code."""
+    lines = re.search(r"(?:^\|.*\n)+", page.read_text(), re.M)[0].splitlines()
+    cells = [re.sub(r"[*`]", "", line).strip("|").split("|") for line in lines]
+    return [[cell.strip() for cell in row] for row in cells if "---" not in row]
+
+
+def test_newcomers_on_streets_are_those_of_the_rows():
+    levels = (DATA / "streets" / "tables.md").read_text()
+    (_, _, *budgets), (_, _, full, *_), *rows = table_rows(FOLDER / "first-sightings.md")
+    assert f"| 100% | full | {full} |" in levels
+    for policy, _, *own in rows:
+        for budget, level in zip(budgets, own, strict=True):
+            assert re.search(rf"^\| {budget} \| {policy} \| {level} \|", levels, re.M), policy
+
+
+def test_newcomers_on_recorded_drives_are_those_of_the_rows():
+    script = loaded(EXAMPLES / "pooled_drives.py")
+    settings = script.read_settings(sorted(DATA.glob("recorded-*-core-first")))
+    names = {name.rpartition(":")[2]: name for plays in settings for name in plays.tags}
+    (_, *budgets), (_, full, *_), *rows = table_rows(FOLDER / "recorded-drives.md")
+    told = {(FULL, 1.0): full} | {
+        (names[policy], float(budget.strip("%")) / 100): level
+        for policy, *own in rows
+        for budget, level in zip(budgets, own, strict=True)
+    }
+    for (policy, budget), level in told.items():
+        tallies = script.pooled(settings, policy, budget)
+        assert f"{ratio_level(FIRST_SIGHTING, tallies).by_event:.1f}" == level, policy
+
+
+def test_collisions_with_and_without_a_camera_are_those_of_the_rows():
+    world = ""
+    for name, budget, *both, _ in table_rows(FOLDER / "camera.md")[1:6]:
+        world = (name or world).partition(",")[0]
+        folder = {"drives": "validate-drive", "Euro NCAP": "validate-ncap"}[world]
+        rows = read_rows(DATA / folder / EPISODES.file)
+        for count, policy in map(str.split, both):
+            hits = [
+                row["seed"]
+                for row in rows
+                if row["policy"] == policy
+                and row["budget"] == float(budget.strip("%")) / 100
+                and row["collision"]
+                and split_of([row["seed"]]) == "test"
+            ]
+            assert len(hits) == int(count), (world, policy)

@@ -179,7 +179,7 @@ def order_figures(rows: Sequence[Row]) -> dict[str, Figure]:
 
 def validation_figures(rows: Sequence[Row]) -> dict[str, Figure]:
     """First detections and collisions in the world as it is and with each factor changed, one
-    column of panels a budget.
+    column of panels per budget; a single world at several budgets in curves over the budget.
     """
     worlds = played_worlds(rows)
     budgets = sorted({budget for world in worlds for budget in world.budgets})
@@ -187,27 +187,42 @@ def validation_figures(rows: Sequence[Row]) -> dict[str, Figure]:
     shown = ("random", "history", *CAMERA_POLICIES, MEMORISER)
     tags = {policy: played[policy] for policy in shown if policy in played}
     tags |= {BEST_CONTROL: ("control",)}
-    ticks = dict(zip(_names(worlds), worlds, strict=True))
+    names = dict(zip(_names(worlds), worlds, strict=True))
+    first = worlds[0]
+    # A single world has one tick, so its curves are over the budget.
+    is_single = len(worlds) == 1 and len(budgets) > 1
+    columns: list[tuple[str, dict[str, tuple[WorldPlays, float]], Sequence[float]]]
+    if is_single:
+        columns = [("", {percent(budget): (first, budget) for budget in budgets}, budgets)]
+    else:
+        columns = [
+            (f": budget {percent(budget)}", {name: (names[name], budget) for name in names}, ())
+            for budget in budgets
+        ]
 
-    def panel(label: str, read: _Read, budget: float, less: bool) -> Panel:
-        def height(role: str, world: WorldPlays) -> Point | None:
+    def panels_of(label: str, read: _Read, less: bool) -> list[Panel]:
+        def height(role: str, tick: tuple[WorldPlays, float]) -> Point | None:
+            world, budget = tick
             return read(world.played(role, budget))
 
-        title = f"{label}: budget {percent(budget)}"
-        return Panel.of(title, [*tags, FULL], ticks, height, less_is_better=less)
+        return [
+            Panel.of(label + told, [*tags, FULL], ticks, height, places=places, less_is_better=less)
+            for told, ticks, places in columns
+        ]
 
     panels = [
-        *(panel("first detection, median, m", first_detection, b, False) for b in budgets),
-        *(panel("episodes with a collision, %", _percent("collision"), b, True) for b in budgets),
+        *panels_of("first detection, median, m", first_detection, False),
+        *panels_of("episodes with a collision, %", _percent("collision"), True),
     ]
-    first = worlds[0]
     known = {budget: name for budget in first.budgets if (name := first.best_control(budget))}
     notes = [f"{BEST_CONTROL} of {first.setting.world}: {named_by_budget(known)}"] if known else []
     seeds = len({row["seed"] for world in worlds for row in world.test_rows})
     changed = ", then with one factor changed" if len(worlds) > 1 else ""
     title = f"{first.setting.label}{changed}: {seeds} test seeds"
-    columns = len(budgets)
-    return curves_figure("validation", title, panels, tags, notes, columns=columns, share="row")
+    if is_single:
+        return curves_figure("validation", title, panels, tags, [BUDGET, *notes])
+    width = len(budgets)
+    return curves_figure("validation", title, panels, tags, notes, columns=width, share="row")
 
 
 def _names(worlds: Sequence[WorldPlays]) -> list[str]:

@@ -15,6 +15,8 @@ LEADERBOARD_FIGURE = "leaderboard"
 _NEVER = 100 * BUDGETS[-1] * 1.6
 """Where "never" is drawn, in % of the cells."""
 _MARKERS = "v^sdP*"
+_SIZES = 60, 30, 12
+"""Areas of the markers, in square points: markers of one budget are seen in each other."""
 _LINE_INCHES = 0.26
 
 
@@ -38,7 +40,8 @@ def leaderboard_figure(results: Sequence[BudgetResult]) -> Figure:
             "marker": _MARKERS[n % len(_MARKERS)],
             "label": name,
         }
-        axes.scatter([own[n] for own in needs], lines, s=24, zorder=3, **look)
+        size = _SIZES[min(n, len(_SIZES) - 1)]
+        axes.scatter([own[n] for own in needs], lines, s=size, zorder=3, **look)
     ends = [[_place(value) for value in each.score[:3]] for each in upwards]
     budgets = [budget for budget, _, _ in ends]
     spans = [[b - low for b, low, _ in ends], [high - b for b, _, high in ends]]

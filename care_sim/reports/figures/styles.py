@@ -133,9 +133,10 @@ _SPARE = (GREEN, "#7468C0", "#C2478A", "#96862A", "#2E9587", "#B3543C", "#3B93C4
 
 def colours(policies: Iterable[str]) -> dict[str, str]:
     """The colour of every policy, the same in every figure."""
-    # Policies of others get what is left, in their order; so the same study has the same colours.
-    spare = cycle(_SPARE)
-    return {policy: _COLOURS.get(policy) or next(spare) for policy in policies}
+    # Other policies get unused colours, in their order; so the same study has the same colours.
+    known = {policy: _COLOURS.get(policy) for policy in policies}
+    spare = cycle([hue for hue in _SPARE if hue not in known.values()])
+    return {policy: hue or next(spare) for policy, hue in known.items()}
 
 
 FORMATS = (".png", ".svg")
