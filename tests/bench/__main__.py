@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from care_sim.base.files import write_text
+from care_sim.reports.figures.styles import save
 from care_sim.study.episode_play import trace
 from care_sim.study.provenance import machine, versions
 from tests.bench import environments, vectors
@@ -50,8 +51,7 @@ def main(arguments=None):
         print(line)
     if out:
         write_text(out, json.dumps(report, indent=2) + "\n")
-        for suffix in (".png", ".svg"):
-            growth_figure(report).savefig(out.with_suffix(suffix))
+        save(growth_figure(report), out.with_suffix(""))
     return 0
 
 

@@ -9,6 +9,7 @@ from matplotlib.ticker import NullLocator
 
 from care_sim.core.allocation import budget_cells
 from care_sim.core.grid import AngularGrid
+from care_sim.reports.figures.styles import BLUE, GREEN, ORANGE, default_style, name_ends
 from tests.bench.casters import SENSOR, casters, moving_bodies
 from tests.bench.environments import EPISODE
 
@@ -28,8 +29,7 @@ AXES = {
     "bodies": "bodies",
     "grid": "grid (columns x rows), same rays",
 }
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
-"""From the palette of Okabe and Ito (2008), safe for the colour-blind."""
+COLOURS = (BLUE, ORANGE, GREEN, "#AF5BAF")
 
 
 def scans(settings):
@@ -135,24 +135,23 @@ def _point(settings, axis, value):
     return {name: 1e3 * float(np.median(seconds[1:])) for name, seconds in times.items()}
 
 
+@default_style()
 def growth_figure(report):
-    """One panel per axis and one line per engine; both scales are logarithmic."""
+    """Draw one panel per axis and one line per engine. Both scales are logarithmic."""
     figure = Figure(figsize=(10.0, 3.4), layout="constrained")
     panels = figure.subplots(1, len(AXES), sharey=True)
     for axes, (name, label) in zip(panels, AXES.items(), strict=True):
         curve = report["growth"][name]
-        styles = zip(curve["ms"].items(), COLOURS, "osD^", strict=False)
-        for (engine, ms), colour, marker in styles:
-            line = {"marker": marker, "color": colour, "label": engine, "markersize": 4}
-            axes.loglog(curve["values"], ms, **line)
-        axes.grid(which="major", linewidth=0.4, alpha=0.5)
+        for ms, colour, marker in zip(curve["ms"].values(), COLOURS, "osD^", strict=False):
+            axes.loglog(curve["values"], ms, marker=marker, color=colour, markersize=4)
         axes.set_xticks(curve["values"], curve["labels"])
         axes.xaxis.set_minor_locator(NullLocator())
         axes.set_xlabel(label)
     panels[0].yaxis.set_major_formatter("{x:g}")
-    panels[0].set_ylabel("a scan, poses included (ms)")
-    panels[0].legend(frameon=False, fontsize=8)
-    scan, processor = report["scans"], report["machine"]["processor"]
-    title = f"{scan['bodies']} bodies and {scan['rays']} rays unless told otherwise. {processor}"
-    figure.suptitle(title, x=0.01, ha="left", fontsize=8)
+    panels[0].set_ylabel("time per scan (ms)")
+    scan = report["scans"]
+    title = f"{scan['bodies']} bodies and {scan['rays']:,} rays, unless the axis varies them"
+    figure.suptitle(title, x=0.01, ha="left")
+    ends = zip(curve["ms"].items(), COLOURS, strict=False)
+    name_ends(figure, {panels[-1]: {engine: (ms[-1], colour) for (engine, ms), colour in ends}})
     return figure

@@ -13,6 +13,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from care_sim.base.files import write_text
+from care_sim.reports.figures.styles import BLUE, ORANGE, default_style, save
 from care_sim.scenarios import PAPER_SCENARIOS
 from care_sim.study.progress import shown_progress
 from care_sim.study.provenance import machine, versions
@@ -21,8 +22,7 @@ from tests.parity.rays import GROUPS, REFERENCES, SAME, VERDICTS
 from tests.parity.scenes import random_scenes
 
 RANDOM = "random scenes"
-STYLES = dict(zip(REFERENCES, (("#0072B2", "o"), ("#D55E00", "D")), strict=True))
-"""Of the palette of Okabe and Ito (2008), safe for the colour-blind."""
+STYLES = dict(zip(REFERENCES, ((BLUE, "o", "full"), (ORANGE, "D", "none")), strict=True))
 
 
 def main(arguments=None):
@@ -38,8 +38,7 @@ def main(arguments=None):
     print(*lines(report), sep="\n")
     if options.out:
         write_text(options.out, json.dumps(report, indent=2) + "\n")
-        for suffix in (".png", ".svg"):
-            parity_figure(report).savefig(options.out.with_suffix(suffix))
+        save(parity_figure(report), options.out.with_suffix(""))
     return 0 if agree(report) else 1
 
 
@@ -107,9 +106,10 @@ def _counted(counts):
                      for name, count in counts.items() if count)  # fmt: skip
 
 
+@default_style()
 def parity_figure(report):
-    """Rays in a million to which `fast` answers otherwise than either reference, a panel for random
-    scenes and one for the keyframes of all scenarios. Kinds that no ray meets have no marker.
+    """Draw the rays per million that differ between `fast` and each reference: a panel for random
+    scenes, one for the keyframes of all scenarios. Kinds that no ray meets have no marker.
     """
     panels = {RANDOM: [own for name, own in report["scans"].items() if name == RANDOM]}
     panels["keyframes of the scenarios"] = [
@@ -123,18 +123,23 @@ def parity_figure(report):
         # Shares span seven powers of ten, and none is a result too: one ray of all that are cast
         # stands apart from it.
         axes.set_xscale("symlog", linthresh=0.01)
-        for reference, (colour, marker) in STYLES.items():
+        for reference, (colour, marker, filled) in STYLES.items():
             met = [own["references"][reference] for own in scans]
             rays = {group: sum(own[group]["rays"] for own in met) for group in GROUPS}
             alike = {group: sum(own[group][VERDICTS[SAME]] for own in met) for group in GROUPS}
             shares = {g: 1e6 * (rays[g] - alike[g]) / rays[g] for g in GROUPS if rays[g]}
             places = [GROUPS.index(group) for group in shares]
-            style = {"color": colour, "label": f"than {reference}", "clip_on": False}
+            style = {
+                "color": colour,
+                "label": f"from {reference}",
+                "clip_on": False,
+                "fillstyle": filled,
+            }
             axes.plot([*shares.values()], places, marker, **style)
         axes.set_xlim(0, 1e6)
     row[0].set_yticks(range(len(GROUPS)), GROUPS)
     row[0].set_ylim(len(GROUPS) - 0.5, -0.5)
-    figure.supxlabel("rays in a million that fast answers otherwise (at 0: none)", fontsize=10)
+    figure.supxlabel("rays per million that differ (at 0: none)", fontsize=9)
     figure.legend(*row[0].get_legend_handles_labels(), loc="outside upper right", frameon=False)
     return figure
 
