@@ -100,7 +100,7 @@ def summary_table() -> Table:
 def with_table(page: str) -> str:
     """Return the text of the page with its table as the result files are now."""
     lines = summary_table().markdown().splitlines(keepends=True)
-    table = "".join(line for line in lines if line.startswith("|"))
+    table = "".join(line.replace(" --- ", "---") for line in lines if line.startswith("|"))
     return re.sub(r"(?:^\|.*\n)+", lambda _: table, page, count=1, flags=re.M)
 
 
