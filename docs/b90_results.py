@@ -4,7 +4,8 @@
 
 plays the published entries under every detector, and writes result files, tables and figure. The
 folder `--plays` keeps what is finished: the same command resumes. With `--tables` nothing plays;
-tables, figure and the entries of the package are made from the result files.
+tables, figure, the table of `results/b90.md` and the entries of the package are made from the
+result files.
 """
 
 import re
@@ -18,7 +19,6 @@ from care_sim.base.interrupts import FAILED
 from care_sim.reports.budgets import (
     budget_tables,
     format_budget,
-    format_smallest,
     sorted_by_budget,
 )
 from care_sim.reports.figures.budgets import BUDGETS_FIGURE, budgets_figure
@@ -39,7 +39,8 @@ from care_sim.study.benchmark.result import publish_references, read_result
 from care_sim.study.benchmark.suite import STREETS, Entry
 from care_sim.study.runner import by_reason
 
-FOLDER = Path(__file__).parents[1] / "results" / "data" / "b90"
+PAGE = Path(__file__).parents[1] / "results" / "b90.md"
+FOLDER = PAGE.parent / "data" / "b90"
 DETECTORS = (MAIN_DETECTOR, "megvii", "pointrcnn", "returns")
 """The main one first. The files of the others are in folders by their names."""
 DRAWN = ("care-sector", "care-sightlines", "after-ancha", "tuned-place", "learned-sets", "care")
@@ -83,7 +84,7 @@ def summary_table() -> Table:
     rows = (
         (
             one.entry.name,
-            format_smallest(one),
+            format_budget(one.score.budget),
             *(format_budget(one.of_part(part).score.budget) for part in parts),
             *(format_budget(played[one.entry].score.budget) for played in others.values()),
         )
@@ -94,6 +95,13 @@ def summary_table() -> Table:
         ("policy", "B90", *parts, *others),
         tuple(rows),
     )
+
+
+def with_table(page: str) -> str:
+    """Return the text of the page with its table as the result files are now."""
+    lines = summary_table().markdown().splitlines(keepends=True)
+    table = "".join(line.replace(" --- ", "---") for line in lines if line.startswith("|"))
+    return re.sub(r"(?:^\|.*\n)+", lambda _: table, page, count=1, flags=re.M)
 
 
 def written() -> str:
@@ -145,6 +153,7 @@ def main(words: Sequence[str] | None = None) -> None:
     drawn = [one for one in results if one.entry.policy in DRAWN]
     save(budgets_figure(drawn), FOLDER / BUDGETS_FIGURE)
     write_text(FOLDER / "tables.md", written())
+    write_text(PAGE, with_table(PAGE.read_text(encoding="utf-8")))
 
 
 if __name__ == "__main__":
