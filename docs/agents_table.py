@@ -9,17 +9,15 @@ from pathlib import Path
 from care_sim.training.agents import shipped_agents
 
 PAGE = Path(__file__).parent / "learning.md"
+_SHOWN = ("policy", "environment", "steps", "validation")
+"""`care-sim list agents` prints the rest."""
 _REGION = re.compile(r"<!-- agents -->\n.*?<!-- end -->", re.S)
 
 
 def written(page: str) -> str:
     """The text of the page with the table as the cards are now."""
     rows = [agent.columns for agent in shipped_agents()]
-    for row in rows:
-        name = row.pop("file")
-        row["weights"] = f"[{Path(name).name}](../{name})"
-    head = [*rows[0]]
-    lines = [head, ["---"] * len(head), *([*row.values()] for row in rows)]
+    lines = [_SHOWN, ["---"] * len(_SHOWN), *([row[name] for name in _SHOWN] for row in rows)]
     table = "".join(f"| {' | '.join(line)} |\n" for line in lines)
     return _REGION.sub(lambda _: f"<!-- agents -->\n{table}<!-- end -->", page)
 

@@ -16,11 +16,11 @@ from care_sim.study.benchmark.suite import STREETS, TESTS, Salt
 from tests.helpers import kitti_drive
 from tests.helpers.commands import run
 from tests.helpers.made_budgets import HALF_WAY, made_budgets
-from tests.helpers.places import ROOT
+from tests.helpers.places import ROOT, fenced
 
 PAGE = (ROOT / "docs" / "benchmark.md").read_text()
 BLOCKS = re.findall(r"^```(\w*)\n(.*?)^```$", PAGE, re.S | re.M)
-(POLICY,) = [text for language, text in BLOCKS if language == "python"]
+POLICY, *_ = fenced(ROOT / "docs" / "write" / "policy.md", "python")
 TRANSCRIPT = [
     shlex.split(line)[1:]
     for _, text in BLOCKS

@@ -268,8 +268,10 @@ def test_every_column_that_is_read_is_explained():
 
 
 def unexplained(names):
-    """Those that the page does not name."""
-    rows = re.findall(r"^\| (.*?) \|", (ROOT / "docs" / "columns.md").read_text(), re.M)
-    told = set(re.findall(r"`([\w/ .-]+)`", " ".join(rows)))
+    """Those that neither the page of columns nor that of conditions names."""
+    pages = ROOT / "docs" / "columns.md", ROOT / "docs" / "api" / "conditions.md"
+    text = "".join(page.read_text() for page in pages)
+    explained = re.findall(r"^(?:- (.*?): |\| (.*?) \|)", text, re.M)
+    told = set(re.findall(r"`([\w/ .-]+)`", " ".join(map("".join, explained))))
     unknown = {name for name in names if not {name, re.sub(r"\..*", ".NAME", name)} & told}
     return {name for name in unknown if not STRATUM_SUM.fullmatch(name)}

@@ -11,7 +11,7 @@ import pytest
 from tests.helpers.places import ROOT
 
 PACKAGE = ROOT / "care_sim"
-ROOMS = tuple(re.findall(r"^\| `(\w+)/` \|", (ROOT / "CONTRIBUTING.md").read_text(), re.M))
+ROOMS = tuple(re.findall(r"^- `(\w+)/`:", (ROOT / "CONTRIBUTING.md").read_text(), re.M))
 """In the order in which they may import each other."""
 MODULES = {
     ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path
