@@ -51,15 +51,15 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
     for scoring alone contain truth. `scoring_info=False` removes all but `outcome`.
 
     - `objects`: number of annotated objects within 50 m
-    - `found`: number of them that this keyframe detected
+    - `found`: number of these objects that this keyframe detected
     - `seed`, `scene`: from `reset`; repeat the episode
     - `outcome`: at the end; a dict of `care_sim.evaluation.recall.SceneOutcome`
 
     ### Arguments
     `budget`, `render_mode`, `secret`, `scoring_info`, `detector` and `detector_parameters` are
-    those of the closed loop. `presence`, "annotated" or "visible", says which objects are present
-    at scene start and therefore no newcomers (`care_sim.evaluation.sightings`). The fields of
-    `care_sim.core.conditions.Conditions` are arguments too. `engine` and errors of the cameras'
+    those of the closed loop. `presence`, "annotated" or "visible", decides which objects are
+    present at scene start and therefore no newcomers (`care_sim.evaluation.sightings`). The fields
+    of `care_sim.core.conditions.Conditions` are arguments too. `engine` and errors of the cameras'
     mount are not, because the film exists before it plays. `min_returns` belongs to the detector
     `returns`. A forbidden value raises `care_sim.InvalidInput`.
     """
