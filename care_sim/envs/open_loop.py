@@ -47,8 +47,11 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
     first-sighting event.
 
     ### Info
-    A policy may read `fired`, `intensities`, `times_s` and `time_s`, as in the closed loop. Entries
-    for scoring alone contain truth. `scoring_info=False` removes all but `outcome`.
+    Entries that a policy may read:
+
+    - `fired`, `intensities`, `times_s`, `time_s`: as in the closed loop
+
+    Entries for scoring alone contain truth. `scoring_info=False` removes all but `outcome`.
 
     - `objects`: number of annotated objects within 50 m
     - `found`: number of these objects that this keyframe detected
