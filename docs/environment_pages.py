@@ -6,6 +6,8 @@ A page marks the place of a docstring with comments, which no file view shows:
     text
     <!-- end -->
 
+`from A beyond B` lists the fields of A without those that B lists alike.
+
 `python docs/environment_pages.py` rewrites all texts. A test fails where a text differs from its
 docstring.
 """
@@ -24,21 +26,26 @@ from care_sim.base.checks import allowed
 
 DOCS = Path(__file__).parent
 PAGES = (*sorted((DOCS / "environments").glob("*.md")), DOCS / "api" / "conditions.md")
-_REGION = re.compile(r"<!-- from (?P<path>\S+) -->\n.*?<!-- end -->", re.S)
+_REGION = re.compile(
+    r"<!-- from (?P<path>\S+)(?: beyond (?P<base>\S+))? -->\n.*?<!-- end -->", re.S
+)
 _SHARED = {
     "care_sim.envs.closed_loop.ClosedLoopEnv": "care_sim.envs.conditions_page.CONDITIONS",
     "care_sim.envs.open_loop.OpenLoopEnv": "",
 }
 """Environments whose whole docstring a page shows, but for the text that another page shows."""
 _COLUMNS = 118
+_LONGEST_LIST = 90
+"""Characters of allowed values. The page of a longer list explains the values in its own text."""
 
 
 def written(page: Path) -> str:
     """Return the page with its texts as the docstrings are now."""
 
     def text_of(region: re.Match[str]) -> str:
-        text = _described(region["path"]).strip()
-        return f"<!-- from {region['path']} -->\n{text}\n<!-- end -->"
+        text = _described(region["path"], region["base"]).strip()
+        head = region[0].partition("\n")[0]
+        return f"{head}\n{text}\n<!-- end -->"
 
     return _REGION.sub(text_of, page.read_text(encoding="utf-8"))
 
@@ -49,12 +56,13 @@ def _found(path: str) -> Any:
     return getattr(importlib.import_module(module), name)
 
 
-def _described(path: str) -> str:
+def _described(path: str, base: str | None = None) -> str:
     one = _found(path)
     if isinstance(one, str):
         return one
     if is_dataclass(one):
-        return "\n".join(_field_lines(one))
+        known = _field_lines(_found(base)) if base else []
+        return "\n".join(line for line in _field_lines(one) if line not in known)
     about = inspect.cleandoc(one.__doc__ or "")
     if path not in _SHARED:
         # The summary and sections of the loop follow, which have a page of their own.
@@ -82,6 +90,8 @@ def _field_lines(one: Any) -> list[str]:
 def _headed(field: Field[Any]) -> str:
     """Return a field's name and default, and its allowed values in brackets."""
     values = allowed(field)
+    if len(values) > _LONGEST_LIST:
+        values = f"of {values.count(',') + 1} names"
     return f"- `{field.name}{_default(field)}`" + (f" ({values})" if values else "")
 
 

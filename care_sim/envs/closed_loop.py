@@ -38,28 +38,26 @@ class ClosedLoopEnv(SensingEnv[OneWorld]):
     """A driving scene: the agent chooses the LiDAR's cells, and a driver brakes by fixed rules.
 
     ### Action
-    `Box(0, 1, (E, A), float32)`: a score per cell of the grid, E rows and A columns. The `B`
-    highest strictly positive scores fire, ties by ascending cell index. A random floor, the same
-    for all policies, fills the rest of the budget. `floor=False` leaves the rest unspent. Every
-    action is valid, a boolean mask too, and no action can overspend. With another `firing` the
-    scores buy whole units, or several shots per cell.
+    `Box(0, 1, (E, A), float32)`: a score per cell of the grid with E rows and A columns. Each
+    keyframe fires the `B` cells with the highest positive scores. Ties go to the lower cell index.
+    A random floor, the same for all policies, spends the rest of the budget. `floor=False` leaves
+    the rest unspent. Every action is valid, a boolean mask too, and none overspends. With another
+    `firing`, scores buy whole units or several shots per cell.
 
     ### Observation
     A `Dict` of float32 arrays with fixed shapes. `care_sim.Belief.from_observation` reads it.
 
-    | key | shape | content |
-    |---|---|---|
-    | `ego` | (3,) | speed m/s (negative backwards), yaw rate rad/s, acceleration m/s^2 |
-    | `budget` | (1,) | B / N, the share of cells that may fire |
-    | `detections` | (128, 9) | camera boxes, columns `ImageDetections.COLUMNS`; class -1 pads |
-    | `tracks` | (256, 13) | forecasts in the sensor frame, columns `Tracks.COLUMNS`; id -1 pads |
-    | `ranges` | (E, A) | last scan in metres, 0 not fired, maximum range without a return |
+    - `ego` (3,): speed m/s (negative backwards), yaw rate rad/s, acceleration m/s^2
+    - `budget` (1,): B / N, the share of cells that may fire
+    - `detections` (128, 9): camera boxes; class -1 pads
+    - `tracks` (256, 13): forecasts; id -1 pads
+    - `ranges` (E, A): last scan, m; 0 not fired, maximum range without a return
 
     | column of `detections` | meaning |
     |---|---|
     | `class` | index in `care_sim.core.types.CLASSES` |
     | `confidence` | 0 to 1 |
-    | `left`, `top`, `right`, `bottom` | box in its picture, pixels from the upper left corner |
+    | `left`, `top`, `right`, `bottom` | box, pixels from the picture's upper left corner |
     | `camera` | index of the camera |
     | `age` | age of the picture, s |
     | `yaw_change` | rotation of the car since the picture, rad |
@@ -75,61 +73,54 @@ class ClosedLoopEnv(SensingEnv[OneWorld]):
     | `misses` | keyframes since the last detection |
     | `hits` | keyframes with a detection |
 
-    `care_sim.loops.observation_limits` says which rows remain if there are more, and how
-    out-of-range numbers are clipped.
+    `care_sim.loops.observation_limits` cuts longer tables and clips large numbers.
 
     ### Reward
     A weighted sum of the terms of `care_sim.envs.reward.Rewards`: undetected time in view,
     clearance, collision and needless braking. `reward_weights={"gain": ...}` adds the
     first-detection distance against the full-scan bound. Every term is at most 0. The reward
-    contains truth that no observation shows: a learner may learn from it, but a policy must not
-    read it while it plays.
+    contains truth: a learner may learn from it, but a policy must not read it during play.
 
     ### Episode end
     Terminated at a collision, or when the scenario is over. Truncated after the scenario's
-    duration (6 s, 60 keyframes, unless the scenario sets another).
+    `duration_s`.
 
     ### Info
-    Entries "for scoring alone" contain truth and must never reach a policy. `scoring_info=False`
-    removes them, except for `outcome`.
+    Entries that a policy may read:
 
-    | key | content | whose |
-    |---|---|---|
-    | `fired` | cells of this keyframe, each as often as it fired (1) | the car's own |
-    | `intensities` | return strength per fired cell, 0 without a return (1) | the car's own |
-    | `times_s` | time per fired cell from the keyframe, s, in a rolling sweep (1) | the car's own |
-    | `braking` | whether the brake is on | the car's own |
-    | `time_s` | time of the keyframe, s from the start | the car's own |
-    | `detected` | whether this keyframe detected the first-sighting actor (2) | scoring alone |
-    | `in_view` | whether a faultless camera shows that actor | scoring alone |
-    | `clearance_m` | least distance to it, hull to hull, until the next keyframe | scoring alone |
-    | `speed_mps` | true speed; the observation has the odometry's | scoring alone |
-    | `reward_terms` | `care_sim.envs.reward.Rewards` | scoring alone |
-    | `seed` | from `reset`; it repeats the episode | scoring alone |
-    | `drawn` | from `reset`: scenario parameters that the seed drew, if any | scoring alone |
-    | `outcome` | at the end: a dict of `care_sim.loops.records.Outcome` | scoring alone |
+    - `fired`: cells of this keyframe, each as often as it fired
+    - `intensities`: return strength per fired cell, 0 without a return
+    - `times_s`: time per fired cell from the keyframe, s, in a rolling sweep
+    - `braking`: whether the brake is on
+    - `time_s`: time of the keyframe, s from the start
 
-    (1) An array of length B, or a list of at most B with `floor=False`. Gymnasium's vectors stack
-    arrays of one length only. (2) A car has its detections as tracks, but cannot know which of
-    them the episode is about.
+    The first three are arrays of length B. With `floor=False` they are lists of at most B.
+
+    Entries for scoring alone contain truth, so a policy must not read them. `scoring_info=False`
+    removes all but `outcome`. *Actor* means the first-sighting actor.
+
+    - `detected`: whether this keyframe detected the actor
+    - `in_view`: whether a faultless camera shows the actor
+    - `clearance_m`: least distance from hull to hull until the next keyframe
+    - `speed_mps`: true speed; the observation has the odometry's
+    - `reward_terms`: `care_sim.envs.reward.Rewards`
+    - `seed`: from `reset`; repeats the episode
+    - `drawn`: from `reset`; scenario parameters that the seed drew, if any
+    - `outcome`: at the end; a dict of `care_sim.loops.records.Outcome`
 
     ### Arguments
     All fields of the scenario, all conditions, and the arguments below. A forbidden value raises
     `care_sim.InvalidInput`.
 
-    | argument | default | meaning |
-    |---|---|---|
-    | `budget` | 0.10 | beta, the share of the cells that may fire, in (0, 1] |
-    | `sensor` | "hdl-32e" | LiDAR and cameras: a name, a TOML file or a `care_sim.SensorSetup` |
-    | `detector` | "returns" | by name (`care_sim.perception.detectors.detector_names`) |
-    | `detector_parameters` | None | a mapping of the detector's own parameters |
-    | `keyframe_s` | 0.1 | seconds between two decisions, at most 1 |
-    | `reward_weights` | None | a mapping of changes to `care_sim.envs.reward.REWARD_WEIGHTS` |
-    | `render_mode` | None | None or "rgb_array" |
-    | `secret` | False | a text that changes everything a seed draws (`care_sim.base.seeds`) |
-    | `scoring_info` | True | whether `info` holds entries for scoring alone |
-
-    A secret prevents agents from looking up public seeds. Take at least 16 random bytes.
+    - `budget=0.10`: beta, the share of the cells that may fire, in (0, 1]
+    - `sensor="hdl-32e"`: set-up, as a name, a TOML file or a `care_sim.SensorSetup`
+    - `detector="returns"`: a name of `care_sim.perception.detectors.detector_names`
+    - `detector_parameters=None`: a mapping of the detector's own parameters
+    - `keyframe_s=0.1`: seconds between two decisions, at most 1
+    - `reward_weights=None`: a mapping of changes to `care_sim.envs.reward.REWARD_WEIGHTS`
+    - `render_mode=None`: None or "rgb_array"
+    - `secret=False`: a text that changes everything a seed draws (`care_sim.base.seeds`)
+    - `scoring_info=True`: whether `info` holds entries for scoring alone
     """
 
     __doc__ = f"{__doc__}{indent(CONDITIONS, '    ')}"

@@ -34,44 +34,37 @@ UNFILMED = ("camera_rotation_sigma_deg", "camera_position_sigma_m", "engine")
 class OpenLoopEnv(SensingEnv[OpenLoop]):
     """A filmed scene: the agent chooses the LiDAR's cells, and nothing reacts.
 
-    ### Action
-    As in `care_sim.envs.closed_loop.ClosedLoopEnv`: `Box(0, 1, (E, A), float32)`, a score per cell.
-
-    ### Observation
-    As in `care_sim.envs.closed_loop.ClosedLoopEnv`, with the cameras of the scene. One policy
-    plays both loops.
+    ### Action and observation
+    As in `care_sim.envs.closed_loop.ClosedLoopEnv`, with the cameras of the scene. One policy plays
+    both loops.
 
     ### Reward
     Minus the share of the annotated objects within 50 m that this keyframe does not detect. The
-    reward contains truth: a learner may learn from it, but a policy must not read it while it
-    plays.
+    reward contains truth: a learner may learn from it, but a policy must not read it during play.
 
     ### Episode end
     Truncated after the last keyframe. `env.unwrapped.score` then holds the result of every
     first-sighting event.
 
     ### Info
-    Entries "for scoring alone" contain truth and must never reach a policy. `scoring_info=False`
-    removes them, except for `outcome`.
+    Entries that a policy may read:
 
-    | key | content | whose |
-    |---|---|---|
-    | `fired` | cells of this keyframe, each as often as it fired | the car's own |
-    | `intensities` | return strength per fired cell, 0 without a return | the car's own |
-    | `times_s` | time of each fired cell from the keyframe, s, in a rolling sweep | the car's own |
-    | `time_s` | time of the keyframe, s from the start | the car's own |
-    | `objects` | number of annotated objects within 50 m | scoring alone |
-    | `found` | number of them detected at this keyframe | scoring alone |
-    | `seed`, `scene` | from `reset`; they repeat the episode | scoring alone |
-    | `outcome` | at the end: a dict of `care_sim.evaluation.recall.SceneOutcome` | scoring alone |
+    - `fired`, `intensities`, `times_s`, `time_s`: as in the closed loop
+
+    Entries for scoring alone contain truth. `scoring_info=False` removes all but `outcome`.
+
+    - `objects`: number of annotated objects within 50 m
+    - `found`: number of these objects that this keyframe detected
+    - `seed`, `scene`: from `reset`; repeat the episode
+    - `outcome`: at the end; a dict of `care_sim.evaluation.recall.SceneOutcome`
 
     ### Arguments
-    `budget`, `render_mode`, `secret`, `scoring_info`, `detector` and `detector_parameters` as in
-    the closed loop. `presence` is "annotated" or "visible": it says which objects are present at
-    scene start and are therefore no first sighting (`care_sim.evaluation.sightings`). The fields
-    of `care_sim.core.conditions.Conditions`, except errors of the cameras' mount and the engine,
-    because they would change the film. `min_returns` belongs to the detector `returns`. A
-    forbidden value raises `care_sim.InvalidInput`.
+    `budget`, `render_mode`, `secret`, `scoring_info`, `detector` and `detector_parameters` are
+    those of the closed loop. `presence`, "annotated" or "visible", decides which objects are
+    present at scene start and therefore no newcomers (`care_sim.evaluation.sightings`). The fields
+    of `care_sim.core.conditions.Conditions` are arguments too. `engine` and errors of the cameras'
+    mount are not, because the film exists before it plays. `min_returns` belongs to the detector
+    `returns`. A forbidden value raises `care_sim.InvalidInput`.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 2}  # noqa: RUF012 (Gymnasium's)

@@ -13,11 +13,11 @@ from care_sim.scenarios.base import Scenario
 class DartoutEnv(ClosedLoopEnv):
     """`CARE-Dartout-v0`: a person runs out from behind a parked trailer into an empty street.
 
-    The paper's first closed-loop scene, at 30 km/h. The trailer parks at the right side of a
-    two-way street, and the person runs straight across. Perception does not report the
-    trailer, which is none of the five classes. `occluder="truck", occluder_reported=True` parks a
-    vehicle that perception reports: the person then emerges inside the hull of its track. The seed
-    draws speeds, place and timing.
+    This is the paper's first closed-loop scene, at 30 km/h. The trailer parks at the right side of
+    a two-way street. The person runs straight across. Perception does not report the trailer,
+    because it is none of the five classes. `occluder="truck", occluder_reported=True` parks a
+    reported vehicle. The person then emerges inside the hull of a track. The seed draws speeds,
+    place and timing.
     """
 
     __doc__ = f"{__doc__}\n    {ClosedLoopEnv.__doc__}"
@@ -27,8 +27,8 @@ class DartoutEnv(ClosedLoopEnv):
 class DenseEnv(ClosedLoopEnv):
     """`CARE-Dense-v0`: the dart-out in a street lined with tracked vehicles.
 
-    The camera shows five of the `vehicles` (7). At 3% of the cells a reserve for every camera box
-    starves the person. `care_sim.scenarios.dartout` explains why, cell by cell.
+    When the person appears, the camera shows five of the seven `vehicles`. At 3% of the cells, a
+    reserve for every camera box leaves too few cells for the person.
     """
 
     __doc__ = f"{__doc__}\n    {ClosedLoopEnv.__doc__}"
@@ -38,9 +38,9 @@ class DenseEnv(ClosedLoopEnv):
 class CutInEnv(ClosedLoopEnv):
     """`CARE-CutIn-v0`: a car pulls out into the ego's lane from in front of a standing bus.
 
-    The car waits hidden in front of the bus, in the right one of two lanes, and changes to the
-    ego's lane (highway-env). A large vehicle returns enough points even with few rays. The paper
-    found no difference between policies here.
+    The bus stands in the right one of two lanes. The car waits hidden in front of the bus and
+    changes to the ego's lane (highway-env). A large vehicle returns enough points even with few
+    rays, so the paper found no difference between policies.
     """
 
     __doc__ = f"{__doc__}\n    {ClosedLoopEnv.__doc__}"
@@ -48,11 +48,10 @@ class CutInEnv(ClosedLoopEnv):
 
 
 class R157Env(ClosedLoopEnv):
-    """`CARE-R157-v0`: a slower vehicle changes over into the ego's lane (UN Regulation 157).
+    """`CARE-R157-v0`: a slower vehicle changes to the ego's lane (UN Regulation 157).
 
-    `ego_kph`, `relative_kph`, `gap_m`, `lateral_mps`, `kind` and `side` set a case. The seed draws
-    the other values, among cases that the regulation's careful human driver prevents from ending
-    in a collision (`care_sim.scenarios.r157`). Nothing hides the vehicle.
+    Nothing hides the vehicle. The arguments set a case. The seed draws each value that is None, so
+    that the regulation's careful human driver can prevent a collision.
     """
 
     __doc__ = f"{__doc__}\n    {ClosedLoopEnv.__doc__}"
@@ -62,12 +61,10 @@ class R157Env(ClosedLoopEnv):
 class NcapEnv(ClosedLoopEnv):
     """`CARE-NCAP-v0`: a test of Euro NCAP's protocols of emergency braking.
 
-    `test`, `speed_kph` and `target_kph` choose the test. The default `CPNCO-50` is a child who
-    steps out from behind two parked cars. An ego that does not brake hits the target. The seed
-    draws the side and everything that the protocol leaves open. `test="drawn", speed_kph=0` lets
-    the seed draw the test and its speeds too. The episode terminates when the ego has stopped
-    before the target's way, when the ways have parted, or when the ego is no faster than a target
-    ahead.
+    The default test is a child who steps out from behind two parked cars. An ego that never brakes
+    hits the target. The seed draws the side and everything that the protocol leaves open. With
+    `test="drawn", speed_kph=0` the seed also draws test and speeds. The episode ends when the ego
+    stands before the target's way, the two have parted, or the ego no longer approaches.
     """
 
     __doc__ = f"{__doc__}\n    {ClosedLoopEnv.__doc__}"
@@ -78,10 +75,9 @@ class DriveEnv(ClosedLoopEnv):
     """`CARE-Drive-v0`: a drive through a generated street, with bends, traffic and conflicts.
 
     The ego has six cameras and follows a route of 160 to 260 m: straight, round a bend or into a
-    side street. Up to three times somebody comes out of hiding. An encounter is a conflict, a near
-    miss or a stop before the lanes. The episode also ends at the end of the route. The outcome is
-    a `care_sim.loops.records.DriveOutcome`. Its first-sighting actor is the first conflict, or
-    else the first encounter. A drive without an encounter has none.
+    side street. Up to three times somebody comes out of hiding. The episode also ends at the end
+    of the route. The first-sighting actor is the first conflict, or else the first encounter. A
+    drive without an encounter has no such actor.
     """
 
     __doc__ = f"{__doc__}\n    {ClosedLoopEnv.__doc__}"

@@ -20,9 +20,8 @@ from care_sim.streets.draft import STREET_KEYFRAME_S
 class StreetEnv(OpenLoopEnv):
     """`CARE-Street-v0`: a generated urban street, 40 keyframes at 2 Hz, six cameras around the car.
 
-    The seed of `reset` draws the street (`care_sim.streets`) and all faults. A `secret` gives
-    other streets, none of which is in the published tables. `sensor` sets LiDAR and cameras, as in
-    the closed loop.
+    The seed of `reset` draws the street and all faults. A `secret` gives unpublished streets.
+    `sensor` sets LiDAR and cameras, as in the closed loop.
     """
 
     __doc__ = f"{__doc__}\n    {OpenLoopEnv.__doc__}"
@@ -49,14 +48,13 @@ class StreetEnv(OpenLoopEnv):
 class ReplayEnv(FilmEnv):
     """`CARE-Replay-v0`: a recorded scene, at 2 Hz.
 
-    `source` names the recordings: `boreas` (a drive that comes with the package),
-    `argoverse2:FOLDER`, `nuscenes:FOLDER`, `kitti:FOLDER`, `sweeps:FOLDER` or a source of your own
-    (`care_sim.sources.named`). `scene` is the name of a scene, by default the first one.
-    `split`, `version`, `camera_detections`, `sweeps`, `camera_times` and `empty_boxes` belong to
-    `care_sim.sources.nuscenes.recordings.NuScenes`; `reference` and `topics` to
-    `care_sim.sources.sweeps.recordings.Sweeps`. `sensor` is the set-up that sees the boxes of
-    Boreas and KITTI, or that recorded the sweeps. Missing or damaged files raise
-    `care_sim.InvalidInput` with their name. The seed of `reset` draws faults, noise and floor.
+    `source` names the recordings: `boreas`, `argoverse2:FOLDER`, `nuscenes:FOLDER`,
+    `kitti:FOLDER`, `sweeps:FOLDER` or a source of your own (`care_sim.sources.named`). `scene`
+    names a scene, by default the first one. `sensor` is the set-up that sees the boxes of Boreas
+    and KITTI, or that recorded the sweeps. `reference` and `topics` belong to
+    `care_sim.sources.sweeps.recordings.Sweeps`, the other arguments to
+    `care_sim.sources.nuscenes.recordings.NuScenes`. Missing or damaged files raise
+    `care_sim.InvalidInput`. The seed of `reset` draws faults, noise and floor.
     """
 
     __doc__ = f"{__doc__}\n    {OpenLoopEnv.__doc__}"

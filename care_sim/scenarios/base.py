@@ -125,7 +125,7 @@ class MirrorableScenario(Scenario):
     """
 
     mirrored: str = one_of("never", MIRRORED)
-    """Reflect the world as in left-hand traffic: never, always, or for half of the seeds."""
+    """Mirror the world (left-hand traffic): in no, half, or all of the seeds."""
 
     def empty_world(self, traffic: Traffic, ego_speed: float, rng: np.random.Generator) -> World:
         """The world to be filled, at time zero; `ego_speed` in m/s."""

@@ -46,8 +46,8 @@ class CutIn(MirrorableScenario):
     gap_m: Range = bounded((2.0, 3.0), 0.05, 50)
     """Gap between bus and car."""
     pull_out_s: Range = bounded((2.0, 2.5), -10, 20)
-    """Time gap of the ego to the car's rear when the car pulls out. UN Regulation 157 (5.2.5.2)
-    counts a cut-in at this closing speed as avoidable down to about 1 s."""
+    """Time gap from the ego to the car's rear when the car pulls out. By UN Regulation 157
+    (5.2.5.2), a cut-in at this closing speed is avoidable down to about 1 s."""
 
     def build(self, rng: np.random.Generator) -> World:
         """A fresh world at time zero."""

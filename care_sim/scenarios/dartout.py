@@ -48,23 +48,20 @@ class CrossingScenario(MirrorableScenario):
     occluder_reported: bool = False
     ego_speed_mps: Range = bounded(USUAL_EGO_SPEED_MPS, *EGO_SPEED_BOUNDS_MPS)
     crossing_m: Range = bounded((37.0, 41.0), 5, 200)
-    """From the ego's first position to the person's line: four to five seconds of approach, in
-    which every track settles."""
+    """From the ego's start to the person's line: four to five seconds, in which tracks settle."""
     gap_m: Range = bounded((0.8, 1.2), 0.05, 20)
-    """From the end of the occluder to the person's line: about a step."""
+    """From the occluder's end to the person's line, about a step."""
+    # No sprinter exceeds 12.5 m/s.
     run_mps: Range = bounded((2.6, 2.8), 0.1, 12.5)
-    """A run of 6 mph, the ten-minute mile (Compendium of Physical Activities 2011, code 12050). No
-    sprinter exceeds 12.5."""
+    """A run of 6 mph (Compendium of Physical Activities 2011, code 12050)."""
     run_up_mps2: float = bounded(5.0, 0.1, 20)
-    """Full speed after half a second and 0.7 m, all of it in the occluder's shade."""
+    """Full speed after half a second and 0.7 m, still hidden."""
     kerb_offset_m: Range = bounded((-0.2, 0.2), -1, 1)
     """Offset of the occluder from the middle of the parking lane."""
+    # Picked from geometry alone: a full scan detects the person at about the paper's 15 m.
     encroachment_s: Range = bounded((0.3, 0.6), -10, 10)
-    """Post-encroachment time (Allen, Shin and Cooper 1978) of an ego that never brakes. Above 0 it
-    is a near miss, so only braking can cause a collision. Below 0 it is a collision course. The
-    bounds were picked from geometry alone: a full scan detects the person at about the paper's
-    distance, 15 m.
-    """
+    """Post-encroachment time (Allen, Shin and Cooper 1978) of an ego that never brakes. Above 0 the
+    person leaves the ego's way in time. Below 0 the ego hits the person."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -192,7 +189,7 @@ class Dense(CrossingScenario):
 
     vehicles: int = bounded(7, 0, len(VEHICLE_PLACES))
     place_jitter_m: Range = bounded((-0.4, 0.4), -3, 3)
-    """Offset of a standing vehicle along the street; across, a quarter of such a draw."""
+    """Offset of a standing vehicle along the street. Across, a quarter of such a draw."""
 
     def furnish(self, world: World, crossing_x: float, rng: np.random.Generator) -> None:
         """Line the street."""

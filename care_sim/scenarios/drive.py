@@ -52,13 +52,11 @@ class DriveScenario(Scenario):
     encounters: int = bounded(3, 0, 3)
     """Largest number of encounters. The seed draws the number evenly from 0 on."""
     side: str | None = one_of(None, SIDES)
-    """Side from which all come. Few cars and cyclists can come from the left, because they would be
-    in view for too long."""
+    """Side from which all come. Few cars and cyclists can come from the left."""
     who: str | None = one_of(None, COMERS)
     """Kind of the person or vehicle that comes out."""
     occluder_reported: bool | None = None
-    """Whether perception reports the occluder. Cyclists and cars always come from behind unreported
-    occluders, so True leaves adults and children."""
+    """Whether perception reports the occluder. True leaves adults and children only."""
     turn_chance: float = bounded(TURN_CHANCE, 0, 1)
     """Probability that the ego turns off where there is a side street."""
 

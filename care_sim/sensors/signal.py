@@ -9,9 +9,18 @@ reflectance rho_0 that faces it is still seen. Therefore a return exists where
 
     rho cos(theta) exp(-2 alpha r) / r^2 >= rho_0 / R^2.
 
-Of a cell that is fired n times the receiver adds up what it counts. Limited by its own photons, of
-which it must count so many, it needs an nth of the power: the left side counts n times, and in
-clear air the reach grows with the square root of n. `docs/firing.md` has the sources.
+An early data sheet of Ouster's OS1 (scribd.com, document 672435817) states 40 m at 10%, 120 m at
+80% and a beam of 2.3 mrad.
+
+A receiver adds up the photons of n shots at a cell (Ouster, US 2023/0243975 A1; AEye,
+RRRWP_19_0812, for several shots at one point). Limited by its own photons, of which it must count
+so many, it needs an nth of the power: the left side counts n times, and in clear air the range
+grows with the square root of n. In sunlight the signal to noise grows with the root of the shots
+(Vaisala, CL61 user guide M212475EN), so the range grows with the fourth root of n. Pile-up (Gupta
+et al. 2019, Photon-Flooded Single-Photon 3D Cameras) is left out.
+
+The error of a mean falls with the root of n, which is computed. Wu et al. 2025 (Sensors 25, 6184)
+disagree: where the clock limits, the error can fall with n.
 """
 
 import math

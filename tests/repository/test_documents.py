@@ -226,6 +226,11 @@ def test_a_page_of_environments_is_read_in_a_clone_and_says_what_docstrings_say(
     assert ENVIRONMENT_PAGES.written(page) == page.read_text()
 
 
+def test_a_page_lists_only_the_arguments_that_another_page_does_not():
+    page = (ROOT / "docs" / "environments" / "dense.md").read_text()
+    assert re.findall(r"^- `(\w+)=", page, re.M) == ["vehicles", "place_jitter_m"]
+
+
 def test_one_page_says_which_seeds_are_for_what():
     page = ROOT / "docs" / "seeds.md"
     rows = re.findall(r"^\| `(\w+)` \| ([\d,]+) (?:to ([\d,]+)|and up) \|", page.read_text(), re.M)

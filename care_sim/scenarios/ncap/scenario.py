@@ -63,15 +63,14 @@ class Ncap(Scenario):
 
     duration_s: float = bounded(20.0, 0.05, LONGEST_EPISODE_S)
     test: str = one_of("CPNCO-50", (*TESTS, DRAWN))
-    """The test, or drawn."""
+    """The test, or "drawn"."""
     speed_kph: float = bounded(40.0, 0, 140)
-    """Speed of the ego, km/h. At 0 the seed draws one of the protocol's pairs of speeds. Tests in
-    which the ego turns allow the protocol's speeds only."""
+    """Speed of the ego, km/h. At 0 the seed draws the protocol's speeds. Turning tests allow no
+    other speeds."""
     target_kph: float = bounded(0.0, 0, 140)
-    """Speed of the target, km/h. 0 takes the protocol's speed at this ego speed, the first one of
-    several unless the pair is drawn."""
+    """Speed of the target, km/h. 0 takes the protocol's speed, the first one of several."""
     mirrored: str = one_of("drawn", MIRRORED)
-    """Reflect the world as in left-hand traffic: never, always, or for half of the seeds."""
+    """Mirror the world (left-hand traffic): in no, half, or all of the seeds."""
     occluder_reported: bool = True
     excess_kph: Range = bounded((0.0, 1.0), 0, 4)
     """Extra speed of the ego, within the protocol's tolerance."""
@@ -81,7 +80,7 @@ class Ncap(Scenario):
     small_width_m: Range = bounded(SMALL_WIDTH_M, 1.5, 2.5)
     large_length_m: Range = bounded(LARGE_LENGTH_M, 3, 6)
     large_width_m: Range = bounded(LARGE_WIDTH_M, 1.5, 2.5)
-    """Sizes of the cars that hide the target, as in the protocol."""
+    """Sizes of the cars that hide the target."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
