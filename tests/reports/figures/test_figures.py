@@ -18,7 +18,7 @@ from care_sim.reports.figures.study_maps import (
     crowding_figures,
     open_ablation_figures,
 )
-from care_sim.reports.figures.styles import remove_others, save, stem_of, svg_text
+from care_sim.reports.figures.styles import colours, remove_others, save, stem_of, svg_text
 from care_sim.reports.report import StudyReport
 from care_sim.reports.studies import STUDIES
 from care_sim.study.designs.ablations import ablation_study
@@ -171,6 +171,23 @@ def test_a_validation_has_every_world_with_the_factor_that_is_changed():
     assert heights(found)["best control"] == [16.0, 10.0]
     assert heights(hit)["history"] == [0.0, 100.0]
     assert "best control of dartout: " in figure.get_supxlabel()
+
+
+def test_the_validation_of_one_world_is_over_the_budget():
+    one = [
+        *made_worlds.world(made_worlds.SATURATED, made_worlds.TRAINING),
+        *made_worlds.world(made_worlds.TELLING, made_worlds.TRAINING, budget=0.1),
+    ]
+    found, hit = validation_figures(one)["validation"].axes
+    assert ticks(found) == ticks(hit) == ["3%", "10%"]
+    assert heights(found)["care"] == [16.0, 15.0]
+    assert heights(hit)["history"] == [0.0, 100.0]
+    assert hit.get_title("left") == "episodes with a collision, %"
+
+
+def test_no_two_policies_of_a_figure_have_one_colour():
+    known = ["care-sector", "place", "fan", "theirs", "mine", "history-place"]
+    assert len({*colours(known).values()}) == len(known)
 
 
 def ablated(config):

@@ -1,6 +1,7 @@
 """The examples of the page on recorded drives: drives pooled, and the rule without tracks."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
@@ -10,6 +11,7 @@ from care_sim.core.belief import Belief
 from care_sim.core.types import ImageDetections
 from care_sim.study.results_formats import PLAYS
 from care_sim.study.rows.parquet import write_rows
+from tests.helpers.drawn import heights
 from tests.helpers.made_plays import study
 from tests.helpers.places import EXAMPLES, loaded
 
@@ -21,7 +23,12 @@ def test_drives_of_several_folders_are_pooled_and_paired(tmp_path, capsys):
         other = [row | {"source": "streets" if number else "nuscenes"} for row in rows]
         (tmp_path / str(number)).mkdir()
         write_rows(other, tmp_path / str(number) / PLAYS.file, "protocol", [], PLAYS.schema)
-    loaded(EXAMPLES / "pooled_drives.py").main("care", [str(tmp_path / n) for n in ("0", "1")])
+    script = loaded(EXAMPLES / "pooled_drives.py")
+    folders = [str(tmp_path / n) for n in ("0", "1")]
+    script.main("care", folders, str(tmp_path / "levels"))
+    assert "5 recorded drives" in (tmp_path / "levels.svg").read_text()
+    newcomers, _ = script.levels_figure(script.read_settings(map(Path, folders))).axes
+    assert {*heights(newcomers)["history"]} == {15.0}
     printed = capsys.readouterr().out
     assert "all: 100 in 5 drives; full scan 40.0%" in printed
     assert "emerging: 35 in 5 drives; full scan 42.9%" in printed
