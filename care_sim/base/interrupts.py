@@ -36,14 +36,16 @@ SOON_S = 0.02
 
 
 def end_at_once() -> None:
-    """From now on an interrupt ends the process: one line, and nothing is waited for."""
+    """Let later interrupts end the process at once, with one line."""
     _listen(_end)
 
 
 def raise_them() -> None:
-    """From now on an interrupt is a KeyboardInterrupt, raised where it is not lost: one that falls
-    into an import, which may turn it into another error, comes after it, or with the next one; one
-    that falls into code whose errors nobody can catch (finalisers, callbacks) comes again.
+    """Raise later interrupts as KeyboardInterrupt, where they are not lost.
+
+    An import may turn an interrupt into another error: the interrupt is then raised after the
+    import, or with the next one. Errors in finalisers and callbacks cannot be caught: an interrupt
+    in them is raised again.
     """
     _listen(_raise)
     signal.signal(signal.SIGALRM, _raise)
@@ -51,16 +53,14 @@ def raise_them() -> None:
 
 
 def end_in_silence() -> None:
-    """From now on an interrupt is the system's to handle: all is said, and the interpreter is
-    ending.
-    """
+    """Leave later interrupts to the system, since the interpreter is ending."""
     signal.setitimer(signal.ITIMER_REAL, 0)
     _listen(signal.SIG_DFL)
 
 
 @contextmanager
 def held_back() -> Iterator[None]:
-    """Interrupts wait for the end of the block, for what must not be left half done."""
+    """Hold interrupts back until the end of the block, for work that must not be left half done."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -21,7 +21,7 @@ LOOK_S = 1.0
 """Seconds between two looks at whether the starter is there."""
 
 UNHEARD = {number for number in SIGNALS if number != signal.SIGTERM}
-"""What a terminal sends to all processes in it. SIGTERM is how a pool ends a worker."""
+"""Signals that a terminal sends to all its processes. Pools end workers by SIGTERM."""
 
 _LONGEST_FOLDER = 75
 """Bytes of the folder for temporary files: the address of a socket inside one of its folders holds
