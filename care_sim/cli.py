@@ -50,15 +50,15 @@ _KEPT = {
     **dict.fromkeys(("benchmark", *GROUPS["Studies"]), _FINISHED_STAYS),
     **dict.fromkeys(("train ppo", "train sac", "train recurrent-ppo"), _LEARNED_STAYS),
 }
-"""What is added to "interrupted" for commands that keep what they have finished."""
+"""Appended to "interrupted" for commands that keep finished work."""
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run the command line and exit.
 
-    Exit codes: 0 done, 1 something failed, such as code of the user's own or a limit of the
-    machine, or a policy was left out, 2 bad input, 70 a fault of the software itself, 130
-    interrupted, 141 nobody reads the output any more. `--debug` shows the trace of a fault.
+    Exit codes: 0 done, 1 a failure or a policy left out, 2 bad input, 70 a fault of the software,
+    130 interrupted, 141 nobody reads the output. A failure is an error of the user's own code, or a
+    limit of the machine. `--debug` shows the trace of a fault.
     """
     # A host that calls this with arguments keeps its handlers of signals and its process.
     alone = arguments is None
