@@ -53,9 +53,9 @@ def check_folder(
     journal: Journal | Finished | None = None,
     force: bool = False,
 ) -> None:
-    """Raise InvalidInput where the study may not take the folder: where that holds results of the
-    other kind, episodes or plays, and unless `force` where results or the rows of a journal would
-    be lost. Raises as `read_rows` does where results are damaged.
+    """Raise InvalidInput where the study may not use the folder. That is where the folder holds
+    results of the other kind (episodes or plays), or, without `force`, where results or a journal's
+    rows would be lost. Raises as `read_rows` does where results are damaged.
     """
     # Each kind has files of its own, so that --force would leave both in one folder.
     kind = study.results

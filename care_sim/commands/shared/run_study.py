@@ -49,9 +49,9 @@ def play_study(
     folder: str,
     left_out: Sequence[str] = (),
 ) -> int:
-    """Play the tasks of the study `name`, in runs/ under `folder` unless the options say otherwise,
-    and print their tables, the tasks that failed and the policies that were left out; returns the
-    exit code.
+    """Play the tasks of the study `name` and return the exit code. Results go to runs/ under
+    `folder`, unless the options say otherwise. Prints tables, failed tasks and policies that were
+    left out.
     """
     study = STUDIES[name]
     # A refusal by environment or policy comes once, before anything is played; weights may be of
