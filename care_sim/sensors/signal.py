@@ -1,17 +1,16 @@
-"""How strong a return is, and whether it is strong enough: the equation of a LiDAR whose beam falls
-whole on a surface that scatters alike in all directions.
+"""Strength of returns, and whether a sensor notices them.
 
-The received power is proportional to rho cos(theta) exp(-2 alpha r) / r^2 with the reflectance rho,
-the angle of incidence theta, the extinction alpha of the air and the range r (Wagner et al. 2006,
-ISPRS Journal 60; with rain, Goodin et al. 2019, Electronics 8, 89). What factor lies before it is
-the sensor's secret. Its data sheet tells the same in other words: the range R at which a target of
-reflectance rho_0 that faces it is still seen. Therefore a return exists where
+The equation is that of a LiDAR whose beam falls whole on a surface that scatters alike in all
+directions. The received power is proportional to rho cos(theta) exp(-2 alpha r) / r^2. Here rho is
+the reflectance, theta the angle of incidence, alpha the extinction of the air and r the range.
+Sources: Wagner et al. 2006, ISPRS Journal 60; with rain, Goodin et al. 2019, Electronics 8, 89. The
+constant factor is not published. A data sheet gives the range R at which a target of reflectance
+rho_0 that faces the sensor is still seen. Therefore a return exists where rho cos(theta) exp(-2
+alpha r) / r^2 >= rho_0 / R^2.
 
-    rho cos(theta) exp(-2 alpha r) / r^2 >= rho_0 / R^2.
-
-Of a cell that is fired n times the receiver adds up what it counts. Limited by its own photons, of
-which it must count so many, it needs an nth of the power: the left side counts n times, and in
-clear air the reach grows with the square root of n. `docs/firing.md` has the sources.
+The receiver adds up the counts of a cell that is fired n times. It is limited by its own photons
+and needs a fixed count, so it needs an nth of the power. The left side counts n times, and in clear
+air the reach grows with the square root of n. `docs/firing.md` has the sources.
 """
 
 import math
@@ -39,10 +38,9 @@ class Signal:
         self._least = settings.lidar_stated_reflectance / stated**2 if stated else 0.0
 
     def intensities(self, brightness: Floats, ranges: Floats) -> Floats:
-        """(n,) what returns from surfaces of a `brightness` (n,), reflectance times cosine of the
-        incidence, at `ranges` (n,), as if all were at one range: 0 to 1, 0 for an infinite range.
-
-        So sensors tell it that calibrate their intensities. The air between is not taken out.
+        """Return (n,) intensities, 0 to 1, as if all surfaces were at one range. `brightness` (n,)
+        is reflectance times cosine of the incidence. An infinite range in `ranges` (n,) gives 0.
+        Sensors with calibrated intensities report them so. The loss in the air stays in.
         """
         # Without air between, exp(-0 * inf) would be no number.
         met = np.isfinite(ranges)
@@ -92,9 +90,9 @@ def rain_extinction(rain_mm_h: float) -> float:
 def brightness(
     parts: Primitives, origins: Floats, rays: Floats, ranges: Floats, bodies: Integers
 ) -> Floats:
-    """(n,) reflectance times cosine of the angle of incidence (Lambert) where unit `rays` (n, 3)
-    from `origins` (n, 3) or (3,) met `bodies` (n,) at `ranges` (n,), all in the world as it stands
-    now; 0 where they met nothing.
+    """Return (n,) reflectance times cosine of the angle of incidence (Lambert), 0 without a hit.
+    Unit `rays` (n, 3) from `origins` (n, 3) or (3,) met `bodies` (n,) at `ranges` (n,), all in the
+    world as it stands now.
     """
     # What was met and has no parts is the road: level, so that the slope of a ray is its angle.
     solid = np.isin(bodies, parts.tables[-1])
@@ -112,7 +110,7 @@ def brightness(
 
 
 SEPARATION_M = 1.0
-"""Surfaces are told apart from this distance on (Velodyne, VLP-16 manual, dual returns)."""
+"""Least distance between surfaces with separate returns (Velodyne, VLP-16 manual, dual returns)."""
 _EDGE_ON = 1e-12
 """The intensity of a surface that is met edge-on, so that its place still counts."""
 
@@ -169,10 +167,8 @@ def echoes_of(ranges: Floats, intensities: Floats, bodies: Integers) -> Echoes:
 
 
 def reported(echoes: Echoes, kept: str) -> Echoes:
-    """What a sensor reports of the echoes that keeps `strongest`, `last` or `both`.
-
-    Where the strongest is also the last, `both` has the second strongest beside it (Velodyne,
-    VLP-16 manual, page 57).
+    """Return the echoes that a sensor reports: the `strongest`, the `last` or `both`. If the
+    strongest is also the last, `both` adds the second strongest (Velodyne, VLP-16 manual, page 57).
     """
     power = echoes.intensities / echoes.ranges**2
     if kept == STRONGEST:
