@@ -1,5 +1,5 @@
-"""Films of annotated boxes, and what every recording of boxes needs: the boxes as bodies of a
-world, what its sensors make of them, and the car's own motion.
+"""Films of annotated boxes: the boxes as bodies of a world, their sensor data, and the car's own
+motion.
 """
 
 from collections.abc import Mapping, Sequence
@@ -43,10 +43,12 @@ from care_sim.world.bodies import sized
 from care_sim.world.bullet import BulletWorld
 
 SPAN_S = 0.5
-"""How far back the poses count: a keyframe. At 10 Hz these are six poses, which average out the
-centimetres by which recorded poses err. Longer spans lag behind a driver who begins to brake."""
+"""Span of earlier poses that count: a keyframe. At 10 Hz these are six poses, which average out the
+centimetres of error of recorded poses. Longer spans lag behind a driver who begins to brake.
+"""
 LEAST_POSES = 3
-"""The fewest poses that tell a steady acceleration without lag. At 2 Hz they reach back a second.
+"""The fewest poses that give a steady acceleration without lag. At 2 Hz they reach back a
+second.
 """
 
 

@@ -52,16 +52,17 @@ from care_sim.sources.recordings import Recordings
 UP_LIDAR = (1.35, 0.0, 1.64)
 """Metres in the car's frame: `up_lidar` in the calibration of the Sensor Dataset guide."""
 CAR_FRAME_HEIGHT_M = 0.33
-"""The origin of the car's frame, the middle of its rear axle, stands this far above the road: the
-wheels' radius, and where the returns of a recorded sweep lie within 10 m."""
+"""Height of the car's origin, the middle of its rear axle, above the road. It is the wheels'
+radius, and fits the returns of a recorded sweep within 10 m.
+"""
 ARGOVERSE2_SENSOR_HEIGHT_M = UP_LIDAR[2] + CAR_FRAME_HEIGHT_M
 ARGOVERSE2_KEYFRAME_S = 0.5
 NANOSECONDS = 10**9
 LABELLED_SPLITS = ("train", "val")
 """Folders of the official download whose logs are annotated; those of `test` are not."""
 HALF_SWEEP_NS = NANOSECONDS // 20
-"""Annotations come at 10 Hz. The nearest is at most this far from a moment, unless a sweep holds
-none.
+"""Annotations come at 10 Hz. Largest distance of the nearest annotation from a moment, unless a
+sweep holds none.
 """
 
 

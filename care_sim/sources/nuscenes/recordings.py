@@ -180,8 +180,8 @@ split `test` has none.
 
 
 def split_scenes(database: Database, split: str = "val") -> list[JsonRow]:
-    """The scenes of a split that the database holds: of an official split, of `all`, or of a split
-    in `<root>/<version>/splits.json`, a map from names of splits to lists of names of scenes.
+    """Return the database's scenes of a split: an official one, `all`, or one in
+    `<root>/<version>/splits.json`. That file maps names of splits to lists of names of scenes.
 
     Raises InvalidInput for an unknown split, a scene of `splits.json` that the database lacks, and
     an empty split.
