@@ -66,9 +66,9 @@ def apart(heights: Sequence[float], least: float, low: float, high: float) -> li
 
 
 INK = "#757575"
-"""Of texts and axes: a grey with a contrast of 4.5 to white and to black alike."""
+"""Colour of texts and axes: a grey with a contrast of 4.5 to both white and black."""
 CALM = "#999999"
-"""Of curves that only give the background."""
+"""Colour of background curves."""
 BLUE, ORANGE, GREEN, YELLOW = "#0072B2", "#D55E00", "#00946B", "#C28100"
 """From the palette of Okabe and Ito (2008), safe for the colour-blind; two are darkened, so that
 names in these colours are read on white, too.
@@ -182,8 +182,8 @@ def svg_text(figure: Figure, name: str) -> str:
 
 @contextmanager
 def texts_as_they_are(figure: Figure) -> Iterator[None]:
-    """Within it the figure can be drawn with any texts: a $ in a name begins no formula, control
-    codes are shown as escapes, and what the font has no sign for is drawn as a box.
+    """Draw figures with any texts within the block. A $ in a name begins no formula, control codes
+    become escapes, and unknown characters become boxes.
     """
     # Labels of ticks are Matplotlib's own, and powers of ten among them are formulas.
     of_ticks = {id(label) for tick in figure.findobj(Tick) for label in tick.findobj(Text)}

@@ -133,7 +133,9 @@ def description_in(folder: Path) -> tuple[dict[str, Any], list[str]]:
 
 
 WATCHED = (EPISODES, VEHICLE, PLAYS)
-"""What can be played again to be watched. A row of the mechanism is no play by itself."""
+"""Kinds of results that can be played again to watch. A row of the mechanism is no play by
+itself.
+"""
 _STYLE_ELEMENT = re.compile(r"<style.*?</style>", re.DOTALL)
 _ASSETS = Path(__file__).with_name("assets")
 
@@ -246,7 +248,7 @@ def write_page(
     MissingExtra without the libraries.
     """
     rows, study, left_out = read_results(folder)
-    # Opened before anything is played: a path that cannot be written is told at once.
+    # Opened before anything is played, so that an unwritable path is reported at once.
     with replacing(path, HTML) as unfinished:
         if source is not None and study.results is not PLAYS:
             raise InvalidInput(f"--source is for plays of the open loop, and {folder} holds none")
