@@ -62,7 +62,7 @@ def replacing(path: Path, kind: bytes = b"") -> Iterator[Path]:
         unfinished.replace(place)
 
 
-def told_if_replaced(path: Path) -> str:
+def describe_output(path: Path) -> str:
     """Return the path as messages show it, and whether it exists."""
     return f"{path} (the earlier one is replaced)" if path.exists() else str(path)
 

@@ -40,7 +40,7 @@ def end_at_once() -> None:
     _listen(_end)
 
 
-def raise_them() -> None:
+def raise_interrupts() -> None:
     """Raise later interrupts as KeyboardInterrupt, where they are not lost.
 
     An import may turn an interrupt into another error: the interrupt is then raised after the
@@ -49,7 +49,7 @@ def raise_them() -> None:
     """
     _listen(_raise)
     signal.signal(signal.SIGALRM, _raise)
-    sys.unraisablehook = _come_again
+    sys.unraisablehook = _raise_again
 
 
 def end_in_silence() -> None:
@@ -59,14 +59,14 @@ def end_in_silence() -> None:
 
 
 @contextmanager
-def held_back() -> Iterator[None]:
+def hold_interrupts() -> Iterator[None]:
     """Hold interrupts back until the end of the block, for work that must not be left half done."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
     # Only handlers of Python can wait in a list. What is ignored, or the system's, stays so.
     waiting: list[int] = []
-    with _deaf():
+    with _defer_signals():
         handlers = {number: signal.getsignal(number) for number in _HEARD}
         before = {number: handler for number, handler in handlers.items() if callable(handler)}
         for number in before:
@@ -74,7 +74,7 @@ def held_back() -> Iterator[None]:
     try:
         yield
     finally:
-        with _deaf():
+        with _defer_signals():
             for number, handler in before.items():
                 signal.signal(number, handler)
         # One is enough: all end a command in the same way. It is raised when the handlers are back.
@@ -83,7 +83,7 @@ def held_back() -> Iterator[None]:
 
 
 @contextmanager
-def _deaf() -> Iterator[None]:
+def _defer_signals() -> Iterator[None]:
     """Handle signals that come meanwhile at the end, so that handlers change all at once."""
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, ())
     try:
@@ -128,7 +128,7 @@ def _imports(frame: FrameType | None) -> bool:
     return False
 
 
-def _come_again(lost: "sys.UnraisableHookArgs") -> None:
+def _raise_again(lost: "sys.UnraisableHookArgs") -> None:
     """Have an interrupt that nobody could catch raised once more, a moment later."""
     if issubclass(lost.exc_type, KeyboardInterrupt):
         signal.setitimer(signal.ITIMER_REAL, SOON_S)

@@ -13,7 +13,7 @@ from contextlib import contextmanager, suppress
 from multiprocessing import resource_tracker, util
 from typing import TypeVar
 
-from care_sim.base.interrupts import SIGNALS, held_back
+from care_sim.base.interrupts import SIGNALS, hold_interrupts
 
 _T = TypeVar("_T")
 
@@ -39,7 +39,7 @@ def starting() -> Iterator[None]:
     They search for modules where this one does: no file of the current folder stands for a library.
     """
     _shorten_socket_folder()
-    with held_back(), _safe_path():
+    with hold_interrupts(), _safe_path():
         # Blocked signals stay blocked over fork and exec: a new process is deaf before it runs a
         # line.
         before = signal.pthread_sigmask(signal.SIG_BLOCK, UNHEARD)

@@ -16,7 +16,7 @@ from care_sim.base.digests import declared_files
 from care_sim.base.errors import InvalidInput, MissingExtra, error_line, printable, shown
 from care_sim.base.plugins import Plugins
 from care_sim.perception.cluster.detector import ClusterDetector
-from care_sim.perception.lifetimes import kept_or_made
+from care_sim.perception.lifetimes import get_or_make
 from care_sim.perception.measured.detector import CenterPoint, Megvii, PointRCNN
 from care_sim.perception.measured.tables import MEASURED
 from care_sim.perception.network_detectors import OnnxDetector, TorchScriptDetector
@@ -102,7 +102,7 @@ def make_detector(name: str, sensor_height_m: float, /, **parameters: object) ->
         proxy: Detector = make(**own)
         return proxy
     declared = () if name in DETECTORS.built_in else declared_files(DETECTORS.entry(name))
-    detector = kept_or_made(make, own, partial(_point_detector, name, make, own), declared)
+    detector = get_or_make(make, own, partial(_point_detector, name, make, own), declared)
     again = partial(make_detector, name, sensor_height_m, **parameters)
     return PointsOnly(name, detector, sensor_height_m, **fed, again=again)
 

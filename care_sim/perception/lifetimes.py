@@ -29,7 +29,7 @@ def _forget() -> None:
 os.register_at_fork(after_in_child=_forget)
 
 
-def kept_or_made(
+def get_or_make(
     make: Callable[..., object],
     parameters: Mapping[str, object],
     made: Callable[[], PointDetector],

@@ -61,7 +61,7 @@ def forecast_in_place(tracks: Floats, seconds: float) -> None:
 
 
 @compiled()
-def seen_nearest_first(tracks: Floats, boxes: Floats, turn: tuple[float, float]) -> Floats:
+def sort_by_distance(tracks: Floats, boxes: Floats, turn: tuple[float, float]) -> Floats:
     """Return the tracks with `boxes` (m, 7) of a sensor's frame, the nearest first. `turn` is the
     cosine and sine of the angle that turns velocities into its axes.
     """
@@ -120,7 +120,7 @@ def possible_pairs(
 
 
 @compiled()
-def lived_on(
+def advance_tracks(
     tracks: Floats, classes: Integers, seen: Floats, pairs: Pairs, rules: Rules, next_id: int
 ) -> tuple[Floats, Integers]:
     """Return the tracks a keyframe later, and (n,) the id of each detection's track.
@@ -273,7 +273,7 @@ class TrackMemory:
         estimates.
         """
         boxes = sensor.boxes_to_local(self._table[:, Tracks.BOX])
-        return Tracks.from_checked_rows(seen_nearest_first(self._table, boxes, sensor.turn_back))
+        return Tracks.from_checked_rows(sort_by_distance(self._table, boxes, sensor.turn_back))
 
     def predict(self) -> None:
         """Move every track one keyframe ahead at constant velocity."""
@@ -286,8 +286,10 @@ class TrackMemory:
         """
         classes = np.ascontiguousarray(detections.classes, np.int64)
         seen = sensor.boxes_to_world(detections.boxes)
-        pairs = assigned(self._table, classes, seen, self._life)
-        self._table, ids = lived_on(self._table, classes, seen, pairs, self._life, self._next_id)
+        pairs = assign_pairs(self._table, classes, seen, self._life)
+        self._table, ids = advance_tracks(
+            self._table, classes, seen, pairs, self._life, self._next_id
+        )
         self._next_id = max(self._next_id, ids.max(initial=-1) + 1)
         return ids
 
@@ -300,7 +302,7 @@ class TrackMemory:
         return turned(self._table[rows, Tracks.VELOCITY], -sensor.yaw)
 
 
-def assigned(tracks: Floats, classes: Integers, seen: Floats, life: Rules) -> Pairs:
+def assign_pairs(tracks: Floats, classes: Integers, seen: Floats, life: Rules) -> Pairs:
     """Return the rows (k,) of matching forecasts and detections, pair by pair."""
     from scipy.optimize import linear_sum_assignment
 

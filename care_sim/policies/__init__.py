@@ -184,7 +184,7 @@ def make_policy(name: str, env: _AnyEnv, /, **parameters: object) -> Policy | Ve
             )
         truth = _of_environment(name, env, "truth")
     for parameter, setting in getattr(make, "told", Policy.told).items():
-        parameters.setdefault(parameter, _told(env, setting))
+        parameters.setdefault(parameter, _setting_of(env, setting))
     makers = [partial(made, name, make, [rig, *truth], parameters) for rig in rigs]
     if isinstance(env, gymnasium.vector.VectorEnv):
         return policy_of_rigs(makers, rigs)
@@ -223,7 +223,7 @@ def _of_environment(name: str, env: _AnyEnv, attribute: str) -> list[Any]:
         ) from error
 
 
-def _told(env: _AnyEnv, setting: str) -> object:
+def _setting_of(env: _AnyEnv, setting: str) -> object:
     """A setting of the environment, None where the environment has no such setting."""
     if not isinstance(env, gymnasium.vector.VectorEnv):
         value = getattr(env.unwrapped, setting, None)

@@ -123,7 +123,7 @@ class PolicyProcess:
             raise BrokenPolicy(f"the process of policy {self.name} died") from error
         if answer[:1] == b"+":
             return answer[1:]
-        raise self.read(_told_error, answer[1:])
+        raise self.read(_rebuild_error, answer[1:])
 
     def read(self, function: Callable[[bytes], Any], answer: bytes) -> Any:
         """Read an answer with a function. Raises BrokenPolicy where the function fails."""
@@ -253,7 +253,7 @@ def _answer(request: bytes) -> bytes:
         return b"-" + json.dumps([kind, told]).encode()
 
 
-def _told_error(answer: bytes) -> Exception:
+def _rebuild_error(answer: bytes) -> Exception:
     kind, told = json.loads(answer)
     return _ERRORS.get(str(kind), InvalidInput)(shortened(one_line(str(told)), LONGEST))
 

@@ -23,7 +23,7 @@ from care_sim.sensors.pictures import FRONT_CAMERA
 from care_sim.streets.layouts import LANE_WIDTH_M, PARKING_WIDTH_M, SPEED_LIMIT_MPS
 from care_sim.world.bodies import CATALOGUE, BodyKind
 from care_sim.world.traffic import RoadVehicle, Traffic
-from care_sim.world.world import Actor, Motion, Reflection, World, on_the_other_side
+from care_sim.world.world import Actor, Motion, Reflection, World, reflect_pose
 
 
 def scenario_faults(made: Any) -> Iterator[str]:
@@ -157,5 +157,5 @@ class MirroredWorld(World):
         backdrop: bool = False,
     ) -> Actor:
         """Add a body where `World.add` would put its reflection."""
-        reflected = on_the_other_side(pose) if isinstance(pose, tuple) else Reflection(pose)
+        reflected = reflect_pose(pose) if isinstance(pose, tuple) else Reflection(pose)
         return super().add(name, kind, reflected, reported=reported, backdrop=backdrop)

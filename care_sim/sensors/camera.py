@@ -19,7 +19,7 @@ from care_sim.sensors.camera_faults import Delay, Detected, Misses
 from care_sim.sensors.camera_profiles import YOLOX
 from care_sim.sensors.false_boxes import EMPTY_POOL, NO_ROWS, BoxPool, FalseBoxes
 from care_sim.sensors.kitti.detector import KittiDetector
-from care_sim.sensors.pictures import surest_first
+from care_sim.sensors.pictures import sort_by_confidence
 
 
 class PictureTiming(NamedTuple):
@@ -142,7 +142,7 @@ class CameraDetector:
         if self._sensing.black_at(time_s):
             rows, objects = rows[:0], objects[:0]
         # Of equally sure boxes the leftmost comes first: nothing depends on the order of bodies.
-        rows, objects = surest_first(rows, objects, self._least_confidence)
+        rows, objects = sort_by_confidence(rows, objects, self._least_confidence)
         seen_here = Detected(np.array([len(rows)]), rows[None], objects[None])
         self._delay.take(_HERE, seen_here, np.array([heading], float))
 

@@ -95,7 +95,7 @@ LEAST_PX = 1.0
 """Width and height that a box keeps within its picture."""
 
 
-def jittered(
+def jitter_boxes(
     boxes: Floats,
     draws: Floats,
     spreads: Floats,
@@ -121,7 +121,7 @@ def jittered(
     return np.concatenate([low, high], axis=1)
 
 
-def confused(classes: Integers, draws: Floats, matrix: Floats) -> Integers:
+def confuse_classes(classes: Integers, draws: Floats, matrix: Floats) -> Integers:
     """Return (n,) the classes reported for objects of `classes` (n,). `matrix` (c, c) holds the
     chances that the class of a row is reported as the class of a column. `draws` (n,) from 0 to 1
     decide.
@@ -281,8 +281,10 @@ class ProfiledDetector:
         (found,) = np.nonzero(own_misses < self._recalls(seen, groups, boxes[places]))
 
         rows = seen.detections.rows()[found]
-        rows[:, ImageDetections.CLASS] = confused(classes[found], confusion[found, 0], self._matrix)
-        rows[:, ImageDetections.BOX] = jittered(
+        rows[:, ImageDetections.CLASS] = confuse_classes(
+            classes[found], confusion[found, 0], self._matrix
+        )
+        rows[:, ImageDetections.BOX] = jitter_boxes(
             rows[:, ImageDetections.BOX],
             jitter[found],
             self._spreads[groups[found]],

@@ -124,7 +124,7 @@ class Crosstalk:
         self._sweep = RollingSweep(grid, settings.lidar_sweep_s)
         self._random = np.random.default_rng(seed)
 
-    def over_scan(self, scan: Scan, bodies: Integers) -> tuple[Scan, Integers]:
+    def add_to_scan(self, scan: Scan, bodies: Integers) -> tuple[Scan, Integers]:
         """A scan, and the bodies (n,) behind its returns, with the ghosts of this keyframe."""
         ghosts, ranges = self._draw()
         jammed = ghosts[scan.cells]
@@ -137,7 +137,7 @@ class Crosstalk:
         twice = jammed & (np.diff(scan.cells, prepend=-1) == 0)
         return haunted.take(~twice), np.where(jammed, NO_BODY, bodies)[~twice]
 
-    def over_cloud(self, cloud: Cloud, answering: Mask) -> Cloud:
+    def add_to_cloud(self, cloud: Cloud, answering: Mask) -> Cloud:
         """A cloud with the ghosts of this keyframe in those cells that are `answering` (N,)."""
         ghosts, ranges = self._draw()
         cells = np.flatnonzero(ghosts & answering)
@@ -224,7 +224,7 @@ class Lidar:
             measured = self._faults.draw_noisy(scan.ranges, scan.cells, shots)
             scan = replace(scan, ranges=measured)
         if self._crosstalk is not None:
-            scan, ids = self._crosstalk.over_scan(scan, ids)
+            scan, ids = self._crosstalk.add_to_scan(scan, ids)
         lost = self._faults.draw_lost(scan.cells)
         scan = _without(scan, lost)
         if self._beams is not None:
@@ -276,7 +276,7 @@ class RecordedLidar:
             if returned.far is not None:
                 far = self._moved(returned.far, self._faults.draw_noisy_far, shots)
                 returned = replace(returned, far=far)
-        return self._crosstalk.over_cloud(returned, answering) if self._crosstalk else returned
+        return self._crosstalk.add_to_cloud(returned, answering) if self._crosstalk else returned
 
     def peek(self, cloud: Cloud) -> Cloud:
         """Return the returns of every cell, fired once each, without noise and dropout. Draws no

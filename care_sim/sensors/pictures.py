@@ -101,7 +101,7 @@ def reported_boxes(table: Integers, classes: Integers, camera: int) -> tuple[Flo
 
 
 @compiled()
-def surest_first(rows: Floats, objects: Integers, least: float) -> tuple[Floats, Integers]:
+def sort_by_confidence(rows: Floats, objects: Integers, least: float) -> tuple[Floats, Integers]:
     """The detections of at least this confidence, the surest first, of equally sure ones the
     leftmost, and the `objects` (n,) behind them.
     """

@@ -75,7 +75,7 @@ def slopes(ego: Floats, rng: np.random.Generator) -> Floats:
     return tilt
 
 
-def as_recorded(
+def add_recorded_losses(
     cloud: Cloud,
     grid: Grid,
     objects: tuple[Integers, Floats],

@@ -37,7 +37,7 @@ from care_sim.sources.film_checks import (
     ValueRange,
     check_film,
     check_span,
-    tell_other_frame,
+    report_other_frame,
 )
 from care_sim.world.bodies import sized
 from care_sim.world.bullet import BulletWorld
@@ -221,7 +221,7 @@ def film_of_boxes(
         given.append((frame, annotations))
         annotated = annotations.take(_is_shown(annotations, pictures, cloud))
         shots.append(Shot(time_s, f"{name}/{len(shots)}", frame, ego, annotated, pictures, cloud))
-    tell_other_frame(name, given)
+    report_other_frame(name, given)
     first, everyone = shots[0], given[0][1]
     film = Film(
         name,

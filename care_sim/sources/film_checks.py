@@ -109,10 +109,10 @@ def check_film(film: Any, recorded: bool = False) -> None:
         _check_shot(film, shot)
     if recorded and not any(len(shot.annotations) for shot in film.shots):
         raise InvalidInput(f"{film.name}: no {', no '.join(CLASSES)} in any of its keyframes")
-    tell_other_frame(film.name, [(shot.sensor, shot.annotations) for shot in film.shots])
+    report_other_frame(film.name, [(shot.sensor, shot.annotations) for shot in film.shots])
 
 
-def tell_other_frame(name: str, seen: Sequence[tuple[Frame, Annotations]]) -> None:
+def report_other_frame(name: str, seen: Sequence[tuple[Frame, Annotations]]) -> None:
     """Print a line where most boxes seem to be given in another frame. `seen` are the frame of the
     LiDAR and the annotations in it, per keyframe.
     """
@@ -215,7 +215,7 @@ def _other_frame(seen: Sequence[tuple[Frame, Annotations]]) -> str:
     return next((name for name, boxes in others if standing(boxes) > MOST_ASTRAY), "")
 
 
-def tell_empty_boxes(
+def report_empty_boxes(
     name: str, every: Sequence[Annotations], filled: Sequence[Mask], range_m: float
 ) -> None:
     """Print once how many boxes of a scene hold no recorded point, and how many newcomers there are

@@ -105,7 +105,7 @@ def source_names() -> list[str]:
     return SOURCES.names()
 
 
-def means_source(place: str) -> bool:
+def is_source_place(place: str) -> bool:
     """Return True if a place names a class of sources, even one with faults."""
     try:
         return _is_source(replace(SOURCES, faults=lambda _: ()).maker(place))

@@ -22,7 +22,7 @@ from care_sim.loops.film import Film, Shot
 from care_sim.sensors.annotated import NO_OBJECT, Annotations, Cloud, IdentifiedDetections, cloud_of
 from care_sim.sensors.beams import Beams
 from care_sim.sensors.engines import make_engine
-from care_sim.sensors.recorded_errors import as_recorded, slopes
+from care_sim.sensors.recorded_errors import add_recorded_losses, slopes
 from care_sim.sensors.setups import DEFAULT_SETUP, sensor_setup
 from care_sim.sensors.signal import Signal
 from care_sim.sensors.surround import (
@@ -180,7 +180,7 @@ class _StreetBodies:
         if self._returns.clutter:
             objects = self._classes, self._bright
             behind = partial(self._behind, keyframe, sensor, numbers)
-            cloud = as_recorded(cloud, self._setup.grid, objects, behind, self._rng)
+            cloud = add_recorded_losses(cloud, self._setup.grid, objects, behind, self._rng)
         annotations, hidden = (
             Annotations(labelled[kept], self._classes[labelled[kept]], boxes[kept])
             for kept in (shown, ~shown)

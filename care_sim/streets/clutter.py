@@ -81,7 +81,7 @@ RACK_APART_M: Range = (0.6, 0.9)
 """FGSV, Hinweise zum Fahrradparken: 0.8 m between bicycles of one height, less in old racks."""
 
 
-def strew(draft: Draft, roads: list[tuple[Road, Span]]) -> tuple[Placed, ...]:
+def place_clutter(draft: Draft, roads: list[tuple[Road, Span]]) -> tuple[Placed, ...]:
     """Draw the clutter of roads over their spans (metres along each). Adds groups and parked
     bicycles to the draft, and returns the rest.
     """

@@ -123,8 +123,8 @@ def drive_joining(draft: Draft, joining: Joining, main: Road) -> None:
     traffic = Traffic(
         road.directions, ego_lane=0, lane_width=LANE_WIDTH_M, speed_limit=SPEED_LIMIT_MPS
     )
-    leaving = flow_places(draft.rng, SIDE_FLOW_PER_H, nearest + 5.0, BEYOND_M)
-    coming = flow_places(draft.rng, SIDE_FLOW_PER_H, nearest + 25.0, 2 * BEYOND_M)
+    leaving = draw_flow(draft.rng, SIDE_FLOW_PER_H, nearest + 5.0, BEYOND_M)
+    coming = draw_flow(draft.rng, SIDE_FLOW_PER_H, nearest + 25.0, 2 * BEYOND_M)
     drivers = [_driver(draft, traffic, s, 0) for s in leaving] + [
         _driver(draft, traffic, s, 1) for s in coming
     ]
@@ -143,8 +143,8 @@ Driver = tuple[str, RoadVehicle]
 
 def _queue(draft: Draft, traffic: Traffic, reach: float) -> list[Driver]:
     """Return the vehicles that drive along with the ego, ahead of it and behind."""
-    ahead = flow_places(draft.rng, FLOW_PER_H, draw(draft.rng, LEAD_M), reach + BEYOND_M)
-    behind = [-s for s in flow_places(draft.rng, FLOW_PER_H, draw(draft.rng, LEAD_M), BEYOND_M)]
+    ahead = draw_flow(draft.rng, FLOW_PER_H, draw(draft.rng, LEAD_M), reach + BEYOND_M)
+    behind = [-s for s in draw_flow(draft.rng, FLOW_PER_H, draw(draft.rng, LEAD_M), BEYOND_M)]
     return [_driver(draft, traffic, s, 0, SPEED_LIMIT_MPS) for s in ahead + behind]
 
 
@@ -152,12 +152,11 @@ def _oncoming(draft: Draft, traffic: Traffic, reach: float) -> list[Driver]:
     """Return oncoming vehicles, up to the distance from which they still meet the ego."""
     farthest = reach + BEYOND_M + SPEED_LIMIT_MPS * float(TIMES[-1])
     return [
-        _driver(draft, traffic, s, 1)
-        for s in flow_places(draft.rng, FLOW_PER_H, -BEYOND_M, farthest)
+        _driver(draft, traffic, s, 1) for s in draw_flow(draft.rng, FLOW_PER_H, -BEYOND_M, farthest)
     ]
 
 
-def flow_places(
+def draw_flow(
     rng: np.random.Generator, flow_per_h: Range, first: float, last: float
 ) -> list[float]:
     """Draw places along a lane, from `first` to `last`, of vehicles at the speed limit."""
@@ -249,8 +248,8 @@ def drive_own_lane(rng: np.random.Generator, plan: Plan, reach_m: float) -> Driv
     half of the drives the vehicle ahead is near and slow.
     """
     slow_lead = draw(rng, SLOW_LEAD_M), draw(rng, SLOW_LEAD_MPS)
-    ahead = flow_places(rng, SIDE_FLOW_PER_H, draw(rng, LEAD_M), reach_m + BEYOND_M)
-    behind = [-s for s in flow_places(rng, SIDE_FLOW_PER_H, draw(rng, LEAD_M), BEYOND_M)]
+    ahead = draw_flow(rng, SIDE_FLOW_PER_H, draw(rng, LEAD_M), reach_m + BEYOND_M)
+    behind = [-s for s in draw_flow(rng, SIDE_FLOW_PER_H, draw(rng, LEAD_M), BEYOND_M)]
     lane = _lane(rng, plan.main.curve, 0.0, 1, [*behind[::-1], *ahead])
     if rng.random() >= EVEN_CHANCE:
         return lane
@@ -265,7 +264,7 @@ def drive_own_lane(rng: np.random.Generator, plan: Plan, reach_m: float) -> Driv
 
 def drive_oncoming_lane(rng: np.random.Generator, plan: Plan, from_m: float) -> DrivenLane:
     """Draw the oncoming vehicles of the next lane, from `from_m` along the road on."""
-    places = flow_places(rng, SIDE_FLOW_PER_H, -from_m, BEYOND_M)
+    places = draw_flow(rng, SIDE_FLOW_PER_H, -from_m, BEYOND_M)
     return _lane(rng, plan.main.curve, LANE_WIDTH_M, -1, places)
 
 
@@ -277,8 +276,8 @@ def drive_side_street(
     """
     nearest = plan.main.side(joining.sign).boundary_m
     curve = joining.road.curve
-    leaving = flow_places(rng, SIDE_FLOW_PER_H, nearest + 25.0, 2 * BEYOND_M)
-    coming = [-s for s in flow_places(rng, SIDE_FLOW_PER_H, nearest + 25.0, 2 * BEYOND_M)][::-1]
+    leaving = draw_flow(rng, SIDE_FLOW_PER_H, nearest + 25.0, 2 * BEYOND_M)
+    coming = [-s for s in draw_flow(rng, SIDE_FLOW_PER_H, nearest + 25.0, 2 * BEYOND_M)][::-1]
     # Drivers keep the standing gap before an obstacle: the first vehicle of any kind stops with its
     # bumper before the pavement.
     stop = STANDING_GAP_M - nearest - CATALOGUE["bus"].size[0] / 2

@@ -280,13 +280,13 @@ def draw_encounter(
         hiding = draw_hiding(rng, spot, side, who)
         if hiding and wanted.reported not in (None, is_reported(hiding.occluder)):
             continue
-        drawn = hiding and _coming_out(rng, spot, side, who, hiding, approach)
+        drawn = hiding and _draw_course(rng, spot, side, who, hiding, approach)
         if drawn and drawn.sight.spare_s >= 0 and drawn.sight.seconds <= MOST_SIGHT_S:
             return drawn
     return None
 
 
-def _coming_out(
+def _draw_course(
     rng: np.random.Generator,
     spot: Spot,
     side: Side,

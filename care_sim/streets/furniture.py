@@ -130,13 +130,13 @@ def _line_with_houses(draft: Draft, road: Road, side: Side, span: Span) -> None:
     """Place a closed front at the pavement, or detached houses behind gardens with hedges."""
     rng = draft.rng
     if not side.garden_m:
-        _outside(
-            side.front_m, side, "building", lambda: _now_and_then(rng, YARD_CHANCE, YARD_M)
-        ).fill(draft, road, span)
+        _outside(side.front_m, side, "building", lambda: _draw_gap(rng, YARD_CHANCE, YARD_M)).fill(
+            draft, road, span
+        )
         return
     _outside(side.front_m, side, "house", lambda: draw(rng, HOUSE_GAP_M)).fill(draft, road, span)
     _outside(
-        side.boundary_m, side, "hedge", lambda: _now_and_then(rng, GATE_CHANCE, GATE_WIDTH_M)
+        side.boundary_m, side, "hedge", lambda: _draw_gap(rng, GATE_CHANCE, GATE_WIDTH_M)
     ).fill(draft, road, span)
 
 
@@ -165,6 +165,6 @@ def _park(draft: Draft, road: Road, side: Side, span: Span) -> None:
     row.fill(draft, road, span)
 
 
-def _now_and_then(rng: np.random.Generator, chance: float, gap: Range) -> float:
+def _draw_gap(rng: np.random.Generator, chance: float, gap: Range) -> float:
     """A drawn gap with a `chance`, else the least there is."""
     return draw(rng, gap) if rng.random() < chance else CLOSE_M

@@ -16,7 +16,7 @@ import numpy as np
 
 from care_sim.core.arrays import Floats
 from care_sim.core.types import Ego
-from care_sim.streets.clutter import Placed, strew
+from care_sim.streets.clutter import Placed, place_clutter
 from care_sim.streets.draft import STEP_S, STREET_KEYFRAME_S, Draft
 from care_sim.streets.drivers import BEYOND_M, drive_joining, drive_main
 from care_sim.streets.furniture import JOINING_M, furnish
@@ -100,7 +100,7 @@ def make_street(seed: int, clutter: bool = False) -> Street:
     for road, reach in roads:
         populate(draft, road, reach)
     draft.rng = strewing
-    strewn = strew(draft, roads) if clutter else ()
+    strewn = place_clutter(draft, roads) if clutter else ()
     # Ways are sampled more often than keyframes, for the tests of room.
     every = round(STREET_KEYFRAME_S / STEP_S)
     poses = np.stack(draft.ways, axis=1)[::every]

@@ -46,7 +46,7 @@ def world_hash(env: ClosedLoopEnv, seed: int) -> str:
     # An actor may react only to a brake.
     for acceleration in (0.0, -DriverSettings().brake_mps2):
         with closing(env.setting.episode(seed).world) as world:
-            content.update(portable_bytes(*_told(world)))
+            content.update(portable_bytes(*_world_content(world)))
             bodies = np.array([world.ego_body, *(actor.body for actor in world.actors)])
             while world.time < env.scenario.duration_s - LAST_BITS_S and not world.is_over():
                 content.update(portable_bytes(world.boxes_of(bodies)[:, [0, 1, 6]]))
@@ -54,7 +54,7 @@ def world_hash(env: ClosedLoopEnv, seed: int) -> str:
     return content.hexdigest()[:16]
 
 
-def _told(world: World) -> Iterator[tuple[Content, ...]]:
+def _world_content(world: World) -> Iterator[tuple[Content, ...]]:
     """Yield the content of a world before anything moves: bodies with their parts, the
     first-sighting actor, and the drawn parameters.
     """

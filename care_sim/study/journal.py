@@ -185,7 +185,7 @@ def note_begin(folder: Path, study: str, tasks: str, others: int, command: str) 
     write_text(folder / UNFINISHED, json.dumps(note, indent=1) + "\n")
 
 
-def how_far(folder: Path) -> str:
+def describe_progress(folder: Path) -> str:
     """Return a line on an unfinished study in the folder; empty without one.
 
     Raises InvalidInput for a journal that is too large.

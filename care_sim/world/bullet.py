@@ -108,7 +108,7 @@ class BulletWorld:
         there.
         """
         # Bullet tests stretches, from a source to a target, and answers with the share of the way.
-        self._bodies.tell_all(self.primitives.poses)
+        self._bodies.sync_all(self.primitives.poses)
         targets = origin + directions * reach
         hits: list[tuple[Any, ...]] = []
         for start in range(0, len(targets), RAYS_PER_CALL):
@@ -149,11 +149,11 @@ class BulletWorld:
         """Smallest distance between two hulls, metres; negative when they overlap, inf beyond
         `within`.
         """
-        own, others = self._bodies.tell([body, other], self.primitives.poses)
+        own, others = self._bodies.sync([body, other], self.primitives.poses)
         return self._bodies.clearance(own, others, within)
 
     def _render(self, camera: PinholeCamera, sensor: Frame, window: PixelWindow) -> tuple[Any, ...]:
-        self._bodies.tell_all(self.primitives.poses)
+        self._bodies.sync_all(self.primitives.poses)
         eye, (forward, _, up) = camera.stance(sensor)
         left, top, right, bottom = window
         # The sides of the frustum of the window alone, where it cuts the near plane.

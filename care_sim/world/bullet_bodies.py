@@ -6,11 +6,11 @@ from weakref import finalize
 
 import numpy as np
 
-from care_sim.base.extras import STANDARD_ERROR, silenced
+from care_sim.base.extras import STANDARD_ERROR, silence_output
 from care_sim.core.arrays import Floats, Integers
 from care_sim.world.bodies import Part
 
-with silenced(STANDARD_ERROR):  # where it prints its build time
+with silence_output(STANDARD_ERROR):  # where it prints its build time
     import pybullet
 
 __all__ = ["MOST_PARTS", "LentClient", "borrow", "give_back", "leave", "pybullet"]
@@ -160,13 +160,13 @@ class BulletBodies:
         """Mark bodies as moved."""
         self._moved.update(bodies)
 
-    def tell_all(self, poses: Floats) -> None:
+    def sync_all(self, poses: Floats) -> None:
         """Pass every body to PyBullet, at its `poses` (m, 7) by id."""
-        self._tell(self._moved, poses)
+        self._sync(self._moved, poses)
 
-    def tell(self, bodies: Sequence[int], poses: Floats) -> list[int]:
+    def sync(self, bodies: Sequence[int], poses: Floats) -> list[int]:
         """Pass some bodies to PyBullet, and return its numbers of them."""
-        self._tell(self._moved.intersection(bodies), poses)
+        self._sync(self._moved.intersection(bodies), poses)
         return [self._numbers[body] for body in bodies]
 
     def ids_of(self, numbers: Integers) -> Integers:
@@ -198,7 +198,7 @@ class BulletBodies:
         )
         return float(min((point[8] for point in points), default=np.inf))
 
-    def _tell(self, moved: Iterable[int], poses: Floats) -> None:
+    def _sync(self, moved: Iterable[int], poses: Floats) -> None:
         if self._ground and 0 not in self._numbers:
             self._numbers[0] = self._make_ground()
         # A copy: `moved` may be the very set that shrinks here. In the order of ids, so that what

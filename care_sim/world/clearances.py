@@ -21,7 +21,7 @@ from care_sim.world.contact import (
     PADDING_M,
     ClearanceJudge,
     StandIns,
-    judge_here,
+    borrow_judge,
     least_gap,
 )
 
@@ -105,7 +105,7 @@ class Clearances:
         known = float(self._known[world, step])
         kinds, pair = self._kinds[world], self._pairs[world]
         if math.isnan(known) and kinds is not None:
-            judge = judge_here()
+            judge = borrow_judge()
             if pair is None or pair[0] is not judge:
                 pair = self._pairs[world] = judge, judge.stand_ins(*kinds)
             known = judge.clearance(pair[1], self._poses[world, step])
@@ -170,7 +170,7 @@ class Impacts:
             ego, kinds = int(egos[world]), self._kinds[world]
             for body in near[world, : found[world]].tolist():
                 kind = kinds[body]
-                if judge_here().touch((kinds[ego], kind), poses[world, [ego, body]]):
+                if borrow_judge().touch((kinds[ego], kind), poses[world, [ego, body]]):
                     moved = boxes[world, body, :2] - before[world, body, :2]
                     own = boxes[world], ego, float(speeds[world])
                     yield world, Impact.on(body, kind.name, *own, moved / self._step_s)

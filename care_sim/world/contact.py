@@ -152,7 +152,7 @@ class ClearanceJudge:
         return self.clearance(self.stand_ins(*kinds), poses, CONTACT_REACH_M) <= 0.0
 
     @property
-    def serves_on(self) -> bool:
+    def is_usable(self) -> bool:
         """Return True while the judge holds few kinds and no other code has closed or emptied its
         client.
         """
@@ -182,10 +182,10 @@ class _Shared(threading.local):
 _SHARED = _Shared()
 
 
-def judge_here() -> ClearanceJudge:
+def borrow_judge() -> ClearanceJudge:
     """Return the judge that the worlds of this thread share. Use it until the next call, and in
     this thread only.
     """
-    if _SHARED.judge is None or not _SHARED.judge.serves_on:
+    if _SHARED.judge is None or not _SHARED.judge.is_usable:
         _SHARED.judge = ClearanceJudge()
     return _SHARED.judge

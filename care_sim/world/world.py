@@ -57,10 +57,10 @@ class Reflection:
     def __call__(self, time: float) -> Pose:
         """The pose at `time`."""
         pose = self.of.pose if isinstance(self.of, RoadVehicle) else self.of(time)
-        return on_the_other_side(pose)
+        return reflect_pose(pose)
 
 
-def on_the_other_side(pose: Pose) -> Pose:
+def reflect_pose(pose: Pose) -> Pose:
     """A pose reflected at the x axis."""
     x, y, heading = pose
     return x, -y, -heading

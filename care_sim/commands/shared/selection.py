@@ -124,7 +124,7 @@ def _policies(names: Sequence[str]) -> list[str]:
     return expanded(names, contenders() if _ALL in names else ())
 
 
-def in_turn(several: Sequence[Any], name: str, common: dict[str, Any]) -> Sequence[Any]:
+def take_values(several: Sequence[Any], name: str, common: dict[str, Any]) -> Sequence[Any]:
     """The values of a condition that a sweep plays in turn: `several`, or else the one in `common`,
     which loses it.
     """

@@ -81,7 +81,9 @@ class ClusterDetector:
             self._candidate(standing[rows], heights[rows].max(), plane, sensor_height_m)
             for rows in clusters
         ]
-        return _detections(_one_a_place([one for one in found if one.guess.misfit <= MOST_MISFIT]))
+        return _detections(
+            _drop_overlaps([one for one in found if one.guess.misfit <= MOST_MISFIT])
+        )
 
     def _candidate(
         self, points: Floats, top_m: float, plane: Floats, sensor_height_m: float
@@ -100,7 +102,7 @@ def _in_order(points: Floats) -> Floats:
     return array[np.lexsort(array.T)]
 
 
-def _one_a_place(found: list[_Candidate]) -> list[_Candidate]:
+def _drop_overlaps(found: list[_Candidate]) -> list[_Candidate]:
     """Drop candidates inside the box of a candidate with more points, since two bodies do not share
     a place.
 

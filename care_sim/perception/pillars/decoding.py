@@ -12,7 +12,7 @@ from care_sim.perception.pillars.network import cell_centres
 
 
 @compiled()
-def one_a_place(boxes: Floats) -> Mask:
+def drop_overlaps(boxes: Floats) -> Mask:
     """Return (n,) which of boxes (n, 7), the surest first, stay. Two bodies do not share a place:
     if a box holds another's centre in plan, the surer one stays.
     """
@@ -98,7 +98,7 @@ def peaks_of(
     rows, columns = rows[order], columns[order]
     boxes = _boxes(answer[len(CLASSES) :, rows, columns], rows, columns)
     boxes[:, 2] -= sensor_height_m
-    return Peaks(classes[order], logits[order], scores[order], boxes).take(one_a_place(boxes))
+    return Peaks(classes[order], logits[order], scores[order], boxes).take(drop_overlaps(boxes))
 
 
 def score(calibration: Floats, classes: Integers, logits: Floats) -> Floats:

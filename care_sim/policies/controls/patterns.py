@@ -57,11 +57,11 @@ class Fan(Pattern):
     name = "fan"
 
     def __init__(self, rig: Rig, shots: int = 1):
-        fans = [fanned(rig.grid, is_low) for is_low in (True, False)]
+        fans = [order_as_fan(rig.grid, is_low) for is_low in (True, False)]
         super().__init__(rig, np.concatenate(fans), shots)
 
 
-def fanned(grid: Grid, is_low: bool) -> Cells:
+def order_as_fan(grid: Grid, is_low: bool) -> Cells:
     """Return the cells between the horizon and `LOWEST_DEG`, or all others, the columns nearest to
     straight ahead first.
     """

@@ -94,14 +94,14 @@ def reserve_demand(
     first, for your own policy. The demand is that of
     `care_sim.policies.learned.sectors.SectorChoice` in one world, before the rig's `cell_order`.
     """
-    enough = enough_beside_hulls(rig.budget)
+    enough = count_beside_hulls(rig.budget)
     (ranked,), (count,) = sectors.ranked(np.reshape(scores, (1, -1)), enough)
     return Demand(
         rig.hulls(belief.tracks.boxes), [[cells] for cells in sectors.cells[ranked[:count]]]
     )
 
 
-def enough_beside_hulls(budget: _Cells) -> _Cells:
+def count_beside_hulls(budget: _Cells) -> _Cells:
     """Return the number of sector cells that fill a budget, or several, whatever the hulls take."""
     # Hulls take at most one budget of the sectors' cells.
     return 2 * budget
@@ -122,7 +122,7 @@ class SectorChoice:
         """
         hulls = beliefs.hulls
         listed = WorldSets(self._rig.listed(hulls.sets), hulls.counts)
-        return [listed, self._best(scores, enough_beside_hulls(beliefs.budgets))]
+        return [listed, self._best(scores, count_beside_hulls(beliefs.budgets))]
 
     def alone(self, scores: NDArray[np.floating], budgets: Integers) -> list[WorldSets]:
         """Return only the sectors with a positive score, best first, for `budgets` (W,)."""

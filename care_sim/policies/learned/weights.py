@@ -110,7 +110,7 @@ class Weights:
         needed |= {"budget": rig.budget} if card.budget is not None else {}
         for name, value in needed.items():
             if getattr(card, name) != value:
-                has, wanted = (_told(name, it, rig) for it in (getattr(card, name), value))
+                has, wanted = (_describe(name, it, rig) for it in (getattr(card, name), value))
                 hint = _HINTS.get(name, "")
                 raise InvalidInput(
                     f"weights {self.path}: {name} is {has}, needed is {wanted}{hint}"
@@ -187,12 +187,12 @@ def _wrapping(stored: dict[str, Any] | str | None) -> Wrapping | None:
     return None if stored is None else Wrapping.from_plain(stored)
 
 
-def _told(name: str, value: Any, rig: Rig) -> str:
+def _describe(name: str, value: Any, rig: Rig) -> str:
     """Return a value of a card in readable form."""
     if name == "budget":
         return f"{value} cells ({value / rig.grid.size:.4g})"
     if isinstance(value, GridStack):
-        told_each = "; ".join(_told(name, head.grid, rig) for head in value.heads)
+        told_each = "; ".join(_describe(name, head.grid, rig) for head in value.heads)
         return f"{len(value.heads)} LiDARs: {told_each}"
     if isinstance(value, AngularGrid):
         told = asdict(value)

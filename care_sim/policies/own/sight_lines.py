@@ -77,7 +77,7 @@ class SightLines:
         # On a grid of shorter reach, a line without a return is also open.
         self._open_m = min(OPEN_M, self._reach / 2)
         self.ranges = np.full(len(cells), self._reach)
-        self._watched = self._worth_a_look()
+        self._watched = self._watched_lines()
 
     def update(self, belief: Belief) -> None:
         """Update the memory with the last scan, and move it by the car's motion since."""
@@ -88,7 +88,7 @@ class SightLines:
         way = driven, turned
         for own, spacing, azimuths in self._heads:
             self.ranges[own] = _moved(self.ranges[own], azimuths, way, self._reach, spacing)
-        self._watched = self._worth_a_look()
+        self._watched = self._watched_lines()
 
     def ahead(self) -> Cells:
         """Return the watched cells in the sector ahead, the nearest to straight ahead first."""
@@ -98,7 +98,7 @@ class SightLines:
         """Return all watched cells, by ascending column."""
         return self._cells(np.flatnonzero(self._watched))
 
-    def _worth_a_look(self) -> Mask:
+    def _watched_lines(self) -> Mask:
         """Return (A,) which lines are open, or near an edge."""
         return np.concatenate(
             [_open_or_edge(self.ranges[own], self._open_m, grid) for own, grid, _ in self._heads]

@@ -31,7 +31,7 @@ def name_ends(figure: Figure, ends: Mapping[Axes, Mapping[str, tuple[float, str]
     """
     names = {axes: [*map(partial(_name, axes), own, own.values())] for axes, own in ends.items()}
     # Heights on paper are known once the names have taken their room.
-    with texts_as_they_are(figure):
+    with allow_any_text(figure):
         figure.draw_without_rendering()
     figure.set_layout_engine("none")
     points = _INCH_POINTS / figure.dpi
@@ -161,7 +161,7 @@ def save(figure: Figure, stem: Path) -> None:
     are.
     """
     drawing = svg_text(figure, stem.name)
-    with default_style(), texts_as_they_are(figure):
+    with default_style(), allow_any_text(figure):
         with replacing(stem.with_name(f"{stem.name}.png")) as unfinished:
             figure.savefig(unfinished, dpi=200)
         with replacing(stem.with_name(f"{stem.name}.svg")) as unfinished:
@@ -175,13 +175,13 @@ def svg_text(figure: Figure, name: str) -> str:
     drawn = StringIO()
     # Ids within an SVG are random without a salt.
     salt: dict[Any, Any] = {"svg.hashsalt": printable(name)}
-    with default_style(), rc_context(salt), texts_as_they_are(figure):
+    with default_style(), rc_context(salt), allow_any_text(figure):
         figure.savefig(drawn, format="svg", transparent=True, metadata=_NO_METADATA)
     return _UNUSED_ID.sub("", drawn.getvalue())
 
 
 @contextmanager
-def texts_as_they_are(figure: Figure) -> Iterator[None]:
+def allow_any_text(figure: Figure) -> Iterator[None]:
     """Draw figures with any texts within the block. A $ in a name begins no formula, control codes
     become escapes, and unknown characters become boxes.
     """

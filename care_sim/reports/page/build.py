@@ -22,7 +22,7 @@ from care_sim.evaluation.sightings import RANGE_M
 from care_sim.reports.engine.tables import PAPER
 from care_sim.reports.figures.styles import default_style, svg_text
 from care_sim.reports.formatting import NOT_DETECTED
-from care_sim.reports.page.episodes import Episode, episodes_to_watch, played_again
+from care_sim.reports.page.episodes import Episode, episodes_to_watch, replay_episodes
 from care_sim.reports.page.listing import episode_groups, replay_data
 from care_sim.reports.report import read_results
 from care_sim.reports.study import Study
@@ -259,7 +259,7 @@ def write_page(
             rest = f" (--episodes {len(rows)}: all)" if len(watched) < len(rows) else ""
             again = counted(len(watched), "episode")
             print(f"playing {again} again to be watched{rest}", file=sys.stderr)
-        episodes = played_again(watched, workers, make_executor, source)
+        episodes = replay_episodes(watched, workers, make_executor, source)
         page = Page(folder.resolve().name, study, rows, findings, about, episodes)
         unfinished.write_text(page.html(), encoding="utf-8")
     return page

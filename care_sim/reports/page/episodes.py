@@ -72,7 +72,7 @@ def episodes_to_watch(rows: Sequence[Row], most: int) -> list[Row]:
     return sorted(rows, key=turn)[:most]
 
 
-def played_again(
+def replay_episodes(
     rows: Sequence[Row],
     workers: int,
     make_executor: ExecutorFactory = processes,

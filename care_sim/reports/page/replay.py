@@ -153,11 +153,11 @@ def replayed(config: EpisodeConfig | PlayConfig) -> Replay:
     moving = [body for body in bodies if any(pose != body["poses"][0] for pose in body["poses"])]
     standing = [body | {"pose": body.pop("poses")[0]} for body in bodies if body not in moving]
     story = recorder.story(range(len(bodies)), world.ego_kind.size)
-    story |= {"moving": moving, **_told(recorder.loop, keyframes)}
+    story |= {"moving": moving, **_keyframe_columns(recorder.loop, keyframes)}
     return Replay(row, standing, story, tuple(Outcome.__dataclass_fields__))
 
 
-def _told(loop: OneWorld, keyframes: Sequence[Keyframe]) -> dict[str, Any]:
+def _keyframe_columns(loop: OneWorld, keyframes: Sequence[Keyframe]) -> dict[str, Any]:
     """Return the keyframes as columns, and whom the episode is about."""
     world, about = loop.world, sought(loop.world)
 

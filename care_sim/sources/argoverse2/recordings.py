@@ -45,7 +45,7 @@ from care_sim.sources.argoverse2.tables import (
     table,
 )
 from care_sim.sources.box_films import SPAN_S, AnnotatedBody, annotations_of, motions, sense
-from care_sim.sources.film_checks import report_once, tell_empty_boxes
+from care_sim.sources.film_checks import report_empty_boxes, report_once
 from care_sim.sources.nuscenes.sweeps import recorded_cloud
 from care_sim.sources.recordings import Recordings
 
@@ -128,7 +128,7 @@ def argoverse2_film(log: Path, grid: AngularGrid | None = None, empty_boxes: boo
         reported = np.array([body.label is not None for body in bodies], bool)
         every.append(annotations_of([body for body in bodies if body.label is not None]))
         filled.append(holds[reported])
-    tell_empty_boxes(log.name, every, filled, grid.range_m)
+    report_empty_boxes(log.name, every, filled, grid.range_m)
     hidden = every[0].take(~(filled[0] | empty_boxes))
     return Film(
         log.name,

@@ -29,7 +29,7 @@ from care_sim.core.types import CLASSES, Ego
 from care_sim.loops.film import Film, Shot
 from care_sim.sensors.annotated import NO_OBJECT, Annotations, Cloud, IdentifiedDetections
 from care_sim.sources.box_films import AnnotatedBody, motions, sense
-from care_sim.sources.film_checks import AWAY_M, SIZES_M, report_once, tell_empty_boxes
+from care_sim.sources.film_checks import AWAY_M, SIZES_M, report_empty_boxes, report_once
 from care_sim.sources.nuscenes.cameras import (
     OWN,
     VISIBLE_SHARES,
@@ -188,7 +188,7 @@ def nuscenes_film(
     shots, every, filled = zip(*(setup.shot(*moment) for moment in moments), strict=True)
     if sweeps > 1:
         shots = with_earlier_sweeps(database, samples, shots, lidar, grid, sweeps - 1)
-    tell_empty_boxes(scene["name"], every, filled, grid.range_m)
+    report_empty_boxes(scene["name"], every, filled, grid.range_m)
     return Film(
         scene["name"],
         tuple(camera.pinhole for camera in cameras),

@@ -91,7 +91,7 @@ def table_rows(path: Path, is_needed: Callable[[JsonRow], bool] | None = None) -
         taken = {name: row.get(name) for name in kinds}
         # Not isinstance: to Python true is an int.
         if [*map(type, taken.values())] != wanted:
-            raise InvalidInput(f"{path}: {_what_is_wrong(row, number, kinds)}")
+            raise InvalidInput(f"{path}: {_describe_fault(row, number, kinds)}")
         yield taken
 
 
@@ -128,7 +128,7 @@ def _readable(path: Path) -> Iterator[None]:
         raise InvalidInput(f"{path}: no readable JSON file ({error})") from error
 
 
-def _what_is_wrong(row: JsonRow, number: int, kinds: dict[str, type]) -> str:
+def _describe_fault(row: JsonRow, number: int, kinds: dict[str, type]) -> str:
     which = f"row {row.get('token') or number}"
     name = next(name for name, kind in kinds.items() if type(row.get(name)) is not kind)
     return (

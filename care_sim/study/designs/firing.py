@@ -11,7 +11,7 @@ from care_sim.sensors.setups import DEFAULT_SETUP, sensor_setup
 from care_sim.sources.scenes import Scene, Source
 from care_sim.study.designs.defaults import FIRING_POLICIES
 from care_sim.study.designs.paper import paper_study
-from care_sim.study.designs.variants import tried_out
+from care_sim.study.designs.variants import keep_playable
 from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.play_config import PlayConfig, play_grid
 from care_sim.study.rows.reading import policy_of
@@ -45,8 +45,8 @@ def fitting(sensor: str | SensorSetup, policies: Sequence[str] = FIRING_POLICIES
 
     where = f"with {sensor_setup(sensor).name}"
     least, *_, most = FIRING_BUDGETS
-    firings = tried_out(FIRINGS, lambda firing: tasks("random", least, firing), where)
-    played = tried_out(policies, lambda policy: tasks(policy, most), where)
+    firings = keep_playable(FIRINGS, lambda firing: tasks("random", least, firing), where)
+    played = keep_playable(policies, lambda policy: tasks(policy, most), where)
     return Fitting(firings.sound, played.sound, [*firings.left_out, *played.left_out])
 
 
@@ -111,7 +111,7 @@ def order_study(seeds: Sequence[int], also: Sequence[str] = ()) -> list[EpisodeC
     """Return the paper's closed-loop study under every order, 279 configurations per seed; `also`
     are further policies.
     """
-    return _felt(
+    return _drop_unused_orders(
         config for order in ORDERS for config in paper_study(seeds, also, cell_order=order)
     )
 
@@ -124,14 +124,14 @@ def order_plays(
     floor_seeds: Sequence[int] = (0,),
 ) -> list[PlayConfig]:
     """The first-sighting protocol under every order."""
-    return _felt(
+    return _drop_unused_orders(
         config
         for order in ORDERS
         for config in play_grid(source, scenes, policies, budgets, floor_seeds, cell_order=order)
     )
 
 
-def _felt(configs: Iterable[_Config]) -> list[_Config]:
+def _drop_unused_orders(configs: Iterable[_Config]) -> list[_Config]:
     """Return the configurations, each once, without the order for policies that do not depend on
     it: patterns and the full scan are played once for all orders.
     """

@@ -13,7 +13,14 @@ from care_sim.scenarios.ncap.table import TESTS
 from care_sim.sources.scenes import Scene, Source
 from care_sim.study.designs.defaults import NCAP_STEP_KPH
 from care_sim.study.designs.standards import NcapCase, ncap_cases
-from care_sim.study.designs.variants import FilmPlace, Group, Place, TriedOut, Variant, tried_out
+from care_sim.study.designs.variants import (
+    FilmPlace,
+    Group,
+    Place,
+    TriedOut,
+    Variant,
+    keep_playable,
+)
 from care_sim.study.episode_config import EpisodeConfig, of_cases
 from care_sim.study.play_config import PlayConfig
 from care_sim.study.run_config import FULL, RunConfig
@@ -194,7 +201,7 @@ def _fitting(
     """
     for config in tasks(IDEAL):
         config.try_out()
-    return tried_out(levels, tasks, f"in {place}", lambda level: level.label)
+    return keep_playable(levels, tasks, f"in {place}", lambda level: level.label)
 
 
 def realism_study(

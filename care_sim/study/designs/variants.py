@@ -117,7 +117,7 @@ class TriedOut(NamedTuple, Generic[_Thing]):
     left_out: list[str]
 
 
-def tried_out(
+def keep_playable(
     things: Iterable[_Thing],
     tasks: Callable[[_Thing], Iterable[RunConfig]],
     where: str,

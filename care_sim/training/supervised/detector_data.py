@@ -103,7 +103,7 @@ def play(world: World) -> list[Example]:
     """
     rng = np.random.default_rng([world.seed, 21])
     if world.film:
-        return [*_film(world.film(), world.seed, rng, _handed)]
+        return [*_film(world.film(), world.seed, rng, _detector_input)]
     if world.kind == CLUTTERED:
         return [*_street(world.seed, rng, clutter=True)]
     # Drawn, since the layouts of streets come in turn.
@@ -182,7 +182,7 @@ def _by_ranges(env: AnyEnv, observation: Any, present: Annotations, full: bool) 
     return _example(points, env.rig.sensor_height_m, present, full)
 
 
-def _handed(env: FilmEnv, _: Any, present: Annotations, full: bool) -> Example:
+def _detector_input(env: FilmEnv, _: Any, present: Annotations, full: bool) -> Example:
     """Return the detector's input: measured points of all gathered sweeps. The source gives the
     object of each point, since a real road is not level.
     """
@@ -299,7 +299,7 @@ def loss(torch: Any, answer: Any, wanted: Any) -> Any:
     return -(missed + invented).sum() / centres + BOX_SHARE * off
 
 
-def box_told(
+def box_targets(
     box: Floats, sensor_height_m: float, rows: Integers, columns: Integers
 ) -> NDArray[np.float32]:
     """Return (BOX_OUTPUTS, n) the targets of cells at `rows` (n,) and `columns` (n,) for a box
@@ -331,4 +331,4 @@ def _mark(own: Targets, label: int, box: Floats, sensor_height_m: float) -> None
     near = (bump > TOLD_FROM) & (bump > own.weights[0, rows, columns])
     rows, columns = rows[near], columns[near]
     own.weights[0, rows, columns] = bump[near]
-    own.boxes[:, rows, columns] = box_told(box, sensor_height_m, rows, columns)
+    own.boxes[:, rows, columns] = box_targets(box, sensor_height_m, rows, columns)

@@ -28,7 +28,7 @@ LATELY = 250
 """Steps over which the shown loss is averaged."""
 
 
-def adam(parameters: Iterable[Any], steps: int) -> tuple[Any, Any]:
+def make_adam(parameters: Iterable[Any], steps: int) -> tuple[Any, Any]:
     """Return Adam with a rate that falls to 0 along a half cosine over this many steps."""
     optim = import_torch().optim
     optimizer = optim.Adam(parameters, lr=LEARNING_RATE)
@@ -72,7 +72,7 @@ def fit(
     return losses
 
 
-def one_by_one(things: Sequence[_Thing], what: str) -> Iterator[_Thing]:
+def show_each(things: Sequence[_Thing], what: str) -> Iterator[_Thing]:
     """Yield all items and show the progress on stderr."""
     for number, thing in enumerate(things, 1):
         print(f"{what} {number} of {len(things)}", end="   \r", file=sys.stderr, flush=True)

@@ -18,7 +18,7 @@ from care_sim.policies.learned.weights import save_weights
 from care_sim.policies.paper.blind import Full
 from care_sim.sources.street_films import street_film
 from care_sim.streets.street import CALIBRATION_SEEDS
-from care_sim.training.supervised.fit import card_of, one_by_one, print_end
+from care_sim.training.supervised.fit import card_of, print_end, show_each
 from care_sim.training.supervised.options import PlaceConfig
 
 
@@ -26,7 +26,7 @@ def train_place(config: PlaceConfig) -> int:
     """Make and write the map, and return the exit code of the command."""
     check_output(config.out, ZIP)
     started = time.perf_counter()
-    seeds = one_by_one(CALIBRATION_SEEDS, "calibration street")
+    seeds = show_each(CALIBRATION_SEEDS, "calibration street")
     found = [cells for seed in seeds for cells in first_returns(street_film(seed))]
     card = card_of(
         "place",

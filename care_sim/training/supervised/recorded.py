@@ -48,7 +48,7 @@ class Scenes:
 
     def __post_init__(self) -> None:
         # Before training, so that a missing file is reported at once.
-        object.__setattr__(self, "told", self._told())
+        object.__setattr__(self, "told", self._describe())
 
     def worlds(self, part: Sequence[Scene], turn: int = 0) -> list[World]:
         """Return a world of every scene of a part. Another `turn` plays the scenes differently."""
@@ -61,7 +61,7 @@ class Scenes:
             for row in np.random.default_rng(turn).permutation(len(self.learned)).tolist():
                 yield self._world(self.learned[row], turn)
 
-    def _told(self) -> dict[str, Any]:
+    def _describe(self) -> dict[str, Any]:
         parts = [
             f"{len(part)} scene{'s' * (len(part) > 1)} {doing}{split and f', split {split}'}"
             f"{self._digest(part)}"

@@ -52,7 +52,7 @@ from care_sim.policies.paper.tracks import History
 from care_sim.sensors.setups import DEFAULT_SETUP
 from care_sim.sources.street_films import street_film
 from care_sim.streets.street import CALIBRATION_SEEDS
-from care_sim.training.supervised.fit import adam, card_of, fit, one_by_one, print_end
+from care_sim.training.supervised.fit import card_of, fit, make_adam, print_end, show_each
 from care_sim.training.supervised.options import ScorerConfig
 from care_sim.training.supervised.recorded import Scenes
 from care_sim.training.supervised.worlds import (
@@ -204,7 +204,7 @@ def train_learned_scorer(config: ScorerConfig, scenes: Scenes | None = None) -> 
     worlds, told = _lessons(config.drawn, scenes)
     made = drawn_examples if config.drawn else examples
     data = {
-        name: balanced(part for world in one_by_one(own, f"{name} world") for part in made(world))
+        name: balanced(part for world in show_each(own, f"{name} world") for part in made(world))
         for name, own in worlds.items()
     }
     arrays, losses = train_scorer(data, config.seed, config.steps)
@@ -240,7 +240,9 @@ def train_scorer(
             torch.nn.Linear(HIDDEN_UNITS, 1, bias=False),
         )
         batches = _batches(np.random.default_rng(seed), len(learned))
-        fit(partial(_loss, network, learned), batches, steps, adam(network.parameters(), steps))
+        fit(
+            partial(_loss, network, learned), batches, steps, make_adam(network.parameters(), steps)
+        )
         with torch.no_grad():
             losses = {
                 name: float(_loss(network, cells, np.arange(len(cells))))

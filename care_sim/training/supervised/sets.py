@@ -45,7 +45,7 @@ from care_sim.policies.learned.learned_sets import STEPS, LearnedSets
 from care_sim.policies.learned.set_items import ITEM_INPUTS, MIRRORED, STRIP_INPUTS, ItemReader
 from care_sim.policies.learned.weights import Card, save_weights
 from care_sim.sensors.setups import DEFAULT_SETUP, sensor_setup
-from care_sim.training.supervised.fit import adam, card_of, fit, one_by_one, print_end
+from care_sim.training.supervised.fit import card_of, fit, make_adam, print_end, show_each
 from care_sim.training.supervised.options import SetsConfig
 from care_sim.training.supervised.recorded import Scenes
 from care_sim.training.supervised.sets_data import Example, play
@@ -107,9 +107,7 @@ def _worlds(scenes: Scenes | None) -> tuple[list[list[World]], list[World]]:
 
 def gathered(worlds: Sequence[World], own: Path | None, faulty: bool = True) -> list[Example]:
     """Return the keyframes of worlds."""
-    return [
-        example for world in one_by_one(worlds, "world") for example in play(world, own, faulty)
-    ]
+    return [example for world in show_each(worlds, "world") for example in play(world, own, faulty)]
 
 
 def learn(
@@ -132,7 +130,7 @@ def learn(
             lambda batch: sum(_losses(torch, arrays, *batch)),
             batches,
             steps,
-            adam(arrays.values(), steps),
+            make_adam(arrays.values(), steps),
         )
         return {name: array.detach().numpy() for name, array in arrays.items()}
 

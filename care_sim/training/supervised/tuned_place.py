@@ -24,7 +24,7 @@ from care_sim.loops.film import Film
 from care_sim.perception.measured.recall import FIRST_HIT
 from care_sim.policies.learned.weights import save_weights
 from care_sim.sources.street_films import street_film
-from care_sim.training.supervised.fit import card_of, one_by_one, print_end
+from care_sim.training.supervised.fit import card_of, print_end, show_each
 from care_sim.training.supervised.options import TunedPlaceConfig
 
 DETECTOR = "centerpoint"
@@ -53,7 +53,7 @@ def train_tuned_place(config: TunedPlaceConfig) -> int:
     """Make and write the map, and return the exit code of the command."""
     check_output(config.out, ZIP)
     started = time.perf_counter()
-    seeds = one_by_one(range(TRAINING, TRAINING + config.streets), "training street")
+    seeds = show_each(range(TRAINING, TRAINING + config.streets), "training street")
     frames = joined(frames_of(street_film(seed)) for seed in seeds)
     grid = AngularGrid()
     order, shares = tuned_order(frames, chance_table(), grid.size)

@@ -205,7 +205,7 @@ def _mark_street(
     for box, _, misses, colour in reversed(marks):
         drawing.wireframe(draw, camera, box, colour, 1 if misses else 2)
     labels = Labels(draw)
-    mark_sought(labels, camera, loop, frame)
+    mark_actors(labels, camera, loop, frame)
     # Draw the legend before the tracks, so that their names leave room for it.
     labels.over((0, street.height), BOXES_MEAN, palette.EXPLAINED_COLOUR)
     for box, name, _, colour in marks:
@@ -214,7 +214,7 @@ def _mark_street(
     return labels
 
 
-def mark_sought(
+def mark_actors(
     labels: Labels, camera: PinholeCamera, loop: OneWorld, frame: Keyframe | None
 ) -> None:
     """Draw an arrow at every actor of the episode, and at actors that the car hit. Actors that a
